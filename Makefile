@@ -1,0 +1,59 @@
+# What a person types. Needs a Rust toolchain and Python 3.11 or newer; all else is put in .venv.
+.DEFAULT_GOAL := help
+.PHONY: help demo test lint rust-test python-test bench docs clean
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+WHEELS := target/wheels
+SOURCES := $(shell find rust python/piezotrack -name '*.rs' -o -name '*.py' -o -name '*.pyi' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
+
+help: ## What can be typed
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/'
+
+demo: $(VENV)/installed ## Build, then the way from a log to a model on a built-in stage
+	$(BIN)/piezotrack demo --out demo
+
+test: lint rust-test python-test ## Everything that must hold before a change lands
+
+lint: $(VENV)/installed $(VENV)/tools ## Formatting, clippy, ruff, types, stubs
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets --locked -- -D warnings
+	$(BIN)/ruff format --check python tests benches
+	$(BIN)/ruff check python tests benches
+	$(BIN)/mypy
+	$(BIN)/python -m mypy.stubtest piezotrack._core
+
+rust-test: ## Tests of the crates, the control crate also without std
+	cargo test --locked --release
+	cargo test --locked --release -p piezotrack-control --no-default-features
+
+python-test: $(VENV)/installed $(VENV)/tools ## Tests of the package, its docstrings and pages
+	$(BIN)/pytest
+
+bench: ## Criterion benches: throughput of the swarm, latency of a step
+	cargo bench --locked
+
+docs: ## The crates' pages
+	cargo doc --locked --no-deps
+
+clean: ## Remove what was built
+	rm -rf $(VENV) target demo results
+
+$(VENV)/pip:
+	$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(None if v >= (3, 11) else f"Python 3.11 or newer is needed, this is {v.major}.{v.minor}")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1' 'maturin>=1.9,<2'
+	@touch $@
+
+# A release wheel, as a user would install it; the package in python/ is never imported.
+$(VENV)/installed: $(VENV)/pip $(SOURCES)
+	rm -rf $(WHEELS)
+	$(BIN)/maturin build --release --locked --out $(WHEELS) --interpreter $(BIN)/python
+	$(BIN)/python -m pip install --quiet --force-reinstall --no-deps $(WHEELS)/*.whl
+	$(BIN)/python -m pip install --quiet $(WHEELS)/*.whl
+	@touch $@
+
+$(VENV)/tools: $(VENV)/pip pyproject.toml
+	$(BIN)/python -m pip install --quiet --group test
+	@touch $@

@@ -1,0 +1,28 @@
+//! Latency of one step of one stage: what a simulation costs per sub-step.
+#![allow(missing_docs, clippy::unwrap_used)]
+
+use std::hint::black_box;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use piezotrack_core::integrate::{Drive, Hold, NEVER, simulate_fixed};
+use piezotrack_core::stage::{DahlStage, StageState};
+
+fn latency(criterion: &mut Criterion) {
+    let turn = core::f64::consts::TAU * 0.25 / 5000.0;
+    let u: Vec<f64> = (0..5001)
+        .map(|k| 37.5 * (1.0 - (turn * f64::from(k)).cos()))
+        .collect();
+    let drive = Drive::new(&u, 2e-4, Hold::First).unwrap();
+    let stage = DahlStage::xu_li_2010();
+    let mut group = criterion.benchmark_group("step_latency");
+    group.throughput(Throughput::Elements(5000));
+    group.bench_function("dahl stage, 1 s at 5 kHz, one step a sample", |bencher| {
+        bencher.iter(|| {
+            simulate_fixed(black_box(&stage), &drive, StageState::default(), 1, NEVER).unwrap()
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, latency);
+criterion_main!(benches);

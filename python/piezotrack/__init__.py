@@ -1,0 +1,46 @@
+"""From a log of a piezo nanopositioner to an identified hysteresis model.
+
+>>> import piezotrack as pt
+>>> stage = pt.DahlStage.xu_li_2010()
+>>> stage.stiffness
+26065.0
+"""
+
+from ._core import __version__
+from .dataset import Dataset
+from .errors import (
+    DataError,
+    Interrupted,
+    NumericalError,
+    ParameterError,
+    PiezotrackError,
+    ShapeError,
+)
+from .identification import Identification, Progress, identify
+from .io import read, read_drive
+from .modelfile import IdentifiedModel, Score, load
+from .models import DahlStage, Response, StageState
+from .swarm import ParticleSwarm
+
+__all__ = [
+    "DahlStage",
+    "DataError",
+    "Dataset",
+    "Identification",
+    "IdentifiedModel",
+    "Interrupted",
+    "NumericalError",
+    "ParameterError",
+    "ParticleSwarm",
+    "PiezotrackError",
+    "Progress",
+    "Response",
+    "Score",
+    "ShapeError",
+    "StageState",
+    "__version__",
+    "identify",
+    "load",
+    "read",
+    "read_drive",
+]

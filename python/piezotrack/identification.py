@@ -1,0 +1,409 @@
+"""Identification of a stage from a record, by a particle swarm in Rust."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from . import _core
+from .bar import ProgressBar
+from .dataset import Dataset
+from .errors import Interrupted, ParameterError
+from .modelfile import IdentifiedModel, Score
+from .models import DahlStage
+from .swarm import ParticleSwarm
+
+if TYPE_CHECKING:
+    import numpy as np
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+__all__ = ["Estimate", "Identification", "Progress", "identify"]
+
+
+class Progress(NamedTuple):
+    """Where a search stands after an iteration.
+
+    Attributes
+    ----------
+    nit : int
+        Iterations done; 0 after the first evaluation.
+    iterations : int
+        Most iterations.
+    nfev : int
+        Simulations done.
+    cost_um : float
+        Best cost so far [um].
+    parameters : dict of str to float
+        The parameters that gave it, SI.
+    """
+
+    nit: int
+    iterations: int
+    nfev: int
+    cost_um: float
+    parameters: dict[str, float]
+
+
+class Estimate(NamedTuple):
+    """One parameter as identified.
+
+    Attributes
+    ----------
+    value : float
+        In `unit`.
+    unit : str
+        SI; empty where there is none.
+    symbol : str
+        As in the literature.
+    free : bool
+        Whether it was searched.
+    bounds : (float, float) or None
+        Of the search.
+    deviation : float or None
+        Standard deviation that the residuals and the sensitivity of the model imply, for
+        independent deviations. Deviations of a model that is not quite right hang together,
+        so the true spread is larger.
+    at_bound : bool
+        Whether the value lies on a bound.
+    """
+
+    value: float
+    unit: str
+    symbol: str
+    free: bool
+    bounds: tuple[float, float] | None
+    deviation: float | None
+    at_bound: bool
+
+    @property
+    def identified(self) -> bool:
+        """Whether the record fixes the value: to better than a half, and inside its bounds."""
+        if not self.free:
+            return True
+        known = self.deviation is not None and self.deviation < 0.5 * abs(self.value)
+        return known and not self.at_bound
+
+
+@dataclass(frozen=True, kw_only=True)
+class Identification(IdentifiedModel):
+    """What a search found; see `IdentifiedModel` for what can be done with it.
+
+    Attributes
+    ----------
+    data : Dataset
+        The record.
+    parameters : dict of str to Estimate
+        The parameters with units, bounds and standard deviations.
+    cost : float
+        RMS deviation in the window [m], equation (16) of Xu and Li 2010.
+    history : ndarray, shape (nit + 1,)
+        Best cost after each iteration [m].
+    nit, nfev, nfail : int
+        Iterations of the swarm, its simulations, and those that did not stay finite.
+    npolish : int
+        Simulations of the polish after the swarm; `history` is the swarm's alone.
+    stop_reason : {"stalled", "iterations", "interrupted"}
+        Why the search ended.
+    substeps : int
+        Steps of the integrator in each sampling interval, fixed for the search.
+    seed : int
+        Seed of the random numbers.
+    swarm : ParticleSwarm
+        Settings of the search.
+    """
+
+    data: Dataset
+    parameters: Mapping[str, Estimate]
+    cost: float
+    history: NDArray[np.float64]
+    nit: int
+    nfev: int
+    nfail: int
+    npolish: int
+    stop_reason: Literal["stalled", "iterations", "interrupted"]
+    substeps: int
+    seed: int
+    swarm: ParticleSwarm
+
+    @property
+    def fun(self) -> float:
+        """The cost [m], under SciPy's name."""
+        return self.cost
+
+    @property
+    def cost_um(self) -> float:
+        """The cost [um]."""
+        return 1e6 * self.cost
+
+    @property
+    def cost_percent(self) -> float:
+        """The cost in per cent of the stroke."""
+        return 100.0 * self.cost / self.stroke
+
+    @property
+    def success(self) -> bool:
+        """Whether the search ended by itself."""
+        return self.stop_reason != "interrupted"
+
+    @property
+    def message(self) -> str:
+        """Why the search ended, in words."""
+        return {
+            "stalled": f"{self.swarm.stall_iterations} iterations in a row improved the cost by "
+            f"less than {self.swarm.min_improvement_um:g} um",
+            "iterations": f"all {self.swarm.iterations} iterations were done",
+            "interrupted": "interrupted",
+        }[self.stop_reason]
+
+    @cached_property
+    def fitted(self) -> Score:
+        """Score on the record that was identified, converged in the sub-steps."""
+        return self.score(self.data, offset=self.offset)
+
+    def summary(self) -> str:
+        """Table of the result.
+
+        Returns
+        -------
+        str
+            Several lines: what the data fix first, then the parameters.
+        """
+        from .report import summary_text
+
+        return summary_text(self)
+
+    def plot(self, data: Dataset | None = None) -> Figure:
+        """Loop, displacement with its error over time, and convergence of the swarm.
+
+        Parameters
+        ----------
+        data : Dataset, optional
+            Another record to show the model on.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Not yet shown or saved.
+        """
+        from .plotting import plot_identification
+
+        return plot_identification(self, data)
+
+
+def identify(
+    data: Dataset,
+    model: Literal["dahl"] = "dahl",
+    *,
+    free: Iterable[str] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    stiffness: float | None = None,
+    offset: bool = True,
+    swarm: ParticleSwarm | None = None,
+    seed: int = 0,
+    threads: int | None = None,
+    progress: bool | None = None,
+    callback: Callable[[Progress], object] | None = None,
+) -> Identification:
+    r"""Find the parameters with which a stage model follows a record best.
+
+    Minimises the RMS deviation over the record's window,
+
+    .. math:: f = \sqrt{\tfrac{1}{n} \sum_i (x_i - \hat x_i)^2}
+
+    (Xu and Li 2010, equation (16), doi 10.1115/1.4001712), by a particle swarm. The warm-up
+    before the window is simulated, from rest, and not counted.
+
+    Voltage and displacement fix ratios only: mass, damping, stiffness, piezo coefficient and b1
+    can all be multiplied by one number without changing the motion. Where nothing in the call
+    fixes a force, a nominal stiffness of 1e6 N/m is held, and the result says "scale assumed".
+
+    Parameters
+    ----------
+    data : Dataset
+        The record. ``log[3.0:23.0]`` counts this window only and keeps the drive before it as
+        warm-up.
+    model : {"dahl"}, optional
+        The kind of stage.
+    free : iterable of str, optional
+        Parameters to search: all that are not fixed, where not given.
+    fixed : mapping of str to float, optional
+        Parameters to hold, SI.
+    bounds : mapping of str to (float, float), optional
+        Bounds of free parameters, SI; derived from the record where not given. Where both are
+        positive and two decades or more apart, the search is on a logarithmic scale.
+    stiffness : float, optional
+        K [N/m] where it is known.
+    offset : bool, optional
+        Whether a constant offset of the displacement is fitted with the rest.
+    swarm : ParticleSwarm, optional
+        Settings of the search.
+    seed : int, optional
+        0 or above. The same seed gives the same bits, for any number of threads.
+    threads : int, optional
+        All cores where not given.
+    progress : bool, optional
+        Whether a progress bar is shown; where not given, in a terminal or notebook only.
+    callback : callable, optional
+        Called with a `Progress` after every iteration; a true return value, or StopIteration,
+        stops the search.
+
+    Returns
+    -------
+    Identification
+        The model, its parameters and how they were found.
+
+    Raises
+    ------
+    ParameterError
+        An argument has a value that cannot be used.
+    DataError
+        The drive or the displacement is constant in the window.
+    NumericalError
+        Not one guess could be simulated.
+    Interrupted
+        Ctrl-C or the callback stopped the search; ``.partial`` has the best so far.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import piezotrack as pt
+    >>> t = np.arange(1000) / 250.0
+    >>> u = 37.5 * (1 - np.cos(2 * np.pi * 0.25 * t))
+    >>> y = pt.DahlStage.xu_li_2010().simulate(u, 1 / 250.0).x
+    >>> fit = pt.identify(
+    ...     pt.Dataset(u=u, y=y, dt=1 / 250.0),
+    ...     fixed={"mass": 0.1828, "a1": 121.9874, "a2": 1.1773e6, "b1": 1.8485e6},
+    ...     seed=1,
+    ... )
+    >>> print(f"K = {fit.model.stiffness:.0f} N/m, {fit.nit > 0}")
+    K = 26065 N/m, True
+    """
+    if not isinstance(data, Dataset):
+        raise ParameterError(f"data is {type(data).__name__}: expected a Dataset, see pt.read")
+    if model != "dahl":
+        raise ParameterError(f"model is {model!r}: expected 'dahl'")
+    if isinstance(free, str):
+        raise ParameterError(f"free is {free!r}: expected names in a list, as ['mass']")
+    swarm = ParticleSwarm() if swarm is None else swarm
+    full = data.full
+    with ProgressBar(progress) as bar:
+        found = _core.identify_dahl(
+            u=full.u,
+            y=full.y,
+            dt=data.dt,
+            hold_name=data.hold,
+            start=data.warmup,
+            free=None if free is None else [str(name) for name in free],
+            fixed=[(name, _core.as_number(name, v)) for name, v in (fixed or {}).items()],
+            bounds=[(name, _pair(name, pair)) for name, pair in (bounds or {}).items()],
+            stiffness=None if stiffness is None else _core.as_number("stiffness", stiffness),
+            offset=bool(offset),
+            settings=swarm.checked(),
+            seed=_core.as_count("seed", seed),
+            threads=0 if threads is None else _core.as_count("threads", threads),
+            callback=None if callback is None else _telling(callback),
+            progress=bar.update,
+        )
+    if found is None:
+        raise Interrupted("interrupted before the first cost was computed")
+    fit = _identification(found, data, swarm, seed, bool(offset))
+    if not fit.success:
+        raise Interrupted(
+            f"interrupted after {fit.nit} iterations, best cost {fit.cost_um:.4g} um", fit
+        )
+    return fit
+
+
+def _telling(callback: Callable[[Progress], object]) -> Callable[..., bool]:
+    """Call back with a `Progress` where the core has plain numbers."""
+    names = DahlStage.parameter_names()
+
+    def tell(nit: int, most: int, nfev: int, cost: float, theta: list[float]) -> bool:
+        parameters = dict(zip(names, theta, strict=True))
+        return bool(callback(Progress(nit, most, nfev, 1e6 * cost, parameters)))
+
+    return tell
+
+
+def _pair(name: str, pair: object) -> tuple[float, float]:
+    """Check that bounds are two numbers."""
+    if not isinstance(pair, Sequence) or isinstance(pair, str) or len(pair) != 2:
+        raise ParameterError(f"bounds of {name} are {pair!r}: expected (low, high)")
+    low, high = pair
+    return (
+        _core.as_number(f"lower bound of {name}", low),
+        _core.as_number(f"upper bound of {name}", high),
+    )
+
+
+def _identification(
+    found: _core.Search, data: Dataset, swarm: ParticleSwarm, seed: int, offset: bool
+) -> Identification:
+    deviations = {i: (deviation, at_bound) for i, deviation, at_bound in found.sensitivities}
+    parameters = {}
+    for i, (name, symbol, unit) in enumerate(_core.DAHL_PARAMETERS):
+        bounds = found.bounds[i]
+        deviation, at_bound = deviations.get(i, (None, False))
+        parameters[name] = Estimate(
+            found.theta[i], unit, symbol, bounds is not None, bounds, deviation, at_bound
+        )
+    names = DahlStage.parameter_names()
+    details: dict[str, Any] = {
+        "parameters": {
+            name: {
+                "free": estimate.free,
+                "bounds": estimate.bounds,
+                "standard_deviation": estimate.deviation,
+                "at_bound": estimate.at_bound,
+            }
+            for name, estimate in parameters.items()
+        },
+        "fit": {
+            "cost": {"value": found.rms, "unit": "m"},
+            "iterations": found.iterations,
+            "simulations": found.evaluations,
+            "polish_simulations": found.polish_evaluations,
+            "failed_simulations": found.failures,
+            "stop_reason": found.stop_reason,
+            "substeps": found.substeps,
+        },
+        "provenance": {
+            "package": "piezotrack",
+            "version": _core.__version__,
+            "seed": seed,
+            "swarm": asdict(swarm),
+            "data": {
+                "source": data.source,
+                "sha256": data.sha256,
+                "samples": len(data),
+                "warmup_samples": data.warmup,
+                "window_s": [float(data.t[0]), float(data.t[-1])],
+                "dt_s": data.dt,
+                "hold": data.hold,
+            },
+        },
+    }
+    return Identification(
+        model=DahlStage(**dict(zip(names, found.theta, strict=True))),
+        offset=found.offset,
+        offset_fitted=offset,
+        scale_assumed=found.scale_assumed,
+        stroke=data.stroke,
+        details=details,
+        data=data,
+        parameters=parameters,
+        cost=found.rms,
+        history=found.history,
+        nit=found.iterations,
+        nfev=found.evaluations,
+        nfail=found.failures,
+        npolish=found.polish_evaluations,
+        stop_reason=found.stop_reason,
+        substeps=found.substeps,
+        seed=seed,
+        swarm=swarm,
+    )

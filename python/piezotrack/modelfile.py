@@ -1,0 +1,339 @@
+"""Identified models as values and as JSON files."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import tempfile
+from collections.abc import Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from . import _core
+from .dataset import Dataset
+from .errors import DataError, ParameterError, PiezotrackError
+from .models import DahlStage, Response
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+__all__ = ["IdentifiedModel", "Score", "load", "replacing"]
+
+FORMAT = "piezotrack-model"
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Score:
+    """How far a simulated displacement is from a measured one.
+
+    Attributes
+    ----------
+    rms, max_error : float
+        Root mean square and largest absolute deviation [m].
+    stroke : float
+        Stroke that the percentages refer to [m].
+    offset : float
+        Offset added to the simulated displacement [m].
+    """
+
+    rms: float
+    max_error: float
+    stroke: float
+    offset: float
+
+    @property
+    def rms_percent(self) -> float:
+        """`rms` in per cent of the stroke."""
+        return 100.0 * self.rms / self.stroke
+
+    @property
+    def max_percent(self) -> float:
+        """`max_error` in per cent of the stroke."""
+        return 100.0 * self.max_error / self.stroke
+
+    def __str__(self) -> str:
+        return (
+            f"rms {1e6 * self.rms:.4g} um ({self.rms_percent:.3g} % of stroke), "
+            f"max {1e6 * self.max_error:.4g} um ({self.max_percent:.3g} %)"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class IdentifiedModel:
+    """A stage as identified, with what is needed to use it on a record.
+
+    Attributes
+    ----------
+    model : DahlStage
+        The stage.
+    offset : float
+        Displacement of the sensor where the stage is at rest without drive [m].
+    offset_fitted : bool
+        Whether the offset was fitted; a record of its own then gets an offset of its own.
+    scale_assumed : bool
+        Whether the stiffness is nominal: only ratios of mass, damping, stiffness, piezo
+        coefficient and b1 are then known.
+    stroke : float
+        Stroke of the record identified [m]; percentages refer to it.
+    details : mapping
+        Everything else that is kept in the file: fit, provenance.
+    """
+
+    model: DahlStage
+    offset: float
+    offset_fitted: bool
+    scale_assumed: bool
+    stroke: float
+    details: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    def simulate(self, data: Dataset, *, offset: float | Literal["own"] = "own") -> Response:
+        """Displacement that the model gives under the drive of a record.
+
+        Parameters
+        ----------
+        data : Dataset
+            The record. Its warm-up is simulated too, from rest.
+        offset : float or "own", optional
+            Added to the displacement [m]. ``"own"``: the one that fits the record's window
+            best where an offset was fitted, none where not.
+
+        Returns
+        -------
+        Response
+            Motion in the window, the offset in its displacement.
+        """
+        if not isinstance(data, Dataset):
+            raise ParameterError(f"data is {type(data).__name__}: expected a Dataset")
+        full, start = data.full, data.warmup
+        run = self.model.simulate(full.u, data.dt, hold=data.hold)
+        return Response(
+            t=data.t,
+            u=data.u,
+            x=run.x[start:] + self._shift(data, run.x[start:], offset),
+            v=run.v[start:],
+            hysteresis=run.hysteresis[start:],
+            final=run.final,
+            substeps=run.substeps,
+            difference=run.difference,
+        )
+
+    def score(self, data: Dataset, *, offset: float | Literal["own"] = "own") -> Score:
+        """Deviation of the model from a record, in the record's window.
+
+        Parameters
+        ----------
+        data : Dataset
+            The record, e.g. one that was not fitted.
+        offset : float or "own", optional
+            As in `simulate`.
+
+        Returns
+        -------
+        Score
+            Percentages refer to the stroke of the record identified.
+        """
+        x = self.simulate(data, offset=0.0).x
+        shift = self._shift(data, x, offset)
+        error = data.y - x - shift
+        return Score(
+            rms=float(np.sqrt(np.mean(error**2))),
+            max_error=float(np.abs(error).max()),
+            stroke=self.stroke,
+            offset=shift,
+        )
+
+    def _shift(
+        self, data: Dataset, x: NDArray[np.float64], offset: float | Literal["own"]
+    ) -> float:
+        """Offset to add to a simulated displacement [m]."""
+        if offset != "own":
+            return _core.as_number("offset", offset)
+        return float(np.mean(data.y - x)) if self.offset_fitted else 0.0
+
+    def document(self) -> dict[str, Any]:
+        """Content of the JSON file.
+
+        Returns
+        -------
+        dict
+            Of numbers, texts, lists and dicts only.
+        """
+        details = {key: dict(value) for key, value in self.details.items()}
+        found = details.pop("parameters", {})
+        parameters = {
+            name: {"value": getattr(self.model, name), "unit": unit, "symbol": symbol}
+            | dict(found.get(name, {}))
+            for name, symbol, unit in _core.DAHL_PARAMETERS
+        }
+        return {
+            "format": FORMAT,
+            "schema_version": SCHEMA_VERSION,
+            "model": "dahl",
+            "parameters": parameters,
+            "scale_assumed": self.scale_assumed,
+            "offset": {"value": self.offset, "unit": "m", "fitted": self.offset_fitted},
+            "stroke": {"value": self.stroke, "unit": "m"},
+            **details,
+        }
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the model to a JSON file that `load` reads back bit for bit.
+
+        Parameters
+        ----------
+        path : path-like
+            The file. It is written beside and renamed, so a file that was there stays whole
+            until then.
+
+        Returns
+        -------
+        pathlib.Path
+            The file written.
+
+        Raises
+        ------
+        DataError
+            The file cannot be written.
+        """
+        text = json.dumps(_finite(self.document()), indent=2, allow_nan=False)
+        with replacing(path) as temporary:
+            temporary.write_text(text + "\n", encoding="utf-8")
+        return Path(path)
+
+
+def load(path: str | os.PathLike[str]) -> IdentifiedModel:
+    """Read a model file.
+
+    Parameters
+    ----------
+    path : path-like
+        A file that `IdentifiedModel.save` wrote.
+
+    Returns
+    -------
+    IdentifiedModel
+        The model, its numbers as they were saved, bit for bit.
+
+    Raises
+    ------
+    DataError
+        The file is missing, is not a model file, or was written by a newer version.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> model = pt.IdentifiedModel(
+    ...     model=pt.DahlStage.xu_li_2010(),
+    ...     offset=0.0,
+    ...     offset_fitted=False,
+    ...     scale_assumed=False,
+    ...     stroke=119e-6,
+    ... )
+    >>> import os, tempfile
+    >>> path = model.save(os.path.join(tempfile.mkdtemp(), "dahl.json"))
+    >>> pt.load(path).model == model.model
+    True
+    """
+    file = Path(path)
+    try:
+        document = json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DataError(f"{file.name}: {(error.strerror or str(error)).lower()}") from None
+    except UnicodeDecodeError:
+        raise DataError(f"{file.name} is not a text file: expected a model in JSON") from None
+    except json.JSONDecodeError as error:
+        raise DataError(f"{file.name}:{error.lineno}: not JSON: {error.msg}") from None
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise DataError(f"{file.name} is not a piezotrack model: its 'format' is not '{FORMAT}'")
+    version = document.get("schema_version")
+    if version != SCHEMA_VERSION:
+        raise DataError(
+            f"{file.name} has schema_version {version!r}: this version of piezotrack reads "
+            f"{SCHEMA_VERSION}"
+        )
+    if document.get("model") != "dahl":
+        raise DataError(f"{file.name} holds a model {document.get('model')!r}: expected 'dahl'")
+    return _identified(file.name, document)
+
+
+def _identified(name: str, document: dict[str, Any]) -> IdentifiedModel:
+    own = {"format", "schema_version", "model", "parameters", "scale_assumed", "offset", "stroke"}
+    try:
+        parameters = document["parameters"]
+        values = {key: parameters[key]["value"] for key in DahlStage.parameter_names()}
+        details = {key: value for key, value in document.items() if key not in own}
+        extra = {
+            key: {k: v for k, v in entry.items() if k not in ("value", "unit", "symbol")}
+            for key, entry in parameters.items()
+        }
+        return IdentifiedModel(
+            model=DahlStage(**values),
+            offset=_core.as_number("offset", document["offset"]["value"]),
+            offset_fitted=bool(document["offset"]["fitted"]),
+            scale_assumed=bool(document["scale_assumed"]),
+            stroke=_core.as_number("stroke", document["stroke"]["value"]),
+            details={"parameters": extra, **details},
+        )
+    except KeyError as error:
+        raise DataError(f"{name}: the entry {error} is missing") from None
+    except (TypeError, AttributeError):
+        raise DataError(f"{name}: an entry is not of the form that 'save' writes") from None
+    except PiezotrackError as error:
+        raise DataError(f"{name}: {error}") from None
+
+
+@contextmanager
+def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Write to a temporary file beside `path`, which is renamed when all went well.
+
+    Parameters
+    ----------
+    path : path-like
+        The file to write.
+
+    Yields
+    ------
+    pathlib.Path
+        The temporary file, with the same ending.
+
+    Raises
+    ------
+    DataError
+        The folder is missing, or the file cannot be written.
+    """
+    file = Path(path)
+    try:
+        handle, name = tempfile.mkstemp(prefix=".", suffix=file.suffix, dir=file.parent)
+        os.close(handle)
+        temporary = Path(name)
+        try:
+            yield temporary
+            # mkstemp makes files that only their owner can read.
+            mask = os.umask(0)
+            os.umask(mask)
+            temporary.chmod(0o666 & ~mask)
+            temporary.replace(file)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise DataError(f"{file} cannot be written: {reason}") from None
+
+
+def _finite(value: Any) -> Any:
+    """Replace what JSON cannot say, NaN and infinity, by null."""
+    if isinstance(value, Mapping):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,252 @@
+"""Pictures of a fit: loop, displacement and error over time, convergence of the swarm.
+
+Every function takes the axes to draw on and returns them, so the pictures can be put together
+anew.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .units import best_length_unit
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from .dataset import Dataset
+    from .identification import Identification
+    from .models import Response
+
+    Array = np.ndarray[tuple[int], np.dtype[np.float64]]
+
+__all__ = [
+    "plot_convergence",
+    "plot_identification",
+    "plot_loop",
+    "plot_response",
+    "plot_time",
+]
+
+# Told apart in black and white as well: by width and dashes.
+MEASURED: dict[str, Any] = {"color": "0.25", "linewidth": 1.8, "label": "measured"}
+SIMULATED: dict[str, Any] = {
+    "color": "#d95f02",
+    "linewidth": 1.2,
+    "linestyle": (0, (5, 2)),
+    "label": "simulated",
+}
+ERROR: dict[str, Any] = {"color": "#1b6ca8", "linewidth": 0.8}
+# More points than a picture has columns of pixels, yet few enough for a light SVG.
+MOST_POINTS = 6000
+
+
+def plot_loop(data: Dataset, run: Response, ax: Axes | None = None) -> Axes:
+    """Draw the hysteresis loop: displacement over drive, measured and simulated.
+
+    Parameters
+    ----------
+    data : Dataset
+        The record.
+    run : Response
+        The model on that record.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure where not given.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+    """
+    (ax,) = _axes(ax, 1)
+    unit, scale = best_length_unit(data.stroke)
+    thin = _stride(len(data))
+    ax.plot(data.u[::thin], scale * data.y[::thin], **MEASURED)
+    ax.plot(data.u[::thin], scale * run.x[::thin], **SIMULATED)
+    ax.set(xlabel=f"drive [{data.drive_unit}]", ylabel=f"displacement [{unit}]")
+    ax.set_title("Hysteresis loop")
+    ax.legend(loc="upper left", frameon=False)
+    return ax
+
+
+def plot_time(
+    data: Dataset,
+    run: Response,
+    axes: Sequence[Axes] | None = None,
+    *,
+    fitted_until: float | None = None,
+) -> tuple[Axes, Axes]:
+    """Draw measured and simulated displacement over time, and the error below.
+
+    Parameters
+    ----------
+    data : Dataset
+        The record.
+    run : Response
+        The model on that record.
+    axes : two matplotlib.axes.Axes, optional
+        Where to draw; a new figure where not given.
+    fitted_until : float, optional
+        Time [s] up to which the record was fitted; a line marks it.
+
+    Returns
+    -------
+    tuple of two matplotlib.axes.Axes
+        Displacement, error.
+    """
+    above, below = _axes(axes, 2)
+    unit, scale = best_length_unit(data.stroke)
+    error = data.y - run.x
+    small, fine = best_length_unit(float(np.abs(error).max()))
+    thin = _stride(len(data))
+    above.plot(data.t[::thin], scale * data.y[::thin], **MEASURED)
+    above.plot(data.t[::thin], scale * run.x[::thin], **SIMULATED)
+    above.set(ylabel=f"displacement [{unit}]", title="Displacement over time")
+    above.margins(x=0.0, y=0.05)
+    top = above.get_ylim()[1] - above.get_ylim()[0]
+    above.set_ylim(top=above.get_ylim()[1] + 0.22 * top)
+    above.legend(loc="upper right", ncols=2, frameon=False)
+    below.plot(data.t[::thin], fine * error[::thin], **ERROR)
+    below.axhline(0.0, color="0.7", linewidth=0.8, zorder=0)
+    below.set(xlabel="time [s]", ylabel=f"error [{small}]")
+    rms = float(np.sqrt(np.mean(error**2)))
+    below.set_title(
+        f"Measured less simulated: rms {fine * rms:.3g} {small} "
+        f"({100 * rms / data.stroke:.2g} % of stroke)",
+        fontsize="medium",
+    )
+    below.margins(x=0.0)
+    if fitted_until is not None:
+        for ax in (above, below):
+            ax.axvline(fitted_until, color="0.4", linestyle=":", linewidth=1.2)
+        above.annotate(
+            " fitted before, predicted after",
+            (fitted_until, 0.02),
+            xycoords=("data", "axes fraction"),
+            fontsize="small",
+            color="0.3",
+        )
+    return above, below
+
+
+def plot_convergence(fit: Identification, ax: Axes | None = None) -> Axes:
+    """Draw the best cost of the swarm after each iteration.
+
+    Parameters
+    ----------
+    fit : Identification
+        What a search found.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure where not given.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+    """
+    (ax,) = _axes(ax, 1)
+    finite = np.isfinite(fit.history)
+    iterations = np.arange(fit.history.size)[finite]
+    ax.semilogy(iterations, 1e6 * fit.history[finite], color="#1b6ca8", linewidth=1.4)
+    ax.set(xlabel="iteration", ylabel="best cost, rms [um]", title="Convergence of the swarm")
+    ax.margins(x=0.02)
+    _plain_log_ticks(ax)
+    ax.annotate(
+        f"{fit.cost_um:.4g} um after {fit.nit} iterations,\n{fit.nfev} simulations",
+        (0.97, 0.93),
+        xycoords="axes fraction",
+        ha="right",
+        va="top",
+        fontsize="small",
+    )
+    return ax
+
+
+def plot_response(t: Array, u: Array, x: Array) -> Figure:
+    """Draw a simulated displacement over time and over the drive.
+
+    Parameters
+    ----------
+    t, u, x : ndarray, shape (n,)
+        Time [s], drive [V], displacement [m].
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Two panels.
+    """
+    import matplotlib.pyplot as plt
+
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.2), layout="constrained")
+    unit, scale = best_length_unit(float(np.ptp(x)))
+    thin = _stride(x.size)
+    left.plot(t[::thin], scale * x[::thin], **SIMULATED)
+    left.set(xlabel="time [s]", ylabel=f"displacement [{unit}]", title="Displacement over time")
+    left.margins(x=0.0)
+    right.plot(u[::thin], scale * x[::thin], **SIMULATED)
+    right.set(xlabel="drive [V]", ylabel=f"displacement [{unit}]", title="Hysteresis loop")
+    return figure
+
+
+def plot_identification(fit: Identification, data: Dataset | None = None) -> Figure:
+    """Put loop, displacement, error and convergence on one sheet.
+
+    Parameters
+    ----------
+    fit : Identification
+        What a search found.
+    data : Dataset, optional
+        Another record to show the model on.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Four panels.
+    """
+    import matplotlib.pyplot as plt
+
+    own = data is None
+    record = fit.data if data is None else data
+    run = fit.simulate(record, offset=fit.offset if own else "own")
+    figure = plt.figure(figsize=(11.0, 6.4), layout="constrained")
+    grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.35])
+    plot_loop(record, run, figure.add_subplot(grid[0, 0]))
+    plot_convergence(fit, figure.add_subplot(grid[1, 0]))
+    above = figure.add_subplot(grid[0, 1])
+    plot_time(record, run, (above, figure.add_subplot(grid[1, 1], sharex=above)))
+    return figure
+
+
+def _axes(given: Axes | Sequence[Axes] | None, count: int) -> list[Axes]:
+    """Take the axes given, or make a figure with some."""
+    if given is None:
+        import matplotlib.pyplot as plt
+
+        size = (6.4, 4.2) if count == 1 else (7.6, 5.4)
+        _, made = plt.subplots(
+            count, 1, figsize=size, sharex=True, squeeze=False, layout="constrained"
+        )
+        return [ax for row in made for ax in row]
+    return list(given) if isinstance(given, (list, tuple, np.ndarray)) else [given]  # type: ignore[list-item]
+
+
+def _stride(samples: int) -> int:
+    return max(1, samples // MOST_POINTS)
+
+
+def _plain_log_ticks(ax: Axes) -> None:
+    """Label a short logarithmic axis with plain numbers."""
+    from matplotlib.ticker import FuncFormatter, LogFormatter, LogLocator
+
+    low, high = ax.get_ylim()
+    plain = FuncFormatter(lambda value, _: f"{value:g}")
+    ax.yaxis.set_major_formatter(plain)
+    if np.log10(high / low) < 2.0:
+        ax.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
+        ax.yaxis.set_minor_formatter(plain)
+    else:
+        ax.yaxis.set_minor_formatter(LogFormatter(labelOnlyBase=True))

@@ -1,0 +1,192 @@
+"""What a person reads of a result: the table, and the files with their pictures."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .errors import DataError
+from .modelfile import replacing
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+
+    from matplotlib.figure import Figure
+
+    from .dataset import Dataset
+    from .identification import Estimate, Identification
+    from .models import DahlStage
+
+__all__ = ["make_folder", "save_figures", "save_identification", "summary_text"]
+
+
+def summary_text(fit: Identification) -> str:
+    """Write a result as a table.
+
+    Parameters
+    ----------
+    fit : Identification
+        What a search found.
+
+    Returns
+    -------
+    str
+        Several lines.
+    """
+    data = fit.data
+    lines = [
+        f"Dahl stage identified from {data.source or 'a record'}: {len(data)} samples, "
+        f"{data.duration:.4g} s at {1 / data.dt:.6g} Hz, stroke {1e6 * data.stroke:.4g} um",
+        f"cost  {fit.cost_um:.4g} um rms = {fit.cost_percent:.3g} % of stroke"
+        + (f", offset {1e6 * fit.offset:.5g} um fitted" if fit.offset_fitted else ""),
+        f"      {fit.nit} iterations, {fit.nfev} simulations, seed {fit.seed}: {fit.message}",
+        "",
+        "fixed by the data",
+        *(f"  {name:<10} {value:>12.6g}  {unit}" for name, value, unit in _ratios(fit.model)),
+        "",
+    ]
+    if fit.scale_assumed:
+        lines += [
+            f"parameters, scale assumed: K = {fit.model.stiffness:g} N/m is nominal. Voltage and",
+            "displacement fix no force; with the true stiffness=, M, D, T and b1 scale along.",
+        ]
+    else:
+        lines.append("parameters")
+    lines.append(f"  {'':<18}{'':<4}{'value':>13}  {'':<9}{'standard deviation'}")
+    lines += [_row(name, estimate) for name, estimate in fit.parameters.items()]
+    if unclear := [n for n, e in fit.parameters.items() if not e.identified]:
+        lines += ["", "Not fixed by this record: " + ", ".join(unclear) + "."]
+    if fit.nfail:
+        lines += ["", f"{fit.nfail} simulations did not stay finite and counted as infinitely bad."]
+    return "\n".join(lines)
+
+
+def _ratios(stage: DahlStage) -> list[tuple[str, float, str]]:
+    """List what voltage and displacement can tell, whatever the scale of the forces."""
+    stiffness = stage.stiffness
+    frequency = math.sqrt(stiffness / stage.mass) / (2 * math.pi)
+    return [
+        ("T/K", 1e6 * stage.piezo_coefficient / stiffness, "um/V"),
+        ("D/K", 1e3 * stage.damping / stiffness, "ms"),
+        ("M/K", stage.mass / stiffness, f"s^2, a natural frequency of {frequency:.4g} Hz"),
+        ("b1 up/K", stage.b1 * stage.up / stiffness, "1/m"),
+        ("a1", stage.a1, "1/m"),
+        ("a2", stage.a2, "1/m^2"),
+    ]
+
+
+def _row(name: str, estimate: Estimate) -> str:
+    if not estimate.free:
+        note = "held"
+    elif estimate.deviation is None:
+        note = "unknown"
+    elif not math.isfinite(estimate.deviation):
+        note = "no trace in the data"
+    else:
+        share = estimate.deviation / abs(estimate.value) if estimate.value else math.inf
+        note = f"{100 * share:.2g} %" if share < 1 else "larger than the value"
+    if estimate.at_bound:
+        note += ", on a bound"
+    return (
+        f"  {name:<18}{estimate.symbol:<4}{estimate.value:>13.6g}  {estimate.unit:<9}{note}"
+    ).rstrip()
+
+
+def make_folder(folder: str | os.PathLike[str]) -> Path:
+    """Make the folder for results.
+
+    Parameters
+    ----------
+    folder : path-like
+        It may exist.
+
+    Returns
+    -------
+    pathlib.Path
+        The folder.
+
+    Raises
+    ------
+    DataError
+        It cannot be made.
+    """
+    path = Path(folder)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise DataError(f"{path} cannot be made a folder: {reason}") from None
+    return path
+
+
+def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
+    """Save figures as PNG and SVG, and close them.
+
+    Parameters
+    ----------
+    figures : mapping of str to matplotlib.figure.Figure
+        By the name of the file, without its ending.
+    folder : pathlib.Path
+        Where to.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The files written.
+    """
+    import matplotlib as mpl
+    import matplotlib.pyplot as plt
+
+    written = []
+    for name, figure in figures.items():
+        for ending in ("png", "svg"):
+            path = folder / f"{name}.{ending}"
+            # Without a date and with fixed ids, the same result gives the same file.
+            stamp = {"Date": None} if ending == "svg" else {}
+            with replacing(path) as temporary, mpl.rc_context({"svg.hashsalt": name}):
+                figure.savefig(temporary, dpi=150, metadata=stamp)
+            written.append(path)
+        plt.close(figure)
+    return written
+
+
+def save_identification(
+    fit: Identification,
+    folder: str | os.PathLike[str],
+    *,
+    name: str = "dahl",
+    shown: Dataset | None = None,
+) -> list[Path]:
+    """Write the model and its pictures.
+
+    Parameters
+    ----------
+    fit : Identification
+        What a search found.
+    folder : path-like
+        Where to; made where it is missing.
+    name : str, optional
+        Beginning of the names of the files.
+    shown : Dataset, optional
+        A longer record that the pictures show, with the end of the fit marked.
+
+    Returns
+    -------
+    list of pathlib.Path
+        ``{name}.json``, and as PNG and SVG ``{name}_loop``, ``{name}_time`` and
+        ``{name}_convergence``.
+    """
+    from .plotting import plot_convergence, plot_loop, plot_time
+
+    path = make_folder(folder)
+    record = fit.data if shown is None else shown
+    run = fit.simulate(record, offset=fit.offset)
+    until = None if shown is None else float(fit.data.t[-1])
+    figures = {
+        f"{name}_loop": plot_loop(record, run).figure,
+        f"{name}_time": plot_time(record, run, fitted_until=until)[0].figure,
+        f"{name}_convergence": plot_convergence(fit).figure,
+    }
+    return [fit.save(path / f"{name}.json"), *save_figures(figures, path)]  # type: ignore[arg-type]

@@ -1,0 +1,56 @@
+//! The number type of a kernel: one `f64`, or a bundle of lanes in lockstep.
+
+use core::ops::{Add, Div, Mul, Neg, Sub};
+
+/// A real number, or several of them that go through the same operations.
+///
+/// A kernel written over this trait gives the same bits for one lane and for many, on every
+/// instruction set: it has only correctly rounded operations, and a choice is made per lane.
+pub trait Number:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// `value` in every lane.
+    #[must_use]
+    fn like(self, value: f64) -> Self;
+
+    /// `self * factor + term`, rounded once.
+    #[must_use]
+    fn mul_add(self, factor: Self, term: Self) -> Self;
+
+    /// `yes` in the lanes where `self < 0`, `no` in the others (and where `self` is NaN).
+    #[must_use]
+    fn where_negative(self, yes: Self, no: Self) -> Self;
+
+    /// Whether `self < 0` in any lane.
+    fn any_negative(self) -> bool;
+}
+
+impl Number for f64 {
+    #[inline(always)]
+    fn like(self, value: f64) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        #[cfg(feature = "std")]
+        return f64::mul_add(self, factor, term);
+        #[cfg(not(feature = "std"))]
+        return libm::fma(self, factor, term);
+    }
+
+    #[inline(always)]
+    fn where_negative(self, yes: Self, no: Self) -> Self {
+        if self < 0.0 { yes } else { no }
+    }
+
+    #[inline(always)]
+    fn any_negative(self) -> bool {
+        self < 0.0
+    }
+}

@@ -1,0 +1,31 @@
+//! Rate-independent hysteresis operators: a path goes in, a value comes out.
+//!
+//! Time does not enter. Along a monotone stretch of the input the step is exact, so an
+//! operator is asked for the *branch* that leaves a state in one direction, and the branch
+//! for the state a displacement further on.
+
+mod dahl;
+
+pub use dahl::{Dahl, DahlBranch, DahlState};
+
+use crate::Number;
+
+/// A hysteresis operator: configuration in `&self`, memory in `State`.
+pub trait Operator<N: Number> {
+    /// What the operator remembers of the path.
+    type State: Copy;
+    /// A monotone stretch that leaves a state in one direction.
+    type Branch: Copy;
+
+    /// The state before any motion.
+    fn rest(&self) -> Self::State;
+
+    /// Output of a state, and the slope of the output along the path.
+    fn output(&self, state: &Self::State) -> (N, N);
+
+    /// The branch that leaves `state` in `direction`, which is +1 or -1.
+    fn branch(&self, state: &Self::State, direction: N) -> Self::Branch;
+
+    /// The state where the input has moved on by `distance`, signed as the direction is.
+    fn along(&self, branch: &Self::Branch, distance: N) -> Self::State;
+}

@@ -1,0 +1,92 @@
+//! What can be wrong with an input: one sentence that names the argument and its value.
+
+/// Result of anything that checks its input.
+pub type Result<T> = core::result::Result<T, Error>;
+
+/// An input that cannot be used, or a computation that reached no usable result.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// An argument has a value that cannot be used.
+    #[error("{name} is {value}: expected {expected}")]
+    Parameter {
+        /// The argument as the caller wrote it.
+        name: String,
+        /// Its value, with the unit.
+        value: String,
+        /// What would have been right.
+        expected: String,
+    },
+    /// An array has the wrong size.
+    #[error("{name} has {found}: expected {expected}")]
+    Shape {
+        /// The argument as the caller wrote it.
+        name: String,
+        /// The shape found.
+        found: String,
+        /// The shape expected.
+        expected: String,
+    },
+    /// A record cannot be used for what was asked.
+    #[error("{0}")]
+    Data(String),
+    /// Valid input, but no usable result.
+    #[error("{0}")]
+    Numerical(String),
+}
+
+impl Error {
+    /// An [`Error::Parameter`] from anything that can be shown.
+    pub fn parameter(
+        name: impl Into<String>,
+        value: impl core::fmt::Display,
+        expected: impl Into<String>,
+    ) -> Self {
+        Self::Parameter {
+            name: name.into(),
+            value: value.to_string(),
+            expected: expected.into(),
+        }
+    }
+}
+
+/// Refuses a value that is not a finite number above zero.
+///
+/// # Errors
+/// [`Error::Parameter`] naming the argument, its value and unit.
+pub fn positive(name: &str, value: f64, unit: &str) -> Result<f64> {
+    check(name, value, unit, value > 0.0, "a finite number above 0")
+}
+
+/// Refuses a value that is not a finite number, zero or above.
+///
+/// # Errors
+/// [`Error::Parameter`] naming the argument, its value and unit.
+pub fn not_negative(name: &str, value: f64, unit: &str) -> Result<f64> {
+    check(
+        name,
+        value,
+        unit,
+        value >= 0.0,
+        "a finite number, 0 or above",
+    )
+}
+
+/// Refuses NaN and infinity.
+///
+/// # Errors
+/// [`Error::Parameter`] naming the argument, its value and unit.
+pub fn finite(name: &str, value: f64, unit: &str) -> Result<f64> {
+    check(name, value, unit, true, "a finite number")
+}
+
+fn check(name: &str, value: f64, unit: &str, holds: bool, expected: &str) -> Result<f64> {
+    if value.is_finite() && holds {
+        return Ok(value);
+    }
+    let space = if unit.is_empty() { "" } else { " " };
+    Err(Error::parameter(
+        name,
+        format!("{value}{space}{unit}"),
+        expected,
+    ))
+}

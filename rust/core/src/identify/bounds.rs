@@ -1,0 +1,104 @@
+//! Bounds of a search, from the data, where the caller gave none.
+//!
+//! Voltage and displacement fix ratios: the gain T/K, the viscous time D/K, the mass over the
+//! stiffness, and the hysteresis force relative to the elastic one. Each ratio gets a generous
+//! range from the stroke, the drive and the sampling, and the stiffness turns it into a bound.
+
+use super::problem::{Coordinate, Record, range};
+use crate::error::Result;
+use crate::integrate::index;
+use crate::stage::DAHL_PARAMETERS;
+
+/// What the ranges are built from.
+struct Measures {
+    /// Range of the displacement, m.
+    stroke: f64,
+    /// Stroke over the range of the drive, m/V.
+    gain: f64,
+    /// Rate of change of the drive over its size, rad/s: the frequency of a sine.
+    frequency: f64,
+    /// Sampling interval, s.
+    dt: f64,
+}
+
+impl Measures {
+    fn of(record: &Record<'_>) -> Self {
+        let u = &record.drive.u[record.window.clone()];
+        let (low, high) = range(u);
+        let stroke = record.stroke();
+        let mean = u.iter().sum::<f64>() / index(u.len());
+        let size: f64 = u.iter().map(|v| (v - mean) * (v - mean)).sum();
+        let change: f64 = u.windows(2).map(|w| (w[1] - w[0]) * (w[1] - w[0])).sum();
+        let dt = record.drive.dt;
+        let frequency = libm::sqrt(change / size) / dt;
+        Self {
+            stroke,
+            gain: stroke / (high - low),
+            frequency,
+            dt,
+        }
+    }
+}
+
+/// Coordinates of all parameters: the fixed ones as given, the others between derived bounds.
+///
+/// # Errors
+/// [`crate::Error::Parameter`] where a derived range is empty, which a record that passed
+/// [`Record::new`] does not lead to.
+pub fn derive(record: &Record<'_>, fixed: &[Option<f64>; 9]) -> Result<[Coordinate; 9]> {
+    let of = Measures::of(record);
+    let up = fixed[8].unwrap_or(30.0);
+    let (soft, hard) = stiffness_range(&of, fixed, up);
+    // Ten times the drive's frequency up to a tenth of the sampling rate, where the paper's
+    // rule for sampling still holds; never less than two octaves.
+    let slowest = 10.0 * of.frequency;
+    let fastest = (0.2 * core::f64::consts::PI / of.dt).max(4.0 * slowest);
+    // A force of half the elastic one at full stroke, either way.
+    let curvature = hard / (up.abs().max(f64::MIN_POSITIVE) * of.stroke);
+    let ranges = [
+        (soft / (fastest * fastest), hard / (slowest * slowest)),
+        (soft * 5e-3 / of.frequency, hard / of.frequency),
+        (soft, hard),
+        (soft * of.gain / 3.0, hard * of.gain * 3.0),
+        // From 100 strokes of memory to a tenth: with a1 = 0 the operator is a lossless spring.
+        (1e-2 / of.stroke, 10.0 / of.stroke),
+        (
+            1e-2 / (of.stroke * of.stroke),
+            40.0 / (of.stroke * of.stroke),
+        ),
+        (-2.0 * curvature, 2.0 * curvature),
+    ];
+    let mut coordinates = [Coordinate::Fixed(0.0); 9];
+    for i in 0..9 {
+        coordinates[i] = match (fixed[i], ranges.get(i)) {
+            (Some(value), _) => Coordinate::Fixed(value),
+            (None, Some(&(low, high))) => Coordinate::between(DAHL_PARAMETERS[i].name, low, high)?,
+            (None, None) => Coordinate::Fixed(0.0),
+        };
+    }
+    Ok(coordinates)
+}
+
+/// Range of the stiffness from whichever parameter that carries force is held.
+fn stiffness_range(of: &Measures, fixed: &[Option<f64>; 9], up: f64) -> (f64, f64) {
+    let [mass, damping, stiffness, piezo, _, _, b1, _, _] = *fixed;
+    let around = |value: f64, factor: f64| (value.abs() / factor, value.abs() * factor);
+    if let Some(value) = stiffness {
+        (value, value)
+    } else if let Some(value) = piezo {
+        around(value / of.gain, 3.0)
+    } else if let Some(value) = b1.filter(|value| *value != 0.0) {
+        // Half the curvature times the stroke is a stiffness: a tenth of K to ten times K.
+        around(0.5 * value * up * of.stroke, 30.0)
+    } else if let Some(value) = damping.filter(|value| *value != 0.0) {
+        (value * of.frequency, value * of.frequency * 1e3)
+    } else if let Some(value) = mass {
+        let slowest = 3.0 * of.frequency;
+        (value * slowest * slowest, value * slowest * slowest * 1e4)
+    } else {
+        (
+            super::problem::NOMINAL_STIFFNESS,
+            super::problem::NOMINAL_STIFFNESS,
+        )
+    }
+}

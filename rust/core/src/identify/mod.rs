@@ -1,0 +1,17 @@
+//! Identification: which parameters are searched, what a guess costs, and the swarm.
+
+pub mod bounds;
+mod cost;
+mod identification;
+mod local;
+mod problem;
+mod random;
+mod search;
+mod swarm;
+
+pub use cost::{Costs, Evaluator};
+pub use identification::{Identification, identify};
+pub use local::{Local, Polished, Sensitivity};
+pub use problem::{Coordinate, NOMINAL_STIFFNESS, Problem, Record, Scale, Spec, Theta};
+pub use search::{Monitor, Outcome, Progress, StopReason, search};
+pub use swarm::{Boundary, Swarm, SwarmSettings, Topology};

@@ -1,0 +1,354 @@
+//! What is searched: a record, the parameters held and the parameters free.
+
+use std::ops::Range;
+
+use super::bounds;
+use crate::error::{Error, Result, positive};
+use crate::integrate::{Drive, Hold};
+use crate::stage::{DAHL_PARAMETERS, DahlStage};
+
+/// A drive and the displacement measured under it.
+#[derive(Clone, Debug)]
+pub struct Record<'a> {
+    /// The drive from the first sample kept, warm-up included.
+    pub drive: Drive<'a>,
+    /// Displacement at the same samples, m.
+    pub y: &'a [f64],
+    /// The samples that count.
+    pub window: Range<usize>,
+}
+
+impl<'a> Record<'a> {
+    /// Checks that the record can tell anything.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] for unequal lengths, [`Error::Parameter`] for a bad `dt`,
+    /// [`Error::Data`] for a constant drive, a dead sensor or too short a window.
+    pub fn new(u: &'a [f64], y: &'a [f64], dt: f64, hold: Hold, start: usize) -> Result<Self> {
+        let drive = Drive::new(u, dt, hold)?;
+        if u.len() != y.len() {
+            return Err(Error::Shape {
+                name: "y".into(),
+                found: format!("{} samples", y.len()),
+                expected: format!("{}, as many as u", u.len()),
+            });
+        }
+        let window = start.min(u.len())..u.len();
+        if window.len() < 10 {
+            return Err(Error::Data(format!(
+                "the window has {} samples: expected at least 10",
+                window.len()
+            )));
+        }
+        let (low, high) = range(&u[window.clone()]);
+        if low >= high {
+            return Err(Error::Data(format!(
+                "the drive is constant at {low} V in the window: expected a drive that moves \
+                 the stage, up and down at least once"
+            )));
+        }
+        let (low, high) = range(&y[window.clone()]);
+        if low >= high {
+            return Err(Error::Data(format!(
+                "the displacement is constant at {low} m in the window while the drive moves: \
+                 the sensor seems dead or not connected"
+            )));
+        }
+        Ok(Self { drive, y, window })
+    }
+
+    /// Range of the displacement in the window, m.
+    #[must_use]
+    pub fn stroke(&self) -> f64 {
+        let (low, high) = range(&self.y[self.window.clone()]);
+        high - low
+    }
+}
+
+/// Smallest and largest value.
+pub(super) fn range(values: &[f64]) -> (f64, f64) {
+    values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| {
+            (f64::min(low, v), f64::max(high, v))
+        })
+}
+
+/// How a coordinate of the unit box maps to a parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scale {
+    /// Evenly.
+    Linear,
+    /// Evenly in the logarithm.
+    Log,
+}
+
+/// One parameter of the stage in a search.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Coordinate {
+    /// Held at a value.
+    Fixed(f64),
+    /// Searched between two bounds.
+    Free {
+        /// Lower bound, SI.
+        low: f64,
+        /// Upper bound, SI.
+        high: f64,
+        /// Scale of the search.
+        scale: Scale,
+    },
+}
+
+impl Coordinate {
+    /// Free between two bounds; on a logarithmic scale where they are positive and two decades
+    /// or more apart.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] where the bounds are not finite or not in order.
+    pub fn between(name: &str, low: f64, high: f64) -> Result<Self> {
+        if low.is_finite() && high.is_finite() && low < high {
+            let wide = low > 0.0 && high >= 100.0 * low;
+            return Ok(Self::Free {
+                low,
+                high,
+                scale: if wide { Scale::Log } else { Scale::Linear },
+            });
+        }
+        Err(Error::parameter(
+            format!("bounds of {name}"),
+            format!("({low}, {high})"),
+            "two finite numbers, the lower one first",
+        ))
+    }
+
+    /// The parameter at a place `z` in [0, 1].
+    #[must_use]
+    pub fn value(&self, z: f64) -> f64 {
+        match *self {
+            Self::Fixed(value) => value,
+            Self::Free {
+                low,
+                high,
+                scale: Scale::Linear,
+            } => (low + (high - low) * z).clamp(low, high),
+            Self::Free {
+                low,
+                high,
+                scale: Scale::Log,
+            } => (low * libm::exp(z * libm::log(high / low))).clamp(low, high),
+        }
+    }
+}
+
+/// What the caller asked for.
+#[derive(Clone, Debug, Default)]
+pub struct Spec {
+    /// Parameters to search; all that are not fixed where `None`.
+    pub free: Option<Vec<String>>,
+    /// Parameters held, SI.
+    pub fixed: Vec<(String, f64)>,
+    /// Bounds, SI.
+    pub bounds: Vec<(String, (f64, f64))>,
+    /// The stiffness where it is known, N/m.
+    pub stiffness: Option<f64>,
+    /// Whether a constant offset of the displacement is fitted with the rest.
+    pub offset: bool,
+}
+
+/// Parameters in the order of [`DAHL_PARAMETERS`].
+pub type Theta = [f64; 9];
+
+/// Stiffness held where nothing in the input fixes a force, N/m.
+pub const NOMINAL_STIFFNESS: f64 = 1e6;
+
+/// A search made definite.
+#[derive(Clone, Debug)]
+pub struct Problem {
+    /// One for each of [`DAHL_PARAMETERS`].
+    pub coordinates: [Coordinate; 9],
+    /// Whether the stiffness is nominal because nothing fixes a force.
+    pub scale_assumed: bool,
+    /// Whether an offset is fitted.
+    pub offset: bool,
+}
+
+const STIFFNESS: usize = 2;
+/// The parameters that carry force: mass, damping, stiffness, `piezo_coefficient`, b1.
+const FORCES: [usize; 5] = [0, 1, STIFFNESS, 3, 6];
+
+impl Problem {
+    /// Settles which parameters are free, and between which bounds.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for an unknown name, a value or bound out of range, a parameter
+    /// that is both fixed and free or has no value, and where all the parameters that carry
+    /// force are free.
+    pub fn new(record: &Record<'_>, spec: &Spec) -> Result<Self> {
+        let mut fixed = fixed_values(spec)?;
+        let free = free_parameters(spec, &mut fixed)?;
+        let holds_scale = FORCES
+            .iter()
+            .any(|&i| fixed[i].is_some_and(|value| value != 0.0));
+        let mut scale_assumed = false;
+        if !holds_scale {
+            let asked = spec
+                .free
+                .as_ref()
+                .is_some_and(|names| names.iter().any(|n| n == "stiffness"));
+            if asked {
+                return Err(Error::parameter(
+                    "free",
+                    "every parameter that carries force",
+                    "one of them held: voltage and displacement fix only their ratios \
+                     (give stiffness=, or name one in fixed=)",
+                ));
+            }
+            fixed[STIFFNESS] = Some(NOMINAL_STIFFNESS);
+            scale_assumed = true;
+        }
+        let mut coordinates = bounds::derive(record, &fixed)?;
+        for (name, (low, high)) in &spec.bounds {
+            let i = parameter("bounds", name)?;
+            if !free[i] {
+                return Err(Error::parameter(
+                    format!("bounds of {name}"),
+                    format!("({low}, {high})"),
+                    "no bounds, as this parameter is not free",
+                ));
+            }
+            coordinates[i] = Coordinate::between(name, *low, *high)?;
+        }
+        if scale_assumed && spec.bounds.iter().any(|(name, _)| name == "stiffness") {
+            // Bounds make the stiffness a choice of the caller's, but no force is known.
+            return Err(Error::parameter(
+                "bounds of stiffness",
+                "given, while no parameter that carries force is held",
+                "stiffness= or one of mass, damping, piezo_coefficient, b1 in fixed=",
+            ));
+        }
+        let problem = Self {
+            coordinates,
+            scale_assumed,
+            offset: spec.offset,
+        };
+        problem.check_corners()?;
+        Ok(problem)
+    }
+
+    /// Indices of the free parameters.
+    pub fn free(&self) -> impl Iterator<Item = usize> {
+        (0..self.coordinates.len())
+            .filter(|&i| matches!(self.coordinates[i], Coordinate::Free { .. }))
+    }
+
+    /// All parameters at a place in the unit box of the free ones.
+    #[must_use]
+    pub fn theta(&self, place: &[f64]) -> Theta {
+        let mut places = place.iter();
+        self.coordinates.map(|coordinate| match coordinate {
+            Coordinate::Fixed(value) => value,
+            Coordinate::Free { .. } => coordinate.value(places.next().copied().unwrap_or(0.5)),
+        })
+    }
+
+    /// Refuses bounds that reach where no stage exists.
+    fn check_corners(&self) -> Result<()> {
+        let count = self.free().count();
+        if count == 0 {
+            return Err(Error::parameter(
+                "free",
+                "empty",
+                "at least one parameter to search",
+            ));
+        }
+        for corner in [0.0, 1.0] {
+            DahlStage::from_theta(&self.theta(&vec![corner; count]))?;
+        }
+        Ok(())
+    }
+}
+
+/// Values of `fixed=` and `stiffness=`, with the defaults of b0 and up.
+fn fixed_values(spec: &Spec) -> Result<[Option<f64>; 9]> {
+    let mut fixed: [Option<f64>; 9] = [None; 9];
+    for (name, value) in &spec.fixed {
+        let i = parameter("fixed", name)?;
+        let unit = DAHL_PARAMETERS[i].unit;
+        fixed[i] = Some(crate::error::finite(
+            &format!("fixed {name}"),
+            *value,
+            unit,
+        )?);
+    }
+    if let Some(stiffness) = spec.stiffness {
+        positive("stiffness", stiffness, "N/m")?;
+        if fixed[STIFFNESS].is_some_and(|value| value.to_bits() != stiffness.to_bits()) {
+            return Err(Error::parameter(
+                "stiffness",
+                format!("{stiffness} N/m"),
+                "the value given for it in fixed=, or only one of the two",
+            ));
+        }
+        fixed[STIFFNESS] = Some(stiffness);
+    }
+    fixed[7] = fixed[7].or(Some(0.0));
+    fixed[8] = fixed[8].or(Some(30.0));
+    Ok(fixed)
+}
+
+/// Which parameters are searched; each of the others must have a value.
+fn free_parameters(spec: &Spec, fixed: &mut [Option<f64>; 9]) -> Result<[bool; 9]> {
+    let Some(names) = &spec.free else {
+        return Ok(fixed.map(|value| value.is_none()));
+    };
+    let mut free = [false; 9];
+    for name in names {
+        let i = parameter("free", name)?;
+        if spec.fixed.iter().any(|(other, _)| other == name)
+            || (i == STIFFNESS && fixed[i].is_some())
+        {
+            return Err(Error::parameter(
+                "free",
+                name,
+                "a parameter that is not fixed as well",
+            ));
+        }
+        if name == "b0" || name == "up" {
+            let reason = if name == "b0" {
+                "b0 = 0: dry friction is not simulated yet"
+            } else {
+                "up held: only the product b1 up shows in the data"
+            };
+            return Err(Error::parameter("free", name, reason));
+        }
+        free[i] = true;
+        fixed[i] = None;
+    }
+    for i in 0..9 {
+        let scale = i == STIFFNESS;
+        if !free[i] && fixed[i].is_none() && !scale {
+            let name = DAHL_PARAMETERS[i].name;
+            return Err(Error::parameter(
+                "free",
+                names.join(", "),
+                format!("{name} as well, or a value for it in fixed="),
+            ));
+        }
+    }
+    Ok(free)
+}
+
+/// Index of a parameter by its name.
+fn parameter(argument: &str, name: &str) -> Result<usize> {
+    DAHL_PARAMETERS
+        .iter()
+        .position(|info| info.name == name)
+        .ok_or_else(|| {
+            let names: Vec<&str> = DAHL_PARAMETERS.iter().map(|info| info.name).collect();
+            Error::parameter(
+                argument,
+                format!("'{name}'"),
+                format!("one of {}", names.join(", ")),
+            )
+        })
+}

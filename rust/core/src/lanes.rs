@@ -1,0 +1,114 @@
+//! Several stages in lockstep: the number type of a swarm's kernel.
+
+use core::ops::{Add, Div, Mul, Neg, Sub};
+
+use piezotrack_control::Number;
+use pulp::Simd;
+
+/// `K` vectors of lanes that go through the same operations.
+///
+/// More than one vector hides the latency of the chain of operations within a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Lanes<S: Simd, const K: usize> {
+    simd: S,
+    vectors: [S::f64s; K],
+}
+
+impl<S: Simd, const K: usize> Lanes<S, K> {
+    /// Lanes in one bundle.
+    pub const COUNT: usize = K * S::F64_LANES;
+
+    /// The value that `values` gives for each lane.
+    #[inline(always)]
+    pub fn gather(simd: S, values: impl Fn(usize) -> f64) -> Self {
+        let mut out = Self {
+            simd,
+            vectors: [simd.splat_f64s(0.0); K],
+        };
+        for (lane, slot) in out.as_mut_slice().iter_mut().enumerate() {
+            *slot = values(lane);
+        }
+        out
+    }
+
+    /// The lanes in order.
+    #[inline(always)]
+    pub fn as_slice(&self) -> &[f64] {
+        pulp::bytemuck::cast_slice(&self.vectors)
+    }
+
+    #[inline(always)]
+    fn as_mut_slice(&mut self) -> &mut [f64] {
+        pulp::bytemuck::cast_slice_mut(&mut self.vectors)
+    }
+}
+
+macro_rules! lanewise {
+    ($trait:ident, $method:ident, $operation:ident) => {
+        impl<S: Simd, const K: usize> $trait for Lanes<S, K> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(mut self, other: Self) -> Self {
+                for k in 0..K {
+                    self.vectors[k] = self.simd.$operation(self.vectors[k], other.vectors[k]);
+                }
+                self
+            }
+        }
+    };
+}
+lanewise!(Add, add, add_f64s);
+lanewise!(Sub, sub, sub_f64s);
+lanewise!(Mul, mul, mul_f64s);
+lanewise!(Div, div, div_f64s);
+
+impl<S: Simd, const K: usize> Neg for Lanes<S, K> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(mut self) -> Self {
+        for k in 0..K {
+            self.vectors[k] = self.simd.neg_f64s(self.vectors[k]);
+        }
+        self
+    }
+}
+
+impl<S: Simd, const K: usize> Number for Lanes<S, K> {
+    #[inline(always)]
+    fn like(mut self, value: f64) -> Self {
+        self.vectors = [self.simd.splat_f64s(value); K];
+        self
+    }
+
+    #[inline(always)]
+    fn mul_add(mut self, factor: Self, term: Self) -> Self {
+        for k in 0..K {
+            self.vectors[k] =
+                self.simd
+                    .mul_add_f64s(self.vectors[k], factor.vectors[k], term.vectors[k]);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn where_negative(mut self, yes: Self, no: Self) -> Self {
+        let zero = self.simd.splat_f64s(0.0);
+        for k in 0..K {
+            let mask = self.simd.less_than_f64s(self.vectors[k], zero);
+            self.vectors[k] = self.simd.select_f64s(mask, yes.vectors[k], no.vectors[k]);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn any_negative(self) -> bool {
+        let zero = self.simd.splat_f64s(0.0);
+        let mut any = false;
+        for k in 0..K {
+            let mask = self.simd.less_than_f64s(self.vectors[k], zero);
+            // Not M64_LANES, which is 0 where a mask is one bit a lane.
+            any |= self.simd.first_true_m64s(mask) < S::F64_LANES;
+        }
+        any
+    }
+}

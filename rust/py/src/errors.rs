@@ -1,0 +1,37 @@
+//! From the core's errors to piezotrack's exceptions: one match.
+
+use piezotrack_core::Error;
+use pyo3::PyErr;
+
+mod classes {
+    pyo3::import_exception!(piezotrack.errors, ParameterError);
+    pyo3::import_exception!(piezotrack.errors, ShapeError);
+    pyo3::import_exception!(piezotrack.errors, DataError);
+    pyo3::import_exception!(piezotrack.errors, NumericalError);
+}
+
+/// The exception for an error.
+pub fn raise(error: &Error) -> PyErr {
+    let message = error.to_string();
+    match error {
+        Error::Parameter { .. } => classes::ParameterError::new_err(message),
+        Error::Shape { .. } => classes::ShapeError::new_err(message),
+        Error::Data(_) => classes::DataError::new_err(message),
+        Error::Numerical(_) => classes::NumericalError::new_err(message),
+    }
+}
+
+/// The exception for an array of the wrong shape.
+pub fn shape(name: &str, found: &str, expected: &str) -> PyErr {
+    let (name, found, expected) = (name.into(), found.into(), expected.into());
+    raise(&Error::Shape {
+        name,
+        found,
+        expected,
+    })
+}
+
+/// The exception for a record that cannot be used.
+pub fn data(message: String) -> PyErr {
+    raise(&Error::Data(message))
+}

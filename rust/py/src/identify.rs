@@ -1,0 +1,233 @@
+//! The swarm and its settings.
+
+use numpy::{PyArray1, ToPyArray};
+use piezotrack_core::identify::{
+    Boundary, Coordinate, Identification, Outcome, Record, Spec, StopReason, SwarmSettings,
+    Topology, identify,
+};
+use piezotrack_core::{Error, Result};
+use pyo3::prelude::*;
+
+use crate::arrays::samples;
+use crate::enter::{Watchers, enter_pool};
+use crate::errors::raise;
+use crate::stage::{Theta, hold};
+
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<PySettings>()?;
+    module.add_class::<PySearch>()?;
+    module.add_function(wrap_pyfunction!(identify_dahl, module)?)
+}
+
+/// Checked settings of a swarm.
+#[pyclass(name = "SwarmSettings", frozen, module = "piezotrack._core")]
+pub struct PySettings(SwarmSettings);
+
+#[pymethods]
+impl PySettings {
+    #[new]
+    #[pyo3(signature = (*, particles, iterations, inertia_start, inertia_end,
+        inertia_iterations, cognitive, social, topology, velocity_limit, boundary, min_improvement,
+        stall_iterations, polish))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "keyword-only, one for each setting"
+    )]
+    fn new(
+        particles: usize,
+        iterations: usize,
+        inertia_start: f64,
+        inertia_end: f64,
+        inertia_iterations: usize,
+        cognitive: f64,
+        social: f64,
+        topology: &str,
+        velocity_limit: f64,
+        boundary: &str,
+        min_improvement: f64,
+        stall_iterations: usize,
+        polish: bool,
+    ) -> PyResult<Self> {
+        let boundary = boundary_named(boundary).map_err(|error| raise(&error))?;
+        let topology = topology_named(topology).map_err(|error| raise(&error))?;
+        let settings = SwarmSettings {
+            particles,
+            iterations,
+            inertia: (inertia_start, inertia_end),
+            inertia_iterations,
+            cognitive,
+            social,
+            topology,
+            velocity_limit,
+            boundary,
+            min_improvement,
+            stall_iterations,
+            polish,
+        };
+        settings.validate().map_err(|error| raise(&error))?;
+        Ok(Self(settings))
+    }
+}
+
+fn boundary_named(name: &str) -> Result<Boundary> {
+    match name {
+        "absorb" => Ok(Boundary::Absorb),
+        "reflect" => Ok(Boundary::Reflect),
+        "invisible" => Ok(Boundary::Invisible),
+        other => Err(Error::parameter(
+            "boundary",
+            format!("'{other}'"),
+            "'absorb', 'reflect' or 'invisible'",
+        )),
+    }
+}
+
+fn topology_named(name: &str) -> Result<Topology> {
+    match name {
+        "global" => Ok(Topology::Global),
+        "ring" => Ok(Topology::Ring),
+        other => Err(Error::parameter(
+            "topology",
+            format!("'{other}'"),
+            "'global' or 'ring'",
+        )),
+    }
+}
+
+/// What a search found, in plain numbers.
+#[pyclass(name = "Search", frozen, module = "piezotrack._core")]
+struct PySearch {
+    found: Identification,
+    outcome: Outcome,
+}
+
+#[pymethods]
+impl PySearch {
+    #[getter]
+    fn theta(&self) -> Theta {
+        self.outcome.theta
+    }
+
+    #[getter]
+    fn rms(&self) -> f64 {
+        self.outcome.costs.rms
+    }
+
+    #[getter]
+    fn offset(&self) -> f64 {
+        self.outcome.costs.offset
+    }
+
+    #[getter]
+    fn iterations(&self) -> usize {
+        self.outcome.iterations
+    }
+
+    #[getter]
+    fn evaluations(&self) -> usize {
+        self.outcome.evaluations
+    }
+
+    #[getter]
+    fn polish_evaluations(&self) -> usize {
+        self.outcome.polish_evaluations
+    }
+
+    #[getter]
+    fn failures(&self) -> usize {
+        self.outcome.failures
+    }
+
+    #[getter]
+    fn substeps(&self) -> usize {
+        self.outcome.substeps
+    }
+
+    #[getter]
+    fn history<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.outcome.history.to_pyarray(py)
+    }
+
+    #[getter]
+    fn stop_reason(&self) -> &'static str {
+        match self.outcome.reason {
+            StopReason::Stalled => "stalled",
+            StopReason::Iterations => "iterations",
+            StopReason::Interrupted => "interrupted",
+        }
+    }
+
+    #[getter]
+    fn scale_assumed(&self) -> bool {
+        self.found.problem.scale_assumed
+    }
+
+    /// Bounds of each parameter; None for one that was held.
+    #[getter]
+    fn bounds(&self) -> Vec<Option<(f64, f64)>> {
+        let bounds = self
+            .found
+            .problem
+            .coordinates
+            .iter()
+            .map(|coordinate| match *coordinate {
+                Coordinate::Fixed(_) => None,
+                Coordinate::Free { low, high, .. } => Some((low, high)),
+            });
+        bounds.collect()
+    }
+
+    /// (index of the parameter, standard deviation, whether it lies on a bound).
+    #[getter]
+    fn sensitivities(&self) -> Vec<(usize, f64, bool)> {
+        let found = self.found.sensitivities.iter();
+        found
+            .map(|s| (s.parameter, s.deviation, s.at_bound))
+            .collect()
+    }
+}
+
+/// Identifies a Dahl stage; None where the search was stopped before its first cost.
+#[pyfunction]
+#[pyo3(signature = (*, u, y, dt, hold_name, start, free, fixed, bounds, stiffness, offset,
+    settings, seed, threads, callback, progress))]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "keyword-only, called from one place"
+)]
+fn identify_dahl(
+    py: Python<'_>,
+    u: &Bound<'_, PyAny>,
+    y: &Bound<'_, PyAny>,
+    dt: f64,
+    hold_name: &str,
+    start: usize,
+    free: Option<Vec<String>>,
+    fixed: Vec<(String, f64)>,
+    bounds: Vec<(String, (f64, f64))>,
+    stiffness: Option<f64>,
+    offset: bool,
+    settings: &PySettings,
+    seed: u64,
+    threads: usize,
+    callback: Option<Py<PyAny>>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Option<PySearch>> {
+    let (u, y) = (samples("u", u)?, samples("y", y)?);
+    let spec = Spec {
+        free,
+        fixed,
+        bounds,
+        stiffness,
+        offset,
+    };
+    let watchers = Watchers { callback, progress };
+    let found = enter_pool(py, threads, &watchers, |monitor, stop| {
+        let record = Record::new(&u, &y, dt, hold(hold_name)?, start)?;
+        identify(&record, &spec, &settings.0, seed, monitor, stop)
+    })?;
+    Ok(found
+        .outcome
+        .clone()
+        .map(|outcome| PySearch { found, outcome }))
+}

@@ -1,0 +1,19 @@
+//! The Python module `piezotrack._core`: this file registers, the others do.
+
+mod arrays;
+mod enter;
+mod errors;
+mod identify;
+mod numbers;
+mod stage;
+
+use pyo3::prelude::*;
+
+/// The compiled core of piezotrack.
+#[pymodule]
+fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    numbers::register(module)?;
+    stage::register(module)?;
+    identify::register(module)
+}

@@ -1,0 +1,43 @@
+//! Single numbers from Python, refused by name.
+
+use piezotrack_core::Error;
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyString};
+
+use crate::errors::raise;
+
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(as_number, module)?)?;
+    module.add_function(wrap_pyfunction!(as_count, module)?)
+}
+
+/// A real number as a float; NaN and infinity pass, for the receiver to judge.
+#[pyfunction]
+fn as_number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
+    let number = value.extract::<f64>();
+    match number {
+        Ok(number) if !is_other(value) => Ok(number),
+        _ => Err(refused(name, value, "a number")),
+    }
+}
+
+/// A whole number, 0 or above.
+#[pyfunction]
+fn as_count(name: &str, value: &Bound<'_, PyAny>) -> PyResult<u64> {
+    match value.extract::<u64>() {
+        Ok(number) if !is_other(value) => Ok(number),
+        _ => Err(refused(name, value, "a whole number, 0 or above")),
+    }
+}
+
+/// Truth values and texts convert to numbers, and are hardly ever meant so.
+fn is_other(value: &Bound<'_, PyAny>) -> bool {
+    value.is_instance_of::<PyBool>() || value.is_instance_of::<PyString>()
+}
+
+fn refused(name: &str, value: &Bound<'_, PyAny>, expected: &str) -> PyErr {
+    let shown = value
+        .repr()
+        .map_or_else(|_| "unprintable".into(), |text| text.to_string());
+    raise(&Error::parameter(name, shown, expected))
+}

@@ -1,0 +1,180 @@
+//! The Dahl stage and its simulation.
+
+use numpy::{PyArray1, ToPyArray};
+use piezotrack_core::integrate::{self, Drive, Hold, Trajectory};
+use piezotrack_core::stage::{DAHL_PARAMETERS, DahlStage, StageState};
+use piezotrack_core::{Error, Result};
+use pyo3::prelude::*;
+
+use crate::arrays::samples;
+use crate::enter::enter;
+use crate::errors::raise;
+
+/// Values of the nine parameters, in the order of `DAHL_PARAMETERS`.
+pub type Theta = [f64; 9];
+
+/// Displacement, velocity, hysteresis force and its slope.
+type State = (f64, f64, f64, f64);
+
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let parameters: Vec<_> = DAHL_PARAMETERS
+        .iter()
+        .map(|info| (info.name, info.symbol, info.unit))
+        .collect();
+    module.add("DAHL_PARAMETERS", parameters)?;
+    module.add_class::<PyTrajectory>()?;
+    module.add_function(wrap_pyfunction!(dahl_check, module)?)?;
+    module.add_function(wrap_pyfunction!(dahl_xu_li_2010, module)?)?;
+    module.add_function(wrap_pyfunction!(dahl_simulate, module)?)?;
+    module.add_function(wrap_pyfunction!(dahl_simulate_fixed, module)?)
+}
+
+/// The hold by its name.
+pub fn hold(name: &str) -> Result<Hold> {
+    match name {
+        "foh" => Ok(Hold::First),
+        "zoh" => Ok(Hold::Zero),
+        other => Err(Error::parameter(
+            "hold",
+            format!("'{other}'"),
+            "'foh' or 'zoh'",
+        )),
+    }
+}
+
+/// A simulated motion.
+#[pyclass(name = "Trajectory", frozen, module = "piezotrack._core")]
+struct PyTrajectory(Trajectory);
+
+#[pymethods]
+impl PyTrajectory {
+    #[getter]
+    fn x<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.0.x.to_pyarray(py)
+    }
+
+    #[getter]
+    fn v<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.0.v.to_pyarray(py)
+    }
+
+    #[getter]
+    fn hysteresis<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.0.hysteresis.to_pyarray(py)
+    }
+
+    #[getter]
+    fn last(&self) -> State {
+        let StageState {
+            x,
+            v,
+            hysteresis,
+            hysteresis_slope,
+        } = self.0.last;
+        (x, v, hysteresis, hysteresis_slope)
+    }
+
+    #[getter]
+    fn substeps(&self) -> usize {
+        self.0.substeps
+    }
+
+    #[getter]
+    fn difference(&self) -> f64 {
+        self.0.difference
+    }
+}
+
+/// Raises where the nine values make no stage.
+#[pyfunction]
+fn dahl_check(theta: Theta) -> PyResult<()> {
+    DahlStage::from_theta(&theta)
+        .map(|_| ())
+        .map_err(|error| raise(&error))
+}
+
+/// Table 1 of Xu and Li 2010.
+#[pyfunction]
+fn dahl_xu_li_2010() -> Theta {
+    let DahlStage {
+        mechanics,
+        piezo_coefficient,
+        a1,
+        a2,
+        b1,
+        up,
+    } = DahlStage::xu_li_2010();
+    let (mass, damping, stiffness) = (mechanics.mass, mechanics.damping, mechanics.stiffness);
+    [
+        mass,
+        damping,
+        stiffness,
+        piezo_coefficient,
+        a1,
+        a2,
+        b1,
+        0.0,
+        up,
+    ]
+}
+
+/// Simulates to an accuracy, choosing the sub-steps.
+#[pyfunction]
+#[pyo3(signature = (theta, u, dt, hold, initial, accuracy))]
+fn dahl_simulate(
+    py: Python<'_>,
+    theta: Theta,
+    u: &Bound<'_, PyAny>,
+    dt: f64,
+    hold: &str,
+    initial: State,
+    accuracy: f64,
+) -> PyResult<PyTrajectory> {
+    run(py, theta, u, dt, hold, |stage, drive, stop| {
+        integrate::simulate(stage, drive, state(initial), accuracy, stop)
+    })
+}
+
+/// Simulates from rest with given sub-steps: for studies of convergence.
+#[pyfunction]
+fn dahl_simulate_fixed(
+    py: Python<'_>,
+    theta: Theta,
+    u: &Bound<'_, PyAny>,
+    dt: f64,
+    hold: &str,
+    substeps: usize,
+) -> PyResult<PyTrajectory> {
+    run(py, theta, u, dt, hold, |stage, drive, stop| {
+        integrate::simulate_fixed(stage, drive, StageState::default(), substeps, stop)
+    })
+}
+
+fn run(
+    py: Python<'_>,
+    theta: Theta,
+    u: &Bound<'_, PyAny>,
+    dt: f64,
+    hold_name: &str,
+    job: impl FnOnce(&DahlStage, &Drive<'_>, integrate::Stop<'_>) -> Result<Option<Trajectory>> + Send,
+) -> PyResult<PyTrajectory> {
+    let u = samples("u", u)?;
+    let trajectory = enter(py, |stop| {
+        let stage = DahlStage::from_theta(&theta)?;
+        let drive = Drive::new(&u, dt, hold(hold_name)?)?;
+        job(&stage, &drive, stop)
+    })?;
+    // None means stopped, for which `enter` has raised.
+    trajectory
+        .map(PyTrajectory)
+        .ok_or_else(|| raise(&Error::Numerical("the simulation was stopped".into())))
+}
+
+fn state((x, v, hysteresis, hysteresis_slope): State) -> StageState {
+    StageState {
+        x,
+        v,
+        hysteresis,
+        hysteresis_slope,
+    }
+}
