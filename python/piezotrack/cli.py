@@ -286,10 +286,10 @@ def _compare(fit: Identification) -> None:
     true = DahlStage.xu_li_2010()
     found = fit.model
     for name, symbol in (("damping", "D"), ("stiffness", "K"), ("piezo_coefficient", "T")):
-        share = getattr(found, name) / getattr(true, name) - 1.0
+        share = 100.0 * (getattr(found, name) / getattr(true, name) - 1.0)
         print(
             f"  {symbol} found {getattr(found, name):.6g}, true {getattr(true, name):.6g}: "
-            f"{100 * share:+.3f} %"
+            f"{round(share, 3) + 0.0:+.3f} %"
         )
 
 
@@ -302,7 +302,7 @@ def _write(fit: Identification, out: Path, second: Dataset | None) -> None:
         run = fit.simulate(second)
         figures = {
             "validation_loop": plot_loop(second, run).figure,
-            "validation_time": plot_time(second, run)[0].figure,
+            "validation_time": plot_time(second, run, stroke=fit.stroke)[0].figure,
         }
         written += save_figures(figures, out)  # type: ignore[arg-type]
     _list(written)

@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .columns import Column, Columns
 from .dataset import Dataset, check_dt, time_fault
 from .errors import DataError, ParameterError, ShapeError
-from .units import Column, Columns, lookup, require
+from .units import lookup, require
 
 if TYPE_CHECKING:
     import os

@@ -186,7 +186,7 @@ def save_identification(
     until = None if shown is None else float(fit.data.t[-1])
     figures = {
         f"{name}_loop": plot_loop(record, run).figure,
-        f"{name}_time": plot_time(record, run, fitted_until=until)[0].figure,
+        f"{name}_time": plot_time(record, run, stroke=fit.stroke, fitted_until=until)[0].figure,
         f"{name}_convergence": plot_convergence(fit).figure,
     }
     return [fit.save(path / f"{name}.json"), *save_figures(figures, path)]  # type: ignore[arg-type]
