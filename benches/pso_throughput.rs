@@ -6,7 +6,7 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use piezotrack_core::identify::{Evaluator, Problem, Record, Spec};
+use piezotrack_core::identify::{Evaluator, Guess, Problem, Record, Spec};
 use piezotrack_core::integrate::{Drive, Hold, NEVER, simulate};
 use piezotrack_core::stage::{DahlStage, StageState};
 
@@ -14,9 +14,7 @@ const RATE: f64 = 5000.0;
 
 fn drive(samples: u32) -> Vec<f64> {
     let turn = core::f64::consts::TAU * 0.25 / RATE;
-    (0..samples)
-        .map(|k| 37.5 * (1.0 - (turn * f64::from(k)).cos()))
-        .collect()
+    (0..samples).map(|k| 37.5 * (1.0 - (turn * f64::from(k)).cos())).collect()
 }
 
 fn paper_spec() -> Spec {
@@ -39,25 +37,18 @@ fn throughput(criterion: &mut Criterion) {
         let u = drive(samples);
         let held = Drive::new(&u, 1.0 / RATE, Hold::First).unwrap();
         let stage = DahlStage::xu_li_2010();
-        let y = simulate(&stage, &held, StageState::default(), 1e-10, NEVER)
-            .unwrap()
-            .unwrap()
-            .x;
+        let y = simulate(&stage, &held, StageState::default(), 1e-10, NEVER).unwrap().unwrap().x;
         let record = Record::new(&u, &y, 1.0 / RATE, Hold::First, 0).unwrap();
         let problem = Problem::new(&record, &paper_spec()).unwrap();
         let evaluator = Evaluator::new(&record, &problem, NEVER);
-        for particles in [1_u32, 10, 64] {
+        for particles in [1_u32, 8, 10, 64, 96] {
             let guesses: Vec<_> = (0..particles)
                 .map(|i| problem.theta(&[f64::from(i) / f64::from(particles); 4]))
+                .map(|theta| Guess { theta, limit: f64::INFINITY })
                 .collect();
-            group.throughput(Throughput::Elements(
-                u64::from(particles) * u64::from(samples),
-            ));
+            group.throughput(Throughput::Elements(u64::from(particles) * u64::from(samples)));
             for threads in [1_usize, 2] {
-                let pool = rayon::ThreadPoolBuilder::new()
-                    .num_threads(threads)
-                    .build()
-                    .unwrap();
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 let name = format!("{particles} particles, {threads} threads");
                 group.bench_function(BenchmarkId::new(name, samples), |bencher| {
                     bencher.iter(|| pool.install(|| evaluator.costs(black_box(&guesses), NEVER)));

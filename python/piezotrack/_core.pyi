@@ -51,6 +51,7 @@ def identify_dahl(
     offset: bool,
     settings: SwarmSettings,
     seed: int,
+    runs: int,
     threads: int,
     callback: Callable[[int, int, int, float, list[float]], bool] | None,
     progress: Callable[[int, int, int, float, list[float]], None] | None,
@@ -113,6 +114,12 @@ class Search:
     def history(self) -> NDArray[np.float64]: ...
     @property
     def stop_reason(self) -> Literal["stalled", "iterations", "interrupted"]: ...
+    @property
+    def order(self) -> int: ...
+    @property
+    def runs(
+        self,
+    ) -> list[tuple[float, int, int, Literal["stalled", "iterations", "interrupted"]]]: ...
     @property
     def scale_assumed(self) -> bool: ...
     @property

@@ -130,6 +130,7 @@ def identify_command(
     offset: Annotated[bool, typer.Option(help="Fit a constant offset of the sensor.")] = True,
     swarm: Annotated[str, typer.Option(help="Settings: default or xu-li-2010.")] = "default",
     seed: Annotated[int, typer.Option(help="Same seed, same result.")] = 0,
+    runs: Annotated[int, typer.Option(help="Swarms that search apart; do they agree?")] = 1,
     threads: Annotated[int | None, typer.Option(help="All cores if not given.")] = None,
     validate: Annotated[
         Path | None, typer.Option(help="A second log, to judge the model on; not fitted.")
@@ -157,6 +158,7 @@ def identify_command(
         offset=offset,
         swarm=_swarm(swarm),
         seed=seed,
+        runs=runs,
         threads=threads,
     )
     _show(fit)

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-__all__ = ["Estimate", "Identification", "Progress", "identify"]
+__all__ = ["Estimate", "Identification", "Progress", "Run", "identify"]
+
+StopReason = Literal["stalled", "iterations", "interrupted"]
 
 
 class Progress(NamedTuple):
@@ -87,6 +89,25 @@ class Estimate(NamedTuple):
         return known and not self.at_bound
 
 
+class Run(NamedTuple):
+    """One of the swarms of a search.
+
+    Attributes
+    ----------
+    cost : float
+        Its lowest cost [m], polished where asked.
+    nit, nfev : int
+        Its iterations and simulations.
+    stop_reason : {"stalled", "iterations", "interrupted"}
+        Why it ended.
+    """
+
+    cost: float
+    nit: int
+    nfev: int
+    stop_reason: StopReason
+
+
 @dataclass(frozen=True, kw_only=True)
 class Identification(IdentifiedModel):
     """What a search found; see `IdentifiedModel` for what can be done with it.
@@ -107,8 +128,11 @@ class Identification(IdentifiedModel):
         Simulations of the polish after the swarm; `history` is the swarm's alone.
     stop_reason : {"stalled", "iterations", "interrupted"}
         Why the search ended.
-    substeps : int
-        Steps of the integrator in each sampling interval, fixed for the search.
+    runs : tuple of Run
+        The swarms that searched apart from each other; the rest is of the best of them.
+    substeps, order : int
+        Steps of the integrator in each sampling interval and their order, fixed for the
+        search.
     seed : int
         Seed of the random numbers.
     swarm : ParticleSwarm
@@ -123,8 +147,10 @@ class Identification(IdentifiedModel):
     nfev: int
     nfail: int
     npolish: int
-    stop_reason: Literal["stalled", "iterations", "interrupted"]
+    stop_reason: StopReason
+    runs: tuple[Run, ...]
     substeps: int
+    order: int
     seed: int
     swarm: ParticleSwarm
 
@@ -142,6 +168,11 @@ class Identification(IdentifiedModel):
     def cost_percent(self) -> float:
         """The cost in per cent of the stroke."""
         return 100.0 * self.cost / self.stroke
+
+    @property
+    def agreeing(self) -> int:
+        """Number of runs that ended within 0.1 % of the lowest cost."""
+        return sum(run.cost <= 1.001 * self.cost for run in self.runs)
 
     @property
     def success(self) -> bool:
@@ -204,6 +235,7 @@ def identify(
     offset: bool = True,
     swarm: ParticleSwarm | None = None,
     seed: int = 0,
+    runs: int = 1,
     threads: int | None = None,
     progress: bool | None = None,
     callback: Callable[[Progress], object] | None = None,
@@ -243,6 +275,10 @@ def identify(
         Settings of the search.
     seed : int, optional
         0 or above. The same seed gives the same bits, for any number of threads.
+    runs : int, optional
+        Swarms that search apart from each other, each from its own random numbers; whether they
+        end with the same cost tells whether there are more valleys. They share the lanes of the
+        processor, so several take less time together than one after the other.
     threads : int, optional
         All cores where not given.
     progress : bool, optional
@@ -304,6 +340,7 @@ def identify(
             offset=bool(offset),
             settings=swarm.checked(),
             seed=_core.as_count("seed", seed),
+            runs=_core.as_count("runs", runs),
             threads=0 if threads is None else _core.as_count("threads", threads),
             callback=None if callback is None else _telling(callback),
             progress=bar.update,
@@ -369,7 +406,9 @@ def _identification(
             "polish_simulations": found.polish_evaluations,
             "failed_simulations": found.failures,
             "stop_reason": found.stop_reason,
+            "runs": [{"cost": cost, "stop_reason": reason} for cost, _, _, reason in found.runs],
             "substeps": found.substeps,
+            "order": found.order,
         },
         "provenance": {
             "package": "piezotrack",
@@ -403,7 +442,9 @@ def _identification(
         nfail=found.failures,
         npolish=found.polish_evaluations,
         stop_reason=found.stop_reason,
+        runs=tuple(Run(*run) for run in found.runs),
         substeps=found.substeps,
+        order=found.order,
         seed=seed,
         swarm=swarm,
     )

@@ -42,6 +42,7 @@ def summary_text(fit: Identification) -> str:
         f"cost  {fit.cost_um:.4g} um rms = {fit.cost_percent:.3g} % of stroke"
         + (f", offset {1e6 * fit.offset:.5g} um fitted" if fit.offset_fitted else ""),
         f"      {fit.nit} iterations, {fit.nfev} simulations, seed {fit.seed}: {fit.message}",
+        *_runs(fit),
         "",
         "fixed by the data",
         *(f"  {name:<10} {value:>12.6g}  {unit}" for name, value, unit in _ratios(fit.model)),
@@ -61,6 +62,16 @@ def summary_text(fit: Identification) -> str:
     if fit.nfail:
         lines += ["", f"{fit.nfail} simulations did not stay finite and counted as infinitely bad."]
     return "\n".join(lines)
+
+
+def _runs(fit: Identification) -> list[str]:
+    """Say whether several runs agree."""
+    if len(fit.runs) == 1:
+        return []
+    costs = ", ".join(f"{1e6 * cost:.4g}" for cost in sorted(run.cost for run in fit.runs)[:8])
+    more = ", ..." if len(fit.runs) > 8 else ""
+    verdict = f"{fit.agreeing} of {len(fit.runs)} runs end within 0.1 % of the best"
+    return [f"      {verdict}: {costs}{more} um"]
 
 
 def _ratios(stage: DahlStage) -> list[tuple[str, float, str]]:

@@ -19,20 +19,14 @@ fn exponential(m: &Mechanics, h: f64) -> Matrix6<f64> {
 }
 
 fn close(found: f64, expected: f64, scale: f64) {
-    assert!(
-        (found - expected).abs() <= 1e-12 * scale,
-        "{found} {expected}"
-    );
+    assert!((found - expected).abs() <= 1e-12 * scale, "{found} {expected}");
 }
 
 #[test]
 fn propagator_is_the_matrix_exponential() {
-    for (mass, damping, stiffness) in [
-        (0.1828, 2597.3, 26065.0),
-        (0.1, 5000.0, 1e4),
-        (0.2, 1000.0, 5e4),
-        (0.1828, 1.2, 1.85e5),
-    ] {
+    for (mass, damping, stiffness) in
+        [(0.1828, 2597.3, 26065.0), (0.1, 5000.0, 1e4), (0.2, 1000.0, 5e4), (0.1828, 1.2, 1.85e5)]
+    {
         let m = Mechanics::new(mass, damping, stiffness).unwrap();
         for h in [2e-5, 2e-4, 1e-3, 2e-2] {
             let (inverse, d, k) = (1.0 / mass, damping / mass, stiffness / mass);
@@ -72,42 +66,21 @@ fn static_gain_is_one_over_stiffness() {
 
 #[test]
 fn dahl_flow_is_the_matrix_exponential() {
-    let dahl = Dahl {
-        a1: 121.9874,
-        a2: 1.1773e6,
-        gain: 1.8485e6 * 30.0,
-    };
+    let dahl: Dahl<f64> = Dahl { a1: 121.9874, a2: 1.1773e6, gain: 1.8485e6 * 30.0 };
     for start in [(0.0, 0.0), (0.3, 4e3), (0.3, -4e3)] {
         for distance in [1e-8, 1e-6, 1e-5, -1e-6, -1e-5] {
-            let state = DahlState {
-                force: start.0,
-                slope: start.1,
-            };
+            let state = DahlState { force: start.0, slope: start.1 };
             let sign = f64::signum(distance);
             let end = dahl.along(&dahl.branch(&state, sign), distance);
             // d/dx [force, slope, 1]
-            let a = Matrix3::new(
-                0.0,
-                1.0,
-                0.0,
-                -dahl.a2,
-                -sign * dahl.a1,
-                dahl.gain,
-                0.0,
-                0.0,
-                0.0,
-            ) * distance;
+            let a =
+                Matrix3::new(0.0, 1.0, 0.0, -dahl.a2, -sign * dahl.a1, dahl.gain, 0.0, 0.0, 0.0)
+                    * distance;
             let e = a.exp();
             let force = e[(0, 0)] * start.0 + e[(0, 1)] * start.1 + e[(0, 2)];
             let slope = e[(1, 0)] * start.0 + e[(1, 1)] * start.1 + e[(1, 2)];
-            assert!(
-                (end.force - force).abs() < 1e-13 * (1.0 + force.abs()),
-                "{distance}"
-            );
-            assert!(
-                (end.slope - slope).abs() < 1e-12 * (1.0 + slope.abs()),
-                "{distance}"
-            );
+            assert!((end.force - force).abs() < 1e-13 * (1.0 + force.abs()), "{distance}");
+            assert!((end.slope - slope).abs() < 1e-12 * (1.0 + slope.abs()), "{distance}");
         }
     }
 }
@@ -115,11 +88,7 @@ fn dahl_flow_is_the_matrix_exponential() {
 #[test]
 fn dahl_steps_compose() {
     // Two moves in one direction are one: the operator knows the path, not the steps.
-    let dahl = Dahl {
-        a1: 121.9874,
-        a2: 1.1773e6,
-        gain: 1.8485e6 * 30.0,
-    };
+    let dahl: Dahl<f64> = Dahl { a1: 121.9874, a2: 1.1773e6, gain: 1.8485e6 * 30.0 };
     let rest = dahl.rest();
     let whole = dahl.along(&dahl.branch(&rest, 1.0), 2e-6);
     let half = dahl.along(&dahl.branch(&rest, 1.0), 1e-6);

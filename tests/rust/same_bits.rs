@@ -2,23 +2,21 @@
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use piezotrack_core::identify::{
-    Evaluator, Monitor, Outcome, Problem, Progress, Record, Spec, SwarmSettings, Theta, search,
+    Evaluator, Guess, Monitor, Outcome, Plan, Problem, Progress, Record, Spec, SwarmSettings,
+    search,
 };
 use piezotrack_core::integrate::{Drive, Hold, NEVER, simulate};
+use piezotrack_core::march::{Order, Stepping};
 use piezotrack_core::stage::{DahlStage, StageState};
 use pulp::Arch;
 
 const DT: f64 = 1e-3;
 
 fn log() -> (Vec<f64>, Vec<f64>) {
-    let u: Vec<f64> = (0..1500)
-        .map(|k| 30.0 * (1.0 - (0.02 * f64::from(k)).cos()))
-        .collect();
+    let u: Vec<f64> = (0..4000).map(|k| 30.0 * (1.0 - (0.02 * f64::from(k)).cos())).collect();
     let drive = Drive::new(&u, DT, Hold::First).unwrap();
     let stage = DahlStage::xu_li_2010();
-    let run = simulate(&stage, &drive, StageState::default(), 1e-10, NEVER)
-        .unwrap()
-        .unwrap();
+    let run = simulate(&stage, &drive, StageState::default(), 1e-10, NEVER).unwrap().unwrap();
     (u, run.x)
 }
 
@@ -31,24 +29,21 @@ fn spec() -> Spec {
     }
 }
 
-fn guesses(problem: &Problem) -> Vec<Theta> {
+fn guesses(problem: &Problem) -> Vec<Guess> {
     let count = problem.free().count();
     (0..23_u32)
         .map(|i| {
             let place: Vec<f64> = (0..count)
                 .map(|d| f64::from((7 * i + 5 * u32::try_from(d).unwrap()) % 23) / 23.0)
                 .collect();
-            problem.theta(&place)
+            Guess { theta: problem.theta(&place), limit: f64::INFINITY }
         })
         .collect()
 }
 
-fn bits(evaluator: &Evaluator<'_>, thetas: &[Theta]) -> Vec<(u64, u64)> {
-    let costs = evaluator.costs(thetas, NEVER);
-    costs
-        .iter()
-        .map(|c| (c.rms.to_bits(), c.offset.to_bits()))
-        .collect()
+fn bits(evaluator: &Evaluator<'_>, guesses: &[Guess]) -> Vec<(u64, u64)> {
+    let costs = evaluator.costs(guesses, NEVER);
+    costs.iter().map(|c| (c.rms.to_bits(), c.offset.to_bits())).collect()
 }
 
 fn instruction_sets() -> Vec<Arch> {
@@ -66,51 +61,82 @@ fn one_lane_and_many_on_every_instruction_set() {
     let (u, y) = log();
     let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
     let problem = Problem::new(&record, &spec()).unwrap();
-    let thetas = guesses(&problem);
-    let expected = bits(&Evaluator::new(&record, &problem, NEVER), &thetas);
-    assert!(expected.iter().any(|c| f64::from_bits(c.0).is_finite()));
-    for arch in instruction_sets() {
-        let evaluator = Evaluator::new(&record, &problem, NEVER).on(arch);
-        assert_eq!(bits(&evaluator, &thetas), expected, "{arch:?}");
-        let one_by_one: Vec<_> = thetas
-            .iter()
-            .flat_map(|theta| bits(&evaluator, &[*theta]))
-            .collect();
-        assert_eq!(one_by_one, expected, "{arch:?}, one by one");
+    let asked = guesses(&problem);
+    for order in [Order::Second, Order::Fourth] {
+        let evaluator = |arch| {
+            let mut evaluator = Evaluator::new(&record, &problem, NEVER).on(arch);
+            evaluator.stepping = Stepping { order, substeps: 2 };
+            evaluator
+        };
+        let expected = bits(&evaluator(Arch::new()), &asked);
+        assert!(expected.iter().any(|c| f64::from_bits(c.0).is_finite()));
+        for arch in instruction_sets() {
+            let evaluator = evaluator(arch);
+            assert_eq!(bits(&evaluator, &asked), expected, "{arch:?} {order:?}");
+            let alone: Vec<_> = asked.iter().flat_map(|one| bits(&evaluator, &[*one])).collect();
+            assert_eq!(alone, expected, "{arch:?} {order:?}, one by one");
+        }
     }
 }
 
-fn outcome(threads: usize, seed: u64) -> Outcome {
+#[test]
+fn abandoning_a_guess_changes_no_result() {
     let (u, y) = log();
     let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
     let problem = Problem::new(&record, &spec()).unwrap();
-    let settings = SwarmSettings {
-        iterations: 30,
-        ..SwarmSettings::xu_li_2010()
-    };
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .unwrap();
+    let evaluator = Evaluator::new(&record, &problem, NEVER);
+    let asked = guesses(&problem);
+    let whole = evaluator.costs(&asked, NEVER);
+    let limit = 2e-6;
+    let limited: Vec<Guess> = asked.iter().map(|guess| Guess { limit, ..*guess }).collect();
+    let (mut kept, mut abandoned) = (0, 0);
+    for (cut, whole) in evaluator.costs(&limited, NEVER).iter().zip(&whole) {
+        if whole.rms <= limit {
+            assert_eq!(cut.rms.to_bits(), whole.rms.to_bits());
+            kept += 1;
+        } else {
+            assert!(limit < cut.rms && cut.rms <= whole.rms, "{cut:?} {whole:?}");
+            abandoned += usize::from(cut.rms < whole.rms);
+        }
+    }
+    assert!(kept > 0 && abandoned > 0, "{kept} {abandoned}");
+}
+
+fn outcomes(threads: usize, seed: u64, runs: usize) -> Vec<Outcome> {
+    let (u, y) = log();
+    let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
+    let problem = Problem::new(&record, &spec()).unwrap();
+    let settings = SwarmSettings { iterations: 30, ..SwarmSettings::xu_li_2010() };
+    let plan = Plan { settings, seed, runs };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     pool.install(|| {
         let evaluator = Evaluator::new(&record, &problem, NEVER);
         let mut quiet = |_: &Progress| core::ops::ControlFlow::Continue(());
         let monitor: &mut dyn Monitor = &mut quiet;
-        search(&evaluator, &problem, &settings, seed, monitor, NEVER).unwrap()
+        search(&evaluator, &problem, &plan, monitor, NEVER).unwrap()
     })
+}
+
+fn assert_same(one: &Outcome, other: &Outcome) {
+    assert_eq!(one.theta.map(f64::to_bits), other.theta.map(f64::to_bits));
+    assert_eq!(one.history, other.history);
+    assert_eq!(one.failures, other.failures);
+    assert_eq!(one.evaluations, other.evaluations);
 }
 
 #[test]
 fn any_number_of_threads() {
-    let one = outcome(1, 3);
+    let one = outcomes(1, 3, 1);
     for threads in [2, 7] {
-        let many = outcome(threads, 3);
-        assert_eq!(one.theta.map(f64::to_bits), many.theta.map(f64::to_bits));
-        assert_eq!(one.history, many.history);
+        assert_same(&one[0], &outcomes(threads, 3, 1)[0]);
     }
-    assert_ne!(
-        one.history,
-        outcome(1, 4).history,
-        "another seed, another search"
-    );
+    assert_ne!(one[0].history, outcomes(1, 4, 1)[0].history, "another seed, another search");
+}
+
+#[test]
+fn a_run_does_not_depend_on_the_others() {
+    let alone = outcomes(2, 3, 1);
+    let three = outcomes(2, 3, 3);
+    assert_same(&alone[0], &three[0]);
+    assert_ne!(three[0].history, three[1].history);
 }

@@ -41,11 +41,7 @@ impl Error {
         value: impl core::fmt::Display,
         expected: impl Into<String>,
     ) -> Self {
-        Self::Parameter {
-            name: name.into(),
-            value: value.to_string(),
-            expected: expected.into(),
-        }
+        Self::Parameter { name: name.into(), value: value.to_string(), expected: expected.into() }
     }
 }
 
@@ -62,13 +58,7 @@ pub fn positive(name: &str, value: f64, unit: &str) -> Result<f64> {
 /// # Errors
 /// [`Error::Parameter`] naming the argument, its value and unit.
 pub fn not_negative(name: &str, value: f64, unit: &str) -> Result<f64> {
-    check(
-        name,
-        value,
-        unit,
-        value >= 0.0,
-        "a finite number, 0 or above",
-    )
+    check(name, value, unit, value >= 0.0, "a finite number, 0 or above")
 }
 
 /// Refuses NaN and infinity.
@@ -84,9 +74,5 @@ fn check(name: &str, value: f64, unit: &str, holds: bool, expected: &str) -> Res
         return Ok(value);
     }
     let space = if unit.is_empty() { "" } else { " " };
-    Err(Error::parameter(
-        name,
-        format!("{value}{space}{unit}"),
-        expected,
-    ))
+    Err(Error::parameter(name, format!("{value}{space}{unit}"), expected))
 }

@@ -1,12 +1,12 @@
 //! Simulation of a stage under a sampled drive, to a stated accuracy.
 
-use piezotrack_control::Number;
-use piezotrack_control::operator::Operator;
+use piezotrack_control::operator::DahlState;
 use pulp::{Simd, WithSimd};
 
 use crate::error::{Error, Result, positive};
+use crate::march::{FEW_TERMS, March, Order, Sink, Stepping, TERMS};
 use crate::mechanics::{Propagator, halvings};
-use crate::stage::feedback::{FeedbackState, step};
+use crate::stage::feedback::FeedbackState;
 use crate::stage::{DahlStage, StageState};
 
 /// Asked now and then whether to give up; answers at once.
@@ -56,11 +56,7 @@ impl<'a> Drive<'a> {
     #[inline(always)]
     #[must_use]
     pub fn interval(&self, k: usize) -> (f64, f64) {
-        let change = if self.hold == Hold::First {
-            self.u[k + 1] - self.u[k]
-        } else {
-            0.0
-        };
+        let change = if self.hold == Hold::First { self.u[k + 1] - self.u[k] } else { 0.0 };
         (self.u[k], change)
     }
 }
@@ -86,9 +82,6 @@ pub struct Trajectory {
 /// Most sub-steps in one sampling interval that are tried.
 const MOST_SUBSTEPS: usize = 1 << 17;
 
-/// Sub-steps between two questions to `stop`: a few hundred microseconds.
-const BLOCK: usize = 8192;
-
 /// Simulates a stage so that halving the sub-steps moves no sample by more than `accuracy`.
 ///
 /// The scheme is of fourth order, so the error of what is returned is about a fifteenth of
@@ -106,12 +99,16 @@ pub fn simulate(
 ) -> Result<Option<Trajectory>> {
     positive("accuracy", accuracy, "m")?;
     let mut substeps = first_substeps(stage, drive.dt);
-    let Some(mut coarse) = simulate_fixed(stage, drive, initial, substeps, stop)? else {
+    let run = |substeps| {
+        let stepping = Stepping { order: Order::Fourth, substeps };
+        simulate_fixed(stage, drive, initial, stepping, stop)
+    };
+    let Some(mut coarse) = run(substeps)? else {
         return Ok(None);
     };
     loop {
         substeps *= 2;
-        let Some(mut fine) = simulate_fixed(stage, drive, initial, substeps, stop)? else {
+        let Some(mut fine) = run(substeps)? else {
             return Ok(None);
         };
         fine.difference = largest_difference(&coarse.x, &fine.x);
@@ -134,21 +131,20 @@ pub fn simulate(
 /// and the displacement with them.
 ///
 /// `None` where the motion is not finite, where more than `most` would be needed, and where
-/// `stop` was set meanwhile.
+/// `stop` said so meanwhile.
 #[must_use]
 pub fn steps_for(
     stage: &DahlStage,
     drive: &Drive<'_>,
+    order: Order,
     accuracy: f64,
     most: usize,
     stop: Stop<'_>,
 ) -> Option<(usize, Vec<f64>)> {
     let run = |substeps| {
         let rest = StageState::default();
-        simulate_fixed(stage, drive, rest, substeps, stop)
-            .ok()
-            .flatten()
-            .map(|run| run.x)
+        let stepping = Stepping { order, substeps };
+        simulate_fixed(stage, drive, rest, stepping, stop).ok().flatten().map(|run| run.x)
     };
     let mut substeps = first_substeps(stage, drive.dt);
     let mut coarse = run(substeps)?;
@@ -163,7 +159,7 @@ pub fn steps_for(
     None
 }
 
-/// Simulates a stage with a given number of sub-steps in each sampling interval.
+/// Simulates a stage with given steps in each sampling interval.
 ///
 /// `None` where `stop` said so meanwhile.
 ///
@@ -174,19 +170,13 @@ pub fn simulate_fixed(
     stage: &DahlStage,
     drive: &Drive<'_>,
     initial: StageState,
-    substeps: usize,
+    stepping: Stepping,
     stop: Stop<'_>,
 ) -> Result<Option<Trajectory>> {
-    if substeps == 0 {
-        return Err(Error::parameter("substeps", substeps, "1 or more"));
+    if stepping.substeps == 0 {
+        return Err(Error::parameter("substeps", 0, "1 or more"));
     }
-    let trajectory = pulp::Arch::new().dispatch(Single {
-        stage,
-        drive,
-        initial,
-        substeps,
-        stop,
-    });
+    let trajectory = pulp::Arch::new().dispatch(Single { stage, drive, initial, stepping, stop });
     let Some(trajectory) = trajectory else {
         return Ok(None);
     };
@@ -205,7 +195,7 @@ struct Single<'a> {
     stage: &'a DahlStage,
     drive: &'a Drive<'a>,
     initial: StageState,
-    substeps: usize,
+    stepping: Stepping,
     stop: Stop<'a>,
 }
 
@@ -215,13 +205,18 @@ impl WithSimd for Single<'_> {
     // One lane needs no vectors; the dispatch is for the fused multiply-add instruction.
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
-        let Self {
-            stage,
-            drive,
-            initial,
-            substeps,
-            stop,
-        } = self;
+        match self.stepping.order {
+            Order::Second => self.run::<FEW_TERMS, false>(),
+            Order::Fourth => self.run::<TERMS, true>(),
+        }
+    }
+}
+
+impl Single<'_> {
+    #[inline(always)]
+    fn run<const T: usize, const FOURTH: bool>(self) -> Option<Trajectory> {
+        let Self { stage, drive, initial, stepping, stop } = self;
+        let substeps = stepping.substeps;
         let h = drive.dt / index(substeps);
         let mechanics = &stage.mechanics;
         let linear = Propagator::new(
@@ -232,7 +227,7 @@ impl WithSimd for Single<'_> {
             halvings(mechanics.rate(), h),
         );
         let n = drive.u.len();
-        let mut out = Trajectory {
+        let out = Trajectory {
             x: Vec::with_capacity(n),
             v: Vec::with_capacity(n),
             hysteresis: Vec::with_capacity(n),
@@ -240,74 +235,38 @@ impl WithSimd for Single<'_> {
             substeps,
             difference: 0.0,
         };
-        let start = FeedbackState {
-            x: initial.x,
-            w: initial.v * h,
-            memory: initial.into(),
-        };
-        let march = March {
-            linear,
-            operator: stage.operator(),
-            gain: stage.piezo_coefficient,
-        };
-        let end = march.run(drive, substeps, start, stop, |_, state| {
-            out.x.push(state.x);
-            out.v.push(state.w / h);
-            out.hysteresis.push(state.memory.force);
-        })?;
-        out.last = StageState {
+        let mut keep = Keep { out, step: h, stop };
+        let start = FeedbackState { x: initial.x, w: initial.v * h, memory: initial.into() };
+        let operator = stage.operator::<T>();
+        let march = March { linear, operator, gain: stage.piezo_coefficient };
+        let end = march.run::<FOURTH>(drive, substeps, start, &mut keep)?;
+        keep.out.last = StageState {
             x: end.x,
             v: end.w / h,
             hysteresis: end.memory.force,
             hysteresis_slope: end.memory.slope,
         };
-        Some(out)
+        Some(keep.out)
     }
 }
 
-/// A stage with everything that its parameters alone decide worked out.
-#[derive(Clone, Copy, Debug)]
-pub struct March<N, O> {
-    /// The linear part over one sub-step.
-    pub linear: Propagator<N>,
-    /// The hysteresis.
-    pub operator: O,
-    /// Force for 1 V, N.
-    pub gain: N,
+/// Keeps the states of one stage.
+struct Keep<'a> {
+    out: Trajectory,
+    step: f64,
+    stop: Stop<'a>,
 }
 
-impl<N: Number, O: Operator<N>> March<N, O> {
-    /// Leads the stage along the drive and shows `sink` its state at each sample.
-    ///
-    /// `None` where `stop` said so meanwhile.
+impl Sink<f64, DahlState<f64>> for Keep<'_> {
     #[inline(always)]
-    pub fn run(
-        &self,
-        drive: &Drive<'_>,
-        substeps: usize,
-        start: FeedbackState<N, O::State>,
-        stop: Stop<'_>,
-        mut sink: impl FnMut(usize, &FeedbackState<N, O::State>),
-    ) -> Option<FeedbackState<N, O::State>> {
-        let mut state = start;
-        sink(0, &state);
-        let part = 1.0 / index(substeps);
-        let block = (BLOCK / substeps).max(1);
-        for k in 1..drive.u.len() {
-            if k % block == 0 && stop() {
-                return None;
-            }
-            let (u, change) = drive.interval(k - 1);
-            let change = change * part;
-            let rise = self.gain * self.gain.like(change);
-            for j in 0..substeps {
-                let now = index(j).mul_add(change, u);
-                let force = self.gain * self.gain.like(now);
-                state = step(&self.linear, &self.operator, &state, force, rise);
-            }
-            sink(k, &state);
-        }
-        Some(state)
+    fn sample(&mut self, _k: usize, state: &FeedbackState<f64, DahlState<f64>>) {
+        self.out.x.push(state.x);
+        self.out.v.push(state.w / self.step);
+        self.out.hysteresis.push(state.memory.force);
+    }
+
+    fn give_up(&mut self, _k: usize) -> bool {
+        (self.stop)()
     }
 }
 
@@ -331,7 +290,5 @@ pub(crate) fn index(n: usize) -> f64 {
 }
 
 fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
-    a.iter()
-        .zip(b)
-        .fold(0.0, |most, (a, b)| f64::max(most, (a - b).abs()))
+    a.iter().zip(b).fold(0.0, |most, (a, b)| f64::max(most, (a - b).abs()))
 }

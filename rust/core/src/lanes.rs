@@ -21,10 +21,7 @@ impl<S: Simd, const K: usize> Lanes<S, K> {
     /// The value that `values` gives for each lane.
     #[inline(always)]
     pub fn gather(simd: S, values: impl Fn(usize) -> f64) -> Self {
-        let mut out = Self {
-            simd,
-            vectors: [simd.splat_f64s(0.0); K],
-        };
+        let mut out = Self { simd, vectors: [simd.splat_f64s(0.0); K] };
         for (lane, slot) in out.as_mut_slice().iter_mut().enumerate() {
             *slot = values(lane);
         }
@@ -84,8 +81,7 @@ impl<S: Simd, const K: usize> Number for Lanes<S, K> {
     fn mul_add(mut self, factor: Self, term: Self) -> Self {
         for k in 0..K {
             self.vectors[k] =
-                self.simd
-                    .mul_add_f64s(self.vectors[k], factor.vectors[k], term.vectors[k]);
+                self.simd.mul_add_f64s(self.vectors[k], factor.vectors[k], term.vectors[k]);
         }
         self
     }

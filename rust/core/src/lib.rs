@@ -8,6 +8,7 @@ pub mod error;
 pub mod identify;
 pub mod integrate;
 pub mod lanes;
+pub mod march;
 pub mod mechanics;
 pub mod stage;
 

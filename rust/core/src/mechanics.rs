@@ -113,10 +113,7 @@ impl<N: Number> Propagator<N> {
             (change, moments) = doubled(&change, &moments);
         }
         let h = inverse_mass.like(step);
-        let column = |v: [N; 2]| Column {
-            x: v[0],
-            w: v[1] * h,
-        };
+        let column = |v: [N; 2]| Column { x: v[0], w: v[1] * h };
         let blend = |a: f64, b: f64| {
             let (a, b) = (h.like(a), h.like(b));
             let row = |i: usize| a.mul_add(moments[2][i], b * moments[3][i]);
@@ -148,12 +145,7 @@ fn series<N: Number>(
     let one = damping.like(1.0);
     let step = damping.like(h);
     // v <- (A h) v for A = [0 1; -K/M -D/M]
-    let advance = |v: [N; 2]| {
-        [
-            step * v[1],
-            -(step * stiffness.mul_add(v[0], damping * v[1])),
-        ]
-    };
+    let advance = |v: [N; 2]| [step * v[1], -(step * stiffness.mul_add(v[0], damping * v[1]))];
     let mut columns = [[one, zero], [zero, one]];
     let mut change = [[zero; 2]; 2];
     let mut input = [zero, step * inverse_mass];
@@ -188,19 +180,12 @@ fn series<N: Number>(
 /// (1 + E)^2 - 1 = E^2 + 2 E.
 #[inline(always)]
 fn doubled<N: Number>(e: &[[N; 2]; 2], moments: &Moments<N>) -> ([[N; 2]; 2], Moments<N>) {
-    const BINOMIAL: [[f64; 4]; 4] = [
-        [1.0, 0.0, 0.0, 0.0],
-        [1.0, 1.0, 0.0, 0.0],
-        [1.0, 2.0, 1.0, 0.0],
-        [1.0, 3.0, 3.0, 1.0],
-    ];
+    const BINOMIAL: [[f64; 4]; 4] =
+        [[1.0, 0.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0], [1.0, 2.0, 1.0, 0.0], [1.0, 3.0, 3.0, 1.0]];
     let two = e[0][0].like(2.0);
     let product =
         |i: usize, j: usize| e[i][0].mul_add(e[0][j], e[i][1].mul_add(e[1][j], two * e[i][j]));
-    let change = [
-        [product(0, 0), product(0, 1)],
-        [product(1, 0), product(1, 1)],
-    ];
+    let change = [[product(0, 0), product(0, 1)], [product(1, 0), product(1, 1)]];
     // First half: s^k is 2^-k of the half's own; second half: ((1 + s)/2)^k, expanded.
     let mut out = *moments;
     let mut scale = 1.0;

@@ -18,9 +18,7 @@ pub fn samples(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let samples = array.as_array().iter().copied().collect::<Vec<f64>>();
     if let Some(k) = samples.iter().position(|value| !value.is_finite()) {
         let value = samples[k];
-        return Err(data(format!(
-            "{name}[{k}] is {value}: expected finite numbers only"
-        )));
+        return Err(data(format!("{name}[{k}] is {value}: expected finite numbers only")));
     }
     Ok(samples)
 }
@@ -35,22 +33,12 @@ fn as_float_array<'py>(
     let numpy = value.py().import("numpy")?;
     let keywords = [("dtype", "float64")].into_py_dict(value.py())?;
     let converted = numpy.call_method("asarray", (value,), Some(&keywords));
-    match converted
-        .as_ref()
-        .map(|array| array.cast::<PyArrayDyn<f64>>())
-    {
+    match converted.as_ref().map(|array| array.cast::<PyArrayDyn<f64>>()) {
         Ok(Ok(array)) => Ok(array.readonly()),
-        _ => Err(shape(
-            name,
-            &kind(value),
-            "a one-dimensional array of numbers",
-        )),
+        _ => Err(shape(name, &kind(value), "a one-dimensional array of numbers")),
     }
 }
 
 fn kind(value: &Bound<'_, PyAny>) -> String {
-    value
-        .get_type()
-        .name()
-        .map_or_else(|_| "another type".into(), |name| format!("type {name}"))
+    value.get_type().name().map_or_else(|_| "another type".into(), |name| format!("type {name}"))
 }

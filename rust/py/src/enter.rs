@@ -123,9 +123,7 @@ pub fn enter_pool<T: Send>(
     }
     match joined {
         Ok(result) => result.map_err(|error| raise(&error)),
-        Err(_) => Err(PyOSError::new_err(
-            "a thread of the search died; please report this",
-        )),
+        Err(_) => Err(PyOSError::new_err("a thread of the search died; please report this")),
     }
 }
 
@@ -166,9 +164,7 @@ fn tell(watchers: &Watchers, halt: &Halt, progress: &Progress, answers: &Sender<
             halt.stop(py, error);
         }
         if let Some(callback) = &watchers.callback {
-            let asked = callback
-                .call1(py, report)
-                .and_then(|answer| answer.is_truthy(py));
+            let asked = callback.call1(py, report).and_then(|answer| answer.is_truthy(py));
             match asked {
                 Ok(false) => {}
                 Ok(true) => halt.stop(py, PyStopIteration::new_err(())),
@@ -177,11 +173,8 @@ fn tell(watchers: &Watchers, halt: &Halt, progress: &Progress, answers: &Sender<
         }
     });
     if watchers.callback.is_some() {
-        let answer = if halt.stopped() {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        };
+        let answer =
+            if halt.stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
         // The worker may have gone meanwhile; then nobody waits.
         let _ = answers.send(answer);
     }

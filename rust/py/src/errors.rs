@@ -24,11 +24,7 @@ pub fn raise(error: &Error) -> PyErr {
 /// The exception for an array of the wrong shape.
 pub fn shape(name: &str, found: &str, expected: &str) -> PyErr {
     let (name, found, expected) = (name.into(), found.into(), expected.into());
-    raise(&Error::Shape {
-        name,
-        found,
-        expected,
-    })
+    raise(&Error::Shape { name, found, expected })
 }
 
 /// The exception for a record that cannot be used.

@@ -2,9 +2,10 @@
 
 use numpy::{PyArray1, ToPyArray};
 use piezotrack_core::identify::{
-    Boundary, Coordinate, Identification, Outcome, Record, Spec, StopReason, SwarmSettings,
+    Boundary, Coordinate, Identification, Outcome, Plan, Record, Spec, StopReason, SwarmSettings,
     Topology, identify,
 };
+use piezotrack_core::march::Order;
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
@@ -29,10 +30,7 @@ impl PySettings {
     #[pyo3(signature = (*, particles, iterations, inertia_start, inertia_end,
         inertia_iterations, cognitive, social, topology, velocity_limit, boundary, min_improvement,
         stall_iterations, polish))]
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "keyword-only, one for each setting"
-    )]
+    #[expect(clippy::too_many_arguments, reason = "keyword-only, one for each setting")]
     fn new(
         particles: usize,
         iterations: usize,
@@ -86,11 +84,15 @@ fn topology_named(name: &str) -> Result<Topology> {
     match name {
         "global" => Ok(Topology::Global),
         "ring" => Ok(Topology::Ring),
-        other => Err(Error::parameter(
-            "topology",
-            format!("'{other}'"),
-            "'global' or 'ring'",
-        )),
+        other => Err(Error::parameter("topology", format!("'{other}'"), "'global' or 'ring'")),
+    }
+}
+
+fn reason_name(reason: StopReason) -> &'static str {
+    match reason {
+        StopReason::Stalled => "stalled",
+        StopReason::Iterations => "iterations",
+        StopReason::Interrupted => "interrupted",
     }
 }
 
@@ -140,7 +142,7 @@ impl PySearch {
 
     #[getter]
     fn substeps(&self) -> usize {
-        self.outcome.substeps
+        self.found.stepping.substeps
     }
 
     #[getter]
@@ -149,12 +151,24 @@ impl PySearch {
     }
 
     #[getter]
-    fn stop_reason(&self) -> &'static str {
-        match self.outcome.reason {
-            StopReason::Stalled => "stalled",
-            StopReason::Iterations => "iterations",
-            StopReason::Interrupted => "interrupted",
+    fn order(&self) -> u32 {
+        match self.found.stepping.order {
+            Order::Second => 2,
+            Order::Fourth => 4,
         }
+    }
+
+    #[getter]
+    fn stop_reason(&self) -> &'static str {
+        reason_name(self.outcome.reason)
+    }
+
+    /// (cost, iterations, simulations, why it ended) of each run.
+    #[getter]
+    fn runs(&self) -> Vec<(f64, usize, usize, &'static str)> {
+        let runs = self.found.runs.iter();
+        runs.map(|run| (run.costs.rms, run.iterations, run.evaluations, reason_name(run.reason)))
+            .collect()
     }
 
     #[getter]
@@ -165,15 +179,10 @@ impl PySearch {
     /// Bounds of each parameter; None for one that was held.
     #[getter]
     fn bounds(&self) -> Vec<Option<(f64, f64)>> {
-        let bounds = self
-            .found
-            .problem
-            .coordinates
-            .iter()
-            .map(|coordinate| match *coordinate {
-                Coordinate::Fixed(_) => None,
-                Coordinate::Free { low, high, .. } => Some((low, high)),
-            });
+        let bounds = self.found.problem.coordinates.iter().map(|coordinate| match *coordinate {
+            Coordinate::Fixed(_) => None,
+            Coordinate::Free { low, high, .. } => Some((low, high)),
+        });
         bounds.collect()
     }
 
@@ -181,20 +190,15 @@ impl PySearch {
     #[getter]
     fn sensitivities(&self) -> Vec<(usize, f64, bool)> {
         let found = self.found.sensitivities.iter();
-        found
-            .map(|s| (s.parameter, s.deviation, s.at_bound))
-            .collect()
+        found.map(|s| (s.parameter, s.deviation, s.at_bound)).collect()
     }
 }
 
 /// Identifies a Dahl stage; None where the search was stopped before its first cost.
 #[pyfunction]
 #[pyo3(signature = (*, u, y, dt, hold_name, start, free, fixed, bounds, stiffness, offset,
-    settings, seed, threads, callback, progress))]
-#[expect(
-    clippy::too_many_arguments,
-    reason = "keyword-only, called from one place"
-)]
+    settings, seed, runs, threads, callback, progress))]
+#[expect(clippy::too_many_arguments, reason = "keyword-only, called from one place")]
 fn identify_dahl(
     py: Python<'_>,
     u: &Bound<'_, PyAny>,
@@ -209,25 +213,18 @@ fn identify_dahl(
     offset: bool,
     settings: &PySettings,
     seed: u64,
+    runs: usize,
     threads: usize,
     callback: Option<Py<PyAny>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Option<PySearch>> {
     let (u, y) = (samples("u", u)?, samples("y", y)?);
-    let spec = Spec {
-        free,
-        fixed,
-        bounds,
-        stiffness,
-        offset,
-    };
+    let spec = Spec { free, fixed, bounds, stiffness, offset };
+    let plan = Plan { settings: settings.0.clone(), seed, runs };
     let watchers = Watchers { callback, progress };
     let found = enter_pool(py, threads, &watchers, |monitor, stop| {
         let record = Record::new(&u, &y, dt, hold(hold_name)?, start)?;
-        identify(&record, &spec, &settings.0, seed, monitor, stop)
+        identify(&record, &spec, &plan, monitor, stop)
     })?;
-    Ok(found
-        .outcome
-        .clone()
-        .map(|outcome| PySearch { found, outcome }))
+    Ok(found.best.map(|best| PySearch { outcome: found.runs[best].clone(), found }))
 }

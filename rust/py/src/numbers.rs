@@ -36,8 +36,6 @@ fn is_other(value: &Bound<'_, PyAny>) -> bool {
 }
 
 fn refused(name: &str, value: &Bound<'_, PyAny>, expected: &str) -> PyErr {
-    let shown = value
-        .repr()
-        .map_or_else(|_| "unprintable".into(), |text| text.to_string());
+    let shown = value.repr().map_or_else(|_| "unprintable".into(), |text| text.to_string());
     raise(&Error::parameter(name, shown, expected))
 }

@@ -2,6 +2,7 @@
 
 use numpy::{PyArray1, ToPyArray};
 use piezotrack_core::integrate::{self, Drive, Hold, Trajectory};
+use piezotrack_core::march::{Order, Stepping};
 use piezotrack_core::stage::{DAHL_PARAMETERS, DahlStage, StageState};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
@@ -17,10 +18,8 @@ pub type Theta = [f64; 9];
 type State = (f64, f64, f64, f64);
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    let parameters: Vec<_> = DAHL_PARAMETERS
-        .iter()
-        .map(|info| (info.name, info.symbol, info.unit))
-        .collect();
+    let parameters: Vec<_> =
+        DAHL_PARAMETERS.iter().map(|info| (info.name, info.symbol, info.unit)).collect();
     module.add("DAHL_PARAMETERS", parameters)?;
     module.add_class::<PyTrajectory>()?;
     module.add_function(wrap_pyfunction!(dahl_check, module)?)?;
@@ -34,11 +33,7 @@ pub fn hold(name: &str) -> Result<Hold> {
     match name {
         "foh" => Ok(Hold::First),
         "zoh" => Ok(Hold::Zero),
-        other => Err(Error::parameter(
-            "hold",
-            format!("'{other}'"),
-            "'foh' or 'zoh'",
-        )),
+        other => Err(Error::parameter("hold", format!("'{other}'"), "'foh' or 'zoh'")),
     }
 }
 
@@ -65,12 +60,7 @@ impl PyTrajectory {
 
     #[getter]
     fn last(&self) -> State {
-        let StageState {
-            x,
-            v,
-            hysteresis,
-            hysteresis_slope,
-        } = self.0.last;
+        let StageState { x, v, hysteresis, hysteresis_slope } = self.0.last;
         (x, v, hysteresis, hysteresis_slope)
     }
 
@@ -88,34 +78,15 @@ impl PyTrajectory {
 /// Raises where the nine values make no stage.
 #[pyfunction]
 fn dahl_check(theta: Theta) -> PyResult<()> {
-    DahlStage::from_theta(&theta)
-        .map(|_| ())
-        .map_err(|error| raise(&error))
+    DahlStage::from_theta(&theta).map(|_| ()).map_err(|error| raise(&error))
 }
 
 /// Table 1 of Xu and Li 2010.
 #[pyfunction]
 fn dahl_xu_li_2010() -> Theta {
-    let DahlStage {
-        mechanics,
-        piezo_coefficient,
-        a1,
-        a2,
-        b1,
-        up,
-    } = DahlStage::xu_li_2010();
+    let DahlStage { mechanics, piezo_coefficient, a1, a2, b1, up } = DahlStage::xu_li_2010();
     let (mass, damping, stiffness) = (mechanics.mass, mechanics.damping, mechanics.stiffness);
-    [
-        mass,
-        damping,
-        stiffness,
-        piezo_coefficient,
-        a1,
-        a2,
-        b1,
-        0.0,
-        up,
-    ]
+    [mass, damping, stiffness, piezo_coefficient, a1, a2, b1, 0.0, up]
 }
 
 /// Simulates to an accuracy, choosing the sub-steps.
@@ -146,7 +117,8 @@ fn dahl_simulate_fixed(
     substeps: usize,
 ) -> PyResult<PyTrajectory> {
     run(py, theta, u, dt, hold, |stage, drive, stop| {
-        integrate::simulate_fixed(stage, drive, StageState::default(), substeps, stop)
+        let stepping = Stepping { order: Order::Fourth, substeps };
+        integrate::simulate_fixed(stage, drive, StageState::default(), stepping, stop)
     })
 }
 
@@ -171,10 +143,5 @@ fn run(
 }
 
 fn state((x, v, hysteresis, hysteresis_slope): State) -> StageState {
-    StageState {
-        x,
-        v,
-        hysteresis,
-        hysteresis_slope,
-    }
+    StageState { x, v, hysteresis, hysteresis_slope }
 }

@@ -12,14 +12,12 @@
 use super::Operator;
 use crate::Number;
 
-/// Terms of the power series in the distance.
-///
-/// The first one left out is `(sqrt(a2) d)^TERMS / (TERMS + 1)!` of the change: below 1e-15
-/// for strides of 0.01 / sqrt(a2), which is 10 um with the published a2. The integrator,
-/// which halves its steps until they agree, checks longer strides.
-const TERMS: usize = 6;
-
 /// Second-order Dahl operator with its output scaled to force, for b0 = 0.
+///
+/// `TERMS` of the power series in the distance are summed. The first one left out is
+/// `(sqrt(a2) d)^TERMS / (TERMS + 1)!` of the change: with six, below 1e-15 for moves of
+/// 0.01 / sqrt(a2), which is 10 um with the published a2. The integrator, which halves its
+/// steps until they agree, checks longer moves.
 ///
 /// | field | symbol | unit | range |
 /// | --- | --- | --- | --- |
@@ -27,7 +25,7 @@ const TERMS: usize = 6;
 /// | `a2` | a2 | 1/m^2 | >= 0 |
 /// | `gain` | b1 up | N/m^2 | any |
 #[derive(Clone, Copy, Debug)]
-pub struct Dahl<N> {
+pub struct Dahl<N, const TERMS: usize = 6> {
     /// Decay along the path, 1/m.
     pub a1: N,
     /// Square of the spatial frequency, 1/m^2.
@@ -47,23 +45,20 @@ pub struct DahlState<N> {
 
 /// Taylor coefficients of the force about the state that a branch leaves.
 #[derive(Clone, Copy, Debug)]
-pub struct DahlBranch<N> {
+pub struct DahlBranch<N, const TERMS: usize> {
     force: N,
     /// Derivatives of the force with respect to x, the first one first.
     derivatives: [N; TERMS],
 }
 
-impl<N: Number> Operator<N> for Dahl<N> {
+impl<N: Number, const TERMS: usize> Operator<N> for Dahl<N, TERMS> {
     type State = DahlState<N>;
-    type Branch = DahlBranch<N>;
+    type Branch = DahlBranch<N, TERMS>;
 
     #[inline(always)]
     fn rest(&self) -> DahlState<N> {
         let zero = self.gain.like(0.0);
-        DahlState {
-            force: zero,
-            slope: zero,
-        }
+        DahlState { force: zero, slope: zero }
     }
 
     #[inline(always)]
@@ -72,7 +67,7 @@ impl<N: Number> Operator<N> for Dahl<N> {
     }
 
     #[inline(always)]
-    fn branch(&self, state: &DahlState<N>, direction: N) -> DahlBranch<N> {
+    fn branch(&self, state: &DahlState<N>, direction: N) -> DahlBranch<N, TERMS> {
         let decay = -(direction * self.a1);
         let spring = -self.a2;
         let mut derivatives = [state.slope; TERMS];
@@ -80,14 +75,11 @@ impl<N: Number> Operator<N> for Dahl<N> {
         for k in 2..TERMS {
             derivatives[k] = spring.mul_add(derivatives[k - 2], decay * derivatives[k - 1]);
         }
-        DahlBranch {
-            force: state.force,
-            derivatives,
-        }
+        DahlBranch { force: state.force, derivatives }
     }
 
     #[inline(always)]
-    fn along(&self, branch: &DahlBranch<N>, distance: N) -> DahlState<N> {
+    fn along(&self, branch: &DahlBranch<N, TERMS>, distance: N) -> DahlState<N> {
         let d = &branch.derivatives;
         let mut force = d[TERMS - 1];
         let mut slope = d[TERMS - 1];
@@ -105,12 +97,5 @@ impl<N: Number> Operator<N> for Dahl<N> {
 }
 
 /// 1/k for the Horner scheme.
-const RECIPROCAL: [f64; TERMS + 1] = [
-    0.0,
-    1.0,
-    1.0 / 2.0,
-    1.0 / 3.0,
-    1.0 / 4.0,
-    1.0 / 5.0,
-    1.0 / 6.0,
-];
+const RECIPROCAL: [f64; 9] =
+    [0.0, 1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0, 1.0 / 5.0, 1.0 / 6.0, 1.0 / 7.0, 1.0 / 8.0];

@@ -31,12 +31,7 @@ impl Measures {
         let change: f64 = u.windows(2).map(|w| (w[1] - w[0]) * (w[1] - w[0])).sum();
         let dt = record.drive.dt;
         let frequency = libm::sqrt(change / size) / dt;
-        Self {
-            stroke,
-            gain: stroke / (high - low),
-            frequency,
-            dt,
-        }
+        Self { stroke, gain: stroke / (high - low), frequency, dt }
     }
 }
 
@@ -62,10 +57,7 @@ pub fn derive(record: &Record<'_>, fixed: &[Option<f64>; 9]) -> Result<[Coordina
         (soft * of.gain / 3.0, hard * of.gain * 3.0),
         // From 100 strokes of memory to a tenth: with a1 = 0 the operator is a lossless spring.
         (1e-2 / of.stroke, 10.0 / of.stroke),
-        (
-            1e-2 / (of.stroke * of.stroke),
-            40.0 / (of.stroke * of.stroke),
-        ),
+        (1e-2 / (of.stroke * of.stroke), 40.0 / (of.stroke * of.stroke)),
         (-2.0 * curvature, 2.0 * curvature),
     ];
     let mut coordinates = [Coordinate::Fixed(0.0); 9];
@@ -96,9 +88,6 @@ fn stiffness_range(of: &Measures, fixed: &[Option<f64>; 9], up: f64) -> (f64, f6
         let slowest = 3.0 * of.frequency;
         (value * slowest * slowest, value * slowest * slowest * 1e4)
     } else {
-        (
-            super::problem::NOMINAL_STIFFNESS,
-            super::problem::NOMINAL_STIFFNESS,
-        )
+        (super::problem::NOMINAL_STIFFNESS, super::problem::NOMINAL_STIFFNESS)
     }
 }

@@ -6,82 +6,75 @@
 //!
 //! Xu and Li 2010, equation (16), doi 10.1115/1.4001712. Where an offset is fitted, its best
 //! value for each guess is the mean of the deviation, so it costs the swarm no dimension.
-//! Particles run in lockstep lanes and no trajectory is stored.
+//! Particles run in lockstep lanes, and no trajectory is stored.
 
 use piezotrack_control::Number;
-use piezotrack_control::operator::{Dahl, Operator};
+use piezotrack_control::operator::{Dahl, DahlState, Operator};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::problem::{Problem, Record, Theta, range};
-use crate::integrate::{Drive, March, Stop, index, steps_for};
+use super::problem::{Problem, Record, Theta};
+use super::stepping;
+use crate::integrate::{Stop, index};
 use crate::lanes::Lanes;
+use crate::march::{FEW_TERMS, March, Order, Sink, Stepping, TERMS};
 use crate::mechanics::{Mechanics, Propagator, halvings};
-use crate::stage::DahlStage;
 use crate::stage::feedback::FeedbackState;
 
-/// Vectors that go through the step together: they hide each other's latency.
-const VECTORS: usize = 2;
+/// Vectors that go through the step together, to hide each other's latency.
+const VECTORS: usize = 3;
 
-/// Accuracy that a search asks of its simulations, m.
-const ACCURACY: f64 = 2e-10;
-
-/// Most sub-steps that a search takes in one sampling interval.
-const MOST: usize = 256;
+/// Parameters to simulate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Guess {
+    /// The parameters, SI.
+    pub theta: Theta,
+    /// The cost, m, beyond which nobody asks how bad the guess is; infinite for none.
+    pub limit: f64,
+}
 
 /// Cost and offset of a guess.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Costs {
-    /// RMS deviation, m; infinite where the simulation blew up.
+    /// RMS deviation, m; infinite where the simulation blew up. Where the guess was abandoned,
+    /// a lower bound that lies above its limit.
     pub rms: f64,
     /// Offset added to the simulated displacement, m.
     pub offset: f64,
 }
 
-/// Computes costs of guesses for one problem, with the sub-steps fixed.
+impl Costs {
+    /// What a guess costs that could not be simulated.
+    const FAILED: Self = Self { rms: f64::INFINITY, offset: 0.0 };
+}
+
+/// Computes costs of guesses for one problem, with the stepping fixed.
 pub struct Evaluator<'a> {
     record: &'a Record<'a>,
     problem: &'a Problem,
     arch: Arch,
-    /// Steps of the integrator in each sampling interval.
-    pub substeps: usize,
+    /// How finely a sampling interval is stepped through.
+    pub stepping: Stepping,
     halvings: u32,
     /// Subtracted from the measured displacement, m, to keep the sums small.
     centre: f64,
 }
 
 impl<'a> Evaluator<'a> {
-    /// Fixes the sub-steps from the bounds, the sampling rate and the drive.
-    ///
-    /// The stages at the corners and in the middle of the box are simulated with more and more
-    /// sub-steps, until none of them moves by more than 0.2 nm.
+    /// Fixes the stepping from the bounds, the sampling rate and the drive.
     #[must_use]
     pub fn new(record: &'a Record<'a>, problem: &'a Problem, stop: Stop<'_>) -> Self {
-        let substeps = substeps(record, problem, stop);
-        let step = record.drive.dt / index(substeps);
-        let rate = corners(problem).iter().fold(0.0, |most: f64, theta| {
-            let mechanics = Mechanics {
-                mass: theta[0],
-                damping: theta[1],
-                stiffness: theta[2],
-            };
+        let stepping = stepping::choose(record, problem, stop);
+        let step = record.drive.dt / index(stepping.substeps);
+        let rate = stepping::corners(problem).iter().fold(0.0, |most: f64, theta| {
+            let mechanics = Mechanics { mass: theta[0], damping: theta[1], stiffness: theta[2] };
             most.max(mechanics.rate())
         });
         let window = &record.y[record.window.clone()];
-        let centre = if problem.offset {
-            window.iter().sum::<f64>() / index(window.len())
-        } else {
-            0.0
-        };
+        let centre =
+            if problem.offset { window.iter().sum::<f64>() / index(window.len()) } else { 0.0 };
         let halvings = halvings(rate, step);
-        Self {
-            record,
-            problem,
-            arch: Arch::new(),
-            substeps,
-            halvings,
-            centre,
-        }
+        Self { record, problem, arch: Arch::new(), stepping, halvings, centre }
     }
 
     /// Runs on another instruction set: the costs have the same bits.
@@ -95,31 +88,36 @@ impl<'a> Evaluator<'a> {
     ///
     /// Those that were not finished when `stop` said so are infinite.
     #[must_use]
-    pub fn costs(&self, thetas: &[Theta], stop: Stop<'_>) -> Vec<Costs> {
+    pub fn costs(&self, guesses: &[Guess], stop: Stop<'_>) -> Vec<Costs> {
         let width = self.arch.dispatch(Width);
-        let share = thetas.len().div_ceil(rayon::current_num_threads()).max(1);
-        let size = share.div_ceil(width).max(1) * width;
-        let size = size.min(width * VECTORS);
-        thetas
-            .par_chunks(size)
-            .flat_map_iter(|chunk| self.bundle(chunk, width, stop))
-            .collect()
+        // Every thread gets vectors to fill before any gets a second one.
+        let vectors = guesses.len().div_ceil(width);
+        let each = vectors.div_ceil(rayon::current_num_threads()).clamp(1, VECTORS);
+        let size = guesses.len().div_ceil(vectors.div_ceil(each).max(1)).max(1);
+        guesses.par_chunks(size).flat_map_iter(|chunk| self.bundle(chunk, width, stop)).collect()
     }
 
     /// Costs of as many guesses as one bundle of lanes takes.
-    fn bundle(&self, thetas: &[Theta], width: usize, stop: Stop<'_>) -> Vec<Costs> {
-        if thetas.len() > width {
-            self.arch.dispatch(Bundle::<VECTORS> {
-                of: self,
-                thetas,
-                stop,
-            })
+    fn bundle(&self, guesses: &[Guess], width: usize, stop: Stop<'_>) -> Vec<Costs> {
+        if guesses.len() <= width {
+            self.arch.dispatch(Bundle::<1> { of: self, guesses, stop })
         } else {
-            self.arch.dispatch(Bundle::<1> {
-                of: self,
-                thetas,
-                stop,
-            })
+            self.arch.dispatch(Bundle::<VECTORS> { of: self, guesses, stop })
+        }
+    }
+
+    /// Cost and offset from the sums of the deviation and of its square.
+    fn conclude(&self, sum: f64, squares: f64, samples: usize) -> Costs {
+        let (mean, mean_square) = (sum / index(samples), squares / index(samples));
+        let (variance, offset) = if self.problem.offset {
+            (mean_square - mean * mean, mean + self.centre)
+        } else {
+            (mean_square, 0.0)
+        };
+        if variance.is_finite() && mean.is_finite() {
+            Costs { rms: libm::sqrt(variance.max(0.0)), offset }
+        } else {
+            Costs::FAILED
         }
     }
 }
@@ -138,7 +136,7 @@ impl WithSimd for Width {
 /// Guesses in one bundle of lanes.
 struct Bundle<'a, const K: usize> {
     of: &'a Evaluator<'a>,
-    thetas: &'a [Theta],
+    guesses: &'a [Guess],
     stop: Stop<'a>,
 }
 
@@ -147,146 +145,99 @@ impl<const K: usize> WithSimd for Bundle<'_, K> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Vec<Costs> {
-        let Self { of, thetas, stop } = self;
-        let Record { drive, y, window } = of.record;
+        match self.of.stepping.order {
+            Order::Second => self.run::<S, FEW_TERMS, false>(simd),
+            Order::Fourth => self.run::<S, TERMS, true>(simd),
+        }
+    }
+}
+
+impl<const K: usize> Bundle<'_, K> {
+    #[inline(always)]
+    fn run<S: Simd, const T: usize, const FOURTH: bool>(self, simd: S) -> Vec<Costs> {
+        let Self { of, guesses, .. } = self;
         // Lanes without a guess of their own repeat the last.
         let lanes = |value: &dyn Fn(&Theta) -> f64| {
             Lanes::<S, K>::gather(simd, |lane| {
-                thetas.get(lane).or(thetas.last()).map_or(f64::NAN, value)
+                guesses.get(lane).or(guesses.last()).map_or(f64::NAN, |guess| value(&guess.theta))
             })
         };
-        let step = drive.dt / index(of.substeps);
         let linear = Propagator::new(
             lanes(&|theta| 1.0 / theta[0]),
             lanes(&|theta| theta[1] / theta[0]),
             lanes(&|theta| theta[2] / theta[0]),
-            step,
+            of.record.drive.dt / index(of.stepping.substeps),
             of.halvings,
         );
-        let operator = Dahl {
+        let operator = Dahl::<_, T> {
             a1: lanes(&|theta| theta[4]),
             a2: lanes(&|theta| theta[5]),
             gain: lanes(&|theta| theta[6] * theta[8]),
         };
         let gain = lanes(&|theta| theta[3]);
         let zero = lanes(&|_| 0.0);
-        let (mut sum, mut squares) = (zero, zero);
-        let start = FeedbackState {
-            x: zero,
-            w: zero,
-            memory: operator.rest(),
-        };
-        let march = March {
-            linear,
-            operator,
-            gain,
-        };
-        march.run(drive, of.substeps, start, stop, |k, state| {
-            if k >= window.start {
-                let deviation = zero.like(y[k] - of.centre) - state.x;
-                sum = sum + deviation;
-                squares = deviation.mul_add(deviation, squares);
-            }
-        });
-        if stop() {
-            return vec![
-                Costs {
-                    rms: f64::INFINITY,
-                    offset: 0.0
-                };
-                thetas.len()
-            ];
-        }
-        let count = index(window.len());
-        let lanes = sum
-            .as_slice()
-            .iter()
-            .zip(squares.as_slice())
-            .take(thetas.len());
+        let start = FeedbackState { x: zero, w: zero, memory: operator.rest() };
+        let verdicts = vec![None; guesses.len()];
+        let mut sums = Sums { of: &self, sum: zero, squares: zero, verdicts };
+        let march = March { linear, operator, gain };
+        let end = march.run::<FOURTH>(&of.record.drive, of.stepping.substeps, start, &mut sums);
+        let ended = end.is_some();
+        let samples = of.record.window.len();
+        let lanes = sums.sum.as_slice().iter().zip(sums.squares.as_slice()).zip(sums.verdicts);
         lanes
-            .map(|(&sum, &squares)| of.conclude(sum / count, squares / count))
+            .map(|((&sum, &squares), verdict)| match verdict {
+                Some(verdict) => verdict,
+                None if ended => of.conclude(sum, squares, samples),
+                None => Costs::FAILED,
+            })
             .collect()
     }
 }
 
-impl Evaluator<'_> {
-    /// Cost and offset from the mean and the mean square of the deviation.
-    fn conclude(&self, mean: f64, mean_square: f64) -> Costs {
-        let (variance, offset) = if self.problem.offset {
-            (mean_square - mean * mean, mean + self.centre)
-        } else {
-            (mean_square, 0.0)
-        };
-        let rms = libm::sqrt(variance.max(0.0));
-        if variance.is_finite() && mean.is_finite() {
-            Costs { rms, offset }
-        } else {
-            Costs {
-                rms: f64::INFINITY,
-                offset: 0.0,
-            }
+/// Sums of the deviation and of its square, in lanes.
+struct Sums<'a, const K: usize, N> {
+    of: &'a Bundle<'a, K>,
+    sum: N,
+    squares: N,
+    /// Costs of the guesses that are settled before the end.
+    verdicts: Vec<Option<Costs>>,
+}
+
+impl<const K: usize, S: Simd> Sink<Lanes<S, K>, DahlState<Lanes<S, K>>>
+    for Sums<'_, K, Lanes<S, K>>
+{
+    #[inline(always)]
+    fn sample(&mut self, k: usize, state: &FeedbackState<Lanes<S, K>, DahlState<Lanes<S, K>>>) {
+        let Evaluator { record, centre, .. } = self.of.of;
+        if k >= record.window.start {
+            let deviation = state.x.like(record.y[k] - centre) - state.x;
+            self.sum = self.sum + deviation;
+            self.squares = deviation.mul_add(deviation, self.squares);
         }
     }
-}
 
-/// The corners of the box of free parameters, and its middle.
-fn corners(problem: &Problem) -> Vec<Theta> {
-    let count = problem.free().count();
-    let mut places: Vec<Vec<f64>> = (0..1_usize << count)
-        .map(|bits| {
-            (0..count)
-                .map(|d| f64::from(u8::from(bits >> d & 1 == 1)))
-                .collect()
-        })
-        .collect();
-    places.push(vec![0.5; count]);
-    places.iter().map(|place| problem.theta(place)).collect()
-}
-
-/// Sub-steps with which the stages at the corners and in the middle are accurate, a power of 2.
-///
-/// A stage that goes more than twice the measured stroke is left out, and so is one that no
-/// sub-steps make accurate: such a guess costs more than any stage worth finding, however
-/// exactly it is computed.
-fn substeps(record: &Record<'_>, problem: &Problem, stop: Stop<'_>) -> usize {
-    let excerpts = excerpts(&record.drive);
-    let most = 2.0 * record.stroke();
-    let thetas = corners(problem);
-    let needed = thetas.par_iter().filter_map(|theta| {
-        let stage = DahlStage::from_theta(theta).ok()?;
-        let needs = excerpts.iter().filter_map(|drive| {
-            let (substeps, x) = steps_for(&stage, drive, ACCURACY, MOST, stop)?;
-            let (low, high) = range(&x);
-            (high - low <= most).then_some(substeps)
-        });
-        needs.max()
-    });
-    needed.max().unwrap_or(1)
-}
-
-/// Parts of a long drive that ask most of the integrator: its beginning, and its steepest part.
-fn excerpts<'a>(drive: &Drive<'a>) -> Vec<Drive<'a>> {
-    const LENGTH: usize = 8192;
-    if drive.u.len() <= 2 * LENGTH {
-        return vec![*drive];
+    /// Gives up where every guess is already beyond its limit: squares only add up, also about
+    /// the mean that would suit best what has been seen.
+    ///
+    /// A guess's verdict is its own, whatever the other lanes hold, so it does not depend on
+    /// how guesses are bundled.
+    #[inline(always)]
+    fn give_up(&mut self, k: usize) -> bool {
+        let Bundle { of, guesses, stop } = self.of;
+        let (seen, samples) =
+            ((k + 1).saturating_sub(of.record.window.start), of.record.window.len());
+        if seen > 0 && seen < samples {
+            let share = libm::sqrt(index(seen) / index(samples));
+            let sums = self.sum.as_slice().iter().zip(self.squares.as_slice());
+            for (((&sum, &squares), guess), verdict) in sums.zip(*guesses).zip(&mut self.verdicts) {
+                let part = of.conclude(sum, squares, seen);
+                let bound = Costs { rms: share * part.rms, ..part };
+                // A hair above, so that rounding cannot abandon a guess that ends at its limit.
+                if verdict.is_none() && bound.rms > guess.limit * (1.0 + 1e-9) {
+                    *verdict = Some(bound);
+                }
+            }
+        }
+        stop() || self.verdicts.iter().all(Option::is_some)
     }
-    let steepest = drive
-        .u
-        .windows(2)
-        .map(|pair| (pair[1] - pair[0]).abs())
-        .enumerate()
-        .fold(
-            (0, 0.0),
-            |most, now| if now.1 > most.1 { now } else { most },
-        )
-        .0;
-    let start = steepest
-        .saturating_sub(LENGTH / 2)
-        .min(drive.u.len() - LENGTH);
-    [0, start]
-        .map(|from| Drive {
-            u: &drive.u[from..from + LENGTH],
-            ..*drive
-        })
-        .to_vec()
 }

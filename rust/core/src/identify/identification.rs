@@ -3,23 +3,28 @@
 use super::cost::Evaluator;
 use super::local::{Local, Sensitivity};
 use super::problem::{Problem, Record, Spec};
-use super::search::{Monitor, Outcome, StopReason, search};
-use super::swarm::SwarmSettings;
+use super::search::{Monitor, Outcome, Plan, StopReason, search};
 use crate::error::Result;
 use crate::integrate::Stop;
+use crate::march::Stepping;
 
 /// An identified stage and how it was found.
 #[derive(Clone, Debug)]
 pub struct Identification {
     /// What was held, what was free, and between which bounds.
     pub problem: Problem,
-    /// What was found; `None` where the search was stopped before its first cost.
-    pub outcome: Option<Outcome>,
+    /// How finely the search stepped.
+    pub stepping: Stepping,
+    /// What each run found, in their order.
+    pub runs: Vec<Outcome>,
+    /// Which of the runs has the lowest cost; `None` where the search was stopped before its
+    /// first cost.
+    pub best: Option<usize>,
     /// What the record tells of each free parameter; empty where the search was stopped.
     pub sensitivities: Vec<Sensitivity>,
 }
 
-/// Identifies a Dahl stage from a record: a swarm, where asked a polish, and the spread.
+/// Identifies a Dahl stage from a record: swarms, where asked a polish of each, and the spread.
 ///
 /// # Errors
 /// [`crate::Error::Parameter`] for a specification or setting that cannot be used,
@@ -27,45 +32,37 @@ pub struct Identification {
 pub fn identify(
     record: &Record<'_>,
     spec: &Spec,
-    settings: &SwarmSettings,
-    seed: u64,
+    plan: &Plan,
     monitor: &mut dyn Monitor,
     stop: Stop<'_>,
 ) -> Result<Identification> {
-    settings.validate()?;
+    plan.settings.validate()?;
     let problem = Problem::new(record, spec)?;
     let evaluator = Evaluator::new(record, &problem, stop);
-    let mut outcome = search(&evaluator, &problem, settings, seed, monitor, stop)?;
-    if outcome.costs.rms.is_infinite() {
-        return Ok(Identification {
-            problem,
-            outcome: None,
-            sensitivities: Vec::new(),
-        });
+    let mut runs = search(&evaluator, &problem, plan, monitor, stop)?;
+    let ended = runs.iter().all(|run| run.reason != StopReason::Interrupted);
+    let local = Local { record, problem: &problem, evaluator: &evaluator, stop };
+    if ended && plan.settings.polish {
+        for run in runs.iter_mut().filter(|run| run.costs.rms.is_finite()) {
+            let polished = local.polish(&run.place, run.costs);
+            run.polish_evaluations = polished.evaluations;
+            run.costs = polished.costs;
+            run.theta = problem.theta(&polished.place);
+            run.place = polished.place;
+        }
     }
+    let best = (0..runs.len())
+        .filter(|&i| runs[i].costs.rms.is_finite())
+        .min_by(|&i, &j| runs[i].costs.rms.total_cmp(&runs[j].costs.rms));
     let mut sensitivities = Vec::new();
-    if outcome.reason != StopReason::Interrupted {
-        let local = Local {
-            record,
-            problem: &problem,
-            evaluator: &evaluator,
-            stop,
-        };
-        if settings.polish {
-            let polished = local.polish(&outcome.place, outcome.costs);
-            outcome.polish_evaluations = polished.evaluations;
-            outcome.costs = polished.costs;
-            outcome.theta = problem.theta(&polished.place);
-            outcome.place = polished.place;
-        }
-        sensitivities = local.sensitivities(&outcome.place, outcome.costs.rms);
-        if stop() {
-            outcome.reason = StopReason::Interrupted;
+    if let Some(run) = best.map(|i| &runs[i]).filter(|_| ended) {
+        sensitivities = local.sensitivities(&run.place, run.costs.rms);
+    }
+    if stop() {
+        for run in &mut runs {
+            run.reason = StopReason::Interrupted;
         }
     }
-    Ok(Identification {
-        problem,
-        outcome: Some(outcome),
-        sensitivities,
-    })
+    let stepping = evaluator.stepping;
+    Ok(Identification { problem, stepping, runs, best, sensitivities })
 }

@@ -11,7 +11,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::cost::{Costs, Evaluator};
+use super::cost::{Costs, Evaluator, Guess};
 use super::problem::{Coordinate, Problem, Record};
 use crate::integrate::{Stop, index, simulate_fixed};
 use crate::stage::{DahlStage, StageState};
@@ -74,11 +74,7 @@ impl Local<'_> {
     /// Goes down to the minimum next to a guess; never returns a worse one.
     #[must_use]
     pub fn polish(&self, place: &[f64], costs: Costs) -> Polished {
-        let mut best = Polished {
-            place: place.to_vec(),
-            costs,
-            evaluations: 0,
-        };
+        let mut best = Polished { place: place.to_vec(), costs, evaluations: 0 };
         let mut damping = 1e-3;
         for _ in 0..ITERATIONS {
             let Some(normal) = self.normal(&best.place) else {
@@ -90,9 +86,8 @@ impl Local<'_> {
                 let Some(next) = step(&normal, &best.place, damping) else {
                     break;
                 };
-                let costs = self
-                    .evaluator
-                    .costs(&[self.problem.theta(&next)], self.stop);
+                let guess = Guess { theta: self.problem.theta(&next), limit: best.costs.rms };
+                let costs = self.evaluator.costs(&[guess], self.stop);
                 best.evaluations += 1;
                 if let Some(&costs) = costs.first()
                     && costs.rms < best.costs.rms
@@ -120,19 +115,11 @@ impl Local<'_> {
         let Some(normal) = self.normal(place) else {
             return Vec::new();
         };
-        let free = self
-            .problem
-            .free()
-            .zip(place)
-            .zip(spreads(&normal, rms, self.record));
+        let free = self.problem.free().zip(place).zip(spreads(&normal, rms, self.record));
         let found = free.map(|((parameter, &z), spread)| {
             let coordinate = self.problem.coordinates[parameter];
             let at_bound = !(1e-3..=1.0 - 1e-3).contains(&z);
-            Sensitivity {
-                parameter,
-                deviation: spread * slope_at(coordinate, z),
-                at_bound,
-            }
+            Sensitivity { parameter, deviation: spread * slope_at(coordinate, z), at_bound }
         });
         found.collect()
     }
@@ -141,16 +128,11 @@ impl Local<'_> {
     fn normal(&self, place: &[f64]) -> Option<Normal> {
         let window = &self.record.window;
         let stride = window.len().div_ceil(MOST_ROWS);
-        let pairs: Vec<(f64, f64)> = place
-            .iter()
-            .map(|z| ((z - CHANGE).max(0.0), (z + CHANGE).min(1.0)))
-            .collect();
+        let pairs: Vec<(f64, f64)> =
+            place.iter().map(|z| ((z - CHANGE).max(0.0), (z + CHANGE).min(1.0))).collect();
         let mut residual = self.displacement(place, stride)?;
         let measured = self.record.y[window.clone()].iter().step_by(stride);
-        residual
-            .iter_mut()
-            .zip(measured)
-            .for_each(|(x, y)| *x = y - *x);
+        residual.iter_mut().zip(measured).for_each(|(x, y)| *x = y - *x);
         self.centre(&mut residual);
         let columns: Option<Vec<Vec<f64>>> = pairs
             .par_iter()
@@ -163,10 +145,7 @@ impl Local<'_> {
                 };
                 let (below, mut column) = (at(low)?, at(high)?);
                 let scale = 1.0 / (high - low);
-                column
-                    .iter_mut()
-                    .zip(below)
-                    .for_each(|(x, b)| *x = (*x - b) * scale);
+                column.iter_mut().zip(below).for_each(|(x, b)| *x = (*x - b) * scale);
                 self.centre(&mut column);
                 Some(column)
             })
@@ -183,16 +162,10 @@ impl Local<'_> {
     /// Every stride-th sample of the window, simulated as the search does.
     fn displacement(&self, place: &[f64], stride: usize) -> Option<Vec<f64>> {
         let stage = DahlStage::from_theta(&self.problem.theta(place)).ok()?;
-        let (drive, substeps) = (&self.record.drive, self.evaluator.substeps);
-        let run = simulate_fixed(&stage, drive, StageState::default(), substeps, self.stop);
+        let (drive, stepping) = (&self.record.drive, self.evaluator.stepping);
+        let run = simulate_fixed(&stage, drive, StageState::default(), stepping, self.stop);
         let x = run.ok().flatten()?.x;
-        Some(
-            x[self.record.window.clone()]
-                .iter()
-                .step_by(stride)
-                .copied()
-                .collect(),
-        )
+        Some(x[self.record.window.clone()].iter().step_by(stride).copied().collect())
     }
 
     /// Takes the mean off where an offset is fitted.
@@ -216,11 +189,7 @@ fn step(normal: &Normal, place: &[f64], damping: f64) -> Option<Vec<f64>> {
         .collect();
     let square = DMatrix::from_fn(moving.len(), moving.len(), |i, j| {
         let value = normal.square[(moving[i], moving[j])];
-        if i == j {
-            value * (1.0 + damping)
-        } else {
-            value
-        }
+        if i == j { value * (1.0 + damping) } else { value }
     });
     let slope = DVector::from_fn(moving.len(), |i, _| normal.slope[moving[i]]);
     let change = square.cholesky()?.solve(&slope);
@@ -237,11 +206,7 @@ fn spreads(normal: &Normal, rms: f64, record: &Record<'_>) -> Vec<f64> {
     let sizes: Vec<f64> = (0..count).map(|d| normal.square[(d, d)].sqrt()).collect();
     let scaled = DMatrix::from_fn(count, count, |i, j| {
         let size = sizes[i] * sizes[j];
-        if size > 0.0 {
-            normal.square[(i, j)] / size
-        } else {
-            0.0
-        }
+        if size > 0.0 { normal.square[(i, j)] / size } else { 0.0 }
     });
     let decomposed = scaled.symmetric_eigen();
     let samples = record.window.len();
@@ -257,11 +222,7 @@ fn spreads(normal: &Normal, rms: f64, record: &Record<'_>) -> Vec<f64> {
             })
             .sum();
         let spread = noise * variance.sqrt() / sizes[d];
-        if spread.is_nan() {
-            f64::INFINITY
-        } else {
-            spread
-        }
+        if spread.is_nan() { f64::INFINITY } else { spread }
     };
     (0..count).map(spread).collect()
 }

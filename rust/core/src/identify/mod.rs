@@ -7,11 +7,12 @@ mod local;
 mod problem;
 mod random;
 mod search;
+mod stepping;
 mod swarm;
 
-pub use cost::{Costs, Evaluator};
+pub use cost::{Costs, Evaluator, Guess};
 pub use identification::{Identification, identify};
 pub use local::{Local, Polished, Sensitivity};
 pub use problem::{Coordinate, NOMINAL_STIFFNESS, Problem, Record, Scale, Spec, Theta};
-pub use search::{Monitor, Outcome, Progress, StopReason, search};
+pub use search::{Monitor, Outcome, Plan, Progress, StopReason, search};
 pub use swarm::{Boundary, Swarm, SwarmSettings, Topology};

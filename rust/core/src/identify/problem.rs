@@ -67,11 +67,9 @@ impl<'a> Record<'a> {
 
 /// Smallest and largest value.
 pub(super) fn range(values: &[f64]) -> (f64, f64) {
-    values
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| {
-            (f64::min(low, v), f64::max(high, v))
-        })
+    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| {
+        (f64::min(low, v), f64::max(high, v))
+    })
 }
 
 /// How a coordinate of the unit box maps to a parameter.
@@ -126,16 +124,12 @@ impl Coordinate {
     pub fn value(&self, z: f64) -> f64 {
         match *self {
             Self::Fixed(value) => value,
-            Self::Free {
-                low,
-                high,
-                scale: Scale::Linear,
-            } => (low + (high - low) * z).clamp(low, high),
-            Self::Free {
-                low,
-                high,
-                scale: Scale::Log,
-            } => (low * libm::exp(z * libm::log(high / low))).clamp(low, high),
+            Self::Free { low, high, scale: Scale::Linear } => {
+                (low + (high - low) * z).clamp(low, high)
+            }
+            Self::Free { low, high, scale: Scale::Log } => {
+                (low * libm::exp(z * libm::log(high / low))).clamp(low, high)
+            }
         }
     }
 }
@@ -186,15 +180,11 @@ impl Problem {
     pub fn new(record: &Record<'_>, spec: &Spec) -> Result<Self> {
         let mut fixed = fixed_values(spec)?;
         let free = free_parameters(spec, &mut fixed)?;
-        let holds_scale = FORCES
-            .iter()
-            .any(|&i| fixed[i].is_some_and(|value| value != 0.0));
+        let holds_scale = FORCES.iter().any(|&i| fixed[i].is_some_and(|value| value != 0.0));
         let mut scale_assumed = false;
         if !holds_scale {
-            let asked = spec
-                .free
-                .as_ref()
-                .is_some_and(|names| names.iter().any(|n| n == "stiffness"));
+            let asked =
+                spec.free.as_ref().is_some_and(|names| names.iter().any(|n| n == "stiffness"));
             if asked {
                 return Err(Error::parameter(
                     "free",
@@ -226,11 +216,7 @@ impl Problem {
                 "stiffness= or one of mass, damping, piezo_coefficient, b1 in fixed=",
             ));
         }
-        let problem = Self {
-            coordinates,
-            scale_assumed,
-            offset: spec.offset,
-        };
+        let problem = Self { coordinates, scale_assumed, offset: spec.offset };
         problem.check_corners()?;
         Ok(problem)
     }
@@ -255,11 +241,7 @@ impl Problem {
     fn check_corners(&self) -> Result<()> {
         let count = self.free().count();
         if count == 0 {
-            return Err(Error::parameter(
-                "free",
-                "empty",
-                "at least one parameter to search",
-            ));
+            return Err(Error::parameter("free", "empty", "at least one parameter to search"));
         }
         for corner in [0.0, 1.0] {
             DahlStage::from_theta(&self.theta(&vec![corner; count]))?;
@@ -274,11 +256,7 @@ fn fixed_values(spec: &Spec) -> Result<[Option<f64>; 9]> {
     for (name, value) in &spec.fixed {
         let i = parameter("fixed", name)?;
         let unit = DAHL_PARAMETERS[i].unit;
-        fixed[i] = Some(crate::error::finite(
-            &format!("fixed {name}"),
-            *value,
-            unit,
-        )?);
+        fixed[i] = Some(crate::error::finite(&format!("fixed {name}"), *value, unit)?);
     }
     if let Some(stiffness) = spec.stiffness {
         positive("stiffness", stiffness, "N/m")?;
@@ -307,11 +285,7 @@ fn free_parameters(spec: &Spec, fixed: &mut [Option<f64>; 9]) -> Result<[bool; 9
         if spec.fixed.iter().any(|(other, _)| other == name)
             || (i == STIFFNESS && fixed[i].is_some())
         {
-            return Err(Error::parameter(
-                "free",
-                name,
-                "a parameter that is not fixed as well",
-            ));
+            return Err(Error::parameter("free", name, "a parameter that is not fixed as well"));
         }
         if name == "b0" || name == "up" {
             let reason = if name == "b0" {
@@ -340,15 +314,8 @@ fn free_parameters(spec: &Spec, fixed: &mut [Option<f64>; 9]) -> Result<[bool; 9
 
 /// Index of a parameter by its name.
 fn parameter(argument: &str, name: &str) -> Result<usize> {
-    DAHL_PARAMETERS
-        .iter()
-        .position(|info| info.name == name)
-        .ok_or_else(|| {
-            let names: Vec<&str> = DAHL_PARAMETERS.iter().map(|info| info.name).collect();
-            Error::parameter(
-                argument,
-                format!("'{name}'"),
-                format!("one of {}", names.join(", ")),
-            )
-        })
+    DAHL_PARAMETERS.iter().position(|info| info.name == name).ok_or_else(|| {
+        let names: Vec<&str> = DAHL_PARAMETERS.iter().map(|info| info.name).collect();
+        Error::parameter(argument, format!("'{name}'"), format!("one of {}", names.join(", ")))
+    })
 }

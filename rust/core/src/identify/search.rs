@@ -1,6 +1,6 @@
 //! The whole search: a swarm, its costs, its stop criteria.
 
-use super::cost::{Costs, Evaluator};
+use super::cost::{Costs, Evaluator, Guess};
 use super::problem::{Problem, Theta};
 use super::swarm::{Swarm, SwarmSettings};
 use crate::error::{Error, Result};
@@ -45,7 +45,7 @@ impl<F: FnMut(&Progress) -> ControlFlow<()>> Monitor for F {
     }
 }
 
-/// What a search found.
+/// What one run of a search found.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// Parameters of the best guess, SI.
@@ -66,13 +66,94 @@ pub struct Outcome {
     pub history: Vec<f64>,
     /// Why it ended.
     pub reason: StopReason,
-    /// Steps of the integrator in each sampling interval.
-    pub substeps: usize,
 }
 
-/// Searches the box of a problem with one swarm.
+/// How a problem is searched.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// Settings of each swarm.
+    pub settings: SwarmSettings,
+    /// Seed of the random numbers.
+    pub seed: u64,
+    /// Swarms that search apart from each other.
+    pub runs: usize,
+}
+
+/// One swarm of a search.
+struct Run {
+    swarm: Swarm,
+    offset: f64,
+    evaluations: usize,
+    failures: usize,
+    history: Vec<f64>,
+    reason: Option<StopReason>,
+}
+
+impl Run {
+    fn new(settings: &SwarmSettings, coordinates: usize, seed: u64, run: u64) -> Result<Self> {
+        Ok(Self {
+            swarm: Swarm::new(settings.clone(), coordinates, seed, run)?,
+            offset: 0.0,
+            evaluations: 0,
+            failures: 0,
+            history: Vec::new(),
+            reason: None,
+        })
+    }
+
+    /// What the swarm wants to know now; nothing once it has ended.
+    fn guesses(&self, problem: &Problem) -> Vec<Guess> {
+        if self.reason.is_some() {
+            return Vec::new();
+        }
+        let asked = self.swarm.ask().zip(self.swarm.limits());
+        asked
+            .filter_map(|(place, limit)| Some(Guess { theta: problem.theta(place?), limit }))
+            .collect()
+    }
+
+    /// Takes the costs of its guesses, in their order.
+    fn tell(&mut self, costs: &[Costs]) {
+        self.evaluations += costs.len();
+        self.failures += costs.iter().filter(|costs| costs.rms.is_infinite()).count();
+        let best = costs.iter().min_by(|a, b| a.rms.total_cmp(&b.rms));
+        if let Some(best) = best.filter(|best| best.rms < self.swarm.best().1) {
+            self.offset = best.offset;
+        }
+        let mut computed = costs.iter();
+        let told: Vec<f64> = self
+            .swarm
+            .ask()
+            .map(|place| place.and_then(|_| computed.next()).map_or(f64::INFINITY, |c| c.rms))
+            .collect();
+        self.swarm.tell(&told);
+        self.history.push(self.swarm.best().1);
+        if self.swarm.stalled() {
+            self.reason = Some(StopReason::Stalled);
+        } else if self.swarm.exhausted() {
+            self.reason = Some(StopReason::Iterations);
+        }
+    }
+
+    fn outcome(self, problem: &Problem) -> Outcome {
+        let (place, rms) = self.swarm.best();
+        Outcome {
+            theta: problem.theta(place),
+            place: place.to_vec(),
+            costs: Costs { rms, offset: self.offset },
+            iterations: self.swarm.iteration(),
+            evaluations: self.evaluations,
+            polish_evaluations: 0,
+            failures: self.failures,
+            history: self.history,
+            reason: self.reason.unwrap_or(StopReason::Interrupted),
+        }
+    }
+}
+
+/// Searches the box of a problem with one or more swarms, whose particles share the lanes.
 ///
-/// The same seed gives the same bits, whatever the threads and the instruction set.
+/// A run gives the same bits whatever the other runs, the threads and the instruction set.
 ///
 /// # Errors
 /// [`Error::Parameter`] for settings that cannot be used, [`Error::Numerical`] where no guess
@@ -80,79 +161,59 @@ pub struct Outcome {
 pub fn search(
     evaluator: &Evaluator<'_>,
     problem: &Problem,
-    settings: &SwarmSettings,
-    seed: u64,
+    plan: &Plan,
     monitor: &mut dyn Monitor,
     stop: Stop<'_>,
-) -> Result<Outcome> {
-    let mut swarm = Swarm::new(settings.clone(), problem.free().count(), seed, 0)?;
-    let mut offset = 0.0;
-    let mut evaluations = 0;
-    let mut failures = 0;
-    let mut history = Vec::with_capacity(settings.iterations + 1);
-    let reason = loop {
-        let places: Vec<Option<Theta>> = swarm
-            .ask()
-            .map(|place| place.map(|place| problem.theta(place)))
-            .collect();
-        let inside: Vec<Theta> = places.iter().flatten().copied().collect();
-        let costs = evaluator.costs(&inside, stop);
+) -> Result<Vec<Outcome>> {
+    let coordinates = problem.free().count();
+    if plan.runs == 0 {
+        return Err(Error::parameter("runs", plan.runs, "1 or more"));
+    }
+    let runs = 0..plan.runs as u64;
+    let runs: Result<Vec<Run>> =
+        runs.map(|run| Run::new(&plan.settings, coordinates, plan.seed, run)).collect();
+    let mut runs = runs?;
+    while runs.iter().any(|run| run.reason.is_none()) {
+        let asked: Vec<Vec<Guess>> = runs.iter().map(|run| run.guesses(problem)).collect();
+        let costs = evaluator.costs(&asked.concat(), stop);
         if stop() {
-            break StopReason::Interrupted;
+            break;
         }
-        evaluations += inside.len();
-        failures += costs.iter().filter(|costs| costs.rms.is_infinite()).count();
-        let before = swarm.best().1;
-        if let Some(best) = costs.iter().min_by(|a, b| a.rms.total_cmp(&b.rms))
-            && best.rms < before
-        {
-            offset = best.offset;
+        let mut rest = costs.as_slice();
+        for (run, asked) in runs.iter_mut().zip(&asked) {
+            let (own, others) = rest.split_at(asked.len());
+            rest = others;
+            if run.reason.is_none() {
+                run.tell(own);
+            }
         }
-        let mut computed = costs.iter();
-        let told: Vec<f64> = places
-            .iter()
-            .map(|place| {
-                place
-                    .and_then(|_| computed.next())
-                    .map_or(f64::INFINITY, |c| c.rms)
-            })
-            .collect();
-        swarm.tell(&told);
-        let (place, cost) = swarm.best();
-        history.push(cost);
-        let progress = Progress {
-            iteration: swarm.iteration(),
-            iterations: settings.iterations,
-            evaluations,
-            cost,
-            theta: problem.theta(place),
-        };
-        if monitor.report(&progress).is_break() {
-            break StopReason::Interrupted;
+        if monitor.report(&progress(&runs, problem, plan)).is_break() {
+            for run in &mut runs {
+                run.reason = Some(StopReason::Interrupted);
+            }
         }
-        if swarm.stalled() {
-            break StopReason::Stalled;
-        }
-        if swarm.exhausted() {
-            break StopReason::Iterations;
-        }
-    };
-    let (place, rms) = swarm.best();
-    if rms.is_infinite() && reason != StopReason::Interrupted {
+    }
+    let simulations: usize = runs.iter().map(|run| run.evaluations).sum();
+    let found = runs.iter().any(|run| run.swarm.best().1.is_finite());
+    let interrupted =
+        runs.iter().any(|run| matches!(run.reason, None | Some(StopReason::Interrupted)));
+    if !found && !interrupted {
         return Err(Error::Numerical(format!(
-            "not one of {evaluations} simulations stayed finite: check bounds and units"
+            "not one of {simulations} simulations stayed finite: check bounds and units"
         )));
     }
-    Ok(Outcome {
+    Ok(runs.into_iter().map(|run| run.outcome(problem)).collect())
+}
+
+/// Where the runs stand together.
+fn progress(runs: &[Run], problem: &Problem, plan: &Plan) -> Progress {
+    let best = runs.iter().map(|run| run.swarm.best()).min_by(|a, b| a.1.total_cmp(&b.1));
+    let (place, cost) = best.unwrap_or((&[], f64::INFINITY));
+    Progress {
+        iteration: runs.iter().map(|run| run.swarm.iteration()).max().unwrap_or(0),
+        iterations: plan.settings.iterations,
+        evaluations: runs.iter().map(|run| run.evaluations).sum(),
+        cost,
         theta: problem.theta(place),
-        place: place.to_vec(),
-        costs: Costs { rms, offset },
-        iterations: swarm.iteration(),
-        evaluations,
-        polish_evaluations: 0,
-        failures,
-        history,
-        reason,
-        substeps: evaluator.substeps,
-    })
+    }
 }

@@ -176,30 +176,12 @@ impl Swarm {
                     .iter()
                     .map(|x| (0.5 * (draws.uniform() - x)).clamp(-limit, limit))
                     .collect();
-                let best = Best {
-                    place: place.clone(),
-                    cost: f64::INFINITY,
-                };
-                Particle {
-                    place,
-                    velocity,
-                    best,
-                }
+                let best = Best { place: place.clone(), cost: f64::INFINITY };
+                Particle { place, velocity, best }
             })
             .collect::<Vec<_>>();
-        let best = Best {
-            place: vec![0.5; coordinates],
-            cost: f64::INFINITY,
-        };
-        Ok(Self {
-            settings,
-            seed,
-            run,
-            iteration: 0,
-            stalled: 0,
-            particles,
-            best,
-        })
+        let best = Best { place: vec![0.5; coordinates], cost: f64::INFINITY };
+        Ok(Self { settings, seed, run, iteration: 0, stalled: 0, particles, best })
     }
 
     /// The places to evaluate, one a particle; `None` for one that is outside and invisible.
@@ -210,6 +192,11 @@ impl Swarm {
         })
     }
 
+    /// The cost of each place asked for beyond which it changes nothing: its particle's best.
+    pub fn limits(&self) -> impl Iterator<Item = f64> {
+        self.particles.iter().map(|particle| particle.best.cost)
+    }
+
     /// Takes the costs of the places asked for, and moves the particles on.
     ///
     /// A cost that is not a number counts as infinite. A particle beyond the end of `costs`
@@ -218,16 +205,10 @@ impl Swarm {
         let before = self.best.cost;
         for (particle, &cost) in self.particles.iter_mut().zip(costs) {
             if cost < particle.best.cost {
-                particle.best = Best {
-                    place: particle.place.clone(),
-                    cost,
-                };
+                particle.best = Best { place: particle.place.clone(), cost };
             }
             if cost < self.best.cost {
-                self.best = Best {
-                    place: particle.place.clone(),
-                    cost,
-                };
+                self.best = Best { place: particle.place.clone(), cost };
             }
         }
         // From infinity to infinity the difference is NaN: a stall.
@@ -248,11 +229,7 @@ impl Swarm {
         for (i, (particle, leader)) in self.particles.iter_mut().zip(&leaders).enumerate() {
             let (i, count) = (i as u64, count as u64);
             let mut draws = Draws::at(self.seed, self.run, self.iteration as u64, i, count);
-            let Particle {
-                place,
-                velocity,
-                best,
-            } = particle;
+            let Particle { place, velocity, best } = particle;
             for (((x, v), own), lead) in place.iter_mut().zip(velocity).zip(&best.place).zip(leader)
             {
                 let own = settings.cognitive * draws.uniform() * (own - *x);

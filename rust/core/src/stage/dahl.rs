@@ -15,51 +15,15 @@ use crate::mechanics::Mechanics;
 
 /// The stage's parameters, in the order of [`DahlStage::from_theta`].
 pub const DAHL_PARAMETERS: [ParameterInfo; 9] = [
-    ParameterInfo {
-        name: "mass",
-        symbol: "M",
-        unit: "kg",
-    },
-    ParameterInfo {
-        name: "damping",
-        symbol: "D",
-        unit: "N s/m",
-    },
-    ParameterInfo {
-        name: "stiffness",
-        symbol: "K",
-        unit: "N/m",
-    },
-    ParameterInfo {
-        name: "piezo_coefficient",
-        symbol: "T",
-        unit: "N/V",
-    },
-    ParameterInfo {
-        name: "a1",
-        symbol: "a1",
-        unit: "1/m",
-    },
-    ParameterInfo {
-        name: "a2",
-        symbol: "a2",
-        unit: "1/m^2",
-    },
-    ParameterInfo {
-        name: "b1",
-        symbol: "b1",
-        unit: "N/m^2",
-    },
-    ParameterInfo {
-        name: "b0",
-        symbol: "b0",
-        unit: "N/m",
-    },
-    ParameterInfo {
-        name: "up",
-        symbol: "up",
-        unit: "",
-    },
+    ParameterInfo { name: "mass", symbol: "M", unit: "kg" },
+    ParameterInfo { name: "damping", symbol: "D", unit: "N s/m" },
+    ParameterInfo { name: "stiffness", symbol: "K", unit: "N/m" },
+    ParameterInfo { name: "piezo_coefficient", symbol: "T", unit: "N/V" },
+    ParameterInfo { name: "a1", symbol: "a1", unit: "1/m" },
+    ParameterInfo { name: "a2", symbol: "a2", unit: "1/m^2" },
+    ParameterInfo { name: "b1", symbol: "b1", unit: "N/m^2" },
+    ParameterInfo { name: "b0", symbol: "b0", unit: "N/m" },
+    ParameterInfo { name: "up", symbol: "up", unit: "" },
 ];
 
 /// A stage with second-order Dahl hysteresis, b0 = 0.
@@ -106,25 +70,11 @@ impl DahlStage {
     /// # Errors
     /// [`Error::Parameter`] naming the parameter that is out of its range.
     pub fn from_theta(theta: &[f64; 9]) -> Result<Self> {
-        let [
-            mass,
-            damping,
-            stiffness,
-            piezo_coefficient,
-            a1,
-            a2,
-            b1,
-            b0,
-            up,
-        ] = *theta;
+        let [mass, damping, stiffness, piezo_coefficient, a1, a2, b1, b0, up] = *theta;
         let mechanics = Mechanics::new(mass, damping, stiffness)?;
         finite("piezo_coefficient", piezo_coefficient, "N/V")?;
         if piezo_coefficient == 0.0 {
-            return Err(Error::parameter(
-                "piezo_coefficient",
-                "0 N/V",
-                "a value other than 0",
-            ));
+            return Err(Error::parameter("piezo_coefficient", "0 N/V", "a value other than 0"));
         }
         if b0 != 0.0 {
             return Err(Error::parameter(
@@ -148,11 +98,7 @@ impl DahlStage {
     #[must_use]
     pub fn xu_li_2010() -> Self {
         Self {
-            mechanics: Mechanics {
-                mass: 0.1828,
-                damping: 2597.3,
-                stiffness: 26065.0,
-            },
+            mechanics: Mechanics { mass: 0.1828, damping: 2597.3, stiffness: 26065.0 },
             piezo_coefficient: 0.0468,
             a1: 121.9874,
             a2: 1.1773e6,
@@ -163,20 +109,13 @@ impl DahlStage {
 
     /// The hysteresis operator, scaled to force.
     #[must_use]
-    pub fn operator(&self) -> Dahl<f64> {
-        Dahl {
-            a1: self.a1,
-            a2: self.a2,
-            gain: self.b1 * self.up,
-        }
+    pub fn operator<const TERMS: usize>(&self) -> Dahl<f64, TERMS> {
+        Dahl { a1: self.a1, a2: self.a2, gain: self.b1 * self.up }
     }
 }
 
 impl From<StageState> for DahlState<f64> {
     fn from(state: StageState) -> Self {
-        Self {
-            force: state.hysteresis,
-            slope: state.hysteresis_slope,
-        }
+        Self { force: state.hysteresis, slope: state.hysteresis_slope }
     }
 }

@@ -1,10 +1,10 @@
 //! An operator in feedback on the displacement: `M x'' + D x' + K x = T u - F(x)`.
 //!
-//! The exponential scheme. Over a step the force is taken as the cubic through its values and
-//! slopes at both ends; the linear part is exact for that cubic, the operator is exact in the
-//! displacement. The force at the end is first extrapolated along its slope (predictor), then
-//! read off the operator where that leads (corrector). A reversal inside the step is located,
-//! and the operator led to the turning point and back. Fourth order in the step.
+//! The exponential scheme. Over a step the force is a polynomial in time; the linear part is
+//! exact for it, and the operator is exact in the displacement. The force is extrapolated along
+//! its slope, which alone gives second order. A corrector then reads the force off the operator
+//! where that leads and takes the cubic through values and slopes at both ends; a reversal
+//! inside the step is located, and the operator led to the turning point and back: fourth order.
 
 use piezotrack_control::Number;
 use piezotrack_control::operator::Operator;
@@ -22,45 +22,68 @@ pub struct FeedbackState<N, M> {
     pub memory: M,
 }
 
-/// One step under a drive force that goes from `drive` to `drive + rise`, linearly.
+/// Where the force extrapolated along its slope leads.
+struct Prediction<N> {
+    x: N,
+    w: N,
+    /// Force at the start, and its change over the step at the slope that it starts with.
+    force: N,
+    change: N,
+}
+
+/// The step whose force goes on along the slope that it starts with.
 #[inline(always)]
-pub fn step<N: Number, O: Operator<N>>(
+fn predict<N: Number, O: Operator<N>>(
+    linear: &Propagator<N>,
+    operator: &O,
+    state: &FeedbackState<N, O::State>,
+    drive: N,
+    rise: N,
+) -> Prediction<N> {
+    let (force, slope) = operator.output(&state.memory);
+    let change = slope * state.w;
+    let f0 = drive - force;
+    let f1 = rise - change;
+    // The force's change comes last: it is what the chain of operations waits for.
+    let x = linear.position.x.mul_add(state.x, linear.velocity.x * state.w);
+    let w = linear.position.w.mul_add(state.x, linear.velocity.w * state.w);
+    let x = linear.ramp.x.mul_add(f1, linear.constant.x.mul_add(f0, x));
+    let w = linear.ramp.w.mul_add(f1, linear.constant.w.mul_add(f0, w));
+    Prediction { x, w, force, change }
+}
+
+/// One step of second order under a drive force that goes from `drive` to `drive + rise`.
+#[inline(always)]
+pub fn second_order<N: Number, O: Operator<N>>(
     linear: &Propagator<N>,
     operator: &O,
     state: &FeedbackState<N, O::State>,
     drive: N,
     rise: N,
 ) -> FeedbackState<N, O::State> {
-    let (force, slope) = operator.output(&state.memory);
-    let change = slope * state.w;
-    let f0 = drive - force;
-    let f1 = rise - change;
-    let px = linear.constant.x.mul_add(f0, linear.ramp.x * f1);
-    let pw = linear.constant.w.mul_add(f0, linear.ramp.w * f1);
-    let px = linear
-        .position
-        .x
-        .mul_add(state.x, linear.velocity.x.mul_add(state.w, px));
-    let pw = linear
-        .position
-        .w
-        .mul_add(state.x, linear.velocity.w.mul_add(state.w, pw));
+    let branch = operator.branch(&state.memory, sign(state.w));
+    let Prediction { x, w, .. } = predict(linear, operator, state, drive, rise);
+    FeedbackState { x, w, memory: operator.along(&branch, x - state.x) }
+}
 
+/// One step of fourth order under a drive force that goes from `drive` to `drive + rise`.
+#[inline(always)]
+pub fn fourth_order<N: Number, O: Operator<N>>(
+    linear: &Propagator<N>,
+    operator: &O,
+    state: &FeedbackState<N, O::State>,
+    drive: N,
+    rise: N,
+) -> FeedbackState<N, O::State> {
+    let ahead = predict(linear, operator, state, drive, rise);
     // At rest the predicted velocity tells the direction; else it is too small to matter.
-    let heading = pw.mul_add(pw.like(1e-12), state.w);
+    let heading = ahead.w.mul_add(ahead.w.like(1e-12), state.w);
     let branch = operator.branch(&state.memory, sign(heading));
-    let ahead = operator.along(&branch, px - state.x);
-    let (force_ahead, slope_ahead) = operator.output(&ahead);
-    let excess = force + change - force_ahead;
-    let bend = change - slope_ahead * pw;
-    let x = linear
-        .excess
-        .x
-        .mul_add(excess, linear.bend.x.mul_add(bend, px));
-    let w = linear
-        .excess
-        .w
-        .mul_add(excess, linear.bend.w.mul_add(bend, pw));
+    let (force, slope) = operator.output(&operator.along(&branch, ahead.x - state.x));
+    let excess = ahead.force + ahead.change - force;
+    let bend = ahead.change - slope * ahead.w;
+    let x = linear.excess.x.mul_add(excess, linear.bend.x.mul_add(bend, ahead.x));
+    let w = linear.excess.w.mul_add(excess, linear.bend.w.mul_add(bend, ahead.w));
 
     let turned = state.w * w;
     let memory = if turned.any_negative() {

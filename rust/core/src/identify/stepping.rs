@@ -1,0 +1,79 @@
+//! How finely a search steps: fixed once, from the bounds, the sampling rate and the drive.
+
+use rayon::prelude::*;
+
+use super::problem::{Problem, Record, Theta, range};
+use crate::integrate::{Drive, Stop, steps_for};
+use crate::march::{Order, Stepping};
+use crate::stage::DahlStage;
+
+/// Accuracy that a search asks of its simulations, m.
+const ACCURACY: f64 = 2e-10;
+
+/// Most sub-steps that a search takes in one sampling interval.
+const MOST: usize = 256;
+
+/// Steps of second order that cost what one of fourth order does.
+const WORTH: usize = 2;
+
+/// The cheapest stepping with which the stages at the corners of the box and in its middle are
+/// accurate to 0.2 nm.
+///
+/// A stage that goes more than twice the measured stroke is left out, and so is one that no
+/// sub-steps make accurate: such a guess costs more than any stage worth finding, however
+/// exactly it is computed.
+pub(super) fn choose(record: &Record<'_>, problem: &Problem, stop: Stop<'_>) -> Stepping {
+    let excerpts = excerpts(&record.drive);
+    let stroke = 2.0 * record.stroke();
+    let thetas = corners(problem);
+    let trials: Vec<(DahlStage, Drive<'_>, usize)> = thetas
+        .par_iter()
+        .filter_map(|theta| DahlStage::from_theta(theta).ok())
+        .flat_map_iter(|stage| excerpts.iter().map(move |drive| (stage, *drive)))
+        .filter_map(|(stage, drive)| {
+            let (steps, x) = steps_for(&stage, &drive, Order::Fourth, ACCURACY, MOST, stop)?;
+            let (low, high) = range(&x);
+            (high - low <= stroke).then_some((stage, drive, steps))
+        })
+        .collect();
+    let fourth = trials.iter().map(|trial| trial.2).max().unwrap_or(1);
+    let most = WORTH * fourth;
+    let second: Option<Vec<usize>> = trials
+        .par_iter()
+        .map(|(stage, drive, _)| {
+            let found = steps_for(stage, drive, Order::Second, ACCURACY, most, stop)?;
+            (found.0 <= most).then_some(found.0)
+        })
+        .collect();
+    match second.map(|steps| steps.into_iter().max().unwrap_or(1)) {
+        Some(substeps) => Stepping { order: Order::Second, substeps },
+        None => Stepping { order: Order::Fourth, substeps: fourth },
+    }
+}
+
+/// The corners of the box of free parameters, and its middle.
+pub(super) fn corners(problem: &Problem) -> Vec<Theta> {
+    let count = problem.free().count();
+    let mut places: Vec<Vec<f64>> = (0..1_usize << count)
+        .map(|bits| (0..count).map(|d| f64::from(u8::from(bits >> d & 1 == 1))).collect())
+        .collect();
+    places.push(vec![0.5; count]);
+    places.iter().map(|place| problem.theta(place)).collect()
+}
+
+/// Parts of a long drive that ask most of the integrator: its beginning, and its steepest part.
+fn excerpts<'a>(drive: &Drive<'a>) -> Vec<Drive<'a>> {
+    const LENGTH: usize = 8192;
+    if drive.u.len() <= 2 * LENGTH {
+        return vec![*drive];
+    }
+    let steepest = drive
+        .u
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]).abs())
+        .enumerate()
+        .fold((0, 0.0), |most, now| if now.1 > most.1 { now } else { most })
+        .0;
+    let start = steepest.saturating_sub(LENGTH / 2).min(drive.u.len() - LENGTH);
+    [0, start].map(|from| Drive { u: &drive.u[from..from + LENGTH], ..*drive }).to_vec()
+}

@@ -1,0 +1,111 @@
+//! The way of a stage along its drive, for one stage or for lanes of them.
+
+use piezotrack_control::Number;
+use piezotrack_control::operator::Operator;
+
+use crate::integrate::{Drive, index};
+use crate::mechanics::Propagator;
+use crate::stage::feedback::{FeedbackState, fourth_order, second_order};
+
+/// Order of the coupling of hysteresis and linear part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// One look at the operator in a step: for slow drives, whose steps are short anyway.
+    Second,
+    /// Predictor, corrector, and reversals located.
+    Fourth,
+}
+
+/// How finely a sampling interval is stepped through.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stepping {
+    /// Order of the coupling.
+    pub order: Order,
+    /// Steps in each sampling interval.
+    pub substeps: usize,
+}
+
+/// What is done with the states of a stage on its way.
+pub trait Sink<N, M> {
+    /// Takes the state at sample `k`.
+    fn sample(&mut self, k: usize, state: &FeedbackState<N, M>);
+
+    /// Asked now and then, after sample `k`, whether to give up.
+    fn give_up(&mut self, k: usize) -> bool;
+}
+
+/// A stage with everything that its parameters alone decide worked out.
+#[derive(Clone, Copy, Debug)]
+pub struct March<N, O> {
+    /// The linear part over one sub-step.
+    pub linear: Propagator<N>,
+    /// The hysteresis.
+    pub operator: O,
+    /// Force for 1 V, N.
+    pub gain: N,
+}
+
+/// Terms of the operator's series with a step of fourth order.
+pub const TERMS: usize = 6;
+
+/// Terms of the operator's series with a step of second order.
+pub const FEW_TERMS: usize = 3;
+
+/// Sub-steps between two questions whether to give up: tens of microseconds.
+const BLOCK: usize = 1024;
+
+impl<N: Number, O: Operator<N>> March<N, O> {
+    /// Leads the stage along the drive; `None` where the sink gave up.
+    #[inline(always)]
+    pub fn run<const FOURTH: bool>(
+        &self,
+        drive: &Drive<'_>,
+        substeps: usize,
+        start: FeedbackState<N, O::State>,
+        sink: &mut impl Sink<N, O::State>,
+    ) -> Option<FeedbackState<N, O::State>> {
+        let mut state = start;
+        sink.sample(0, &state);
+        let part = 1.0 / index(substeps);
+        let block = (BLOCK / substeps).max(1);
+        let mut from = 1;
+        while from < drive.u.len() {
+            let to = (from + block).min(drive.u.len());
+            for k in from..to {
+                let (u, change) = drive.interval(k - 1);
+                if substeps == 1 {
+                    // Written apart: most searches spend their time here.
+                    state = self.step::<FOURTH>(&state, u, change);
+                } else {
+                    let change = change * part;
+                    for j in 0..substeps {
+                        state = self.step::<FOURTH>(&state, index(j).mul_add(change, u), change);
+                    }
+                }
+                sink.sample(k, &state);
+            }
+            if sink.give_up(to - 1) {
+                return None;
+            }
+            from = to;
+        }
+        Some(state)
+    }
+
+    /// One sub-step under a drive that goes from `u` to `u + change`, V.
+    #[inline(always)]
+    fn step<const FOURTH: bool>(
+        &self,
+        state: &FeedbackState<N, O::State>,
+        u: f64,
+        change: f64,
+    ) -> FeedbackState<N, O::State> {
+        let force = self.gain * self.gain.like(u);
+        let rise = self.gain * self.gain.like(change);
+        if FOURTH {
+            fourth_order(&self.linear, &self.operator, state, force, rise)
+        } else {
+            second_order(&self.linear, &self.operator, state, force, rise)
+        }
+    }
+}
