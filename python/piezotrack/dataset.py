@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Mapping
 from numbers import Real
@@ -194,6 +193,8 @@ class Dataset:
         SHA-256 over little-endian float64: `dt`, all of `full.u`, all of `full.y`, `warmup`.
         """
         if self._sha256 is None:
+            import hashlib
+
             digest = hashlib.sha256()
             for part in (self._dt, self._u, self._y, self._start):
                 digest.update(np.asarray(part, dtype="<f8").tobytes())

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
-import tempfile
 from collections.abc import Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -203,6 +201,8 @@ class IdentifiedModel:
         DataError
             The file cannot be written.
         """
+        import json
+
         text = json.dumps(_finite(self.document()), indent=2, allow_nan=False)
         with replacing(path) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
@@ -242,6 +242,8 @@ def load(path: str | os.PathLike[str]) -> IdentifiedModel:
     >>> pt.load(path).model == model.model
     True
     """
+    import json
+
     file = Path(path)
     try:
         document = json.loads(file.read_text(encoding="utf-8"))
@@ -309,6 +311,8 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     DataError
         The folder is missing, or the file cannot be written.
     """
+    import tempfile
+
     file = Path(path)
     try:
         handle, name = tempfile.mkstemp(prefix=".", suffix=file.suffix, dir=file.parent)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,6 +39,11 @@ class StageState:
     v: float = 0.0
     hysteresis: float = 0.0
     hysteresis_slope: float = 0.0
+
+    @property
+    def values(self) -> tuple[float, float, float, float]:
+        """The four values in their order."""
+        return self.x, self.v, self.hysteresis, self.hysteresis_slope
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,7 +153,23 @@ class DahlStage:
         for field in fields(self):
             value = _core.as_number(field.name, getattr(self, field.name))
             object.__setattr__(self, field.name, value)
-        _core.dahl_check(astuple(self))
+        _core.dahl_check(self.theta)
+
+    @property
+    def theta(self) -> tuple[float, ...]:
+        """The parameters in their order."""
+        # Not dataclasses.astuple, which copies deeply and takes longer than a short simulation.
+        return (
+            self.mass,
+            self.damping,
+            self.stiffness,
+            self.piezo_coefficient,
+            self.a1,
+            self.a2,
+            self.b1,
+            self.b0,
+            self.up,
+        )
 
     @classmethod
     def xu_li_2010(cls) -> DahlStage:
@@ -230,7 +251,7 @@ class DahlStage:
         start = StageState() if initial is None else initial
         dt = _core.as_number("dt", dt)
         accuracy = _core.as_number("accuracy", accuracy)
-        run = _core.dahl_simulate(astuple(self), u, dt, hold, astuple(start), accuracy)
+        run = _core.dahl_simulate(self.theta, u, dt, hold, start.values, accuracy)
         x, v, force, slope = run.last
         return Response(
             t=np.arange(run.x.size, dtype=np.float64) * dt,
