@@ -7,7 +7,7 @@ use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use piezotrack_core::identify::{Evaluator, Guess, Problem, Record, Spec};
-use piezotrack_core::integrate::{Drive, Hold, NEVER, simulate};
+use piezotrack_core::integrate::{Drive, Hold, Method, NEVER, simulate};
 use piezotrack_core::stage::{DahlStage, StageState};
 
 const RATE: f64 = 5000.0;
@@ -37,7 +37,10 @@ fn throughput(criterion: &mut Criterion) {
         let u = drive(samples);
         let held = Drive::new(&u, 1.0 / RATE, Hold::First).unwrap();
         let stage = DahlStage::xu_li_2010();
-        let y = simulate(&stage, &held, StageState::default(), 1e-10, NEVER).unwrap().unwrap().x;
+        let y = simulate(&stage, &held, StageState::default(), Method::Exponential, 1e-10, NEVER)
+            .unwrap()
+            .unwrap()
+            .x;
         let record = Record::new(&u, &y, 1.0 / RATE, Hold::First, 0).unwrap();
         let problem = Problem::new(&record, &paper_spec()).unwrap();
         let evaluator = Evaluator::new(&record, &problem, NEVER);

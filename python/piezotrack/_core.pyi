@@ -32,6 +32,7 @@ def dahl_simulate(
     dt: float,
     hold: str,
     initial: tuple[float, ...],
+    method: str,
     accuracy: float,
 ) -> Trajectory: ...
 def dahl_simulate_fixed(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from numbers import Real
+from numbers import Integral, Real
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -230,6 +230,60 @@ class Dataset:
         """
         first, end = self._samples(start, stop)
         return self._part(first, end, start=0)
+
+    def decimate(self, factor: int) -> Dataset:
+        """Return the record at a lower sampling rate, without what that rate cannot show.
+
+        Drive, displacement and further columns go through the same low-pass filter, which
+        shifts nothing in time: a finite impulse response with 80 dB from 1.2 times the new
+        Nyquist frequency on, flat up to 0.8 times. The drive then goes straight from sample to
+        sample.
+
+        Parameters
+        ----------
+        factor : int
+            How many samples become one, 2 or more.
+
+        Returns
+        -------
+        Dataset
+            The window begins with the same sample as before.
+
+        Raises
+        ------
+        ParameterError
+            `factor` is not a whole number of 2 or more, or leaves fewer than 3 samples.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import piezotrack as pt
+        >>> u = np.sin(np.arange(5000) / 500.0)
+        >>> pt.Dataset(u=u, y=1e-6 * u, dt=0.001).decimate(10).dt
+        0.01
+        """
+        from .resample import low_passed
+
+        if isinstance(factor, bool) or not isinstance(factor, Integral) or factor < 2:
+            raise ParameterError(f"factor is {factor!r}: expected a whole number, 2 or more")
+        factor = int(factor)
+        if len(self) < MIN_SAMPLES * factor:
+            raise ParameterError(
+                f"factor is {factor}: that leaves fewer than {MIN_SAMPLES} of {len(self)} samples"
+            )
+        first = self._start % factor
+        less = Dataset(
+            u=low_passed(self._u, factor)[first::factor],
+            y=low_passed(self._y, factor)[first::factor],
+            t=self._t[first::factor],
+            hold="foh",
+            drive_unit=self._drive_unit,
+            columns={k: low_passed(v, factor)[first::factor] for k, v in self._columns.items()},
+            column_units=self._column_units,
+            source=self._source,
+        )
+        less._start = self._start // factor
+        return less
 
     def _samples(self, start: float | None, stop: float | None) -> tuple[int, int]:
         """Turn the bounds of a window [s] into sample numbers of the arrays kept."""

@@ -3,6 +3,7 @@
 use piezotrack_control::operator::DahlState;
 use pulp::{Simd, WithSimd};
 
+use crate::classical::{self, Rk4, Rk45};
 use crate::error::{Error, Result, positive};
 use crate::march::{FEW_TERMS, March, Order, Sink, Stepping, TERMS};
 use crate::mechanics::{Propagator, halvings};
@@ -82,10 +83,23 @@ pub struct Trajectory {
 /// Most sub-steps in one sampling interval that are tried.
 const MOST_SUBSTEPS: usize = 1 << 17;
 
-/// Simulates a stage so that halving the sub-steps moves no sample by more than `accuracy`.
+/// How a stage is integrated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Linear part exact, hysteresis exact in the displacement, coupled to fourth order.
+    Exponential,
+    /// Classical Runge-Kutta of fourth order, in equal steps.
+    Rk4,
+    /// Dormand-Prince of order 5(4), adaptive.
+    Rk45,
+}
+
+/// Simulates a stage so that a finer simulation moves no sample by more than `accuracy`.
 ///
-/// The scheme is of fourth order, so the error of what is returned is about a fifteenth of
-/// that. `None` where `stop` said so meanwhile.
+/// Finer means twice the sub-steps or, for the adaptive method, a tenth of the tolerance. The
+/// finer of the last two is returned. The exponential method is tried to second order first,
+/// which is quicker and does for slow drives; the error is then a third of the difference, and
+/// a fifteenth to fourth order. `None` where `stop` said so meanwhile.
 ///
 /// # Errors
 /// [`Error::Parameter`] where `accuracy` is not above 0; [`Error::Numerical`] where the motion
@@ -94,37 +108,90 @@ pub fn simulate(
     stage: &DahlStage,
     drive: &Drive<'_>,
     initial: StageState,
+    method: Method,
     accuracy: f64,
     stop: Stop<'_>,
 ) -> Result<Option<Trajectory>> {
     positive("accuracy", accuracy, "m")?;
-    let mut substeps = first_substeps(stage, drive.dt);
-    let run = |substeps| {
-        let stepping = Stepping { order: Order::Fourth, substeps };
-        simulate_fixed(stage, drive, initial, stepping, stop)
-    };
-    let Some(mut coarse) = run(substeps)? else {
-        return Ok(None);
-    };
-    loop {
-        substeps *= 2;
-        let Some(mut fine) = run(substeps)? else {
-            return Ok(None);
+    let mut level = if method == Method::Rk45 { 6 } else { first_substeps(stage, drive.dt) };
+    let last = if method == Method::Rk45 { 14 } else { MOST_SUBSTEPS };
+    if method == Method::Exponential {
+        let quick = |substeps| {
+            let stepping = Stepping { order: Order::Second, substeps };
+            stepped(Single { stage, drive, initial, stepping, few_terms: false, stop })
         };
-        fine.difference = largest_difference(&coarse.x, &fine.x);
-        if fine.difference <= accuracy {
-            return Ok(Some(fine));
+        if let (Ok(Some(coarse)), Ok(Some(mut fine))) = (quick(level), quick(2 * level)) {
+            fine.difference = largest_difference(&coarse.x, &fine.x);
+            if fine.difference <= accuracy {
+                return Ok(Some(fine));
+            }
         }
-        if substeps >= MOST_SUBSTEPS {
-            return Err(Error::Numerical(format!(
-                "accuracy {accuracy} m is out of reach: {substeps} sub-steps a sample differ \
-                 from half as many by {:.3e} m; ask for less with accuracy=, or check that \
-                 the parameters are in SI units",
-                fine.difference
-            )));
-        }
-        coarse = fine;
     }
+    let mut coarse: Option<Trajectory> = None;
+    loop {
+        let fine = at_level(stage, drive, initial, method, level, stop);
+        if stop() {
+            return Ok(None);
+        }
+        coarse = match (fine, coarse.take()) {
+            (Ok(mut fine), Some(before)) => {
+                fine.difference = largest_difference(&before.x, &fine.x);
+                if fine.difference <= accuracy {
+                    return Ok(Some(fine));
+                }
+                if level >= last {
+                    return Err(out_of_reach(accuracy, fine.substeps, fine.difference));
+                }
+                Some(fine)
+            }
+            (Ok(fine), None) => Some(fine),
+            // A Runge-Kutta method that is not stable may be so in shorter steps.
+            (Err(error), _) if method == Method::Exponential || level >= last => return Err(error),
+            (Err(_), _) => None,
+        };
+        level = if method == Method::Rk45 { level + 1 } else { 2 * level };
+    }
+}
+
+fn out_of_reach(accuracy: f64, substeps: usize, difference: f64) -> Error {
+    Error::Numerical(format!(
+        "accuracy {accuracy} m is out of reach: {substeps} sub-steps a sample differ from a \
+         coarser simulation by {difference:.3e} m; ask for less with accuracy=, or check that \
+         the parameters are in SI units"
+    ))
+}
+
+/// One simulation: `level` is the sub-steps or, for the adaptive method, the digits asked for.
+fn at_level(
+    stage: &DahlStage,
+    drive: &Drive<'_>,
+    initial: StageState,
+    method: Method,
+    level: usize,
+    stop: Stop<'_>,
+) -> Result<Trajectory> {
+    let run = match method {
+        Method::Exponential => {
+            let stepping = Stepping { order: Order::Fourth, substeps: level };
+            simulate_fixed(stage, drive, initial, stepping, stop)?
+        }
+        Method::Rk4 => {
+            let mut crossing = Rk4 { stage, substeps: level };
+            classical::march(&mut crossing, drive, initial, stop)
+        }
+        Method::Rk45 => {
+            let tolerance = libm::pow(10.0, -index(level));
+            let mut crossing = Rk45::new(stage, drive, tolerance);
+            classical::march(&mut crossing, drive, initial, stop)
+        }
+    };
+    run.ok_or_else(|| {
+        Error::Numerical(
+            "the simulated displacement does not stay finite: check that the parameters are in \
+             SI units"
+                .into(),
+        )
+    })
 }
 
 /// Fewest sub-steps, by powers of two, from which twice as many differ by at most `accuracy`,
@@ -159,7 +226,7 @@ pub fn steps_for(
     None
 }
 
-/// Simulates a stage with given steps in each sampling interval.
+/// Simulates a stage as a search does, with given steps in each sampling interval.
 ///
 /// `None` where `stop` said so meanwhile.
 ///
@@ -173,19 +240,23 @@ pub fn simulate_fixed(
     stepping: Stepping,
     stop: Stop<'_>,
 ) -> Result<Option<Trajectory>> {
-    if stepping.substeps == 0 {
+    let few_terms = stepping.order == Order::Second;
+    stepped(Single { stage, drive, initial, stepping, few_terms, stop })
+}
+
+fn stepped(single: Single<'_>) -> Result<Option<Trajectory>> {
+    if single.stepping.substeps == 0 {
         return Err(Error::parameter("substeps", 0, "1 or more"));
     }
-    let trajectory = pulp::Arch::new().dispatch(Single { stage, drive, initial, stepping, stop });
-    let Some(trajectory) = trajectory else {
-        return Ok(None);
-    };
+    let dt = single.drive.dt;
+    let trajectory = pulp::Arch::new().dispatch(single);
+    let Some(trajectory) = trajectory else { return Ok(None) };
     match trajectory.x.iter().position(|x| !x.is_finite()) {
         None => Ok(Some(trajectory)),
         Some(k) => Err(Error::Numerical(format!(
             "the simulated displacement is not finite from sample {k} on ({:.6} s): check that \
              the parameters are in SI units",
-            drive.dt * index(k)
+            dt * index(k)
         ))),
     }
 }
@@ -196,6 +267,8 @@ struct Single<'a> {
     drive: &'a Drive<'a>,
     initial: StageState,
     stepping: Stepping,
+    /// Whether the operator's series is cut as in the lanes of a search.
+    few_terms: bool,
     stop: Stop<'a>,
 }
 
@@ -205,9 +278,10 @@ impl WithSimd for Single<'_> {
     // One lane needs no vectors; the dispatch is for the fused multiply-add instruction.
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
-        match self.stepping.order {
-            Order::Second => self.run::<FEW_TERMS, false>(),
-            Order::Fourth => self.run::<TERMS, true>(),
+        match (self.stepping.order, self.few_terms) {
+            (Order::Second, true) => self.run::<FEW_TERMS, false>(),
+            (Order::Second, false) => self.run::<TERMS, false>(),
+            (Order::Fourth, _) => self.run::<TERMS, true>(),
         }
     }
 }
@@ -215,7 +289,7 @@ impl WithSimd for Single<'_> {
 impl Single<'_> {
     #[inline(always)]
     fn run<const T: usize, const FOURTH: bool>(self) -> Option<Trajectory> {
-        let Self { stage, drive, initial, stepping, stop } = self;
+        let Self { stage, drive, initial, stepping, stop, .. } = self;
         let substeps = stepping.substeps;
         let h = drive.dt / index(substeps);
         let mechanics = &stage.mechanics;

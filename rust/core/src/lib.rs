@@ -4,6 +4,7 @@
 //! of Python, prints nothing, and returns an [`Error`] where an argument cannot be used.
 #![forbid(unsafe_code)]
 
+mod classical;
 pub mod error;
 pub mod identify;
 pub mod integrate;

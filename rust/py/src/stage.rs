@@ -1,7 +1,7 @@
 //! The Dahl stage and its simulation.
 
 use numpy::{PyArray1, ToPyArray};
-use piezotrack_core::integrate::{self, Drive, Hold, Trajectory};
+use piezotrack_core::integrate::{self, Drive, Hold, Method, Trajectory};
 use piezotrack_core::march::{Order, Stepping};
 use piezotrack_core::stage::{DAHL_PARAMETERS, DahlStage, StageState};
 use piezotrack_core::{Error, Result};
@@ -34,6 +34,17 @@ pub fn hold(name: &str) -> Result<Hold> {
         "foh" => Ok(Hold::First),
         "zoh" => Ok(Hold::Zero),
         other => Err(Error::parameter("hold", format!("'{other}'"), "'foh' or 'zoh'")),
+    }
+}
+
+fn method_named(name: &str) -> Result<Method> {
+    match name {
+        "exponential" => Ok(Method::Exponential),
+        "rk4" => Ok(Method::Rk4),
+        "rk45" => Ok(Method::Rk45),
+        other => {
+            Err(Error::parameter("method", format!("'{other}'"), "'exponential', 'rk4' or 'rk45'"))
+        }
     }
 }
 
@@ -91,7 +102,8 @@ fn dahl_xu_li_2010() -> Theta {
 
 /// Simulates to an accuracy, choosing the sub-steps.
 #[pyfunction]
-#[pyo3(signature = (theta, u, dt, hold, initial, accuracy))]
+#[pyo3(signature = (theta, u, dt, hold, initial, method, accuracy))]
+#[expect(clippy::too_many_arguments, reason = "called from one place")]
 fn dahl_simulate(
     py: Python<'_>,
     theta: Theta,
@@ -99,10 +111,12 @@ fn dahl_simulate(
     dt: f64,
     hold: &str,
     initial: State,
+    method: &str,
     accuracy: f64,
 ) -> PyResult<PyTrajectory> {
+    let method = method_named(method).map_err(|error| raise(&error))?;
     run(py, theta, u, dt, hold, |stage, drive, stop| {
-        integrate::simulate(stage, drive, state(initial), accuracy, stop)
+        integrate::simulate(stage, drive, state(initial), method, accuracy, stop)
     })
 }
 

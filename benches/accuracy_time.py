@@ -1,0 +1,90 @@
+"""Accuracy against time of the three integrators: writes docs/accuracy.png.
+
+Run as ``python benches/accuracy_time.py`` after ``make demo``, with the environment it made.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import piezotrack as pt
+
+METHODS = {"exponential": "o-", "rk4": "s--", "rk45": "^:"}
+LABELS = {"exponential": "exponential (default)", "rk4": "RK4", "rk45": "RK4(5), adaptive"}
+
+
+def light_stage() -> pt.DahlStage:
+    """A stage with a 160 Hz mode of zeta = 0.065, as the paper's step response shows it."""
+    mass = 0.1828
+    stiffness = mass * (2 * math.pi * 160) ** 2
+    return pt.DahlStage(
+        mass=mass,
+        damping=2 * 0.065 * math.sqrt(stiffness * mass),
+        stiffness=stiffness,
+        piezo_coefficient=1.6e-6 * stiffness,
+        a1=121.9874,
+        a2=1.1773e6,
+        b1=1.8485e6 * stiffness / 26065.0,
+    )
+
+
+def measured(stage: pt.DahlStage, u: np.ndarray, dt: float, hold: str) -> dict[str, list]:
+    """Error and time for accuracies asked from 1 um to 0.1 pm."""
+    exact = stage.simulate(u, dt, hold=hold, accuracy=1e-15).x
+    found: dict[str, list] = {}
+    for method in METHODS:
+        for digits in range(6, 14):
+            start = time.perf_counter()
+            rounds = 0
+            while rounds < 3 or time.perf_counter() - start < 0.05:
+                x = stage.simulate(u, dt, hold=hold, method=method, accuracy=10.0**-digits).x
+                rounds += 1
+            each = (time.perf_counter() - start) / rounds
+            error = max(float(np.abs(x - exact).max()), 1e-16)
+            found.setdefault(method, []).append((1e3 * each, error))
+            print(f"{method:12} asked 1e-{digits:02} m: error {error:.1e} m, {1e3 * each:8.3f} ms")
+    return found
+
+
+def main() -> None:
+    """Measure and draw."""
+    t = np.arange(20001) / 5000.0
+    cases = {
+        "Table 1, 4 s of 0.25 Hz at 5 kHz": (
+            pt.DahlStage.xu_li_2010(),
+            37.5 * (1 - np.cos(2 * np.pi * 0.25 * t)),
+            1 / 5000.0,
+            "foh",
+        ),
+        "160 Hz, zeta 0.065, steps of 75 V at 1 kHz": (
+            light_stage(),
+            75.0 * (np.arange(1000) // 50 % 2),
+            1 / 1000.0,
+            "zoh",
+        ),
+    }
+    figure, axes = plt.subplots(1, 2, figsize=(11, 4.4), layout="constrained")
+    for ax, (title, case) in zip(axes, cases.items(), strict=True):
+        print(title)
+        for method, points in measured(*case).items():
+            times, errors = zip(*points, strict=True)
+            ax.loglog(times, errors, METHODS[method], label=LABELS[method])
+        ax.axhline(1e-10, color="0.6", linewidth=0.8)
+        ax.annotate("0.1 nm", (0.99, 1.15e-10), xycoords=("axes fraction", "data"), ha="right")
+        ax.set(title=title, xlabel="time of one call [ms]", ylabel="largest error [m]")
+    axes[0].set_xlim(1.0, 10.0)
+    axes[1].legend(loc="upper right")
+    figure.savefig(Path(__file__).parent.parent / "docs" / "accuracy.png", dpi=110)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,43 @@
+"""Lower sampling rates."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+__all__ = ["low_passed"]
+
+STOP_DB = 80.0
+# Half the width of the transition, in new Nyquist frequencies.
+TRANSITION = 0.2
+
+
+def low_passed(signal: Array, factor: int) -> Array:
+    """Take off what a rate lower by `factor` cannot show, without a shift in time.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (n,)
+        Evenly sampled.
+    factor : int
+        Old over new sampling rate.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        At the old rate. Ends are continued point-symmetrically.
+    """
+    from scipy.signal import fftconvolve, firwin, kaiserord
+
+    taps, beta = kaiserord(STOP_DB, 2.0 * TRANSITION / factor)
+    half = min(taps // 2 + 1, signal.size - 1)
+    weights = firwin(2 * half + 1, 1.0 / factor, window=("kaiser", beta))
+    padded = np.pad(signal, half, mode="reflect", reflect_type="odd")
+    filtered: Array = fftconvolve(padded, weights, mode="valid")
+    return filtered
