@@ -37,8 +37,8 @@ bench: ## Criterion benches: throughput of the swarm, latency of a step
 docs: ## The crates' pages
 	cargo doc --locked --no-deps
 
-clean: ## Remove what was built
-	rm -rf $(VENV) target demo results
+clean: ## Remove what was built, not your results
+	rm -rf $(VENV) target demo
 
 $(VENV)/pip:
 	$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(None if v >= (3, 11) else f"Python 3.11 or newer is needed, this is {v.major}.{v.minor}")'

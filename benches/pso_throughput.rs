@@ -1,20 +1,26 @@
-//! Throughput of a swarm's evaluation: time for one particle over one sample.
+//! Throughput of a swarm's evaluation: particle-samples per second.
 //!
 //! The signal is the paper's, 4 s of 0.25 Hz at 5 kHz, and the box that of its section 3.3.
+//! Everything that a ratio is made of runs here, in one process.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use std::hint::black_box;
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use piezotrack_core::identify::{Evaluator, Guess, Problem, Record, Spec};
+use criterion::measurement::WallTime;
+use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
+use piezotrack_core::identify::{Evaluator, Guess, Plan, Problem, Progress, Record, Spec};
+use piezotrack_core::identify::{SwarmSettings, search};
 use piezotrack_core::integrate::{Drive, Hold, Method, NEVER, simulate};
+use piezotrack_core::march::{Order, Stepping};
 use piezotrack_core::stage::{DahlStage, StageState};
+use pulp::{Arch, Simd, WithSimd};
 
 const RATE: f64 = 5000.0;
+const SAMPLES: u32 = 20_001;
 
-fn drive(samples: u32) -> Vec<f64> {
+fn drive() -> Vec<f64> {
     let turn = core::f64::consts::TAU * 0.25 / RATE;
-    (0..samples).map(|k| 37.5 * (1.0 - (turn * f64::from(k)).cos())).collect()
+    (0..SAMPLES).map(|k| 37.5 * (1.0 - (turn * f64::from(k)).cos())).collect()
 }
 
 fn paper_spec() -> Spec {
@@ -31,35 +37,158 @@ fn paper_spec() -> Spec {
     }
 }
 
+fn guesses(problem: &Problem, particles: u32) -> Vec<Guess> {
+    (0..particles)
+        .map(|i| problem.theta(&[f64::from(i) / f64::from(particles); 4]))
+        .map(|theta| Guess { theta, limit: f64::INFINITY })
+        .collect()
+}
+
+fn instruction_sets() -> Vec<(&'static str, Arch)> {
+    let mut sets = vec![("scalar", Arch::Scalar)];
+    #[cfg(target_arch = "x86_64")]
+    {
+        sets.extend(pulp::x86::V3::try_new().map(|v| ("AVX2", Arch::V3(v))));
+        sets.extend(pulp::x86::V4::try_new().map(|v| ("AVX-512", Arch::V4(v))));
+    }
+    sets
+}
+
+fn costs(
+    group: &mut BenchmarkGroup<'_, WallTime>,
+    name: &str,
+    evaluator: &Evaluator<'_>,
+    guesses: &[Guess],
+    threads: usize,
+) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let samples = guesses.len() as u64 * u64::from(SAMPLES);
+    group.throughput(Throughput::Elements(samples));
+    group.bench_function(name, |bencher| {
+        bencher.iter(|| pool.install(|| evaluator.costs(black_box(guesses), NEVER)));
+    });
+}
+
 fn throughput(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("pso_throughput");
-    for samples in [2_001_u32, 20_001] {
-        let u = drive(samples);
-        let held = Drive::new(&u, 1.0 / RATE, Hold::First).unwrap();
-        let stage = DahlStage::xu_li_2010();
-        let y = simulate(&stage, &held, StageState::default(), Method::Exponential, 1e-10, NEVER)
-            .unwrap()
-            .unwrap()
-            .x;
-        let record = Record::new(&u, &y, 1.0 / RATE, Hold::First, 0).unwrap();
-        let problem = Problem::new(&record, &paper_spec()).unwrap();
-        let evaluator = Evaluator::new(&record, &problem, NEVER);
-        for particles in [1_u32, 8, 10, 64, 96] {
-            let guesses: Vec<_> = (0..particles)
-                .map(|i| problem.theta(&[f64::from(i) / f64::from(particles); 4]))
-                .map(|theta| Guess { theta, limit: f64::INFINITY })
-                .collect();
-            group.throughput(Throughput::Elements(u64::from(particles) * u64::from(samples)));
-            for threads in [1_usize, 2] {
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-                let name = format!("{particles} particles, {threads} threads");
-                group.bench_function(BenchmarkId::new(name, samples), |bencher| {
-                    bencher.iter(|| pool.install(|| evaluator.costs(black_box(&guesses), NEVER)));
-                });
-            }
+    let u = drive();
+    let held = Drive::new(&u, 1.0 / RATE, Hold::First).unwrap();
+    let stage = DahlStage::xu_li_2010();
+    let rest = StageState::default();
+    let y = simulate(&stage, &held, rest, Method::Exponential, 1e-10, NEVER).unwrap().unwrap().x;
+    let record = Record::new(&u, &y, 1.0 / RATE, Hold::First, 0).unwrap();
+    let problem = Problem::new(&record, &paper_spec()).unwrap();
+    let evaluator = || Evaluator::new(&record, &problem, NEVER);
+    assert_eq!(evaluator().stepping, Stepping { order: Order::Second, substeps: 1 });
+
+    let mut group = criterion.benchmark_group("particles and threads");
+    for particles in [1, 8, 10, 64, 96] {
+        for threads in [1, 2] {
+            let name = format!("{particles} particles, {threads} threads");
+            costs(&mut group, &name, &evaluator(), &guesses(&problem, particles), threads);
         }
     }
     group.finish();
+
+    let mut group = criterion.benchmark_group("instruction sets, one thread");
+    for (name, arch) in instruction_sets() {
+        let second = evaluator().on(arch);
+        let mut fourth = evaluator().on(arch);
+        fourth.stepping.order = Order::Fourth;
+        let full = guesses(&problem, 96);
+        costs(&mut group, &format!("{name}, second order"), &second, &full, 1);
+        costs(&mut group, &format!("{name}, fourth order"), &fourth, &full, 1);
+        group.throughput(Throughput::Elements(Peak::COUNT * arch.dispatch(Width)));
+        group.bench_function(format!("{name}, multiply-adds, peak"), |bencher| {
+            bencher.iter(|| arch.dispatch(Peak(black_box(0.5))));
+        });
+    }
+    group.throughput(Throughput::Elements(u64::from(SAMPLES)));
+    group.bench_function("plain RK4, 4 steps a sample", |bencher| {
+        bencher.iter(|| plain_rk4(black_box(&stage), &u, 1.0 / RATE));
+    });
+    group.finish();
+
+    let mut group = criterion.benchmark_group("whole searches of 2000 iterations");
+    group.sample_size(10);
+    let settings = SwarmSettings { stall_iterations: 100_000, ..SwarmSettings::xu_li_2010() };
+    for runs in [1, 32] {
+        let plan = Plan { settings: settings.clone(), seed: 1, runs };
+        group.bench_function(format!("the paper's, {runs} at once, 2 threads"), |bencher| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+            bencher.iter(|| {
+                let mut quiet = |_: &Progress| core::ops::ControlFlow::Continue(());
+                pool.install(|| search(&evaluator(), &problem, &plan, &mut quiet, NEVER))
+            });
+        });
+    }
+    group.finish();
+}
+
+/// Independent chains of multiply-adds: what the core can do at most.
+struct Peak(f64);
+
+impl Peak {
+    const CHAINS: usize = 12;
+    const ROUNDS: u64 = 10_000;
+    const COUNT: u64 = Self::ROUNDS * 12;
+}
+
+impl WithSimd for Peak {
+    type Output = f64;
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> f64 {
+        let (factor, term) = (simd.splat_f64s(self.0), simd.splat_f64s(1.0));
+        let mut chains = [simd.splat_f64s(0.0); Self::CHAINS];
+        for _ in 0..Self::ROUNDS {
+            for chain in &mut chains {
+                *chain = simd.mul_add_f64s(*chain, factor, term);
+            }
+        }
+        let mut sum = simd.splat_f64s(0.0);
+        for chain in chains {
+            sum = simd.add_f64s(sum, chain);
+        }
+        simd.reduce_sum_f64s(sum)
+    }
+}
+
+/// Lanes of an instruction set.
+struct Width;
+
+impl WithSimd for Width {
+    type Output = u64;
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> u64 {
+        S::F64_LANES as u64
+    }
+}
+
+/// RK4 on x, x', q1, q2 as one would write it, with the four steps that the box needs.
+fn plain_rk4(stage: &DahlStage, u: &[f64], dt: f64) -> f64 {
+    let m = stage.mechanics;
+    let slope = |s: [f64; 4], u: f64| {
+        let [x, v, q1, q2] = s;
+        let force = stage.piezo_coefficient * u - stage.b1 * q1 - m.damping * v - m.stiffness * x;
+        let bend = stage.up - stage.a2 * q1 - v.signum() * stage.a1 * q2;
+        [v, force / m.mass, q2 * v, bend * v]
+    };
+    let add = |s: [f64; 4], k: [f64; 4], h: f64| core::array::from_fn(|i| s[i] + h * k[i]);
+    let h = dt / 4.0;
+    let (mut s, mut squares) = ([0.0; 4], 0.0);
+    for pair in u.windows(2) {
+        for j in 0..4 {
+            let at = |c: f64| pair[0] + (pair[1] - pair[0]) * (f64::from(j) + c) / 4.0;
+            let k1 = slope(s, at(0.0));
+            let k2 = slope(add(s, k1, h / 2.0), at(0.5));
+            let k3 = slope(add(s, k2, h / 2.0), at(0.5));
+            let k4 = slope(add(s, k3, h), at(1.0));
+            s = core::array::from_fn(|i| {
+                s[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
+            });
+        }
+        squares += s[0] * s[0];
+    }
+    squares
 }
 
 criterion_group!(benches, throughput);

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from . import _core
 from .dataset import Dataset
 from .identification import Identification, identify
 from .models import DahlStage
@@ -44,6 +45,7 @@ def demo_log(seed: int = 1) -> Dataset:
     Dataset
         60 001 samples.
     """
+    seed = _core.as_count("seed", seed)
     rate, seconds = 5000.0, 12.0
     t = np.arange(int(rate * seconds) + 1) / rate
     u = 37.5 * (1.0 - np.cos(2.0 * np.pi * 0.25 * t))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -108,7 +108,7 @@ class Run(NamedTuple):
     stop_reason: StopReason
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Identification(IdentifiedModel):
     """What a search found; see `IdentifiedModel` for what can be done with it.
 
@@ -154,6 +154,12 @@ class Identification(IdentifiedModel):
     seed: int
     swarm: ParticleSwarm
 
+    def __repr__(self) -> str:
+        return (
+            f"<Identification of a Dahl stage: {self.cost_um:.4g} um rms, "
+            f"{self.cost_percent:.3g} % of stroke; see summary()>"
+        )
+
     @property
     def fun(self) -> float:
         """The cost [m], under SciPy's name."""
@@ -168,6 +174,23 @@ class Identification(IdentifiedModel):
     def cost_percent(self) -> float:
         """The cost in per cent of the stroke."""
         return 100.0 * self.cost / self.stroke
+
+    @property
+    def notes(self) -> list[str]:
+        """What a careful reader should know before using the result."""
+        notes = []
+        if not 1e-9 <= self.stroke <= 1e-2:
+            notes.append(
+                f"a stroke of {1e6 * self.stroke:.4g} um is not that of a nanopositioner: is the "
+                "unit of the displacement right?"
+            )
+        if self.cost_percent > 5.0:
+            notes.append(
+                f"the model does not follow this record: {self.cost_percent:.3g} % of stroke remain"
+            )
+        if len(self.runs) > 1 and self.agreeing == 1:
+            notes.append("no other run ended where the best one did: try more, with runs=")
+        return notes
 
     @property
     def agreeing(self) -> int:
@@ -235,7 +258,7 @@ def identify(
     offset: bool = True,
     swarm: ParticleSwarm | None = None,
     seed: int = 0,
-    runs: int = 1,
+    runs: int | None = None,
     threads: int | None = None,
     progress: bool | None = None,
     callback: Callable[[Progress], object] | None = None,
@@ -278,9 +301,9 @@ def identify(
     runs : int, optional
         Swarms that search apart from each other, each from its own random numbers; whether they
         end with the same cost tells whether there are more valleys. They share the lanes of the
-        processor, so several take less time together than one after the other.
+        processor. Where not given, 4, and 1 with a `swarm` of your own.
     threads : int, optional
-        All cores where not given.
+        Up to 256; all cores where it is 0 or not given.
     progress : bool, optional
         Whether a progress bar is shown; where not given, in a terminal or notebook only.
     callback : callable, optional
@@ -322,9 +345,15 @@ def identify(
         raise ParameterError(f"data is {type(data).__name__}: expected a Dataset, see pt.read")
     if model != "dahl":
         raise ParameterError(f"model is {model!r}: expected 'dahl'")
-    if isinstance(free, str):
-        raise ParameterError(f"free is {free!r}: expected names in a list, as ['mass']")
+    if runs is None:
+        runs = 4 if swarm is None else 1
     swarm = ParticleSwarm() if swarm is None else swarm
+    if not isinstance(swarm, ParticleSwarm):
+        raise ParameterError(f"swarm is {swarm!r}: expected a ParticleSwarm, as pt.ParticleSwarm()")
+    if callback is not None and not callable(callback):
+        raise ParameterError(f"callback is {callback!r}: expected a function, or None")
+    seed = _core.as_count("seed", seed)
+    offset = _core.as_truth("offset", offset)
     full = data.full
     with ProgressBar(progress) as bar:
         found = _core.identify_dahl(
@@ -333,13 +362,13 @@ def identify(
             dt=data.dt,
             hold_name=data.hold,
             start=data.warmup,
-            free=None if free is None else [str(name) for name in free],
-            fixed=[(name, _core.as_number(name, v)) for name, v in (fixed or {}).items()],
-            bounds=[(name, _pair(name, pair)) for name, pair in (bounds or {}).items()],
+            free=_names(free),
+            fixed=[(name, _core.as_number(name, v)) for name, v in _items("fixed", fixed)],
+            bounds=[(name, _pair(name, pair)) for name, pair in _items("bounds", bounds)],
             stiffness=None if stiffness is None else _core.as_number("stiffness", stiffness),
-            offset=bool(offset),
+            offset=offset,
             settings=swarm.checked(),
-            seed=_core.as_count("seed", seed),
+            seed=seed,
             runs=_core.as_count("runs", runs),
             threads=0 if threads is None else _core.as_count("threads", threads),
             callback=None if callback is None else _telling(callback),
@@ -347,7 +376,7 @@ def identify(
         )
     if found is None:
         raise Interrupted("interrupted before the first cost was computed")
-    fit = _identification(found, data, swarm, seed, bool(offset))
+    fit = _identification(found, data, swarm, seed, offset)
     if not fit.success:
         raise Interrupted(
             f"interrupted after {fit.nit} iterations, best cost {fit.cost_um:.4g} um", fit
@@ -366,11 +395,30 @@ def _telling(callback: Callable[[Progress], object]) -> Callable[..., bool]:
     return tell
 
 
+def _names(free: object) -> list[str] | None:
+    """Check that free names parameters in a list."""
+    if free is None:
+        return None
+    if isinstance(free, str) or not isinstance(free, Iterable):
+        raise ParameterError(f"free is {free!r}: expected names in a list, as ['mass']")
+    return [str(name) for name in free]
+
+
+def _items(argument: str, mapping: object) -> list[tuple[str, Any]]:
+    """Check that an argument maps names of parameters to something."""
+    if mapping is None:
+        return []
+    if not isinstance(mapping, Mapping):
+        raise ParameterError(f"{argument} is {mapping!r}: expected a mapping of names to values")
+    return [(str(name), value) for name, value in mapping.items()]
+
+
 def _pair(name: str, pair: object) -> tuple[float, float]:
     """Check that bounds are two numbers."""
-    if not isinstance(pair, Sequence) or isinstance(pair, str) or len(pair) != 2:
+    two = list(pair) if isinstance(pair, Iterable) and not isinstance(pair, str) else []
+    if len(two) != 2:
         raise ParameterError(f"bounds of {name} are {pair!r}: expected (low, high)")
-    low, high = pair
+    low, high = two
     return (
         _core.as_number(f"lower bound of {name}", low),
         _core.as_number(f"upper bound of {name}", high),
@@ -422,6 +470,8 @@ def _identification(
                 "warmup_samples": data.warmup,
                 "window_s": [float(data.t[0]), float(data.t[-1])],
                 "dt_s": data.dt,
+                "drive_range": [float(data.full.u.min()), float(data.full.u.max())],
+                "drive_unit": data.drive_unit,
                 "hold": data.hold,
             },
         },

@@ -92,6 +92,13 @@ class IdentifiedModel:
     stroke: float
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
+    @property
+    def drive_range(self) -> tuple[float, float] | None:
+        """Lowest and highest drive of the record identified, where the file tells them."""
+        provenance = self.details.get("provenance", {})
+        found = provenance.get("data", {}).get("drive_range")
+        return (float(found[0]), float(found[1])) if found else None
+
     def simulate(self, data: Dataset, *, offset: float | Literal["own"] = "own") -> Response:
         """Displacement that the model gives under the drive of a record.
 
@@ -138,6 +145,8 @@ class IdentifiedModel:
         Score
             Percentages refer to the stroke of the record identified.
         """
+        if not isinstance(data, Dataset):
+            raise ParameterError(f"data is {type(data).__name__}: expected a Dataset")
         x = self.simulate(data, offset=0.0).x
         shift = self._shift(data, x, offset)
         error = data.y - x - shift
@@ -153,7 +162,10 @@ class IdentifiedModel:
     ) -> float:
         """Offset to add to a simulated displacement [m]."""
         if offset != "own":
-            return _core.as_number("offset", offset)
+            shift = _core.as_number("offset", offset)
+            if not math.isfinite(shift):
+                raise ParameterError(f"offset is {shift}: expected a finite number or 'own'")
+            return shift
         return float(np.mean(data.y - x)) if self.offset_fitted else 0.0
 
     def document(self) -> dict[str, Any]:
@@ -164,7 +176,7 @@ class IdentifiedModel:
         dict
             Of numbers, texts, lists and dicts only.
         """
-        details = {key: dict(value) for key, value in self.details.items()}
+        details = dict(self.details)
         found = details.pop("parameters", {})
         parameters = {
             name: {"value": getattr(self.model, name), "unit": unit, "symbol": symbol}
@@ -200,9 +212,15 @@ class IdentifiedModel:
         ------
         DataError
             The file cannot be written.
+        ParameterError
+            Offset or stroke are not finite numbers.
         """
         import json
 
+        # What load would refuse is refused now, while the fit is still there.
+        for name, value in (("offset", self.offset), ("stroke", self.stroke)):
+            if not math.isfinite(_core.as_number(name, value)):
+                raise ParameterError(f"{name} is {value}: expected a finite number")
         text = json.dumps(_finite(self.document()), indent=2, allow_nan=False)
         with replacing(path) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
@@ -244,15 +262,22 @@ def load(path: str | os.PathLike[str]) -> IdentifiedModel:
     """
     import json
 
-    file = Path(path)
+    try:
+        file = Path(path)
+    except TypeError:
+        raise ParameterError(f"path is {path!r}: expected the name of a file") from None
     try:
         document = json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise DataError(f"{file.name}: {(error.strerror or str(error)).lower()}") from None
+    except RecursionError:
+        raise DataError(f"{file.name} is not a piezotrack model: it is nested too deep") from None
     except UnicodeDecodeError:
         raise DataError(f"{file.name} is not a text file: expected a model in JSON") from None
     except json.JSONDecodeError as error:
         raise DataError(f"{file.name}:{error.lineno}: not JSON: {error.msg}") from None
+    except ValueError as error:
+        raise DataError(f"{file.name} cannot be read: {error}") from None
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise DataError(f"{file.name} is not a piezotrack model: its 'format' is not '{FORMAT}'")
     version = document.get("schema_version")
@@ -276,12 +301,14 @@ def _identified(name: str, document: dict[str, Any]) -> IdentifiedModel:
             key: {k: v for k, v in entry.items() if k not in ("value", "unit", "symbol")}
             for key, entry in parameters.items()
         }
+        for key, _, unit in _core.DAHL_PARAMETERS:
+            _require_unit(key, parameters[key], unit)
         return IdentifiedModel(
             model=DahlStage(**values),
-            offset=_core.as_number("offset", document["offset"]["value"]),
-            offset_fitted=bool(document["offset"]["fitted"]),
-            scale_assumed=bool(document["scale_assumed"]),
-            stroke=_core.as_number("stroke", document["stroke"]["value"]),
+            offset=_metres("offset", document["offset"]),
+            offset_fitted=_core.as_truth("offset fitted", document["offset"]["fitted"]),
+            scale_assumed=_core.as_truth("scale_assumed", document["scale_assumed"]),
+            stroke=_metres("stroke", document["stroke"], positive=True),
             details={"parameters": extra, **details},
         )
     except KeyError as error:
@@ -290,6 +317,22 @@ def _identified(name: str, document: dict[str, Any]) -> IdentifiedModel:
         raise DataError(f"{name}: an entry is not of the form that 'save' writes") from None
     except PiezotrackError as error:
         raise DataError(f"{name}: {error}") from None
+
+
+def _require_unit(name: str, entry: Mapping[str, Any], unit: str) -> None:
+    if entry.get("unit") != unit:
+        raise ParameterError(f"the unit of {name} is {entry.get('unit')!r}: expected {unit!r}")
+
+
+def _metres(name: str, entry: Mapping[str, Any], *, positive: bool = False) -> float:
+    """Take a length from the file."""
+    _require_unit(name, entry, "m")
+    value = _core.as_number(name, entry["value"])
+    if not math.isfinite(value) or (positive and value <= 0.0):
+        raise ParameterError(
+            f"{name} is {value} m: expected a finite number" + " above 0" * positive
+        )
+    return value
 
 
 @contextmanager

@@ -46,7 +46,7 @@ class StageState:
         return self.x, self.v, self.hysteresis, self.hysteresis_slope
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Response:
     """Motion of a stage at the samples of its drive.
 

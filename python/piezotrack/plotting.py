@@ -17,12 +17,13 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
     from .dataset import Dataset
     from .identification import Identification
     from .models import Response
 
-    Array = np.ndarray[tuple[int], np.dtype[np.float64]]
+    Array = NDArray[np.float64]
 
 __all__ = [
     "plot_convergence",
@@ -59,9 +60,9 @@ def plot_loop(data: Dataset, run: Response, ax: Axes | None = None) -> Axes:
     """
     (ax,) = _axes(ax, 1)
     unit, scale = best_length_unit(data.stroke)
-    thin = _stride(len(data))
-    ax.plot(data.u[::thin], scale * data.y[::thin], **MEASURED)
-    ax.plot(data.u[::thin], scale * run.x[::thin], **SIMULATED)
+    for y, style in ((data.y, MEASURED), (run.x, SIMULATED)):
+        kept = _kept(y)
+        ax.plot(data.u[kept], scale * y[kept], **style)
     ax.set(xlabel=f"drive [{data.drive_unit}]", ylabel=f"displacement [{unit}]")
     ax.set_title("Hysteresis loop")
     ax.legend(loc="upper left", frameon=False)
@@ -100,15 +101,16 @@ def plot_time(
     unit, scale = best_length_unit(data.stroke)
     error = data.y - run.x
     small, fine = best_length_unit(float(np.abs(error).max()))
-    thin = _stride(len(data))
-    above.plot(data.t[::thin], scale * data.y[::thin], **MEASURED)
-    above.plot(data.t[::thin], scale * run.x[::thin], **SIMULATED)
+    for y, style in ((data.y, MEASURED), (run.x, SIMULATED)):
+        kept = _kept(y)
+        above.plot(data.t[kept], scale * y[kept], **style)
     above.set(ylabel=f"displacement [{unit}]", title="Displacement over time")
     above.margins(x=0.0, y=0.05)
     top = above.get_ylim()[1] - above.get_ylim()[0]
     above.set_ylim(top=above.get_ylim()[1] + 0.22 * top)
     above.legend(loc="upper right", ncols=2, frameon=False)
-    below.plot(data.t[::thin], fine * error[::thin], **ERROR)
+    kept = _kept(error)
+    below.plot(data.t[kept], fine * error[kept], **ERROR)
     below.axhline(0.0, color="0.7", linewidth=0.8, zorder=0)
     below.set(xlabel="time [s]", ylabel=f"error [{small}]")
     rms = float(np.sqrt(np.mean(error**2)))
@@ -148,14 +150,18 @@ def plot_convergence(fit: Identification, ax: Axes | None = None) -> Axes:
         The axes drawn on.
     """
     (ax,) = _axes(ax, 1)
-    finite = np.isfinite(fit.history)
+    # Nothing is left to draw on a logarithmic scale where a fit is exact.
+    finite = np.isfinite(fit.history) & (fit.history > 0.0)
     iterations = np.arange(fit.history.size)[finite]
-    ax.semilogy(iterations, 1e6 * fit.history[finite], color="#1b6ca8", linewidth=1.4)
+    ax.plot(iterations, 1e6 * fit.history[finite], color="#1b6ca8", linewidth=1.4)
+    if finite.any():
+        ax.set_yscale("log")
     ax.set(xlabel="iteration", ylabel="best cost, rms [um]", title="Convergence of the swarm")
     ax.margins(x=0.02)
-    _plain_log_ticks(ax)
+    if finite.any():
+        _plain_log_ticks(ax)
     told = f"{1e6 * fit.history[-1]:.4g} um after {fit.nit} iterations,\n{fit.nfev} simulations"
-    if fit.npolish:
+    if fit.npolish and fit.cost > 0.0:
         ax.plot(fit.nit, fit.cost_um, "o", color="#b3400a", markersize=5)
         told += f";\npolished to {fit.cost_um:.4g} um"
     ax.annotate(
@@ -186,11 +192,11 @@ def plot_response(t: Array, u: Array, x: Array) -> Figure:
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.2), layout="constrained")
     unit, scale = best_length_unit(float(np.ptp(x)))
-    thin = _stride(x.size)
-    left.plot(t[::thin], scale * x[::thin], **SIMULATED)
+    kept = _kept(x)
+    left.plot(t[kept], scale * x[kept], **SIMULATED)
     left.set(xlabel="time [s]", ylabel=f"displacement [{unit}]", title="Displacement over time")
     left.margins(x=0.0)
-    right.plot(u[::thin], scale * x[::thin], **SIMULATED)
+    right.plot(u[kept], scale * x[kept], **SIMULATED)
     right.set(xlabel="drive [V]", ylabel=f"displacement [{unit}]", title="Hysteresis loop")
     return figure
 
@@ -238,8 +244,21 @@ def _axes(given: Axes | Sequence[Axes] | None, count: int) -> list[Axes]:
     return list(given) if isinstance(given, (list, tuple, np.ndarray)) else [given]  # type: ignore[list-item]
 
 
-def _stride(samples: int) -> int:
-    return max(1, samples // MOST_POINTS)
+def _kept(values: Array) -> NDArray[np.intp]:
+    """Choose the samples to draw: of a long signal, the extremes of each stretch.
+
+    A glitch of one sample is just what one looks for.
+    """
+    stretch = max(1, values.size // (MOST_POINTS // 2))
+    if stretch < 3:
+        return np.arange(values.size)
+    whole = values.size // stretch * stretch
+    rows = values[:whole].reshape(-1, stretch)
+    first = np.arange(0, whole, stretch)
+    extremes = np.stack([first + rows.argmin(axis=1), first + rows.argmax(axis=1)])
+    ends = [0, values.size - 1]
+    tail = np.arange(whole, values.size)
+    return np.unique(np.concatenate([extremes.ravel(), tail, ends]))
 
 
 def _plain_log_ticks(ax: Axes) -> None:

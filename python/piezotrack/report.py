@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
     from .dataset import Dataset
     from .identification import Estimate, Identification
-    from .models import DahlStage
 
 __all__ = ["make_folder", "save_figures", "save_identification", "summary_text"]
 
@@ -43,9 +42,9 @@ def summary_text(fit: Identification) -> str:
         + (f", offset {1e6 * fit.offset:.5g} um fitted" if fit.offset_fitted else ""),
         f"      {fit.nit} iterations, {fit.nfev} simulations, seed {fit.seed}: {fit.message}",
         *_runs(fit),
+        *(f"note  {note}" for note in fit.notes),
         "",
-        "fixed by the data",
-        *(f"  {name:<10} {value:>12.6g}  {unit}" for name, value, unit in _ratios(fit.model)),
+        *_known(fit),
         "",
     ]
     if fit.scale_assumed:
@@ -67,25 +66,40 @@ def summary_text(fit: Identification) -> str:
 def _runs(fit: Identification) -> list[str]:
     """Say whether several runs agree."""
     if len(fit.runs) == 1:
-        return []
-    costs = ", ".join(f"{1e6 * cost:.4g}" for cost in sorted(run.cost for run in fit.runs)[:8])
-    more = ", ..." if len(fit.runs) > 8 else ""
+        return ["      one run: several, runs=4, would tell whether there are other valleys"]
+    costs = ", ".join(f"{1e6 * cost:.4g}" for cost in sorted(run.cost for run in fit.runs)[:4])
+    more = ", ..." if len(fit.runs) > 4 else ""
     verdict = f"{fit.agreeing} of {len(fit.runs)} runs end within 0.1 % of the best"
     return [f"      {verdict}: {costs}{more} um"]
 
 
-def _ratios(stage: DahlStage) -> list[tuple[str, float, str]]:
-    """List what voltage and displacement can tell, whatever the scale of the forces."""
-    stiffness = stage.stiffness
+def _known(fit: Identification) -> list[str]:
+    """List what the data tell, whatever the scale of the forces, and what they do not."""
+    stage, stiffness = fit.model, fit.model.stiffness
     frequency = math.sqrt(stiffness / stage.mass) / (2 * math.pi)
-    return [
-        ("T/K", 1e6 * stage.piezo_coefficient / stiffness, "um/V"),
-        ("D/K", 1e3 * stage.damping / stiffness, "ms"),
-        ("M/K", stage.mass / stiffness, f"s^2, a natural frequency of {frequency:.4g} Hz"),
-        ("b1 up/K", stage.b1 * stage.up / stiffness, "1/m"),
-        ("a1", stage.a1, "1/m"),
-        ("a2", stage.a2, "1/m^2"),
+    ratios = [
+        ("piezo_coefficient", "T/K", 1e6 * stage.piezo_coefficient / stiffness, "um/V"),
+        ("damping", "D/K", 1e3 * stage.damping / stiffness, "ms"),
+        ("mass", "M/K", stage.mass / stiffness, f"s^2, a natural frequency of {frequency:.4g} Hz"),
+        ("b1", "b1 up/K", stage.b1 * stage.up / stiffness, "1/m"),
+        ("a1", "a1", stage.a1, "1/m"),
+        ("a2", "a2", stage.a2, "1/m^2"),
     ]
+    # A ratio to a stiffness that was searched is known where both are.
+    whole = fit.parameters["stiffness"]
+    known: list[tuple[str, str]] = []
+    unknown: list[tuple[str, str]] = []
+    for name, symbol, value, unit in ratios:
+        estimate = fit.parameters[name]
+        held = not estimate.free and (not whole.free or name in ("a1", "a2"))
+        sure = estimate.identified and (whole.identified or name in ("a1", "a2"))
+        if not held:
+            (known if sure else unknown).append((symbol, f"{value:>12.6g}  {unit}"))
+    lines = ["fixed by the data" if known else "nothing is fixed by these data"]
+    lines += [f"  {symbol:<10} {text}" for symbol, text in known]
+    if unknown:
+        lines.append("not fixed by them: " + ", ".join(symbol for symbol, _ in unknown))
+    return lines
 
 
 def _row(name: str, estimate: Estimate) -> str:
@@ -96,8 +110,9 @@ def _row(name: str, estimate: Estimate) -> str:
     elif not math.isfinite(estimate.deviation):
         note = "no trace in the data"
     else:
-        share = estimate.deviation / abs(estimate.value) if estimate.value else math.inf
-        note = f"{100 * share:.2g} %" if share < 1 else "larger than the value"
+        share = 100 * estimate.deviation / abs(estimate.value) if estimate.value else math.inf
+        digits = f"{share:.2g}" if share < 10 else f"{share:.0f}"
+        note = f"{digits} %" if share < 100 else "larger than the value"
     if estimate.at_bound:
         note += ", on a bound"
     return (
@@ -151,15 +166,18 @@ def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
     import matplotlib.pyplot as plt
 
     written = []
-    for name, figure in figures.items():
-        for ending in ("png", "svg"):
-            path = folder / f"{name}.{ending}"
-            # Without a date and with fixed ids, the same result gives the same file.
-            stamp = {"Date": None} if ending == "svg" else {}
-            with replacing(path) as temporary, mpl.rc_context({"svg.hashsalt": name}):
-                figure.savefig(temporary, dpi=150, metadata=stamp)
-            written.append(path)
-        plt.close(figure)
+    try:
+        for name, figure in figures.items():
+            for ending in ("png", "svg"):
+                path = folder / f"{name}.{ending}"
+                # Without a date and with fixed ids, the same result gives the same file.
+                stamp = {"Date": None} if ending == "svg" else {}
+                with replacing(path) as temporary, mpl.rc_context({"svg.hashsalt": name}):
+                    figure.savefig(temporary, dpi=150, metadata=stamp)
+                written.append(path)
+    finally:
+        for figure in figures.values():
+            plt.close(figure)
     return written
 
 

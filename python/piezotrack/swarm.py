@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields
-from typing import Literal
+import math
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, Literal
 
 from . import _core
+from .errors import ParameterError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 __all__ = ["ParticleSwarm"]
 
@@ -80,6 +85,10 @@ class ParticleSwarm:
 
     def __post_init__(self) -> None:
         self.checked()
+        # NumPy's numbers become Python's: they are compared, printed and written to JSON.
+        for field in fields(self):
+            value = CHECKS[field.name](field.name, getattr(self, field.name))
+            object.__setattr__(self, field.name, value)
 
     @classmethod
     def xu_li_2010(cls) -> ParticleSwarm:
@@ -118,11 +127,36 @@ class ParticleSwarm:
         piezotrack._core.SwarmSettings
             The same settings, in SI.
         """
-        settings = asdict(self)
+        settings: dict[str, Any] = {}
         for field in fields(self):
-            check = {"int": _core.as_count, "float": _core.as_number}.get(str(field.type))
-            if check is not None:
-                settings[field.name] = check(field.name, settings[field.name])
+            value = getattr(self, field.name)
+            settings[field.name] = CHECKS[field.name](field.name, value)
+        improvement = settings.pop("min_improvement_um")
+        if not 0.0 <= improvement < math.inf:
+            raise ParameterError(
+                f"min_improvement_um is {improvement}: expected a finite number, 0 or above"
+            )
         # Divided, not multiplied: 1e-6 um is then 1e-12 m to the last bit.
-        settings["min_improvement"] = settings.pop("min_improvement_um") / 1e6
-        return _core.SwarmSettings(**settings)
+        return _core.SwarmSettings(**settings, min_improvement=improvement / 1e6)
+
+
+def _text(_name: str, value: object) -> str:
+    # What is no text at all is refused as an unknown word, by the core.
+    return value if isinstance(value, str) else repr(value)
+
+
+CHECKS: dict[str, Callable[[str, object], Any]] = {
+    "particles": _core.as_count,
+    "iterations": _core.as_count,
+    "inertia_start": _core.as_number,
+    "inertia_end": _core.as_number,
+    "inertia_iterations": _core.as_count,
+    "cognitive": _core.as_number,
+    "social": _core.as_number,
+    "topology": _text,
+    "velocity_limit": _core.as_number,
+    "boundary": _text,
+    "min_improvement_um": _core.as_number,
+    "stall_iterations": _core.as_count,
+    "polish": _core.as_truth,
+}

@@ -5,7 +5,7 @@ use piezotrack_core::identify::{
     Evaluator, Guess, Monitor, Outcome, Plan, Problem, Progress, Record, Spec, SwarmSettings,
     search,
 };
-use piezotrack_core::integrate::{Drive, Hold, NEVER, simulate};
+use piezotrack_core::integrate::{Drive, Hold, Method, NEVER, simulate};
 use piezotrack_core::march::{Order, Stepping};
 use piezotrack_core::stage::{DahlStage, StageState};
 use pulp::Arch;
@@ -16,7 +16,9 @@ fn log() -> (Vec<f64>, Vec<f64>) {
     let u: Vec<f64> = (0..4000).map(|k| 30.0 * (1.0 - (0.02 * f64::from(k)).cos())).collect();
     let drive = Drive::new(&u, DT, Hold::First).unwrap();
     let stage = DahlStage::xu_li_2010();
-    let run = simulate(&stage, &drive, StageState::default(), 1e-10, NEVER).unwrap().unwrap();
+    let run = simulate(&stage, &drive, StageState::default(), Method::Exponential, 1e-10, NEVER)
+        .unwrap()
+        .unwrap();
     (u, run.x)
 }
 

@@ -69,10 +69,21 @@ pub fn finite(name: &str, value: f64, unit: &str) -> Result<f64> {
     check(name, value, unit, true, "a finite number")
 }
 
+/// A number as a person would write it, never with hundreds of digits.
+#[must_use]
+pub fn shown(value: f64) -> String {
+    let size = value.abs();
+    if value.is_finite() && size != 0.0 && !(1e-4..1e7).contains(&size) {
+        format!("{value:e}")
+    } else {
+        value.to_string()
+    }
+}
+
 fn check(name: &str, value: f64, unit: &str, holds: bool, expected: &str) -> Result<f64> {
     if value.is_finite() && holds {
         return Ok(value);
     }
     let space = if unit.is_empty() { "" } else { " " };
-    Err(Error::parameter(name, format!("{value}{space}{unit}"), expected))
+    Err(Error::parameter(name, format!("{}{space}{unit}", shown(value)), expected))
 }

@@ -157,7 +157,7 @@ fn out_of_reach(accuracy: f64, substeps: usize, difference: f64) -> Error {
     Error::Numerical(format!(
         "accuracy {accuracy} m is out of reach: {substeps} sub-steps a sample differ from a \
          coarser simulation by {difference:.3e} m; ask for less with accuracy=, or check that \
-         the parameters are in SI units"
+         parameters and drive are in SI units"
     ))
 }
 
@@ -187,8 +187,8 @@ fn at_level(
     };
     run.ok_or_else(|| {
         Error::Numerical(
-            "the simulated displacement does not stay finite: check that the parameters are in \
-             SI units"
+            "the simulated displacement does not stay finite: check that parameters and drive are \
+             in SI units"
                 .into(),
         )
     })
@@ -255,7 +255,7 @@ fn stepped(single: Single<'_>) -> Result<Option<Trajectory>> {
         None => Ok(Some(trajectory)),
         Some(k) => Err(Error::Numerical(format!(
             "the simulated displacement is not finite from sample {k} on ({:.6} s): check that \
-             the parameters are in SI units",
+             parameters and drive are in SI units",
             dt * index(k)
         ))),
     }

@@ -27,16 +27,28 @@ fn as_float_array<'py>(
     name: &str,
     value: &Bound<'py, PyAny>,
 ) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
-    if let Ok(array) = value.cast::<PyArrayDyn<f64>>() {
+    // Subclasses are not taken as they are: a masked array would lose its mask.
+    if let Ok(array) = value.cast_exact::<PyArrayDyn<f64>>() {
         return Ok(array.readonly());
     }
-    let numpy = value.py().import("numpy")?;
-    let keywords = [("dtype", "float64")].into_py_dict(value.py())?;
-    let converted = numpy.call_method("asarray", (value,), Some(&keywords));
-    match converted.as_ref().map(|array| array.cast::<PyArrayDyn<f64>>()) {
-        Ok(Ok(array)) => Ok(array.readonly()),
-        _ => Err(shape(name, &kind(value), "a one-dimensional array of numbers")),
+    let refused = |_| shape(name, &kind(value), "a one-dimensional array of numbers");
+    let py = value.py();
+    let numpy = py.import("numpy")?;
+    let value = if value.hasattr("mask")? && value.hasattr("filled")? {
+        // A masked sample is a missing one.
+        let floats = value.call_method1("astype", ("float64",)).map_err(refused)?;
+        floats.call_method1("filled", (f64::NAN,)).map_err(refused)?
+    } else {
+        numpy.call_method1("asarray", (value,)).map_err(refused)?
+    };
+    let dtype: String = value.getattr("dtype")?.getattr("kind")?.extract()?;
+    if !matches!(dtype.as_str(), "b" | "i" | "u" | "f") {
+        let found = format!("values of type {}", value.getattr("dtype")?);
+        return Err(shape(name, &found, "real numbers"));
     }
+    let keywords = [("dtype", "float64")].into_py_dict(py)?;
+    let converted = numpy.call_method("asarray", (&value,), Some(&keywords))?;
+    Ok(converted.cast::<PyArrayDyn<f64>>()?.readonly())
 }
 
 fn kind(value: &Bound<'_, PyAny>) -> String {

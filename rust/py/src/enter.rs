@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::{Duration, Instant};
 
+use piezotrack_core::Error;
 use piezotrack_core::identify::{Monitor, Progress};
 use piezotrack_core::integrate::Stop;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyOSError, PyStopIteration};
@@ -15,6 +16,9 @@ use crate::errors::raise;
 
 /// Time between two looks at the signals, and between two reports to a progress bar.
 const POLL: Duration = Duration::from_millis(50);
+
+/// Most threads that are started: more than any machine of today has use for.
+const MOST_THREADS: usize = 256;
 
 /// Who is told of the progress of a search.
 pub struct Watchers {
@@ -95,6 +99,10 @@ pub fn enter_pool<T: Send>(
     watchers: &Watchers,
     job: impl FnOnce(&mut dyn Monitor, Stop<'_>) -> piezotrack_core::Result<T> + Send,
 ) -> PyResult<T> {
+    if threads > MOST_THREADS {
+        let expected = format!("0 for all cores, or up to {MOST_THREADS}");
+        return Err(raise(&Error::parameter("threads", threads, expected)));
+    }
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .thread_name(|i| format!("piezotrack-{i}"))

@@ -8,7 +8,8 @@ use crate::errors::raise;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(as_number, module)?)?;
-    module.add_function(wrap_pyfunction!(as_count, module)?)
+    module.add_function(wrap_pyfunction!(as_count, module)?)?;
+    module.add_function(wrap_pyfunction!(as_truth, module)?)
 }
 
 /// A real number as a float; NaN and infinity pass, for the receiver to judge.
@@ -26,8 +27,14 @@ fn as_number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
 fn as_count(name: &str, value: &Bound<'_, PyAny>) -> PyResult<u64> {
     match value.extract::<u64>() {
         Ok(number) if !is_other(value) => Ok(number),
-        _ => Err(refused(name, value, "a whole number, 0 or above")),
+        _ => Err(refused(name, value, "a whole number, 0 or above and below 2^64")),
     }
+}
+
+/// True or False, and nothing that merely counts as one of them.
+#[pyfunction]
+fn as_truth(name: &str, value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    value.extract::<bool>().map_err(|_| refused(name, value, "True or False"))
 }
 
 /// Truth values and texts convert to numbers, and are hardly ever meant so.
@@ -37,5 +44,11 @@ fn is_other(value: &Bound<'_, PyAny>) -> bool {
 
 fn refused(name: &str, value: &Bound<'_, PyAny>, expected: &str) -> PyErr {
     let shown = value.repr().map_or_else(|_| "unprintable".into(), |text| text.to_string());
+    // A number of a thousand digits is no help in full.
+    let shown = if shown.len() > 60 {
+        format!("{}...", shown.chars().take(57).collect::<String>())
+    } else {
+        shown
+    };
     raise(&Error::parameter(name, shown, expected))
 }

@@ -5,7 +5,7 @@
 //! range from the stroke, the drive and the sampling, and the stiffness turns it into a bound.
 
 use super::problem::{Coordinate, Record, range};
-use crate::error::Result;
+use crate::error::{Error, Result, shown};
 use crate::integrate::index;
 use crate::stage::DAHL_PARAMETERS;
 
@@ -15,6 +15,8 @@ struct Measures {
     stroke: f64,
     /// Stroke over the range of the drive, m/V.
     gain: f64,
+    /// Whether the displacement falls where the drive rises.
+    inverted: bool,
     /// Rate of change of the drive over its size, rad/s: the frequency of a sine.
     frequency: f64,
     /// Sampling interval, s.
@@ -31,17 +33,31 @@ impl Measures {
         let change: f64 = u.windows(2).map(|w| (w[1] - w[0]) * (w[1] - w[0])).sum();
         let dt = record.drive.dt;
         let frequency = libm::sqrt(change / size) / dt;
-        Self { stroke, gain: stroke / (high - low), frequency, dt }
+        let y = &record.y[record.window.clone()];
+        let level = y.iter().sum::<f64>() / index(y.len());
+        let together: f64 = u.iter().zip(y).map(|(u, y)| (u - mean) * (y - level)).sum();
+        let gain = stroke / (high - low);
+        Self { stroke, gain, inverted: together < 0.0, frequency, dt }
     }
 }
 
 /// Coordinates of all parameters: the fixed ones as given, the others between derived bounds.
 ///
 /// # Errors
-/// [`crate::Error::Parameter`] where a derived range is empty, which a record that passed
-/// [`Record::new`] does not lead to.
+/// [`Error::Data`] where the record's values are absurd; [`Error::Parameter`] where a derived
+/// range is empty, which other records that passed [`Record::new`] do not lead to.
 pub fn derive(record: &Record<'_>, fixed: &[Option<f64>; 9]) -> Result<[Coordinate; 9]> {
     let of = Measures::of(record);
+    let usable = |value: f64| (1e-60..1e60).contains(&value);
+    if ![of.stroke, of.gain, of.frequency, of.dt].into_iter().all(usable) {
+        return Err(Error::Data(format!(
+            "a stroke of {} m, {} m/V and a drive of {} rad/s cannot be computed with: check \
+             the units of time, drive and displacement",
+            shown(of.stroke),
+            shown(of.gain),
+            shown(of.frequency)
+        )));
+    }
     let up = fixed[8].unwrap_or(30.0);
     let (soft, hard) = stiffness_range(&of, fixed, up);
     // Ten times the drive's frequency up to a tenth of the sampling rate, where the paper's
@@ -50,11 +66,12 @@ pub fn derive(record: &Record<'_>, fixed: &[Option<f64>; 9]) -> Result<[Coordina
     let fastest = (0.2 * core::f64::consts::PI / of.dt).max(4.0 * slowest);
     // A force of half the elastic one at full stroke, either way.
     let curvature = hard / (up.abs().max(f64::MIN_POSITIVE) * of.stroke);
+    let piezo = (soft * of.gain / 3.0, hard * of.gain * 3.0);
     let ranges = [
         (soft / (fastest * fastest), hard / (slowest * slowest)),
         (soft * 5e-3 / of.frequency, hard / of.frequency),
         (soft, hard),
-        (soft * of.gain / 3.0, hard * of.gain * 3.0),
+        if of.inverted { (-piezo.1, -piezo.0) } else { piezo },
         // From 100 strokes of memory to a tenth: with a1 = 0 the operator is a lossless spring.
         (1e-2 / of.stroke, 10.0 / of.stroke),
         (1e-2 / (of.stroke * of.stroke), 40.0 / (of.stroke * of.stroke)),

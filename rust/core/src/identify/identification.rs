@@ -36,7 +36,7 @@ pub fn identify(
     monitor: &mut dyn Monitor,
     stop: Stop<'_>,
 ) -> Result<Identification> {
-    plan.settings.validate()?;
+    plan.validate()?;
     let problem = Problem::new(record, spec)?;
     let evaluator = Evaluator::new(record, &problem, stop);
     let mut runs = search(&evaluator, &problem, plan, monitor, stop)?;

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::bounds;
-use crate::error::{Error, Result, positive};
+use crate::error::{Error, Result, positive, shown};
 use crate::integrate::{Drive, Hold};
 use crate::stage::{DAHL_PARAMETERS, DahlStage};
 
@@ -114,7 +114,7 @@ impl Coordinate {
         }
         Err(Error::parameter(
             format!("bounds of {name}"),
-            format!("({low}, {high})"),
+            format!("({}, {})", shown(low), shown(high)),
             "two finite numbers, the lower one first",
         ))
     }
@@ -128,7 +128,9 @@ impl Coordinate {
                 (low + (high - low) * z).clamp(low, high)
             }
             Self::Free { low, high, scale: Scale::Log } => {
-                (low * libm::exp(z * libm::log(high / low))).clamp(low, high)
+                // Not log(high / low), which can overflow where the bounds do not.
+                let (from, to) = (libm::log(low), libm::log(high));
+                libm::exp(from + z * (to - from)).clamp(low, high)
             }
         }
     }
@@ -196,6 +198,7 @@ impl Problem {
             fixed[STIFFNESS] = Some(NOMINAL_STIFFNESS);
             scale_assumed = true;
         }
+        check_fixed(&fixed)?;
         let mut coordinates = bounds::derive(record, &fixed)?;
         for (name, (low, high)) in &spec.bounds {
             let i = parameter("bounds", name)?;
@@ -272,6 +275,20 @@ fn fixed_values(spec: &Spec) -> Result<[Option<f64>; 9]> {
     fixed[7] = fixed[7].or(Some(0.0));
     fixed[8] = fixed[8].or(Some(30.0));
     Ok(fixed)
+}
+
+/// Refuses held values with which no stage exists, by their own names.
+fn check_fixed(fixed: &[Option<f64>; 9]) -> Result<()> {
+    let mut theta = [1.0; 9];
+    theta[7] = 0.0;
+    for (value, held) in theta.iter_mut().zip(fixed) {
+        *value = held.unwrap_or(*value);
+    }
+    DahlStage::from_theta(&theta)?;
+    if theta[8] == 0.0 {
+        return Err(Error::parameter("up", 0, "a value other than 0: without it no hysteresis"));
+    }
+    Ok(())
 }
 
 /// Which parameters are searched; each of the others must have a value.

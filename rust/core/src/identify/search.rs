@@ -79,6 +79,24 @@ pub struct Plan {
     pub runs: usize,
 }
 
+impl Plan {
+    /// Checks the settings and the number of runs.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming what cannot be used.
+    pub fn validate(&self) -> Result<()> {
+        self.settings.validate()?;
+        if self.runs == 0 || self.runs > MOST_RUNS {
+            let expected = format!("1 or more, {MOST_RUNS} at most");
+            return Err(Error::parameter("runs", self.runs, expected));
+        }
+        Ok(())
+    }
+}
+
+/// Most swarms of a search.
+const MOST_RUNS: usize = 10_000;
+
 /// One swarm of a search.
 struct Run {
     swarm: Swarm,
@@ -166,9 +184,7 @@ pub fn search(
     stop: Stop<'_>,
 ) -> Result<Vec<Outcome>> {
     let coordinates = problem.free().count();
-    if plan.runs == 0 {
-        return Err(Error::parameter("runs", plan.runs, "1 or more"));
-    }
+    plan.validate()?;
     let runs = 0..plan.runs as u64;
     let runs: Result<Vec<Run>> =
         runs.map(|run| Run::new(&plan.settings, coordinates, plan.seed, run)).collect();

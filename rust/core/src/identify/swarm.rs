@@ -24,6 +24,9 @@ pub enum Boundary {
     Invisible,
 }
 
+/// Most particles of a swarm: far beyond any use, far below what memory holds.
+const MOST_PARTICLES: usize = 100_000;
+
 /// Whose best place draws a particle besides its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Topology {
@@ -99,6 +102,10 @@ impl SwarmSettings {
             Err(Error::parameter(name, value, format!("{least} or more")))
         };
         at_least("particles", self.particles, 2)?;
+        if self.particles > MOST_PARTICLES {
+            let expected = format!("{MOST_PARTICLES} at most");
+            return Err(Error::parameter("particles", self.particles, expected));
+        }
         at_least("iterations", self.iterations, 1)?;
         at_least("stall_iterations", self.stall_iterations, 1)?;
         not_negative("inertia_start", self.inertia.0, "")?;

@@ -1,0 +1,176 @@
+"""What is written to be read: every example runs, every parameter is documented."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+import inspect
+import os
+import pkgutil
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import piezotrack as pt
+
+ROOT = Path(__file__).resolve().parents[1]
+MODULES = sorted(
+    {"piezotrack"}
+    | {
+        module.name
+        for module in pkgutil.walk_packages(pt.__path__, "piezotrack.")
+        if module.name != "piezotrack._core"
+    }
+)
+PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
+
+
+# Examples.
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_the_examples_in_docstrings_run(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = doctest.testmod(importlib.import_module(name))
+    assert result.failed == 0
+
+
+@pytest.mark.parametrize("name", ["identify", "read", "load", "Dataset", "DahlStage"])
+def test_what_one_begins_with_has_an_example(name: str) -> None:
+    assert doctest.DocTestFinder(recurse=False).find(getattr(pt, name))[0].examples
+
+
+FENCED = re.compile(r"^```python[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
+BLOCKS = [
+    pytest.param(
+        page, match[1], id=f"{page.name}:{page.read_text()[: match.start()].count(chr(10)) + 1}"
+    )
+    for page in PAGES
+    for match in FENCED.finditer(page.read_text(encoding="utf-8"))
+]
+
+
+def failures(page: Path, code: str) -> str:
+    """Run a block with prompts, and return what doctest has to say about it."""
+    report: list[str] = []
+    test = doctest.DocTestParser().get_doctest(code, {}, page.name, str(page), 0)
+    doctest.DocTestRunner(verbose=False).run(test, out=report.append)
+    return "".join(report)
+
+
+@pytest.mark.parametrize(("page", "code"), BLOCKS)
+def test_the_examples_on_the_pages_run(
+    page: Path, code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if ">>>" in code:
+        monkeypatch.chdir(tmp_path)
+        assert failures(page, code) == ""
+        return
+    # Without prompts it is a script, which stands alone.
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60.0,
+        check=False,
+        env={**os.environ, "MPLBACKEND": "Agg"},
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_readme_has_an_example_that_runs() -> None:
+    assert any(ROOT / "README.md" in block.values for block in BLOCKS)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
+def test_the_pages_link_to_what_is_there(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text(encoding="utf-8")):
+        if "://" not in target:
+            assert (page.parent / target).exists(), target
+
+
+# Docstrings.
+
+PUBLIC = {name: getattr(pt, name) for name in pt.__all__ if name != "__version__"}
+CLASSES = {name: value for name, value in PUBLIC.items() if inspect.isclass(value)}
+
+
+def members() -> dict[str, Any]:
+    """The public functions, classes and methods, by the names they are used with."""
+    found = dict(PUBLIC)
+    for owner, value in CLASSES.items():
+        for name, member in inspect.getmembers(value):
+            module = getattr(
+                inspect.unwrap(getattr(member, "fget", None) or member), "__module__", ""
+            )
+            if not name.startswith("_") and str(module).startswith("piezotrack"):
+                found[f"{owner}.{name}"] = member
+    return found
+
+
+MEMBERS = members()
+
+
+def documented(value: Any, *sections: str) -> set[str]:
+    """The names that numpydoc sections of a docstring explain."""
+    lines = (inspect.getdoc(value) or "").splitlines()
+    names: set[str] = set()
+    section = ""
+    for line, below in zip(lines, [*lines[1:], ""], strict=True):
+        if line and set(below) == {"-"}:
+            section = line
+        elif section in sections and line and not line.startswith((" ", "-")):
+            names.update(name.strip() for name in line.partition(" : ")[0].split(","))
+    return names
+
+
+def parameters(value: Any) -> set[str]:
+    return {name.lstrip("*") for name in inspect.signature(value).parameters} - {"self", "cls"}
+
+
+@pytest.mark.parametrize("name", MEMBERS)
+def test_every_public_name_has_a_docstring(name: str) -> None:
+    text = inspect.getdoc(MEMBERS[name])
+    assert text
+    first = text.splitlines()[0]
+    assert first.endswith("."), first
+
+
+FUNCTIONS = [name for name in MEMBERS if inspect.isroutine(MEMBERS[name])]
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_every_parameter_of_a_function_is_documented(name: str) -> None:
+    assert documented(MEMBERS[name], "Parameters") == parameters(MEMBERS[name])
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_what_a_function_returns_is_documented(name: str) -> None:
+    returned = inspect.signature(MEMBERS[name]).return_annotation
+    if returned not in (None, "None"):
+        assert (
+            documented(MEMBERS[name], "Returns", "Yields")
+            or "Return" in (inspect.getdoc(MEMBERS[name]) or "").partition("\n")[0]
+        )
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_every_field_of_a_class_is_documented(name: str) -> None:
+    value = CLASSES[name]
+    if issubclass(value, BaseException):
+        fields = {"partial"} if value is pt.Interrupted else set()
+    else:
+        fields = parameters(value)
+    explained: set[str] = set()
+    for base in value.__mro__:
+        if base.__module__.startswith("piezotrack"):
+            explained |= documented(base, "Parameters", "Attributes")
+    assert fields <= explained, fields - explained
+    assert documented(value, "Parameters", "Attributes") <= fields | {"partial"}
