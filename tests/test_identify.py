@@ -63,10 +63,10 @@ def test_two_solvers_agree_on_the_records(drive: str) -> None:
 
 
 @pytest.mark.parametrize("drive", ["slow sine", "two tones"])
-def test_the_papers_search_finds_what_scipy_simulated(drive: str) -> None:
-    # One run of the paper's swarm is within 1 % from about three seeds in four on the slow
-    # sine, and from one in three on a sine of 0.5 Hz; so is a transcription in NumPy. The lowest
-    # cost of eight runs, which a user sees as well, tells which one to take.
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_papers_search_finds_what_scipy_simulated(drive: str, seed: int) -> None:
+    # A single swarm of these settings does not get there from every seed (docs/identification.md
+    # has the shares); the lowest cost of the four runs of a search tells which one to take.
     fit = pt.identify(
         noisy(drive),
         free=list(BOX),
@@ -74,8 +74,7 @@ def test_the_papers_search_finds_what_scipy_simulated(drive: str) -> None:
         bounds=BOX,
         offset=False,
         swarm=pt.ParticleSwarm.xu_li_2010(),
-        seed=1,
-        runs=8,
+        seed=seed,
     )
     assert max(off(fit).values()) < 0.01, off(fit)
     assert fit.cost == min(run.cost for run in fit.runs)
@@ -259,7 +258,7 @@ def test_a_result_has_scipys_names() -> None:
     assert fit.cost_um == pytest.approx(1e6 * fit.cost)
     assert fit.cost_percent == pytest.approx(100.0 * fit.cost / fit.data.stroke)
     assert fit.nit == 30
-    assert fit.nfev == 12 * 31
+    assert fit.nfev == 4 * 12 * 31  # of all runs
     assert fit.success is True
     assert fit.stop_reason == "iterations"
     assert fit.message == "all 30 iterations were done"
@@ -348,7 +347,7 @@ def test_the_callback_is_told_of_every_iteration_in_order() -> None:
     fit = quick_fit(callback=seen.append, swarm=pt.ParticleSwarm(particles=12, iterations=30))
     assert [progress.nit for progress in seen] == list(range(31))
     assert {progress.iterations for progress in seen} == {30}
-    assert [progress.nfev for progress in seen] == [12 * (k + 1) for k in range(31)]
+    assert [progress.nfev for progress in seen] == [4 * 12 * (k + 1) for k in range(31)]
     assert [progress.cost_um for progress in seen] == [1e6 * cost for cost in fit.history]
     last = seen[-1].parameters
     assert tuple(last) == NAMES
@@ -379,7 +378,7 @@ def test_a_true_answer_stops_with_the_best_so_far() -> None:
     assert len(seen) == 8
     assert partial.cost_um == seen[-1].cost_um
     assert partial.model == pt.DahlStage(**seen[-1].parameters)
-    assert (partial.nit, partial.nfev) == (7, 12 * 8)
+    assert (partial.nit, partial.nfev) == (7, 4 * 12 * 8)
     assert (partial.success, partial.stop_reason) == (False, "interrupted")
     assert partial.message == "interrupted"
     assert partial.history.shape == (8,)

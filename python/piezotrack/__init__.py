@@ -16,7 +16,7 @@ from .errors import (
     PiezotrackError,
     ShapeError,
 )
-from .identification import Identification, Progress, identify
+from .identification import Estimate, Identification, Progress, Run, identify
 from .io import read, read_drive
 from .modelfile import IdentifiedModel, Score, load
 from .models import DahlStage, Response, StageState
@@ -26,6 +26,7 @@ __all__ = [
     "DahlStage",
     "DataError",
     "Dataset",
+    "Estimate",
     "Identification",
     "IdentifiedModel",
     "Interrupted",
@@ -35,6 +36,7 @@ __all__ = [
     "PiezotrackError",
     "Progress",
     "Response",
+    "Run",
     "Score",
     "ShapeError",
     "StageState",

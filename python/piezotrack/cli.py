@@ -167,9 +167,7 @@ def identify_command(
     offset: Annotated[bool, typer.Option(help="Fit a constant offset of the sensor.")] = True,
     swarm: Annotated[str, typer.Option(help="Settings: default or xu-li-2010.")] = "default",
     seed: Annotated[int, typer.Option(help="Same seed, same result.")] = 0,
-    runs: Annotated[
-        int | None, typer.Option(help="Swarms that search apart; do they agree? 4 if not given.")
-    ] = None,
+    runs: Annotated[int, typer.Option(help="Swarms that search apart; do they agree?")] = 4,
     threads: Annotated[int | None, typer.Option(help="Up to 256; else all cores.")] = None,
     validate: Annotated[
         Path | None, typer.Option(help="A second log, to judge the model on; not fitted.")

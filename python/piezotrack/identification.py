@@ -122,10 +122,12 @@ class Identification(IdentifiedModel):
         RMS deviation in the window [m], equation (16) of Xu and Li 2010.
     history : ndarray, shape (nit + 1,)
         Best cost after each iteration [m].
-    nit, nfev, nfail : int
-        Iterations of the swarm, its simulations, and those that did not stay finite.
+    nit : int
+        Iterations of the swarm that found the best place.
+    nfev, nfail : int
+        Simulations of all runs, and those among them that did not stay finite.
     npolish : int
-        Simulations of the polish after the swarm; `history` is the swarm's alone.
+        Simulations of the polish after that swarm; `history` is the swarm's alone.
     stop_reason : {"stalled", "iterations", "interrupted"}
         Why the search ended.
     runs : tuple of Run
@@ -194,8 +196,12 @@ class Identification(IdentifiedModel):
 
     @property
     def agreeing(self) -> int:
-        """Number of runs that ended within 0.1 % of the lowest cost."""
-        return sum(run.cost <= 1.001 * self.cost for run in self.runs)
+        """Number of runs that ended within 0.1 % of the lowest cost.
+
+        Costs below 0.001 % of the stroke count as equal.
+        """
+        near = max(1.001 * self.cost, 1e-5 * self.stroke)
+        return sum(run.cost <= near for run in self.runs)
 
     @property
     def success(self) -> bool:
@@ -258,7 +264,7 @@ def identify(
     offset: bool = True,
     swarm: ParticleSwarm | None = None,
     seed: int = 0,
-    runs: int | None = None,
+    runs: int = 4,
     threads: int | None = None,
     progress: bool | None = None,
     callback: Callable[[Progress], object] | None = None,
@@ -301,7 +307,7 @@ def identify(
     runs : int, optional
         Swarms that search apart from each other, each from its own random numbers; whether they
         end with the same cost tells whether there are more valleys. They share the lanes of the
-        processor. Where not given, 4, and 1 with a `swarm` of your own.
+        processor.
     threads : int, optional
         Up to 256; all cores where it is 0 or not given.
     progress : bool, optional
@@ -345,8 +351,6 @@ def identify(
         raise ParameterError(f"data is {type(data).__name__}: expected a Dataset, see pt.read")
     if model != "dahl":
         raise ParameterError(f"model is {model!r}: expected 'dahl'")
-    if runs is None:
-        runs = 4 if swarm is None else 1
     swarm = ParticleSwarm() if swarm is None else swarm
     if not isinstance(swarm, ParticleSwarm):
         raise ParameterError(f"swarm is {swarm!r}: expected a ParticleSwarm, as pt.ParticleSwarm()")
@@ -450,7 +454,7 @@ def _identification(
         "fit": {
             "cost": {"value": found.rms, "unit": "m"},
             "iterations": found.iterations,
-            "simulations": found.evaluations,
+            "simulations": sum(nfev for _, _, nfev, _ in found.runs),
             "polish_simulations": found.polish_evaluations,
             "failed_simulations": found.failures,
             "stop_reason": found.stop_reason,
@@ -488,7 +492,7 @@ def _identification(
         cost=found.rms,
         history=found.history,
         nit=found.iterations,
-        nfev=found.evaluations,
+        nfev=sum(nfev for _, _, nfev, _ in found.runs),
         nfail=found.failures,
         npolish=found.polish_evaluations,
         stop_reason=found.stop_reason,

@@ -98,7 +98,8 @@ class ParticleSwarm:
         iterations, stopped after 500 in a row that improve the best cost by less than 1e-6.
         The paper gives that number without a unit; in metres it would stop every search after
         500 iterations, so it is taken as micrometres. It says nothing of a velocity limit or
-        of what happens at the bounds: half the range, and absorbing walls, are ours.
+        of what happens at the bounds: a tenth of the range, and absorbing walls, are ours. A
+        single swarm of these does not always reach the bottom of the paper's own search.
 
         Returns
         -------
@@ -114,6 +115,7 @@ class ParticleSwarm:
             cognitive=2.0,
             social=2.0,
             topology="global",
+            velocity_limit=0.1,
             min_improvement_um=1e-6,
             stall_iterations=500,
             polish=False,

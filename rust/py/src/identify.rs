@@ -137,7 +137,7 @@ impl PySearch {
 
     #[getter]
     fn failures(&self) -> usize {
-        self.outcome.failures
+        self.found.runs.iter().map(|run| run.failures).sum()
     }
 
     #[getter]

@@ -19,6 +19,9 @@ struct Measures {
     inverted: bool,
     /// Rate of change of the drive over its size, rad/s: the frequency of a sine.
     frequency: f64,
+    /// The lower of that and two periods in the window, rad/s: of steps, the former is far above
+    /// what moves the stage.
+    slow: f64,
     /// Sampling interval, s.
     dt: f64,
 }
@@ -37,7 +40,9 @@ impl Measures {
         let level = y.iter().sum::<f64>() / index(y.len());
         let together: f64 = u.iter().zip(y).map(|(u, y)| (u - mean) * (y - level)).sum();
         let gain = stroke / (high - low);
-        Self { stroke, gain, inverted: together < 0.0, frequency, dt }
+        let twice = 2.0 * core::f64::consts::TAU / (index(u.len()) * dt);
+        let slow = frequency.min(twice);
+        Self { stroke, gain, inverted: together < 0.0, frequency, slow, dt }
     }
 }
 
@@ -69,7 +74,7 @@ pub fn derive(record: &Record<'_>, fixed: &[Option<f64>; 9]) -> Result<[Coordina
     let piezo = (soft * of.gain / 3.0, hard * of.gain * 3.0);
     let ranges = [
         (soft / (fastest * fastest), hard / (slowest * slowest)),
-        (soft * 5e-3 / of.frequency, hard / of.frequency),
+        (soft * 5e-3 / of.frequency, hard / of.slow),
         (soft, hard),
         if of.inverted { (-piezo.1, -piezo.0) } else { piezo },
         // From 100 strokes of memory to a tenth: with a1 = 0 the operator is a lossless spring.

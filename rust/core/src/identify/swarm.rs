@@ -69,8 +69,8 @@ pub struct SwarmSettings {
 impl SwarmSettings {
     /// Section 3.3 of Xu and Li 2010.
     ///
-    /// The paper gives neither a velocity limit nor what happens at the bounds: here half the
-    /// range, and absorbing walls. It gives the improvement of 1e-6 without a unit; it can only
+    /// The paper gives neither a velocity limit nor what happens at the bounds: here a tenth of
+    /// the range, and absorbing walls. It gives the improvement of 1e-6 without a unit; it can only
     /// be micrometres.
     #[must_use]
     pub fn xu_li_2010() -> Self {
@@ -82,7 +82,7 @@ impl SwarmSettings {
             cognitive: 2.0,
             social: 2.0,
             topology: Topology::Global,
-            velocity_limit: 0.5,
+            velocity_limit: 0.1,
             boundary: Boundary::Absorb,
             min_improvement: 1e-12,
             stall_iterations: 500,
