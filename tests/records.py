@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -104,3 +105,15 @@ def quick_fit(**arguments: Any) -> pt.Identification:
     }
     wanted.update(arguments)
     return pt.identify(wanted.pop("data", quick()), **wanted)
+
+
+def bits(fit: pt.Identification) -> dict[str, Any]:
+    """All numbers of a result, down to the last bit."""
+    return {
+        "model": [value.hex() for value in asdict(fit.model).values()],
+        "cost": fit.cost.hex(),
+        "offset": fit.offset.hex(),
+        "history": fit.history.tobytes(),
+        "parameters": repr(dict(fit.parameters)),
+        "counts": (fit.nit, fit.nfev, fit.nfail, fit.npolish, fit.substeps, fit.stop_reason),
+    }

@@ -16,7 +16,8 @@ from .errors import (
     PiezotrackError,
     ShapeError,
 )
-from .identification import Estimate, Identification, Progress, Run, identify
+from .estimates import Estimate, Progress, Run
+from .identification import Identification, identify
 from .io import read, read_drive
 from .modelfile import IdentifiedModel, Score, load
 from .models import DahlStage, Response, StageState

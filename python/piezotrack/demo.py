@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from .identification import Progress
+    from .estimates import Progress
 
 __all__ = ["SEARCH_BOX", "demo_log", "identify_demo", "write_log"]
 

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .dataset import Dataset
-    from .identification import Estimate, Identification
+    from .estimates import Estimate
+    from .identification import Identification
 
 __all__ = ["make_folder", "save_figures", "save_identification", "summary_text"]
 
