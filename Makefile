@@ -19,8 +19,8 @@ test: lint rust-test python-test ## Everything that must hold before a change la
 lint: $(VENV)/installed $(VENV)/tools ## Formatting, clippy, ruff, types, stubs
 	cargo fmt --all --check
 	cargo clippy --workspace --all-targets --locked -- -D warnings
-	$(BIN)/ruff format --check python tests benches
-	$(BIN)/ruff check python tests benches
+	$(BIN)/ruff format --check
+	$(BIN)/ruff check
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest piezotrack._core
 

@@ -174,3 +174,17 @@ def test_every_field_of_a_class_is_documented(name: str) -> None:
             explained |= documented(base, "Parameters", "Attributes")
     assert fields <= explained, fields - explained
     assert documented(value, "Parameters", "Attributes") <= fields | {"partial"}
+
+
+@pytest.mark.parametrize("example", sorted((ROOT / "python" / "examples").glob("*.py")), ids=str)
+def test_the_examples_run(example: Path, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-W", "error", str(example)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=120.0,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert pt.load(tmp_path / "dahl.json").model.mass > 0.0

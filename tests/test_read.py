@@ -393,3 +393,21 @@ def test_a_clean_log_is_not_read_line_by_line(
     # Ten times slower, and a million samples are nothing unusual.
     monkeypatch.delattr("piezotrack.io._TextLog._table_by_line")
     assert is_the_log(pt.read(write(tmp_path, content)))
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", " "])
+def test_reads_what_numpy_saved_with_its_header(tmp_path: Path, delimiter: str) -> None:
+    path = tmp_path / "saved.txt"
+    table = np.column_stack([np.arange(20) / 100.0, np.arange(20.0) % 7, np.arange(20.0) % 5])
+    header = delimiter.join(["time_s", "voltage_V", "displacement_um"])
+    np.savetxt(path, table, delimiter=delimiter, header="stage 7\n" + header)
+    log = pt.read(path)
+    assert np.array_equal(log.u, table[:, 1])
+    np.testing.assert_allclose(log.y, table[:, 2] * 1e-6, rtol=1e-15)
+
+
+def test_a_remark_above_the_samples_is_no_header(tmp_path: Path) -> None:
+    path = tmp_path / "bare.csv"
+    path.write_text("# measured on Monday, cold\n0,1,2\n1,2,3\n2,1,2\n", encoding="utf-8")
+    with pytest.raises(pt.DataError, match="there is no header line"):
+        pt.read(path)

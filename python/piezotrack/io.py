@@ -157,11 +157,12 @@ class _TextLog:
         header = self._first_line()
         self.delimiter = _delimiter(self.lines[header])
         titles = _split(self.lines[header], self.delimiter, is_header=True)
-        numbers = sum(not math.isnan(_number(title.replace(",", "."))) for title in titles)
-        # A header may well hold a number (of a channel), and a first sample a text.
-        has_header = 2 * numbers < len(titles)
+        has_header = _are_titles(titles)
         self.header = header + 1
         self.first = header + has_header
+        if not has_header and (commented := self._commented_titles(header, len(titles))):
+            self.header, titles = commented
+            has_header = True
         self.columns = Columns(titles, has_titles=has_header)
         if not any(True for _ in self._rows()):
             raise self.error("holds a header and no samples", self.header)
@@ -221,6 +222,17 @@ class _TextLog:
             if line.strip() and not line.lstrip().startswith(("#", "%")):
                 return number
         raise self.error("is empty: expected a header and samples")
+
+    def _commented_titles(self, first: int, count: int) -> tuple[int, list[str]] | None:
+        """Find titles in the comment right above the first sample, as numpy.savetxt writes them.
+
+        Returns the line's number and the titles, or None.
+        """
+        above = [k for k in range(first) if self.lines[k].strip()]
+        if not above:
+            return None
+        titles = _split(self.lines[above[-1]].strip().lstrip("#% "), self.delimiter, is_header=True)
+        return (above[-1] + 1, titles) if len(titles) == count and _are_titles(titles) else None
 
     def _rows(self) -> Iterator[tuple[int, str]]:
         """Yield the lines with samples, each with its number as an editor counts."""
@@ -329,6 +341,12 @@ class _TextLog:
             if "," in numbers or "." in numbers:
                 return "." not in numbers
         return False
+
+
+def _are_titles(fields: Sequence[str]) -> bool:
+    """Tell titles from samples: a title may well hold a number, and a sample be a text."""
+    numbers = sum(not math.isnan(_number(field.replace(",", "."))) for field in fields)
+    return 2 * numbers < len(fields)
 
 
 def _delimiter(header: str) -> str | None:
