@@ -176,7 +176,9 @@ def test_every_field_of_a_class_is_documented(name: str) -> None:
     assert documented(value, "Parameters", "Attributes") <= fields | {"partial"}
 
 
-@pytest.mark.parametrize("example", sorted((ROOT / "python" / "examples").glob("*.py")), ids=str)
+@pytest.mark.parametrize(
+    "example", sorted((ROOT / "python" / "examples").glob("*.py")), ids=lambda path: path.name
+)
 def test_the_examples_run(example: Path, tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-W", "error", str(example)],
