@@ -223,7 +223,7 @@ def simulate_command(
     hold: HoldOption = "foh",
 ) -> None:
     """Simulate a model under a drive: a CSV with the displacement, and a picture."""
-    from .demo import write_columns
+    from .files import write_columns
     from .io import read_drive
     from .modelfile import load
     from .plotting import plot_response

@@ -8,6 +8,7 @@ import numpy as np
 
 from . import _core
 from .dataset import Dataset
+from .files import write_columns
 from .identification import Identification, identify
 from .models import DahlStage
 
@@ -110,32 +111,3 @@ def write_log(log: Dataset, path: Path) -> Path:
     return write_columns(
         path, {"time_s": log.t, "voltage_V": log.u, "displacement_um": 1e6 * log.y}
     )
-
-
-def write_columns(path: Path, columns: dict[str, np.ndarray]) -> Path:
-    """Write columns of numbers as a CSV file with a header.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-        The file.
-    columns : dict of str to ndarray, each of shape (n,)
-        By title, with the unit in it.
-
-    Returns
-    -------
-    pathlib.Path
-        The file.
-    """
-    from .modelfile import replacing
-
-    with replacing(path) as temporary:
-        np.savetxt(
-            temporary,
-            np.column_stack(list(columns.values())),
-            delimiter=",",
-            fmt="%.10g",
-            header=",".join(columns),
-            comments="",
-        )
-    return path

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -15,14 +13,15 @@ import numpy as np
 from . import _core
 from .dataset import Dataset
 from .errors import DataError, ParameterError, PiezotrackError
+from .files import replacing
 from .models import DahlStage, Response
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    import os
 
     from numpy.typing import NDArray
 
-__all__ = ["IdentifiedModel", "Score", "load", "replacing"]
+__all__ = ["IdentifiedModel", "Score", "load"]
 
 FORMAT = "piezotrack-model"
 SCHEMA_VERSION = 1
@@ -333,46 +332,6 @@ def _metres(name: str, entry: Mapping[str, Any], *, positive: bool = False) -> f
             f"{name} is {value} m: expected a finite number" + " above 0" * positive
         )
     return value
-
-
-@contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Write to a temporary file beside `path`, which is renamed when all went well.
-
-    Parameters
-    ----------
-    path : path-like
-        The file to write.
-
-    Yields
-    ------
-    pathlib.Path
-        The temporary file, with the same ending.
-
-    Raises
-    ------
-    DataError
-        The folder is missing, or the file cannot be written.
-    """
-    import tempfile
-
-    file = Path(path)
-    try:
-        handle, name = tempfile.mkstemp(prefix=".", suffix=file.suffix, dir=file.parent)
-        os.close(handle)
-        temporary = Path(name)
-        try:
-            yield temporary
-            # mkstemp makes files that only their owner can read.
-            mask = os.umask(0)
-            os.umask(mask)
-            temporary.chmod(0o666 & ~mask)
-            temporary.replace(file)
-        finally:
-            temporary.unlink(missing_ok=True)
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise DataError(f"{file} cannot be written: {reason}") from None
 
 
 def _finite(value: Any) -> Any:

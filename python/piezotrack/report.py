@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .errors import DataError
-from .modelfile import replacing
+from .files import replacing
 
 if TYPE_CHECKING:
     import os

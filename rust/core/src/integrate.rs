@@ -75,8 +75,7 @@ pub struct Trajectory {
     pub last: StageState,
     /// Steps of the integrator in each sampling interval.
     pub substeps: usize,
-    /// Largest difference in displacement from half as many sub-steps, m; 0 where it was not
-    /// asked for.
+    /// Largest difference in displacement from a coarser simulation, m; 0 where there was none.
     pub difference: f64,
 }
 
@@ -115,17 +114,11 @@ pub fn simulate(
     positive("accuracy", accuracy, "m")?;
     let mut level = if method == Method::Rk45 { 6 } else { first_substeps(stage, drive.dt) };
     let last = if method == Method::Rk45 { 14 } else { MOST_SUBSTEPS };
-    if method == Method::Exponential {
-        let quick = |substeps| {
-            let stepping = Stepping { order: Order::Second, substeps };
-            stepped(Single { stage, drive, initial, stepping, few_terms: false, stop })
-        };
-        if let (Ok(Some(coarse)), Ok(Some(mut fine))) = (quick(level), quick(2 * level)) {
-            fine.difference = largest_difference(&coarse.x, &fine.x);
-            if fine.difference <= accuracy {
-                return Ok(Some(fine));
-            }
-        }
+    if method == Method::Exponential
+        && let Some(quick) = second_order(stage, drive, initial, level, stop)
+        && quick.difference <= accuracy
+    {
+        return Ok(Some(quick));
     }
     let mut coarse: Option<Trajectory> = None;
     loop {
@@ -151,6 +144,23 @@ pub fn simulate(
         };
         level = if method == Method::Rk45 { level + 1 } else { 2 * level };
     }
+}
+
+/// Twice `substeps` to second order, and the difference from `substeps`.
+fn second_order(
+    stage: &DahlStage,
+    drive: &Drive<'_>,
+    initial: StageState,
+    substeps: usize,
+    stop: Stop<'_>,
+) -> Option<Trajectory> {
+    let run = |substeps| {
+        let stepping = Stepping { order: Order::Second, substeps };
+        stepped(Single { stage, drive, initial, stepping, few_terms: false, stop }).ok().flatten()
+    };
+    let (coarse, mut fine) = (run(substeps)?, run(2 * substeps)?);
+    fine.difference = largest_difference(&coarse.x, &fine.x);
+    Some(fine)
 }
 
 fn out_of_reach(accuracy: f64, substeps: usize, difference: f64) -> Error {
