@@ -422,11 +422,6 @@ def test_parameters_that_cannot_be_used_are_named(name: str, value: float) -> No
         stage_of(replace(TABLE_1, **{name: value}))
 
 
-def test_b0_is_refused_in_words() -> None:
-    with pytest.raises(pt.ParameterError, match=r"\bb0\b"):
-        stage_of(replace(TABLE_1, b0=1.0)).simulate(np.zeros(3), 0.02)
-
-
 @pytest.mark.parametrize("dt", [0.0, -1e-3, math.nan, math.inf])
 def test_dt_must_be_positive_and_finite(dt: float) -> None:
     stage = pt.DahlStage.xu_li_2010()

@@ -17,6 +17,7 @@ __all__ = [
     "dahl_simulate",
     "dahl_simulate_fixed",
     "dahl_xu_li_2010",
+    "delayed",
     "identify_dahl",
 ]
 
@@ -40,6 +41,7 @@ def dahl_simulate(
 def dahl_simulate_fixed(
     theta: tuple[float, ...], u: ArrayLike, dt: float, hold: str, substeps: int
 ) -> Trajectory: ...
+def delayed(x: ArrayLike, v: ArrayLike, dt: float, delay: float) -> NDArray[np.float64]: ...
 def identify_dahl(
     *,
     u: ArrayLike,
@@ -52,6 +54,7 @@ def identify_dahl(
     bounds: list[tuple[str, tuple[float, float]]],
     stiffness: float | None,
     offset: bool,
+    delay: tuple[float, float] | None,
     settings: SwarmSettings,
     seed: int,
     runs: int,
@@ -74,6 +77,8 @@ class Trajectory:
     def substeps(self) -> int: ...
     @property
     def difference(self) -> float: ...
+    @property
+    def well_posed(self) -> bool: ...
 
 @final
 class SwarmSettings:

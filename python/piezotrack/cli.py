@@ -165,6 +165,10 @@ def identify_command(
     ] = None,
     stiffness: Annotated[float | None, typer.Option(help="Stiffness in N/m, if known.")] = None,
     offset: Annotated[bool, typer.Option(help="Fit a constant offset of the sensor.")] = True,
+    delay: Annotated[
+        str | None,
+        typer.Option(metavar="fit|S|LOW:HIGH", help="Delay of the displacement in s: fit it?"),
+    ] = None,
     swarm: Annotated[str, typer.Option(help="Settings: default or xu-li-2010.")] = "default",
     seed: Annotated[int, typer.Option(help="Same seed, same result.")] = 0,
     runs: Annotated[int, typer.Option(help="Swarms that search apart; do they agree?")] = 4,
@@ -191,6 +195,7 @@ def identify_command(
         "bounds": {name: _range("--bound", text) for name, text in _pairs("--bound", bound)},
         "stiffness": stiffness,
         "offset": offset,
+        "delay": _delay(delay),
         "swarm": _swarm(swarm),
         "seed": seed,
         "runs": runs,
@@ -236,8 +241,7 @@ def simulate_command(
     )
     _can_be_folder(out)
     with _of_file(drive_file):
-        run = known.model.simulate(u, float(t[-1] - t[0]) / (t.size - 1), hold=hold)
-    x = run.x + known.offset
+        x = known.displacement(u, float(t[-1] - t[0]) / (t.size - 1), hold=hold)
     folder = make_folder(out)
     table = {"time_s": t, "voltage_V": u, "displacement_um": 1e6 * x}
     written = [write_columns(folder / "simulated.csv", table)]
@@ -419,6 +423,12 @@ def _swarm(name: str) -> ParticleSwarm | None:
     if name not in known:
         raise ParameterError(f"--swarm is '{name}': expected {' or '.join(known)}")
     return known[name]
+
+
+def _delay(text: str | None) -> bool | float | tuple[float, float]:
+    if text is None or text == "fit":
+        return text is not None
+    return _range("--delay", text) if ":" in text else _number("--delay", text)
 
 
 def _pairs(option: str, given: list[str] | None) -> list[tuple[str, str]]:

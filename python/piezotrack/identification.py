@@ -33,7 +33,8 @@ class Identification(IdentifiedModel):
     data : Dataset
         The record.
     parameters : dict of str to Estimate
-        The parameters with units, bounds and standard deviations.
+        The parameters with units, bounds and standard deviations; the delay with them where it
+        was fitted.
     cost : float
         RMS deviation in the window [m], equation (16) of Xu and Li 2010.
     history : ndarray, shape (nit + 1,)
@@ -105,6 +106,10 @@ class Identification(IdentifiedModel):
         if self.cost_percent > 5.0:
             notes.append(
                 f"the model does not follow this record: {self.cost_percent:.3g} % of stroke remain"
+            )
+        if self.model.b0 != 0.0 and not self.simulate(self.data).well_posed:
+            notes.append(
+                "b0 q2 falls below 0 at rest: this model has another motion under the same drive"
             )
         if len(self.runs) > 1 and self.agreeing == 1:
             notes.append("no other run ended where the best one did: try more, with runs=")
@@ -178,6 +183,7 @@ def identify(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     stiffness: float | None = None,
     offset: bool = True,
+    delay: bool | float | tuple[float, float] = False,
     swarm: ParticleSwarm | None = None,
     seed: int = 0,
     runs: int = 4,
@@ -194,8 +200,8 @@ def identify(
     (Xu and Li 2010, equation (16), doi 10.1115/1.4001712), by a particle swarm. The warm-up
     before the window is simulated, from rest, and not counted.
 
-    Voltage and displacement fix ratios only: mass, damping, stiffness, piezo coefficient and b1
-    can all be multiplied by one number without changing the motion. Where nothing in the call
+    Voltage and displacement fix ratios only: mass, damping, stiffness, piezo coefficient, b1 and
+    b0 can all be multiplied by one number without changing the motion. Where nothing in the call
     fixes a force, a nominal stiffness of 1e6 N/m is held, and the result says "scale assumed".
 
     Parameters
@@ -206,7 +212,8 @@ def identify(
     model : {"dahl"}, optional
         The kind of stage.
     free : iterable of str, optional
-        Parameters to search: all that are not fixed, where not given.
+        Parameters to search: all that are not fixed, where not given. `b0`, dry friction at
+        reversals, is held at 0 unless it is named here or in `fixed`.
     fixed : mapping of str to float, optional
         Parameters to hold, SI.
     bounds : mapping of str to (float, float), optional
@@ -216,6 +223,10 @@ def identify(
         K [N/m] where it is known.
     offset : bool, optional
         Whether a constant offset of the displacement is fitted with the rest.
+    delay : bool, float or (float, float), optional
+        Time by which the displacement is late behind the drive [s], as amplifiers and slow
+        readings make it: none, fitted (True), known, or fitted between two bounds. Under one
+        slow sine a delay looks like damping; a drive of several frequencies tells them apart.
     swarm : ParticleSwarm, optional
         Settings of the search.
     seed : int, optional
@@ -274,6 +285,7 @@ def identify(
         raise ParameterError(f"callback is {callback!r}: expected a function, or None")
     seed = _core.as_count("seed", seed)
     offset = _core.as_truth("offset", offset)
+    late = _delay(delay)
     full = data.full
     with ProgressBar(progress) as bar:
         found = _core.identify_dahl(
@@ -287,6 +299,7 @@ def identify(
             bounds=[(name, _pair(name, pair)) for name, pair in _items("bounds", bounds)],
             stiffness=None if stiffness is None else _core.as_number("stiffness", stiffness),
             offset=offset,
+            delay=late,
             settings=swarm.checked(),
             seed=seed,
             runs=_core.as_count("runs", runs),
@@ -306,7 +319,7 @@ def identify(
 
 def _telling(callback: Callable[[Progress], object]) -> Callable[..., bool]:
     """Call back with a `Progress` where the core has plain numbers."""
-    names = DahlStage.parameter_names()
+    names = (*DahlStage.parameter_names(), "delay")
 
     def tell(nit: int, most: int, nfev: int, cost: float, theta: list[float]) -> bool:
         parameters = dict(zip(names, theta, strict=True))
@@ -345,28 +358,38 @@ def _pair(name: str, pair: object) -> tuple[float, float]:
     )
 
 
+def _delay(delay: object) -> tuple[float, float] | None:
+    """Bounds of the delay; none where the core chooses them, equal ones where it is known."""
+    if isinstance(delay, bool):
+        return None if delay else (0.0, 0.0)
+    if isinstance(delay, Iterable) and not isinstance(delay, str):
+        low, high = _pair("delay", delay)
+        if low == high:
+            raise ParameterError(f"bounds of delay are ({low}, {high}) s: expected the lower first")
+        return low, high
+    known = _core.as_number("delay", delay)
+    return known, known
+
+
 def _identification(
     found: _core.Search, data: Dataset, swarm: ParticleSwarm, seed: int, offset: bool
 ) -> Identification:
     deviations = {i: (deviation, at_bound) for i, deviation, at_bound in found.sensitivities}
     parameters = {}
-    for i, (name, symbol, unit) in enumerate(_core.DAHL_PARAMETERS):
+    for i, (name, symbol, unit) in enumerate([*_core.DAHL_PARAMETERS, ("delay", "Td", "s")]):
         bounds = found.bounds[i]
         deviation, at_bound = deviations.get(i, (None, False))
         parameters[name] = Estimate(
             found.theta[i], unit, symbol, bounds is not None, bounds, deviation, at_bound
         )
-    names = DahlStage.parameter_names()
+    stage_names, late = DahlStage.parameter_names(), found.theta[-1]
+    if late == 0.0 and not parameters["delay"].free:
+        del parameters["delay"]
     details: dict[str, Any] = {
         "parameters": {
-            name: {
-                "free": estimate.free,
-                "bounds": estimate.bounds,
-                "standard_deviation": estimate.deviation,
-                "at_bound": estimate.at_bound,
-            }
-            for name, estimate in parameters.items()
+            name: _details(estimate) for name, estimate in parameters.items() if name != "delay"
         },
+        "delay": _details(parameters["delay"]) if "delay" in parameters else {},
         "fit": {
             "cost": {"value": found.rms, "unit": "m"},
             "iterations": found.iterations,
@@ -397,7 +420,8 @@ def _identification(
         },
     }
     return Identification(
-        model=DahlStage(**dict(zip(names, found.theta, strict=True))),
+        model=DahlStage(**dict(zip(stage_names, found.theta[:-1], strict=True))),
+        delay=late,
         offset=found.offset,
         offset_fitted=offset,
         scale_assumed=found.scale_assumed,
@@ -418,3 +442,13 @@ def _identification(
         seed=seed,
         swarm=swarm,
     )
+
+
+def _details(estimate: Estimate) -> dict[str, Any]:
+    """Keep in the file what the search says of a parameter."""
+    return {
+        "free": estimate.free,
+        "bounds": estimate.bounds,
+        "standard_deviation": estimate.deviation,
+        "at_bound": estimate.at_bound,
+    }

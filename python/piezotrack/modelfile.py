@@ -19,7 +19,7 @@ from .models import DahlStage, Response
 if TYPE_CHECKING:
     import os
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["IdentifiedModel", "Score", "load"]
 
@@ -75,6 +75,9 @@ class IdentifiedModel:
         Displacement of the sensor where the stage is at rest without drive [m].
     offset_fitted : bool
         Whether the offset was fitted; a record of its own then gets an offset of its own.
+    delay : float
+        Time by which the displacement is late, in the amplifier or the reading of the sensor
+        [s].
     scale_assumed : bool
         Whether the stiffness is nominal: only ratios of mass, damping, stiffness, piezo
         coefficient and b1 are then known.
@@ -89,6 +92,7 @@ class IdentifiedModel:
     offset_fitted: bool
     scale_assumed: bool
     stroke: float
+    delay: float = 0.0
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     @property
@@ -97,6 +101,28 @@ class IdentifiedModel:
         provenance = self.details.get("provenance", {})
         found = provenance.get("data", {}).get("drive_range")
         return (float(found[0]), float(found[1])) if found else None
+
+    def displacement(
+        self, u: ArrayLike, dt: float, *, hold: Literal["foh", "zoh"] = "foh"
+    ) -> NDArray[np.float64]:
+        """Displacement that the sensor shows under a drive, from rest.
+
+        Parameters
+        ----------
+        u : array_like, shape (n,)
+            Drive [V].
+        dt : float
+            Sampling interval [s].
+        hold : {"foh", "zoh"}, optional
+            As for `DahlStage.simulate`.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Displacement with offset and delay [m].
+        """
+        run = self.model.simulate(u, dt, hold=hold)
+        return _core.delayed(run.x, run.v, dt, self.delay) + self.offset
 
     def simulate(self, data: Dataset, *, offset: float | Literal["own"] = "own") -> Response:
         """Displacement that the model gives under the drive of a record.
@@ -112,21 +138,24 @@ class IdentifiedModel:
         Returns
         -------
         Response
-            Motion in the window, the offset in its displacement.
+            Motion in the window; offset and delay are in its displacement, `v`, `hysteresis`
+            and `final` are the stage's own.
         """
         if not isinstance(data, Dataset):
             raise ParameterError(f"data is {type(data).__name__}: expected a Dataset")
         full, start = data.full, data.warmup
         run = self.model.simulate(full.u, data.dt, hold=data.hold)
+        x = _core.delayed(run.x, run.v, data.dt, self.delay)[start:]
         return Response(
             t=data.t,
             u=data.u,
-            x=run.x[start:] + self._shift(data, run.x[start:], offset),
+            x=x + self._shift(data, x, offset),
             v=run.v[start:],
             hysteresis=run.hysteresis[start:],
             final=run.final,
             substeps=run.substeps,
             difference=run.difference,
+            well_posed=run.well_posed,
         )
 
     def score(self, data: Dataset, *, offset: float | Literal["own"] = "own") -> Score:
@@ -177,6 +206,7 @@ class IdentifiedModel:
         """
         details = dict(self.details)
         found = details.pop("parameters", {})
+        delay = dict(details.pop("delay", {}))
         parameters = {
             name: {"value": getattr(self.model, name), "unit": unit, "symbol": symbol}
             | dict(found.get(name, {}))
@@ -190,6 +220,7 @@ class IdentifiedModel:
             "scale_assumed": self.scale_assumed,
             "offset": {"value": self.offset, "unit": "m", "fitted": self.offset_fitted},
             "stroke": {"value": self.stroke, "unit": "m"},
+            "delay": {"value": self.delay, "unit": "s"} | delay,
             **details,
         }
 
@@ -212,12 +243,13 @@ class IdentifiedModel:
         DataError
             The file cannot be written.
         ParameterError
-            Offset or stroke are not finite numbers.
+            Offset, stroke or delay are not finite numbers.
         """
         import json
 
         # What load would refuse is refused now, while the fit is still there.
-        for name, value in (("offset", self.offset), ("stroke", self.stroke)):
+        numbers = {"offset": self.offset, "stroke": self.stroke, "delay": self.delay}
+        for name, value in numbers.items():
             if not math.isfinite(_core.as_number(name, value)):
                 raise ParameterError(f"{name} is {value}: expected a finite number")
         text = json.dumps(_finite(self.document()), indent=2, allow_nan=False)
@@ -291,7 +323,8 @@ def load(path: str | os.PathLike[str]) -> IdentifiedModel:
 
 
 def _identified(name: str, document: dict[str, Any]) -> IdentifiedModel:
-    own = {"format", "schema_version", "model", "parameters", "scale_assumed", "offset", "stroke"}
+    own = {"format", "schema_version", "model", "parameters"}
+    own |= {"scale_assumed", "offset", "stroke", "delay"}
     try:
         parameters = document["parameters"]
         values = {key: parameters[key]["value"] for key in DahlStage.parameter_names()}
@@ -302,13 +335,17 @@ def _identified(name: str, document: dict[str, Any]) -> IdentifiedModel:
         }
         for key, _, unit in _core.DAHL_PARAMETERS:
             _require_unit(key, parameters[key], unit)
+        # Files of version 0.1.0 have no delay.
+        late = document.get("delay", {"value": 0.0, "unit": "s"})
+        delay = {k: v for k, v in late.items() if k not in ("value", "unit")}
         return IdentifiedModel(
             model=DahlStage(**values),
-            offset=_metres("offset", document["offset"]),
+            offset=_number("offset", document["offset"], "m"),
             offset_fitted=_core.as_truth("offset fitted", document["offset"]["fitted"]),
             scale_assumed=_core.as_truth("scale_assumed", document["scale_assumed"]),
-            stroke=_metres("stroke", document["stroke"], positive=True),
-            details={"parameters": extra, **details},
+            stroke=_number("stroke", document["stroke"], "m", above=0.0),
+            delay=_number("delay", late, "s", least=0.0),
+            details={"parameters": extra, "delay": delay, **details},
         )
     except KeyError as error:
         raise DataError(f"{name}: the entry {error} is missing") from None
@@ -323,14 +360,20 @@ def _require_unit(name: str, entry: Mapping[str, Any], unit: str) -> None:
         raise ParameterError(f"the unit of {name} is {entry.get('unit')!r}: expected {unit!r}")
 
 
-def _metres(name: str, entry: Mapping[str, Any], *, positive: bool = False) -> float:
-    """Take a length from the file."""
-    _require_unit(name, entry, "m")
+def _number(
+    name: str,
+    entry: Mapping[str, Any],
+    unit: str,
+    *,
+    above: float = -math.inf,
+    least: float = -math.inf,
+) -> float:
+    """Take a length or a time from the file."""
+    _require_unit(name, entry, unit)
     value = _core.as_number(name, entry["value"])
-    if not math.isfinite(value) or (positive and value <= 0.0):
-        raise ParameterError(
-            f"{name} is {value} m: expected a finite number" + " above 0" * positive
-        )
+    if not math.isfinite(value) or value <= above or value < least:
+        limit = " above 0" if above == 0.0 else ", 0 or above" if least == 0.0 else ""
+        raise ParameterError(f"{name} is {value} {unit}: expected a finite number{limit}")
     return value
 
 

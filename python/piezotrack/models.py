@@ -29,21 +29,21 @@ class StageState:
         Displacement [m].
     v : float
         Velocity [m/s].
-    hysteresis : float
-        Hysteresis force Fh = b1 q1 [N].
-    hysteresis_slope : float
-        Slope of that force along the path, b1 q2 [N/m].
+    q1 : float
+        First state of the hysteresis operator.
+    q2 : float
+        Second state, its slope along the path [1/m]. Both are 0 where b1 and b0 are 0.
     """
 
     x: float = 0.0
     v: float = 0.0
-    hysteresis: float = 0.0
-    hysteresis_slope: float = 0.0
+    q1: float = 0.0
+    q2: float = 0.0
 
     @property
     def values(self) -> tuple[float, float, float, float]:
         """The four values in their order."""
-        return self.x, self.v, self.hysteresis, self.hysteresis_slope
+        return self.x, self.v, self.q1, self.q2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -69,6 +69,10 @@ class Response:
     difference : float
         Largest change of `x` from a coarser simulation [m]; the error of `x` is a third of it,
         and a fifteenth where the drive asked for the scheme's fourth order.
+    well_posed : bool
+        Whether each rest was unique. False where a stage with `b0` other than 0 came to rest
+        with the friction term along the motion and too little force to decide: the same drive
+        then has another motion too.
     """
 
     t: Array
@@ -79,6 +83,7 @@ class Response:
     final: StageState
     substeps: int
     difference: float
+    well_posed: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,12 +92,14 @@ class DahlStage:
 
     .. math::
 
-        M \ddot x + D \dot x + K x = T u - F_h, \qquad F_h = b_1 q_1
+        M \ddot x + D \dot x + K x = T u - F_h
+
+        F_h = b_1 q_1 + \operatorname{sgn}(\dot x)\, b_0 q_2
 
         \dot q_1 = q_2 \dot x, \qquad
         \dot q_2 = (u_p - a_2 q_1 - \operatorname{sgn}(\dot x) a_1 q_2)\, \dot x
 
-    Xu and Li 2010, equations (2), (7) and (8), doi 10.1115/1.4001712, for b0 = 0.
+    Xu and Li 2010, equations (2), (7) and (8), doi 10.1115/1.4001712.
 
     Parameters
     ----------
@@ -109,14 +116,16 @@ class DahlStage:
     b1 : float
         Gain of the hysteresis force [N/m^2].
     b0 : float, optional
-        0. Any other value adds dry friction at reversals, which is not simulated yet.
+        Gain of the friction force [N/m]. With any value but 0 the hysteresis force jumps by
+        2 b0 q2 at a reversal: the stage sticks where the other forces are smaller than b0 q2.
+        Where b0 q2 is below 0, rest is not unique: see ``Response.well_posed``.
     up : float, optional
         Constant input of the operator. Only the product ``b1 * up`` shows in the motion.
 
     Raises
     ------
     ParameterError
-        A parameter is out of its range, or `b0` is not 0.
+        A parameter is out of its range.
 
     Notes
     -----
@@ -237,7 +246,8 @@ class DahlStage:
         Raises
         ------
         ParameterError
-            `dt` or `accuracy` is not above 0, or `hold` or `method` is unknown.
+            `dt` or `accuracy` is not above 0, `hold` or `method` is unknown, or a Runge-Kutta
+            method is asked for with `b0` other than 0.
         ShapeError, DataError
             `u` is not one-dimensional, is empty, or holds NaN or infinity.
         NumericalError
@@ -258,14 +268,14 @@ class DahlStage:
         dt = _core.as_number("dt", dt)
         accuracy = _core.as_number("accuracy", accuracy)
         run = _core.dahl_simulate(self.theta, u, dt, hold, start.values, method, accuracy)
-        x, v, force, slope = run.last
         return Response(
             t=np.arange(run.x.size, dtype=np.float64) * dt,
             u=np.array(u, dtype=np.float64),
             x=run.x,
             v=run.v,
             hysteresis=run.hysteresis,
-            final=StageState(x=x, v=v, hysteresis=force, hysteresis_slope=slope),
+            final=StageState(**dict(zip(("x", "v", "q1", "q2"), run.last, strict=True))),
             substeps=run.substeps,
             difference=run.difference,
+            well_posed=run.well_posed,
         )

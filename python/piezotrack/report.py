@@ -51,7 +51,7 @@ def summary_text(fit: Identification) -> str:
     if fit.scale_assumed:
         lines += [
             f"parameters, scale assumed: K = {fit.model.stiffness:g} N/m is nominal. Voltage and",
-            "displacement fix no force; with the true stiffness=, M, D, T and b1 scale along.",
+            "displacement fix no force; with the true stiffness=, M, D, T, b1 and b0 scale along.",
         ]
     else:
         lines.append("parameters")
@@ -86,14 +86,19 @@ def _known(fit: Identification) -> list[str]:
         ("a1", "a1", stage.a1, "1/m"),
         ("a2", "a2", stage.a2, "1/m^2"),
     ]
+    if "delay" in fit.parameters:
+        ratios.append(("delay", "delay", 1e3 * fit.delay, "ms"))
+    if fit.parameters["b0"].free or stage.b0:
+        ratios.append(("b0", "b0 up/K", stage.b0 * stage.up / stiffness, ""))
     # A ratio to a stiffness that was searched is known where both are.
     whole = fit.parameters["stiffness"]
     known: list[tuple[str, str]] = []
     unknown: list[tuple[str, str]] = []
     for name, symbol, value, unit in ratios:
         estimate = fit.parameters[name]
-        held = not estimate.free and (not whole.free or name in ("a1", "a2"))
-        sure = estimate.identified and (whole.identified or name in ("a1", "a2"))
+        alone = name in ("a1", "a2", "delay")
+        held = not estimate.free and (not whole.free or alone)
+        sure = estimate.identified and (whole.identified or alone)
         if not held:
             (known if sure else unknown).append((symbol, f"{value:>12.6g}  {unit}"))
     lines = ["fixed by the data" if known else "nothing is fixed by these data"]

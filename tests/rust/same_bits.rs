@@ -2,8 +2,8 @@
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use piezotrack_core::identify::{
-    Evaluator, Guess, Monitor, Outcome, Plan, Problem, Progress, Record, Spec, SwarmSettings,
-    search,
+    Delay, Evaluator, Guess, Monitor, Outcome, Plan, Problem, Progress, Record, Spec,
+    SwarmSettings, search,
 };
 use piezotrack_core::integrate::{Drive, Hold, Method, NEVER, simulate};
 use piezotrack_core::march::{Order, Stepping};
@@ -78,6 +78,29 @@ fn one_lane_and_many_on_every_instruction_set() {
             let alone: Vec<_> = asked.iter().flat_map(|one| bits(&evaluator, &[*one])).collect();
             assert_eq!(alone, expected, "{arch:?} {order:?}, one by one");
         }
+    }
+}
+
+/// Sticking, reversals inside the step and delays of their own in every lane.
+#[test]
+fn one_lane_and_many_with_friction_and_delay() {
+    let (u, y) = log();
+    let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
+    let mut spec = spec();
+    spec.free = Some(
+        ["mass", "damping", "piezo_coefficient", "a1", "a2", "b1", "b0"].map(String::from).to_vec(),
+    );
+    spec.bounds.push(("b0".into(), (-100.0, 400.0)));
+    spec.delay = Delay::Between(0.0, 0.02);
+    let problem = Problem::new(&record, &spec).unwrap();
+    let asked = guesses(&problem);
+    let expected = bits(&Evaluator::new(&record, &problem, NEVER), &asked);
+    assert!(expected.iter().filter(|c| f64::from_bits(c.0).is_finite()).count() > 10);
+    for arch in instruction_sets() {
+        let evaluator = Evaluator::new(&record, &problem, NEVER).on(arch);
+        assert_eq!(bits(&evaluator, &asked), expected, "{arch:?}");
+        let alone: Vec<_> = asked.iter().flat_map(|one| bits(&evaluator, &[*one])).collect();
+        assert_eq!(alone, expected, "{arch:?}, one by one");
     }
 }
 

@@ -22,6 +22,10 @@ pub trait Number:
     #[must_use]
     fn mul_add(self, factor: Self, term: Self) -> Self;
 
+    /// Square root, correctly rounded.
+    #[must_use]
+    fn sqrt(self) -> Self;
+
     /// `yes` in the lanes where `self < 0`, `no` in the others (and where `self` is NaN).
     #[must_use]
     fn where_negative(self, yes: Self, no: Self) -> Self;
@@ -42,6 +46,11 @@ impl Number for f64 {
         return f64::mul_add(self, factor, term);
         #[cfg(not(feature = "std"))]
         return libm::fma(self, factor, term);
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        libm::sqrt(self)
     }
 
     #[inline(always)]

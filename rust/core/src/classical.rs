@@ -5,6 +5,8 @@
 //! 5 kHz excludes the published stage. The adaptive pair is that of Dormand and Prince 1980,
 //! doi 10.1016/0771-050X(80)90013-3, behind the solver that Xu and Li used.
 
+use piezotrack_control::operator::DahlState;
+
 use crate::integrate::{Drive, Trajectory, index};
 use crate::stage::{DahlStage, StageState};
 
@@ -162,13 +164,15 @@ impl Crossing for Rk45<'_> {
 
 /// Leads a stage along its drive; `None` where it does not stay finite or `stop` says so.
 pub(crate) fn march(
+    stage: &DahlStage,
     crossing: &mut impl Crossing,
     drive: &Drive<'_>,
     initial: StageState,
     stop: &dyn Fn() -> bool,
 ) -> Option<Trajectory> {
     let n = drive.u.len();
-    let mut state = [initial.x, initial.v, initial.hysteresis, initial.hysteresis_slope];
+    let memory = stage.memory(&initial);
+    let mut state = [initial.x, initial.v, memory.force, memory.slope];
     let mut out = Trajectory {
         x: Vec::with_capacity(n),
         v: Vec::with_capacity(n),
@@ -176,6 +180,7 @@ pub(crate) fn march(
         last: initial,
         substeps: 0,
         difference: 0.0,
+        well_posed: true,
     };
     for k in 0..n {
         if k > 0 {
@@ -189,8 +194,9 @@ pub(crate) fn march(
         out.v.push(state[1]);
         out.hysteresis.push(state[2]);
     }
-    let [x, v, hysteresis, hysteresis_slope] = state;
-    out.last = StageState { x, v, hysteresis, hysteresis_slope };
+    let [x, v, force, slope] = state;
+    let (q1, q2) = stage.states(&DahlState { force, slope });
+    out.last = StageState { x, v, q1, q2 };
     out.substeps = crossing.steps();
     Some(out)
 }

@@ -1,5 +1,6 @@
 //! Simulation of a stage under a sampled drive, to a stated accuracy.
 
+use piezotrack_control::Number;
 use piezotrack_control::operator::DahlState;
 use pulp::{Simd, WithSimd};
 
@@ -7,8 +8,9 @@ use crate::classical::{self, Rk4, Rk45};
 use crate::error::{Error, Result, positive};
 use crate::march::{FEW_TERMS, March, Order, Sink, Stepping, TERMS};
 use crate::mechanics::{Propagator, halvings};
-use crate::stage::feedback::FeedbackState;
-use crate::stage::{DahlStage, StageState};
+use crate::stage::feedback::{FeedbackState, Smooth};
+use crate::stage::friction::{Friction, FrictionMemory};
+use crate::stage::{Coupling, DahlStage, StageState};
 
 /// Asked now and then whether to give up; answers at once.
 pub type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
@@ -69,7 +71,7 @@ pub struct Trajectory {
     pub x: Vec<f64>,
     /// Velocity, m/s.
     pub v: Vec<f64>,
-    /// Hysteresis force, N.
+    /// Hysteresis force Fh, N.
     pub hysteresis: Vec<f64>,
     /// State at the last sample.
     pub last: StageState,
@@ -77,6 +79,9 @@ pub struct Trajectory {
     pub substeps: usize,
     /// Largest difference in displacement from a coarser simulation, m; 0 where there was none.
     pub difference: f64,
+    /// Whether each rest was unique: false once a stage with b0 other than 0 could have gone
+    /// either way.
+    pub well_posed: bool,
 }
 
 /// Most sub-steps in one sampling interval that are tried.
@@ -114,7 +119,13 @@ pub fn simulate(
     positive("accuracy", accuracy, "m")?;
     let mut level = if method == Method::Rk45 { 6 } else { first_substeps(stage, drive.dt) };
     let last = if method == Method::Rk45 { 14 } else { MOST_SUBSTEPS };
+    if method != Method::Exponential && stage.has_friction() {
+        let expected = "0 with a Runge-Kutta method, which steps over sticking (or \
+                        method='exponential')";
+        return Err(Error::parameter("b0", format!("{} N/m", stage.b0), expected));
+    }
     if method == Method::Exponential
+        && !stage.has_friction()
         && let Some(quick) = second_order(stage, drive, initial, level, stop)
         && quick.difference <= accuracy
     {
@@ -187,12 +198,12 @@ fn at_level(
         }
         Method::Rk4 => {
             let mut crossing = Rk4 { stage, substeps: level };
-            classical::march(&mut crossing, drive, initial, stop)
+            classical::march(stage, &mut crossing, drive, initial, stop)
         }
         Method::Rk45 => {
             let tolerance = libm::pow(10.0, -index(level));
             let mut crossing = Rk45::new(stage, drive, tolerance);
-            classical::march(&mut crossing, drive, initial, stop)
+            classical::march(stage, &mut crossing, drive, initial, stop)
         }
     };
     run.ok_or_else(|| {
@@ -288,20 +299,21 @@ impl WithSimd for Single<'_> {
     // One lane needs no vectors; the dispatch is for the fused multiply-add instruction.
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        if self.stage.has_friction() {
+            return self.with_friction();
+        }
         match (self.stepping.order, self.few_terms) {
-            (Order::Second, true) => self.run::<FEW_TERMS, false>(),
-            (Order::Second, false) => self.run::<TERMS, false>(),
-            (Order::Fourth, _) => self.run::<TERMS, true>(),
+            (Order::Second, true) => self.smooth::<FEW_TERMS, false>(),
+            (Order::Second, false) => self.smooth::<TERMS, false>(),
+            (Order::Fourth, _) => self.smooth::<TERMS, true>(),
         }
     }
 }
 
 impl Single<'_> {
     #[inline(always)]
-    fn run<const T: usize, const FOURTH: bool>(self) -> Option<Trajectory> {
-        let Self { stage, drive, initial, stepping, stop, .. } = self;
-        let substeps = stepping.substeps;
-        let h = drive.dt / index(substeps);
+    fn smooth<const T: usize, const FOURTH: bool>(self) -> Option<Trajectory> {
+        let (stage, initial, h) = (self.stage, self.initial, self.step());
         let mechanics = &stage.mechanics;
         let linear = Propagator::new(
             1.0 / mechanics.mass,
@@ -310,27 +322,74 @@ impl Single<'_> {
             h,
             halvings(mechanics.rate(), h),
         );
-        let n = drive.u.len();
+        let memory = stage.memory(&initial);
+        let start = FeedbackState { x: initial.x, w: initial.v * h, memory };
+        let coupling = Smooth::<_, _, FOURTH> { linear, operator: stage.operator::<T>() };
+        let (mut out, end) = self.march(coupling, start)?;
+        (out.last.q1, out.last.q2) = stage.states(&end.memory);
+        Some(out)
+    }
+
+    #[inline(always)]
+    fn with_friction(self) -> Option<Trajectory> {
+        let (initial, h) = (self.initial, self.step());
+        let halvings = halvings(self.stage.mechanics.rate(), h);
+        let coupling = Friction::new(self.stage.friction(), h, halvings);
+        let memory = DahlState { force: initial.q1, slope: initial.q2 };
+        let start = coupling.start(initial.x, initial.v * h, memory);
+        let (mut out, end) = self.march(coupling, start)?;
+        (out.last.q1, out.last.q2) = (end.memory.operator.force, end.memory.operator.slope);
+        out.well_posed = end.memory.doubt <= 0.0;
+        Some(out)
+    }
+
+    /// Length of a sub-step, s.
+    fn step(&self) -> f64 {
+        self.drive.dt / index(self.stepping.substeps)
+    }
+
+    /// Leads the stage along its drive; what is peculiar to its memory is left to the caller.
+    #[inline(always)]
+    fn march<C: Coupling<f64, Memory: Force>>(
+        self,
+        coupling: C,
+        start: FeedbackState<f64, C::Memory>,
+    ) -> Option<(Trajectory, FeedbackState<f64, C::Memory>)> {
+        let Self { drive, stepping, .. } = self;
+        let (n, h) = (drive.u.len(), self.step());
         let out = Trajectory {
             x: Vec::with_capacity(n),
             v: Vec::with_capacity(n),
             hysteresis: Vec::with_capacity(n),
-            last: initial,
-            substeps,
+            last: self.initial,
+            substeps: stepping.substeps,
             difference: 0.0,
+            well_posed: true,
         };
-        let mut keep = Keep { out, step: h, stop };
-        let start = FeedbackState { x: initial.x, w: initial.v * h, memory: initial.into() };
-        let operator = stage.operator::<T>();
-        let march = March { linear, operator, gain: stage.piezo_coefficient };
-        let end = march.run::<FOURTH>(drive, substeps, start, &mut keep)?;
-        keep.out.last = StageState {
-            x: end.x,
-            v: end.w / h,
-            hysteresis: end.memory.force,
-            hysteresis_slope: end.memory.slope,
-        };
-        Some(keep.out)
+        let mut keep = Keep { out, step: h, stop: self.stop };
+        let march = March { coupling, gain: self.stage.piezo_coefficient };
+        let end = march.run(drive, stepping.substeps, start, &mut keep)?;
+        keep.out.last = StageState { x: end.x, v: end.w / h, ..self.initial };
+        Some((keep.out, end))
+    }
+}
+
+/// A memory that tells the hysteresis force, N.
+trait Force {
+    fn force(&self) -> f64;
+}
+
+impl Force for DahlState<f64> {
+    #[inline(always)]
+    fn force(&self) -> f64 {
+        self.force
+    }
+}
+
+impl Force for FrictionMemory<f64> {
+    #[inline(always)]
+    fn force(&self) -> f64 {
+        self.force
     }
 }
 
@@ -341,12 +400,12 @@ struct Keep<'a> {
     stop: Stop<'a>,
 }
 
-impl Sink<f64, DahlState<f64>> for Keep<'_> {
+impl<M: Force> Sink<f64, M> for Keep<'_> {
     #[inline(always)]
-    fn sample(&mut self, _k: usize, state: &FeedbackState<f64, DahlState<f64>>) {
+    fn sample(&mut self, _k: usize, state: &FeedbackState<f64, M>) {
         self.out.x.push(state.x);
         self.out.v.push(state.w / self.step);
-        self.out.hysteresis.push(state.memory.force);
+        self.out.hysteresis.push(state.memory.force());
     }
 
     fn give_up(&mut self, _k: usize) -> bool {
@@ -364,6 +423,50 @@ fn first_substeps(stage: &DahlStage, dt: f64) -> usize {
         substeps *= 2;
     }
     substeps
+}
+
+/// Displacement that is late by `delay` seconds, between the samples on the cubic through
+/// displacements and velocities, m; before the first sample the stage is where it starts.
+#[must_use]
+pub fn delayed(x: &[f64], v: &[f64], dt: f64, delay: f64) -> Vec<f64> {
+    if delay == 0.0 {
+        return x.to_vec();
+    }
+    let Late { whole, part } = Late::new(delay, dt);
+    let at =
+        |k: Option<usize>| k.map_or((x.first().copied().unwrap_or(0.0), 0.0), |k| (x[k], v[k]));
+    let values = (0..x.len().min(v.len())).map(|k| {
+        let ((x0, v0), (x1, v1)) = (at(k.checked_sub(whole + 1)), at(k.checked_sub(whole)));
+        between(x0, v0 * dt, x1, v1 * dt, part)
+    });
+    values.collect()
+}
+
+/// A delay in samples.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Late {
+    /// Whole samples.
+    pub whole: usize,
+    /// Where between the sample before and that one the displacement is read off, 0 to 1.
+    pub part: f64,
+}
+
+impl Late {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 or above")]
+    pub(crate) fn new(delay: f64, dt: f64) -> Self {
+        let samples = (delay / dt).max(0.0);
+        let whole = libm::floor(samples);
+        Self { whole: whole as usize, part: 1.0 - (samples - whole) }
+    }
+}
+
+/// The cubic through values and scaled slopes at 0 and 1, at `s`.
+#[inline(always)]
+pub(crate) fn between<N: Number>(x0: N, w0: N, x1: N, w1: N, s: N) -> N {
+    let rise = x1 - x0;
+    let c3 = rise.mul_add(rise.like(-2.0), w0 + w1);
+    let c2 = rise - w0 - c3;
+    s.mul_add(s.mul_add(s.mul_add(c3, c2), w0), x0)
 }
 
 /// A number of samples as a factor; exact below 2^53.

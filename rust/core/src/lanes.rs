@@ -28,6 +28,13 @@ impl<S: Simd, const K: usize> Lanes<S, K> {
         out
     }
 
+    /// As many lanes, each with the value that `values` gives for it.
+    #[inline(always)]
+    #[must_use]
+    pub fn each(self, values: impl Fn(usize) -> f64) -> Self {
+        Self::gather(self.simd, values)
+    }
+
     /// The lanes in order.
     #[inline(always)]
     pub fn as_slice(&self) -> &[f64] {
@@ -82,6 +89,14 @@ impl<S: Simd, const K: usize> Number for Lanes<S, K> {
         for k in 0..K {
             self.vectors[k] =
                 self.simd.mul_add_f64s(self.vectors[k], factor.vectors[k], term.vectors[k]);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn sqrt(mut self) -> Self {
+        for k in 0..K {
+            self.vectors[k] = self.simd.sqrt_f64s(self.vectors[k]);
         }
         self
     }

@@ -1,11 +1,10 @@
 //! The way of a stage along its drive, for one stage or for lanes of them.
 
 use piezotrack_control::Number;
-use piezotrack_control::operator::Operator;
 
 use crate::integrate::{Drive, index};
-use crate::mechanics::Propagator;
-use crate::stage::feedback::{FeedbackState, fourth_order, second_order};
+use crate::stage::Coupling;
+use crate::stage::feedback::FeedbackState;
 
 /// Order of the coupling of hysteresis and linear part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,11 +35,9 @@ pub trait Sink<N, M> {
 
 /// A stage with everything that its parameters alone decide worked out.
 #[derive(Clone, Copy, Debug)]
-pub struct March<N, O> {
-    /// The linear part over one sub-step.
-    pub linear: Propagator<N>,
-    /// The hysteresis.
-    pub operator: O,
+pub struct March<N, C> {
+    /// One sub-step.
+    pub coupling: C,
     /// Force for 1 V, N.
     pub gain: N,
 }
@@ -54,16 +51,16 @@ pub const FEW_TERMS: usize = 3;
 /// Sub-steps between two questions whether to give up: tens of microseconds.
 const BLOCK: usize = 1024;
 
-impl<N: Number, O: Operator<N>> March<N, O> {
+impl<N: Number, C: Coupling<N>> March<N, C> {
     /// Leads the stage along the drive; `None` where the sink gave up.
     #[inline(always)]
-    pub fn run<const FOURTH: bool>(
+    pub fn run(
         &self,
         drive: &Drive<'_>,
         substeps: usize,
-        start: FeedbackState<N, O::State>,
-        sink: &mut impl Sink<N, O::State>,
-    ) -> Option<FeedbackState<N, O::State>> {
+        start: FeedbackState<N, C::Memory>,
+        sink: &mut impl Sink<N, C::Memory>,
+    ) -> Option<FeedbackState<N, C::Memory>> {
         let mut state = start;
         sink.sample(0, &state);
         let part = 1.0 / index(substeps);
@@ -75,11 +72,11 @@ impl<N: Number, O: Operator<N>> March<N, O> {
                 let (u, change) = drive.interval(k - 1);
                 if substeps == 1 {
                     // Written apart: most searches spend their time here.
-                    state = self.step::<FOURTH>(&state, u, change);
+                    state = self.step(&state, u, change);
                 } else {
                     let change = change * part;
                     for j in 0..substeps {
-                        state = self.step::<FOURTH>(&state, index(j).mul_add(change, u), change);
+                        state = self.step(&state, index(j).mul_add(change, u), change);
                     }
                 }
                 sink.sample(k, &state);
@@ -94,18 +91,14 @@ impl<N: Number, O: Operator<N>> March<N, O> {
 
     /// One sub-step under a drive that goes from `u` to `u + change`, V.
     #[inline(always)]
-    fn step<const FOURTH: bool>(
+    fn step(
         &self,
-        state: &FeedbackState<N, O::State>,
+        state: &FeedbackState<N, C::Memory>,
         u: f64,
         change: f64,
-    ) -> FeedbackState<N, O::State> {
+    ) -> FeedbackState<N, C::Memory> {
         let force = self.gain * self.gain.like(u);
         let rise = self.gain * self.gain.like(change);
-        if FOURTH {
-            fourth_order(&self.linear, &self.operator, state, force, rise)
-        } else {
-            second_order(&self.linear, &self.operator, state, force, rise)
-        }
+        self.coupling.step(state, force, rise)
     }
 }

@@ -2,8 +2,8 @@
 
 use numpy::{PyArray1, ToPyArray};
 use piezotrack_core::identify::{
-    Boundary, Coordinate, Identification, Outcome, Plan, Record, Spec, StopReason, SwarmSettings,
-    Topology, identify,
+    Boundary, Coordinate, Delay, Identification, Outcome, Plan, Record, Spec, StopReason,
+    SwarmSettings, Theta, Topology, identify,
 };
 use piezotrack_core::march::Order;
 use piezotrack_core::{Error, Result};
@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 use crate::arrays::samples;
 use crate::enter::{Watchers, enter_pool};
 use crate::errors::raise;
-use crate::stage::{Theta, hold};
+use crate::stage::hold;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PySettings>()?;
@@ -105,6 +105,7 @@ struct PySearch {
 
 #[pymethods]
 impl PySearch {
+    /// The parameters of the stage, then the delay.
     #[getter]
     fn theta(&self) -> Theta {
         self.outcome.theta
@@ -194,10 +195,11 @@ impl PySearch {
     }
 }
 
-/// Identifies a Dahl stage; None where the search was stopped before its first cost.
+/// Identifies a Dahl stage, its `delay` between two bounds, known where they are equal, or
+/// between bounds of its own choice where there are none; None where the search was stopped before its first cost.
 #[pyfunction]
 #[pyo3(signature = (*, u, y, dt, hold_name, start, free, fixed, bounds, stiffness, offset,
-    settings, seed, runs, threads, callback, progress))]
+    delay, settings, seed, runs, threads, callback, progress))]
 #[expect(clippy::too_many_arguments, reason = "keyword-only, called from one place")]
 fn identify_dahl(
     py: Python<'_>,
@@ -211,6 +213,7 @@ fn identify_dahl(
     bounds: Vec<(String, (f64, f64))>,
     stiffness: Option<f64>,
     offset: bool,
+    delay: Option<(f64, f64)>,
     settings: &PySettings,
     seed: u64,
     runs: usize,
@@ -219,7 +222,13 @@ fn identify_dahl(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Option<PySearch>> {
     let (u, y) = (samples("u", u)?, samples("y", y)?);
-    let spec = Spec { free, fixed, bounds, stiffness, offset };
+    let delay = match delay {
+        None => Delay::Fitted,
+        #[expect(clippy::float_cmp, reason = "the caller writes one number twice")]
+        Some((low, high)) if low == high => Delay::Fixed(low),
+        Some((low, high)) => Delay::Between(low, high),
+    };
+    let spec = Spec { free, fixed, bounds, stiffness, offset, delay };
     let plan = Plan { settings: settings.0.clone(), seed, runs };
     let watchers = Watchers { callback, progress };
     let found = enter_pool(py, threads, &watchers, |monitor, stop| {

@@ -14,7 +14,7 @@ use crate::errors::raise;
 /// Values of the nine parameters, in the order of `DAHL_PARAMETERS`.
 pub type Theta = [f64; 9];
 
-/// Displacement, velocity, hysteresis force and its slope.
+/// Displacement, velocity, q1 and q2.
 type State = (f64, f64, f64, f64);
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -22,6 +22,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
         DAHL_PARAMETERS.iter().map(|info| (info.name, info.symbol, info.unit)).collect();
     module.add("DAHL_PARAMETERS", parameters)?;
     module.add_class::<PyTrajectory>()?;
+    module.add_function(wrap_pyfunction!(delayed, module)?)?;
     module.add_function(wrap_pyfunction!(dahl_check, module)?)?;
     module.add_function(wrap_pyfunction!(dahl_xu_li_2010, module)?)?;
     module.add_function(wrap_pyfunction!(dahl_simulate, module)?)?;
@@ -71,8 +72,8 @@ impl PyTrajectory {
 
     #[getter]
     fn last(&self) -> State {
-        let StageState { x, v, hysteresis, hysteresis_slope } = self.0.last;
-        (x, v, hysteresis, hysteresis_slope)
+        let StageState { x, v, q1, q2 } = self.0.last;
+        (x, v, q1, q2)
     }
 
     #[getter]
@@ -81,9 +82,27 @@ impl PyTrajectory {
     }
 
     #[getter]
+    fn well_posed(&self) -> bool {
+        self.0.well_posed
+    }
+
+    #[getter]
     fn difference(&self) -> f64 {
         self.0.difference
     }
+}
+
+/// The displacement `delay` seconds late.
+#[pyfunction]
+fn delayed<'py>(
+    py: Python<'py>,
+    x: &Bound<'py, PyAny>,
+    v: &Bound<'py, PyAny>,
+    dt: f64,
+    delay: f64,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (x, v) = (samples("x", x)?, samples("v", v)?);
+    Ok(integrate::delayed(&x, &v, dt, delay).to_pyarray(py))
 }
 
 /// Raises where the nine values make no stage.
@@ -95,9 +114,9 @@ fn dahl_check(theta: Theta) -> PyResult<()> {
 /// Table 1 of Xu and Li 2010.
 #[pyfunction]
 fn dahl_xu_li_2010() -> Theta {
-    let DahlStage { mechanics, piezo_coefficient, a1, a2, b1, up } = DahlStage::xu_li_2010();
+    let DahlStage { mechanics, piezo_coefficient, a1, a2, b1, b0, up } = DahlStage::xu_li_2010();
     let (mass, damping, stiffness) = (mechanics.mass, mechanics.damping, mechanics.stiffness);
-    [mass, damping, stiffness, piezo_coefficient, a1, a2, b1, 0.0, up]
+    [mass, damping, stiffness, piezo_coefficient, a1, a2, b1, b0, up]
 }
 
 /// Simulates to an accuracy, choosing the sub-steps.
@@ -156,6 +175,6 @@ fn run(
         .ok_or_else(|| raise(&Error::Numerical("the simulation was stopped".into())))
 }
 
-fn state((x, v, hysteresis, hysteresis_slope): State) -> StageState {
-    StageState { x, v, hysteresis, hysteresis_slope }
+fn state((x, v, q1, q2): State) -> StageState {
+    StageState { x, v, q1, q2 }
 }

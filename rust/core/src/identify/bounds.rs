@@ -81,6 +81,8 @@ pub fn derive(record: &Record<'_>, fixed: &[Option<f64>; 9]) -> Result<[Coordina
         (1e-2 / of.stroke, 10.0 / of.stroke),
         (1e-2 / (of.stroke * of.stroke), 40.0 / (of.stroke * of.stroke)),
         (-2.0 * curvature, 2.0 * curvature),
+        // q2 is about up times the path: a friction of half the elastic force.
+        (0.0, 0.5 * hard / up.abs().max(f64::MIN_POSITIVE)),
     ];
     let mut coordinates = [Coordinate::Fixed(0.0); 9];
     for i in 0..9 {
@@ -93,9 +95,15 @@ pub fn derive(record: &Record<'_>, fixed: &[Option<f64>; 9]) -> Result<[Coordina
     Ok(coordinates)
 }
 
+/// Longest delay that is searched where no bounds are given, s.
+pub(super) fn longest_delay(record: &Record<'_>) -> f64 {
+    let of = Measures::of(record);
+    (20.0 * of.dt).min(0.1 * core::f64::consts::TAU / of.frequency)
+}
+
 /// Range of the stiffness from whichever parameter that carries force is held.
 fn stiffness_range(of: &Measures, fixed: &[Option<f64>; 9], up: f64) -> (f64, f64) {
-    let [mass, damping, stiffness, piezo, _, _, b1, _, _] = *fixed;
+    let [mass, damping, stiffness, piezo, _, _, b1, b0, _] = *fixed;
     let around = |value: f64, factor: f64| (value.abs() / factor, value.abs() * factor);
     if let Some(value) = stiffness {
         (value, value)
@@ -104,6 +112,8 @@ fn stiffness_range(of: &Measures, fixed: &[Option<f64>; 9], up: f64) -> (f64, f6
     } else if let Some(value) = b1.filter(|value| *value != 0.0) {
         // Half the curvature times the stroke is a stiffness: a tenth of K to ten times K.
         around(0.5 * value * up * of.stroke, 30.0)
+    } else if let Some(value) = b0.filter(|value| *value != 0.0) {
+        around(value * up, 30.0)
     } else if let Some(value) = damping.filter(|value| *value != 0.0) {
         (value * of.frequency, value * of.frequency * 1e3)
     } else if let Some(value) = mass {

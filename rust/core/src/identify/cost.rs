@@ -8,18 +8,20 @@
 //! value for each guess is the mean of the deviation, so it costs the swarm no dimension.
 //! Particles run in lockstep lanes, and no trajectory is stored.
 
-use piezotrack_control::Number;
 use piezotrack_control::operator::{Dahl, DahlState, Operator};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
+use super::deviation::{Delayed, Sums};
 use super::problem::{Problem, Record, Theta};
 use super::stepping;
 use crate::integrate::{Stop, index};
 use crate::lanes::Lanes;
-use crate::march::{FEW_TERMS, March, Order, Sink, Stepping, TERMS};
+use crate::march::{FEW_TERMS, March, Order, Stepping, TERMS};
 use crate::mechanics::{Mechanics, Propagator, halvings};
-use crate::stage::feedback::FeedbackState;
+use crate::stage::Coupling;
+use crate::stage::feedback::{FeedbackState, Smooth};
+use crate::stage::friction::{Friction, FrictionParameters};
 
 /// Vectors that go through the step together, to hide each other's latency.
 const VECTORS: usize = 3;
@@ -45,19 +47,19 @@ pub struct Costs {
 
 impl Costs {
     /// What a guess costs that could not be simulated.
-    const FAILED: Self = Self { rms: f64::INFINITY, offset: 0.0 };
+    pub(super) const FAILED: Self = Self { rms: f64::INFINITY, offset: 0.0 };
 }
 
 /// Computes costs of guesses for one problem, with the stepping fixed.
 pub struct Evaluator<'a> {
-    record: &'a Record<'a>,
+    pub(super) record: &'a Record<'a>,
     problem: &'a Problem,
     arch: Arch,
     /// How finely a sampling interval is stepped through.
     pub stepping: Stepping,
     halvings: u32,
     /// Subtracted from the measured displacement, m, to keep the sums small.
-    centre: f64,
+    pub(super) centre: f64,
 }
 
 impl<'a> Evaluator<'a> {
@@ -65,7 +67,6 @@ impl<'a> Evaluator<'a> {
     #[must_use]
     pub fn new(record: &'a Record<'a>, problem: &'a Problem, stop: Stop<'_>) -> Self {
         let stepping = stepping::choose(record, problem, stop);
-        let step = record.drive.dt / index(stepping.substeps);
         let rate = stepping::corners(problem).iter().fold(0.0, |most: f64, theta| {
             let mechanics = Mechanics { mass: theta[0], damping: theta[1], stiffness: theta[2] };
             most.max(mechanics.rate())
@@ -73,7 +74,7 @@ impl<'a> Evaluator<'a> {
         let window = &record.y[record.window.clone()];
         let centre =
             if problem.offset { window.iter().sum::<f64>() / index(window.len()) } else { 0.0 };
-        let halvings = halvings(rate, step);
+        let halvings = halvings(rate, record.drive.dt / index(stepping.substeps));
         Self { record, problem, arch: Arch::new(), stepping, halvings, centre }
     }
 
@@ -84,6 +85,11 @@ impl<'a> Evaluator<'a> {
         self
     }
 
+    /// Length of a sub-step, s.
+    fn step(&self) -> f64 {
+        self.record.drive.dt / index(self.stepping.substeps)
+    }
+
     /// Costs of guesses, in their order, computed on the threads of the present pool.
     ///
     /// Those that were not finished when `stop` said so are infinite.
@@ -92,9 +98,14 @@ impl<'a> Evaluator<'a> {
         let width = self.arch.dispatch(Width);
         // Every thread gets vectors to fill before any gets a second one.
         let vectors = guesses.len().div_ceil(width);
-        let each = vectors.div_ceil(rayon::current_num_threads()).clamp(1, VECTORS);
+        let each = vectors.div_ceil(rayon::current_num_threads()).clamp(1, self.most());
         let size = guesses.len().div_ceil(vectors.div_ceil(each).max(1)).max(1);
         guesses.par_chunks(size).flat_map_iter(|chunk| self.bundle(chunk, width, stop)).collect()
+    }
+
+    /// Most vectors in a bundle: a step with friction fills the registers with one.
+    fn most(&self) -> usize {
+        if self.problem.has_friction() { 1 } else { VECTORS }
     }
 
     /// Costs of as many guesses as one bundle of lanes takes.
@@ -107,7 +118,7 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Cost and offset from the sums of the deviation and of its square.
-    fn conclude(&self, sum: f64, squares: f64, samples: usize) -> Costs {
+    pub(super) fn conclude(&self, sum: f64, squares: f64, samples: usize) -> Costs {
         let (mean, mean_square) = (sum / index(samples), squares / index(samples));
         let (variance, offset) = if self.problem.offset {
             (mean_square - mean * mean, mean + self.centre)
@@ -134,10 +145,10 @@ impl WithSimd for Width {
 }
 
 /// Guesses in one bundle of lanes.
-struct Bundle<'a, const K: usize> {
-    of: &'a Evaluator<'a>,
-    guesses: &'a [Guess],
-    stop: Stop<'a>,
+pub(super) struct Bundle<'a, const K: usize> {
+    pub of: &'a Evaluator<'a>,
+    pub guesses: &'a [Guess],
+    pub stop: Stop<'a>,
 }
 
 impl<const K: usize> WithSimd for Bundle<'_, K> {
@@ -145,99 +156,78 @@ impl<const K: usize> WithSimd for Bundle<'_, K> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Vec<Costs> {
+        if self.of.problem.has_friction() {
+            return self.with_friction(simd);
+        }
         match self.of.stepping.order {
-            Order::Second => self.run::<S, FEW_TERMS, false>(simd),
-            Order::Fourth => self.run::<S, TERMS, true>(simd),
+            Order::Second => self.smooth::<S, FEW_TERMS, false>(simd),
+            Order::Fourth => self.smooth::<S, TERMS, true>(simd),
         }
     }
 }
 
 impl<const K: usize> Bundle<'_, K> {
+    /// A value for each lane; lanes without a guess of their own repeat the last.
     #[inline(always)]
-    fn run<S: Simd, const T: usize, const FOURTH: bool>(self, simd: S) -> Vec<Costs> {
-        let Self { of, guesses, .. } = self;
-        // Lanes without a guess of their own repeat the last.
-        let lanes = |value: &dyn Fn(&Theta) -> f64| {
-            Lanes::<S, K>::gather(simd, |lane| {
-                guesses.get(lane).or(guesses.last()).map_or(f64::NAN, |guess| value(&guess.theta))
-            })
-        };
+    fn lanes<S: Simd>(&self, simd: S, value: impl Fn(&Theta) -> f64) -> Lanes<S, K> {
+        Lanes::gather(simd, |lane| {
+            let guess = self.guesses.get(lane).or(self.guesses.last());
+            guess.map_or(f64::NAN, |guess| value(&guess.theta))
+        })
+    }
+
+    #[inline(always)]
+    fn smooth<S: Simd, const T: usize, const FOURTH: bool>(self, simd: S) -> Vec<Costs> {
         let linear = Propagator::new(
-            lanes(&|theta| 1.0 / theta[0]),
-            lanes(&|theta| theta[1] / theta[0]),
-            lanes(&|theta| theta[2] / theta[0]),
-            of.record.drive.dt / index(of.stepping.substeps),
-            of.halvings,
+            self.lanes(simd, |theta| 1.0 / theta[0]),
+            self.lanes(simd, |theta| theta[1] / theta[0]),
+            self.lanes(simd, |theta| theta[2] / theta[0]),
+            self.of.step(),
+            self.of.halvings,
         );
         let operator = Dahl::<_, T> {
-            a1: lanes(&|theta| theta[4]),
-            a2: lanes(&|theta| theta[5]),
-            gain: lanes(&|theta| theta[6] * theta[8]),
+            a1: self.lanes(simd, |theta| theta[4]),
+            a2: self.lanes(simd, |theta| theta[5]),
+            gain: self.lanes(simd, |theta| theta[6] * theta[8]),
         };
-        let gain = lanes(&|theta| theta[3]);
-        let zero = lanes(&|_| 0.0);
+        let zero = self.lanes(simd, |_| 0.0);
         let start = FeedbackState { x: zero, w: zero, memory: operator.rest() };
-        let verdicts = vec![None; guesses.len()];
-        let mut sums = Sums { of: &self, sum: zero, squares: zero, verdicts };
-        let march = March { linear, operator, gain };
-        let end = march.run::<FOURTH>(&of.record.drive, of.stepping.substeps, start, &mut sums);
-        let ended = end.is_some();
-        let samples = of.record.window.len();
-        let lanes = sums.sum.as_slice().iter().zip(sums.squares.as_slice()).zip(sums.verdicts);
-        lanes
-            .map(|((&sum, &squares), verdict)| match verdict {
-                Some(verdict) => verdict,
-                None if ended => of.conclude(sum, squares, samples),
-                None => Costs::FAILED,
-            })
-            .collect()
-    }
-}
-
-/// Sums of the deviation and of its square, in lanes.
-struct Sums<'a, const K: usize, N> {
-    of: &'a Bundle<'a, K>,
-    sum: N,
-    squares: N,
-    /// Costs of the guesses that are settled before the end.
-    verdicts: Vec<Option<Costs>>,
-}
-
-impl<const K: usize, S: Simd> Sink<Lanes<S, K>, DahlState<Lanes<S, K>>>
-    for Sums<'_, K, Lanes<S, K>>
-{
-    #[inline(always)]
-    fn sample(&mut self, k: usize, state: &FeedbackState<Lanes<S, K>, DahlState<Lanes<S, K>>>) {
-        let Evaluator { record, centre, .. } = self.of.of;
-        if k >= record.window.start {
-            let deviation = state.x.like(record.y[k] - centre) - state.x;
-            self.sum = self.sum + deviation;
-            self.squares = deviation.mul_add(deviation, self.squares);
-        }
+        self.march(simd, Smooth::<_, _, FOURTH> { linear, operator }, start)
     }
 
-    /// Gives up where every guess is already beyond its limit: squares only add up, also about
-    /// the mean that would suit best what has been seen.
-    ///
-    /// A guess's verdict is its own, whatever the other lanes hold, so it does not depend on
-    /// how guesses are bundled.
     #[inline(always)]
-    fn give_up(&mut self, k: usize) -> bool {
-        let Bundle { of, guesses, stop } = self.of;
-        let (seen, samples) =
-            ((k + 1).saturating_sub(of.record.window.start), of.record.window.len());
-        if seen > 0 && seen < samples {
-            let share = libm::sqrt(index(seen) / index(samples));
-            let sums = self.sum.as_slice().iter().zip(self.squares.as_slice());
-            for (((&sum, &squares), guess), verdict) in sums.zip(*guesses).zip(&mut self.verdicts) {
-                let part = of.conclude(sum, squares, seen);
-                let bound = Costs { rms: share * part.rms, ..part };
-                // A hair above, so that rounding cannot abandon a guess that ends at its limit.
-                if verdict.is_none() && bound.rms > guess.limit * (1.0 + 1e-9) {
-                    *verdict = Some(bound);
-                }
-            }
-        }
-        stop() || self.verdicts.iter().all(Option::is_some)
+    fn with_friction<S: Simd>(self, simd: S) -> Vec<Costs> {
+        let parameters = FrictionParameters {
+            mechanics: [0, 1, 2].map(|i| self.lanes(simd, |theta| theta[i])),
+            operator: [4, 5, 8].map(|i| self.lanes(simd, |theta| theta[i])),
+            b1: self.lanes(simd, |theta| theta[6]),
+            b0: self.lanes(simd, |theta| theta[7]),
+        };
+        let coupling = Friction::new(parameters, self.of.step(), self.of.halvings);
+        let zero = self.lanes(simd, |_| 0.0);
+        let start = coupling.start(zero, zero, DahlState { force: zero, slope: zero });
+        self.march(simd, coupling, start)
+    }
+
+    /// Leads the lanes along the drive and concludes.
+    #[inline(always)]
+    fn march<S: Simd, C: Coupling<Lanes<S, K>>>(
+        self,
+        simd: S,
+        coupling: C,
+        start: FeedbackState<Lanes<S, K>, C::Memory>,
+    ) -> Vec<Costs> {
+        let (drive, substeps) = (&self.of.record.drive, self.of.stepping.substeps);
+        let march = March { coupling, gain: self.lanes(simd, |theta| theta[3]) };
+        let mut sums = Sums::new(&self, start.x);
+        let ended = if self.of.problem.has_delay() {
+            let mut late = Delayed::new(sums, index(substeps));
+            let end = march.run(drive, substeps, start, &mut late);
+            sums = late.sums;
+            end.is_some()
+        } else {
+            march.run(drive, substeps, start, &mut sums).is_some()
+        };
+        sums.conclude(ended)
     }
 }

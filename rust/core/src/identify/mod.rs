@@ -2,6 +2,7 @@
 
 pub mod bounds;
 mod cost;
+mod deviation;
 mod identification;
 mod local;
 mod problem;
@@ -13,6 +14,8 @@ mod swarm;
 pub use cost::{Costs, Evaluator, Guess};
 pub use identification::{Identification, identify};
 pub use local::{Local, Polished, Sensitivity};
-pub use problem::{Coordinate, NOMINAL_STIFFNESS, Problem, Record, Scale, Spec, Theta};
+pub use problem::{
+    Coordinate, DELAY, Delay, NOMINAL_STIFFNESS, Problem, Record, Scale, Spec, Theta, stage_of,
+};
 pub use search::{Monitor, Outcome, Plan, Progress, StopReason, search};
 pub use swarm::{Boundary, Swarm, SwarmSettings, Topology};

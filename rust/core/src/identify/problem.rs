@@ -149,10 +149,68 @@ pub struct Spec {
     pub stiffness: Option<f64>,
     /// Whether a constant offset of the displacement is fitted with the rest.
     pub offset: bool,
+    /// Time by which the displacement is late, s.
+    pub delay: Delay,
 }
 
-/// Parameters in the order of [`DAHL_PARAMETERS`].
-pub type Theta = [f64; 9];
+/// Delay between drive and displacement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Delay {
+    /// Known, s; 0 for none.
+    Fixed(f64),
+    /// Fitted, up to twenty samples or a tenth of the drive's period, whichever is less.
+    Fitted,
+    /// Fitted between two bounds, s.
+    Between(f64, f64),
+}
+
+impl Default for Delay {
+    fn default() -> Self {
+        Self::Fixed(0.0)
+    }
+}
+
+impl Delay {
+    /// The coordinate of the search.
+    fn coordinate(self, record: &Record<'_>) -> Result<Coordinate> {
+        let length = record.drive.dt * crate::integrate::index(record.drive.u.len());
+        let (low, high) = match self {
+            Self::Fixed(value) => (value, value),
+            Self::Fitted => {
+                return Coordinate::between("delay", 0.0, bounds::longest_delay(record));
+            }
+            Self::Between(low, high) => (low, high),
+        };
+        if !(low >= 0.0 && high < length) {
+            let found = if low < high || high < low {
+                format!("({}, {}) s", shown(low), shown(high))
+            } else {
+                format!("{} s", shown(low))
+            };
+            let expected = format!("0 s or above, below the record's {length:.6} s");
+            return Err(Error::parameter("delay", found, expected));
+        }
+        match self {
+            Self::Fixed(value) => Ok(Coordinate::Fixed(value)),
+            _ => Coordinate::between("delay", low, high),
+        }
+    }
+}
+
+/// Parameters in the order of [`DAHL_PARAMETERS`], and after them the delay, s.
+pub type Theta = [f64; 10];
+
+/// Index of the delay in [`Theta`].
+pub const DELAY: usize = 9;
+
+/// The stage of a guess.
+///
+/// # Errors
+/// As [`DahlStage::from_theta`].
+pub fn stage_of(theta: &Theta) -> Result<DahlStage> {
+    let [mass, damping, stiffness, piezo, a1, a2, b1, b0, up, _delay] = *theta;
+    DahlStage::from_theta(&[mass, damping, stiffness, piezo, a1, a2, b1, b0, up])
+}
 
 /// Stiffness held where nothing in the input fixes a force, N/m.
 pub const NOMINAL_STIFFNESS: f64 = 1e6;
@@ -160,8 +218,8 @@ pub const NOMINAL_STIFFNESS: f64 = 1e6;
 /// A search made definite.
 #[derive(Clone, Debug)]
 pub struct Problem {
-    /// One for each of [`DAHL_PARAMETERS`].
-    pub coordinates: [Coordinate; 9],
+    /// One for each of [`DAHL_PARAMETERS`], and the delay.
+    pub coordinates: [Coordinate; 10],
     /// Whether the stiffness is nominal because nothing fixes a force.
     pub scale_assumed: bool,
     /// Whether an offset is fitted.
@@ -169,8 +227,8 @@ pub struct Problem {
 }
 
 const STIFFNESS: usize = 2;
-/// The parameters that carry force: mass, damping, stiffness, `piezo_coefficient`, b1.
-const FORCES: [usize; 5] = [0, 1, STIFFNESS, 3, 6];
+/// The parameters that carry force: mass, damping, stiffness, `piezo_coefficient`, b1, b0.
+const FORCES: [usize; 6] = [0, 1, STIFFNESS, 3, 6, 7];
 
 impl Problem {
     /// Settles which parameters are free, and between which bounds.
@@ -199,7 +257,9 @@ impl Problem {
             scale_assumed = true;
         }
         check_fixed(&fixed)?;
-        let mut coordinates = bounds::derive(record, &fixed)?;
+        let mut coordinates = [Coordinate::Fixed(0.0); 10];
+        coordinates[..DELAY].copy_from_slice(&bounds::derive(record, &fixed)?);
+        coordinates[DELAY] = spec.delay.coordinate(record)?;
         for (name, (low, high)) in &spec.bounds {
             let i = parameter("bounds", name)?;
             if !free[i] {
@@ -216,7 +276,7 @@ impl Problem {
             return Err(Error::parameter(
                 "bounds of stiffness",
                 "given, while no parameter that carries force is held",
-                "stiffness= or one of mass, damping, piezo_coefficient, b1 in fixed=",
+                "stiffness= or one of mass, damping, piezo_coefficient, b1, b0 in fixed=",
             ));
         }
         let problem = Self { coordinates, scale_assumed, offset: spec.offset };
@@ -240,6 +300,18 @@ impl Problem {
         })
     }
 
+    /// Whether any guess has dry friction.
+    #[must_use]
+    pub fn has_friction(&self) -> bool {
+        self.coordinates[7] != Coordinate::Fixed(0.0)
+    }
+
+    /// Whether any guess is late.
+    #[must_use]
+    pub fn has_delay(&self) -> bool {
+        self.coordinates[DELAY] != Coordinate::Fixed(0.0)
+    }
+
     /// Refuses bounds that reach where no stage exists.
     fn check_corners(&self) -> Result<()> {
         let count = self.free().count();
@@ -247,7 +319,7 @@ impl Problem {
             return Err(Error::parameter("free", "empty", "at least one parameter to search"));
         }
         for corner in [0.0, 1.0] {
-            DahlStage::from_theta(&self.theta(&vec![corner; count]))?;
+            stage_of(&self.theta(&vec![corner; count]))?;
         }
         Ok(())
     }
@@ -304,12 +376,8 @@ fn free_parameters(spec: &Spec, fixed: &mut [Option<f64>; 9]) -> Result<[bool; 9
         {
             return Err(Error::parameter("free", name, "a parameter that is not fixed as well"));
         }
-        if name == "b0" || name == "up" {
-            let reason = if name == "b0" {
-                "b0 = 0: dry friction is not simulated yet"
-            } else {
-                "up held: only the product b1 up shows in the data"
-            };
+        if name == "up" {
+            let reason = "up held: only the products b1 up and b0 up show in the data";
             return Err(Error::parameter("free", name, reason));
         }
         free[i] = true;

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::problem::{Problem, Record, Theta, range};
+use super::problem::{Problem, Record, Theta, range, stage_of};
 use crate::integrate::{Drive, Stop, steps_for};
 use crate::march::{Order, Stepping};
 use crate::stage::DahlStage;
@@ -28,7 +28,7 @@ pub(super) fn choose(record: &Record<'_>, problem: &Problem, stop: Stop<'_>) -> 
     let thetas = corners(problem);
     let trials: Vec<(DahlStage, Drive<'_>, usize)> = thetas
         .par_iter()
-        .filter_map(|theta| DahlStage::from_theta(theta).ok())
+        .filter_map(|theta| stage_of(theta).ok())
         .flat_map_iter(|stage| excerpts.iter().map(move |drive| (stage, *drive)))
         .filter_map(|(stage, drive)| {
             let (steps, x) = steps_for(&stage, &drive, Order::Fourth, ACCURACY, MOST, stop)?;
@@ -37,6 +37,9 @@ pub(super) fn choose(record: &Record<'_>, problem: &Problem, stop: Stop<'_>) -> 
         })
         .collect();
     let fourth = trials.iter().map(|trial| trial.2).max().unwrap_or(1);
+    if problem.has_friction() {
+        return Stepping { order: Order::Fourth, substeps: fourth };
+    }
     let most = WORTH * fourth;
     let second: Option<Vec<usize>> = trials
         .par_iter()

@@ -10,6 +10,7 @@
 use piezotrack_control::operator::{Dahl, DahlState};
 
 use super::ParameterInfo;
+use super::friction::FrictionParameters;
 use crate::error::{Error, Result, finite, not_negative};
 use crate::mechanics::Mechanics;
 
@@ -26,7 +27,7 @@ pub const DAHL_PARAMETERS: [ParameterInfo; 9] = [
     ParameterInfo { name: "up", symbol: "up", unit: "" },
 ];
 
-/// A stage with second-order Dahl hysteresis, b0 = 0.
+/// A stage with second-order Dahl hysteresis.
 ///
 /// | field | symbol | unit | range |
 /// | --- | --- | --- | --- |
@@ -34,6 +35,7 @@ pub const DAHL_PARAMETERS: [ParameterInfo; 9] = [
 /// | `piezo_coefficient` | T | N/V | not 0 |
 /// | `a1`, `a2` | a1, a2 | 1/m, 1/m^2 | >= 0 |
 /// | `b1` | b1 | N/m^2 | any |
+/// | `b0` | b0 | N/m | any |
 /// | `up` | up | 1 | any |
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DahlStage {
@@ -47,6 +49,8 @@ pub struct DahlStage {
     pub a2: f64,
     /// b1, N/m^2.
     pub b1: f64,
+    /// b0, N/m: other than 0 it adds dry friction at reversals.
+    pub b0: f64,
     /// up, a constant of the operator.
     pub up: f64,
 }
@@ -58,10 +62,10 @@ pub struct StageState {
     pub x: f64,
     /// Velocity, m/s.
     pub v: f64,
-    /// Hysteresis force b1 q1, N.
-    pub hysteresis: f64,
-    /// Its slope along the path, b1 q2, N/m.
-    pub hysteresis_slope: f64,
+    /// First state of the operator, q1; 0 where b1 and b0 are 0.
+    pub q1: f64,
+    /// Second state of the operator, q2 = dq1/dx, 1/m.
+    pub q2: f64,
 }
 
 impl DahlStage {
@@ -76,20 +80,13 @@ impl DahlStage {
         if piezo_coefficient == 0.0 {
             return Err(Error::parameter("piezo_coefficient", "0 N/V", "a value other than 0"));
         }
-        if b0 != 0.0 {
-            return Err(Error::parameter(
-                "b0",
-                format!("{b0} N/m"),
-                "0: a stage with b0 other than 0 sticks at reversals (dry friction), which is \
-                 not simulated yet",
-            ));
-        }
         Ok(Self {
             mechanics,
             piezo_coefficient,
             a1: not_negative("a1", a1, "1/m")?,
             a2: not_negative("a2", a2, "1/m^2")?,
             b1: finite("b1", b1, "N/m^2")?,
+            b0: finite("b0", b0, "N/m")?,
             up: finite("up", up, "")?,
         })
     }
@@ -103,8 +100,15 @@ impl DahlStage {
             a1: 121.9874,
             a2: 1.1773e6,
             b1: 1.8485e6,
+            b0: 0.0,
             up: 30.0,
         }
+    }
+
+    /// Whether the stage sticks: b0 other than 0.
+    #[must_use]
+    pub fn has_friction(&self) -> bool {
+        self.b0 != 0.0
     }
 
     /// The hysteresis operator, scaled to force.
@@ -112,10 +116,28 @@ impl DahlStage {
     pub fn operator<const TERMS: usize>(&self) -> Dahl<f64, TERMS> {
         Dahl { a1: self.a1, a2: self.a2, gain: self.b1 * self.up }
     }
-}
 
-impl From<StageState> for DahlState<f64> {
-    fn from(state: StageState) -> Self {
-        Self { force: state.hysteresis, slope: state.hysteresis_slope }
+    /// Memory of that operator.
+    #[must_use]
+    pub fn memory(&self, state: &StageState) -> DahlState<f64> {
+        DahlState { force: self.b1 * state.q1, slope: self.b1 * state.q2 }
+    }
+
+    /// q1 and q2 from that memory.
+    #[must_use]
+    pub fn states(&self, memory: &DahlState<f64>) -> (f64, f64) {
+        if self.b1 == 0.0 { (0.0, 0.0) } else { (memory.force / self.b1, memory.slope / self.b1) }
+    }
+
+    /// The parameters for steps with friction.
+    #[must_use]
+    pub fn friction(&self) -> FrictionParameters<f64> {
+        let Mechanics { mass, damping, stiffness } = self.mechanics;
+        FrictionParameters {
+            mechanics: [mass, damping, stiffness],
+            operator: [self.a1, self.a2, self.up],
+            b1: self.b1,
+            b0: self.b0,
+        }
     }
 }

@@ -9,6 +9,8 @@
 use piezotrack_control::Number;
 use piezotrack_control::operator::Operator;
 
+use super::Coupling;
+use crate::integrate::between;
 use crate::mechanics::Propagator;
 
 /// Displacement, scaled velocity `h x'` and the operator's memory.
@@ -22,10 +24,37 @@ pub struct FeedbackState<N, M> {
     pub memory: M,
 }
 
+/// An operator without dry friction in feedback, coupled to second or fourth order.
+#[derive(Clone, Copy, Debug)]
+pub struct Smooth<N, O, const FOURTH: bool> {
+    /// The linear part over one step.
+    pub linear: Propagator<N>,
+    /// The hysteresis.
+    pub operator: O,
+}
+
+impl<N: Number, O: Operator<N>, const FOURTH: bool> Coupling<N> for Smooth<N, O, FOURTH> {
+    type Memory = O::State;
+
+    #[inline(always)]
+    fn step(
+        &self,
+        state: &FeedbackState<N, O::State>,
+        drive: N,
+        rise: N,
+    ) -> FeedbackState<N, O::State> {
+        if FOURTH {
+            fourth_order(&self.linear, &self.operator, state, drive, rise)
+        } else {
+            second_order(&self.linear, &self.operator, state, drive, rise)
+        }
+    }
+}
+
 /// Where the force extrapolated along its slope leads.
-struct Prediction<N> {
-    x: N,
-    w: N,
+pub(super) struct Prediction<N> {
+    pub x: N,
+    pub w: N,
     /// Force at the start, and its change over the step at the slope that it starts with.
     force: N,
     change: N,
@@ -33,7 +62,7 @@ struct Prediction<N> {
 
 /// The step whose force goes on along the slope that it starts with.
 #[inline(always)]
-fn predict<N: Number, O: Operator<N>>(
+pub(super) fn predict<N: Number, O: Operator<N>>(
     linear: &Propagator<N>,
     operator: &O,
     state: &FeedbackState<N, O::State>,
@@ -52,9 +81,27 @@ fn predict<N: Number, O: Operator<N>>(
     Prediction { x, w, force, change }
 }
 
+/// Displacement and scaled velocity with the cubic through the forces at both ends, the force
+/// at the end read off the branch where the prediction leads.
+#[inline(always)]
+pub(super) fn correct<N: Number, O: Operator<N>>(
+    linear: &Propagator<N>,
+    operator: &O,
+    branch: &O::Branch,
+    ahead: &Prediction<N>,
+    from: N,
+) -> (N, N) {
+    let (force, slope) = operator.output(&operator.along(branch, ahead.x - from));
+    let excess = ahead.force + ahead.change - force;
+    let bend = ahead.change - slope * ahead.w;
+    let x = linear.excess.x.mul_add(excess, linear.bend.x.mul_add(bend, ahead.x));
+    let w = linear.excess.w.mul_add(excess, linear.bend.w.mul_add(bend, ahead.w));
+    (x, w)
+}
+
 /// One step of second order under a drive force that goes from `drive` to `drive + rise`.
 #[inline(always)]
-pub fn second_order<N: Number, O: Operator<N>>(
+fn second_order<N: Number, O: Operator<N>>(
     linear: &Propagator<N>,
     operator: &O,
     state: &FeedbackState<N, O::State>,
@@ -68,7 +115,7 @@ pub fn second_order<N: Number, O: Operator<N>>(
 
 /// One step of fourth order under a drive force that goes from `drive` to `drive + rise`.
 #[inline(always)]
-pub fn fourth_order<N: Number, O: Operator<N>>(
+fn fourth_order<N: Number, O: Operator<N>>(
     linear: &Propagator<N>,
     operator: &O,
     state: &FeedbackState<N, O::State>,
@@ -79,12 +126,7 @@ pub fn fourth_order<N: Number, O: Operator<N>>(
     // At rest the predicted velocity tells the direction; else it is too small to matter.
     let heading = ahead.w.mul_add(ahead.w.like(1e-12), state.w);
     let branch = operator.branch(&state.memory, sign(heading));
-    let (force, slope) = operator.output(&operator.along(&branch, ahead.x - state.x));
-    let excess = ahead.force + ahead.change - force;
-    let bend = ahead.change - slope * ahead.w;
-    let x = linear.excess.x.mul_add(excess, linear.bend.x.mul_add(bend, ahead.x));
-    let w = linear.excess.w.mul_add(excess, linear.bend.w.mul_add(bend, ahead.w));
-
+    let (x, w) = correct(linear, operator, &branch, &ahead, state.x);
     let turned = state.w * w;
     let memory = if turned.any_negative() {
         // Lanes that did not turn go to the end on the first leg; their second has length 0.
@@ -99,7 +141,7 @@ pub fn fourth_order<N: Number, O: Operator<N>>(
 
 /// +1 or -1; +1 for 0.
 #[inline(always)]
-fn sign<N: Number>(value: N) -> N {
+pub(super) fn sign<N: Number>(value: N) -> N {
     value.where_negative(value.like(-1.0), value.like(1.0))
 }
 
@@ -109,10 +151,5 @@ fn sign<N: Number>(value: N) -> N {
 /// so its error is of fourth order.
 #[inline(always)]
 fn turning_point<N: Number, M>(from: &FeedbackState<N, M>, x: N, w: N) -> N {
-    let s = from.w / (from.w - w);
-    let rise = x - from.x;
-    // Hermite form about the start: w0 s + (3 r - 2 w0 - w1) s^2 + (w0 + w1 - 2 r) s^3
-    let c3 = rise.mul_add(rise.like(-2.0), from.w + w);
-    let c2 = rise - from.w - c3;
-    s.mul_add(s.mul_add(s.mul_add(c3, c2), from.w), from.x)
+    between(from.x, from.w, x, w, from.w / (from.w - w))
 }

@@ -2,8 +2,23 @@
 
 mod dahl;
 pub mod feedback;
+pub mod friction;
 
 pub use dahl::{DAHL_PARAMETERS, DahlStage, StageState};
+
+/// A hysteresis coupled with linear mechanics, as one step in time sees it.
+pub trait Coupling<N> {
+    /// What the hysteresis remembers.
+    type Memory: Copy;
+
+    /// The state one step on, under a drive force that goes from `drive` to `drive + rise`, N.
+    fn step(
+        &self,
+        state: &feedback::FeedbackState<N, Self::Memory>,
+        drive: N,
+        rise: N,
+    ) -> feedback::FeedbackState<N, Self::Memory>;
+}
 
 /// Name, symbol and unit of one parameter of a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
