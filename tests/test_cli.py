@@ -395,7 +395,7 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "identify log.csv --fix weight=1": ("'weight'", "one of mass, damping"),
     "identify log.csv --fix b0=nan": ("b0 is NaN", "finite"),
     "identify log.csv --delay -1": ("delay is -1 s", "0 s or above"),
-    "identify log.csv --delay 5:1": ("delay is (5, 1) s", "0 s or above"),
+    "identify log.csv --delay 5:1": ("bounds of delay", "the lower one first"),
     "identify log.csv --delay late": ("--delay has 'late'", "number"),
     "identify log.csv --free weight": ("free is 'weight'", "one of mass, damping"),
     "identify log.csv --free b0": ("free is b0", "mass as well"),

@@ -18,10 +18,16 @@ impl<S: Simd, const K: usize> Lanes<S, K> {
     /// Lanes in one bundle.
     pub const COUNT: usize = K * S::F64_LANES;
 
+    /// `value` in every lane.
+    #[inline(always)]
+    pub fn splat(simd: S, value: f64) -> Self {
+        Self { simd, vectors: [simd.splat_f64s(value); K] }
+    }
+
     /// The value that `values` gives for each lane.
     #[inline(always)]
     pub fn gather(simd: S, values: impl Fn(usize) -> f64) -> Self {
-        let mut out = Self { simd, vectors: [simd.splat_f64s(0.0); K] };
+        let mut out = Self::splat(simd, 0.0);
         for (lane, slot) in out.as_mut_slice().iter_mut().enumerate() {
             *slot = values(lane);
         }

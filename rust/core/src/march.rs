@@ -1,5 +1,7 @@
 //! The way of a stage along its drive, for one stage or for lanes of them.
 
+use std::ops::Range;
+
 use piezotrack_control::Number;
 
 use crate::integrate::{Drive, index};
@@ -63,30 +65,61 @@ impl<N: Number, C: Coupling<N>> March<N, C> {
     ) -> Option<FeedbackState<N, C::Memory>> {
         let mut state = start;
         sink.sample(0, &state);
-        let part = 1.0 / index(substeps);
         let block = (BLOCK / substeps).max(1);
         let mut from = 1;
         while from < drive.u.len() {
             let to = (from + block).min(drive.u.len());
-            for k in from..to {
-                let (u, change) = drive.interval(k - 1);
-                if substeps == 1 {
-                    // Written apart: most searches spend their time here.
-                    state = self.step(&state, u, change);
-                } else {
-                    let change = change * part;
-                    for j in 0..substeps {
-                        state = self.step(&state, index(j).mul_add(change, u), change);
-                    }
-                }
-                sink.sample(k, &state);
-            }
+            let reached = if substeps == 1 {
+                self.whole(drive, from..to, state, sink)
+            } else {
+                self.parts(drive, substeps, from..to, state, sink)
+            };
+            state = reached;
             if sink.give_up(to - 1) {
                 return None;
             }
             from = to;
         }
         Some(state)
+    }
+
+    /// One step from sample to sample. Written apart: most searches spend their time here.
+    #[inline(always)]
+    fn whole(
+        &self,
+        drive: &Drive<'_>,
+        samples: Range<usize>,
+        mut state: FeedbackState<N, C::Memory>,
+        sink: &mut impl Sink<N, C::Memory>,
+    ) -> FeedbackState<N, C::Memory> {
+        for k in samples {
+            let (u, change) = drive.interval(k - 1);
+            state = self.step(&state, u, change);
+            sink.sample(k, &state);
+        }
+        state
+    }
+
+    /// Several steps from sample to sample.
+    #[inline(always)]
+    fn parts(
+        &self,
+        drive: &Drive<'_>,
+        substeps: usize,
+        samples: Range<usize>,
+        mut state: FeedbackState<N, C::Memory>,
+        sink: &mut impl Sink<N, C::Memory>,
+    ) -> FeedbackState<N, C::Memory> {
+        let part = 1.0 / index(substeps);
+        for k in samples {
+            let (u, change) = drive.interval(k - 1);
+            let change = change * part;
+            for j in 0..substeps {
+                state = self.step(&state, index(j).mul_add(change, u), change);
+            }
+            sink.sample(k, &state);
+        }
+        state
     }
 
     /// One sub-step under a drive that goes from `u` to `u + change`, V.

@@ -190,7 +190,7 @@ impl<const K: usize> Bundle<'_, K> {
             a2: self.lanes(simd, |theta| theta[5]),
             gain: self.lanes(simd, |theta| theta[6] * theta[8]),
         };
-        let zero = self.lanes(simd, |_| 0.0);
+        let zero = Lanes::splat(simd, 0.0);
         let start = FeedbackState { x: zero, w: zero, memory: operator.rest() };
         self.march(simd, Smooth::<_, _, FOURTH> { linear, operator }, start)
     }
@@ -204,7 +204,7 @@ impl<const K: usize> Bundle<'_, K> {
             b0: self.lanes(simd, |theta| theta[7]),
         };
         let coupling = Friction::new(parameters, self.of.step(), self.of.halvings);
-        let zero = self.lanes(simd, |_| 0.0);
+        let zero = Lanes::splat(simd, 0.0);
         let start = coupling.start(zero, zero, DahlState { force: zero, slope: zero });
         self.march(simd, coupling, start)
     }
