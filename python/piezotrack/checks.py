@@ -3,11 +3,30 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from . import _core
 from .errors import ParameterError
 
-__all__ = ["finite", "in_range", "not_negative", "plain", "positive"]
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "bounds",
+    "check_reach",
+    "finite",
+    "in_range",
+    "not_negative",
+    "numbers",
+    "plain",
+    "positive",
+]
+
+# A displacement [m] that only a mistaken unit explains.
+TOO_FAR = 1.0
 
 
 def finite(name: str, value: object, unit: str) -> float:
@@ -92,3 +111,51 @@ def plain(number: float) -> str:
     ('110', '0')
     """
     return f"{round(number, 9) + 0.0:.6g}"
+
+
+def bounds(low: object, high: object) -> tuple[float, float]:
+    """Return the lowest and the highest displacement [m] of a motion that moves, checked.
+
+    Examples
+    --------
+    >>> bounds(0, 110e-6)
+    (0.0, 0.00011)
+    """
+    bottom, top = finite("low", low, "m"), finite("high", high, "m")
+    check_reach(bottom, top)
+    if not bottom < top:
+        raise ParameterError(f"low is {bottom:g}: expected less than high, which is {top:g} m")
+    return bottom, top
+
+
+def check_reach(low: float, high: float) -> None:
+    """Raise ParameterError if a displacement [m] is so large that it must be in another unit."""
+    for name, value in (("low", low), ("high", high)):
+        if abs(value) >= TOO_FAR:
+            raise ParameterError(
+                f"{name} is {value:g}: expected metres, and no piezo stage goes so far; "
+                f"{plain(value)} um is {plain(value)}e-6"
+            )
+
+
+def numbers(
+    name: str, values: ArrayLike, unit: str, *, least: int = 1, above: float = -math.inf
+) -> NDArray[np.float64]:
+    """Return one or several finite numbers above `above` as an array of one dimension.
+
+    Examples
+    --------
+    >>> numbers("levels", [0, 1e-5], "m")
+    array([0.e+00, 1.e-05])
+    """
+    entries = values if isinstance(values, (Sequence, np.ndarray)) else [values]
+    array = np.array([_core.as_number(name, value) for value in entries])
+    if array.size < least:
+        raise ParameterError(f"{name} has {array.size} entries: expected at least {least}")
+    for number in array:
+        if not (math.isfinite(number) and number > above):
+            limit = "" if above == -math.inf else f" above {above:g}"
+            raise ParameterError(
+                f"{name} has {number:g}: expected finite numbers{limit}, in {unit}"
+            )
+    return array

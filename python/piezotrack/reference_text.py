@@ -177,8 +177,9 @@ def parse_reference(text: str, *, duration: float | None = None) -> Reference:
             values.setdefault("duration", duration)
         elif kind.make in (sine, triangle) and values.get("frequency", 0.0) > 0.0:
             values.setdefault("duration", PERIODS / values["frequency"])
-        for missing in (argument for argument in kind.needed if argument not in values):
-            raise ParameterError(f"there is no {MISSING.get(missing, missing)}: {kind.expected}")
+        if missing := [argument for argument in kind.needed if argument not in values]:
+            what = MISSING.get(missing[0], missing[0])
+            raise ParameterError(f"there is no {what}: {kind.expected}")
         return kind.make(**values)
     except ParameterError as error:
         raise ParameterError(f"reference {text!r}: {error}") from None

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from . import _core
-from .checks import finite, in_range, not_negative, plain, positive
+from .checks import bounds, check_reach, finite, in_range, not_negative, numbers, positive
 from .errors import ParameterError, ShapeError
 from .motions import (
     Chirp,
@@ -34,8 +33,6 @@ __all__ = ["chirp", "multisine", "sine", "staircase", "triangle"]
 START = 1.0 / 6.0
 # The longest rise, as a share of the time at a level.
 RISE = 0.2
-# A displacement [m] that only a mistaken unit explains.
-TOO_FAR = 1.0
 
 
 def sine(
@@ -85,7 +82,7 @@ def sine(
     Reference(sine 0.2 Hz, 0 to 110 um, 20 s)
     """
     frequency = positive("frequency", frequency, "Hz")
-    low, high = _range(low, high)
+    low, high = bounds(low, high)
     duration = positive("duration", duration, "s")
     turn = finite("phase", phase, "rad")
     return Reference(
@@ -146,7 +143,7 @@ def triangle(
     Reference(triangle 1 Hz, 0 to 50 um, 4 s)
     """
     frequency = positive("frequency", frequency, "Hz")
-    low, high = _range(low, high)
+    low, high = bounds(low, high)
     duration = positive("duration", duration, "s")
     share = in_range("rounding", rounding, 1.0, "parts of a period")
     return Reference(
@@ -223,7 +220,7 @@ def staircase(
         count = _core.as_count("steps", steps)
         if not 1 <= count <= 10**6:
             raise ParameterError(f"steps is {count}: expected a whole number from 1 to 1000000")
-        low, high = _range(low, high)
+        low, high = bounds(low, high)
         up = np.linspace(low, high, count + 1)
         places = np.concatenate([up, up[-2:0:-1]])
         name = f"staircase of {count} step{'s' if count > 1 else ''} up and down"
@@ -231,9 +228,9 @@ def staircase(
     else:
         if low is not None or high is not None:
             raise ParameterError("low and high come with steps: expected levels without them")
-        places = _numbers("levels", levels, "m", least=2)
+        places = numbers("levels", levels, "m", least=2)
         low, high = float(places.min()), float(places.max())
-        _check_reach(low, high)
+        check_reach(low, high)
         name = f"staircase of {places.size} levels"
         period, record = None, places.size * (dwell + rise) - rise
     return Reference(
@@ -293,7 +290,7 @@ def chirp(
     """
     first = positive("start_frequency", start_frequency, "Hz")
     last = positive("stop_frequency", stop_frequency, "Hz")
-    low, high = _range(low, high)
+    low, high = bounds(low, high)
     duration = positive("duration", duration, "s")
     return Reference(
         name=f"chirp {first:g} to {last:g} Hz",
@@ -363,7 +360,7 @@ def multisine(
     >>> lines, lines.period
     (Reference(multisine 0.5, 1, 1.5 Hz, 0 to 50 um, 8 s), 2.0)
     """
-    lines = _numbers("frequencies", frequencies, "Hz", above=0.0)
+    lines = numbers("frequencies", frequencies, "Hz", above=0.0)
     order = np.argsort(lines)
     lines = lines[order]
     if (np.diff(lines) == 0.0).any():
@@ -379,7 +376,7 @@ def multisine(
         )
     sizes = np.ones(lines.size)
     if amplitudes is not None:
-        given = _numbers("amplitudes", amplitudes, "m, or ratios", above=0.0)
+        given = numbers("amplitudes", amplitudes, "m, or ratios", above=0.0)
         if given.size not in (1, lines.size):
             raise ShapeError(
                 f"amplitudes has {given.size} entries: expected one, or {lines.size} like "
@@ -394,13 +391,13 @@ def multisine(
     motion = Cosines(0.0, *(tuple(values.tolist()) for values in (sizes, lines, phases)))
     bottom, top = extremes(motion, min(duration, period), 1.0 / lines[-1])
     if is_fitted:
-        low, high = _range(low, high)
+        low, high = bounds(low, high)
         scale = (high - low) / (top - bottom)
         offset = low - scale * bottom
     else:
         scale, offset = 1.0, finite("offset", offset, "m")
         low, high = offset + bottom, offset + top
-        _check_reach(low, high)
+        check_reach(low, high)
     names = ", ".join(f"{line:g}" for line in lines[:3])
     return Reference(
         name=f"multisine {names} Hz" if lines.size <= 3 else f"multisine of {lines.size} lines",
@@ -418,38 +415,3 @@ def _ramp(ramp: float | None, first_period: float, duration: float) -> float:
     if ramp is None:
         return min(START * first_period, duration)
     return in_range("ramp", ramp, duration, "s, within the reference")
-
-
-def _range(low: object, high: object) -> tuple[float, float]:
-    """Check the bounds of a motion that moves."""
-    bottom, top = finite("low", low, "m"), finite("high", high, "m")
-    _check_reach(bottom, top)
-    if not bottom < top:
-        raise ParameterError(f"low is {bottom:g}: expected less than high, which is {top:g} m")
-    return bottom, top
-
-
-def _check_reach(low: float, high: float) -> None:
-    for name, value in (("low", low), ("high", high)):
-        if abs(value) >= TOO_FAR:
-            raise ParameterError(
-                f"{name} is {value:g}: expected metres, and no piezo stage goes so far; "
-                f"{plain(value)} um is {plain(value)}e-6"
-            )
-
-
-def _numbers(
-    name: str, values: ArrayLike, unit: str, *, least: int = 1, above: float = -math.inf
-) -> Array:
-    """Return one or several finite numbers above `above` as an array of one dimension."""
-    entries = values if isinstance(values, (Sequence, np.ndarray)) else [values]
-    array = np.array([_core.as_number(name, value) for value in entries])
-    if array.size < least:
-        raise ParameterError(f"{name} has {array.size} entries: expected at least {least}")
-    for number in array:
-        if not (math.isfinite(number) and number > above):
-            limit = "" if above == -math.inf else f" above {above:g}"
-            raise ParameterError(
-                f"{name} has {number:g}: expected finite numbers{limit}, in {unit}"
-            )
-    return array
