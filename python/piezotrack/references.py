@@ -277,7 +277,7 @@ class Reference:
 
         Notes
         -----
-        A spline goes through every sample. Noise of e in x comes out as some 10 e / dt^2 in the
+        A spline goes through every sample. White noise of e rms in x is some 5 e / dt^2 rms in the
         acceleration, so a measured displacement needs smoothing first.
 
         Examples
