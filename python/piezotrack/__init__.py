@@ -21,7 +21,10 @@ from .identification import Identification, identify
 from .io import read, read_drive
 from .modelfile import IdentifiedModel, Score, load
 from .models import DahlStage, Response, StageState
+from .reference_text import parse_reference
+from .references import Reference, SampledReference, read_reference
 from .swarm import ParticleSwarm
+from .waveforms import chirp, multisine, sine, staircase, triangle
 
 __all__ = [
     "DahlStage",
@@ -36,14 +39,23 @@ __all__ = [
     "ParticleSwarm",
     "PiezotrackError",
     "Progress",
+    "Reference",
     "Response",
     "Run",
+    "SampledReference",
     "Score",
     "ShapeError",
     "StageState",
     "__version__",
+    "chirp",
     "identify",
     "load",
+    "multisine",
+    "parse_reference",
     "read",
     "read_drive",
+    "read_reference",
+    "sine",
+    "staircase",
+    "triangle",
 ]

@@ -26,6 +26,8 @@ NAMES = {
     "drive": ("voltage", "drive", "u", "v", "command", "input", "control", "drive voltage"),
     "displacement": ("displacement", "position", "pos", "x", "y", "output", "sensor", "measured"),
 }
+# What a displacement is called that is to be followed.
+TO_FOLLOW = ("reference", "desired", "target", "setpoint")
 BY_NUMBER = (
     "there is no header line: name the columns by number and give their units, as in "
     "time=0, drive=1, displacement=2, units={0: 's', 1: 'V', 2: 'um'}"
@@ -95,6 +97,11 @@ class Columns(list[Column]):
             if role != "time" or needs_time:
                 _check_unit(roles[role], role)
         return roles
+
+    def to_follow(self) -> int | None:
+        """Return the number of the one column that is called a reference, or None."""
+        found = [column.index for column in self if column.name.lower() in TO_FOLLOW]
+        return found[0] if len(found) == 1 else None
 
     def _set_unit(self, column: Column, unit: str) -> Column:
         self[column.index] = replace(column, unit=unit, unit_from_caller=True)

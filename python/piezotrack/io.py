@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["read", "read_drive"]
+__all__ = ["read", "read_displacement", "read_drive"]
 
 NOT_TEXT = {".mat", ".h5", ".hdf5", ".tdms", ".npy", ".npz", ".xls", ".xlsx", ".parquet"}
 
@@ -142,6 +142,48 @@ def read_drive(
     log = _TextLog(path)
     record = log.dataset(log.roles({"time": time, "drive": drive}, units, dt), dt, "foh")
     return record.t, record.u
+
+
+def read_displacement(
+    path: str | os.PathLike[str],
+    *,
+    time: str | int | None = None,
+    displacement: str | int | None = None,
+    units: Mapping[str | int, str] | None = None,
+    dt: float | None = None,
+) -> Dataset:
+    r"""Read a displacement, to be followed, from a text file that need not have a drive.
+
+    Parameters
+    ----------
+    path, time, units, dt
+        As in `read`.
+    displacement : str or int, optional
+        As in `read`; a column called reference, desired, target or setpoint goes first.
+
+    Returns
+    -------
+    Dataset
+        A record whose drive is 0 V.
+
+    Raises
+    ------
+    DataError, ParameterError
+        As in `read`.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> path = pathlib.Path(folder.name, "target.csv")
+    >>> _ = path.write_text("t_s,x_um,target_um\n0,0,2\n1,1,3\n2,2,4\n")
+    >>> read_displacement(path).y
+    array([2.e-06, 3.e-06, 4.e-06])
+    >>> folder.cleanup()
+    """
+    log = _TextLog(path)
+    column = log.columns.to_follow() if displacement is None else displacement
+    return log.dataset(log.roles({"time": time, "displacement": column}, units, dt), dt, "foh")
 
 
 class _TextLog:
@@ -261,12 +303,12 @@ class _TextLog:
             line = next(islice(self._rows(), fault[0], None))[0]
             raise self.error(f"{roles['time']}: {fault[1]}", line)
         columns, units = self._further(table, {column.index for column in roles.values()})
-        u = signals["drive"]
+        # A drive alone is a record whose displacement nobody looks at, and the other way round.
+        nothing = np.zeros(len(table))
         with self.named():
             return Dataset(
-                u=u,
-                # A drive alone is a record whose displacement nobody looks at.
-                y=signals.get("displacement", np.zeros_like(u)),
+                u=signals.get("drive", nothing),
+                y=signals.get("displacement", nothing),
                 t=signals.get("time"),
                 dt=dt,
                 hold=hold,

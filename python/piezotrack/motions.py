@@ -1,0 +1,319 @@
+"""The mathematics of references: motions as functions of time, with their derivatives.
+
+A motion takes times [s], an array of any shape, and returns the displacement [m], the velocity
+[m/s] and the acceleration [m/s^2] at each.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+Array: TypeAlias = "NDArray[np.float64]"
+Motion: TypeAlias = "Callable[[Array], tuple[Array, Array, Array]]"
+
+__all__ = [
+    "Chirp",
+    "Cosines",
+    "Motion",
+    "Spline",
+    "Steps",
+    "Triangle",
+    "blended",
+    "common_period",
+    "extremes",
+    "schroeder_phases",
+]
+
+# Points in the shortest period that locate an extreme, and Newton's steps that sharpen it.
+POINTS, NEWTON = 64, 5
+
+
+def s_curve(u: Array) -> tuple[Array, Array, Array]:
+    """Go from 0 to 1 in unit time, from rest to rest, and return value, slope and curvature.
+
+    The quintic ``10 u^3 - 15 u^4 + 6 u^5``, whose first two derivatives vanish at both ends; it
+    stays where it is before and after.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> s_curve(np.array([0.0, 0.5, 1.0]))[0]
+    array([0. , 0.5, 1. ])
+    """
+    u = np.clip(u, 0.0, 1.0)
+    rest = 1.0 - u
+    return (
+        u**3 * (10.0 + u * (6.0 * u - 15.0)),
+        30.0 * (u * rest) ** 2,
+        60.0 * u * rest * (1.0 - 2.0 * u),
+    )
+
+
+def blended(motion: Motion, t: Array, ramp: float) -> tuple[Array, Array, Array]:
+    """Evaluate a motion that leaves its place at time 0 from rest and is itself from `ramp` on.
+
+    Parameters
+    ----------
+    motion : callable
+        The motion.
+    t : ndarray
+        Times [s], 0 or above.
+    ramp : float
+        Length of the start [s]; 0 for none.
+
+    Returns
+    -------
+    x, v, a : ndarray
+        ``x(0) + s(t / ramp) (x(t) - x(0))`` with the quintic ``s`` of `s_curve`, and its
+        derivatives.
+    """
+    x, v, a = motion(t)
+    if ramp <= 0.0:
+        return x, v, a
+    s, slope, curvature = s_curve(t / ramp)
+    start = motion(np.zeros(1))[0][0]
+    way = x - start
+    at_start = t < ramp
+    return (
+        np.where(at_start, start + s * way, x),
+        np.where(at_start, slope * way / ramp + s * v, v),
+        np.where(at_start, curvature * way / ramp**2 + 2.0 * slope * v / ramp + s * a, a),
+    )
+
+
+@dataclass(frozen=True)
+class Cosines:
+    """``offset + sum of amplitudes cos(2 pi frequencies t + phases)``: a sine, or several."""
+
+    offset: float
+    amplitudes: tuple[float, ...]
+    frequencies: tuple[float, ...]
+    phases: tuple[float, ...]
+
+    def __call__(self, t: Array) -> tuple[Array, Array, Array]:
+        """Return displacement, velocity and acceleration at the times `t`."""
+        x, v, a = np.full(t.shape, self.offset), np.zeros(t.shape), np.zeros(t.shape)
+        for size, frequency, phase in zip(
+            self.amplitudes, self.frequencies, self.phases, strict=True
+        ):
+            rate = math.tau * frequency
+            cosine = size * np.cos(rate * t + phase)
+            x += cosine
+            v -= rate * size * np.sin(rate * t + phase)
+            a -= rate**2 * cosine
+        return x, v, a
+
+
+@dataclass(frozen=True)
+class Chirp:
+    """``mid - amplitude cos(phase)``, the frequency going evenly from `start` to `stop`."""
+
+    mid: float
+    amplitude: float
+    start: float
+    stop: float
+    duration: float
+
+    def __call__(self, t: Array) -> tuple[Array, Array, Array]:
+        """Return displacement, velocity and acceleration at the times `t`."""
+        sweep = math.tau * (self.stop - self.start) / self.duration
+        rate = math.tau * self.start + sweep * t
+        phase = (math.tau * self.start + 0.5 * sweep * t) * t
+        cosine, sine = self.amplitude * np.cos(phase), self.amplitude * np.sin(phase)
+        return self.mid - cosine, rate * sine, rate**2 * cosine + sweep * sine
+
+
+@dataclass(frozen=True)
+class Triangle:
+    """From `low` to `high` and back at one speed, but for rounded corners.
+
+    In a corner the velocity follows ``1.5 u - 0.5 u^3`` from one speed to the other, u from -1 to
+    1, so that the acceleration has no jump.
+    """
+
+    low: float
+    high: float
+    period: float
+    rounding: float
+
+    def __call__(self, t: Array) -> tuple[Array, Array, Array]:
+        """Return displacement, velocity and acceleration at the times `t`."""
+        half = 0.5 * self.period
+        # Half the time that a corner takes, and the speed that still reaches both ends.
+        corner = 0.25 * self.rounding * self.period
+        speed = (self.high - self.low) / (half - 0.75 * corner)
+        number = np.round(t / half)
+        s = t - number * half
+        if corner > 0.0:
+            u = np.clip(s / corner, -1.0, 1.0)
+            beyond = np.maximum(np.abs(s) - corner, 0.0)
+            way = speed * (corner * (0.75 - 0.125 * u**2) * u**2 + beyond)
+            v = speed * (1.5 - 0.5 * u**2) * u
+            a = 1.5 * speed / corner * (1.0 - u**2)
+        else:
+            way, v, a = speed * np.abs(s), np.where(s < 0.0, -speed, speed), np.zeros(t.shape)
+        is_low = np.mod(number, 2.0) == 0.0
+        return (
+            np.where(is_low, self.low + way, self.high - way),
+            np.where(is_low, v, -v),
+            np.where(is_low, a, -a),
+        )
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Levels one after the other, each held for `dwell` and left along an S-curve.
+
+    After the last level comes the first again where `cyclic`, and else it is held for ever.
+    """
+
+    levels: tuple[float, ...]
+    dwell: float
+    rise: float
+    cyclic: bool
+
+    def __call__(self, t: Array) -> tuple[Array, Array, Array]:
+        """Return displacement, velocity and acceleration at the times `t`."""
+        levels = np.asarray(self.levels)
+        following = np.roll(levels, -1)
+        step = self.dwell + self.rise
+        if self.cyclic:
+            t = np.mod(t, levels.size * step)
+        else:
+            following[-1] = levels[-1]
+        number = np.clip(np.floor(t / step), 0, levels.size - 1).astype(np.intp)
+        s, slope, curvature = s_curve((t - number * step - self.dwell) / self.rise)
+        way = (following - levels)[number]
+        x = levels[number] + way * s
+        return x, way * slope / self.rise, way * curvature / self.rise**2
+
+
+@dataclass(frozen=True, eq=False)
+class Spline:
+    """The quintic spline through samples `x`, at interval `dt`.
+
+    It repeats where `cyclic`; else it goes on after the last sample at that sample's
+    acceleration, for the one interval that belongs to it.
+    """
+
+    x: Array
+    dt: float
+    cyclic: bool
+
+    @cached_property
+    def _splines(self) -> tuple[Any, Any, Any]:
+        from scipy.interpolate import make_interp_spline
+
+        # The samples' own numbers as knots keep the system well scaled at any interval.
+        values = np.append(self.x, self.x[0]) if self.cyclic else self.x
+        kind = "periodic" if self.cyclic else None
+        # Taken from the first sample, a flat record stays flat.
+        spline = make_interp_spline(np.arange(values.size), values - values[0], 5, bc_type=kind)
+        return spline, spline.derivative(1), spline.derivative(2)
+
+    def __call__(self, t: Array) -> tuple[Array, Array, Array]:
+        """Return displacement, velocity and acceleration at the times `t`."""
+        place = t / self.dt
+        u = np.mod(place, self.x.size) if self.cyclic else np.minimum(place, self.x.size - 1)
+        x, v, a = (spline(u) for spline in self._splines)
+        beyond = 0.0 if self.cyclic else place - u
+        return (
+            self.x[0] + x + (v + 0.5 * a * beyond) * beyond,
+            (v + a * beyond) / self.dt,
+            a / self.dt**2,
+        )
+
+
+def extremes(motion: Motion, duration: float, shortest: float) -> tuple[float, float]:
+    """Find the lowest and the highest displacement of a motion [m].
+
+    Parameters
+    ----------
+    motion : callable
+        A smooth motion.
+    duration : float
+        How long to look at it [s].
+    shortest : float
+        The shortest period in it [s].
+
+    Returns
+    -------
+    low, high : float
+        Located on a grid and sharpened by Newton's method [m].
+
+    Examples
+    --------
+    >>> extremes(Cosines(1.0, (2.0,), (0.2,), (0.3,)), 5.0, 5.0)
+    (-1.0, 3.0)
+    """
+    step = shortest / POINTS
+    grid = np.linspace(0.0, duration, math.ceil(duration / step) + 1)
+    x = motion(grid)[0]
+    found = [float(x.min()), float(x.max())]
+    for k, sign in enumerate((-1.0, 1.0)):
+        inner = sign * x[1:-1]
+        t = grid[1:-1][(inner >= sign * x[:-2]) & (inner >= sign * x[2:])]
+        for _ in range(NEWTON if t.size else 0):
+            _, v, a = motion(t)
+            move = np.divide(-v, a, out=np.zeros(t.shape), where=sign * a < 0.0)
+            t = np.clip(t + np.clip(move, -step, step), 0.0, duration)
+        if t.size:
+            found[k] = sign * max(sign * found[k], float((sign * motion(t)[0]).max()))
+    return found[0], found[1]
+
+
+def schroeder_phases(amplitudes: Array) -> Array:
+    """Return phases [rad] that keep a sum of cosines at neighbouring harmonics low.
+
+    Schroeder 1970, doi 10.1109/TIT.1970.1054411, equation (11): with the relative powers p_l the
+    phase of the n-th is ``-2 pi`` times the sum of ``(n - l) p_l`` over l < n.
+
+    Parameters
+    ----------
+    amplitudes : ndarray, shape (n,)
+        Amplitudes in the order of the frequencies.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Phases, from 0 up to 2 pi [rad].
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> schroeder_phases(np.ones(2)).round(3)
+    array([0.   , 3.142])
+    """
+    powers = np.cumsum(amplitudes**2) / np.sum(amplitudes**2)
+    phases: Array = np.mod(-math.tau * np.append(0.0, np.cumsum(powers)[:-1]), math.tau)
+    return phases
+
+
+def common_period(frequencies: tuple[float, ...]) -> float:
+    """Return the time after which all frequencies [Hz] have made whole turns [s], or infinity.
+
+    Examples
+    --------
+    >>> common_period((0.2, 0.5)), common_period((1.0, 2.0**0.5))
+    (10.0, inf)
+    """
+    exact = [Fraction(frequency).limit_denominator(10**6) for frequency in frequencies]
+    # A frequency is a decimal or a ratio of small numbers to the last digit, or it is neither.
+    if any(
+        abs(float(ratio) - frequency) > 1e-14 * frequency
+        for ratio, frequency in zip(exact, frequencies, strict=True)
+    ):
+        return math.inf
+    turns = math.gcd(*(ratio.numerator for ratio in exact))
+    return math.lcm(*(ratio.denominator for ratio in exact)) / turns
