@@ -11,6 +11,8 @@ pub mod integrate;
 pub mod lanes;
 pub mod march;
 pub mod mechanics;
+mod random;
+pub mod simulate;
 pub mod stage;
 
 pub use error::{Error, Result};

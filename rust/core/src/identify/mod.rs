@@ -5,7 +5,6 @@ mod cost;
 mod identification;
 mod local;
 mod problem;
-mod random;
 mod search;
 mod stepping;
 mod swarm;

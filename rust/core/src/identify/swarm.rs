@@ -10,7 +10,7 @@
 //! update does not change under a scaling of the coordinates. r1 and r2 are drawn anew for
 //! each particle and coordinate.
 
-use super::random::Draws;
+use crate::random::Draws;
 use crate::error::{Error, Result, not_negative};
 
 /// What becomes of a particle that leaves the box.

@@ -2,8 +2,13 @@
 
 mod dahl;
 pub mod feedback;
+mod virtual_stage;
 
 pub use dahl::{DAHL_PARAMETERS, DahlStage, StageState};
+pub use virtual_stage::{
+    Creep, DEAD_ZONES, PLAYS, RELAXATIONS, StagePlay, VirtualFlow, VirtualSettings, VirtualStage,
+    VirtualState,
+};
 
 /// Name, symbol and unit of one parameter of a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
