@@ -11,6 +11,7 @@ pub mod integrate;
 pub mod lanes;
 pub mod march;
 pub mod mechanics;
+pub mod metrics;
 mod random;
 pub mod simulate;
 pub mod stage;

@@ -52,8 +52,7 @@ impl Amplifier {
     /// # Errors
     /// [`Error::Parameter`] naming the number that is out of its range.
     pub fn validate(&self) -> Result<()> {
-        for (name, value, unit) in
-            [("bandwidth", self.bandwidth, "Hz"), ("slew", self.slew, "V/s")]
+        for (name, value, unit) in [("bandwidth", self.bandwidth, "Hz"), ("slew", self.slew, "V/s")]
         {
             if value.is_nan() || value <= 0.0 {
                 let expected = "a number above 0, or infinity";

@@ -63,6 +63,7 @@ impl<'a, P: Plant> Apparatus<'a, P> {
     }
 
     /// The state before any command, with the sensor at 0.
+    #[must_use]
     pub fn rest(&self) -> ApparatusState<P::State> {
         let applied = self.amplifier.within_limits(0.0);
         let sensor = SensorState::default();
@@ -70,6 +71,7 @@ impl<'a, P: Plant> Apparatus<'a, P> {
     }
 
     /// True displacement from the sensor's zero, m.
+    #[must_use]
     pub fn displacement(&self, state: &ApparatusState<P::State>) -> f64 {
         self.plant.displacement(&state.plant) - state.sensor.zero
     }
