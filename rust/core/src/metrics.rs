@@ -32,6 +32,16 @@ pub struct Tracking {
 ///
 /// `frequency`, Hz, is the fundamental's where the reference has one.
 ///
+/// ```
+/// use piezotrack_core::metrics::tracking;
+///
+/// let desired = [0.0, 1.0, 2.0, 1.0, 0.0];
+/// let actual = [0.0, 0.5, 2.0, 1.5, 0.0];
+/// let figures = tracking(&desired, &actual, 0.02, None).unwrap();
+/// assert_eq!(figures.max_error, 0.5);
+/// assert_eq!(figures.widest_loop, Some(0.5));
+/// ```
+///
 /// # Errors
 /// [`Error::Shape`] where the records are empty or differ in length; [`Error::Data`] where a
 /// sample is not finite; those of [`fundamental`] where a frequency is given.

@@ -16,6 +16,16 @@ use crate::Number;
 
 /// Modified Prandtl-Ishlinskii operator with `PLAYS` plays and `ZONES` dead zones.
 ///
+/// ```
+/// use piezotrack_control::operator::{Operator, Play};
+///
+/// let play = Play { linear: 0.0, thresholds: [3.0], weights: [1.0], corners: [], bends: [] };
+/// let mut state = play.rest();
+/// assert_eq!(play.follow(&mut state, 10.0), 7.0);
+/// assert_eq!(play.follow(&mut state, 5.0), 7.0); // the backlash is 6 wide
+/// assert_eq!(play.follow(&mut state, 0.0), 3.0);
+/// ```
+///
 /// It is increasing, and so has an inverse, where `linear`, all `weights` and all partial sums
 /// of 1 + `bends` are positive.
 ///

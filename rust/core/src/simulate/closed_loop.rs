@@ -69,7 +69,27 @@ impl Delay {
 ///
 /// `controller` is called with the number of the control sample and the reading, m, and returns
 /// the command, V. Before its first command has an effect, the amplifier keeps the one that it
-/// had at the start.
+/// had at the start. With a delay of 0 a command acts at once, and shows in the next reading.
+///
+/// ```
+/// use piezotrack_core::integrate::NEVER;
+/// use piezotrack_core::simulate::{Timing, closed_loop};
+/// use piezotrack_core::stage::VirtualStage;
+///
+/// # fn main() -> piezotrack_core::Result<()> {
+/// let stage = VirtualStage::xu_li_2010(1);
+/// let timing = Timing { interval: 0.02, samples: 100, delay: 0.0, substeps: 10 };
+/// let mut volts = 0.0;
+/// let integral = |_, measured: f64| {
+///     volts += 0.1e6 * (20e-6 - measured);
+///     volts
+/// };
+/// let run = closed_loop(&stage.apparatus(), stage.start(), &timing, integral, NEVER)?.unwrap();
+/// assert_eq!(run.time.len(), 991);
+/// assert!((run.displacement[990] - 20e-6).abs() < 0.5e-6);
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Errors
 /// [`Error::Parameter`] where a number is out of its range; [`Error::Numerical`] where the

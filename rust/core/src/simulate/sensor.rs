@@ -1,6 +1,6 @@
 //! The displacement sensor: noise of a bandwidth, a smallest step, a range, a zero.
 
-use crate::error::{Error, Result, finite, not_negative};
+use crate::error::{Error, Result, not_negative};
 use crate::random::Draws;
 
 /// A displacement sensor.
@@ -70,12 +70,8 @@ impl Sensor {
     }
 
     /// Makes `displacement`, m, read 0, to the nearest step of the sensor.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] where it is not finite.
-    pub fn set_zero(&self, state: &mut SensorState, displacement: f64) -> Result<()> {
-        state.zero = self.quantised(finite("displacement", displacement, "m")?);
-        Ok(())
+    pub fn set_zero(&self, state: &mut SensorState, displacement: f64) {
+        state.zero = self.quantised(displacement);
     }
 
     /// The reading, m, at `displacement`, m, `interval` seconds after the one before.

@@ -14,8 +14,9 @@
 use piezotrack_control::operator::{Operator, Play, PlayState};
 
 use crate::error::{Error, Result, finite, not_negative, positive};
+use crate::integrate::{Drive, Stop};
 use crate::mechanics::{Mechanics, Propagator, halvings};
-use crate::simulate::{Amplifier, Apparatus, ApparatusState, Plant, Sensor};
+use crate::simulate::{Amplifier, Apparatus, ApparatusState, OpenLoop, Plant, Sensor, open_loop};
 
 /// Plays of a virtual stage; those with weight 0 do nothing.
 pub const PLAYS: usize = 10;
@@ -66,6 +67,21 @@ pub struct VirtualSettings {
 }
 
 /// A stage to experiment on.
+///
+/// ```
+/// use piezotrack_core::integrate::{Drive, Hold, NEVER};
+/// use piezotrack_core::stage::VirtualStage;
+///
+/// # fn main() -> piezotrack_core::Result<()> {
+/// let stage = VirtualStage::xu_li_2010(1);
+/// let drive = Drive::new(&[75.0; 1500], 2e-4, Hold::Zero)?;
+/// let run = stage.simulate(&drive, NEVER)?.unwrap();
+/// let end = run.displacement[1499];
+/// assert!((end - 117.76e-6).abs() < 0.2e-6);
+/// assert!((run.measured[1499] - end).abs() < 0.6e-6);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VirtualStage {
     settings: VirtualSettings,
@@ -296,12 +312,23 @@ impl VirtualStage {
         if self.settings.preconditioned {
             self.cycle(&mut state.plant);
             self.wait(&mut state.plant);
-            // Fails for no finite displacement, and settings in their range give no other.
-            if apparatus.sensor.set_zero(&mut state.sensor, state.plant.x).is_err() {
-                state.sensor.zero = 0.0;
-            }
+            apparatus.sensor.set_zero(&mut state.sensor, state.plant.x);
         }
         state
+    }
+
+    /// Drives the stage from its start: true and measured displacement, for a log.
+    ///
+    /// `None` where `stop` said so meanwhile.
+    ///
+    /// # Errors
+    /// Those of [`open_loop`].
+    pub fn simulate(
+        &self,
+        drive: &Drive<'_>,
+        stop: Stop<'_>,
+    ) -> Result<Option<OpenLoop<VirtualState>>> {
+        open_loop(&self.apparatus(), self.start(), drive, stop)
     }
 
     /// Full cycles between 0 V and the swing, each `(1 - cos) / 2`.
