@@ -11,6 +11,9 @@ pub mod integrate;
 pub mod lanes;
 pub mod march;
 pub mod mechanics;
+pub mod metrics;
+mod random;
+pub mod simulate;
 pub mod stage;
 
 pub use error::{Error, Result};

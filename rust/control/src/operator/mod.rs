@@ -5,8 +5,10 @@
 //! for the state a displacement further on.
 
 mod dahl;
+mod play;
 
 pub use dahl::{Dahl, DahlBranch, DahlState};
+pub use play::{Play, PlayBranch, PlayState};
 
 use crate::Number;
 

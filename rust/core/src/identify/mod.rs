@@ -6,7 +6,6 @@ mod deviation;
 mod identification;
 mod local;
 mod problem;
-mod random;
 mod search;
 mod stepping;
 mod swarm;

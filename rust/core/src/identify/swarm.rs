@@ -10,8 +10,8 @@
 //! update does not change under a scaling of the coordinates. r1 and r2 are drawn anew for
 //! each particle and coordinate.
 
-use super::random::Draws;
 use crate::error::{Error, Result, not_negative};
+use crate::random::Draws;
 
 /// What becomes of a particle that leaves the box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,8 +3,13 @@
 mod dahl;
 pub mod feedback;
 pub mod friction;
+mod virtual_stage;
 
 pub use dahl::{DAHL_PARAMETERS, DahlStage, StageState};
+pub use virtual_stage::{
+    Creep, DEAD_ZONES, PLAYS, RELAXATIONS, StagePlay, VirtualFlow, VirtualSettings, VirtualStage,
+    VirtualState,
+};
 
 /// A hysteresis coupled with linear mechanics, as one step in time sees it.
 pub trait Coupling<N> {

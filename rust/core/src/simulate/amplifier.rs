@@ -1,0 +1,110 @@
+//! The amplifier: first-order lag, slew limit, output limits.
+
+use crate::error::{Error, Result};
+
+/// A voltage amplifier of gain 1; its command is what it would give at rest.
+///
+/// ```text
+/// v' = clip((clip(c, low, high) - v) / tau, -slew, slew),   tau = 1 / (2 pi bandwidth)
+/// ```
+///
+/// | field | symbol | unit | range |
+/// | --- | --- | --- | --- |
+/// | `bandwidth` | | Hz | > 0, may be infinite |
+/// | `slew` | | V/s | > 0, may be infinite |
+/// | `low`, `high` | | V | low < high, may be infinite |
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Amplifier {
+    /// Frequency at which a small signal has lost 3 dB, Hz.
+    pub bandwidth: f64,
+    /// Fastest change of the output, V/s.
+    pub slew: f64,
+    /// Lowest output, V.
+    pub low: f64,
+    /// Highest output, V.
+    pub high: f64,
+}
+
+/// What the length of a step decides of an amplifier.
+#[derive(Clone, Copy, Debug)]
+pub struct AmplifierFlow {
+    /// exp(-step / tau).
+    decay: f64,
+    /// tau / step.
+    lag: f64,
+    /// Largest change in a step, V.
+    most: f64,
+    /// Whether the output is the command.
+    ideal: bool,
+}
+
+impl Amplifier {
+    /// Gives what is asked for, at once and without limits.
+    pub const IDEAL: Self = Self {
+        bandwidth: f64::INFINITY,
+        slew: f64::INFINITY,
+        low: f64::NEG_INFINITY,
+        high: f64::INFINITY,
+    };
+
+    /// Checks the four numbers.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming the number that is out of its range.
+    pub fn validate(&self) -> Result<()> {
+        for (name, value, unit) in [("bandwidth", self.bandwidth, "Hz"), ("slew", self.slew, "V/s")]
+        {
+            if value.is_nan() || value <= 0.0 {
+                let expected = "a number above 0, or infinity";
+                return Err(Error::parameter(name, format!("{value} {unit}"), expected));
+            }
+        }
+        if !(self.low < self.high && self.low < f64::INFINITY && self.high > f64::NEG_INFINITY) {
+            let found = format!("{} V to {} V", self.low, self.high);
+            return Err(Error::parameter("limits", found, "the lower one below the upper one"));
+        }
+        Ok(())
+    }
+
+    /// Time constant, s.
+    #[must_use]
+    pub fn lag(&self) -> f64 {
+        1.0 / (core::f64::consts::TAU * self.bandwidth)
+    }
+
+    /// The nearest voltage that the amplifier can give, V.
+    #[inline(always)]
+    #[must_use]
+    pub fn within_limits(&self, volts: f64) -> f64 {
+        volts.max(self.low).min(self.high)
+    }
+
+    /// Works out steps of `step` seconds.
+    #[must_use]
+    pub fn flow(&self, step: f64) -> AmplifierFlow {
+        let lag = self.lag();
+        AmplifierFlow {
+            decay: if lag > 0.0 { libm::exp(-step / lag) } else { 0.0 },
+            lag: lag / step,
+            most: self.slew * step,
+            ideal: lag == 0.0 && self.slew == f64::INFINITY,
+        }
+    }
+
+    /// Output at both ends of a step, V, whose command goes straight from `from` to `to`.
+    ///
+    /// The lag is exact; the slew limit is applied to the step as a whole.
+    #[inline(always)]
+    #[must_use]
+    pub fn advance(&self, flow: &AmplifierFlow, output: f64, from: f64, to: f64) -> (f64, f64) {
+        let (from, to) = (self.within_limits(from), self.within_limits(to));
+        if flow.ideal {
+            return (from, to);
+        }
+        // Behind a ramp the output settles to trail by `trail`; the rest of the gap decays.
+        let trail = (to - from) * flow.lag;
+        let gap = (from - output - trail) * flow.decay + trail;
+        let change = (to - gap - output).max(-flow.most).min(flow.most);
+        (output, output + change)
+    }
+}

@@ -1,0 +1,260 @@
+//! The virtual stage: each of its parts against what physics or the paper says of it.
+#![allow(missing_docs, clippy::unwrap_used, clippy::float_cmp, clippy::cast_precision_loss)]
+
+use core::f64::consts::TAU;
+
+use piezotrack_core::integrate::{Drive, Hold, NEVER};
+use piezotrack_core::metrics::widest_loop;
+use piezotrack_core::simulate::{Amplifier, OpenLoop, Sensor, open_loop};
+use piezotrack_core::stage::{Creep, VirtualSettings, VirtualStage, VirtualState};
+
+const UM: f64 = 1e-6;
+
+fn published() -> VirtualSettings {
+    VirtualSettings::xu_li_2010(1)
+}
+
+/// The mode alone: no lag, no creep, no noise, from the virgin state.
+fn bare() -> VirtualSettings {
+    let none = Creep { share: 0.0, time: 1.0 };
+    VirtualSettings {
+        amplifier: Amplifier::IDEAL,
+        creep: [none; 3],
+        sensor: Sensor::IDEAL,
+        preconditioned: false,
+        ..published()
+    }
+}
+
+fn drive(settings: &VirtualSettings, u: &[f64], dt: f64, hold: Hold) -> OpenLoop<VirtualState> {
+    let stage = VirtualStage::new(settings).unwrap();
+    let drive = Drive::new(u, dt, hold).unwrap();
+    open_loop(&stage.apparatus(), stage.start(), &drive, NEVER).unwrap().unwrap()
+}
+
+/// `(1 - cos) / 2` up to `peak`, V, sampled at 5 kHz.
+fn cosine(peak: f64, frequency: f64, samples: usize) -> Vec<f64> {
+    let turn = TAU * frequency / 5000.0;
+    let wave = |k: usize| 0.5 * peak * (1.0 - (turn * k as f64).cos());
+    (0..samples).map(wave).collect()
+}
+
+/// Places and heights of the maxima, by a parabola through three samples.
+fn peaks(x: &[f64], dt: f64) -> Vec<(f64, f64)> {
+    let mut out = Vec::new();
+    for k in 1..x.len() - 1 {
+        let (a, b, c) = (x[k - 1], x[k], x[k + 1]);
+        if b > a && b >= c {
+            let s = 0.5 * (a - c) / (a - 2.0 * b + c);
+            out.push(((k as f64 + s) * dt, b - 0.25 * (a - c) * s));
+        }
+    }
+    out
+}
+
+#[test]
+fn the_mode_rings_at_its_frequency_and_decays_with_its_damping() {
+    // One volt moves no play, so this is a linear second-order system.
+    let dt = 2e-5;
+    let run = drive(&bare(), &[1.0; 2000], dt, Hold::Zero);
+    let peaks = peaks(&run.displacement, dt);
+    let end = bare().gain * bare().play.linear;
+    let zeta: f64 = 0.065;
+    let period = 1.0 / (160.0 * (1.0 - zeta * zeta).sqrt());
+    assert!(((peaks[1].0 - peaks[0].0) / period - 1.0).abs() < 1e-4);
+    let ratio = ((peaks[0].1 - end) / (peaks[1].1 - end)).ln();
+    assert!((ratio / (TAU * zeta / (1.0 - zeta * zeta).sqrt()) - 1.0).abs() < 1e-3, "{ratio}");
+}
+
+#[test]
+fn creep_grows_with_the_logarithm_of_time_to_its_share() {
+    let mut settings = bare();
+    settings.creep = published().creep;
+    let run = drive(&settings, &vec![50.0; 10_001], 1e-2, Hold::Zero);
+    let x = &run.displacement;
+    // The mode has died away after 0.2 s.
+    assert!(x[20..].windows(2).all(|pair| pair[1] >= pair[0] - 1e-15));
+    let decade = |k: usize| x[10 * k] - x[k];
+    let (first, second) = (decade(20), decade(200));
+    assert!(first > 0.5 * second && second > 0.5 * first, "{first} {second}");
+    let immediate = drive(&bare(), &[50.0; 101], 1e-2, Hold::Zero).displacement[100];
+    assert!((x[10_000] / immediate - 1.012).abs() < 1e-5);
+}
+
+#[test]
+fn the_published_step_is_near() {
+    let run = drive(&published(), &vec![75.0; 2501], 2e-4, Hold::Zero);
+    let x = &run.displacement;
+    let peaks = peaks(x, 2e-4);
+    assert!((x[1500] - 117.7622 * UM).abs() < 0.2 * UM, "{}", x[1500]);
+    assert!((peaks[0].1 - 192.5302 * UM).abs() < 1.5 * UM, "{}", peaks[0].1);
+    // The published second peak does not go with the published damping.
+    assert!((peaks[1].1 - 170.2524 * UM).abs() < 4.0 * UM, "{}", peaks[1].1);
+    let frequency = 1.0 / (peaks[2].0 - peaks[1].0);
+    assert!((frequency - 160.0).abs() < 1.0, "{frequency}");
+}
+
+#[test]
+fn the_settled_loop_closes_and_is_a_tenth_of_the_travel_wide() {
+    let u = cosine(75.0, 0.25, 40_000);
+    let run = drive(&published(), &u, 2e-4, Hold::First);
+    let x = &run.displacement;
+    assert!(x[0].abs() < 0.02 * UM && x[20_000].abs() < 0.1 * UM, "{} {}", x[0], x[20_000]);
+    // The loop over u in volts, brought to the travel's own unit.
+    let volts: Vec<f64> = x.iter().map(|here| here * 75.0 / x[10_000]).collect();
+    let width = widest_loop(&u, &volts).unwrap().unwrap();
+    assert!((width - 0.10).abs() < 0.01, "{width}");
+}
+
+#[test]
+fn a_virgin_stage_does_not_come_back_to_its_zero() {
+    let settings = VirtualSettings { preconditioned: false, ..published() };
+    let u = cosine(75.0, 0.25, 20_005);
+    let run = drive(&settings, &u, 2e-4, Hold::First);
+    assert_eq!(run.displacement[0], 0.0);
+    assert!(run.displacement[20_000] > 5.0 * UM);
+}
+
+#[test]
+fn a_rest_before_the_experiment_leaves_no_drift() {
+    let drift = |rest: f64| {
+        let settings = VirtualSettings { rest, ..published() };
+        let run = drive(&settings, &[0.0; 11], 1.0, Hold::Zero);
+        (run.displacement[10] - run.displacement[0]).abs()
+    };
+    assert!(drift(0.0) > 0.1 * UM);
+    assert!(drift(120.0) < 1e-11);
+}
+
+#[test]
+fn half_the_step_changes_little() {
+    let coarse = published();
+    let fine = VirtualSettings { step: 0.5 * coarse.step, ..coarse };
+    let most = |u: &[f64], hold| {
+        let (a, b) = (drive(&coarse, u, 2e-4, hold), drive(&fine, u, 2e-4, hold));
+        let differences = a.displacement.iter().zip(&b.displacement).map(|(a, b)| (a - b).abs());
+        differences.fold(0.0, f64::max)
+    };
+    let slow = most(&cosine(75.0, 10.0, 1500), Hold::First);
+    let step = most(&[75.0; 1000], Hold::Zero);
+    assert!(slow < 1e-10, "{slow:e}");
+    assert!(step < 30e-9, "{step:e}");
+}
+
+/// Readings of the published sensor on a stage at rest, and their moments.
+fn at_rest(seed: u64, n: usize, dt: f64) -> (Vec<f64>, f64, f64) {
+    let settings = VirtualSettings { preconditioned: false, ..VirtualSettings::xu_li_2010(seed) };
+    let y = drive(&settings, &vec![0.0; n], dt, Hold::Zero).measured;
+    let square = y.iter().map(|y| y * y).sum::<f64>() / n as f64;
+    let product = y.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / (n - 1) as f64;
+    (y, square.sqrt(), product / square)
+}
+
+#[test]
+fn noise_has_the_published_size_and_the_spectrum_of_its_bandwidth() {
+    let (y, rms, correlation) = at_rest(1, 200_000, 2e-4);
+    assert!((rms - 0.097 * UM).abs() < 0.002 * UM, "{rms:e}");
+    let share = (0.0964_f64 / 0.097).powi(2);
+    assert!((correlation - share * (-TAU * 200.0 * 2e-4).exp()).abs() < 0.01, "{correlation}");
+    // About two thirds within one standard deviation, a twentieth beyond two: normal.
+    let within =
+        |sigmas: f64| y.iter().filter(|y| y.abs() < sigmas * rms).count() as f64 / y.len() as f64;
+    // Readings come in steps of 0.39 standard deviations, so the shares are coarse.
+    assert!((within(1.0) - 0.683).abs() < 0.08 && (within(2.0) - 0.954).abs() < 0.02);
+    // Read at 50 Hz it is white and as large.
+    let (_, rms, correlation) = at_rest(2, 20_000, 2e-2);
+    assert!((rms - 0.097 * UM).abs() < 0.002 * UM && correlation.abs() < 0.03);
+}
+
+#[test]
+fn readings_are_whole_steps_of_the_converter() {
+    let (y, ..) = at_rest(1, 5000, 2e-4);
+    let step = 2.5e-3 / 65536.0;
+    assert!((step - 0.038 * UM).abs() < 0.0002 * UM);
+    assert!(y.iter().all(|y| (y / step - (y / step).round()).abs() < 1e-6));
+    assert!(y.iter().any(|y| (y / step).round().abs() > 5.0));
+}
+
+#[test]
+fn readings_stop_at_the_end_of_the_range() {
+    let mut settings = bare();
+    settings.sensor.range = 50.0 * UM;
+    let run = drive(&settings, &[60.0; 500], 1e-3, Hold::Zero);
+    assert_eq!(run.measured[499], 50.0 * UM);
+    assert!(run.displacement[499] > 60.0 * UM);
+}
+
+#[test]
+fn a_seed_is_an_experiment() {
+    let u = cosine(75.0, 1.0, 2500);
+    let run = |seed| drive(&VirtualSettings::xu_li_2010(seed), &u, 2e-4, Hold::First);
+    let (one, again, other) = (run(1), run(1), run(2));
+    assert_eq!(one, again);
+    assert_eq!(one.displacement, other.displacement);
+    let same = one.measured.iter().zip(&other.measured).filter(|(a, b)| a == b).count();
+    assert!(same < one.measured.len() / 4, "{same}");
+}
+
+#[test]
+fn an_experiment_goes_on_where_it_ended() {
+    let stage = VirtualStage::xu_li_2010(1);
+    let u = cosine(75.0, 1.0, 5000);
+    let run = |u: &[f64], start| {
+        let drive = Drive::new(u, 2e-4, Hold::First).unwrap();
+        open_loop(&stage.apparatus(), start, &drive, NEVER).unwrap().unwrap()
+    };
+    let whole = run(&u, stage.start());
+    let half = run(&u[..=2500], stage.start());
+    let rest = run(&u[2500..], half.last);
+    assert_eq!(whole.displacement[2500..], rest.displacement[..]);
+    assert_eq!(whole.last.plant, rest.last.plant);
+}
+
+#[test]
+fn the_amplifier_lags_slews_and_stops_at_its_limits() {
+    let mut settings = published();
+    settings.amplifier = Amplifier { bandwidth: 100.0, slew: 1e9, low: 0.0, high: 75.0 };
+    let lag = settings.amplifier.lag();
+    let run = drive(&settings, &[10.0; 3], lag, Hold::Zero);
+    assert!((run.applied[1] - 10.0 * (1.0 - (-1.0_f64).exp())).abs() < 1e-9);
+
+    settings.amplifier.slew = 1000.0;
+    let run = drive(&settings, &[75.0; 200], 1e-3, Hold::Zero);
+    let fastest = run.applied.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+    assert!(fastest <= 1.0 + 1e-9 && fastest > 0.999, "{fastest}");
+
+    let run = drive(&settings, &[90.0; 2000], 1e-3, Hold::Zero);
+    assert!((run.applied[1999] - 75.0).abs() < 1e-9);
+    let run = drive(&settings, &[-9.0; 2000], 1e-3, Hold::Zero);
+    assert!(run.applied[1999].abs() < 1e-9);
+}
+
+#[test]
+fn a_ramp_is_followed_at_a_distance_of_the_lag() {
+    let amplifier = published().amplifier;
+    let u: Vec<f64> = (0..1001).map(|k| 0.05 * f64::from(k)).collect();
+    let run = drive(&published(), &u, 1e-4, Hold::First);
+    assert!((u[1000] - run.applied[1000] - 500.0 * amplifier.lag()).abs() < 1e-6);
+}
+
+#[test]
+fn settings_out_of_range_are_named() {
+    let refused = |change: fn(&mut VirtualSettings)| {
+        let mut settings = published();
+        change(&mut settings);
+        VirtualStage::new(&settings).unwrap_err().to_string()
+    };
+    assert!(refused(|s| s.gain = 0.0).starts_with("gain is 0 m/V"));
+    assert!(refused(|s| s.play.weights[3] = -1.0).starts_with("weights[3] is -1"));
+    assert!(refused(|s| s.play.bends[1] = -1.06).starts_with("bends[1] is -1.06"));
+    assert!(refused(|s| s.play.corners[1] = 1.0).starts_with("corners[1] is 1 V"));
+    assert!(refused(|s| s.creep[2].time = f64::NAN).starts_with("creep_time[2] is NaN s"));
+    assert!(refused(|s| s.amplifier.slew = 0.0).starts_with("slew is 0 V/s"));
+    assert!(refused(|s| s.amplifier.low = 80.0).starts_with("limits is 80 V to 75 V"));
+    assert!(refused(|s| s.sensor.range = 0.0).starts_with("range is 0 m"));
+    assert!(refused(|s| s.rest = 1e9).starts_with("rest is"));
+
+    let stage = VirtualStage::xu_li_2010(1);
+    let drive = Drive { u: &[0.0, f64::NAN], dt: 1e-3, hold: Hold::Zero };
+    assert!(open_loop(&stage.apparatus(), stage.start(), &drive, NEVER).is_err());
+}
