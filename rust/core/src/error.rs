@@ -45,6 +45,13 @@ impl Error {
     }
 }
 
+impl From<piezotrack_control::Error> for Error {
+    fn from(error: piezotrack_control::Error) -> Self {
+        let piezotrack_control::Error { name, value, unit, expected } = error;
+        Self::parameter(name, format!("{} {unit}", shown(value)).trim_end(), expected)
+    }
+}
+
 /// Refuses a value that is not a finite number above zero.
 ///
 /// # Errors

@@ -9,12 +9,14 @@ mod closed_loop;
 mod open_loop;
 mod plant;
 mod sensor;
+mod tracking;
 
 pub use amplifier::{Amplifier, AmplifierFlow};
 pub use closed_loop::{ClosedLoop, Timing, closed_loop};
 pub use open_loop::{OpenLoop, open_loop};
 pub use plant::{DahlFlow, Plant};
 pub use sensor::{Sensor, SensorState};
+pub use tracking::{Course, Law, LawState, MOST_STATES, Tracked, track};
 
 use pulp::{Simd, WithSimd};
 

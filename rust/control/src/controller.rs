@@ -1,0 +1,239 @@
+//! The whole controller: feedforward, feedback and repetitive part, clipped to the limits.
+//!
+//! ```text
+//! u = uFB + uFF + uRC,   v = clip(u),   eu = v - u
+//! ```
+//!
+//! Xu and Li 2010, section 4, doi 10.1115/1.4001712; how the parts were corrected is told in
+//! [`crate::pid`] and [`crate::repetitive`].
+
+use crate::error::{Error, Result, check};
+use crate::feedback::Feedback;
+use crate::filters::{Filter, FilterState};
+use crate::limits::Limits;
+use crate::repetitive::{RepetitiveState, SampledRepetitive};
+
+/// Composes the parts that run at the sample rate.
+///
+/// Parts may be exchanged between two steps, with the state kept: other gains come without a
+/// bump.
+///
+/// ```
+/// use piezotrack_control::{Controller, Limits, Pid};
+///
+/// let pid = Pid::new(0.120e6, 0.009, 0.044, None)?.at(0.02)?;
+/// let controller = Controller::new(Limits::new(0.0, 75.0)?, pid);
+/// let mut state = controller.rest([])?;
+/// let command = controller.step(&mut state, 1e-6, 0.0, 0.5);
+/// assert!((command.volts - (0.5 + 0.120 * 0.02 / 0.009)).abs() < 1e-12);
+/// # Ok::<(), piezotrack_control::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Controller<F> {
+    /// Range of the actuator.
+    pub limits: Limits,
+    /// The feedback law; `()` for none.
+    pub feedback: F,
+    /// The repetitive part.
+    pub repetitive: Option<SampledRepetitive>,
+    /// Filters of the measurement, one after the other.
+    pub filters: [Option<Filter>; 2],
+}
+
+/// What a controller remembers; `L` is the delay line of the repetitive part, `[f64; 0]` for a
+/// controller without one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ControllerState<S, L> {
+    feedback: S,
+    repetitive: Option<RepetitiveState<L>>,
+    filters: [FilterState; 2],
+    /// Voltage to go on from at the first step.
+    present: Option<f64>,
+    /// The last command.
+    last: Command,
+    /// What the actuator got less what was asked for, V.
+    excess: f64,
+    /// The error that the repetitive part has yet to store, m.
+    unlearnt: f64,
+}
+
+/// What a controller asks for at one sample, and how it is made up.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Command {
+    /// The voltage for the actuator, within the limits, V.
+    pub volts: f64,
+    /// The voltage before it was clipped, V.
+    pub unclipped: f64,
+    /// Its feedforward part uFF, V.
+    pub feedforward: f64,
+    /// Its feedback part uFB, V.
+    pub feedback: f64,
+    /// Its repetitive part uRC, V.
+    pub repetitive: f64,
+    /// The tracking error that was used, reference less filtered measurement, m.
+    pub error: f64,
+    /// Whether the voltage was clipped.
+    pub saturated: bool,
+    /// Whether the measurement could be used.
+    pub measurement_ok: bool,
+    /// Whether reference and feedforward could be used.
+    pub reference_ok: bool,
+}
+
+impl<F: Feedback> Controller<F> {
+    /// Limits and feedback alone; set the public fields for more.
+    #[must_use]
+    pub fn new(limits: Limits, feedback: F) -> Self {
+        Self { limits, feedback, repetitive: None, filters: [None; 2] }
+    }
+
+    /// The memory of a controller whose feedback part begins at 0 V.
+    ///
+    /// `line` is the delay line of the repetitive part; `[]` where there is none.
+    ///
+    /// # Errors
+    /// Names `line` where the repetitive part needs more room.
+    pub fn rest<L: AsMut<[f64]>>(&self, line: L) -> Result<ControllerState<F::State, L>> {
+        let repetitive = match &self.repetitive {
+            Some(part) => Some(part.rest(line)?),
+            None => None,
+        };
+        Ok(ControllerState {
+            feedback: self.feedback.rest(),
+            repetitive,
+            filters: [None; 2],
+            present: None,
+            last: Command { volts: self.limits.clip(0.0), ..Command::default() },
+            excess: 0.0,
+            unlearnt: 0.0,
+        })
+    }
+
+    /// The memory of a controller that goes on, without a bump, from the voltage `present` (V)
+    /// that the actuator has: the feedback part begins at what the others leave of it.
+    ///
+    /// # Errors
+    /// Names `present` where it is outside the limits, `line` as in [`Self::rest`].
+    pub fn start<L: AsMut<[f64]>>(
+        &self,
+        present: f64,
+        line: L,
+    ) -> Result<ControllerState<F::State, L>> {
+        let right = (self.limits.low()..=self.limits.high()).contains(&present);
+        check("present", present, "V", right, "a voltage within the limits")?;
+        let mut state = self.rest(line)?;
+        state.present = Some(present);
+        state.last.volts = present;
+        Ok(state)
+    }
+
+    /// Back to [`Self::rest`], with what was learnt forgotten and the delay line kept.
+    pub fn reset<L: AsMut<[f64]>>(&self, state: &mut ControllerState<F::State, L>) {
+        if let (Some(part), Some(memory)) = (&self.repetitive, &mut state.repetitive) {
+            part.reset(memory);
+        }
+        state.feedback = self.feedback.rest();
+        state.filters = [None; 2];
+        state.present = None;
+        state.last = Command { volts: self.limits.clip(0.0), ..Command::default() };
+        state.excess = 0.0;
+        state.unlearnt = 0.0;
+    }
+
+    /// One sample: `reference` and `measured` displacement in m, `feedforward` in V.
+    ///
+    /// What is not a finite number (or beyond 1e100) reaches neither the actuator nor any
+    /// memory. Without a measurement or a reference the feedback part holds, the next error
+    /// follows on the last good one, and the repetitive part plays on what it has learnt and
+    /// learns nothing; without a feedforward that holds. The command's flags tell.
+    #[inline]
+    pub fn step<L: AsMut<[f64]>>(
+        &self,
+        state: &mut ControllerState<F::State, L>,
+        reference: f64,
+        measured: f64,
+        feedforward: f64,
+    ) -> Command {
+        let measurement_ok = usable(measured);
+        let feedforward_ok = usable(feedforward);
+        let error_ok = measurement_ok && usable(reference);
+        let reference_ok = feedforward_ok && usable(reference);
+        let last = state.last;
+        let feedforward = if feedforward_ok { feedforward } else { last.feedforward };
+        let repetitive = match (&self.repetitive, &mut state.repetitive) {
+            (Some(part), Some(memory)) => part.step(memory, state.unlearnt, last.saturated),
+            _ => 0.0,
+        };
+        let mut feedback = last.feedback;
+        if let Some(present) = state.present.take() {
+            feedback = present - feedforward - repetitive;
+            state.feedback = self.feedback.start(feedback);
+        }
+        let mut error = last.error;
+        state.unlearnt = 0.0;
+        if error_ok {
+            error = reference - self.filtered(&mut state.filters, measured);
+            let volts = self.feedback.step(&mut state.feedback, error, state.excess);
+            feedback = if volts.is_finite() { volts } else { feedback };
+            state.unlearnt = error;
+        }
+        let unclipped = feedback + feedforward + repetitive;
+        // Parts that are too large to be added up: stay.
+        let unclipped = if unclipped.is_finite() { unclipped } else { last.volts };
+        let volts = self.limits.clip(unclipped);
+        state.excess = volts - unclipped;
+        state.last = Command {
+            volts,
+            unclipped,
+            feedforward,
+            feedback,
+            repetitive,
+            error,
+            saturated: state.excess.abs() > 0.0,
+            measurement_ok,
+            reference_ok,
+        };
+        state.last
+    }
+
+    #[inline]
+    fn filtered(&self, states: &mut [FilterState; 2], measured: f64) -> f64 {
+        let mut value = measured;
+        for (filter, state) in self.filters.iter().zip(states) {
+            if let Some(filter) = filter {
+                value = filter.step(state, value);
+            }
+        }
+        value
+    }
+}
+
+impl<S, L> ControllerState<S, L> {
+    /// Tells the voltage that the actuator really got for the last command, V, where something
+    /// beyond the limits (a slew rate, an amplifier's own limit) came between.
+    ///
+    /// Antiwindup works on it; without this call, on the clipped command.
+    ///
+    /// # Errors
+    /// Names `volts` where it is not finite; nothing is changed then.
+    pub fn applied(&mut self, volts: f64) -> Result<()> {
+        if !usable(volts) {
+            let expected = "the voltage that the actuator got";
+            return Err(Error { name: "volts", value: volts, unit: "V", expected });
+        }
+        self.excess = volts - self.last.unclipped;
+        Ok(())
+    }
+
+    /// The last command.
+    #[must_use]
+    pub fn last(&self) -> &Command {
+        &self.last
+    }
+}
+
+/// Whether a number can enter a memory: NaN, infinity and what would soon be one cannot.
+#[inline]
+fn usable(value: f64) -> bool {
+    value.abs() < 1e100
+}

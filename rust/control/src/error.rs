@@ -1,0 +1,56 @@
+//! What can be wrong with a parameter: its name, its value and what was expected.
+
+use core::fmt;
+
+/// A parameter that cannot be used. Holds no text of its own, so that it needs no allocation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Error {
+    /// The argument as the caller wrote it.
+    pub name: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// Unit of the value, empty where it has none.
+    pub unit: &'static str,
+    /// What would have been right.
+    pub expected: &'static str,
+}
+
+/// Result of anything that checks its parameters.
+pub type Result<T> = core::result::Result<T, Error>;
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let space = if self.unit.is_empty() { "" } else { " " };
+        write!(f, "{} is {}{space}{}: expected {}", self.name, self.value, self.unit, self.expected)
+    }
+}
+
+impl core::error::Error for Error {}
+
+/// `value`, or an error unless `right`.
+pub(crate) fn check(
+    name: &'static str,
+    value: f64,
+    unit: &'static str,
+    right: bool,
+    expected: &'static str,
+) -> Result<f64> {
+    if right { Ok(value) } else { Err(Error { name, value, unit, expected }) }
+}
+
+/// Refuses NaN and infinity.
+pub(crate) fn finite(name: &'static str, value: f64, unit: &'static str) -> Result<f64> {
+    check(name, value, unit, value.is_finite(), "a finite number")
+}
+
+/// Refuses what is not a finite number above zero.
+pub(crate) fn positive(name: &'static str, value: f64, unit: &'static str) -> Result<f64> {
+    let right = value.is_finite() && value > 0.0;
+    check(name, value, unit, right, "a finite number above 0")
+}
+
+/// Refuses what is not a finite number, zero or above.
+pub(crate) fn not_negative(name: &'static str, value: f64, unit: &'static str) -> Result<f64> {
+    let right = value.is_finite() && value >= 0.0;
+    check(name, value, unit, right, "a finite number, 0 or above")
+}

@@ -1,0 +1,336 @@
+//! Feedforward: the inverse of the Dahl stage, sample by sample.
+//!
+//! ```text
+//! uFF = (M xd'' + D xd' + K xd + Fh(xd))/T,   Fh = b1 q1 + sgn(xd') b0 q2
+//! dq1/dx = q2,   dq2/dx = up - a2 q1 - sgn(x') a1 q2
+//! ```
+//!
+//! Xu and Li 2010, equations (21), (7) and (8), doi 10.1115/1.4001712. The force depends on the
+//! path of the reference alone, so the inverse is explicit and the operator exact along the path.
+//! A reference may turn between two samples: there it is taken as the cubic through displacement
+//! and velocity at both ends, and the operator is led to its turning points.
+
+use core::ops::{Add, Div, Mul, Neg, Sub};
+
+use crate::Number;
+use crate::error::{Result, check, finite, not_negative, positive};
+use crate::operator::{Dahl, DahlState, Operator};
+
+/// Parameters of the inverse of a Dahl stage.
+///
+/// | field | symbol | unit | range |
+/// | --- | --- | --- | --- |
+/// | `mass`, `damping`, `stiffness` | M, D, K | kg, N s/m, N/m | >= 0 |
+/// | `piezo_coefficient` | T | N/V | not 0 |
+/// | `a1`, `a2` | a1, a2 | 1/m, 1/m^2 | >= 0 |
+/// | `b1`, `b0` | b1, b0 | N/m^2, N/m | any |
+/// | `up` | up | 1 | any |
+///
+/// ```
+/// use piezotrack_control::DahlInverse;
+///
+/// let inverse = DahlInverse::xu_li_2010().at(2e-4)?;
+/// let mut state = inverse.rest();
+/// assert_eq!(inverse.step(&mut state, 0.0, 0.0, 0.0), 0.0);
+/// # Ok::<(), piezotrack_control::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DahlInverse {
+    mass: f64,
+    damping: f64,
+    stiffness: f64,
+    piezo_coefficient: f64,
+    a1: f64,
+    a2: f64,
+    b1: f64,
+    b0: f64,
+    up: f64,
+}
+
+impl DahlInverse {
+    /// The inverse of the stage with these parameters, in SI units.
+    ///
+    /// # Errors
+    /// Names the parameter that is out of its range.
+    #[expect(clippy::too_many_arguments, reason = "the stage's nine numbers, in their order")]
+    pub fn new(
+        mass: f64,
+        damping: f64,
+        stiffness: f64,
+        piezo_coefficient: f64,
+        a1: f64,
+        a2: f64,
+        b1: f64,
+        b0: f64,
+        up: f64,
+    ) -> Result<Self> {
+        finite("piezo_coefficient", piezo_coefficient, "N/V")?;
+        let right = piezo_coefficient.abs() > 0.0;
+        check("piezo_coefficient", piezo_coefficient, "N/V", right, "a value other than 0")?;
+        Ok(Self {
+            mass: not_negative("mass", mass, "kg")?,
+            damping: not_negative("damping", damping, "N s/m")?,
+            stiffness: not_negative("stiffness", stiffness, "N/m")?,
+            piezo_coefficient,
+            a1: not_negative("a1", a1, "1/m")?,
+            a2: not_negative("a2", a2, "1/m^2")?,
+            b1: finite("b1", b1, "N/m^2")?,
+            b0: finite("b0", b0, "N/m")?,
+            up: finite("up", up, "")?,
+        })
+    }
+
+    /// The inverse of Table 1 of Xu and Li 2010.
+    #[must_use]
+    pub fn xu_li_2010() -> Self {
+        Self {
+            mass: 0.1828,
+            damping: 2597.3,
+            stiffness: 26065.0,
+            piezo_coefficient: 0.0468,
+            a1: 121.9874,
+            a2: 1.1773e6,
+            b1: 1.8485e6,
+            b0: 0.0,
+            up: 30.0,
+        }
+    }
+
+    /// The inverse for samples that come every `dt` seconds.
+    ///
+    /// # Errors
+    /// Names `dt` where it is not above 0.
+    pub fn at(&self, dt: f64) -> Result<SampledDahlInverse> {
+        positive("dt", dt, "s")?;
+        let t = self.piezo_coefficient;
+        let root = libm::sqrt(self.a2);
+        Ok(SampledDahlInverse {
+            inertia: self.mass / t,
+            damping: self.damping / t,
+            stiffness: self.stiffness / t,
+            level: self.b1 / t,
+            friction: self.b0 / t,
+            operator: Dahl { a1: Plain(self.a1), a2: Plain(self.a2), gain: Plain(self.up) },
+            piece: PIECE / if root > self.a1 { root } else { self.a1 },
+            dt,
+        })
+    }
+}
+
+/// Longest move that six terms of the operator's power series follow to 1e-15, times
+/// sqrt(a2) or a1.
+const PIECE: f64 = 0.01;
+/// Most pieces that a move between two samples is split into: a bound on the time of a step.
+const MOST_PIECES: f64 = 1000.0;
+
+/// The inverse for one sampling interval; see [`DahlInverse::at`].
+#[derive(Clone, Copy, Debug)]
+pub struct SampledDahlInverse {
+    /// M/T, V s^2/m.
+    inertia: f64,
+    /// D/T, V s/m.
+    damping: f64,
+    /// K/T, V/m.
+    stiffness: f64,
+    /// b1/T, V for one unit of q1.
+    level: f64,
+    /// b0/T, V for one unit of q2.
+    friction: f64,
+    /// Driven by up alone, so that its output is q1 and q2 and not b1 times them.
+    operator: Dahl<Plain>,
+    /// Longest move in one piece, m; infinite where the operator is a parabola.
+    piece: f64,
+    dt: f64,
+}
+
+/// Where the reference was, and what the operator remembers of its path.
+#[derive(Clone, Copy, Debug)]
+pub struct InverseState {
+    x: f64,
+    /// x' times the sampling interval, m; `None` before the first sample.
+    w: Option<f64>,
+    memory: DahlState<Plain>,
+}
+
+impl SampledDahlInverse {
+    /// The inverse of a stage at rest at 0 that never moved.
+    #[must_use]
+    pub fn rest(&self) -> InverseState {
+        InverseState { x: 0.0, w: None, memory: self.operator.rest() }
+    }
+
+    /// The voltage for displacement `x` (m), velocity `v` (m/s) and acceleration `a` (m/s^2) of
+    /// the reference. At the first sample the stage is taken to come straight from 0 to `x`.
+    ///
+    /// NaN, with the state left as it was, where an input is not finite or more than 1000 pieces
+    /// (9 mm with the published a2) away; a controller holds its feedforward then.
+    #[inline]
+    pub fn step(&self, state: &mut InverseState, x: f64, v: f64, a: f64) -> f64 {
+        let rise = x - state.x;
+        let w = v * self.dt;
+        let straight = match state.w {
+            None => true,
+            Some(w0) => {
+                // The cubic is known not to turn where no end is steeper than three times the
+                // mean (Fritsch and Carlson 1980).
+                let steepest = 3.0 * rise.abs();
+                let along = w0 * rise >= 0.0 && w * rise >= 0.0;
+                along && w0.abs() <= steepest && w.abs() <= steepest
+            }
+        };
+        let memory = if straight {
+            self.travel(state.memory, rise)
+        } else {
+            self.travel_cubic(state.memory, rise, state.w.unwrap_or(0.0), w)
+        };
+        let Some(memory) = memory else { return f64::NAN };
+        let sign = if v > 0.0 {
+            1.0
+        } else if v < 0.0 {
+            -1.0
+        } else {
+            0.0
+        };
+        let linear = self.inertia * a + self.damping * v + self.stiffness * x;
+        let hysteresis = self.level * memory.force.0 + sign * self.friction * memory.slope.0;
+        let volts = linear + hysteresis;
+        if !volts.is_finite() {
+            return f64::NAN;
+        }
+        *state = InverseState { x, w: Some(w), memory };
+        volts
+    }
+
+    /// The operator after a monotone move; `None` where that is too long or not a number.
+    #[inline]
+    fn travel(&self, mut memory: DahlState<Plain>, distance: f64) -> Option<DahlState<Plain>> {
+        let length = distance.abs();
+        let direction = Plain(if distance < 0.0 { -1.0 } else { 1.0 });
+        if length > self.piece {
+            if length > MOST_PIECES * self.piece {
+                return None;
+            }
+            let mut left = length;
+            while left > self.piece {
+                let branch = self.operator.branch(&memory, direction);
+                memory = self.operator.along(&branch, direction * Plain(self.piece));
+                left -= self.piece;
+            }
+            let branch = self.operator.branch(&memory, direction);
+            return Some(self.operator.along(&branch, direction * Plain(left)));
+        }
+        if distance.is_nan() {
+            return None;
+        }
+        let branch = self.operator.branch(&memory, direction);
+        Some(self.operator.along(&branch, Plain(distance)))
+    }
+
+    /// The operator along the cubic with velocities `w0` and `w1` that rises by `rise`.
+    #[cold]
+    fn travel_cubic(
+        &self,
+        mut memory: DahlState<Plain>,
+        rise: f64,
+        w0: f64,
+        w1: f64,
+    ) -> Option<DahlState<Plain>> {
+        // Hermite form about the start: w0 s + c2 s^2 + c3 s^3, s from 0 to 1
+        let c3 = w0 + w1 - 2.0 * rise;
+        let c2 = rise - w0 - c3;
+        let mut here = 0.0;
+        for s in turning_times(w0, c2, c3) {
+            if s > 0.0 && s < 1.0 {
+                let there = s * (w0 + s * (c2 + s * c3));
+                memory = self.travel(memory, there - here)?;
+                here = there;
+            }
+        }
+        self.travel(memory, rise - here)
+    }
+}
+
+/// Where w0 + 2 c2 s + 3 c3 s^2 is 0, in order; NaN where it is not.
+fn turning_times(w0: f64, c2: f64, c3: f64) -> [f64; 2] {
+    let root = libm::sqrt(c2 * c2 - 3.0 * c3 * w0);
+    let q = -(c2 + if c2 < 0.0 { -root } else { root });
+    let (a, b) = (q / (3.0 * c3), w0 / q);
+    if a < b { [a, b] } else { [b, a] }
+}
+
+/// A number whose `mul_add` rounds twice. A processor built for without a fused instruction
+/// calls a function for each one that rounds once, which takes longer than the whole step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Plain(f64);
+
+impl Add for Plain {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(self.0 + other.0)
+    }
+}
+
+impl Sub for Plain {
+    type Output = Self;
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self(self.0 - other.0)
+    }
+}
+
+impl Mul for Plain {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self(self.0 * other.0)
+    }
+}
+
+impl Div for Plain {
+    type Output = Self;
+
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Self(self.0 / other.0)
+    }
+}
+
+impl Neg for Plain {
+    type Output = Self;
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(-self.0)
+    }
+}
+
+impl Number for Plain {
+    #[inline(always)]
+    fn like(self, value: f64) -> Self {
+        Self(value)
+    }
+
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        self * factor + term
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(libm::sqrt(self.0))
+    }
+
+    #[inline(always)]
+    fn where_negative(self, yes: Self, no: Self) -> Self {
+        if self.0 < 0.0 { yes } else { no }
+    }
+
+    #[inline(always)]
+    fn any_negative(self) -> bool {
+        self.0 < 0.0
+    }
+}

@@ -1,0 +1,182 @@
+//! Incremental PID controller with back-calculation antiwindup.
+//!
+//! ```text
+//! uFB[k] = uFB[k-1] + Kp (e[k] - e[k-1]) + (Kp Ts/Ti) e[k]
+//!          + (Kp Td/Ts) (e[k] - 2 e[k-1] + e[k-2]) + (Ts/Tt) eu[k-1],   eu = v - u
+//! ```
+//!
+//! Xu and Li 2010, equations (22) to (25), doi 10.1115/1.4001712, with one correction. Printed,
+//! the recursion starts from the previous *total* command and adds the feedforward again, which
+//! integrates the feedforward: some 100 um of error. It belongs to the feedback part alone. The
+//! excess `eu` however is that of the total command `u = uFB + uFF + uRC` against the voltage
+//! `v` that the amplifier really gave.
+
+use crate::error::{Error, Result, check, finite, not_negative};
+use crate::feedback::Feedback;
+
+/// Gains of a PID controller, in continuous time.
+///
+/// | field | symbol | unit | range |
+/// | --- | --- | --- | --- |
+/// | `kp` | Kp | V/m | any |
+/// | `ti` | Ti | s | > 0, or infinite: no integral part |
+/// | `td` | Td | s | >= 0 |
+/// | `tt` | Tt | s | > Ts/2, or infinite: no antiwindup |
+///
+/// ```
+/// use piezotrack_control::{Feedback, Pid};
+///
+/// let pid = Pid::new(0.120e6, 0.009, 0.044, None)?.at(0.02)?;
+/// let mut state = pid.rest();
+/// let volts = pid.step(&mut state, 1e-6, 0.0);
+/// assert!((volts - 0.120 * 0.02 / 0.009).abs() < 1e-12);
+/// # Ok::<(), piezotrack_control::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pid {
+    kp: f64,
+    ti: f64,
+    td: f64,
+    tt: f64,
+}
+
+impl Pid {
+    /// Gains `kp` in V/m and times in s.
+    ///
+    /// `tt`, the time in which back-calculation works off an excess, is sqrt(Ti Td) by default,
+    /// and Ti where Td is 0. Without an integral part (`ti` infinite) nothing winds up, and an
+    /// incremental controller would keep for ever what back-calculation took off it: there is
+    /// no antiwindup then, and a finite `tt` is refused.
+    ///
+    /// # Errors
+    /// Names the gain or time that is out of its range.
+    pub fn new(kp: f64, ti: f64, td: f64, tt: Option<f64>) -> Result<Self> {
+        finite("kp", kp, "V/m")?;
+        check("ti", ti, "s", ti > 0.0, "a time above 0, or infinity for no integral part")?;
+        not_negative("td", td, "s")?;
+        let tt = match tt {
+            Some(tt) => {
+                check("tt", tt, "s", tt > 0.0, "a time above 0, or infinity for no antiwindup")?;
+                let right = ti.is_finite() || tt.is_infinite();
+                check("tt", tt, "s", right, "none: with ti infinite there is nothing to unwind")?
+            }
+            None if ti.is_finite() && td > 0.0 => libm::sqrt(ti) * libm::sqrt(td),
+            None => ti,
+        };
+        Ok(Self { kp, ti, td, tt })
+    }
+
+    /// The published gains: Kp 0.120 V/um, Ti 0.009 s, Td 0.044 s, Tt = sqrt(Ti Td).
+    ///
+    /// Xu and Li 2010, section 5, doi 10.1115/1.4001712; for a loop at 50 Hz.
+    #[must_use]
+    pub fn xu_li_2010() -> Self {
+        Self { kp: 0.120e6, ti: 0.009, td: 0.044, tt: libm::sqrt(0.009 * 0.044) }
+    }
+
+    /// Kp, V/m.
+    #[must_use]
+    pub fn kp(&self) -> f64 {
+        self.kp
+    }
+
+    /// Ti, s.
+    #[must_use]
+    pub fn ti(&self) -> f64 {
+        self.ti
+    }
+
+    /// Td, s.
+    #[must_use]
+    pub fn td(&self) -> f64 {
+        self.td
+    }
+
+    /// Tt, s.
+    #[must_use]
+    pub fn tt(&self) -> f64 {
+        self.tt
+    }
+
+    /// The controller for a sampling interval `dt`, s.
+    ///
+    /// # Errors
+    /// Names `dt` where it is not above 0; `tt` where it is not above dt/2, from where on
+    /// back-calculation is unstable by itself (its pole is 1 - dt/Tt); `kp` where a coefficient
+    /// is too large to be a number.
+    pub fn at(&self, dt: f64) -> Result<SampledPid> {
+        crate::error::positive("dt", dt, "s")?;
+        let right = self.tt > 0.5 * dt;
+        check("tt", self.tt, "s", right, "more than half a sampling interval")?;
+        let sampled = SampledPid {
+            proportional: self.kp,
+            integral: self.kp * (dt / self.ti),
+            derivative: self.kp * (self.td / dt),
+            tracking: dt / self.tt,
+        };
+        let right = sampled.integral.is_finite() && sampled.derivative.is_finite();
+        let expected = "a gain whose coefficients Kp dt/Ti and Kp Td/dt are finite";
+        if right {
+            Ok(sampled)
+        } else {
+            Err(Error { name: "kp", value: self.kp, unit: "V/m", expected })
+        }
+    }
+}
+
+/// Coefficients of a PID controller for one sampling interval; see [`Pid::at`].
+///
+/// Gains change without a bump: take other coefficients and go on with the same state. All that
+/// is remembered is the output and two errors, and no coefficient acts on the output.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SampledPid {
+    /// Kp, V/m.
+    proportional: f64,
+    /// Kp Ts/Ti, V/m.
+    integral: f64,
+    /// Kp Td/Ts, V/m.
+    derivative: f64,
+    /// Ts/Tt.
+    tracking: f64,
+}
+
+/// Memory of a PID controller.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PidState {
+    /// The output, V.
+    volts: f64,
+    /// The last two errors, m. `None` before the first: it counts as having always been there,
+    /// so that the controller starts without a kick.
+    errors: Option<[f64; 2]>,
+}
+
+impl Feedback for SampledPid {
+    type State = PidState;
+
+    fn rest(&self) -> PidState {
+        self.start(0.0)
+    }
+
+    fn start(&self, volts: f64) -> PidState {
+        PidState { volts, errors: None }
+    }
+
+    #[inline]
+    fn step(&self, state: &mut PidState, error: f64, excess: f64) -> f64 {
+        let [e1, e2] = state.errors.unwrap_or([error; 2]);
+        let rise = error - e1;
+        let bend = rise - (e1 - e2);
+        let change = self.proportional * rise
+            + self.integral * error
+            + self.derivative * bend
+            + self.tracking * excess;
+        let volts = state.volts + change;
+        if volts.is_finite() {
+            *state = PidState { volts, errors: Some([error, e1]) };
+        } else {
+            // Too large to be a number: hold the output, and start anew from the next error.
+            state.errors = None;
+        }
+        state.volts
+    }
+}

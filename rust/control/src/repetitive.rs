@@ -1,0 +1,328 @@
+//! Repetitive controller, plugged in beside the feedback: it learns what every period needs.
+//!
+//! ```text
+//! uRC[k] = p uRC[k-1] + (1-p) (uRC[k-N-1] + Kq e[k-N-1]),   p = exp(-Ts/Tq),  N = L/Ts
+//! ```
+//!
+//! Xu and Li 2010, equations (26) to (28), doi 10.1115/1.4001712. The recursion that is printed
+//! there, (29) and (30), has a common factor left in and four digits: its pole at 1.000172 grows
+//! by 4.4 % a period. What is written to the delay line here is the sum `uRC + Kq e`, so one line
+//! does, and all of Q, leak and fractional delay are a few taps on it.
+
+use crate::error::{Error, Result, check, not_negative, positive};
+
+/// Taps of the cubic that reads between two samples.
+const CUBIC: usize = 4;
+/// Taps on each side of the middle one in a zero-phase filter, at most.
+const HALF: usize = 4;
+/// Taps on the delay line, at most.
+const TAPS: usize = 2 * HALF + CUBIC;
+/// Longest period, in samples.
+const LONGEST: f64 = 1e9;
+
+/// The filter Q: what it passes is learnt, and what it stops cannot make the loop unstable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Smoothing {
+    /// First-order lag of time constant `tq`, s, as in the paper.
+    ///
+    /// It delays by `tq` too, so that what was learnt comes that much late; with
+    /// `compensated` the delay line is that much shorter.
+    Lag {
+        /// Time constant Tq, s.
+        tq: f64,
+        /// Whether the delay line makes up for the filter's lag.
+        compensated: bool,
+    },
+    /// `((1 + cos(w Ts))/2)^order`, order 1 to 4: no lag at all, since a period ago the
+    /// samples that follow are known. Half is passed at 1/4 of the sampling rate for order 1, at
+    /// 0.18 of it for order 2, 0.13 for order 4.
+    ZeroPhase {
+        /// Order, 1 to 4.
+        order: u32,
+    },
+    /// Q = leak: everything is learnt, which only a loop without delay survives.
+    None,
+}
+
+/// Settings of a repetitive controller, in continuous time.
+///
+/// | field | symbol | unit | range | default |
+/// | --- | --- | --- | --- | --- |
+/// | `period` | L | s | two samples or more | |
+/// | `smoothing` | Q, Tq | s | | |
+/// | `kq` | Kq | V/um | 0 < Kq < 2 | |
+/// | `leak` | Q(1) | 1 | 0 < Q(1) <= 1 | 0.99 |
+/// | `lead` | | s | >= 0 | 0 |
+/// | `pause` | | | | true |
+///
+/// `kq` is in V/um, unlike all else here: (28) states its bound, 0 < Kq < 2, for the number
+/// that goes with errors in um. The bound is necessary, not sufficient.
+///
+/// Beside an integrator in the feedback the loop has a root at exactly 1, in which uRC and uFB
+/// move against each other unseen; under saturation they drift without end. `leak` and `pause`
+/// (no error is learnt from a saturated sample) put an end to it.
+///
+/// ```
+/// use piezotrack_control::{Repetitive, Smoothing};
+///
+/// let smoothing = Smoothing::Lag { tq: 0.2, compensated: true };
+/// let learner = Repetitive::new(5.0, smoothing, 1.0)?.at(0.02)?;
+/// let mut state = learner.rest([0.0; 256])?;
+/// let volts = learner.step(&mut state, 1e-6, false);
+/// assert_eq!(volts, 0.0); // there is no period to learn from yet
+/// # Ok::<(), piezotrack_control::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Repetitive {
+    /// Period L of the reference, s; it need not be a whole number of samples.
+    pub period: f64,
+    /// The filter Q.
+    pub smoothing: Smoothing,
+    /// Learning gain Kq, V/um.
+    pub kq: f64,
+    /// Q(1), what is kept of a constant from period to period.
+    pub leak: f64,
+    /// By how much the learnt voltage comes earlier, s, to make up for the plant's own lag.
+    pub lead: f64,
+    /// Whether the error of a saturated sample is stored as 0.
+    pub pause: bool,
+}
+
+impl Repetitive {
+    /// A controller with the defaults of the table: `period` in s, `kq` in V/um.
+    ///
+    /// # Errors
+    /// Names the parameter that is out of its range.
+    pub fn new(period: f64, smoothing: Smoothing, kq: f64) -> Result<Self> {
+        let settings = Self { period, smoothing, kq, leak: 0.99, lead: 0.0, pause: true };
+        settings.check()?;
+        Ok(settings)
+    }
+
+    /// The paper's form: Tq = 0.2 s, Kq = 1.0 V/um, no leak, no pause under saturation.
+    ///
+    /// Xu and Li 2010, section 4.3, with L = 5 s for 0.2 Hz and 2 s for 0.5 Hz.
+    #[must_use]
+    pub fn xu_li_2010(period: f64) -> Self {
+        let smoothing = Smoothing::Lag { tq: 0.2, compensated: false };
+        Self { period, smoothing, kq: 1.0, leak: 1.0, lead: 0.0, pause: false }
+    }
+
+    /// Room in samples for a period of so many samples (rounded up), for an array of fixed size.
+    #[must_use]
+    pub const fn room(period: usize) -> usize {
+        period.saturating_add(HALF + CUBIC)
+    }
+
+    fn check(&self) -> Result<()> {
+        positive("period", self.period, "s")?;
+        let right = self.kq > 0.0 && self.kq < 2.0;
+        check("kq", self.kq, "V/um", right, "a gain above 0 and below 2, not included")?;
+        let right = self.leak > 0.0 && self.leak <= 1.0;
+        check("leak", self.leak, "", right, "a gain above 0, at most 1")?;
+        not_negative("lead", self.lead, "s")?;
+        match self.smoothing {
+            Smoothing::Lag { tq, .. } => positive("tq", tq, "s").map(drop),
+            Smoothing::ZeroPhase { order } => {
+                let right = (1..=4).contains(&order);
+                check("order", f64::from(order), "", right, "1 to 4").map(drop)
+            }
+            Smoothing::None => Ok(()),
+        }
+    }
+
+    /// The controller for a sampling interval `dt`, s.
+    ///
+    /// # Errors
+    /// Names the parameter that is out of its range: `period` where it is under two samples, or
+    /// shorter than filter and lead together need.
+    pub fn at(&self, dt: f64) -> Result<SampledRepetitive> {
+        self.check()?;
+        positive("dt", dt, "s")?;
+        let samples = self.period / dt;
+        // Two samples given in decimals may miss 2 by rounding.
+        let right = (2.0 - 1e-9..=LONGEST).contains(&samples);
+        check("period", self.period, "s", right, "from 2 to 1e9 sampling intervals")?;
+
+        let mut q = [0.0; HALF + 1];
+        q[0] = 1.0;
+        let (mut pole, mut half) = (0.0, 0);
+        let mut delay = samples - self.lead / dt;
+        match self.smoothing {
+            Smoothing::Lag { tq, compensated } => {
+                pole = libm::exp(-dt / tq);
+                // Its zero-order hold delays by one sample; the rest of the lag is Tq.
+                delay += if compensated { 1.0 - tq / dt } else { 1.0 };
+            }
+            Smoothing::ZeroPhase { order } => (q, half) = binomial(order),
+            Smoothing::None => {}
+        }
+        let shortest = samples - delay + count(half) + 1.0;
+        let right = samples >= shortest;
+        let expected = "longer than the filter's lag, the lead and one sample together";
+        check("period", self.period, "s", right, expected)?;
+        Ok(self.taps(delay, pole, &q, half))
+    }
+
+    /// Convolves the filter with the cubic that reads the line at a fractional delay.
+    fn taps(&self, delay: f64, pole: f64, q: &[f64; HALF + 1], half: usize) -> SampledRepetitive {
+        // A period given in decimals is a whole number of samples up to rounding.
+        let nearest = libm::round(delay);
+        let whole = if (delay - nearest).abs() < 1e-9 * delay { nearest } else { delay };
+        let mut floor = libm::floor(whole);
+        let mut part = whole - floor;
+        // The cubic reads one sample before and one after its interval; before the newest there
+        // is none yet, so close to it the outermost interval has to do.
+        let newest = count(half) + 1.0;
+        let (before, reads) = if part > 0.0 {
+            if floor - 1.0 < newest {
+                floor += 1.0;
+                part -= 1.0;
+            }
+            (1.0, CUBIC)
+        } else {
+            (0.0, 1)
+        };
+        let cubic = if reads == 1 { [1.0, 0.0, 0.0, 0.0] } else { lagrange(part) };
+        let mut taps = [0.0; TAPS];
+        let gain = self.leak * (1.0 - pole);
+        for (i, read) in cubic.iter().take(reads).enumerate() {
+            for j in 0..=2 * half {
+                taps[i + j] += gain * read * q[j.abs_diff(half)];
+            }
+        }
+        SampledRepetitive {
+            pole,
+            gain: self.kq * 1e6,
+            pause: self.pause,
+            nearest: samples(floor - before) - half,
+            taps,
+            reads: reads + 2 * half,
+        }
+    }
+}
+
+/// Taps of `((1 + cos w)/2)^order` from the middle one outwards, and how many on each side.
+fn binomial(order: u32) -> ([f64; HALF + 1], usize) {
+    let half = if order > 4 { HALF } else { order as usize };
+    let mut q = [0.0; HALF + 1];
+    q[0] = 1.0;
+    for _ in 0..half {
+        let old = q;
+        for j in 0..=half {
+            let outer = if j < half { old[j + 1] } else { 0.0 };
+            let inner = if j == 0 { old[1] } else { old[j - 1] };
+            q[j] = 0.5 * old[j] + 0.25 * (inner + outer);
+        }
+    }
+    (q, half)
+}
+
+/// Weights of the samples at -1, 0, 1 and 2 for the cubic through them, read at `part`.
+fn lagrange(part: f64) -> [f64; CUBIC] {
+    let (up, down, far) = (part + 1.0, part - 1.0, part - 2.0);
+    [
+        -part * down * far / 6.0,
+        up * down * far / 2.0,
+        -up * part * far / 2.0,
+        up * part * down / 6.0,
+    ]
+}
+
+/// A small index as a number.
+fn count(n: usize) -> f64 {
+    u32::try_from(n).map_or(f64::NAN, f64::from)
+}
+
+/// A whole number of samples, already checked to lie between 0 and [`LONGEST`].
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
+fn samples(value: f64) -> usize {
+    value as usize
+}
+
+/// Coefficients of a repetitive controller for one sampling interval; see [`Repetitive::at`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SampledRepetitive {
+    /// p, 0 for a filter without memory.
+    pole: f64,
+    /// Kq, V/m.
+    gain: f64,
+    pause: bool,
+    /// Delay of the first tap, in samples, 1 or more.
+    nearest: usize,
+    taps: [f64; TAPS],
+    /// How many taps are in use.
+    reads: usize,
+}
+
+/// Memory of a repetitive controller: a delay line lent by the caller, `&mut [f64]`, `[f64; N]`
+/// or `Vec<f64>`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RepetitiveState<L> {
+    line: L,
+    /// Where the next entry goes.
+    next: usize,
+    /// The last output, V.
+    volts: f64,
+}
+
+impl SampledRepetitive {
+    /// Entries that the delay line must have, at least.
+    #[must_use]
+    pub fn length(&self) -> usize {
+        self.nearest + self.reads - 1
+    }
+
+    /// The memory before any learning. `line` is filled with zeros.
+    ///
+    /// # Errors
+    /// Names `line` where it is shorter than [`Self::length`].
+    pub fn rest<L: AsMut<[f64]>>(&self, mut line: L) -> Result<RepetitiveState<L>> {
+        let entries = line.as_mut();
+        if entries.len() < self.length() {
+            let value = count(entries.len());
+            let expected = "at least as many as the controller's length()";
+            return Err(Error { name: "line", value, unit: "entries", expected });
+        }
+        entries.fill(0.0);
+        Ok(RepetitiveState { line, next: 0, volts: 0.0 })
+    }
+
+    /// The voltage for this sample, from the tracking error (m) of the sample *before*.
+    ///
+    /// The error of a sample can show in the voltage of the next one at the earliest, so that it
+    /// need not be known sooner; by then it is also known whether the command was clipped
+    /// (`saturated`). At the first sample there is no error yet: 0.
+    #[inline]
+    pub fn step<L: AsMut<[f64]>>(
+        &self,
+        state: &mut RepetitiveState<L>,
+        error: f64,
+        saturated: bool,
+    ) -> f64 {
+        let error = if (saturated && self.pause) || !error.is_finite() { 0.0 } else { error };
+        let line = state.line.as_mut();
+        let length = self.length();
+        let Some(line) = line.get_mut(..length) else { return 0.0 };
+        if let Some(entry) = line.get_mut(state.next) {
+            *entry = state.volts + self.gain * error;
+        }
+        state.next = if state.next + 1 < length { state.next + 1 } else { 0 };
+        // The oldest entry, which is the last tap's, is the one to be written next.
+        let (newer, older) = line.split_at(state.next);
+        let ages = older.iter().chain(newer);
+        let taps = self.taps.iter().take(self.reads).rev();
+        let learnt = ages.zip(taps).fold(0.0, |sum, (entry, tap)| sum + entry * tap);
+        let volts = self.pole * state.volts + learnt;
+        // An output too large to be a number is forgotten.
+        state.volts = if volts.is_finite() { volts } else { 0.0 };
+        state.volts
+    }
+
+    /// Forgets all that was learnt.
+    pub fn reset<L: AsMut<[f64]>>(&self, state: &mut RepetitiveState<L>) {
+        state.line.as_mut().fill(0.0);
+        state.next = 0;
+        state.volts = 0.0;
+    }
+}

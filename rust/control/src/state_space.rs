@@ -1,0 +1,149 @@
+//! A feedback law in discrete state space.
+//!
+//! ```text
+//! x[k+1] = A x[k] + B e[k],   u[k] = C x[k] + D e[k]
+//! ```
+
+use crate::error::{Error, Result, check, finite};
+use crate::feedback::Feedback;
+
+/// A linear controller with up to `N` states; one error in (m), one voltage out.
+///
+/// **Antiwindup.** With a gain vector `l`, back-calculation: what the amplifier gave less what
+/// was asked for, `eu[k]` in V, enters as `x[k+1] = A x[k] + B e[k] + l eu[k]`; `A - l C` should
+/// be stable. Without one, conditional freezing: while the command is clipped, the state stays
+/// where it is as long as its next step would take the command further out.
+///
+/// ```
+/// use piezotrack_control::{Feedback, StateSpace};
+///
+/// // An integrator of 1e5 V/(m sample).
+/// let law = StateSpace::<1>::new(&[1.0], &[1e5], &[1.0], 0.0, None)?;
+/// let mut state = law.rest();
+/// law.step(&mut state, 1e-6, 0.0);
+/// assert!((law.step(&mut state, 1e-6, 0.0) - 0.1).abs() < 1e-15);
+/// # Ok::<(), piezotrack_control::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StateSpace<const N: usize> {
+    a: [[f64; N]; N],
+    b: [f64; N],
+    c: [f64; N],
+    d: f64,
+    back: Option<[f64; N]>,
+}
+
+impl<const N: usize> StateSpace<N> {
+    /// Matrices of `b.len()` states, `a` row by row; fewer than `N` are padded with zeros.
+    ///
+    /// `d` is in V/m, `b` times `c` too; `back` is the optional vector of back-calculation.
+    ///
+    /// # Errors
+    /// Names the matrix that has the wrong number of entries or one that is not finite.
+    pub fn new(a: &[f64], b: &[f64], c: &[f64], d: f64, back: Option<&[f64]>) -> Result<Self> {
+        let n = b.len();
+        entries("b", b, n, n <= N, "at most as many entries as the controller has room for")?;
+        entries("a", a, n, a.len() == n * n, "a square of as many rows as b has entries")?;
+        entries("c", c, n, c.len() == n, "as many entries as b")?;
+        finite("d", d, "V/m")?;
+        let mut out =
+            Self { a: [[0.0; N]; N], b: [0.0; N], c: [0.0; N], d, back: back.map(|_| [0.0; N]) };
+        for (to, from) in out.a.iter_mut().zip(a.chunks(n.max(1))) {
+            fill(to, from);
+        }
+        fill(&mut out.b, b);
+        fill(&mut out.c, c);
+        if let (Some(to), Some(from)) = (&mut out.back, back) {
+            entries("back", from, n, from.len() == n, "as many entries as b")?;
+            fill(to, from);
+        }
+        Ok(out)
+    }
+}
+
+/// Refuses a wrong number of entries, and entries that are not finite.
+fn entries(
+    name: &'static str,
+    values: &[f64],
+    n: usize,
+    right: bool,
+    expected: &'static str,
+) -> Result<()> {
+    let count = u32::try_from(values.len()).map_or(f64::INFINITY, f64::from);
+    check(name, count, "entries", right && n > 0, expected)?;
+    match values.iter().find(|value| !value.is_finite()) {
+        Some(&value) => Err(Error { name, value, unit: "", expected: "finite numbers" }),
+        None => Ok(()),
+    }
+}
+
+fn fill(to: &mut [f64], from: &[f64]) {
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = *from;
+    }
+}
+
+/// Memory of a [`StateSpace`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StateSpaceState<const N: usize> {
+    x: [f64; N],
+    /// The error of the sample before, which has not yet moved `x`; `None` before the first.
+    error: Option<f64>,
+    /// Voltage at the first sample where a start without a bump was asked for.
+    first: Option<f64>,
+    /// Constant part of the output that this takes, V. It stays; an integrator works it off.
+    offset: f64,
+}
+
+impl<const N: usize> Feedback for StateSpace<N> {
+    type State = StateSpaceState<N>;
+
+    fn rest(&self) -> Self::State {
+        StateSpaceState { x: [0.0; N], error: None, first: None, offset: 0.0 }
+    }
+
+    fn start(&self, volts: f64) -> Self::State {
+        StateSpaceState { first: Some(volts), ..self.rest() }
+    }
+
+    #[inline]
+    fn step(&self, state: &mut Self::State, error: f64, excess: f64) -> f64 {
+        if let Some(last) = state.error {
+            self.advance(&mut state.x, last, excess);
+        } else if let Some(first) = state.first {
+            state.offset = first - self.d * error;
+        }
+        state.error = Some(error);
+        let volts = dot(&self.c, &state.x) + self.d * error + state.offset;
+        if volts.is_finite() {
+            return volts;
+        }
+        // Too large to be a number: start anew.
+        *state = self.rest();
+        0.0
+    }
+}
+
+impl<const N: usize> StateSpace<N> {
+    /// Moves the state on by the sample whose error and excess are now known.
+    #[inline]
+    fn advance(&self, x: &mut [f64; N], error: f64, excess: f64) {
+        let mut next = [0.0; N];
+        for ((next, row), b) in next.iter_mut().zip(&self.a).zip(&self.b) {
+            *next = dot(row, x) + b * error;
+        }
+        if let Some(back) = &self.back {
+            for (next, gain) in next.iter_mut().zip(back) {
+                *next += gain * excess;
+            }
+        } else if excess * (dot(&self.c, &next) - dot(&self.c, x)) < 0.0 {
+            return;
+        }
+        *x = next;
+    }
+}
+
+#[inline]
+fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+    a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + a * b)
+}

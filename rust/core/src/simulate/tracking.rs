@@ -1,0 +1,121 @@
+//! A controller in the loop: reference and feedforward in, motion and commands out.
+
+use piezotrack_control::{
+    Command, Controller, Feedback, PidState, SampledPid, StateSpace, StateSpaceState,
+};
+
+use super::{Apparatus, ApparatusState, ClosedLoop, Plant, Timing, closed_loop};
+use crate::error::{Error, Result};
+use crate::integrate::Stop;
+
+/// Most states of a feedback law in state space.
+pub const MOST_STATES: usize = 16;
+
+/// The feedback laws that a controller can be given.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "one in a controller, and no allocation in it")]
+pub enum Law {
+    /// None: feedforward alone.
+    None,
+    /// Incremental PID.
+    Pid(SampledPid),
+    /// Discrete state space.
+    StateSpace(StateSpace<MOST_STATES>),
+}
+
+/// Memory of a [`Law`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "one in a controller, and no allocation in it")]
+pub enum LawState {
+    /// Nothing to remember.
+    None,
+    /// Of a PID controller.
+    Pid(PidState),
+    /// Of a controller in state space.
+    StateSpace(StateSpaceState<MOST_STATES>),
+}
+
+impl Feedback for Law {
+    type State = LawState;
+
+    fn rest(&self) -> LawState {
+        match self {
+            Self::None => LawState::None,
+            Self::Pid(law) => LawState::Pid(law.rest()),
+            Self::StateSpace(law) => LawState::StateSpace(law.rest()),
+        }
+    }
+
+    fn start(&self, volts: f64) -> LawState {
+        match self {
+            Self::None => LawState::None,
+            Self::Pid(law) => LawState::Pid(law.start(volts)),
+            Self::StateSpace(law) => LawState::StateSpace(law.start(volts)),
+        }
+    }
+
+    fn step(&self, state: &mut LawState, error: f64, excess: f64) -> f64 {
+        match (self, state) {
+            (Self::Pid(law), LawState::Pid(state)) => law.step(state, error, excess),
+            (Self::StateSpace(law), LawState::StateSpace(state)) => law.step(state, error, excess),
+            _ => 0.0,
+        }
+    }
+}
+
+/// What a controller is to follow, sample by sample.
+#[derive(Clone, Copy, Debug)]
+pub struct Course<'a> {
+    /// Reference, m.
+    pub reference: &'a [f64],
+    /// Feedforward, V.
+    pub feedforward: &'a [f64],
+}
+
+/// A controlled motion and the commands behind it.
+#[derive(Clone, Debug)]
+pub struct Tracked<S> {
+    /// The motion, with the instants between the control samples.
+    pub motion: ClosedLoop<S>,
+    /// The command at each control sample.
+    pub commands: Vec<Command>,
+}
+
+/// Leads an apparatus along a course; `None` where `stop` said so meanwhile.
+///
+/// # Errors
+/// [`Error::Shape`] where the course's parts differ in length; otherwise as [`closed_loop`].
+pub fn track<P: Plant, F: Feedback>(
+    apparatus: &Apparatus<'_, P>,
+    start: ApparatusState<P::State>,
+    timing: &Timing,
+    controller: &Controller<F>,
+    course: Course<'_>,
+    stop: Stop<'_>,
+) -> Result<Option<Tracked<P::State>>> {
+    let samples = course.reference.len();
+    if course.feedforward.len() != samples {
+        return Err(Error::Shape {
+            name: "feedforward".into(),
+            found: format!("{} samples", course.feedforward.len()),
+            expected: format!("{samples}, as many as the reference"),
+        });
+    }
+    let length = controller.repetitive.map_or(0, |part| part.length());
+    let mut state = controller.rest(vec![0.0; length])?;
+    let mut commands = Vec::with_capacity(samples);
+    let timing = Timing { samples, ..*timing };
+    let motion = closed_loop(
+        apparatus,
+        start,
+        &timing,
+        |k, measured| {
+            let (reference, feedforward) = (course.reference[k], course.feedforward[k]);
+            let command = controller.step(&mut state, reference, measured, feedforward);
+            commands.push(command);
+            command.volts
+        },
+        stop,
+    )?;
+    Ok(motion.map(|motion| Tracked { motion, commands }))
+}
