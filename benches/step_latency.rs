@@ -1,9 +1,11 @@
-//! Latency of one step of one stage: what a simulation costs per sub-step.
+//! Latency of one step: of a stage, which is what a simulation costs per sub-step, and of a
+//! controller, which is what it costs per sample.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use piezotrack_control::{Controller, DahlInverse, Limits, Pid, Repetitive, Smoothing};
 use piezotrack_core::integrate::{Drive, Hold, NEVER, simulate_fixed};
 use piezotrack_core::march::{Order, Stepping};
 use piezotrack_core::stage::{DahlStage, StageState};
@@ -26,5 +28,54 @@ fn latency(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, latency);
+/// Feedforward, PID with antiwindup and repetitive control with N = 250, 5000 samples a turn.
+///
+/// The measurement of a sample follows from the command before, as in a loop, so that steps
+/// cannot overlap more than they could there.
+fn controller(criterion: &mut Criterion) {
+    let dt = 0.02;
+    let turn = core::f64::consts::TAU * 0.2;
+    let path: Vec<[f64; 3]> = (0..5000)
+        .map(|k| {
+            let (sin, cos) = (turn * dt * f64::from(k)).sin_cos();
+            [55e-6 * (1.0 - cos), 55e-6 * turn * sin, 55e-6 * turn * turn * cos]
+        })
+        .collect();
+    let inverse = DahlInverse::xu_li_2010().at(dt).unwrap();
+    let mut controller =
+        Controller::new(Limits::new(0.0, 75.0).unwrap(), Pid::xu_li_2010().at(dt).unwrap());
+    let mut group = criterion.benchmark_group("step_latency");
+    group.throughput(Throughput::Elements(5000));
+    let settings = [
+        ("lag", Smoothing::Lag { tq: 0.2, compensated: true }, 5.0),
+        ("zero phase, fractional period", Smoothing::ZeroPhase { order: 4 }, 5.007),
+    ];
+    for (name, smoothing, period) in settings {
+        let learner = Repetitive::new(period, smoothing, 1.0).unwrap().at(dt).unwrap();
+        controller.repetitive = Some(learner);
+        group.bench_function(format!("controller, {name}"), |bencher| {
+            let mut forward = inverse.rest();
+            let mut state = controller.rest([0.0; Repetitive::room(251)]).unwrap();
+            let mut y = 0.0;
+            bencher.iter(|| {
+                for [x, v, a] in black_box(&path) {
+                    let feedforward = inverse.step(&mut forward, *x, *v, *a);
+                    y = 1.1e-6 * controller.step(&mut state, *x, y, feedforward).volts;
+                }
+                y
+            });
+        });
+    }
+    group.bench_function("inverse alone", |bencher| {
+        let mut forward = inverse.rest();
+        bencher.iter(|| {
+            black_box(&path)
+                .iter()
+                .fold(0.0, |sum, [x, v, a]| sum + inverse.step(&mut forward, *x, *v, *a))
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, latency, controller);
 criterion_main!(benches);

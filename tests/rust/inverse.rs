@@ -55,16 +55,18 @@ fn turning_points_between_samples_are_followed() {
     assert!(turns > 8, "{turns}");
     let linear = |k: usize| 1e4 / 0.05 * path[k];
     let most = (0..400).fold(0.0, |most, k| f64::max(most, (coarse[k] - linear(k)).abs()));
-    let mut straight = 0.0;
+    let (mut worst, mut straight) = (0.0, 0.0);
     let mut state = inverse.at(0.01).unwrap().rest();
     for k in 0..400 {
         let error = (coarse[k] - fine[400 * k]).abs();
-        assert!(error < 1e-5 * most, "{error} V of {most} V at sample {k}");
+        worst = f64::max(worst, error);
         // With no velocities given, the path is monotone from sample to sample.
         let volts = inverse.at(0.01).unwrap().step(&mut state, path[k], 0.0, 0.0);
         straight = f64::max(straight, (volts - fine[400 * k]).abs());
     }
-    assert!(straight > 1e-3 * most, "{straight} V of {most} V");
+    println!("{worst} {straight}");
+    assert!(worst < 1e-6 * most, "{worst} V of {most} V");
+    assert!(straight > 100.0 * worst, "{straight} V beside {worst} V");
 }
 
 #[test]

@@ -7,7 +7,7 @@
 //! Xu and Li 2010, section 4, doi 10.1115/1.4001712; how the parts were corrected is told in
 //! [`crate::pid`] and [`crate::repetitive`].
 
-use crate::error::{Error, Result, check};
+use crate::error::{Error, Result, check, usable};
 use crate::feedback::Feedback;
 use crate::filters::{Filter, FilterState};
 use crate::limits::Limits;
@@ -230,10 +230,4 @@ impl<S, L> ControllerState<S, L> {
     pub fn last(&self) -> &Command {
         &self.last
     }
-}
-
-/// Whether a number can enter a memory: NaN, infinity and what would soon be one cannot.
-#[inline]
-fn usable(value: f64) -> bool {
-    value.abs() < 1e100
 }

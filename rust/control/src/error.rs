@@ -54,3 +54,9 @@ pub(crate) fn not_negative(name: &'static str, value: f64, unit: &'static str) -
     let right = value.is_finite() && value >= 0.0;
     check(name, value, unit, right, "a finite number, 0 or above")
 }
+
+/// Whether a number can enter a memory: NaN, infinity and what would soon be one cannot.
+#[inline]
+pub(crate) fn usable(value: f64) -> bool {
+    value.abs() < 1e100
+}

@@ -13,7 +13,7 @@
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::Number;
-use crate::error::{Result, check, finite, not_negative, positive};
+use crate::error::{Result, check, finite, not_negative, positive, usable};
 use crate::operator::{Dahl, DahlState, Operator};
 
 /// Parameters of the inverse of a Dahl stage.
@@ -162,10 +162,13 @@ impl SampledDahlInverse {
     /// The voltage for displacement `x` (m), velocity `v` (m/s) and acceleration `a` (m/s^2) of
     /// the reference. At the first sample the stage is taken to come straight from 0 to `x`.
     ///
-    /// NaN, with the state left as it was, where an input is not finite or more than 1000 pieces
+    /// NaN, with the state left as it was, where an input is not finite (or beyond 1e100), or `x` more than 1000 pieces
     /// (9 mm with the published a2) away; a controller holds its feedforward then.
     #[inline]
     pub fn step(&self, state: &mut InverseState, x: f64, v: f64, a: f64) -> f64 {
+        if !(usable(x) && usable(v) && usable(a)) {
+            return f64::NAN;
+        }
         let rise = x - state.x;
         let w = v * self.dt;
         let straight = match state.w {
@@ -201,7 +204,7 @@ impl SampledDahlInverse {
         volts
     }
 
-    /// The operator after a monotone move; `None` where that is too long or not a number.
+    /// The operator after a monotone move; `None` where that is too long.
     #[inline]
     fn travel(&self, mut memory: DahlState<Plain>, distance: f64) -> Option<DahlState<Plain>> {
         let length = distance.abs();
@@ -218,9 +221,6 @@ impl SampledDahlInverse {
             }
             let branch = self.operator.branch(&memory, direction);
             return Some(self.operator.along(&branch, direction * Plain(left)));
-        }
-        if distance.is_nan() {
-            return None;
         }
         let branch = self.operator.branch(&memory, direction);
         Some(self.operator.along(&branch, Plain(distance)))

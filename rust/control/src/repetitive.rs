@@ -9,7 +9,7 @@
 //! by 4.4 % a period. What is written to the delay line here is the sum `uRC + Kq e`, so one line
 //! does, and all of Q, leak and fractional delay are a few taps on it.
 
-use crate::error::{Error, Result, check, not_negative, positive};
+use crate::error::{Error, Result, check, positive};
 
 /// Taps of the cubic that reads between two samples.
 const CUBIC: usize = 4;
@@ -52,7 +52,7 @@ pub enum Smoothing {
 /// | `smoothing` | Q, Tq | s | | |
 /// | `kq` | Kq | V/um | 0 < Kq < 2 | |
 /// | `leak` | Q(1) | 1 | 0 < Q(1) <= 1 | 0.99 |
-/// | `lead` | | s | >= 0 | 0 |
+/// | `lead` | m | samples | shorter than the period | 0 |
 /// | `pause` | | | | true |
 ///
 /// `kq` is in V/um, unlike all else here: (28) states its bound, 0 < Kq < 2, for the number
@@ -82,8 +82,10 @@ pub struct Repetitive {
     pub kq: f64,
     /// Q(1), what is kept of a constant from period to period.
     pub leak: f64,
-    /// By how much the learnt voltage comes earlier, s, to make up for the plant's own lag.
-    pub lead: f64,
+    /// By how many samples an error comes earlier in what is learnt from it, to make up for the
+    /// plant's own delay. What was learnt before stays where it is: moving that too would learn
+    /// another period.
+    pub lead: u32,
     /// Whether the error of a saturated sample is stored as 0.
     pub pause: bool,
 }
@@ -94,7 +96,7 @@ impl Repetitive {
     /// # Errors
     /// Names the parameter that is out of its range.
     pub fn new(period: f64, smoothing: Smoothing, kq: f64) -> Result<Self> {
-        let settings = Self { period, smoothing, kq, leak: 0.99, lead: 0.0, pause: true };
+        let settings = Self { period, smoothing, kq, leak: 0.99, lead: 0, pause: true };
         settings.check()?;
         Ok(settings)
     }
@@ -105,7 +107,7 @@ impl Repetitive {
     #[must_use]
     pub fn xu_li_2010(period: f64) -> Self {
         let smoothing = Smoothing::Lag { tq: 0.2, compensated: false };
-        Self { period, smoothing, kq: 1.0, leak: 1.0, lead: 0.0, pause: false }
+        Self { period, smoothing, kq: 1.0, leak: 1.0, lead: 0, pause: false }
     }
 
     /// Room in samples for a period of so many samples (rounded up), for an array of fixed size.
@@ -120,7 +122,6 @@ impl Repetitive {
         check("kq", self.kq, "V/um", right, "a gain above 0 and below 2, not included")?;
         let right = self.leak > 0.0 && self.leak <= 1.0;
         check("leak", self.leak, "", right, "a gain above 0, at most 1")?;
-        not_negative("lead", self.lead, "s")?;
         match self.smoothing {
             Smoothing::Lag { tq, .. } => positive("tq", tq, "s").map(drop),
             Smoothing::ZeroPhase { order } => {
@@ -134,8 +135,8 @@ impl Repetitive {
     /// The controller for a sampling interval `dt`, s.
     ///
     /// # Errors
-    /// Names the parameter that is out of its range: `period` where it is under two samples, or
-    /// shorter than filter and lead together need.
+    /// Names the parameter that is out of its range: `period` where it is under two samples or
+    /// shorter than the filter needs, `lead` where the period leaves no room for it.
     pub fn at(&self, dt: f64) -> Result<SampledRepetitive> {
         self.check()?;
         positive("dt", dt, "s")?;
@@ -147,7 +148,7 @@ impl Repetitive {
         let mut q = [0.0; HALF + 1];
         q[0] = 1.0;
         let (mut pole, mut half) = (0.0, 0);
-        let mut delay = samples - self.lead / dt;
+        let mut delay = samples;
         match self.smoothing {
             Smoothing::Lag { tq, compensated } => {
                 pole = libm::exp(-dt / tq);
@@ -159,9 +160,12 @@ impl Repetitive {
         }
         let shortest = samples - delay + count(half) + 1.0;
         let right = samples >= shortest;
-        let expected = "longer than the filter's lag, the lead and one sample together";
+        let expected = "longer than the filter's lag and one sample together";
         check("period", self.period, "s", right, expected)?;
-        Ok(self.taps(delay, pole, &q, half))
+        let sampled = self.taps(delay, pole, &q, half);
+        let right = sampled.lead < sampled.nearest;
+        check("lead", f64::from(self.lead), "samples", right, "less than the period allows")?;
+        Ok(sampled)
     }
 
     /// Convolves the filter with the cubic that reads the line at a fractional delay.
@@ -195,6 +199,7 @@ impl Repetitive {
             pole,
             gain: self.kq * 1e6,
             pause: self.pause,
+            lead: self.lead as usize,
             nearest: samples(floor - before) - half,
             taps,
             reads: reads + 2 * half,
@@ -248,6 +253,8 @@ pub struct SampledRepetitive {
     /// Kq, V/m.
     gain: f64,
     pause: bool,
+    /// How many entries back an error goes.
+    lead: usize,
     /// Delay of the first tap, in samples, 1 or more.
     nearest: usize,
     taps: [f64; TAPS],
@@ -305,7 +312,11 @@ impl SampledRepetitive {
         let length = self.length();
         let Some(line) = line.get_mut(..length) else { return 0.0 };
         if let Some(entry) = line.get_mut(state.next) {
-            *entry = state.volts + self.gain * error;
+            *entry = state.volts;
+        }
+        let back = if state.next >= self.lead { state.next } else { state.next + length };
+        if let Some(entry) = line.get_mut(back - self.lead) {
+            *entry += self.gain * error;
         }
         state.next = if state.next + 1 < length { state.next + 1 } else { 0 };
         // The oldest entry, which is the last tap's, is the one to be written next.
