@@ -7,6 +7,7 @@
 """
 
 from ._core import __version__
+from .control import Command, Controller, LowPass, Notch, Pid, Repetitive, Session, StateSpace
 from .dataset import Dataset
 from .errors import (
     DataError,
@@ -18,15 +19,20 @@ from .errors import (
 )
 from .estimates import Estimate, Progress, Run
 from .identification import Identification, identify
+from .inverse import Inverse, InverseSession
 from .io import read, read_drive
 from .modelfile import IdentifiedModel, Score, load
 from .models import DahlStage, Response, StageState
 from .reference_text import parse_reference
 from .references import Reference, SampledReference, read_reference
 from .swarm import ParticleSwarm
+from .tracking import Metrics, Tracking, track
+from .virtual import VirtualResponse, VirtualStage
 from .waveforms import chirp, multisine, sine, staircase, triangle
 
 __all__ = [
+    "Command",
+    "Controller",
     "DahlStage",
     "DataError",
     "Dataset",
@@ -34,18 +40,30 @@ __all__ = [
     "Identification",
     "IdentifiedModel",
     "Interrupted",
+    "Inverse",
+    "InverseSession",
+    "LowPass",
+    "Metrics",
+    "Notch",
     "NumericalError",
     "ParameterError",
     "ParticleSwarm",
+    "Pid",
     "PiezotrackError",
     "Progress",
     "Reference",
+    "Repetitive",
     "Response",
     "Run",
     "SampledReference",
     "Score",
+    "Session",
     "ShapeError",
     "StageState",
+    "StateSpace",
+    "Tracking",
+    "VirtualResponse",
+    "VirtualStage",
     "__version__",
     "chirp",
     "identify",
@@ -57,5 +75,6 @@ __all__ = [
     "read_reference",
     "sine",
     "staircase",
+    "track",
     "triangle",
 ]

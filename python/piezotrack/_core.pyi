@@ -1,24 +1,33 @@
 from collections.abc import Callable
-from typing import Literal, final
+from typing import Any, Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "DAHL_PARAMETERS",
+    "Controller",
+    "InverseSession",
     "Search",
+    "Session",
     "SwarmSettings",
+    "Tracked",
     "Trajectory",
+    "VirtualStage",
     "__version__",
     "as_count",
     "as_number",
     "as_truth",
     "dahl_check",
+    "dahl_feedforward",
     "dahl_simulate",
     "dahl_simulate_fixed",
     "dahl_xu_li_2010",
     "delayed",
     "identify_dahl",
+    "period_metrics",
+    "track_dahl",
+    "tracking_metrics",
 ]
 
 __version__: str
@@ -134,3 +143,78 @@ class Search:
     def bounds(self) -> list[tuple[float, float] | None]: ...
     @property
     def sensitivities(self) -> list[tuple[int, float, bool]]: ...
+
+def dahl_feedforward(
+    theta: tuple[float, ...], dt: float, x: ArrayLike, v: ArrayLike, a: ArrayLike
+) -> NDArray[np.float64]: ...
+def track_dahl(
+    theta: tuple[float, ...],
+    step: float,
+    controller: Controller,
+    reference: ArrayLike,
+    feedforward: ArrayLike,
+    delay: float,
+    substeps: int,
+) -> Tracked: ...
+def tracking_metrics(
+    desired: ArrayLike, actual: ArrayLike, dt: float, frequency: float | None
+) -> tuple[float, float, float, float, float, float | None, float | None]: ...
+def period_metrics(
+    desired: ArrayLike, actual: ArrayLike, dt: float, period: float
+) -> list[tuple[float, float, float, float, float, float | None, float | None]]: ...
+
+@final
+class Controller:
+    def __new__(
+        cls,
+        *,
+        dt: float,
+        limits: tuple[float, float],
+        pid: tuple[float, float, float, float | None] | None,
+        state_space: tuple[list[float], list[float], list[float], float, list[float] | None] | None,
+        repetitive: tuple[float, float, str, float, float, int, bool] | None,
+        filters: list[tuple[str, float, float, float]],
+    ) -> Controller: ...
+    @property
+    def line_length(self) -> int: ...
+    def start(self, present: float | None) -> Session: ...
+
+@final
+class Session:
+    def step(self, reference: float, measured: float, feedforward: float) -> float: ...
+    def last(self) -> tuple[float, float, float, float, float, float, bool, bool]: ...
+    def applied(self, volts: float) -> None: ...
+    def reset(self) -> None: ...
+    def retune(self, other: Controller) -> None: ...
+
+@final
+class InverseSession:
+    def __new__(cls, theta: tuple[float, ...], dt: float) -> InverseSession: ...
+    def step(self, x: float, v: float, a: float) -> float: ...
+    def reset(self) -> None: ...
+
+@final
+class VirtualStage:
+    def __new__(cls, settings: dict[str, Any]) -> VirtualStage: ...
+    @staticmethod
+    def xu_li_2010(seed: int) -> dict[str, Any]: ...
+    def simulate(
+        self, u: ArrayLike, dt: float, hold_name: str
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+    def track(
+        self,
+        controller: Controller,
+        reference: ArrayLike,
+        feedforward: ArrayLike,
+        delay: float,
+        substeps: int,
+    ) -> Tracked: ...
+
+@final
+class Tracked:
+    @property
+    def measured(self) -> NDArray[np.float64]: ...
+    @property
+    def saturated(self) -> NDArray[np.bool_]: ...
+    def motion(self) -> list[NDArray[np.float64]]: ...
+    def part(self, name: str) -> NDArray[np.float64]: ...

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from .inverse import Inverse
+
 __all__ = ["IdentifiedModel", "Score", "load"]
 
 FORMAT = "piezotrack-model"
@@ -101,6 +103,33 @@ class IdentifiedModel:
         provenance = self.details.get("provenance", {})
         found = provenance.get("data", {}).get("drive_range")
         return (float(found[0]), float(found[1])) if found else None
+
+    def inverse(
+        self, *, playback: Literal["table", "online"] = "table", settle: int = 1
+    ) -> Inverse:
+        """Feedforward with the offset and the delay of this model, as `Inverse` describes.
+
+        Parameters
+        ----------
+        playback : {"table", "online"}, optional
+            Whether one settled period is played again and again, or all is computed.
+        settle : int, optional
+            Periods before the one of the table.
+
+        Returns
+        -------
+        Inverse
+            For `Controller` or on its own. That of the bare stage is ``model.inverse()``.
+        """
+        from .inverse import Inverse
+
+        return Inverse(
+            stage=self.model,
+            offset=self.offset,
+            delay=self.delay,
+            playback=playback,
+            settle=settle,
+        )
 
     def displacement(
         self, u: ArrayLike, dt: float, *, hold: Literal["foh", "zoh"] = "foh"

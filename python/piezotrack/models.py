@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from .dataset import Hold
+    from .inverse import Inverse
 
     Array = NDArray[np.float64]
 
@@ -201,6 +202,27 @@ class DahlStage:
             As the constructor takes them.
         """
         return tuple(name for name, _, _ in _core.DAHL_PARAMETERS)
+
+    def inverse(
+        self, *, playback: Literal["table", "online"] = "table", settle: int = 1
+    ) -> Inverse:
+        """Feedforward of the bare stage, as `Inverse` describes.
+
+        Parameters
+        ----------
+        playback : {"table", "online"}, optional
+            Whether one settled period is played again and again, or all is computed.
+        settle : int, optional
+            Periods before the one of the table.
+
+        Returns
+        -------
+        Inverse
+            For `Controller` or on its own.
+        """
+        from .inverse import Inverse
+
+        return Inverse(stage=self, playback=playback, settle=settle)
 
     def simulate(
         self,

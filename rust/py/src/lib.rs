@@ -1,11 +1,13 @@
 //! The Python module `piezotrack._core`: this file registers, the others do.
 
 mod arrays;
+mod control;
 mod enter;
 mod errors;
 mod identify;
 mod numbers;
 mod stage;
+mod virtual_stage;
 
 use pyo3::prelude::*;
 
@@ -15,5 +17,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     numbers::register(module)?;
     stage::register(module)?;
-    identify::register(module)
+    identify::register(module)?;
+    control::register(module)?;
+    virtual_stage::register(module)
 }

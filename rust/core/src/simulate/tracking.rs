@@ -25,7 +25,6 @@ pub enum Law {
 
 /// Memory of a [`Law`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "one in a controller, and no allocation in it")]
 pub enum LawState {
     /// Nothing to remember.
     None,

@@ -1,0 +1,348 @@
+"""Tracking: a controller leads a stage along a reference, and how well it does."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import _core
+from .checks import not_negative
+from .control import Controller
+from .errors import ParameterError
+from .modelfile import IdentifiedModel
+from .models import DahlStage
+from .references import Reference, SampledReference
+from .virtual import VirtualStage
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+__all__ = ["Metrics", "Tracking", "track"]
+
+# Fastest step with which the model's mechanics are followed under a jumping voltage [s].
+MODEL_STEP = 5e-5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Metrics:
+    """How well a motion follows its reference; errors are desired less actual.
+
+    Attributes
+    ----------
+    max_error, rms_error : float
+        Largest absolute error and root mean square [m].
+    mean_error, sd_error : float
+        Mean of the signed error and standard deviation about it [m].
+    peak_to_peak : float
+        Largest less smallest error [m].
+    phase_lag : float or None
+        Of the fundamental [rad]; None where the reference does not repeat.
+    widest_loop : float or None
+        Of actual against desired, as a part of the travel; None where it never turns.
+    """
+
+    max_error: float
+    rms_error: float
+    mean_error: float
+    sd_error: float
+    peak_to_peak: float
+    phase_lag: float | None
+    widest_loop: float | None
+
+    def __str__(self) -> str:
+        text = f"max {1e6 * self.max_error:.3f} um, rms {1e6 * self.rms_error:.3f} um"
+        if self.phase_lag is not None:
+            text += f", phase lag {self.phase_lag:.4f} rad"
+        if self.widest_loop is not None:
+            text += f", widest loop {100.0 * self.widest_loop:.2f} % of travel"
+        return text
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Tracking:
+    """A tracked motion.
+
+    Attributes
+    ----------
+    reference : Reference
+        What was to be followed.
+    controller : Controller
+        What led the stage.
+    t : ndarray, shape (n,)
+        Time of the control samples [s].
+    desired, measured, displacement : ndarray, shape (n,)
+        Reference, reading of the sensor, true displacement [m]; the reading is that which the
+        voltage of the same sample was computed from.
+    voltage : ndarray, shape (n,)
+        Command to the amplifier [V].
+    feedforward, feedback, repetitive : ndarray, shape (n,)
+        Its parts before it was clipped [V].
+    saturated : ndarray of bool, shape (n,)
+        Whether it was clipped.
+    fine_t, fine_displacement, fine_voltage : ndarray, shape (m,)
+        Time [s], true displacement [m] and applied voltage [V] between the samples too.
+    note : str
+        How the feedforward was computed.
+    """
+
+    reference: Reference
+    controller: Controller
+    t: Array
+    desired: Array
+    measured: Array
+    displacement: Array
+    voltage: Array
+    feedforward: Array
+    feedback: Array
+    repetitive: Array
+    saturated: NDArray[np.bool_]
+    fine_t: Array
+    fine_displacement: Array
+    fine_voltage: Array
+    note: str
+
+    def __repr__(self) -> str:
+        return f"<Tracking of {self.reference!r}: {self.metrics}>"
+
+    @property
+    def error(self) -> Array:
+        """Desired less measured [m]."""
+        return self.desired - self.measured
+
+    @property
+    def settled(self) -> float:
+        """Time from which on `metrics` counts [s].
+
+        After the smooth start; of a reference that repeats, from the first whole period after it
+        where there is one.
+        """
+        period = self.reference.period
+        if period is None:
+            return self.reference.ramp
+        start = math.ceil(self.reference.ramp / period - 1e-9) * period
+        return start if start + period <= self.reference.duration * (1 + 1e-9) else 0.0
+
+    @cached_property
+    def metrics(self) -> Metrics:
+        """Figures of the measured motion, from `settled` on."""
+        return self.score()
+
+    def score(
+        self, start: float | None = None, stop: float | None = None, *, true: bool = False
+    ) -> Metrics:
+        """Figures of a part of the run.
+
+        Parameters
+        ----------
+        start, stop : float, optional
+            The part [s]; from `settled` to the end where not given.
+        true : bool, optional
+            Whether the true displacement is scored, without noise and steps of the sensor.
+
+        Returns
+        -------
+        Metrics
+            The figures.
+        """
+        first = self.settled if start is None else not_negative("start", start, "s")
+        last = math.inf if stop is None else stop
+        part = (self.t >= first - 1e-9) & (self.t < last - 1e-9)
+        if part.sum() < 2:
+            raise ParameterError(
+                f"start and stop are {first:g} and {last:g} s: expected a part of the run, 0 to "
+                f"{self.t[-1]:g} s, with two samples"
+            )
+        actual = self.displacement if true else self.measured
+        period = self.reference.period
+        frequency = None if period is None else 1.0 / period
+        if frequency is not None and part.sum() * self.controller.dt < 0.999 * self._whole:
+            frequency = None
+        return _metrics(
+            _core.tracking_metrics(self.desired[part], actual[part], self.controller.dt, frequency)
+        )
+
+    @property
+    def _whole(self) -> float:
+        return self.reference.period or 0.0
+
+    @cached_property
+    def periods(self) -> list[Metrics]:
+        """Figures of each whole period, the first with the smooth start in it.
+
+        Empty where the reference does not repeat.
+        """
+        if self.reference.period is None:
+            return []
+        found = _core.period_metrics(
+            self.desired, self.measured, self.controller.dt, self.reference.period
+        )
+        return [_metrics(figures) for figures in found]
+
+    def plot(self) -> Figure:
+        """Desired and actual motion, error, actual against desired, and the parts of the voltage.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Not yet shown or saved.
+        """
+        from .plotting_tracking import plot_tracking
+
+        return plot_tracking(self)
+
+    def summary(self) -> str:
+        """Table of the run: all of it, and period by period.
+
+        Returns
+        -------
+        str
+            Several lines.
+        """
+        lines = [f"{self.reference!r} at {1.0 / self.controller.dt:g} Hz; {self.note}"]
+        since = f"from {self.settled:g} s on" if self.settled else "all of it"
+        lines.append(f"{since}: {self.metrics}")
+        if self.saturated.any():
+            lines.append(f"clipped in {100.0 * self.saturated.mean():.1f} % of the samples")
+        if self.periods:
+            lines.append("period  max um  rms um  mean um")
+            lines += [
+                f"{i:>6}  {1e6 * one.max_error:>6.3f}  {1e6 * one.rms_error:>6.3f}  "
+                f"{1e6 * one.mean_error:>7.3f}"
+                for i, one in enumerate(self.periods, 1)
+            ]
+        return "\n".join(lines)
+
+
+def _metrics(
+    figures: tuple[float, float, float, float, float, float | None, float | None],
+) -> Metrics:
+    names = ("max_error", "rms_error", "mean_error", "sd_error", "peak_to_peak")
+    *errors, lag, loop = figures
+    return Metrics(**dict(zip(names, errors, strict=True)), phase_lag=lag, widest_loop=loop)
+
+
+def track(
+    stage: VirtualStage | DahlStage | IdentifiedModel,
+    controller: Controller,
+    reference: Reference,
+    *,
+    delay: float = 0.0,
+    substeps: int = 10,
+    beyond_reach: bool = False,
+) -> Tracking:
+    """Let a controller lead a stage along a reference.
+
+    The stage moves in continuous time; at each sampling instant the sensor is read and the
+    voltage computed from the reading goes out, held until the next.
+
+    Parameters
+    ----------
+    stage : VirtualStage, DahlStage or IdentifiedModel
+        What is led. A model is without noise and amplifier.
+    controller : Controller
+        What leads it.
+    reference : Reference
+        What is to be followed, as ``pt.sine(...)``.
+    delay : float, optional
+        Time from a reading to the effect of its voltage [s], besides the hold.
+    substeps : int, optional
+        Instants kept for plots in each sampling interval.
+    beyond_reach : bool, optional
+        Whether a reference may leave what the stage can reach within the limits, as to study
+        saturation.
+
+    Returns
+    -------
+    Tracking
+        The motion, its metrics and pictures.
+
+    Raises
+    ------
+    ParameterError
+        A number is out of its range, or the reference leaves the reach of the stage.
+    NumericalError
+        The loop runs away.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+    >>> reference = pt.sine(frequency=0.2, low=0.0, high=100e-6, duration=10.0)
+    >>> run = pt.track(pt.VirtualStage.xu_li_2010(seed=1), loop, reference)
+    >>> print(f"{run.metrics.phase_lag:.2f} rad")
+    0.06 rad
+    """
+    if isinstance(stage, IdentifiedModel):
+        stage = stage.model
+    for name, value, kind in (
+        ("stage", stage, (VirtualStage, DahlStage)),
+        ("controller", controller, (Controller,)),
+        ("reference", reference, (Reference,)),
+    ):
+        if not isinstance(value, kind):
+            expected = " or ".join(f"pt.{one.__name__}" for one in kind)
+            raise ParameterError(f"{name} is {type(value).__name__}: expected {expected}")
+    delay = not_negative("delay", delay, "s")
+    substeps = _core.as_count("substeps", substeps)
+    samples = reference.sample(controller.dt)
+    if not beyond_reach:
+        _check_reach(stage, controller, samples)
+    if controller.feedforward is None:
+        volts, note = np.zeros(len(samples)), "no feedforward"
+    else:
+        volts, note = controller.feedforward.played(reference, controller.dt)
+    if isinstance(stage, VirtualStage):
+        run = stage.core().track(controller.core, samples.x, volts, delay, substeps)
+    else:
+        step = min(MODEL_STEP, controller.dt / 4)
+        run = _core.track_dahl(
+            stage.theta, step, controller.core, samples.x, volts, delay, substeps
+        )
+    fine_t, fine_displacement, fine_voltage = run.motion()
+    return Tracking(
+        reference=reference,
+        controller=controller,
+        t=samples.t,
+        desired=samples.x,
+        measured=run.measured,
+        displacement=fine_displacement[::substeps],
+        voltage=run.part("volts"),
+        feedforward=run.part("feedforward"),
+        feedback=run.part("feedback"),
+        repetitive=run.part("repetitive"),
+        saturated=run.saturated,
+        fine_t=fine_t,
+        fine_displacement=fine_displacement,
+        fine_voltage=fine_voltage,
+        note=note,
+    )
+
+
+def _check_reach(
+    stage: VirtualStage | DahlStage, controller: Controller, samples: SampledReference
+) -> None:
+    """Refuse a reference that leaves what the stage reaches between the limits."""
+    low, high = controller.limits
+    # Slowly from limit to limit: 4 s each way, with a rest at each end.
+    u = np.interp(np.arange(0.0, 10.0, 1e-3), [0, 4, 5, 9], [low, high, high, low])
+    x = stage.simulate(u, 1e-3).x
+    bottom, top = float(x.min()), float(x.max())
+    slack = 0.01 * (top - bottom)
+    for value, past, edge in (
+        (samples.x.max(), samples.x.max() - top, top),
+        (samples.x.min(), bottom - samples.x.min(), bottom),
+    ):
+        if past > slack:
+            k = int(np.flatnonzero(samples.x == value)[0])
+            raise ParameterError(
+                f"reference is {1e6 * value:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} um "
+                f"beyond {1e6 * edge:.4g} um: expected what the stage reaches from {low:g} to "
+                f"{high:g} V, or beyond_reach=True"
+            )

@@ -1,0 +1,236 @@
+//! Controllers and inverses, as configuration and as sessions.
+
+use numpy::{PyArray1, ToPyArray};
+use piezotrack_control::{
+    Command, Controller, ControllerState, DahlInverse, Filter, InverseState, Limits, Pid,
+    Repetitive, SampledDahlInverse, Smoothing, StateSpace,
+};
+use piezotrack_core::simulate::{Law, LawState};
+use piezotrack_core::{Error, Result};
+use pyo3::prelude::*;
+
+use crate::arrays::samples;
+use crate::errors::raise;
+use crate::stage::Theta;
+
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<PyController>()?;
+    module.add_class::<PySession>()?;
+    module.add_class::<PyInverseSession>()?;
+    module.add_function(wrap_pyfunction!(dahl_feedforward, module)?)
+}
+
+/// kp, ti, td, and tt where it is given.
+type PidGains = (f64, f64, f64, Option<f64>);
+
+/// A row by row, B, C, D, and the vector of back-calculation where it is given.
+type Matrices = (Vec<f64>, Vec<f64>, Vec<f64>, f64, Option<Vec<f64>>);
+
+/// period, kq, smoothing by its name, its number, leak, lead, pause.
+type RepetitiveSettings = (f64, f64, String, f64, f64, u32, bool);
+
+/// A controller for one sampling interval.
+#[pyclass(name = "Controller", frozen, module = "piezotrack._core")]
+pub struct PyController {
+    pub controller: Controller<Law>,
+    pub dt: f64,
+}
+
+#[pymethods]
+impl PyController {
+    #[new]
+    #[pyo3(signature = (*, dt, limits, pid, state_space, repetitive, filters))]
+    fn new(
+        dt: f64,
+        limits: (f64, f64),
+        pid: Option<PidGains>,
+        state_space: Option<Matrices>,
+        repetitive: Option<RepetitiveSettings>,
+        filters: Vec<(String, f64, f64, f64)>,
+    ) -> PyResult<Self> {
+        let build = move || -> Result<Self> {
+            piezotrack_core::error::positive("dt", dt, "s")?;
+            let law = law(dt, pid, state_space)?;
+            let mut controller = Controller::new(Limits::new(limits.0, limits.1)?, law);
+            controller.repetitive = match repetitive {
+                Some(settings) => Some(repetitive_from(settings)?.at(dt)?),
+                None => None,
+            };
+            let most = controller.filters.len();
+            if filters.len() > most {
+                return Err(Error::parameter("filters", filters.len(), format!("{most} at most")));
+            }
+            for (slot, filter) in controller.filters.iter_mut().zip(&filters) {
+                *slot = Some(filter_from(filter, dt)?);
+            }
+            Ok(Self { controller, dt })
+        };
+        build().map_err(|error| raise(&error))
+    }
+
+    /// Entries of the repetitive part's delay line.
+    #[getter]
+    fn line_length(&self) -> usize {
+        self.controller.repetitive.map_or(0, |part| part.length())
+    }
+
+    /// A session of its own, going on from the voltage `present` where that is given.
+    fn start(&self, present: Option<f64>) -> PyResult<PySession> {
+        let line = vec![0.0; self.line_length()];
+        let state = match present {
+            Some(volts) => self.controller.start(volts, line),
+            None => self.controller.rest(line),
+        };
+        let state = state.map_err(|error| raise(&error.into()))?;
+        Ok(PySession { controller: self.controller, state })
+    }
+}
+
+fn law(dt: f64, pid: Option<PidGains>, state_space: Option<Matrices>) -> Result<Law> {
+    match (pid, state_space) {
+        (Some((kp, ti, td, tt)), _) => Ok(Law::Pid(Pid::new(kp, ti, td, tt)?.at(dt)?)),
+        (None, Some((a, b, c, d, back))) => {
+            Ok(Law::StateSpace(StateSpace::new(&a, &b, &c, d, back.as_deref())?))
+        }
+        (None, None) => Ok(Law::None),
+    }
+}
+
+/// A repetitive part from plain numbers.
+pub fn repetitive_from(settings: RepetitiveSettings) -> Result<Repetitive> {
+    let (period, kq, smoothing, number, leak, lead, pause) = settings;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked there")]
+    let smoothing = match smoothing.as_str() {
+        "lag" => Smoothing::Lag { tq: number, compensated: false },
+        "compensated lag" => Smoothing::Lag { tq: number, compensated: true },
+        "zero phase" => Smoothing::ZeroPhase { order: number as u32 },
+        _ => Smoothing::None,
+    };
+    Ok(Repetitive { leak, lead, pause, ..Repetitive::new(period, smoothing, kq)? })
+}
+
+/// A filter from its name and three numbers.
+fn filter_from((kind, first, second, third): &(String, f64, f64, f64), dt: f64) -> Result<Filter> {
+    Ok(match kind.as_str() {
+        "notch" => Filter::notch(*first, *second, *third, dt)?,
+        _ => Filter::low_pass(*first, dt)?,
+    })
+}
+
+/// A controller at work.
+#[pyclass(name = "Session", module = "piezotrack._core")]
+struct PySession {
+    controller: Controller<Law>,
+    state: ControllerState<LawState, Vec<f64>>,
+}
+
+/// volts, unclipped, feedforward, feedback, repetitive, error, saturated, measured well.
+type CommandParts = (f64, f64, f64, f64, f64, f64, bool, bool);
+
+#[pymethods]
+impl PySession {
+    fn step(&mut self, reference: f64, measured: f64, feedforward: f64) -> f64 {
+        self.controller.step(&mut self.state, reference, measured, feedforward).volts
+    }
+
+    fn last(&self) -> CommandParts {
+        let Command {
+            volts,
+            unclipped,
+            feedforward,
+            feedback,
+            repetitive,
+            error,
+            saturated,
+            measurement_ok,
+            ..
+        } = *self.state.last();
+        (volts, unclipped, feedforward, feedback, repetitive, error, saturated, measurement_ok)
+    }
+
+    fn applied(&mut self, volts: f64) -> PyResult<()> {
+        self.state.applied(volts).map_err(|error| raise(&error.into()))
+    }
+
+    fn reset(&mut self) {
+        self.controller.reset(&mut self.state);
+    }
+
+    /// Goes on with the settings of another controller for the same interval.
+    fn retune(&mut self, other: &PyController) -> PyResult<()> {
+        let (mine, others) = (&self.controller.feedback, &other.controller.feedback);
+        let same = core::mem::discriminant(mine) == core::mem::discriminant(others);
+        let repetitive = self.controller.repetitive.map(|part| part.length())
+            == other.controller.repetitive.map(|part| part.length());
+        if !(same && repetitive) {
+            let expected = "a feedback of the same kind, and a repetitive part of the same period";
+            return Err(raise(&Error::parameter("controller", "another", expected)));
+        }
+        self.controller = other.controller;
+        Ok(())
+    }
+}
+
+/// The inverse of a stage.
+pub fn inverse(theta: Theta) -> Result<DahlInverse> {
+    let [mass, damping, stiffness, piezo_coefficient, a1, a2, b1, b0, up] = theta;
+    Ok(DahlInverse::new(mass, damping, stiffness, piezo_coefficient, a1, a2, b1, b0, up)?)
+}
+
+/// The voltage along a whole reference, from a stage that never moved.
+#[pyfunction]
+fn dahl_feedforward<'py>(
+    py: Python<'py>,
+    theta: Theta,
+    dt: f64,
+    x: &Bound<'py, PyAny>,
+    v: &Bound<'py, PyAny>,
+    a: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (x, v, a) = (samples("x", x)?, samples("v", v)?, samples("a", a)?);
+    let volts = || -> Result<Vec<f64>> {
+        let inverse = inverse(theta)?.at(dt)?;
+        let mut state = inverse.rest();
+        let mut volts = Vec::with_capacity(x.len());
+        for (k, ((&x, &v), &a)) in x.iter().zip(v.iter()).zip(a.iter()).enumerate() {
+            let value = inverse.step(&mut state, x, v, a);
+            if !value.is_finite() {
+                return Err(Error::Numerical(format!(
+                    "the inverse has no voltage for sample {k} of the reference ({x:e} m, \
+                     {v:e} m/s, {a:e} m/s^2): check its units and its sampling"
+                )));
+            }
+            volts.push(value);
+        }
+        Ok(volts)
+    };
+    volts().map(|volts| volts.to_pyarray(py)).map_err(|error| raise(&error))
+}
+
+/// The inverse at work, sample by sample.
+#[pyclass(name = "InverseSession", module = "piezotrack._core")]
+struct PyInverseSession {
+    inverse: SampledDahlInverse,
+    state: InverseState,
+}
+
+#[pymethods]
+impl PyInverseSession {
+    #[new]
+    fn new(theta: Theta, dt: f64) -> PyResult<Self> {
+        let build = || -> Result<Self> {
+            let inverse = inverse(theta)?.at(dt)?;
+            Ok(Self { inverse, state: inverse.rest() })
+        };
+        build().map_err(|error| raise(&error))
+    }
+
+    /// NaN where there is no voltage.
+    fn step(&mut self, x: f64, v: f64, a: f64) -> f64 {
+        self.inverse.step(&mut self.state, x, v, a)
+    }
+
+    fn reset(&mut self) {
+        self.state = self.inverse.rest();
+    }
+}
