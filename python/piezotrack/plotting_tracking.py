@@ -19,6 +19,13 @@ DESIRED: dict[str, Any] = {"color": "0.35", "linewidth": 1.6, "label": "desired"
 ACTUAL: dict[str, Any] = {"color": "C0", "linewidth": 1.1, "label": "actual"}
 
 
+def _above(ax: Axes) -> None:
+    """Put the legend above the axes, where it hides nothing."""
+    ax.legend(
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, frameon=False, borderaxespad=0.2
+    )
+
+
 def plot_motion(run: Tracking, ax: Axes | None = None) -> Axes:
     """Plot desired and actual displacement over time.
 
@@ -38,7 +45,7 @@ def plot_motion(run: Tracking, ax: Axes | None = None) -> Axes:
     ax.plot(run.t, 1e6 * run.desired, **DESIRED)
     ax.plot(run.fine_t, 1e6 * run.fine_displacement, **ACTUAL)
     ax.set(xlabel="time [s]", ylabel="displacement [um]")
-    ax.legend(loc="upper right", frameon=True)
+    _above(ax)
     ax.margins(x=0)
     return ax
 
@@ -66,7 +73,7 @@ def plot_error(run: Tracking, ax: Axes | None = None) -> Axes:
             run.t, low, high, where=run.saturated, color="0.85", zorder=0, label="voltage clipped"
         )
         ax.set_ylim(low, high)
-        ax.legend(loc="upper right")
+        _above(ax)
     period = run.reference.period
     for i, one in enumerate(run.periods):
         assert period is not None
@@ -128,7 +135,7 @@ def plot_effort(run: Tracking, ax: Axes | None = None) -> Axes:
         if np.any(volts):
             ax.step(run.t, volts, where="post", color=colour, linewidth=1.0, label=name)
     ax.set(xlabel="time [s]", ylabel="voltage [V]")
-    ax.legend(loc="upper right", ncols=2)
+    _above(ax)
     ax.margins(x=0)
     return ax
 

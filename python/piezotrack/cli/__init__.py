@@ -1,0 +1,60 @@
+"""The command ``piezotrack``."""
+
+from __future__ import annotations
+
+import io
+import sys
+from typing import Annotated
+
+import typer
+
+from .. import __version__
+from .demo import demo_command
+from .identify import identify_command
+from .simulate import simulate_command
+from .track import feedforward_command, track_command
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    help="From a log of a piezo nanopositioner to a hysteresis model and a tracked reference.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+def main() -> None:
+    """Run the command with the arguments of the process."""
+    import matplotlib as mpl
+
+    # No window is ever opened, so none is needed.
+    mpl.use("Agg")
+    # The name of a file may have letters that the terminal has not.
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+    app()
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        print(f"piezotrack {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Take the options of the command as such."""
+
+
+app.command("identify")(identify_command)
+app.command("simulate")(simulate_command)
+app.command("feedforward")(feedforward_command)
+app.command("track")(track_command)
+app.command("demo")(demo_command)

@@ -1,0 +1,151 @@
+"""Options that several commands share, and how their texts are read."""
+
+from __future__ import annotations
+
+import os
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from ..errors import ParameterError, PiezotrackError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from ..dataset import Dataset, Hold
+
+__all__ = [
+    "Columns",
+    "DisplacementColumn",
+    "DriveColumn",
+    "HoldOption",
+    "Interval",
+    "Out",
+    "Seconds",
+    "TimeColumn",
+    "Units",
+    "can_be_folder",
+    "column",
+    "list_files",
+    "number",
+    "number_range",
+    "of_file",
+    "pairs",
+]
+
+Seconds = Annotated[
+    str | None,
+    typer.Option(metavar="A:B", help="Seconds that count; the drive before A is warm-up."),
+]
+TimeColumn = Annotated[str | None, typer.Option(help="Column of the time.")]
+DriveColumn = Annotated[str | None, typer.Option(help="Column of the drive voltage.")]
+DisplacementColumn = Annotated[str | None, typer.Option(help="Column of the displacement.")]
+Units = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--unit",
+        metavar="NAME=UNIT",
+        help="Unit of a column, or of time, drive, displacement. Repeatable.",
+    ),
+]
+Interval = Annotated[
+    float | None, typer.Option(help="Sampling interval in s, in place of a time column.")
+]
+HoldOption = Annotated[
+    Literal["foh", "zoh"],
+    typer.Option(help="Between samples the drive is a line (foh) or constant (zoh)."),
+]
+Out = Annotated[Path, typer.Option(help="Folder for the results.")]
+
+
+class Columns:
+    """The columns of a log as options name them; a number counts them from 0."""
+
+    def __init__(
+        self,
+        time: str | None,
+        drive: str | None,
+        displacement: str | None,
+        unit: list[str] | None,
+        dt: float | None,
+    ) -> None:
+        self.time, self.drive, self.displacement = map(column, (time, drive, displacement))
+        self.units = {column(name) or name: text for name, text in pairs("--unit", unit)}
+        self.dt = dt
+
+    def read(self, file: Path, hold: Hold) -> Dataset:
+        """Read a log with these columns."""
+        from ..io import read
+
+        return read(
+            file,
+            time=self.time,
+            drive=self.drive,
+            displacement=self.displacement,
+            units=self.units,
+            dt=self.dt,
+            hold=hold,
+        )
+
+
+def column(text: str | None) -> str | int | None:
+    """Take a number for a place, anything else for a name."""
+    return int(text) if text is not None and text.isdecimal() else text
+
+
+@contextmanager
+def of_file(file: Path) -> Iterator[None]:
+    """Say which file an error is about."""
+    try:
+        yield
+    except PiezotrackError as error:
+        raise type(error)(f"{file.name}: {error}") from None
+
+
+def can_be_folder(out: Path) -> None:
+    """Refuse a folder that cannot be written to, before a search and not after it."""
+    there = out
+    while not there.exists() and there != there.parent:
+        there = there.parent
+    if not there.is_dir():
+        raise ParameterError(f"--out: {out} cannot be made a folder: {there} is a file")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise ParameterError(f"--out: {there} cannot be written to: permission denied")
+
+
+def list_files(written: Iterable[Path]) -> None:
+    """Print which files were written."""
+    print("\nwritten")
+    for path in written:
+        print(f"  {path}")
+
+
+def pairs(option: str, given: list[str] | None) -> list[tuple[str, str]]:
+    """Split NAME=VALUE texts."""
+    pairs: list[tuple[str, str]] = []
+    for text in given or []:
+        name, equals, value = text.partition("=")
+        if not equals or not name or not value:
+            raise ParameterError(f"{option} is '{text}': expected NAME=VALUE")
+        if name.strip() in dict(pairs):
+            raise ParameterError(f"{option} names {name.strip()} twice: expected it once")
+        pairs.append((name.strip(), value.strip()))
+    return pairs
+
+
+def number(option: str, text: str) -> float:
+    """Take a number from a text."""
+    try:
+        return float(text)
+    except ValueError:
+        raise ParameterError(f"{option} has '{text}': expected a number") from None
+
+
+def number_range(option: str, text: str) -> tuple[float, float]:
+    """Take LOW:HIGH from a text."""
+    low, colon, high = text.partition(":")
+    if not colon:
+        raise ParameterError(f"{option} has '{text}': expected LOW:HIGH")
+    return number(option, low), number(option, high)

@@ -1,0 +1,67 @@
+"""``piezotrack simulate``: a model under a drive."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import (
+    Columns,
+    DriveColumn,
+    HoldOption,
+    Interval,
+    Out,
+    TimeColumn,
+    Units,
+    can_be_folder,
+    list_files,
+    of_file,
+)
+from .words import in_words
+
+__all__ = ["simulate_command"]
+
+
+@in_words
+def simulate_command(
+    model: Annotated[Path, typer.Argument(help="Model file in JSON.")],
+    drive_file: Annotated[
+        Path, typer.Argument(metavar="DRIVE", help="CSV with time and drive voltage.")
+    ],
+    out: Out = Path("results"),
+    time: TimeColumn = None,
+    drive: DriveColumn = None,
+    unit: Units = None,
+    dt: Interval = None,
+    hold: HoldOption = "foh",
+) -> None:
+    """Simulate a model under a drive: a CSV with the displacement, and a picture."""
+    from ..files import write_columns
+    from ..io import read_drive
+    from ..modelfile import load
+    from ..plotting import plot_response
+    from ..report import make_folder, save_figures
+
+    known = load(model)
+    columns = Columns(time, drive, None, unit, dt)
+    t, u = read_drive(
+        drive_file, time=columns.time, drive=columns.drive, units=columns.units, dt=dt
+    )
+    can_be_folder(out)
+    with of_file(drive_file):
+        x = known.displacement(u, float(t[-1] - t[0]) / (t.size - 1), hold=hold)
+    folder = make_folder(out)
+    table = {"time_s": t, "voltage_V": u, "displacement_um": 1e6 * x}
+    written = [write_columns(folder / "simulated.csv", table)]
+    written += save_figures({"simulated": plot_response(t, u, x)}, folder)
+    print(
+        f"{t.size} samples from rest, drive from {u.min():.4g} to {u.max():.4g} V: displacement "
+        f"from {1e6 * x.min():.4g} to {1e6 * x.max():.4g} um"
+    )
+    if fitted := known.drive_range:
+        margin = 0.01 * (fitted[1] - fitted[0])
+        if u.min() < fitted[0] - margin or u.max() > fitted[1] + margin:
+            print(f"note  the model was fitted from {fitted[0]:.4g} to {fitted[1]:.4g} V only")
+    list_files(written)

@@ -1,0 +1,184 @@
+"""``piezotrack track`` and ``piezotrack feedforward``: from a model to a tracked reference."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from ..errors import ParameterError
+from .options import Out, can_be_folder, list_files, number_range
+from .words import in_words
+
+if TYPE_CHECKING:
+    from ..control import Controller
+    from ..modelfile import IdentifiedModel
+    from ..references import Reference
+    from ..tracking import Tracking
+
+__all__ = ["feedforward_command", "track_command"]
+
+ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file in JSON.")]
+ControlInterval = Annotated[float, typer.Option(help="Sampling interval of the controller in s.")]
+Online = Annotated[
+    bool, typer.Option("--online", help="Compute all of the feedforward; else a table repeats.")
+]
+Duration = Annotated[float | None, typer.Option(help="Length of the reference in s.")]
+Period = Annotated[
+    float | None, typer.Option(help="Time in s after which a reference from a file repeats.")
+]
+
+
+@in_words
+def track_command(
+    model: ModelFile,
+    reference: Annotated[
+        str,
+        typer.Option(
+            metavar="TEXT", help="As sine:0.2Hz,0..110um, triangle:, chirp:, ..., or a CSV file."
+        ),
+    ],
+    stage: Annotated[
+        str, typer.Option(help="What is led: virtual, or model for the model itself.")
+    ] = "virtual",
+    out: Out = Path("results"),
+    dt: ControlInterval = 0.02,
+    limits: Annotated[
+        str, typer.Option(metavar="LOW:HIGH", help="Voltage limits of the amplifier.")
+    ] = "0:75",
+    feedforward: Annotated[bool, typer.Option(help="Feedforward by the model's inverse.")] = True,
+    online: Online = False,
+    feedback: Annotated[bool, typer.Option(help="PID feedback.")] = True,
+    kp: Annotated[float, typer.Option(help="Proportional gain in V/um.")] = 0.120,
+    ti: Annotated[float, typer.Option(help="Integral time in s.")] = 0.009,
+    td: Annotated[float, typer.Option(help="Derivative time in s.")] = 0.044,
+    tt: Annotated[float | None, typer.Option(help="Antiwindup time in s; inf for none.")] = None,
+    repetitive: Annotated[bool, typer.Option(help="Learn from period to period.")] = False,
+    kq: Annotated[float, typer.Option(help="Learning gain in V/um.")] = 1.0,
+    tq: Annotated[float, typer.Option(help="Time constant of the learning's filter in s.")] = 0.2,
+    delay: Annotated[float, typer.Option(help="Delay in the loop in s, besides the hold.")] = 0.0,
+    duration: Duration = None,
+    period: Period = None,
+    seed: Annotated[int, typer.Option(help="Of the virtual stage's noise.")] = 1,
+    beyond_reach: Annotated[
+        bool, typer.Option("--beyond-reach", help="Let the reference leave the stage's reach.")
+    ] = False,
+) -> None:
+    """Let a controller lead the virtual stage along a reference: figures, a table, pictures."""
+    from ..control import Controller, Pid, Repetitive
+    from ..modelfile import load
+    from ..tracking import track
+    from ..virtual import VirtualStage
+
+    known = load(model)
+    course = _reference(reference, duration, period)
+    if repetitive and course.period is None:
+        raise ParameterError(f"--repetitive: the reference ({course.name}) does not repeat")
+    playback: Literal["table", "online"] = "online" if online else "table"
+    loop = Controller(
+        dt=dt,
+        limits=number_range("--limits", limits),
+        feedforward=known.inverse(playback=playback) if feedforward else None,
+        feedback=Pid.from_um(kp=kp, ti=ti, td=td, tt=tt) if feedback else None,
+        addon=Repetitive(period=course.period or 0.0, tq=tq, kq=kq) if repetitive else None,
+    )
+    if stage not in ("virtual", "model"):
+        raise ParameterError(f"--stage is '{stage}': expected virtual or model")
+    led = VirtualStage.xu_li_2010(seed=seed) if stage == "virtual" else known.model
+    can_be_folder(out)
+    run = track(led, loop, course, delay=delay, beyond_reach=beyond_reach)
+    written = _write(run, known, loop, out)
+    print(f"the {stage} stage" if stage == "virtual" else "the model itself", end=", ")
+    print(run.summary())
+    list_files(written)
+
+
+@in_words
+def feedforward_command(
+    model: ModelFile,
+    reference: Annotated[
+        str, typer.Argument(metavar="REFERENCE", help="CSV with time and displacement, or a text.")
+    ],
+    out: Out = Path("results"),
+    dt: Annotated[float | None, typer.Option(help="Sampling interval of the table in s.")] = None,
+    online: Online = False,
+    duration: Duration = None,
+    period: Period = None,
+) -> None:
+    """Write the voltage table that leads a stage along a reference."""
+    from ..files import write_columns
+    from ..modelfile import load
+    from ..plotting import plot_response
+    from ..report import make_folder, save_figures
+
+    known = load(model)
+    course = _reference(reference, duration, period)
+    interval = 0.02 if dt is None else dt
+    can_be_folder(out)
+    volts, how = known.inverse(playback="online" if online else "table").played(course, interval)
+    samples = course.sample(interval)
+    folder = make_folder(out)
+    table = {"time_s": samples.t, "voltage_V": volts, "displacement_um": 1e6 * samples.x}
+    written = [write_columns(folder / "feedforward.csv", table)]
+    written += save_figures({"feedforward": plot_response(samples.t, volts, samples.x)}, folder)
+    print(f"{course!r} at {1.0 / interval:g} Hz; {how}")
+    print(f"{volts.size} samples, voltage from {volts.min():.4g} to {volts.max():.4g} V")
+    if fitted := known.drive_range:
+        margin = 0.01 * (fitted[1] - fitted[0])
+        if volts.min() < fitted[0] - margin or volts.max() > fitted[1] + margin:
+            print(f"note  the model was fitted from {fitted[0]:.4g} to {fitted[1]:.4g} V only")
+    list_files(written)
+
+
+def _reference(text: str, duration: float | None, period: float | None) -> Reference:
+    """Read a file where the text names one, else a description."""
+    from ..reference_text import parse_reference
+    from ..references import read_reference
+
+    if Path(text).is_file():
+        return read_reference(text, duration=duration, period=period)
+    if period is not None:
+        raise ParameterError(f"--period is for a reference from a file: expected none with {text}")
+    return parse_reference(text, duration=duration)
+
+
+def _write(run: Tracking, known: IdentifiedModel, loop: Controller, out: Path) -> list[Path]:
+    """Write the samples, the figures as JSON, and the pictures."""
+    from .. import __version__
+    from ..files import replacing, write_columns
+    from ..report import make_folder, save_figures
+
+    folder = make_folder(out)
+    table = {
+        "time_s": run.t,
+        "desired_um": 1e6 * run.desired,
+        "measured_um": 1e6 * run.measured,
+        "voltage_V": run.voltage,
+        "feedforward_V": run.feedforward,
+        "feedback_V": run.feedback,
+        "repetitive_V": run.repetitive,
+    }
+    written = [write_columns(folder / "tracking.csv", table)]
+    document: dict[str, Any] = {
+        "format": "piezotrack-tracking",
+        "schema_version": 1,
+        "reference": repr(run.reference),
+        "dt": {"value": loop.dt, "unit": "s"},
+        "limits": {"value": list(loop.limits), "unit": "V"},
+        "feedback": None if loop.feedback is None else repr(loop.feedback),
+        "repetitive": None if loop.addon is None else repr(loop.addon),
+        "feedforward": run.note,
+        "unit": "errors in m, phase lag in rad, widest loop as a part of the travel",
+        "from_s": run.settled,
+        "metrics": asdict(run.metrics),
+        "periods": [asdict(one) for one in run.periods],
+        "model_drive_range": known.drive_range,
+        "provenance": {"package": "piezotrack", "version": __version__},
+    }
+    path = folder / "tracking.json"
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+    return [*written, path, *save_figures({"tracking": run.plot()}, folder)]

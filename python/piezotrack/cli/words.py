@@ -1,0 +1,69 @@
+"""What a person reads when something goes wrong: one sentence, and an exit code."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from functools import wraps
+from typing import TYPE_CHECKING, ParamSpec
+
+import typer
+
+from ..errors import PiezotrackError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+__all__ = ["in_words"]
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+NOT_PRINTED = 1
+
+P = ParamSpec("P")
+
+
+def in_words(command: Callable[P, None]) -> Callable[P, None]:
+    """Turn what piezotrack raises into one sentence and an exit code."""
+
+    @wraps(command)
+    def run(*args: P.args, **kwargs: P.kwargs) -> None:
+        try:
+            command(*args, **kwargs)
+            sys.stdout.flush()
+        except PiezotrackError as error:
+            print(f"piezotrack: {_as_options(str(error))}", file=sys.stderr)
+            raise typer.Exit(BAD_INPUT) from None
+        except KeyboardInterrupt as error:
+            print(f"piezotrack: {str(error) or 'interrupted'}", file=sys.stderr)
+            raise typer.Exit(INTERRUPTED) from None
+        except OSError as error:
+            # What there is to keep has been written before anything is printed.
+            if not isinstance(error, BrokenPipeError):
+                print(f"piezotrack: cannot print: {error.strerror}", file=sys.stderr)
+            # The rest of the output is given up, or Python would complain at its end.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            raise typer.Exit(NOT_PRINTED) from None
+
+    return run
+
+
+# Advice that the library gives in Python, and what to type instead.
+ADVICE = [
+    (
+        re.compile(r"time=0, drive=1, displacement=2, units=\{0: 's', 1: 'V', 2: 'um'\}"),
+        "--time 0 --drive 1 --displacement 2 --unit 0=s --unit 1=V --unit 2=um",
+    ),
+    (re.compile(r"units=\{'?(\w+)'?: \.\.\.\}"), r"--unit \1=..."),
+    (re.compile(r"\bfixed="), "--fix"),
+    (re.compile(r"\bbeyond_reach=True"), "--beyond-reach"),
+    (re.compile(r"pt\.Pid\.from_um\(kp=.*\)"), "a value in V/um"),
+    (re.compile(r"\b(time|drive|displacement|dt|stiffness|runs)=(?!\d)"), r"--\1"),
+]
+
+
+def _as_options(sentence: str) -> str:
+    for python, option in ADVICE:
+        sentence = python.sub(option, sentence)
+    return sentence
