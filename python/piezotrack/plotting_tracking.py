@@ -125,7 +125,7 @@ def plot_effort(run: Tracking, ax: Axes | None = None) -> Axes:
         With the picture.
     """
     ax = plt.figure().add_subplot() if ax is None else ax
-    ax.step(run.t, run.voltage, where="post", color="0.2", linewidth=1.3, label="total")
+    ax.step(run.t, run.voltage, where="post", color="0.55", linewidth=2.4, label="total")
     parts = {
         "feedforward": (run.feedforward, "C0"),
         "feedback": (run.feedback, "C1"),
