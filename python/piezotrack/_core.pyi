@@ -82,6 +82,7 @@ class SwarmSettings:
         *,
         particles: int,
         iterations: int,
+        update: str,
         inertia_start: float,
         inertia_end: float,
         inertia_iterations: int,

@@ -165,7 +165,7 @@ def identify_command(
     ] = None,
     stiffness: Annotated[float | None, typer.Option(help="Stiffness in N/m, if known.")] = None,
     offset: Annotated[bool, typer.Option(help="Fit a constant offset of the sensor.")] = True,
-    swarm: Annotated[str, typer.Option(help="Settings: default or xu-li-2010.")] = "default",
+    swarm: Annotated[str, typer.Option(help="Settings: default, xu-li-2010 or spso-2011.")] = "default",
     seed: Annotated[int, typer.Option(help="Same seed, same result.")] = 0,
     runs: Annotated[int, typer.Option(help="Swarms that search apart; do they agree?")] = 4,
     threads: Annotated[int | None, typer.Option(help="Up to 256; else all cores.")] = None,
@@ -415,9 +415,13 @@ def _list(written: Iterable[Path]) -> None:
 def _swarm(name: str) -> ParticleSwarm | None:
     from .swarm import ParticleSwarm
 
-    known = {"default": None, "xu-li-2010": ParticleSwarm.xu_li_2010()}
+    known = {
+        "default": None,
+        "xu-li-2010": ParticleSwarm.xu_li_2010(),
+        "spso-2011": ParticleSwarm.spso_2011(),
+    }
     if name not in known:
-        raise ParameterError(f"--swarm is '{name}': expected {' or '.join(known)}")
+        raise ParameterError(f"--swarm is '{name}': expected {', '.join(known)}")
     return known[name]
 
 

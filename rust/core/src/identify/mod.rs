@@ -15,4 +15,4 @@ pub use identification::{Identification, identify};
 pub use local::{Local, Polished, Sensitivity};
 pub use problem::{Coordinate, NOMINAL_STIFFNESS, Problem, Record, Scale, Spec, Theta};
 pub use search::{Monitor, Outcome, Plan, Progress, StopReason, search};
-pub use swarm::{Boundary, Swarm, SwarmSettings, Topology};
+pub use swarm::{Boundary, Swarm, SwarmSettings, Topology, Update};

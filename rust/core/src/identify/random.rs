@@ -9,7 +9,10 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 /// 32-bit words reserved for one particle in one iteration: room for 32 coordinates.
 const WORDS: u128 = 128;
 
-/// The numbers of one particle in one iteration, uniform in [0, 1).
+/// Which of a run's streams draws the links between particles.
+const LINKS: u64 = 1 << 63;
+
+/// The numbers of one particle in one iteration.
 pub(super) struct Draws(ChaCha8Rng);
 
 impl Draws {
@@ -22,10 +25,54 @@ impl Draws {
         Self(generator)
     }
 
-    /// The next number: the upper 53 bits of a word over 2^53.
+    /// As [`Draws::at`], of another stream: whom the particle informs from this iteration on.
+    pub(super) fn of_links(
+        seed: u64,
+        run: u64,
+        iteration: u64,
+        particle: u64,
+        particles: u64,
+    ) -> Self {
+        Self::at(seed, run ^ LINKS, iteration, particle, particles)
+    }
+
+    /// The next number, uniform in [0, 1): the upper 53 bits of a word over 2^53.
     #[expect(clippy::cast_precision_loss, reason = "53 bits fit")]
     pub(super) fn uniform(&mut self) -> f64 {
         const SCALE: f64 = 1.0 / (1_u64 << 53) as f64;
         (self.0.next_u64() >> 11) as f64 * SCALE
+    }
+
+    /// A whole number below `count`.
+    #[expect(clippy::cast_possible_truncation, reason = "below count, which is a usize")]
+    pub(super) fn below(&mut self, count: usize) -> usize {
+        ((u128::from(self.0.next_u64()) * count as u128) >> 64) as usize
+    }
+
+    /// A point drawn evenly from the unit ball; of 32 coordinates it takes 33 numbers.
+    ///
+    /// Normal deviates g (Box and Muller 1958, doi 10.1214/aoms/1177706645) and an exponential
+    /// one e give g / sqrt(|g|^2 + 2 e): Barthe, Guedon, Mendelson and Naor 2005, doi
+    /// 10.1214/009117904000000874. Its radius is d/(d+1) on average.
+    pub(super) fn in_unit_ball(&mut self, coordinates: usize) -> Vec<f64> {
+        let mut point = Vec::with_capacity(coordinates + 1);
+        while point.len() < coordinates {
+            let radius = libm::sqrt(2.0 * self.exponential());
+            let (sine, cosine) = libm::sincos(core::f64::consts::TAU * self.uniform());
+            point.extend([radius * cosine, radius * sine]);
+        }
+        point.truncate(coordinates);
+        let squares: f64 = point.iter().map(|g| g * g).sum();
+        // Above 0 also where everything else is 0.
+        let scale = libm::sqrt(squares + 2.0 * self.exponential() + f64::MIN_POSITIVE);
+        for g in &mut point {
+            *g /= scale;
+        }
+        point
+    }
+
+    /// An exponential deviate of mean 1.
+    fn exponential(&mut self) -> f64 {
+        -libm::log(1.0 - self.uniform())
     }
 }
