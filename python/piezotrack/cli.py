@@ -165,7 +165,9 @@ def identify_command(
     ] = None,
     stiffness: Annotated[float | None, typer.Option(help="Stiffness in N/m, if known.")] = None,
     offset: Annotated[bool, typer.Option(help="Fit a constant offset of the sensor.")] = True,
-    swarm: Annotated[str, typer.Option(help="Settings: default, xu-li-2010 or spso-2011.")] = "default",
+    swarm: Annotated[
+        str, typer.Option(help="Settings: default, xu-li-2010 or spso-2011.")
+    ] = "default",
     seed: Annotated[int, typer.Option(help="Same seed, same result.")] = 0,
     runs: Annotated[int, typer.Option(help="Swarms that search apart; do they agree?")] = 4,
     threads: Annotated[int | None, typer.Option(help="Up to 256; else all cores.")] = None,

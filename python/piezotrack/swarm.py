@@ -49,8 +49,9 @@ class ParticleSwarm:
         Number of particles, 2 or more.
     iterations : int, optional
         Most iterations after the first evaluation.
-    update : {"classic", "hypersphere"}, optional
-        How a particle moves.
+    update : {"classic", "hypersphere", "hypersphere-radial"}, optional
+        How a particle moves. The last draws the radius of X' about G evenly, not the volume:
+        points are denser about G, and a swarm settles sooner.
     inertia_start, inertia_end : float, optional
         Inertia w at the first iteration, and from `inertia_iterations` on.
     inertia_iterations : int, optional
@@ -89,7 +90,7 @@ class ParticleSwarm:
 
     particles: int = 64
     iterations: int = 200
-    update: Literal["classic", "hypersphere"] = "classic"
+    update: Literal["classic", "hypersphere", "hypersphere-radial"] = "classic"
     inertia_start: float = 0.7298
     inertia_end: float = 0.7298
     inertia_iterations: int = 1
@@ -149,7 +150,9 @@ class ParticleSwarm:
         c1 = c2 = 1/2 + ln 2, three informed at random, half the velocity turned back at a bound.
         The standard leaves the end of a search to its user: at most 1000 iterations, stopped
         after 200 in a row that improve the best cost by less than 1e-6 um, are ours. It has no
-        descent; ``dataclasses.replace(swarm, polish=True)`` adds one.
+        descent; ``dataclasses.replace(swarm, polish=True)`` adds one. Points are drawn evenly in
+        the hypersphere's volume; the programs released with the standard draw the radius evenly,
+        which is ``update="hypersphere-radial"``.
 
         Returns
         -------

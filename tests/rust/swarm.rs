@@ -49,7 +49,8 @@ fn places(swarm: &Swarm, coordinates: usize) -> Vec<Vec<f64>> {
 #[test]
 fn finds_the_minimum_with_every_update_boundary_and_topology() {
     let standard = SwarmSettings { particles: 30, iterations: 400, ..SwarmSettings::spso_2011() };
-    for settings in [quick(), standard] {
+    let radial = SwarmSettings { update: Update::HypersphereRadial, ..standard.clone() };
+    for settings in [quick(), standard, radial] {
         for boundary in BOUNDARIES {
             for topology in TOPOLOGIES {
                 let settings =
@@ -173,50 +174,67 @@ fn the_settings_of_spso_2011() {
     assert_eq!(kinds, (Update::Hypersphere, Topology::Random, Boundary::Rebound));
 }
 
+/// First steps of a swarm without inertia, as points of the unit ball: from X, its own best place,
+/// a particle goes into the sphere about G = X + c2 (L - X)/3. A small c2 keeps that in the box.
+fn points_of_the_ball(update: Update, coordinates: usize, particles: usize) -> Vec<Vec<f64>> {
+    let settings = SwarmSettings {
+        particles,
+        update,
+        inertia: (0.0, 0.0),
+        social: 3e-5,
+        topology: Topology::Global,
+        ..SwarmSettings::spso_2011()
+    };
+    let mut swarm = Swarm::new(settings, coordinates, 5, 0).unwrap();
+    let before = places(&swarm, coordinates);
+    let mut costs = vec![1.0; particles];
+    costs[0] = 0.0;
+    swarm.tell(&costs);
+    let moved = |(x, after): (&Vec<f64>, Vec<f64>)| {
+        let centre: Vec<f64> = x.iter().zip(&before[0]).map(|(x, l)| 1e-5 * (l - x)).collect();
+        let radius = size(&centre);
+        let offsets = after.iter().zip(x).zip(&centre);
+        offsets.map(|((after, x), centre)| (after - x - centre) / radius).collect()
+    };
+    before.iter().zip(places(&swarm, coordinates)).skip(1).map(moved).collect()
+}
+
+fn size(vector: &[f64]) -> f64 {
+    vector.iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+/// Kolmogorov and Smirnov: the largest distance from evenly spread numbers, over the square root
+/// of their count; 1.95 is passed by one sample in a thousand.
+fn unevenness(mut numbers: Vec<f64>) -> f64 {
+    numbers.sort_by(f64::total_cmp);
+    let n = numbers.iter().map(|_| 1.0).sum::<f64>();
+    let apart = (0_u16..).zip(&numbers).map(|(i, x)| (x - (f64::from(i) + 0.5) / n).abs());
+    apart.fold(0.0, f64::max) * n.sqrt()
+}
+
 #[test]
 fn points_are_even_in_the_hypersphere() {
-    // Without inertia the first step goes from X, its own best place, to a point of the sphere
-    // about G = X + c2 (L - X)/3. A small c2 keeps all of it inside the box.
-    const PARTICLES: u16 = 20_000;
-    for d in [1_u8, 2, 3, 6, 7, 32] {
-        let (coordinates, d) = (usize::from(d), f64::from(d));
-        let settings = SwarmSettings {
-            particles: PARTICLES.into(),
-            inertia: (0.0, 0.0),
-            social: 3e-5,
-            topology: Topology::Global,
-            ..SwarmSettings::spso_2011()
-        };
-        let mut swarm = Swarm::new(settings, coordinates, 5, 0).unwrap();
-        let before = places(&swarm, coordinates);
-        let mut costs = vec![1.0; PARTICLES.into()];
-        costs[0] = 0.0;
-        swarm.tell(&costs);
-        let after = places(&swarm, coordinates);
-        let n = f64::from(PARTICLES - 1);
-        let (mut radii, mut first, mut square) = (Vec::new(), 0.0, 0.0);
-        for (x, moved) in before.iter().zip(&after).skip(1) {
-            let centre: Vec<f64> = x.iter().zip(&before[0]).map(|(x, l)| 1e-5 * (l - x)).collect();
-            let radius = centre.iter().map(|c| c * c).sum::<f64>().sqrt();
-            let point: Vec<f64> =
-                (0..coordinates).map(|k| (moved[k] - x[k] - centre[k]) / radius).collect();
-            radii.push(point.iter().map(|p| p * p).sum::<f64>().sqrt());
-            first += point[0] / n;
-            square += point[coordinates - 1] * point[coordinates - 1] / n;
-        }
-        radii.sort_by(f64::total_cmp);
-        assert!(radii[radii.len() - 1] <= 1.0 + 1e-9);
+    const COUNT: u16 = 20_000;
+    let n = f64::from(COUNT - 1);
+    for coordinates in [1_u8, 2, 3, 6, 7, 32] {
+        let d = f64::from(coordinates);
+        let points = |update| points_of_the_ball(update, coordinates.into(), COUNT.into());
+        let even = points(Update::Hypersphere);
+        let radii: Vec<f64> = even.iter().map(|point| size(point)).collect();
+        assert!(radii.iter().all(|r| *r <= 1.0 + 1e-9));
         // The share of points within r is r^d: mean d/(d+1), variance of a coordinate 1/(d+2).
         let mean = radii.iter().sum::<f64>() / n;
         let deviation = (d / (d + 2.0)).sqrt() / (d + 1.0);
         assert!((mean - d / (d + 1.0)).abs() < 4.0 * deviation / n.sqrt(), "{d} {mean}");
-        assert!(first.abs() < 4.0 / (n * (d + 2.0)).sqrt(), "{d} {first}");
-        assert!((square * (d + 2.0) - 1.0).abs() < 6.0 / n.sqrt(), "{d} {square}");
-        // Kolmogorov and Smirnov; 1.95 is passed by one sample in a thousand.
-        let apart = (0_u16..)
-            .zip(&radii)
-            .fold(0.0, |most: f64, (i, r)| most.max((r.powf(d) - (f64::from(i) + 0.5) / n).abs()));
-        assert!(apart < 1.95 / n.sqrt(), "{d} {apart}");
+        assert!(unevenness(radii.iter().map(|r| r.powf(d)).collect()) < 1.95, "{d}");
+        for k in [0, usize::from(coordinates) - 1] {
+            let mean = even.iter().map(|point| point[k]).sum::<f64>() / n;
+            assert!(mean.abs() < 4.0 / (n * (d + 2.0)).sqrt(), "{d} {mean}");
+            let variance = even.iter().map(|point| point[k] * point[k]).sum::<f64>() / n;
+            assert!((variance * (d + 2.0) - 1.0).abs() < 6.0 / n.sqrt(), "{d} {variance}");
+        }
+        let radial = points(Update::HypersphereRadial);
+        assert!(unevenness(radial.iter().map(|point| size(point)).collect()) < 1.95, "{d}");
     }
 }
 
@@ -280,8 +298,10 @@ fn a_rotation_matters_to_the_classic_update_alone() {
         let (turned, other) = reached(&settings, true);
         (turned - straight, error.hypot(other))
     };
-    let (hypersphere, error) = changed(SwarmSettings::spso_2011());
-    assert!(hypersphere.abs() < 2.5 * error, "{hypersphere} +- {error}");
+    for update in [Update::Hypersphere, Update::HypersphereRadial] {
+        let (found, error) = changed(SwarmSettings { update, ..SwarmSettings::spso_2011() });
+        assert!(found.abs() < 2.5 * error, "{update:?} {found} +- {error}");
+    }
     let (classic, error) = changed(SwarmSettings { particles: 40, ..quick() });
     assert!(classic > 8.0 * error && classic > 1.0, "{classic} +- {error}");
 }

@@ -74,9 +74,12 @@ fn update_named(name: &str) -> Result<Update> {
     match name {
         "classic" => Ok(Update::Classic),
         "hypersphere" => Ok(Update::Hypersphere),
-        other => {
-            Err(Error::parameter("update", format!("'{other}'"), "'classic' or 'hypersphere'"))
-        }
+        "hypersphere-radial" => Ok(Update::HypersphereRadial),
+        other => Err(Error::parameter(
+            "update",
+            format!("'{other}'"),
+            "'classic', 'hypersphere' or 'hypersphere-radial'",
+        )),
     }
 }
 

@@ -51,28 +51,46 @@ impl Draws {
 
     /// A point drawn evenly from the unit ball; of 32 coordinates it takes 33 numbers.
     ///
-    /// Normal deviates g (Box and Muller 1958, doi 10.1214/aoms/1177706645) and an exponential
-    /// one e give g / sqrt(|g|^2 + 2 e): Barthe, Guedon, Mendelson and Naor 2005, doi
-    /// 10.1214/009117904000000874. Its radius is d/(d+1) on average.
+    /// Normal deviates g and an exponential one e give g / sqrt(|g|^2 + 2 e): Barthe, Guedon,
+    /// Mendelson and Naor 2005, doi 10.1214/009117904000000874. Its radius is d/(d+1) on average.
     pub(super) fn in_unit_ball(&mut self, coordinates: usize) -> Vec<f64> {
-        let mut point = Vec::with_capacity(coordinates + 1);
-        while point.len() < coordinates {
+        let normals = self.normals(coordinates);
+        let rest = 2.0 * self.exponential();
+        scaled(normals, 1.0, rest)
+    }
+
+    /// A point of the unit ball in an even direction at an even radius, so that points are denser
+    /// the nearer to the centre; of 32 coordinates it takes 33 numbers.
+    pub(super) fn in_unit_ball_radially(&mut self, coordinates: usize) -> Vec<f64> {
+        let normals = self.normals(coordinates);
+        let radius = self.uniform();
+        scaled(normals, radius, 0.0)
+    }
+
+    /// Normal deviates: Box and Muller 1958, doi 10.1214/aoms/1177706645.
+    fn normals(&mut self, count: usize) -> Vec<f64> {
+        let mut normals = Vec::with_capacity(count + 1);
+        while normals.len() < count {
             let radius = libm::sqrt(2.0 * self.exponential());
             let (sine, cosine) = libm::sincos(core::f64::consts::TAU * self.uniform());
-            point.extend([radius * cosine, radius * sine]);
+            normals.extend([radius * cosine, radius * sine]);
         }
-        point.truncate(coordinates);
-        let squares: f64 = point.iter().map(|g| g * g).sum();
-        // Above 0 also where everything else is 0.
-        let scale = libm::sqrt(squares + 2.0 * self.exponential() + f64::MIN_POSITIVE);
-        for g in &mut point {
-            *g /= scale;
-        }
-        point
+        normals.truncate(count);
+        normals
     }
 
     /// An exponential deviate of mean 1.
     fn exponential(&mut self) -> f64 {
         -libm::log(1.0 - self.uniform())
     }
+}
+
+/// `radius g / sqrt(|g|^2 + rest)`; 0 where the radius or everything else is 0.
+fn scaled(mut g: Vec<f64>, radius: f64, rest: f64) -> Vec<f64> {
+    let squares: f64 = g.iter().map(|g| g * g).sum();
+    let scale = libm::sqrt(squares + rest + f64::MIN_POSITIVE) / radius;
+    for g in &mut g {
+        *g /= scale;
+    }
+    g
 }

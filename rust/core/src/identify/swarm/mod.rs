@@ -65,7 +65,7 @@ impl Swarm {
         let count = settings.particles as u64;
         let share = match settings.update {
             Update::Classic => 0.5,
-            Update::Hypersphere => 1.0,
+            Update::Hypersphere | Update::HypersphereRadial => 1.0,
         };
         let limit = settings.velocity_limit;
         let particles = (0..count)

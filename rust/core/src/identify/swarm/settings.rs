@@ -40,6 +40,9 @@ pub enum Update {
     /// particle, a point beyond its own best place and one beyond its leader's: the same
     /// however the coordinates are turned. Clerc 2012, hal-00764996.
     Hypersphere,
+    /// The same with the radius drawn evenly, not the volume, so that points are denser about the
+    /// centre: what the programs released with SPSO-2011 do.
+    HypersphereRadial,
 }
 
 /// Settings of the swarm.
@@ -55,7 +58,7 @@ pub struct SwarmSettings {
     pub inertia: (f64, f64),
     /// Iterations over which the inertia goes linearly from one to the other.
     pub inertia_iterations: usize,
-    /// c1, the pull of a particle's own best place; of [`Update::Hypersphere`] how far beyond it
+    /// c1, the pull of a particle's own best place; of a hypersphere how far beyond it
     /// a point is taken.
     pub cognitive: f64,
     /// c2, the same of the leader's best place.
@@ -103,7 +106,7 @@ impl SwarmSettings {
     /// Clerc and Rojas 2013, doi 10.1109/CEC.2013.6557848.
     ///
     /// 40 particles, w = 1/(2 ln 2), c1 = c2 = 1/2 + ln 2. When to end is left to the user there:
-    /// the iterations and the stall are ours.
+    /// the iterations and the stall are ours. Points are drawn evenly in volume.
     #[must_use]
     pub fn spso_2011() -> Self {
         use core::f64::consts::LN_2;

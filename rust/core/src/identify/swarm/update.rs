@@ -14,7 +14,14 @@ impl Particle {
     ) {
         match settings.update {
             Update::Classic => self.classic(settings, inertia, leader, draws),
-            Update::Hypersphere => self.hypersphere(settings, inertia, leader, draws),
+            Update::Hypersphere => {
+                let around = draws.in_unit_ball(self.place.len());
+                self.hypersphere(settings, inertia, leader, &around);
+            }
+            Update::HypersphereRadial => {
+                let around = draws.in_unit_ball_radially(self.place.len());
+                self.hypersphere(settings, inertia, leader, &around);
+            }
         }
     }
 
@@ -42,7 +49,7 @@ impl Particle {
     /// ```text
     /// G  = (X + (X + c1 (P - X)) + (X + c2 (L - X))) / 3
     /// G  = (X + (X + c1 (P - X))) / 2                      where X leads itself
-    /// X' is drawn evenly from the hypersphere about G of radius |G - X|
+    /// X' = G + |G - X| B                                   B a point of the unit ball
     /// V <- w V + X' - X
     /// X <- X + V
     /// ```
@@ -51,7 +58,7 @@ impl Particle {
         settings: &SwarmSettings,
         inertia: f64,
         leader: &Best,
-        draws: &mut Draws,
+        around: &[f64],
     ) {
         let limit = settings.velocity_limit;
         let Self { place, velocity, best } = self;
@@ -65,8 +72,7 @@ impl Particle {
             .map(|(x, (own, lead))| share * (settings.cognitive * (own - x) + social * (lead - x)))
             .collect();
         let radius = libm::sqrt(centre.iter().map(|d| d * d).sum());
-        let around = draws.in_unit_ball(place.len());
-        let steps = centre.iter().zip(&around);
+        let steps = centre.iter().zip(around);
         for ((x, v), (centre, around)) in place.iter_mut().zip(velocity).zip(steps) {
             let pulled = (inertia * *v + centre + radius * around).clamp(-limit, limit);
             (*x, *v) = bounded(settings.boundary, *x + pulled, pulled);
