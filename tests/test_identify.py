@@ -73,6 +73,21 @@ def test_the_papers_search_finds_what_scipy_simulated(drive: str, seed: int) -> 
     assert fit.cost < 1.3 * NOISE
 
 
+@pytest.mark.parametrize("update", ["hypersphere", "hypersphere-radial"])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_spso_2011_finds_it_and_the_descent_sharpens_it(update: Any, seed: int) -> None:
+    swarm = replace(pt.ParticleSwarm.spso_2011(), update=update)
+    plain = quick_fit(offset=False, swarm=swarm, seed=seed)
+    assert plain.npolish == 0
+    assert plain.cost < 1.3 * NOISE
+    assert max(off(plain).values()) < 0.02, off(plain)
+    polished = quick_fit(offset=False, swarm=replace(swarm, polish=True), seed=seed)
+    assert polished.cost == pytest.approx(NOISE, rel=0.05)
+    assert max(off(polished).values()) < 0.002, off(polished)
+    # The four runs end in one place.
+    assert polished.agreeing == 4
+
+
 @pytest.mark.parametrize("drive", ["slow sine", "two tones"])
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_default_search_finds_it_from_any_seed(drive: str, seed: int) -> None:
@@ -208,6 +223,8 @@ SWARMS = {
     "the paper's": replace(pt.ParticleSwarm.xu_li_2010(), iterations=40),
     "five": pt.ParticleSwarm(particles=5, iterations=25, topology="global"),
     "invisible": pt.ParticleSwarm(particles=13, iterations=25, boundary="invisible"),
+    "SPSO-2011": replace(pt.ParticleSwarm.spso_2011(), iterations=25),
+    "radial": replace(pt.ParticleSwarm.spso_2011(), iterations=25, update="hypersphere-radial"),
     "reflect": pt.ParticleSwarm(particles=50, iterations=10, boundary="reflect", polish=False),
 }
 
@@ -316,6 +333,7 @@ def test_the_published_settings() -> None:
     } == {
         "particles": 10,
         "iterations": 2000,
+        "update": "classic",
         "inertia_start": 0.9,
         "inertia_end": 0.4,
         "inertia_iterations": 500,
@@ -329,6 +347,16 @@ def test_the_published_settings() -> None:
         "boundary": None,
     }
     assert pt.ParticleSwarm.xu_li_2010() == pt.ParticleSwarm.xu_li_2010()
+
+
+def test_the_settings_of_spso_2011() -> None:
+    # Clerc 2012, hal-00764996; the end of a search is ours.
+    swarm = pt.ParticleSwarm.spso_2011()
+    assert swarm.particles == 40
+    assert swarm.inertia_start == swarm.inertia_end == 1.0 / (2.0 * math.log(2.0))
+    assert swarm.cognitive == swarm.social == 0.5 + math.log(2.0)
+    assert (swarm.update, swarm.topology, swarm.boundary) == ("hypersphere", "random", "rebound")
+    assert swarm.velocity_limit == math.inf
 
 
 def test_no_velocity_limit_is_a_setting() -> None:

@@ -96,6 +96,7 @@ class SwarmSettings:
         *,
         particles: int,
         iterations: int,
+        update: str,
         inertia_start: float,
         inertia_end: float,
         inertia_iterations: int,

@@ -128,10 +128,14 @@ fn abandoning_a_guess_changes_no_result() {
 }
 
 fn outcomes(threads: usize, seed: u64, runs: usize) -> Vec<Outcome> {
+    searched(&SwarmSettings::xu_li_2010(), threads, seed, runs)
+}
+
+fn searched(settings: &SwarmSettings, threads: usize, seed: u64, runs: usize) -> Vec<Outcome> {
     let (u, y) = log();
     let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
     let problem = Problem::new(&record, &spec()).unwrap();
-    let settings = SwarmSettings { iterations: 30, ..SwarmSettings::xu_li_2010() };
+    let settings = SwarmSettings { iterations: 30, ..settings.clone() };
     let plan = Plan { settings, seed, runs };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     pool.install(|| {
@@ -156,6 +160,12 @@ fn any_number_of_threads() {
         assert_same(&one[0], &outcomes(threads, 3, 1)[0]);
     }
     assert_ne!(one[0].history, outcomes(1, 4, 1)[0].history, "another seed, another search");
+    let standard = |threads| searched(&SwarmSettings::spso_2011(), threads, 3, 2);
+    let one = standard(1);
+    for threads in [2, 7] {
+        let others = standard(threads);
+        one.iter().zip(&others).for_each(|(one, other)| assert_same(one, other));
+    }
 }
 
 #[test]

@@ -66,7 +66,9 @@ def identify_command(
         str | None,
         typer.Option(metavar="fit|S|LOW:HIGH", help="Delay of the displacement in s: fit it?"),
     ] = None,
-    swarm: Annotated[str, typer.Option(help="Settings: default or xu-li-2010.")] = "default",
+    swarm: Annotated[
+        str, typer.Option(help="Settings: default, xu-li-2010 or spso-2011.")
+    ] = "default",
     seed: Annotated[int, typer.Option(help="Same seed, same result.")] = 0,
     runs: Annotated[int, typer.Option(help="Swarms that search apart; do they agree?")] = 4,
     threads: Annotated[int | None, typer.Option(help="Up to 256; else all cores.")] = None,
@@ -174,9 +176,13 @@ def _write(
 def _swarm(name: str) -> ParticleSwarm | None:
     from ..swarm import ParticleSwarm
 
-    known = {"default": None, "xu-li-2010": ParticleSwarm.xu_li_2010()}
+    known = {
+        "default": None,
+        "xu-li-2010": ParticleSwarm.xu_li_2010(),
+        "spso-2011": ParticleSwarm.spso_2011(),
+    }
     if name not in known:
-        raise ParameterError(f"--swarm is '{name}': expected {' or '.join(known)}")
+        raise ParameterError(f"--swarm is '{name}': expected {', '.join(known)}")
     return known[name]
 
 

@@ -3,7 +3,7 @@
 use numpy::{PyArray1, ToPyArray};
 use piezotrack_core::identify::{
     Boundary, Coordinate, Delay, Identification, Outcome, Plan, Record, Spec, StopReason,
-    SwarmSettings, Theta, Topology, identify,
+    SwarmSettings, Theta, Topology, Update, identify,
 };
 use piezotrack_core::march::Order;
 use piezotrack_core::{Error, Result};
@@ -27,13 +27,14 @@ pub struct PySettings(SwarmSettings);
 #[pymethods]
 impl PySettings {
     #[new]
-    #[pyo3(signature = (*, particles, iterations, inertia_start, inertia_end,
+    #[pyo3(signature = (*, particles, iterations, update, inertia_start, inertia_end,
         inertia_iterations, cognitive, social, topology, velocity_limit, boundary, min_improvement,
         stall_iterations, polish))]
     #[expect(clippy::too_many_arguments, reason = "keyword-only, one for each setting")]
     fn new(
         particles: usize,
         iterations: usize,
+        update: &str,
         inertia_start: f64,
         inertia_end: f64,
         inertia_iterations: usize,
@@ -46,11 +47,13 @@ impl PySettings {
         stall_iterations: usize,
         polish: bool,
     ) -> PyResult<Self> {
+        let update = update_named(update).map_err(|error| raise(&error))?;
         let boundary = boundary_named(boundary).map_err(|error| raise(&error))?;
         let topology = topology_named(topology).map_err(|error| raise(&error))?;
         let settings = SwarmSettings {
             particles,
             iterations,
+            update,
             inertia: (inertia_start, inertia_end),
             inertia_iterations,
             cognitive,
@@ -67,15 +70,29 @@ impl PySettings {
     }
 }
 
+fn update_named(name: &str) -> Result<Update> {
+    match name {
+        "classic" => Ok(Update::Classic),
+        "hypersphere" => Ok(Update::Hypersphere),
+        "hypersphere-radial" => Ok(Update::HypersphereRadial),
+        other => Err(Error::parameter(
+            "update",
+            format!("'{other}'"),
+            "'classic', 'hypersphere' or 'hypersphere-radial'",
+        )),
+    }
+}
+
 fn boundary_named(name: &str) -> Result<Boundary> {
     match name {
         "absorb" => Ok(Boundary::Absorb),
+        "rebound" => Ok(Boundary::Rebound),
         "reflect" => Ok(Boundary::Reflect),
         "invisible" => Ok(Boundary::Invisible),
         other => Err(Error::parameter(
             "boundary",
             format!("'{other}'"),
-            "'absorb', 'reflect' or 'invisible'",
+            "'absorb', 'rebound', 'reflect' or 'invisible'",
         )),
     }
 }
@@ -84,7 +101,10 @@ fn topology_named(name: &str) -> Result<Topology> {
     match name {
         "global" => Ok(Topology::Global),
         "ring" => Ok(Topology::Ring),
-        other => Err(Error::parameter("topology", format!("'{other}'"), "'global' or 'ring'")),
+        "random" => Ok(Topology::Random),
+        other => {
+            Err(Error::parameter("topology", format!("'{other}'"), "'global', 'ring' or 'random'"))
+        }
     }
 }
 

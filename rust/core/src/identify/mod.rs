@@ -17,4 +17,4 @@ pub use problem::{
     Coordinate, DELAY, Delay, NOMINAL_STIFFNESS, Problem, Record, Scale, Spec, Theta, stage_of,
 };
 pub use search::{Monitor, Outcome, Plan, Progress, StopReason, search};
-pub use swarm::{Boundary, Swarm, SwarmSettings, Topology};
+pub use swarm::{Boundary, Swarm, SwarmSettings, Topology, Update};
