@@ -185,11 +185,11 @@ fn memory_stays_in_step_through_a_dropout() {
         y = gain * command.volts;
         if (7900..8000).contains(&k) {
             before = f64::max(before, command.error.abs());
-        } else if (8150..8250).contains(&k) {
+        } else if (8050..8150).contains(&k) {
             after = f64::max(after, command.error.abs());
         }
     }
-    assert!(after < 3.0 * before, "{after} m, before {before} m");
+    assert!(after < 1.5 * before, "{after} m, before {before} m");
 }
 
 #[test]
