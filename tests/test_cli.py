@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 import piezotrack as pt
 from piezotrack.cli import app
 from piezotrack.demo import write_log
-from records import BOX, HELD, TABLE_1, quick
+from records import BOX, HELD, quick
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -196,18 +196,27 @@ def test_simulate_writes_the_displacement() -> None:
 def test_the_demonstration_tells_the_whole_story() -> None:
     printed = ran("demo")
     pictures = [f"dahl_{picture}" for picture in PICTURES]
+    tracked = ("feedforward", "pid", "all")
+    pictures += [f"track_{name}.{ending}" for name in tracked for ending in ("png", "svg")]
     assert names("demo") == sorted(["dahl.json", "log.csv", *pictures])
     log = pt.read("demo/log.csv")
     assert len(log) == 60001
     assert log.dt == pytest.approx(1 / 5000.0)
     model = pt.load("demo/dahl.json")
-    for name in ("damping", "stiffness", "piezo_coefficient"):
-        found = getattr(model.model, name)
-        assert found == pytest.approx(getattr(TABLE_1, name), rel=0.01), name
-    # The noise of the sensor is all that is left, also where the record was not fitted.
-    assert model.score(log[:4.0]).rms == pytest.approx(0.098e-6, rel=0.02)
-    assert model.score(log[4.0:]).rms == pytest.approx(0.098e-6, rel=0.02)
-    assert "the other 8 s, not fitted: rms 0.09" in printed
+    # The model does not have all that the virtual stage has: published, 5 um at most.
+    for part in (log[:4.0], log[4.0:]):
+        score = model.score(part)
+        assert 0.098e-6 < score.rms < 2e-6
+        assert score.max_error < 5e-6
+    assert "the other 8 s, not fitted: rms 1." in printed
+    largest = {
+        name: float(found)
+        for name, found in re.findall(r"  (\S.*?) +max (\d+\.\d+) um, rms", printed)
+    }
+    # Published: 5.69, 4.44, within 1.5.
+    assert 4.5 < largest["feedforward alone"] < 7.0
+    assert 3.0 < largest["PID alone"] < 5.0
+    assert largest["both, repetitive"] < 1.5
     for path in names("demo"):
         assert f"  {Path('demo', path)}\n" in printed
 

@@ -1,4 +1,4 @@
-"""The demonstration: a log from a built-in stage, identified on its first part."""
+"""The demonstration: a log of the virtual stage, a model from it, and a tracked reference."""
 
 from __future__ import annotations
 
@@ -6,19 +6,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import _core
-from .dataset import Dataset
+from .control import Controller, Pid, Repetitive
 from .files import write_columns
 from .identification import Identification, identify
 from .models import DahlStage
+from .tracking import Tracking, track
+from .virtual import VirtualStage
+from .waveforms import sine
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from .dataset import Dataset
     from .estimates import Progress
 
-__all__ = ["SEARCH_BOX", "demo_log", "identify_demo", "write_log"]
+__all__ = ["SEARCH_BOX", "demo_log", "identify_demo", "track_demo", "write_log"]
 
 # The box of Xu and Li 2010, section 3.3, SI.
 SEARCH_BOX = {
@@ -31,29 +34,22 @@ FITTED_SECONDS = 4.0
 
 
 def demo_log(seed: int = 1) -> Dataset:
-    """Make the log of Fig. 7 of Xu and Li 2010: 12 s of 0.25 Hz, 0 to 75 V, at 5 kHz.
-
-    The stage is that of Table 1, the sensor has the published noise, 0.097 um rms, and steps of
-    0.038 um.
+    """Record the log of Fig. 7 of Xu and Li 2010: 12 s of 0.25 Hz, 0 to 75 V, at 5 kHz.
 
     Parameters
     ----------
     seed : int, optional
-        Of the noise.
+        Of the noise of the virtual stage's sensor.
 
     Returns
     -------
     Dataset
         60 001 samples.
     """
-    seed = _core.as_count("seed", seed)
     rate, seconds = 5000.0, 12.0
     t = np.arange(int(rate * seconds) + 1) / rate
     u = 37.5 * (1.0 - np.cos(2.0 * np.pi * 0.25 * t))
-    x = DahlStage.xu_li_2010().simulate(u, 1.0 / rate).x
-    noisy = x + np.random.default_rng(seed).normal(0.0, 0.097e-6, t.size)
-    step = 2.5e-3 / 2**16
-    return Dataset(u=u, y=step * np.round(noisy / step), dt=1.0 / rate, source="built-in stage")
+    return VirtualStage.xu_li_2010(seed=seed).record(u, 1.0 / rate)
 
 
 def identify_demo(
@@ -86,11 +82,39 @@ def identify_demo(
         log[:FITTED_SECONDS],
         fixed={"a1": published.a1, "a2": published.a2, "b1": published.b1},
         bounds=SEARCH_BOX,
-        offset=False,
         seed=seed,
         progress=progress,
         callback=callback,
     )
+
+
+def track_demo(fit: Identification, seed: int = 1) -> dict[str, Tracking]:
+    """Track 0.2 Hz over 110 um with each part of the controller, as in Fig. 12 of the paper.
+
+    Parameters
+    ----------
+    fit : Identification
+        The model, whose inverse is the feedforward.
+    seed : int, optional
+        Of the noise of the virtual stage's sensor.
+
+    Returns
+    -------
+    dict of str to Tracking
+        With feedforward alone, with PID alone, and with both and a repetitive part.
+    """
+    stage = VirtualStage.xu_li_2010(seed=seed)
+    reference = sine(frequency=0.2, low=0.0, high=110e-6, duration=20.0)
+    inverse, pid = fit.inverse(), Pid.xu_li_2010()
+    learning = Repetitive(period=5.0, tq=0.2, kq=1.0)
+    loops = {
+        "feedforward": Controller(dt=0.02, limits=(0.0, 75.0), feedforward=inverse),
+        "pid": Controller(dt=0.02, limits=(0.0, 75.0), feedback=pid),
+        "all": Controller(
+            dt=0.02, limits=(0.0, 75.0), feedforward=inverse, feedback=pid, addon=learning
+        ),
+    }
+    return {name: track(stage, loop, reference) for name, loop in loops.items()}
 
 
 def write_log(log: Dataset, path: Path) -> Path:

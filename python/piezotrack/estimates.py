@@ -65,12 +65,16 @@ class Estimate(NamedTuple):
     at_bound: bool
 
     @property
-    def identified(self) -> bool:
-        """Whether the record fixes the value: to better than a half, and inside its bounds."""
+    def precise(self) -> bool:
+        """Whether the standard deviation is below half of the value, or the value held."""
         if not self.free:
             return True
-        known = self.deviation is not None and self.deviation < 0.5 * abs(self.value)
-        return known and not self.at_bound
+        return self.deviation is not None and self.deviation < 0.5 * abs(self.value)
+
+    @property
+    def identified(self) -> bool:
+        """Whether the record fixes the value: to better than a half, and inside its bounds."""
+        return self.precise and not self.at_bound
 
 
 class Run(NamedTuple):

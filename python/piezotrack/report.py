@@ -90,7 +90,8 @@ def _known(fit: Identification) -> list[str]:
         ratios.append(("delay", "delay", 1e3 * fit.delay, "ms"))
     if fit.parameters["b0"].free or stage.b0:
         ratios.append(("b0", "b0 up/K", stage.b0 * stage.up / stiffness, ""))
-    # A ratio to a stiffness that was searched is known where both are.
+    # A ratio to a stiffness that was searched is known where both are; a stiffness that presses
+    # against its bound takes the others along.
     whole = fit.parameters["stiffness"]
     known: list[tuple[str, str]] = []
     unknown: list[tuple[str, str]] = []
@@ -98,7 +99,7 @@ def _known(fit: Identification) -> list[str]:
         estimate = fit.parameters[name]
         alone = name in ("a1", "a2", "delay")
         held = not estimate.free and (not whole.free or alone)
-        sure = estimate.identified and (whole.identified or alone)
+        sure = estimate.identified and (whole.precise or alone)
         if not held:
             (known if sure else unknown).append((symbol, f"{value:>12.6g}  {unit}"))
     lines = ["fixed by the data" if known else "nothing is fixed by these data"]

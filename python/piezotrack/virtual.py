@@ -209,7 +209,7 @@ class VirtualStage:
             Command and measured displacement.
         """
         run = self.simulate(u, dt, hold=hold)
-        return Dataset(u=run.u, y=run.y, dt=dt, hold=hold)
+        return Dataset(u=run.u, y=run.y, dt=dt, hold=hold, source="virtual stage")
 
 
 def _numbers(name: str, values: object) -> tuple[float, ...]:
