@@ -24,6 +24,8 @@ class Progress(NamedTuple):
         Best cost so far [um].
     parameters : dict of str to float
         The parameters that gave it, SI.
+    delay : float
+        The delay that gave it [s].
     """
 
     nit: int
@@ -31,6 +33,7 @@ class Progress(NamedTuple):
     nfev: int
     cost_um: float
     parameters: dict[str, float]
+    delay: float = 0.0
 
 
 class Estimate(NamedTuple):

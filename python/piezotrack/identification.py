@@ -319,11 +319,11 @@ def identify(
 
 def _telling(callback: Callable[[Progress], object]) -> Callable[..., bool]:
     """Call back with a `Progress` where the core has plain numbers."""
-    names = (*DahlStage.parameter_names(), "delay")
+    names = DahlStage.parameter_names()
 
     def tell(nit: int, most: int, nfev: int, cost: float, theta: list[float]) -> bool:
-        parameters = dict(zip(names, theta, strict=True))
-        return bool(callback(Progress(nit, most, nfev, 1e6 * cost, parameters)))
+        parameters = dict(zip(names, theta[:-1], strict=True))
+        return bool(callback(Progress(nit, most, nfev, 1e6 * cost, parameters, theta[-1])))
 
     return tell
 
