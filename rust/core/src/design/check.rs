@@ -6,11 +6,14 @@ use super::margins::Margins;
 use super::plant::LoopPlant;
 use super::sampled_loop::{LinearFeedback, SampledLoop};
 use super::stability::{GainRange, Root};
-use super::walk::Place;
+use super::walk::{Peak, Place};
 use crate::error::Result;
 
 /// A loop gain so many times off its limit is taken for a wrong unit.
 const WRONG_UNIT: f64 = 3e4;
+
+/// Where the search for the small-gain bound begins, rad.
+const SLOWEST: f64 = 1e-6;
 
 /// What is known about the closed loop of a plant and a controller.
 #[derive(Clone, Debug, PartialEq)]
@@ -103,26 +106,16 @@ impl SampledLoop {
         }
         let alone = self.without_repetitive();
         let size = |theta: f64| self.learning_gain(alone.place(1.0, theta).delta).norm();
-        let mut largest = 0.0_f64;
-        let turn = |place: &Place| place.turn_open().norm().max(place.turn_closed().norm()) * 8.0;
-        alone.walk(1.0, 1e-6, turn, |left, right| {
-            let (mut from, mut to) = (left.theta, right.theta);
-            largest = largest.max(size(from)).max(size(to));
-            if size(from).max(size(to)) < 0.8 * largest {
-                return;
-            }
-            for _ in 0..20 {
-                let third = (to - from) / 3.0;
-                let (lower, upper) = (size(from + third), size(to - third));
-                largest = largest.max(lower).max(upper);
-                if lower < upper {
-                    from += third;
-                } else {
-                    to -= third;
-                }
-            }
+        // Q turns too, most where its pole is near
+        let turn = |place: &Place| {
+            let open = place.turn_open().norm().max(place.turn_closed().norm());
+            8.0 * open.max(self.turn_of_filter(place.z()))
+        };
+        let mut peak = Peak::default();
+        alone.walk(1.0, SLOWEST, turn, |left, right| {
+            peak.take(left.theta, right.theta, size(right.theta));
         });
-        Some(largest)
+        Some(peak.refine(size).height)
     }
 
     /// What may be wrong with the gain of a feedback whose stable range is known.

@@ -92,7 +92,7 @@ impl Ratio {
         Self { above: vec![value], below: vec![1.0] }
     }
 
-    /// `c (delta I - E)^-1 b + d` by the recursion of Faddeev and LeVerrier (Gantmacher, The
+    /// `c (delta I - E)^-1 b + d` by the recursion of Faddeev and Le Verrier (Gantmacher, The
     /// Theory of Matrices, chapter IV.5).
     pub fn of_matrices(e: &DMatrix<f64>, b: &DVector<f64>, c: &DVector<f64>, d: f64) -> Self {
         let n = e.nrows();

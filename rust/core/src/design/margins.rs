@@ -7,7 +7,7 @@ use piezotrack_control::Filter;
 use super::jet::C;
 use super::plant::LoopPlant;
 use super::sampled_loop::{LinearFeedback, SampledLoop};
-use super::walk::Place;
+use super::walk::{Peak, Place};
 use crate::error::{Error, Result};
 
 /// Where the walk for margins begins, rad: slower than that nothing is looked at.
@@ -104,12 +104,20 @@ impl SampledLoop {
             out.gain_frequency = at.map(|(theta, _)| self.hertz(*theta));
         }
         let turn = |place: &Place| place.turn_open().norm().max(place.turn_closed().norm()) * 4.0;
-        self.walk(1.0, SLOWEST, turn, |left, right| self.between_two(&mut out, left, right));
+        let sensitivity = |place: &Place| place.parts.a.value.norm() / place.closed().value.norm();
+        let mut peak = Peak::default();
+        self.walk(1.0, SLOWEST, turn, |left, right| {
+            self.crossover(&mut out, left, right);
+            peak.take(left.theta, right.theta, sensitivity(right));
+        });
+        let peak = peak.refine(|theta| sensitivity(&self.place(1.0, theta)));
+        out.sensitivity = peak.height;
+        out.sensitivity_frequency = self.hertz(peak.theta);
         out
     }
 
-    /// What a piece of the circle adds to the margins.
-    fn between_two(&self, out: &mut Margins, left: &Place, right: &Place) {
+    /// Where |L| passes 1 between two places, if it does.
+    fn crossover(&self, out: &mut Margins, left: &Place, right: &Place) {
         let size = |place: &Place| place.parts.b.value.norm() - place.parts.a.value.norm();
         if (size(left) > 0.0) != (size(right) > 0.0) {
             let place = self.between(left, right, size);
@@ -122,28 +130,6 @@ impl SampledLoop {
             let delay = (if angle < 0.0 { angle + TAU } else { angle }) / (TAU * hertz);
             out.delay = Some(out.delay.map_or(delay, |least| least.min(delay)));
             out.crossover = Some(hertz);
-        }
-        // 1/(1 + L), as large as it can be between the two
-        let sensitivity =
-            |place: &Place| place.parts.a.value.norm() / place.closed().value.norm();
-        let (mut from, mut to) = (left.theta, right.theta);
-        let ends = sensitivity(left).max(sensitivity(right));
-        if ends * 1.5 < out.sensitivity {
-            return;
-        }
-        for place in [left, right] {
-            out.larger(sensitivity(place), self.hertz(place.theta));
-        }
-        for _ in 0..40 {
-            let third = (to - from) / 3.0;
-            let places = [self.place(1.0, from + third), self.place(1.0, to - third)];
-            let [lower, upper] = places.map(|place| sensitivity(&place));
-            out.larger(lower.max(upper), self.hertz(from + 1.5 * third));
-            if lower < upper {
-                from += third;
-            } else {
-                to -= third;
-            }
         }
     }
 
@@ -179,13 +165,5 @@ impl SampledLoop {
     /// An angle on the circle as a frequency, Hz.
     pub(crate) fn hertz(&self, theta: f64) -> f64 {
         theta / (TAU * self.dt())
-    }
-}
-
-impl Margins {
-    fn larger(&mut self, sensitivity: f64, hertz: f64) {
-        if sensitivity > self.sensitivity {
-            (self.sensitivity, self.sensitivity_frequency) = (sensitivity, hertz);
-        }
     }
 }

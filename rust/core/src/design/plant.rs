@@ -185,7 +185,11 @@ impl LoopPlant {
         positive("dt", dt, "s")?;
         let samples = self.delay / dt;
         if samples > DELAY {
-            return Err(Error::parameter("delay", format!("{} s", self.delay), "1e5 samples or less"));
+            return Err(Error::parameter(
+                "delay",
+                format!("{} s", self.delay),
+                "1e5 samples or less",
+            ));
         }
         // A delay given in decimals is a whole number of samples up to rounding.
         let nearest = libm::round(samples);

@@ -190,6 +190,12 @@ impl SampledLoop {
         self.learning.as_ref().map(|part| part.period)
     }
 
+    /// `|d ln (1 - p w)/d ln z|` of the repetitive part's filter.
+    pub(crate) fn turn_of_filter(&self, z: nalgebra::Complex<f64>) -> f64 {
+        let pole = self.learning.as_ref().map_or(0.0, |part| part.pole);
+        pole / (z - pole).norm()
+    }
+
     /// The longest delay in the characteristic function, in samples.
     pub(crate) fn longest_delay(&self) -> usize {
         let learning = self.learning.as_ref().map_or(0, |part| part.nearest + part.taps.len());
@@ -242,7 +248,7 @@ impl SampledLoop {
     /// one period to what is learnt in the next; without a repetitive part, 0.
     pub(crate) fn learning_gain(&self, delta: nalgebra::Complex<f64>) -> nalgebra::Complex<f64> {
         let one = nalgebra::Complex::new(1.0, 0.0);
-        let Some(part) = &self.learning else { return one - one };
+        let Some(part) = &self.learning else { return one * 0.0 };
         let at = Jet { value: delta, slope: one };
         let w = (at + Jet::constant(1.0)).inverse();
         let (learnt, _) = part.at(w);

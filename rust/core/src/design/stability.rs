@@ -63,7 +63,7 @@ impl SampledLoop {
                 let (from, to) = (left.closed().value, right.closed().value);
                 let turn = (to * from.conj()).arg();
                 // Also where it is not a number
-                met |= !(turn.abs() < 2.0) || from == C::new(0.0, 0.0);
+                met |= turn.is_nan() || turn.abs() > 2.0 || from == C::new(0.0, 0.0);
                 turned += turn;
                 let steep = right.turn_closed().norm();
                 if nearest.as_ref().is_none_or(|(most, _)| steep > *most) {
@@ -153,7 +153,9 @@ impl SampledLoop {
         let radius = radius_of(delta);
         // ln |1 + delta| without cancelling
         let log = 0.5 * libm::log1p(2.0 * delta.re + delta.norm_sqr());
-        Root { radius, frequency: angle.abs() / (TAU * self.dt()), samples: -1.0 / log }
+        // What rounding leaves of a real root
+        let angle = if angle.abs() < 1e-14 { 0.0 } else { angle.abs() };
+        Root { radius, frequency: angle / (TAU * self.dt()), samples: -1.0 / log }
     }
 
     /// Newton's method on the characteristic function.

@@ -105,3 +105,44 @@ impl SampledLoop {
         left_over > 0
     }
 }
+
+/// The highest of a function's values on a walk, and the piece in which it may be higher still.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Peak {
+    pub height: f64,
+    pub theta: f64,
+    from: f64,
+    to: f64,
+}
+
+impl Peak {
+    /// Takes in the value at the right end of a piece of the walk.
+    pub fn take(&mut self, left: f64, right: f64, height: f64) {
+        if height > self.height {
+            *self = Self { height, theta: right, from: left, to: right };
+        } else if left <= self.theta {
+            // The piece that follows the highest place
+            self.to = self.to.max(right);
+        }
+    }
+
+    /// Searches the two pieces beside the highest place.
+    pub fn refine(mut self, value: impl Fn(f64) -> f64) -> Self {
+        let (mut from, mut to) = (self.from, self.to);
+        for _ in 0..80 {
+            let third = (to - from) / 3.0;
+            let (lower, upper) = (value(from + third), value(to - third));
+            for (height, theta) in [(lower, from + third), (upper, to - third)] {
+                if height > self.height {
+                    (self.height, self.theta) = (height, theta);
+                }
+            }
+            if lower < upper {
+                from += third;
+            } else {
+                to -= third;
+            }
+        }
+        self
+    }
+}
