@@ -2,6 +2,7 @@
 
 use piezotrack_control::{Controller, Feedback};
 
+use super::jet::C;
 use super::margins::Margins;
 use super::plant::LoopPlant;
 use super::sampled_loop::{LinearFeedback, SampledLoop};
@@ -32,8 +33,11 @@ pub struct Verdict {
     pub gains: Option<GainRange>,
     /// The same for the feedback without the repetitive part.
     pub feedback_gains: Option<GainRange>,
-    /// Periods until 1/e of an error is left, by the slowest root; `None` without a repetitive
-    /// part or for an unstable loop.
+    /// The root that a leak has moved from exactly 1 to a little below. uRC and uFB return by
+    /// it from where they have drifted; the error hardly shows it.
+    pub almost_hidden: Option<Root>,
+    /// Periods until 1/e of an error is left, by the slowest root beside the almost hidden one;
+    /// `None` without a repetitive part or for an unstable loop.
     pub periods: Option<f64>,
     /// The small-gain bound of [`SampledLoop::small_gain`]; `None` without a repetitive part.
     pub small_gain: Option<f64>,
@@ -77,13 +81,19 @@ impl SampledLoop {
         let outside = self.roots_outside(1.0);
         let stable = outside == Some(0);
         let slowest = self.slowest_root()?;
-        let samples = slowest.filter(|_| stable).map(|root| root.samples);
+        let almost_hidden = self.almost_hidden();
+        let seen = match almost_hidden {
+            Some(delta) => self.leaving_out(delta).slowest_root()?,
+            None => slowest,
+        };
+        let samples = seen.filter(|_| stable).map(|root| root.samples);
         let feedback_gains = alone.stable_gains();
         Ok(Verdict {
             stable,
             outside,
             slowest,
             hidden: self.hidden_roots(),
+            almost_hidden: almost_hidden.map(|delta| self.root(C::new(delta, 0.0), 0.0)),
             gains: if self.repeats() { self.stable_gains() } else { feedback_gains },
             feedback_gains,
             periods: self.period().and_then(|period| samples.map(|samples| samples / period)),

@@ -4,7 +4,7 @@ use piezotrack_control::{Controller, Feedback, Filter, SampledPid, SampledRepeti
 
 use nalgebra::{DMatrix, DVector};
 
-use super::jet::{Jet, Ratio};
+use super::jet::{C, Jet, Ratio};
 use super::plant::LoopPlant;
 use crate::error::{Error, Result, positive};
 
@@ -83,6 +83,8 @@ pub struct SampledLoop {
     learning: Option<Learning>,
     /// Roots at exactly 1 that neither reference nor displacement show, and that are left out.
     hidden: usize,
+    /// A real root `1 + delta` that is left out.
+    left_out: Option<f64>,
     /// Factor on the plant's gain.
     gain: f64,
     named_gain: Option<f64>,
@@ -126,6 +128,7 @@ impl SampledLoop {
             feedback: law,
             learning,
             hidden,
+            left_out: None,
             gain: 1.0,
             named_gain: feedback.named_gain(),
         })
@@ -155,7 +158,44 @@ impl SampledLoop {
     pub fn without_repetitive(&self) -> Self {
         let both = self.feedback.integrates()
             && self.learning.as_ref().is_some_and(|part| part.forgets == 0.0);
-        Self { learning: None, hidden: self.hidden - usize::from(both), ..self.clone() }
+        let hidden = self.hidden - usize::from(both);
+        Self { learning: None, hidden, left_out: None, ..self.clone() }
+    }
+
+    /// The root that a leak has moved from exactly 1 to a little below, `z - 1`: still almost
+    /// hidden, as it almost cancels with a pole of the repetitive part.
+    pub(crate) fn almost_hidden(&self) -> Option<f64> {
+        let part = self.learning.as_ref().filter(|_| self.feedback.integrates())?;
+        if part.forgets == 0.0 {
+            return None;
+        }
+        let newton = |f: &dyn Fn(Jet) -> Jet, start: f64| {
+            let mut delta = start;
+            for _ in 0..50 {
+                let value = f(Jet { value: C::new(delta, 0.0), slope: C::new(1.0, 0.0) });
+                let step = (value.value / value.slope).re;
+                delta -= step;
+                if step.abs() <= 1e-14 * delta.abs() {
+                    return Some(delta);
+                }
+            }
+            None
+        };
+        let below = |delta: Jet| {
+            let w = (delta + Jet::constant(1.0)).inverse();
+            Jet::constant(part.forgets) + delta * w * part.at(w).1
+        };
+        let pole = newton(&below, 0.0)?;
+        let closed = |delta: Jet| {
+            let parts = self.all_parts(delta);
+            parts.a + parts.b
+        };
+        newton(&closed, pole).filter(|root| (root - pole).abs() < 0.5 * pole.abs())
+    }
+
+    /// The same loop with the root `1 + delta` left out.
+    pub(crate) fn leaving_out(&self, delta: f64) -> Self {
+        Self { left_out: Some(delta), ..self.clone() }
     }
 
     /// Sampling interval, s.
@@ -191,7 +231,7 @@ impl SampledLoop {
     }
 
     /// `|d ln (1 - p w)/d ln z|` of the repetitive part's filter.
-    pub(crate) fn turn_of_filter(&self, z: nalgebra::Complex<f64>) -> f64 {
+    pub(crate) fn turn_of_filter(&self, z: C) -> f64 {
         let pole = self.learning.as_ref().map_or(0.0, |part| part.pole);
         pole / (z - pole).norm()
     }
@@ -205,7 +245,7 @@ impl SampledLoop {
     /// Degree of the characteristic function at infinity: its roots less its poles at 0.
     pub(crate) fn degree(&self) -> usize {
         let degree = self.plant.degree() + self.filters.degree() + self.feedback.degree();
-        degree - usize::from(self.doubled())
+        degree - usize::from(self.doubled()) - usize::from(self.left_out.is_some())
     }
 
     /// Whether feedback and repetitive part both have a pole at 1, so that one is left out.
@@ -220,9 +260,15 @@ impl SampledLoop {
     /// ```
     ///
     /// with a common factor `z - 1` of dC and dR taken out.
-    pub(crate) fn parts(&self, delta: nalgebra::Complex<f64>) -> Parts {
-        let one = nalgebra::Complex::new(1.0, 0.0);
-        let delta = Jet { value: delta, slope: one };
+    pub(crate) fn parts(&self, delta: C) -> Parts {
+        let delta = Jet { value: delta, slope: C::new(1.0, 0.0) };
+        let Parts { a, b } = self.all_parts(delta);
+        let Some(root) = self.left_out else { return Parts { a, b } };
+        let without = (delta - Jet::constant(root)).inverse();
+        Parts { a: a * without, b: b * without }
+    }
+
+    fn all_parts(&self, delta: Jet) -> Parts {
         let w = (delta + Jet::constant(1.0)).inverse();
         let (plant, plant_below) = self.plant.at(delta);
         let (filter, filter_below) = self.filters.at(delta);
@@ -246,8 +292,8 @@ impl SampledLoop {
 
     /// `Q (1 - z^lead Kq G F/(1 + G F C))` at `z = 1 + delta`, the gain from what is learnt in
     /// one period to what is learnt in the next; without a repetitive part, 0.
-    pub(crate) fn learning_gain(&self, delta: nalgebra::Complex<f64>) -> nalgebra::Complex<f64> {
-        let one = nalgebra::Complex::new(1.0, 0.0);
+    pub(crate) fn learning_gain(&self, delta: C) -> C {
+        let one = C::new(1.0, 0.0);
         let Some(part) = &self.learning else { return one * 0.0 };
         let at = Jet { value: delta, slope: one };
         let w = (at + Jet::constant(1.0)).inverse();
