@@ -83,6 +83,12 @@ impl Filter {
         })
     }
 
+    /// `[b0, b1, b2]` and `[a1, a2]` of the recursion.
+    #[must_use]
+    pub fn coefficients(&self) -> ([f64; 3], [f64; 2]) {
+        (self.b, self.a)
+    }
+
     /// The filtered value of `input`, in its unit.
     #[inline]
     pub fn step(&self, state: &mut FilterState, input: f64) -> f64 {

@@ -29,5 +29,5 @@ pub use inverse::{DahlInverse, InverseState, SampledDahlInverse};
 pub use limits::Limits;
 pub use number::Number;
 pub use pid::{Pid, PidState, SampledPid};
-pub use repetitive::{Repetitive, RepetitiveState, SampledRepetitive, Smoothing};
+pub use repetitive::{Recursion, Repetitive, RepetitiveState, SampledRepetitive, Smoothing};
 pub use state_space::{StateSpace, StateSpaceState};

@@ -150,6 +150,15 @@ pub struct PidState {
     errors: Option<[f64; 2]>,
 }
 
+impl SampledPid {
+    /// Kp, Kp Ts/Ti and Kp Td/Ts, V/m: the weights of `e[k] - e[k-1]`, `e[k]` and
+    /// `e[k] - 2 e[k-1] + e[k-2]`.
+    #[must_use]
+    pub fn weights(&self) -> [f64; 3] {
+        [self.proportional, self.integral, self.derivative]
+    }
+}
+
 impl Feedback for SampledPid {
     type State = PidState;
 

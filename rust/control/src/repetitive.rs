@@ -162,7 +162,7 @@ impl Repetitive {
         let right = samples >= shortest;
         let expected = "longer than the filter's lag and one sample together";
         check("period", self.period, "s", right, expected)?;
-        let sampled = self.taps(delay, pole, &q, half);
+        let sampled = SampledRepetitive { period: samples, ..self.taps(delay, pole, &q, half) };
         let right = sampled.lead < sampled.nearest;
         check("lead", f64::from(self.lead), "samples", right, "less than the period allows")?;
         Ok(sampled)
@@ -200,6 +200,7 @@ impl Repetitive {
             used.reverse();
         }
         SampledRepetitive {
+            period: delay,
             pole,
             gain: self.kq * 1e6,
             pause: self.pause,
@@ -252,6 +253,8 @@ fn samples(value: f64) -> usize {
 /// Coefficients of a repetitive controller for one sampling interval; see [`Repetitive::at`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampledRepetitive {
+    /// L/Ts.
+    period: f64,
     /// p, 0 for a filter without memory.
     pole: f64,
     /// Kq, V/m.
@@ -281,6 +284,23 @@ fn weighted(entries: &[f64], taps: &[f64]) -> f64 {
     even + odd
 }
 
+/// Coefficients of a repetitive controller: see [`SampledRepetitive::recursion`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Recursion<'a> {
+    /// Period of the reference, in samples.
+    pub period: f64,
+    /// Pole p of the filter, 0 for a filter without memory.
+    pub pole: f64,
+    /// Learning gain Kq, V/m.
+    pub gain: f64,
+    /// By how many samples the errors come earlier than the voltages beside them.
+    pub lead: usize,
+    /// Delay of the first tap, in samples, more than `lead`.
+    pub nearest: usize,
+    /// Weights of the samples, the oldest first: the last is for the delay `nearest`.
+    pub taps: &'a [f64],
+}
+
 /// Memory of a repetitive controller: a delay line lent by the caller, `&mut [f64]`, `[f64; N]`
 /// or `Vec<f64>`.
 #[derive(Clone, Debug, PartialEq)]
@@ -297,6 +317,20 @@ impl SampledRepetitive {
     #[must_use]
     pub fn length(&self) -> usize {
         self.nearest + self.reads - 1
+    }
+
+    /// Coefficients of the recursion `uRC[k] = pole uRC[k-1] + sum of tap (uRC[k-d] + gain
+    /// e[k-d+lead])` over the delays d from `nearest` on; for the design of the loop.
+    #[must_use]
+    pub fn recursion(&self) -> Recursion<'_> {
+        Recursion {
+            period: self.period,
+            pole: self.pole,
+            gain: self.gain,
+            lead: self.lead,
+            nearest: self.nearest,
+            taps: self.taps.get(..self.reads).unwrap_or_default(),
+        }
     }
 
     /// The memory before any learning. `line` is filled with zeros.

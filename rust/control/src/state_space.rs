@@ -61,6 +61,14 @@ impl<const N: usize> StateSpace<N> {
     }
 }
 
+impl<const N: usize> StateSpace<N> {
+    /// A (row by row), B, C and D, padded with zeros where there are fewer than `N` states.
+    #[must_use]
+    pub fn matrices(&self) -> (&[[f64; N]; N], &[f64; N], &[f64; N], f64) {
+        (&self.a, &self.b, &self.c, self.d)
+    }
+}
+
 /// Refuses a wrong number of entries, and entries that are not finite.
 fn entries(
     name: &'static str,

@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 mod classical;
+pub mod design;
 pub mod error;
 pub mod identify;
 pub mod integrate;
