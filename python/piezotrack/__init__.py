@@ -21,6 +21,7 @@ from .estimates import Estimate, Progress, Run
 from .identification import Identification, identify
 from .inverse import Inverse, InverseSession
 from .io import read, read_drive
+from .loopcheck import LoopCheck, LoopReport, LoopResponse, check_loop
 from .modelfile import IdentifiedModel, Score, load
 from .models import DahlStage, Response, StageState
 from .reference_text import parse_reference
@@ -42,6 +43,9 @@ __all__ = [
     "Interrupted",
     "Inverse",
     "InverseSession",
+    "LoopCheck",
+    "LoopReport",
+    "LoopResponse",
     "LowPass",
     "Metrics",
     "Notch",
@@ -65,6 +69,7 @@ __all__ = [
     "VirtualResponse",
     "VirtualStage",
     "__version__",
+    "check_loop",
     "chirp",
     "identify",
     "load",

@@ -8,6 +8,7 @@ __all__ = [
     "DAHL_PARAMETERS",
     "Controller",
     "InverseSession",
+    "LoopPlant",
     "Search",
     "Session",
     "SwarmSettings",
@@ -18,6 +19,7 @@ __all__ = [
     "as_count",
     "as_number",
     "as_truth",
+    "check_loop",
     "dahl_check",
     "dahl_feedforward",
     "dahl_simulate",
@@ -25,6 +27,7 @@ __all__ = [
     "dahl_xu_li_2010",
     "delayed",
     "identify_dahl",
+    "loop_response",
     "period_metrics",
     "track_dahl",
     "tracking_metrics",
@@ -163,6 +166,28 @@ def tracking_metrics(
 def period_metrics(
     desired: ArrayLike, actual: ArrayLike, dt: float, period: float
 ) -> list[tuple[float, float, float, float, float, float | None, float | None]]: ...
+def check_loop(controller: Controller, plant: LoopPlant) -> dict[str, Any]: ...
+def loop_response(
+    controller: Controller, plant: LoopPlant, frequency: list[float]
+) -> tuple[
+    list[tuple[float, float]],
+    list[tuple[float, float]],
+    list[tuple[float, float]],
+    list[float],
+]: ...
+
+@final
+class LoopPlant:
+    @staticmethod
+    def mode(
+        gain: float, frequency: float, damping_ratio: float, bandwidth: float, delay: float
+    ) -> LoopPlant: ...
+    @staticmethod
+    def dahl(
+        theta: tuple[float, ...], low: float, high: float, delay: float
+    ) -> list[LoopPlant]: ...
+    @property
+    def static_gain(self) -> float: ...
 
 @final
 class Controller:
@@ -199,6 +224,7 @@ class VirtualStage:
     def __new__(cls, settings: dict[str, Any]) -> VirtualStage: ...
     @staticmethod
     def xu_li_2010(seed: int) -> dict[str, Any]: ...
+    def gains(self) -> list[float]: ...
     def simulate(
         self, u: ArrayLike, dt: float, hold_name: str
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...

@@ -17,6 +17,11 @@ from .inverse import Inverse, InverseSession
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from .loopcheck import LoopReport
+    from .modelfile import IdentifiedModel
+    from .models import DahlStage
+    from .virtual import VirtualStage
+
 __all__ = [
     "Command",
     "Controller",
@@ -407,6 +412,27 @@ class Controller:
             filters=[one.settings for one in self.filters],
         )
         object.__setattr__(self, "core", core)
+
+    def check(
+        self, stage: VirtualStage | DahlStage | IdentifiedModel, *, delay: float = 0.0
+    ) -> LoopReport:
+        """Gain and phase margins on a stage, and whether the loop is stable: see `check_loop`.
+
+        Parameters
+        ----------
+        stage : VirtualStage, DahlStage or IdentifiedModel
+            The stage.
+        delay : float, optional
+            Delay in the loop besides the hold [s].
+
+        Returns
+        -------
+        LoopReport
+            At the lowest, a middle and the highest gain of the stage.
+        """
+        from .loopcheck import check_loop
+
+        return check_loop(self, stage, delay=delay)
 
     def start(self, *, present: float | None = None) -> Session:
         """Begin to control, with a memory of its own.

@@ -11,9 +11,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from .loopcheck import LoopReport
     from .tracking import Tracking
 
-__all__ = ["plot_effort", "plot_error", "plot_following", "plot_motion", "plot_tracking"]
+__all__ = [
+    "plot_effort",
+    "plot_error",
+    "plot_following",
+    "plot_loop_report",
+    "plot_motion",
+    "plot_tracking",
+]
 
 DESIRED: dict[str, Any] = {"color": "0.35", "linewidth": 1.6, "label": "desired"}
 ACTUAL: dict[str, Any] = {"color": "C0", "linewidth": 1.1, "label": "actual"}
@@ -138,6 +146,40 @@ def plot_effort(run: Tracking, ax: Axes | None = None) -> Axes:
     _above(ax)
     ax.margins(x=0)
     return ax
+
+
+def plot_loop_report(report: LoopReport) -> Figure:
+    """Plot open loop, sensitivity and, with a repetitive part, what a period leaves of an error.
+
+    Parameters
+    ----------
+    report : LoopReport
+        What is known of a loop.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Not yet shown or saved.
+    """
+    curves = report.response()
+    f = curves.frequency
+    figure = plt.figure(figsize=(7.0, 7.0), layout="constrained")
+    size, phase, parts = figure.subplots(3, 1, sharex=True)
+    size.loglog(f, np.abs(curves.open_loop), color="C0")
+    size.axhline(1.0, color="0.7", linewidth=0.8)
+    size.set(ylabel="open loop |L|")
+    phase.semilogx(f, np.degrees(np.unwrap(np.angle(curves.open_loop))), color="C0")
+    phase.axhline(-180.0, color="0.7", linewidth=0.8)
+    phase.set(ylabel="phase of L [deg]")
+    parts.loglog(f, np.abs(curves.sensitivity), color="C3", label="sensitivity |S|")
+    parts.loglog(f, np.abs(curves.complementary), color="C0", label="complementary |T|")
+    if np.any(curves.learning):
+        parts.loglog(f, curves.learning, color="C2", label="left by a period")
+    parts.axhline(1.0, color="0.7", linewidth=0.8)
+    parts.set(xlabel="frequency [Hz]", ylabel="closed loop")
+    _above(parts)
+    figure.suptitle(str(report.middle))
+    return figure
 
 
 def plot_tracking(run: Tracking) -> Figure:

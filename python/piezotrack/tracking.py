@@ -13,6 +13,7 @@ from . import _core
 from .checks import not_negative
 from .control import Controller
 from .errors import ParameterError
+from .loopcheck import check_loop
 from .modelfile import IdentifiedModel
 from .models import DahlStage
 from .references import Reference, SampledReference
@@ -236,6 +237,7 @@ def track(
     delay: float = 0.0,
     substeps: int = 10,
     beyond_reach: bool = False,
+    unstable: bool = False,
 ) -> Tracking:
     """Let a controller lead a stage along a reference.
 
@@ -257,6 +259,8 @@ def track(
     beyond_reach : bool, optional
         Whether a reference may leave what the stage can reach within the limits, as to study
         saturation.
+    unstable : bool, optional
+        Whether a loop that is unstable for small motions may run.
 
     Returns
     -------
@@ -266,7 +270,8 @@ def track(
     Raises
     ------
     ParameterError
-        A number is out of its range, or the reference leaves the reach of the stage.
+        A number is out of its range, the reference leaves the reach of the stage, or the loop
+        is unstable on it.
     NumericalError
         The loop runs away.
 
@@ -292,6 +297,8 @@ def track(
     delay = not_negative("delay", delay, "s")
     substeps = _core.as_count("substeps", substeps)
     samples = reference.sample(controller.dt)
+    if not unstable:
+        _check_stable(stage, controller, delay)
     if not beyond_reach:
         _check_reach(stage, controller, samples)
     if controller.feedforward is None:
@@ -323,6 +330,25 @@ def track(
         fine_voltage=fine_voltage,
         note=note,
     )
+
+
+def _check_stable(stage: VirtualStage | DahlStage, controller: Controller, delay: float) -> None:
+    """Refuse a loop that is unstable at the middle gain of the stage."""
+    if controller.feedback is None and controller.addon is None:
+        return
+    report = check_loop(controller, stage, delay=delay)
+    if report.stable:
+        return
+    one = report.middle
+    found = f"the loop is unstable on this stage, {1e6 * one.gain:.3g} um/V"
+    if one.slowest_root is not None:
+        found += f": its largest root is {one.slowest_root:.5g}"
+    if one.gain_margin is not None and one.gain_margin < 1.0:
+        found += f", and {one.gain_margin:.3g} times the gain would be at the limit"
+    elif controller.addon is not None:
+        found += "; without the repetitive part it is stable, so lower kq or take another filter"
+    hint = f" ({one.hint})" if one.hint else ""
+    raise ParameterError(f"{found}{hint}: expected a stable one, or unstable=True")
 
 
 def _check_reach(

@@ -66,6 +66,9 @@ def track_command(
     beyond_reach: Annotated[
         bool, typer.Option("--beyond-reach", help="Let the reference leave the stage's reach.")
     ] = False,
+    unstable: Annotated[
+        bool, typer.Option("--unstable", help="Run a loop that is unstable for small motions.")
+    ] = False,
 ) -> None:
     """Let a controller lead the virtual stage along a reference: figures, a table, pictures."""
     from ..control import Controller, Pid, Repetitive
@@ -89,10 +92,12 @@ def track_command(
         raise ParameterError(f"--stage is '{stage}': expected virtual or model")
     led = VirtualStage.xu_li_2010(seed=seed) if stage == "virtual" else known.model
     can_be_folder(out)
-    run = track(led, loop, course, delay=delay, beyond_reach=beyond_reach)
+    run = track(led, loop, course, delay=delay, beyond_reach=beyond_reach, unstable=unstable)
     written = _write(run, known, loop, out)
     print(f"the {stage} stage" if stage == "virtual" else "the model itself", end=", ")
     print(run.summary())
+    if loop.feedback is not None or loop.addon is not None:
+        print(f"loop at {loop.check(led, delay=delay).middle}")
     list_files(written)
 
 

@@ -2,6 +2,7 @@
 
 mod arrays;
 mod control;
+mod design;
 mod enter;
 mod errors;
 mod identify;
@@ -19,5 +20,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     stage::register(module)?;
     identify::register(module)?;
     control::register(module)?;
+    design::register(module)?;
     virtual_stage::register(module)
 }

@@ -185,6 +185,11 @@ impl PyVirtualStage {
         Settings::of(&VirtualSettings::xu_li_2010(seed))
     }
 
+    /// Lowest, mean and highest gain for small motions, m/V.
+    fn gains(&self) -> [f64; 3] {
+        self.0.gains()
+    }
+
     fn simulate<'py>(
         &self,
         py: Python<'py>,

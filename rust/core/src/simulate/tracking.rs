@@ -5,6 +5,7 @@ use piezotrack_control::{
 };
 
 use super::{Apparatus, ApparatusState, ClosedLoop, Plant, Timing, closed_loop};
+use crate::design::LinearFeedback;
 use crate::error::{Error, Result};
 use crate::integrate::Stop;
 
@@ -58,6 +59,23 @@ impl Feedback for Law {
             (Self::Pid(law), LawState::Pid(state)) => law.step(state, error, excess),
             (Self::StateSpace(law), LawState::StateSpace(state)) => law.step(state, error, excess),
             _ => 0.0,
+        }
+    }
+}
+
+impl LinearFeedback for Law {
+    fn transfer_function(&self) -> [Vec<f64>; 2] {
+        match self {
+            Self::None => ().transfer_function(),
+            Self::Pid(law) => law.transfer_function(),
+            Self::StateSpace(law) => law.transfer_function(),
+        }
+    }
+
+    fn named_gain(&self) -> Option<f64> {
+        match self {
+            Self::Pid(law) => law.named_gain(),
+            Self::None | Self::StateSpace(_) => None,
         }
     }
 }

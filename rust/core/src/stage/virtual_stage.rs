@@ -177,11 +177,7 @@ impl VirtualSettings {
         };
         // The gain that takes a settled stage to the published end of the 75 V step, of which
         // the creep of the first tenths of a second is taken to be a part.
-        let mut state = play.rest();
-        for volts in [75.0, 0.0] {
-            play.follow(&mut state, volts);
-        }
-        let travel = -play.output(&state).0 + play.follow(&mut state, 75.0);
+        let travel = travel(&play, 75.0);
         settings.gain = 117.7622e-6 / (travel * (1.0 + settings.creep[0].share));
         settings
     }
@@ -238,6 +234,15 @@ impl VirtualSettings {
         }
         Ok(())
     }
+}
+
+/// What a settled hysteresis passes of a swing from 0 V, V.
+fn travel(play: &StagePlay, swing: f64) -> f64 {
+    let mut state = play.rest();
+    for volts in [swing, 0.0] {
+        play.follow(&mut state, volts);
+    }
+    -play.output(&state).0 + play.follow(&mut state, swing)
 }
 
 /// Plays of equal weight with thresholds spread evenly, and dead zones at a third and at two.
@@ -301,6 +306,17 @@ impl VirtualStage {
     pub fn apparatus(&self) -> Apparatus<'_, Self> {
         let VirtualSettings { amplifier, sensor, step, .. } = self.settings;
         Apparatus { plant: self, amplifier, sensor, step }
+    }
+
+    /// Gains for small motions, m/V: just after a reversal, the mean over the swing of a settled
+    /// stage, and where all plays move.
+    #[must_use]
+    pub fn gains(&self) -> [f64; 3] {
+        let VirtualSettings { play, gain, swing, .. } = &self.settings;
+        let moving: f64 = play.weights.iter().sum();
+        let bends: f64 = play.bends.iter().sum();
+        let mean = travel(play, *swing) / swing;
+        [play.linear, mean, (play.linear + moving) * (1.0 + bends)].map(|slope| slope * gain)
     }
 
     /// Where an experiment starts: preconditioned and zeroed as the settings say.

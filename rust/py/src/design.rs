@@ -1,0 +1,121 @@
+//! The sampled loop of a controller and a linearised stage: is it stable, and by how much.
+
+use piezotrack_core::Result;
+use piezotrack_core::design::{GainRange, LoopPlant, SampledLoop, Verdict};
+use piezotrack_core::stage::DahlStage;
+use pyo3::prelude::*;
+
+use crate::control::PyController;
+use crate::enter::enter;
+use crate::errors::raise;
+use crate::stage::Theta;
+
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<PyLoopPlant>()?;
+    module.add_function(wrap_pyfunction!(check_loop, module)?)?;
+    module.add_function(wrap_pyfunction!(loop_response, module)?)
+}
+
+/// A stage for small motions, from the controller's voltage to displacement.
+#[pyclass(name = "LoopPlant", frozen, module = "piezotrack._core")]
+#[derive(Clone)]
+struct PyLoopPlant(LoopPlant);
+
+#[pymethods]
+impl PyLoopPlant {
+    /// A mode of a static gain (m/V), with the amplifier's bandwidth and a delay.
+    #[staticmethod]
+    fn mode(
+        gain: f64,
+        frequency: f64,
+        damping_ratio: f64,
+        bandwidth: f64,
+        delay: f64,
+    ) -> PyResult<Self> {
+        let build = || -> Result<LoopPlant> {
+            let plant = LoopPlant::mode(gain, frequency, damping_ratio)?.with_delay(delay)?;
+            if bandwidth.is_finite() { plant.with_amplifier(bandwidth) } else { Ok(plant) }
+        };
+        build().map(Self).map_err(|error| raise(&error))
+    }
+
+    /// The softest and the stiffest of a Dahl stage between two displacements (m), with a delay.
+    #[staticmethod]
+    fn dahl(theta: Theta, low: f64, high: f64, delay: f64) -> PyResult<[Self; 2]> {
+        let build = || -> Result<[LoopPlant; 2]> {
+            let stage = DahlStage::from_theta(&theta)?;
+            let [soft, stiff] = LoopPlant::dahl_extremes(&stage, low..=high)?;
+            Ok([soft.with_delay(delay)?, stiff.with_delay(delay)?])
+        };
+        build().map(|both| both.map(Self)).map_err(|error| raise(&error))
+    }
+
+    #[getter]
+    fn static_gain(&self) -> f64 {
+        self.0.static_gain()
+    }
+}
+
+/// What is known of a loop, as a dict in Python.
+#[derive(IntoPyObject)]
+struct Check {
+    stable: bool,
+    outside: Option<usize>,
+    hidden: usize,
+    slowest: Option<(f64, f64, f64)>,
+    gains: Option<(f64, f64)>,
+    periods: Option<f64>,
+    small_gain: Option<f64>,
+    gain_margin: Option<f64>,
+    phase_margin: Option<f64>,
+    delay_margin: Option<f64>,
+    crossover: Option<f64>,
+    sensitivity: f64,
+    hint: Option<String>,
+}
+
+impl Check {
+    fn of(verdict: Verdict) -> Self {
+        let margins = verdict.margins;
+        Self {
+            stable: verdict.stable,
+            outside: verdict.outside,
+            hidden: verdict.hidden,
+            slowest: verdict.slowest.map(|root| (root.radius, root.frequency, root.samples)),
+            gains: verdict.gains.map(|GainRange { low, high }| (low, high)),
+            periods: verdict.periods,
+            small_gain: verdict.small_gain,
+            gain_margin: margins.gain,
+            phase_margin: margins.phase,
+            delay_margin: margins.delay,
+            crossover: margins.crossover,
+            sensitivity: margins.sensitivity,
+            hint: verdict.hint,
+        }
+    }
+}
+
+/// Checks the loop of a controller and a plant.
+#[pyfunction]
+fn check_loop(py: Python<'_>, controller: &PyController, plant: &PyLoopPlant) -> PyResult<Check> {
+    let verdict =
+        enter(py, |_| SampledLoop::of(&plant.0, &controller.controller, controller.dt)?.check())?;
+    Ok(Check::of(verdict))
+}
+
+/// Open loop, sensitivity, complementary sensitivity and what a period leaves, at frequencies.
+type Curves = (Vec<[f64; 2]>, Vec<[f64; 2]>, Vec<[f64; 2]>, Vec<f64>);
+
+/// The loop at some frequencies, Hz; complex numbers as pairs.
+#[pyfunction]
+fn loop_response(
+    py: Python<'_>,
+    controller: &PyController,
+    plant: &PyLoopPlant,
+    frequency: Vec<f64>,
+) -> PyResult<Curves> {
+    let response = enter(py, move |_| {
+        SampledLoop::of(&plant.0, &controller.controller, controller.dt)?.response(&frequency)
+    })?;
+    Ok((response.open, response.sensitivity, response.complementary, response.learning))
+}
