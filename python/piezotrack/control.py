@@ -144,11 +144,16 @@ class StateSpace:
     d: float = 0.0
     back: ArrayLike | None = None
 
+    def __post_init__(self) -> None:
+        _ = self.matrices
+
     @property
     def matrices(self) -> tuple[list[float], list[float], list[float], float, list[float] | None]:
         """A row by row, B, C, D and the gain of back-calculation."""
         a, b, c = (_matrix(name, getattr(self, name)) for name in ("a", "b", "c"))
         n = b.size
+        if n == 0:
+            raise ShapeError("b has 0 entries: expected one for each state, 1 to 16")
         if a.size != n * n or c.size != n:
             raise ShapeError(
                 f"a, b and c have {a.size}, {n} and {c.size} entries: expected n x n, n and n"
@@ -237,7 +242,8 @@ class Repetitive:
             )
         if not 1 <= _core.as_count("order", self.order) <= 4:
             raise ParameterError(f"order is {self.order}: expected 1 to 4")
-        _core.as_count("lead", self.lead)
+        if _core.as_count("lead", self.lead) >= 2**32:
+            raise ParameterError(f"lead is {self.lead}: expected less than the period allows")
         if in_range("leak", self.leak, 1.0, "parts of 1") == 0.0:
             raise ParameterError("leak is 0: expected above 0, at most 1")
         _core.as_truth("compensated", self.compensated)
@@ -281,10 +287,13 @@ class LowPass:
 
     cutoff: float
 
+    def __post_init__(self) -> None:
+        positive("cutoff", self.cutoff, "Hz")
+
     @property
     def settings(self) -> tuple[str, float, float, float]:
         """The numbers as the core takes them."""
-        return "low pass", positive("cutoff", self.cutoff, "Hz"), 0.0, 0.0
+        return "low pass", self.cutoff, 0.0, 0.0
 
 
 @dataclass(frozen=True)
@@ -304,6 +313,11 @@ class Notch:
     frequency: float
     width: float = 0.5
     depth: float = 0.0
+
+    def __post_init__(self) -> None:
+        positive("frequency", self.frequency, "Hz")
+        positive("width", self.width, "parts of the frequency")
+        in_range("depth", self.depth, 1.0, "parts of 1")
 
     @property
     def settings(self) -> tuple[str, float, float, float]:
@@ -397,6 +411,8 @@ class Controller:
             if part is not None and not isinstance(part, kind):
                 expected = " or ".join(f"pt.{one.__name__}" for one in kind)
                 raise ParameterError(f"{name} is {type(part).__name__}: expected {expected}")
+        if not isinstance(self.filters, Sequence):
+            raise ParameterError(f"filters is {self.filters!r}: expected a list of filters")
         for one in self.filters:
             if not isinstance(one, (LowPass, Notch)):
                 raise ParameterError(f"filters has {one!r}: expected pt.LowPass or pt.Notch")
@@ -462,10 +478,10 @@ def _limits(limits: object) -> tuple[float, float]:
 
 
 def _check_unit(kp: float, span: float) -> None:
-    """Refuse a gain that no nanopositioner can have: full span for 1 nm, or a trace for 1 mm."""
-    if abs(kp) * 1e-9 > span:
+    """Refuse a gain that no nanopositioner can have: full span for 10 nm, or a trace for 1 mm."""
+    if abs(kp) * 1e-8 > span:
         raise ParameterError(
-            f"kp is {kp:g} V/m: expected a gain with which 1 nm of error does not ask for the "
+            f"kp is {kp:g} V/m: expected a gain with which 10 nm of error does not ask for the "
             f"whole range of {span:g} V; {1e-6 * kp:g} V/m is {1e-12 * kp:g} V/um"
         )
     if 0.0 < abs(kp) * 1e-3 < 1e-3 * span:
@@ -529,7 +545,13 @@ class Session:
             volts = self._inverse.step(
                 reference, velocity=velocity, acceleration=acceleration, preview=preview
             )
-        return self._core.step(reference, measured, volts)
+        try:
+            return self._core.step(reference, measured, volts)
+        except TypeError:
+            given = {"reference": reference, "measured": measured, "feedforward": volts}
+            for name, value in given.items():
+                _core.as_number(name, value)
+            raise
 
     @property
     def last(self) -> Command:
@@ -552,13 +574,25 @@ class Session:
         Parameters
         ----------
         controller : Controller
-            With the same interval, kind of feedback and period of the repetitive part.
+            With the same interval, feedforward, kind of feedback and period of the repetitive
+            part.
+
+        Raises
+        ------
+        ParameterError
+            It differs in more than its gains.
         """
+        if not isinstance(controller, Controller):
+            raise ParameterError(
+                f"controller is {type(controller).__name__}: expected pt.Controller"
+            )
         if not math.isclose(controller.dt, self._controller.dt, rel_tol=1e-12):
             raise ParameterError(
                 f"dt is {controller.dt:g} s: expected that of the session, "
                 f"{self._controller.dt:g} s"
             )
+        if controller.feedforward != self._controller.feedforward:
+            raise ParameterError("feedforward is another: expected that of the session")
         self._core.retune(controller.core)
         self._controller = controller
 

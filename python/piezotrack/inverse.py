@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -10,12 +11,12 @@ import numpy as np
 from . import _core
 from .checks import finite, not_negative, positive
 from .errors import ParameterError
+from .models import DahlStage
+from .motions import Spline
 from .references import Reference
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    from .models import DahlStage
 
     Array = NDArray[np.float64]
 
@@ -46,7 +47,8 @@ class Inverse:
         computed and played again and again. ``"online"``: computed along the whole path. The
         printed model drifts from period to period, its table does not.
     settle : int, optional
-        Periods before the one that is played again, 1 or more.
+        Periods before the one that is played again, 1 or more; those in which the reference
+        starts smoothly are never the one.
 
     Examples
     --------
@@ -67,6 +69,8 @@ class Inverse:
     settle: int = 1
 
     def __post_init__(self) -> None:
+        if not isinstance(self.stage, DahlStage):
+            raise ParameterError(f"stage is {type(self.stage).__name__}: expected pt.DahlStage")
         finite("offset", self.offset, "m")
         not_negative("delay", self.delay, "s")
         if self.playback not in ("table", "online"):
@@ -96,13 +100,10 @@ class Inverse:
         NumericalError
             The reference asks for a voltage that is not finite.
         """
-        if not isinstance(reference, Reference):
-            raise ParameterError(
-                f"reference is {type(reference).__name__}: expected a Reference, as pt.sine(...)"
-            )
+        _check(reference)
         samples = reference.sample(dt)
         t = samples.t + self.delay
-        if reference.period is None:
+        if not _goes_on(reference):
             x, v, a = reference.at(np.minimum(t, reference.duration))
         else:
             longer = replace(reference, duration=reference.duration + self.delay + samples.dt)
@@ -127,8 +128,10 @@ class Inverse:
         Raises
         ------
         ParameterError
-            The reference does not repeat, or not after a whole number of samples.
+            The reference does not repeat, or not after a whole number of samples, or is a record
+            that ends before its period has settled.
         """
+        _check(reference)
         if reference.period is None:
             raise ParameterError(f"reference ({reference.name}) does not repeat: it has no table")
         turn = reference.period / positive("dt", dt, "s")
@@ -138,8 +141,13 @@ class Inverse:
                 f"{reference.period:g} s; online playback has no such need"
             )
         count = round(turn)
-        long = replace(reference, duration=(self.settle + 1) * reference.period)
-        return self.voltage(long, dt)[-count:]
+        length = (self._settled(reference, reference.period) + 1) * reference.period
+        if not _goes_on(reference) and length > reference.duration + 1e-3 * dt:
+            raise ParameterError(
+                f"reference ({reference.name}) lasts {reference.duration:g} s: expected "
+                f"{length:g} s, until a period has settled"
+            )
+        return self.voltage(replace(reference, duration=length), dt)[-count:]
 
     def played(self, reference: Reference, dt: float) -> tuple[Array, str]:
         """Feedforward of a run as `playback` says.
@@ -160,14 +168,19 @@ class Inverse:
         """
         volts = self.voltage(reference, dt)
         period = reference.period
-        head = 0 if period is None else round((self.settle + 1) * period / dt)
+        before = 0 if period is None else self._settled(reference, period)
+        head = 0 if period is None else round((before + 1) * period / dt)
         if self.playback == "online" or period is None or volts.size <= head:
             return volts, "feedforward computed along the whole path"
         # Between samples where a period is no whole number of them.
         late = np.arange(head, volts.size, dtype=np.float64)
         turns = np.floor((late - head) * dt / period) + 1.0
         volts[head:] = np.interp(late - turns * period / dt, np.arange(head + 1), volts[: head + 1])
-        return volts, f"feedforward of period {self.settle + 1} repeated from a table"
+        return volts, f"feedforward of period {before + 1} repeated from a table"
+
+    def _settled(self, reference: Reference, period: float) -> int:
+        """Periods before the one of the table: `settle`, or as many as the smooth start takes."""
+        return max(self.settle, math.ceil(reference.ramp / period - 1e-9))
 
     def start(self, dt: float) -> InverseSession:
         """Begin a computation sample by sample.
@@ -183,6 +196,20 @@ class Inverse:
             With a memory of its own; any number can run at once.
         """
         return InverseSession(self, positive("dt", dt, "s"))
+
+
+def _check(reference: object) -> None:
+    if not isinstance(reference, Reference):
+        raise ParameterError(
+            f"reference is {type(reference).__name__}: expected a Reference, as pt.sine(...)"
+        )
+
+
+def _goes_on(reference: Reference) -> bool:
+    """Whether the motion is known after the end: it repeats, and is not a record that stops."""
+    motion = reference.motion
+    stops = isinstance(motion, Spline) and not motion.cyclic
+    return reference.period is not None and not stops
 
 
 class InverseSession:
@@ -207,7 +234,8 @@ class InverseSession:
         self._inverse = inverse
         self._dt = dt
         self._core = _core.InverseSession(inverse.stage.theta, dt)
-        self._past: list[float] = []
+        # The last two references; none before the first.
+        self._past: tuple[float, float] | None = None
 
     def step(
         self,
@@ -233,14 +261,31 @@ class InverseSession:
         Returns
         -------
         float
-            Voltage [V]; NaN, with nothing remembered, where an input is not finite.
+            Voltage [V]; NaN, with nothing remembered, where an input is not finite. The
+            differences go on as if the reference had kept its velocity meanwhile.
         """
+        try:
+            return self._step(reference, velocity, acceleration, preview)
+        except TypeError:
+            given = {"reference": reference, "velocity": velocity}
+            given |= {"acceleration": acceleration, "preview": preview}
+            for name, value in given.items():
+                if value is not None or name == "reference":
+                    _core.as_number(name, value)
+            raise
+
+    def _step(
+        self,
+        reference: float,
+        velocity: float | None,
+        acceleration: float | None,
+        preview: float | None,
+    ) -> float:
         past, dt = self._past, self._dt
-        before = past[-1] if past else reference
+        first, before = past or (reference, reference)
         if preview is not None:
             rough = (0.5 * (preview - before) / dt, (preview - 2 * reference + before) / dt**2)
         else:
-            first = past[-2] if len(past) > 1 else before
             rough = ((reference - before) / dt, (reference - 2 * before + first) / dt**2)
         v = rough[0] if velocity is None else velocity
         a = rough[1] if acceleration is None else acceleration
@@ -248,11 +293,13 @@ class InverseSession:
         late = self._inverse.delay
         x = reference + late * (v + 0.5 * late * a) - self._inverse.offset
         volts = self._core.step(x, v + late * a, a)
-        if volts == volts:  # not NaN
-            self._past = [before, reference]
+        if math.isfinite(reference):
+            self._past = (before, reference)
+        elif past:
+            self._past = (before, 2.0 * before - first)
         return volts
 
     def reset(self) -> None:
         """Forget the path."""
-        self._past = []
+        self._past = None
         self._core.reset()

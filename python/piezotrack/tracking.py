@@ -122,11 +122,11 @@ class Tracking:
         """Time from which on `metrics` counts [s].
 
         After the smooth start; of a reference that repeats, from the first whole period after it
-        where there is one.
+        where there is one. 0 where the smooth start is all there is.
         """
         period = self.reference.period
         if period is None:
-            return self.reference.ramp
+            return self.reference.ramp if self.reference.ramp < self.t[-1] - 1e-9 else 0.0
         start = math.ceil(self.reference.ramp / period - 1e-9) * period
         return start if start + period <= self.reference.duration * (1 + 1e-9) else 0.0
 
@@ -153,7 +153,7 @@ class Tracking:
             The figures.
         """
         first = self.settled if start is None else not_negative("start", start, "s")
-        last = math.inf if stop is None else stop
+        last = math.inf if stop is None else _core.as_number("stop", stop)
         part = (self.t >= first - 1e-9) & (self.t < last - 1e-9)
         if part.sum() < 2:
             raise ParameterError(
@@ -161,29 +161,24 @@ class Tracking:
                 f"{self.t[-1]:g} s, with two samples"
             )
         actual = self.displacement if true else self.measured
-        period = self.reference.period
+        dt, period = self.controller.dt, self.reference.period
+        # A phase needs a whole period, and more than two samples of it.
         frequency = None if period is None else 1.0 / period
-        if frequency is not None and part.sum() * self.controller.dt < 0.999 * self._whole:
+        if frequency and not (part.sum() * dt * frequency >= 0.999 and frequency * dt < 0.5):
             frequency = None
-        return _metrics(
-            _core.tracking_metrics(self.desired[part], actual[part], self.controller.dt, frequency)
-        )
-
-    @property
-    def _whole(self) -> float:
-        return self.reference.period or 0.0
+        return _metrics(_core.tracking_metrics(self.desired[part], actual[part], dt, frequency))
 
     @cached_property
     def periods(self) -> list[Metrics]:
         """Figures of each whole period, the first with the smooth start in it.
 
-        Empty where the reference does not repeat.
+        Empty where the reference does not repeat, ends before its first period does, or has less
+        than four samples in one.
         """
-        if self.reference.period is None:
+        dt, period = self.controller.dt, self.reference.period
+        if period is None or not 4.0 <= period / dt <= self.t.size + 0.01:
             return []
-        found = _core.period_metrics(
-            self.desired, self.measured, self.controller.dt, self.reference.period
-        )
+        found = _core.period_metrics(self.desired, self.measured, dt, period)
         return [_metrics(figures) for figures in found]
 
     def plot(self) -> Figure:
@@ -247,7 +242,8 @@ def track(
     Parameters
     ----------
     stage : VirtualStage, DahlStage or IdentifiedModel
-        What is led. A model is without noise and amplifier.
+        What is led. A model is without noise and amplifier; with an identified one its offset and
+        delay are in the displacement.
     controller : Controller
         What leads it.
     reference : Reference
@@ -284,8 +280,9 @@ def track(
     >>> print(f"{run.metrics.phase_lag:.2f} rad")
     0.06 rad
     """
+    offset = late = 0.0
     if isinstance(stage, IdentifiedModel):
-        stage = stage.model
+        offset, late, stage = stage.offset, stage.delay, stage.model
     for name, value, kind in (
         ("stage", stage, (VirtualStage, DahlStage)),
         ("controller", controller, (Controller,)),
@@ -294,13 +291,14 @@ def track(
         if not isinstance(value, kind):
             expected = " or ".join(f"pt.{one.__name__}" for one in kind)
             raise ParameterError(f"{name} is {type(value).__name__}: expected {expected}")
-    delay = not_negative("delay", delay, "s")
+    # A displacement that is late shows the same as a voltage that is late.
+    delay = not_negative("delay", delay, "s") + late
     substeps = _core.as_count("substeps", substeps)
     samples = reference.sample(controller.dt)
     if not unstable:
         _check_stable(stage, controller, delay)
     if not beyond_reach:
-        _check_reach(stage, controller, samples)
+        _check_reach(stage, controller, samples, offset)
     if controller.feedforward is None:
         volts, note = np.zeros(len(samples)), "no feedforward"
     else:
@@ -310,15 +308,16 @@ def track(
     else:
         step = min(MODEL_STEP, controller.dt / 4)
         run = _core.track_dahl(
-            stage.theta, step, controller.core, samples.x, volts, delay, substeps
+            stage.theta, step, controller.core, samples.x - offset, volts, delay, substeps
         )
     fine_t, fine_displacement, fine_voltage = run.motion()
+    fine_displacement = fine_displacement + offset
     return Tracking(
         reference=reference,
         controller=controller,
         t=samples.t,
         desired=samples.x,
-        measured=run.measured,
+        measured=run.measured + offset,
         displacement=fine_displacement[::substeps],
         voltage=run.part("volts"),
         feedforward=run.part("feedforward"),
@@ -352,13 +351,17 @@ def _check_stable(stage: VirtualStage | DahlStage, controller: Controller, delay
 
 
 def _check_reach(
-    stage: VirtualStage | DahlStage, controller: Controller, samples: SampledReference
+    stage: VirtualStage | DahlStage,
+    controller: Controller,
+    samples: SampledReference,
+    offset: float,
 ) -> None:
     """Refuse a reference that leaves what the stage reaches between the limits."""
     low, high = controller.limits
-    # Slowly from limit to limit: 4 s each way, with a rest at each end.
-    u = np.interp(np.arange(0.0, 10.0, 1e-3), [0, 4, 5, 9], [low, high, high, low])
-    x = stage.simulate(u, 1e-3).x
+    # To the lower limit, and then slowly to the upper one and back: 4 s each way, with rests.
+    t = np.arange(0.0, 11.0, 1e-3)
+    u = np.interp(t, [0, 0.5, 1, 5, 6, 10], [0.0, low, low, high, high, low])
+    x = stage.simulate(u, 1e-3).x[t >= 1.0] + offset
     bottom, top = float(x.min()), float(x.max())
     slack = 0.01 * (top - bottom)
     for value, past, edge in (

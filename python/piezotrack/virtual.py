@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from . import _core
 from .dataset import Dataset
+from .errors import ParameterError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -135,6 +136,13 @@ class VirtualStage:
             object.__setattr__(self, name, _numbers(name, getattr(self, name)))
         for name in ("creep_shares", "creep_times"):
             object.__setattr__(self, name, _numbers(name, getattr(self, name)))
+        if len(self.limits) != 2:
+            raise ParameterError(f"limits are {self.limits}: expected (low, high) in V")
+        for one in fields(self):
+            if one.type == "float":
+                value = _core.as_number(one.name, getattr(self, one.name))
+                object.__setattr__(self, one.name, value)
+        _core.as_truth("preconditioned", self.preconditioned)
         object.__setattr__(self, "seed", _core.as_count("seed", self.seed))
         self.core()
 

@@ -90,7 +90,7 @@ def track_command(
     )
     if stage not in ("virtual", "model"):
         raise ParameterError(f"--stage is '{stage}': expected virtual or model")
-    led = VirtualStage.xu_li_2010(seed=seed) if stage == "virtual" else known.model
+    led = VirtualStage.xu_li_2010(seed=seed) if stage == "virtual" else known
     can_be_folder(out)
     run = track(led, loop, course, delay=delay, beyond_reach=beyond_reach, unstable=unstable)
     written = _write(run, known, loop, out)

@@ -21,7 +21,8 @@ pub struct Tracking {
     /// Largest less smallest error, m.
     pub error_peak_to_peak: f64,
     /// By how much the fundamental of the actual motion lags behind the desired one's, rad, in
-    /// (-pi, pi]; none where no frequency was given.
+    /// (-pi, pi]; none where no frequency was given, or the desired motion has nothing there, as
+    /// 0.5 and 0.75 Hz together have nothing at the 0.25 Hz of their period.
     pub phase_lag: Option<f64>,
     /// Widest loop of actual against desired, as a fraction of the desired travel; none where
     /// the desired motion does not turn.
@@ -59,7 +60,7 @@ pub fn tracking(
     let highest = errors().fold(f64::NEG_INFINITY, f64::max);
     let lowest = errors().fold(f64::INFINITY, f64::min);
     let phase_lag = match frequency {
-        Some(frequency) => Some(phase_lag(desired, actual, dt, frequency)?),
+        Some(frequency) => lag(desired, actual, dt, frequency)?,
         None => None,
     };
     Ok(Tracking {
@@ -167,14 +168,18 @@ pub fn fundamental(signal: &[f64], dt: f64, frequency: f64) -> Result<Fundamenta
 /// Those of [`fundamental`]; [`Error::Data`] where `desired` has nothing at that frequency.
 pub fn phase_lag(desired: &[f64], actual: &[f64], dt: f64, frequency: f64) -> Result<f64> {
     check(desired, actual)?;
+    lag(desired, actual, dt, frequency)?
+        .ok_or_else(|| Error::Data(format!("the reference has nothing at {frequency} Hz")))
+}
+
+/// As [`phase_lag`]; none where `desired` has nothing at that frequency.
+fn lag(desired: &[f64], actual: &[f64], dt: f64, frequency: f64) -> Result<Option<f64>> {
     let (wanted, found) =
         (fundamental(desired, dt, frequency)?, fundamental(actual, dt, frequency)?);
     let size = desired.iter().fold(0.0, |most, value| f64::max(most, value.abs()));
-    if wanted.amplitude <= 1e-9 * size {
-        return Err(Error::Data(format!("the reference has nothing at {frequency} Hz")));
-    }
     let lag = wanted.phase - found.phase;
-    Ok(libm::atan2(libm::sin(lag), libm::cos(lag)))
+    let some = wanted.amplitude > 1e-9 * size;
+    Ok(some.then(|| libm::atan2(libm::sin(lag), libm::cos(lag))))
 }
 
 /// Widest loop of actual against desired, as a fraction of the desired travel.

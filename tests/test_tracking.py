@@ -1,0 +1,411 @@
+"""Tracking on the virtual stage, beside the published figures; and what `track` promises."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import piezotrack as pt
+from loops import DT, PID, STAGE, WINDING, fitted, forward, loop, record, sine
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+UM = 1e-6
+TABLE_1 = pt.DahlStage.xu_li_2010()
+# Where the inverse of Table 1, which is viscous, is not clipped.
+WIDE = (-20.0, 95.0)
+
+
+# Fig. 12: 0.2 Hz, 0 to 110 um.
+
+
+@cache
+def fig_12(what: str) -> pt.Tracking:
+    parts: dict[str, Any] = {}
+    if "FF" in what:
+        parts["feedforward"] = forward()
+    if "FB" in what:
+        parts["feedback"] = PID
+    return pt.track(STAGE, loop(**parts), sine(0.2, 20.0))
+
+
+def test_feedforward_alone_leaves_what_the_model_leaves() -> None:
+    """Published: 5.69 um at most."""
+    run = fig_12("FF")
+    assert 4.5 * UM < run.metrics.max_error < 7.0 * UM
+    assert not run.saturated.any()
+    assert np.array_equal(run.voltage, run.feedforward)
+    assert not run.feedback.any()
+
+
+def test_feedback_alone_lags() -> None:
+    """Published: 4.44 um, 0.063 rad, a loop of 6.24 % of the travel."""
+    run = fig_12("FB")
+    assert 3.0 * UM < run.metrics.max_error < 5.0 * UM
+    assert run.metrics.phase_lag is not None
+    assert run.metrics.widest_loop is not None
+    assert 0.055 < run.metrics.phase_lag < 0.068
+    assert 0.055 < run.metrics.widest_loop < 0.072
+    # With an integrator at the head of the loop the error is (1/Kv) of the velocity.
+    w, gain = 2 * math.pi * 0.2, 110 * UM / float(np.ptp(run.voltage))
+    assert run.metrics.phase_lag == pytest.approx(w * 0.009 / (0.120e6 * gain), rel=0.1)
+
+
+def test_both_together_are_better_than_either() -> None:
+    """Published: within 1.5 um, 0.006 rad, 1.76 %."""
+    run = fig_12("FF FB")
+    assert run.metrics.phase_lag is not None
+    assert run.metrics.widest_loop is not None
+    # The noise of the sensor sets the floor.
+    assert 0.3 * UM < run.metrics.max_error < 1.5 * UM
+    assert abs(run.metrics.phase_lag) < 0.006
+    assert run.metrics.widest_loop < 0.0176
+    for other in ("FF", "FB"):
+        assert run.metrics.max_error < 0.4 * fig_12(other).metrics.max_error
+        assert run.metrics.rms_error < 0.2 * fig_12(other).metrics.rms_error
+    away = run.desired > 5 * UM
+    assert not run.saturated[away].any()
+    # The sensor's noise is not in the true displacement.
+    assert run.score(true=True).rms_error < run.metrics.rms_error
+
+
+# Fig. 13: limits of 6 V and 28 V.
+
+
+@cache
+def fig_13(pid: pt.Pid | None) -> pt.Tracking:
+    """From 8 to 40 um the loop asks for 5.7 to 30.4 V. `None`: with the usual limits."""
+    limits = (0.0, 75.0) if pid is None else (6.0, 28.0)
+    controller = loop(limits=limits, feedforward=forward(), feedback=pid or PID)
+    course = sine(0.2, 20.0, 8 * UM, 40 * UM)
+    return pt.track(STAGE, controller, course, beyond_reach=True)
+
+
+def test_saturation_weakens_and_antiwindup_helps() -> None:
+    """Published: 6.35 um without antiwindup, six times as much as unsaturated; less with it."""
+    free, winding, unwinding = fig_13(None), fig_13(WINDING), fig_13(PID)
+    assert not free.saturated[250:].any()
+    for run in (winding, unwinding):
+        assert run.voltage.min() == 6.0
+        assert run.voltage.max() == 28.0
+        assert run.saturated[250:].any()
+    assert free.metrics.max_error < 1.06 * UM
+    assert winding.metrics.max_error > 6.0 * free.metrics.max_error
+    assert unwinding.metrics.max_error < 0.6 * winding.metrics.max_error
+    # What is left with it comes from where 28 V do not reach, and ends with it.
+    clipped = unwinding.saturated & (unwinding.t >= 5.0)
+    assert np.abs(unwinding.error[clipped]).max() == unwinding.metrics.max_error
+    assert unwinding.saturated.mean() < 0.8 * winding.saturated.mean()
+
+
+# Fig. 14: 0.5 Hz, repetitive control.
+
+
+def test_half_a_hertz_without_learning() -> None:
+    """Published: 2.29 um, with a stage whose model fits less well than this one's does."""
+    run = pt.track(STAGE, loop(feedforward=forward(), feedback=PID), sine(0.5, 20.0))
+    assert 0.8 * UM < run.metrics.max_error < 2.29 * UM
+    later = [one.rms_error for one in run.periods[1:]]
+    assert max(later) < 1.1 * min(later)
+
+
+@pytest.mark.parametrize("kind", ["paper", "zero phase"])
+def test_learning_makes_the_error_fall_period_by_period(kind: str) -> None:
+    """Published: it falls until the fourth period; uRC grows while the total hardly changes.
+
+    With feedback alone, so that there is something to learn: 9 um against 1 um of noise.
+    """
+    addon = (
+        pt.Repetitive.xu_li_2010(2.0)
+        if kind == "paper"
+        else pt.Repetitive(period=2.0, smoothing="zero phase")
+    )
+    course = sine(0.5, 20.0, 10 * UM, 100 * UM)
+    plain = pt.track(STAGE, loop(feedback=PID), course)
+    run = pt.track(STAGE, loop(feedback=PID, addon=addon), course)
+    rms = np.array([one.rms_error for one in run.periods])
+    untaught = np.array([one.rms_error for one in plain.periods])
+    assert np.all(np.diff(rms[1:4]) < 0.0)
+    # The lag Tq leaves 0.62 to 0.74 of the fundamental's error at 0.5 Hz.
+    assert rms[-1] < 0.85 * untaught[-1]
+    learnt = np.abs(run.repetitive.reshape(-1, 100)).max(axis=1)
+    assert learnt[0] < 1e-9
+    assert np.all(np.diff(learnt[:4]) > 0.0)
+    total = run.voltage.reshape(-1, 100)
+    assert np.abs(total[4:] - total[1]).mean() < 0.2 * learnt[4:].mean() + 2.0
+
+
+def test_learning_beside_feedforward_stays_within_the_published_bound() -> None:
+    """Fig. 14: within 1.5 um after three periods."""
+    addon = pt.Repetitive.xu_li_2010(2.0)
+    controller = loop(feedforward=forward(), feedback=PID, addon=addon)
+    run = pt.track(STAGE, controller, sine(0.5, 20.0))
+    plain = pt.track(STAGE, loop(feedforward=forward(), feedback=PID), sine(0.5, 20.0))
+    assert max(one.max_error for one in run.periods[3:]) < 1.5 * UM
+    assert run.score(6.0).rms_error < 0.9 * plain.score(6.0).rms_error
+    # Without the filter's lag more is learnt.
+    better = dataclasses.replace(
+        controller, addon=pt.Repetitive(period=2.0, smoothing="zero phase")
+    )
+    last = pt.track(STAGE, better, sine(0.5, 20.0)).periods[-1]
+    assert last.rms_error < 0.6 * plain.periods[-1].rms_error
+
+
+# What a run consists of.
+
+
+def test_the_metrics_are_what_their_names_say() -> None:
+    run = fig_12("FB")
+    part = run.t >= 5.0
+    assert run.settled == 5.0
+    error = (run.desired - run.measured)[part]
+    expected = {
+        "max_error": np.abs(error).max(),
+        "rms_error": np.sqrt(np.mean(error**2)),
+        "mean_error": error.mean(),
+        "sd_error": error.std(),
+        "peak_to_peak": np.ptp(error),
+    }
+    for name, value in expected.items():
+        assert getattr(run.metrics, name) == pytest.approx(value, rel=1e-12), name
+
+    def phase(x: Any) -> float:
+        return float(np.angle(np.fft.rfft(x[part])[3]))
+
+    lag = phase(run.desired) - phase(run.measured)
+    assert run.metrics.phase_lag == pytest.approx(lag, rel=1e-9)
+    assert len(run.periods) == 4
+    for i, one in enumerate(run.periods):
+        assert one == run.score(5.0 * i, 5.0 * (i + 1))
+    assert run.metrics.max_error == max(one.max_error for one in run.periods[1:])
+    assert run.score(6.0, 7.0).phase_lag is None
+
+
+def test_arrays_and_parts_fit_together() -> None:
+    run = fig_12("FF FB")
+    n = 1000
+    for name in ("t", "desired", "measured", "displacement", "voltage", "feedforward"):
+        assert getattr(run, name).shape == (n,)
+    assert run.fine_t.shape == run.fine_displacement.shape == run.fine_voltage.shape
+    assert run.fine_t.shape == ((n - 1) * 10 + 1,)
+    assert np.allclose(run.fine_t[::10], run.t, atol=1e-12)
+    assert np.array_equal(run.fine_displacement[::10], run.displacement)
+    total = run.feedforward + run.feedback + run.repetitive
+    assert np.allclose(run.voltage, np.clip(total, 0.0, 75.0), rtol=0.0, atol=1e-9)
+    assert np.array_equal(run.saturated, run.voltage != total) or run.saturated.sum() < 5
+    noise = run.measured - run.displacement
+    assert noise.std() == pytest.approx(0.097 * UM, rel=0.1)
+    # The amplifier has settled long before the next sample.
+    assert np.abs(run.fine_voltage[9::10] - run.voltage[:-1]).max() < 1e-6
+
+
+def test_a_session_gives_the_voltages_of_the_run() -> None:
+    addon = pt.Repetitive(period=2.0)
+    controller = loop(feedforward=forward(), feedback=PID, addon=addon, filters=[pt.LowPass(20.0)])
+    run = pt.track(STAGE, controller, sine(0.5, 8.0))
+    session = controller.start()
+    rows = np.stack([run.desired, run.measured, run.feedforward], axis=1).tolist()
+    volts = [session.step(x, y, feedforward=ff) for x, y, ff in rows]
+    assert np.array_equal(volts, run.voltage)
+    assert session.last.repetitive == run.repetitive[-1]
+
+
+def test_the_same_seed_gives_the_same_bits_and_another_other_noise() -> None:
+    def run(seed: int) -> pt.Tracking:
+        stage = pt.VirtualStage.xu_li_2010(seed=seed)
+        return pt.track(stage, loop(feedback=PID), sine(0.5, 4.0))
+
+    one, again, other = run(1), run(1), run(2)
+    for name in ("measured", "voltage", "fine_displacement"):
+        assert getattr(one, name).tobytes() == getattr(again, name).tobytes()
+        assert getattr(one, name).tobytes() != getattr(other, name).tobytes()
+    assert one.metrics.rms_error == pytest.approx(other.metrics.rms_error, rel=0.05)
+
+
+# Other stages, delay.
+
+
+def test_a_model_is_led_by_its_own_inverse() -> None:
+    """Only the hold of 1 kHz is between them: half a sample late."""
+    inverse = dataclasses.replace(TABLE_1.inverse(), playback="online")
+    controller = pt.Controller(dt=1e-3, limits=WIDE, feedforward=inverse)
+    course = sine(0.5, 6.0)
+    run = pt.track(TABLE_1, controller, course)
+    late = course.sample(1e-3).v * 0.5e-3
+    assert np.abs(run.error - late)[2000:].max() < 0.02 * np.abs(late).max()
+    assert np.array_equal(run.measured, run.displacement)
+
+
+@pytest.mark.parametrize("delay", [0.0, 5e-3])
+def test_an_identified_model_has_its_offset_and_delay(delay: float) -> None:
+    known = pt.IdentifiedModel(
+        model=TABLE_1,
+        offset=-3 * UM,
+        offset_fitted=True,
+        scale_assumed=False,
+        stroke=119 * UM,
+        delay=delay,
+    )
+    controller = pt.Controller(dt=1e-3, limits=WIDE, feedforward=known.inverse(playback="online"))
+    course = sine(0.5, 6.0, -3 * UM)
+    run = pt.track(known, controller, course)
+    late = course.sample(1e-3).v * 0.5e-3
+    assert np.abs(run.error - late)[2000:].max() < 0.02 * np.abs(late).max()
+    assert run.metrics.phase_lag == pytest.approx(math.pi * 0.5e-3, rel=0.05)
+    # Without the inverse's share in them, they show.
+    inverse = dataclasses.replace(TABLE_1.inverse(), playback="online")
+    bare = pt.track(known, dataclasses.replace(controller, feedforward=inverse), course)
+    assert bare.metrics.mean_error == pytest.approx(3 * UM, rel=0.01)
+    assert bare.metrics.phase_lag == pytest.approx(math.pi * (0.5e-3 + delay), rel=0.05)
+
+
+def test_a_delay_in_the_loop_is_a_delay_of_the_motion() -> None:
+    inverse = dataclasses.replace(TABLE_1.inverse(), playback="online")
+    controller = loop(limits=WIDE, feedforward=inverse)
+    runs = [pt.track(TABLE_1, controller, sine(0.5, 6.0), delay=late) for late in (0.0, 0.013)]
+    lags = [run.metrics.phase_lag or 0.0 for run in runs]
+    assert lags[1] - lags[0] == pytest.approx(math.pi * 0.013, rel=0.02)
+
+
+def test_substeps_change_what_is_kept_and_not_the_run() -> None:
+    one, many = (pt.track(STAGE, loop(feedback=PID), sine(0.5, 2.0), substeps=n) for n in (1, 20))
+    assert one.fine_t.size == 100
+    assert many.fine_t.size == 99 * 20 + 1
+    assert np.abs(one.measured - many.measured).max() < 0.2 * UM
+
+
+# What cannot be reached, and what else is refused.
+
+
+def test_a_reference_out_of_reach_is_told_how_far_and_where() -> None:
+    with pytest.raises(
+        pt.ParameterError,
+        match=r"reference is 150 um at 2\.5 s, 3\d(\.\d)? um beyond 11\d\S* um: expected what the "
+        r"stage reaches from 0 to 75 V, or beyond_reach=True",
+    ):
+        pt.track(STAGE, loop(feedback=PID), sine(0.2, 10.0, 0.0, 150 * UM))
+    run = pt.track(STAGE, loop(feedback=PID), sine(0.2, 10.0, 0.0, 150 * UM), beyond_reach=True)
+    assert run.saturated.any()
+    assert 110 * UM < run.displacement.max() < 120 * UM
+
+
+@pytest.mark.parametrize("stage", [STAGE, TABLE_1], ids=["virtual", "dahl"])
+def test_below_the_lower_limit_is_out_of_reach_too(stage: Any) -> None:
+    """At 6 V the stage stands some 8 um high, although it comes from 0."""
+    with pytest.raises(pt.ParameterError, match=r"reference is 0 um at 0 s, \S+ um beyond"):
+        pt.track(stage, loop(limits=(6.0, 28.0), feedback=PID), sine(0.2, 10.0, 0.0, 30 * UM))
+    pt.track(stage, loop(limits=(6.0, 28.0), feedback=PID), sine(0.2, 5.0, 16 * UM, 30 * UM))
+
+
+BAD: dict[str, tuple[Callable[[], Any], str]] = {
+    "stage": (lambda: pt.track(5, loop(), sine(0.5, 2.0)), "stage is int: expected pt.VirtualSt"),  # type: ignore[arg-type]
+    "controller": (lambda: pt.track(STAGE, PID, sine(0.5, 2.0)), "controller is Pid"),  # type: ignore[arg-type]
+    "reference": (lambda: pt.track(STAGE, loop(), np.zeros(9)), "reference is ndarray"),  # type: ignore[arg-type]
+    "delay": (lambda: pt.track(STAGE, loop(), sine(0.5, 2.0), delay=-0.1), "delay is -0.1"),
+    "substeps": (lambda: pt.track(STAGE, loop(), sine(0.5, 2.0), substeps=0), "substeps is 0"),
+    "many": (lambda: pt.track(STAGE, loop(), sine(0.5, 2.0), substeps=10**12), "too many"),
+    "coarse": (lambda: pt.track(STAGE, loop(), sine(30.0, 2.0)), "two samples in the shortest"),
+    "part": (lambda: fig_12("FF").score(19.99), "expected a part of the run"),
+    "turned": (lambda: fig_12("FF").score(5.0, 4.0), "start and stop are 5 and 4 s"),
+    "stop": (lambda: fig_12("FF").score(0.0, "4"), "stop is '4'"),  # type: ignore[arg-type]
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_refuses(name: str) -> None:
+    call, message = BAD[name]
+    with pytest.raises(pt.ParameterError, match=message):
+        call()
+
+
+# References of every kind, words and pictures.
+
+COURSES: dict[str, Callable[[], pt.Reference]] = {
+    "less than a period": lambda: sine(0.2, 2.0, 0.0, 50 * UM),
+    "a start and no more": lambda: pt.chirp(
+        start_frequency=0.05, stop_frequency=0.5, low=0.0, high=50 * UM, duration=2.0
+    ),
+    "no fundamental": lambda: pt.multisine(
+        frequencies=[0.5, 0.75], low=0.0, high=50 * UM, duration=8.0
+    ),
+    "two samples a period": lambda: sine(25.0, 1.0, 0.0, 1 * UM),
+    "three samples a period": lambda: sine(50.0 / 3.0, 1.0, 0.0, 1 * UM),
+    "staircase": lambda: pt.staircase(steps=3, low=0.0, high=60 * UM, dwell=0.5),
+    "levels": lambda: pt.staircase(levels=[0.0, 30 * UM, 10 * UM], dwell=0.5),
+    "standing": lambda: pt.Reference(
+        name="standing",
+        duration=1.0,
+        low=20 * UM,
+        high=20 * UM,
+        motion=lambda t: (0 * t + 20 * UM, 0 * t, 0 * t),
+    ),
+    "record": lambda: pt.Reference.from_samples(np.linspace(0.0, 40 * UM, 80), DT),
+}
+
+
+@pytest.mark.parametrize("name", COURSES)
+def test_every_reference_has_figures_words_and_pictures(name: str) -> None:
+    run = pt.track(STAGE, loop(feedback=PID), COURSES[name]())
+    assert repr(run).startswith("<Tracking of Reference(")
+    assert "rms" in run.summary()
+    assert math.isfinite(run.metrics.max_error)
+    figure = run.plot()
+    figure.canvas.draw()
+    plt.close(figure)
+
+
+def test_the_summary_tells_the_run() -> None:
+    lines = fig_12("FF FB").summary().splitlines()
+    assert lines[0] == (
+        "Reference(sine 0.2 Hz, 0 to 110 um, 20 s) at 50 Hz; "
+        "feedforward of period 2 repeated from a table"
+    )
+    assert lines[1].startswith("from 5 s on: max ")
+    assert "phase lag" in lines[1]
+    assert "% of travel" in lines[1]
+    table = lines[lines.index("period  max um  rms um  mean um") + 1 :]
+    assert [line.split()[0] for line in table] == ["1", "2", "3", "4"]
+    shown = float(table[0].split()[1])
+    assert shown == pytest.approx(1e6 * fig_12("FF FB").periods[0].max_error, abs=5e-4)
+    assert "clipped in" in fig_13(PID).summary()
+    assert "no feedforward" in fig_12("FB").summary()
+
+
+@pytest.mark.parametrize("which", ["FF FB", "saturated"])
+def test_the_pictures_have_labels_with_units_and_no_empty_panel(which: str) -> None:
+    run = fig_13(PID) if which == "saturated" else fig_12(which)
+    figure = run.plot()
+    figure.canvas.draw()
+    assert len(figure.axes) == 4
+    for ax in figure.axes:
+        for label in (ax.get_xlabel(), ax.get_ylabel()):
+            assert label.endswith(("[s]", "[um]", "[V]")), label
+        longest = max(ax.lines, key=lambda line: len(line.get_xdata()))  # type: ignore[arg-type]
+        x, y = (np.asarray(data, dtype=float) for data in longest.get_data())
+        assert len(x) > 100
+        assert np.isfinite(y).all()
+        # It fills the panel, and in um and V as the labels say.
+        low, high = ax.get_ylim()
+        assert np.ptp(y) > 0.3 * (high - low)
+    motion, following, error, effort = figure.axes
+    assert 1e6 * run.desired.max() <= motion.get_ylim()[1] < 1.3e6 * run.desired.max()
+    assert following.get_xlim()[1] > 1e6 * run.desired.max()
+    assert error.get_ylim()[1] > 1e6 * run.error.max()
+    names = [text.get_text() for text in effort.get_legend().get_texts()]  # type: ignore[union-attr]
+    assert names == ["total", "feedforward", "feedback"]
+    plt.close(figure)
+
+
+def test_the_model_is_fitted_as_in_the_paper() -> None:
+    """Fig. 7: about 5 um at most, 4.2 % of the travel, and as good on the 8 s not fitted."""
+    assert 1.5 * UM < fitted().fitted.max_error < 5.0 * UM
+    rest = fitted().score(record()[4.0:])
+    assert rest.max_error < 5.0 * UM
+    assert rest.rms == pytest.approx(fitted().fitted.rms, rel=0.1)

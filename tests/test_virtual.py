@@ -1,0 +1,222 @@
+"""The virtual stage beside what is published of the real one, and what it refuses."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezotrack as pt
+from records import BOX, HELD
+
+STAGE = pt.VirtualStage.xu_li_2010(seed=1)
+FAST = 1 / 5000.0
+
+
+def quiet(**other: Any) -> pt.VirtualStage:
+    changes: dict[str, Any] = {"noise": 0.0, "resolution": 0.0, **other}
+    return dataclasses.replace(STAGE, **changes)
+
+
+def test_it_is_a_record_of_plain_numbers() -> None:
+    again = pt.VirtualStage(**dataclasses.asdict(STAGE))
+    assert again == STAGE
+    assert hash(again) == hash(STAGE)
+    assert dataclasses.replace(STAGE) == STAGE
+    other = dataclasses.replace(STAGE, noise=0.0, weights=list(STAGE.weights))
+    assert other != STAGE
+    assert dataclasses.replace(other, noise=STAGE.noise) == STAGE
+    # Whole numbers are numbers too.
+    whole = dataclasses.replace(STAGE, limits=[0, 75], frequency=160, rest=0)
+    assert whole == STAGE
+    assert isinstance(whole.frequency, float)
+
+
+def test_what_is_published_of_it() -> None:
+    assert STAGE.limits == (0.0, 75.0)
+    assert STAGE.frequency == 160.0
+    assert STAGE.damping_ratio == 0.065
+    # 2.5 mm in 16 bit.
+    assert STAGE.resolution == pytest.approx(0.038e-6, rel=0.005)
+    assert STAGE.sensor_range == pytest.approx(1.25e-3)
+
+
+def test_the_step_is_near_the_published_one() -> None:
+    """Fig. 4: ends at 117.76 um, overshoots to 192.53 um, rings with 160 to 172 Hz."""
+    run = STAGE.simulate(np.full(1500, 75.0), FAST, hold="zoh")
+    x = 1e6 * run.x
+    assert x[-1] == pytest.approx(117.7622, rel=0.005)
+    peaks = [k for k in range(1, 1499) if x[k - 1] < x[k] >= x[k + 1] and x[k] > 125.0]
+    assert x[peaks[0]] == pytest.approx(192.5302, rel=0.03)
+    assert x[peaks[1]] == pytest.approx(170.2524, rel=0.04)
+    periods = np.diff(run.t[peaks[:4]])
+    assert 1.0 / periods.mean() == pytest.approx(160.0, rel=0.03)
+    # Successive peaks above the end decay as exp(-2 pi zeta / sqrt(1 - zeta^2)).
+    ratio = (x[peaks[2]] - x[-1]) / (x[peaks[1]] - x[-1])
+    expected = math.exp(-2 * math.pi * 0.065 / math.sqrt(1 - 0.065**2))
+    assert ratio == pytest.approx(expected, rel=0.05)
+
+
+def test_the_noise_at_rest_is_the_published_one() -> None:
+    """Fig. 3: 0.097 um rms in steps of 0.038 um, band-limited."""
+    run = STAGE.simulate(np.zeros(50000), FAST)
+    steps = run.y / STAGE.resolution
+    assert np.abs(steps - np.round(steps)).max() < 1e-6
+    noise = run.y - run.x
+    assert noise.std() == pytest.approx(0.097e-6, rel=0.03)
+    neighbours = np.mean(noise[1:] * noise[:-1]) / noise.var()
+    expected = math.exp(-2 * math.pi * STAGE.noise_bandwidth * FAST)
+    assert neighbours == pytest.approx(expected, abs=0.05)
+    # Preconditioned, with the sensor at zero: only creep is left.
+    assert np.abs(run.x).max() < 1e-6
+
+
+def test_the_same_seed_gives_the_same_reading_and_no_other_does() -> None:
+    u = np.linspace(0.0, 10.0, 500)
+    one, again = STAGE.simulate(u, FAST), pt.VirtualStage.xu_li_2010(seed=1).simulate(u, FAST)
+    other = pt.VirtualStage.xu_li_2010(seed=2).simulate(u, FAST)
+    assert one.y.tobytes() == again.y.tobytes() != other.y.tobytes()
+    assert one.x.tobytes() == other.x.tobytes()
+
+
+def test_shapes_units_and_times() -> None:
+    u = [0, 1, 2, 1, 0]
+    run = STAGE.simulate(u, 1e-3)
+    for name in ("t", "u", "applied", "x", "y"):
+        array = getattr(run, name)
+        assert array.shape == (5,)
+        assert array.dtype == np.float64
+    assert run.t.tolist() == pytest.approx([0.0, 1e-3, 2e-3, 3e-3, 4e-3])
+    assert run.u.tolist() == u
+
+
+def test_without_an_amplifier_and_a_sensor_it_shows_what_it_is() -> None:
+    bare = quiet(bandwidth=math.inf, slew=math.inf, sensor_range=math.inf)
+    u = 37.5 - 37.5 * np.cos(2 * np.pi * np.arange(2000) / 2000)
+    run = bare.simulate(u, 1e-3)
+    assert np.array_equal(run.applied, u)
+    # The sensor is set to 0 where the experiment begins.
+    assert np.allclose(run.y, run.x, rtol=0.0, atol=1e-15)
+    assert abs(run.x[0]) < 1e-9
+
+
+def test_the_amplifier_has_its_limits_bandwidth_and_slew() -> None:
+    run = STAGE.simulate(np.full(500, 90.0), FAST, hold="zoh")
+    assert run.applied.max() <= 75.0
+    assert run.applied[-1] == pytest.approx(75.0, abs=1e-6)
+    slow = quiet(slew=1000.0).simulate(np.full(500, 50.0), FAST, hold="zoh")
+    assert np.diff(slow.applied).max() == pytest.approx(1000.0 * FAST, rel=1e-6)
+    first = quiet(slew=math.inf, bandwidth=100.0).simulate(np.full(50, 50.0), FAST, hold="zoh")
+    expected = 50.0 * (1.0 - np.exp(-2 * np.pi * 100.0 * first.t))
+    assert np.abs(first.applied - expected).max() < 0.05
+
+
+def test_the_loop_is_rate_independent_and_a_tenth_wide() -> None:
+    """What Table 1 is not: piezo hysteresis does not grow with the frequency."""
+    stage = quiet(creep_shares=(0.0, 0.0, 0.0))
+    widths = []
+    for frequency in (0.1, 1.0):
+        n = round(2 / frequency / 1e-3)
+        u = 37.5 - 37.5 * np.cos(2 * np.pi * frequency * 1e-3 * np.arange(n))
+        run = stage.simulate(u, 1e-3)
+        last = slice(n // 2, n)
+        up, down = np.array_split(run.x[last], 2)
+        going, coming = np.array_split(u[last], 2)
+        grid = np.linspace(5.0, 70.0, 100)
+        there = np.interp(grid, going, up)
+        back = np.interp(grid, coming[::-1], down[::-1])
+        widths.append((back - there).max() / np.ptp(run.x[last]))
+    assert widths[0] == pytest.approx(0.10, abs=0.01)
+    # At 1 Hz the amplifier's lag of 0.7 ms adds its share.
+    assert widths[1] == pytest.approx(widths[0], abs=0.006)
+
+
+def test_creep_goes_on_after_a_step() -> None:
+    """0.4 % of the displacement with each of 0.1, 1 and 10 s."""
+    run = quiet().simulate(np.full(20001, 75.0), 1e-3, hold="zoh")
+    at = {t: run.x[round(1000 * t)] for t in (0.15, 1.0, 20.0)}
+    immediate = 117.7622e-6 / 1.004
+    left = {
+        t: sum(0.004 * (1 - math.exp(-t / tau)) for tau in (0.1, 1.0, 10.0)) for t in (1.0, 20.0)
+    }
+    assert at[20.0] - at[1.0] == pytest.approx(immediate * (left[20.0] - left[1.0]), rel=0.05)
+    rest = quiet(creep_shares=(), creep_times=()).simulate(np.full(20001, 75.0), 1e-3, hold="zoh")
+    assert np.ptp(rest.x[2000:]) < 1e-12
+
+
+def test_its_log_can_be_identified() -> None:
+    t = np.arange(1001) / 250.0
+    log = STAGE.record(37.5 - 37.5 * np.cos(0.5 * np.pi * t), 1 / 250.0)
+    assert isinstance(log, pt.Dataset)
+    assert (len(log), log.dt, log.hold) == (1001, 1 / 250.0, "foh")
+    assert np.array_equal(log.y, STAGE.simulate(log.u, log.dt).y)
+    fit = pt.identify(
+        log, fixed=HELD, bounds=BOX, swarm=pt.ParticleSwarm(particles=12, iterations=60), seed=1
+    )
+    assert fit.fitted.max_error < 5e-6
+    assert STAGE.record(log.u, log.dt, hold="zoh").hold == "zoh"
+
+
+BAD: list[tuple[dict[str, Any], str]] = [
+    ({"bandwidth": 0.0}, "bandwidth is 0 Hz"),
+    ({"slew": -1.0}, "slew is -1 V/s"),
+    ({"limits": (75.0, 0.0)}, "expected the lower one below"),
+    ({"limits": (0.0, 1.0, 2.0)}, r"limits are \(0.0, 1.0, 2.0\): expected \(low, high\) in V"),
+    ({"limits": 75.0}, "limits are"),
+    ({"linear": 0.0}, "linear is 0"),
+    ({"thresholds": None}, r"thresholds\[0\] is None"),
+    ({"thresholds": (-1.0,) * 10}, r"thresholds\[0\] is -1 V"),
+    ({"weights": (math.nan,) * 10}, r"weights\[0\] is NaN"),
+    ({"bends": (-2.0, 0.0)}, r"bends\[0\] is -2"),
+    ({"thresholds": (1.0,) * 11, "weights": (0.1,) * 11}, "thresholds is 11 numbers: expected 10"),
+    ({"gain": 0.0}, "gain is 0 m/V"),
+    ({"creep_times": (0.0, 1.0, 10.0)}, r"creep_time\[0\] is 0 s"),
+    ({"frequency": 0.0}, "frequency is 0 Hz"),
+    ({"frequency": None}, "frequency is None: expected a number"),
+    ({"damping_ratio": -0.1}, "damping_ratio is -0.1"),
+    ({"noise": -1e-9}, "noise is .* m: expected a finite number, 0 or above"),
+    ({"noise": math.nan}, "noise is NaN"),
+    ({"noise": "0"}, "noise is '0': expected a number"),
+    ({"noise_bandwidth": 0.0}, "noise_bandwidth is 0 Hz"),
+    ({"resolution": -1.0}, "resolution is -1 m"),
+    ({"sensor_range": 0.0}, "range is 0 m: expected more than the resolution"),
+    ({"seed": -1}, "seed is -1"),
+    ({"seed": 1.5}, "seed is 1.5"),
+    ({"preconditioned": "yes"}, "preconditioned is 'yes': expected True or False"),
+    ({"swing": 0.0}, "swing is 0 V"),
+    ({"rest": 1e9}, "rest is 1000000000 s: expected 3600 s at most"),
+    ({"step": 0.0}, "step is 0 s"),
+]
+
+
+@pytest.mark.parametrize(("changes", "message"), BAD, ids=[message for _, message in BAD])
+def test_refuses_a_bad_number(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(pt.ParameterError, match=message):
+        dataclasses.replace(STAGE, **changes)
+
+
+@pytest.mark.parametrize("name", ["weights", "bends", "creep_shares"])
+def test_refuses_pairs_that_differ_in_length(name: str) -> None:
+    with pytest.raises(pt.ShapeError, match=f"{name} has 1 numbers: expected"):
+        dataclasses.replace(STAGE, **{name: (0.1,)})
+
+
+@pytest.mark.parametrize(
+    ("u", "dt", "hold", "kind", "message"),
+    [
+        ([0.0, 1.0], 0.0, "foh", pt.ParameterError, "dt is 0 s"),
+        ([0.0, 1.0], "1", "foh", pt.ParameterError, "dt is '1'"),
+        ([0.0, math.nan], 1e-3, "foh", pt.DataError, r"u\[1\] is NaN"),
+        ([0.0, 1.0], 1e-3, "line", pt.ParameterError, "hold is 'line'"),
+        ([[0.0, 1.0]], 1e-3, "foh", pt.ShapeError, "expected a one-dimensional array"),
+        (1.0, 1e-3, "foh", pt.ShapeError, "expected a one-dimensional array"),
+    ],
+)
+def test_refuses_a_bad_drive(
+    u: Any, dt: Any, hold: Any, kind: type[Exception], message: str
+) -> None:
+    with pytest.raises(kind, match=message):
+        STAGE.simulate(u, dt, hold=hold)
