@@ -97,7 +97,7 @@ class LoopResponse:
     frequency : ndarray, shape (n,)
         Frequencies [Hz].
     open_loop, sensitivity, complementary : ndarray of complex, shape (n,)
-        L, 1/(1 + L) and L/(1 + L) of the feedback.
+        L, 1/(1 + L) and L/(1 + L) of the whole loop.
     learning : ndarray, shape (n,)
         What a period leaves of an error; 0 without a repetitive part.
     """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
@@ -168,17 +169,17 @@ def plot_loop_report(report: LoopReport) -> Figure:
     size.loglog(f, np.abs(curves.open_loop), color="C0")
     size.axhline(1.0, color="0.7", linewidth=0.8)
     size.set(ylabel="open loop |L|")
-    phase.semilogx(f, np.degrees(np.unwrap(np.angle(curves.open_loop))), color="C0")
-    phase.axhline(-180.0, color="0.7", linewidth=0.8)
-    phase.set(ylabel="phase of L [deg]")
+    phase.semilogx(f, np.degrees(np.angle(curves.open_loop)), color="C0")
+    phase.set(ylabel="phase of L [deg]", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
     parts.loglog(f, np.abs(curves.sensitivity), color="C3", label="sensitivity |S|")
     parts.loglog(f, np.abs(curves.complementary), color="C0", label="complementary |T|")
     if np.any(curves.learning):
         parts.loglog(f, curves.learning, color="C2", label="left by a period")
     parts.axhline(1.0, color="0.7", linewidth=0.8)
     parts.set(xlabel="frequency [Hz]", ylabel="closed loop")
+    parts.set_ylim(bottom=max(1e-3, parts.get_ylim()[0]))
     _above(parts)
-    figure.suptitle(str(report.middle))
+    figure.suptitle("\n".join(textwrap.wrap(str(report.middle), 75)), fontsize="medium")
     return figure
 
 
