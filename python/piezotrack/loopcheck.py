@@ -121,6 +121,8 @@ class LoopReport:
         The controller.
     low, middle, high : LoopCheck
         The loop at these gains.
+    plant : LoopPlant
+        The stage at the middle gain, as the core has it.
     """
 
     controller: Controller
