@@ -156,11 +156,10 @@ fn shrunk_limits_cost_little_with_antiwindup() {
         let feedforward = |k: u32| 0.9 * sine(k) / GAIN;
         let run = track(&Controller::new(limits, pid), 1000, sine, feedforward);
         let reachable = |k: u32| {
-            let margin = (k.saturating_sub(5)..k + 1).all(|k| {
+            (k.saturating_sub(5)..=k).all(|k| {
                 let volts = sine(k) / GAIN;
                 volts > 7.0 && volts < 27.0
-            });
-            margin
+            })
         };
         (0..1000).filter(|&k| reachable(k)).map(|k| run[k as usize].error.abs()).fold(0.0, f64::max)
     };

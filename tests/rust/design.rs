@@ -322,7 +322,7 @@ fn eigenvalues(gain: f64, part: &SampledRepetitive) -> Vec<nalgebra::Complex<f64
         let e = -s[0];
         let feedback = s[3] + kp * (e - s[1]) + ki * e + kd * (e - 2.0 * s[1] + s[2]);
         let mut learnt = recursion.pole * s[4];
-        for (i, tap) in recursion.taps.iter().enumerate() {
+        for (i, tap) in recursion.taps.iter().rev().enumerate() {
             let age = recursion.nearest + i - 1;
             learnt += tap * (s[4 + age] + learning * s[4 + length + age - recursion.lead]);
         }

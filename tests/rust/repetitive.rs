@@ -107,12 +107,10 @@ fn printed_coefficients_diverge_and_ours_do_not() {
     }
     let most =
         |from: usize| u[from * n..(from + 1) * n].iter().fold(0.0, |m, u| f64::max(m, u.abs()));
-    println!("printed {} {} {}", most(50), most(500), most(998));
     assert!(most(998) > 100.0 * most(50), "{} {}", most(50), most(998));
 
     let ours = track(Some(Repetitive::xu_li_2010(2.0)), WIDE, gain, 100.0, 1000.0);
     let most = |from: usize| largest(&ours[from * n..(from + 1) * n], |c| c.repetitive);
-    println!("ours {} {} {}", most(50), most(500), most(998));
     assert!(most(998) < 1.01 * most(50), "{} {}", most(50), most(998));
 }
 
@@ -129,10 +127,8 @@ fn hidden_root_drifts_under_saturation_in_the_papers_form_only() {
             let end = commands.len() / share;
             largest(&commands[end - 250..end], |command| command.repetitive)
         };
-        println!("{period} {} {}", late(&paper, 2), late(&paper, 1));
-        println!("{period} {} {}", late(&ours, 2), late(&ours, 1));
         assert!(late(&paper, 1) > 60.0 && late(&paper, 1) > 1.5 * late(&paper, 2));
-        assert!(late(&ours, 1) < 40.0 && late(&ours, 1) < 1.01 * late(&ours, 2));
+        assert!(late(&ours, 1) < 40.0 && late(&ours, 1) < 1.05 * late(&ours, 2));
     }
 }
 
@@ -149,7 +145,6 @@ fn compensated_lag_reduces_the_fundamental() {
         };
         let without = amplitude(None);
         let ratio = |compensated| amplitude(Some(lag(0.2, compensated))) / without;
-        println!("{period} {} {}", ratio(false), ratio(true));
         assert!((ratio(true) - compensated).abs() < 0.03, "{}", ratio(true));
         assert!((ratio(false) - plain).abs() < 0.04, "{}", ratio(false));
     }
@@ -169,8 +164,7 @@ fn fractional_periods_learn() {
             largest(&run[run.len() - 400..], |command| command.error)
         };
         let (none, rounded, exact) = (error(None), error(Some(100.0)), error(Some(period)));
-        println!("{smoothing:?} {none:e} {rounded:e} {exact:e}");
-        assert!(exact < 0.05 * none, "{exact} m of {none} m");
+        assert!(exact < 0.1 * none, "{exact} m of {none} m");
         assert!(exact < 0.2 * rounded, "{exact} m, rounded {rounded} m");
     }
 }
@@ -191,12 +185,11 @@ fn memory_stays_in_step_through_a_dropout() {
         y = gain * command.volts;
         if (7900..8000).contains(&k) {
             before = f64::max(before, command.error.abs());
-        } else if (8150..8250).contains(&k) {
+        } else if (8050..8150).contains(&k) {
             after = f64::max(after, command.error.abs());
         }
     }
-    println!("{before:e} {after:e}");
-    assert!(after < 3.0 * before, "{after} m, before {before} m");
+    assert!(after < 1.5 * before, "{after} m, before {before} m");
 }
 
 #[test]

@@ -195,6 +195,10 @@ impl Repetitive {
                 taps[i + j] += gain * read * q[j.abs_diff(half)];
             }
         }
+        let reads = reads + 2 * half;
+        if let Some(used) = taps.get_mut(..reads) {
+            used.reverse();
+        }
         SampledRepetitive {
             period: delay,
             pole,
@@ -203,7 +207,7 @@ impl Repetitive {
             lead: self.lead as usize,
             nearest: samples(floor - before) - half,
             taps,
-            reads: reads + 2 * half,
+            reads,
         }
     }
 }
@@ -260,6 +264,7 @@ pub struct SampledRepetitive {
     lead: usize,
     /// Delay of the first tap, in samples, 1 or more.
     nearest: usize,
+    /// The oldest sample's first; 0 where not in use.
     taps: [f64; TAPS],
     /// How many taps are in use.
     reads: usize,
@@ -278,8 +283,22 @@ pub struct Recursion<'a> {
     pub lead: usize,
     /// Delay of the first tap, in samples, more than `lead`.
     pub nearest: usize,
-    /// Weights of the samples at the delays `nearest`, `nearest + 1`, ...
+    /// Weights of the samples, the oldest first; the last is that at the delay `nearest`.
     pub taps: &'a [f64],
+}
+
+/// Sum of products, in two chains that do not wait for each other.
+#[inline]
+fn weighted(entries: &[f64], taps: &[f64]) -> f64 {
+    let (mut even, mut odd) = (0.0, 0.0);
+    let mut pairs = entries.iter().zip(taps);
+    while let Some((entry, tap)) = pairs.next() {
+        even += entry * tap;
+        if let Some((entry, tap)) = pairs.next() {
+            odd += entry * tap;
+        }
+    }
+    even + odd
 }
 
 /// Memory of a repetitive controller: a delay line lent by the caller, `&mut [f64]`, `[f64; N]`
@@ -300,8 +319,8 @@ impl SampledRepetitive {
         self.nearest + self.reads - 1
     }
 
-    /// Coefficients of the recursion `uRC[k] = pole uRC[k-1] + sum of taps[i] (uRC[k-n-i] +
-    /// gain e[k-n-i+lead])`, n = `nearest`; for the design of the loop.
+    /// Coefficients of the recursion, for the design of the loop:
+    /// `uRC[k] = pole uRC[k-1] + sum of tap (uRC[k-n] + gain e[k-n+lead])`, n the tap's delay.
     #[must_use]
     pub fn recursion(&self) -> Recursion<'_> {
         Recursion {
@@ -355,9 +374,11 @@ impl SampledRepetitive {
         state.next = if state.next + 1 < length { state.next + 1 } else { 0 };
         // The oldest entry, which is the last tap's, is the one to be written next.
         let (newer, older) = line.split_at(state.next);
-        let ages = older.iter().chain(newer);
-        let taps = self.taps.iter().take(self.reads).rev();
-        let learnt = ages.zip(taps).fold(0.0, |sum, (entry, tap)| sum + entry * tap);
+        let (first, rest) = self.taps.split_at(self.reads.min(older.len()).min(TAPS));
+        let mut learnt = weighted(older, first);
+        if first.len() < self.reads {
+            learnt += weighted(newer, rest);
+        }
         let volts = self.pole * state.volts + learnt;
         // An output too large to be a number is forgotten.
         state.volts = if volts.is_finite() { volts } else { 0.0 };

@@ -347,7 +347,7 @@ fn learning(part: &SampledRepetitive) -> Result<Learning> {
         let found = format!("{} samples", recursion.nearest);
         return Err(Error::parameter("period", found, "a million sampling intervals or less"));
     }
-    let taps = recursion.taps.to_vec();
+    let taps: Vec<f64> = recursion.taps.iter().rev().copied().collect();
     let forgets = 1.0 - recursion.pole - taps.iter().sum::<f64>();
     Ok(Learning {
         period: recursion.period,
