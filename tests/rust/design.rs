@@ -453,14 +453,19 @@ fn stiff_and_fast_plants_keep_their_digits() {
 
 #[test]
 fn long_periods_are_cheap() {
-    for (period, n) in [(5.0, 250), (100.0, 5000)] {
+    for (period, n) in [(5.0, 250), (100.0, 5000), (2e4, 1_000_000)] {
         let part = Repetitive::new(period, Smoothing::ZeroPhase { order: 2 }, 0.1).unwrap();
         let part = part.at(DT).unwrap();
         let start = Instant::now();
         let one = SampledLoop::new(&table_1(), &published(), &[], Some(&part), DT).unwrap();
         let verdict = one.check().unwrap();
         println!("N = {n}: {:?}, {verdict:?}", start.elapsed());
-        assert!(verdict.stable);
+        assert!(verdict.stable && verdict.exact == (n < 10_000));
+        // Far too high a gain is found out as fast
+        let start = Instant::now();
+        let verdict = one.amplified(1e6).check().unwrap();
+        println!("   {:?}, {:?}", start.elapsed(), verdict.gains);
+        assert!(!verdict.stable);
     }
 }
 
@@ -479,6 +484,7 @@ fn bad_input_is_named() {
     named(LoopPlant::dahl(&stage, -2e-3).unwrap_err(), "K + dFh/dx");
     let empty = LoopPlant::dahl_extremes(&stage, 1.0..=0.0);
     named(empty.unwrap_err(), "range");
+    close(LoopPlant::fixed_gain(2.0).unwrap().static_gain(), 2.0, 0.0);
     let law = published();
     let new = |plant: &LoopPlant, dt| SampledLoop::new(plant, &law, &[], None, dt);
     named(new(&mode(160.0), 0.0).unwrap_err(), "dt");

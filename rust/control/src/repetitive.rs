@@ -270,20 +270,6 @@ pub struct SampledRepetitive {
     reads: usize,
 }
 
-/// Sum of products, in two chains that do not wait for each other.
-#[inline]
-fn weighted(entries: &[f64], taps: &[f64]) -> f64 {
-    let (mut even, mut odd) = (0.0, 0.0);
-    let mut pairs = entries.iter().zip(taps);
-    while let Some((entry, tap)) = pairs.next() {
-        even += entry * tap;
-        if let Some((entry, tap)) = pairs.next() {
-            odd += entry * tap;
-        }
-    }
-    even + odd
-}
-
 /// Coefficients of a repetitive controller: see [`SampledRepetitive::recursion`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Recursion<'a> {
@@ -297,8 +283,22 @@ pub struct Recursion<'a> {
     pub lead: usize,
     /// Delay of the first tap, in samples, more than `lead`.
     pub nearest: usize,
-    /// Weights of the samples, the oldest first: the last is for the delay `nearest`.
+    /// Weights of the samples, the oldest first; the last is that at the delay `nearest`.
     pub taps: &'a [f64],
+}
+
+/// Sum of products, in two chains that do not wait for each other.
+#[inline]
+fn weighted(entries: &[f64], taps: &[f64]) -> f64 {
+    let (mut even, mut odd) = (0.0, 0.0);
+    let mut pairs = entries.iter().zip(taps);
+    while let Some((entry, tap)) = pairs.next() {
+        even += entry * tap;
+        if let Some((entry, tap)) = pairs.next() {
+            odd += entry * tap;
+        }
+    }
+    even + odd
 }
 
 /// Memory of a repetitive controller: a delay line lent by the caller, `&mut [f64]`, `[f64; N]`
@@ -319,8 +319,8 @@ impl SampledRepetitive {
         self.nearest + self.reads - 1
     }
 
-    /// Coefficients of the recursion `uRC[k] = pole uRC[k-1] + sum of tap (uRC[k-d] + gain
-    /// e[k-d+lead])` over the delays d from `nearest` on; for the design of the loop.
+    /// Coefficients of the recursion, for the design of the loop:
+    /// `uRC[k] = pole uRC[k-1] + sum of tap (uRC[k-n] + gain e[k-n+lead])`, n the tap's delay.
     #[must_use]
     pub fn recursion(&self) -> Recursion<'_> {
         Recursion {

@@ -16,11 +16,18 @@ const WRONG_UNIT: f64 = 3e4;
 /// Where the search for the small-gain bound begins, rad.
 const SLOWEST: f64 = 1e-6;
 
+/// The longest delay line, in samples, whose roots [`SampledLoop::check`] counts.
+const EXACT: usize = 10_000;
+
 /// What is known about the closed loop of a plant and a controller.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
-    /// Whether it is stable; decided exactly, hidden roots aside.
+    /// Whether it is stable, hidden roots aside.
     pub stable: bool,
+    /// Whether that was decided by counting roots. With a delay line of more than 10 000 samples
+    /// it is by the small-gain bound, which may call a stable loop unstable; roots, periods and
+    /// gains are `None` then.
+    pub exact: bool,
     /// How many roots are outside the unit circle; `None` where one is on it.
     pub outside: Option<usize>,
     /// The slowest root, the largest; `None` where all vanish within samples.
@@ -78,26 +85,34 @@ impl SampledLoop {
     /// [`crate::Error::Numerical`] where its numbers are too large to count roots with.
     pub fn check(&self) -> Result<Verdict> {
         let alone = self.without_repetitive();
-        let outside = self.roots_outside(1.0);
-        let stable = outside == Some(0);
-        let slowest = self.slowest_root()?;
+        let exact = self.longest_delay() <= EXACT;
+        let small_gain = self.small_gain();
+        let outside = if exact { self.roots_outside(1.0) } else { None };
+        let bounded = || small_gain.is_none_or(|gain| gain < 1.0) && alone.is_stable();
+        let stable = if exact { outside == Some(0) } else { bounded() };
+        let slowest = if exact { self.slowest_root()? } else { None };
         let almost_hidden = self.almost_hidden();
         let seen = match almost_hidden {
-            Some(delta) => self.leaving_out(delta).slowest_root()?,
-            None => slowest,
+            Some(delta) if exact => self.leaving_out(delta).slowest_root()?,
+            _ => slowest,
         };
         let samples = seen.filter(|_| stable).map(|root| root.samples);
         let feedback_gains = alone.stable_gains();
         Ok(Verdict {
             stable,
+            exact,
             outside,
             slowest,
             hidden: self.hidden_roots(),
             almost_hidden: almost_hidden.map(|delta| self.root(C::new(delta, 0.0), 0.0)),
-            gains: if self.repeats() { self.stable_gains() } else { feedback_gains },
+            gains: match (exact, self.repeats()) {
+                (true, true) => self.stable_gains(),
+                (true, false) => feedback_gains,
+                (false, _) => None,
+            },
             feedback_gains,
             periods: self.period().and_then(|period| samples.map(|samples| samples / period)),
-            small_gain: self.small_gain(),
+            small_gain,
             margins: alone.margins(),
             hint: alone.hint(feedback_gains),
         })

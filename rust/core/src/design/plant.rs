@@ -13,7 +13,7 @@ use crate::stage::DahlStage;
 /// States of a plant, at most.
 const STATES: usize = 8;
 /// Delay in samples, at most.
-const DELAY: f64 = 1e5;
+const DELAY: f64 = 1e3;
 /// Terms of the power series of the matrix exponential, for a norm of 0.5 at most.
 const TERMS: u32 = 18;
 
@@ -172,6 +172,9 @@ impl LoopPlant {
     /// Gain at frequency 0, m/V; infinite for a plant that integrates.
     #[must_use]
     pub fn static_gain(&self) -> f64 {
+        if self.b.is_empty() {
+            return self.d;
+        }
         let state = (-&self.a).lu().solve(&self.b);
         state.map_or(f64::INFINITY, |state| self.d + self.c.dot(&state))
     }
@@ -188,7 +191,7 @@ impl LoopPlant {
             return Err(Error::parameter(
                 "delay",
                 format!("{} s", self.delay),
-                "1e5 samples or less",
+                "1000 samples or less",
             ));
         }
         // A delay given in decimals is a whole number of samples up to rounding.

@@ -111,6 +111,11 @@ impl SampledLoop {
     ) -> Result<Self> {
         let (ratio, delay) = plant.sampled(positive("dt", dt, "s")?)?;
         let [above, below] = feedback.transfer_function();
+        let proper = (1..=below.len()).contains(&above.len()) && below.last() == Some(&1.0);
+        if !proper {
+            let text = "the feedback's transfer function must be proper, its denominator monic";
+            return Err(Error::Numerical(text.into()));
+        }
         let mut law = Ratio { above, below }.checked("feedback")?;
         let mut hidden = law.cancel_integrators();
         if law.above.iter().all(|c| *c == 0.0) {

@@ -8,8 +8,8 @@ use super::sampled_loop::{SampledLoop, small};
 use super::walk::Place;
 use crate::error::{Error, Result};
 
-/// Crossings tried on the way to a stable range of gains.
-const CROSSINGS: usize = 200;
+/// Places on the circle that a search for a stable range of gains may cost, about.
+const EFFORT: usize = 300_000;
 
 /// A root of the closed loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -183,7 +183,8 @@ impl SampledLoop {
     ///
     /// A root crosses the unit circle only at a gain `k = -1/L`, where the open loop L is real
     /// and negative. Those gains are found along the circle, and between two of them the roots
-    /// are counted once.
+    /// are counted once; so often at most, that a range with very many crossings inside may be
+    /// given too narrow.
     #[must_use]
     pub fn stable_gains(&self) -> Option<GainRange> {
         let gains = self.crossing_gains();
@@ -198,15 +199,18 @@ impl SampledLoop {
             };
             self.amplified(middle).is_stable()
         };
-        let below = (0..=at).rev().take(CROSSINGS);
-        let above = (at + 1..=gains.len()).take(CROSSINGS);
+        let tries = (EFFORT / (64 + self.longest_delay())).clamp(8, 200);
+        let below = (0..=at).rev().take(tries);
+        let above = (at + 1..=gains.len()).take(tries);
         let found = below.chain(above).find(|i| stable(*i))?;
-        let more = (found + 1..=gains.len()).take(CROSSINGS).find(|i| !stable(*i));
-        let less = (0..found).rev().take(CROSSINGS).find(|i| !stable(*i));
-        let bound = |i: Option<&f64>| i.copied();
+        // The last range on either side that is stable still
+        let last = (found + 1..=gains.len()).take(tries).take_while(|i| stable(*i)).last();
+        let first = (0..found).rev().take(tries).take_while(|i| stable(*i)).last();
+        let (first, last) = (first.unwrap_or(found), last.unwrap_or(found));
+        let low = if first == 0 { None } else { gains.get(first - 1) };
         Some(GainRange {
-            low: less.and_then(|i| bound(gains.get(i))).unwrap_or(0.0),
-            high: more.and_then(|i| bound(gains.get(i - 1))).unwrap_or(f64::INFINITY),
+            low: low.copied().unwrap_or(0.0),
+            high: gains.get(last).copied().unwrap_or(f64::INFINITY),
         })
     }
 
