@@ -35,7 +35,10 @@ class LoopCheck:
     gain : float
         Static gain of the stage for small motions [m/V].
     stable : bool
-        Whether the loop is stable; decided exactly, by counting roots.
+        Whether the loop is stable.
+    exact : bool
+        Whether that was decided by counting roots; of periods above 10 000 samples the
+        small-gain bound decides, which is enough and not necessary.
     gain_margin : float or None
         Factor by which the gain may rise until the feedback is unstable; of an unstable one,
         that which would make it stable; None where no gain would.
@@ -64,6 +67,7 @@ class LoopCheck:
 
     gain: float
     stable: bool
+    exact: bool
     gain_margin: float | None
     phase_margin: float | None
     delay_margin: float | None
@@ -258,6 +262,7 @@ def _check(controller: Controller, plant: _core.LoopPlant) -> LoopCheck:
     return LoopCheck(
         gain=plant.static_gain,
         stable=found["stable"],
+        exact=found["exact"],
         gain_margin=None if margin is None or math.isinf(margin) else margin,
         phase_margin=found["phase_margin"],
         delay_margin=found["delay_margin"],

@@ -60,6 +60,7 @@ impl PyLoopPlant {
 #[derive(IntoPyObject)]
 struct Check {
     stable: bool,
+    exact: bool,
     outside: Option<usize>,
     hidden: usize,
     slowest: Option<(f64, f64, f64)>,
@@ -79,6 +80,7 @@ impl Check {
         let margins = verdict.margins;
         Self {
             stable: verdict.stable,
+            exact: verdict.exact,
             outside: verdict.outside,
             hidden: verdict.hidden,
             slowest: verdict.slowest.map(|root| (root.radius, root.frequency, root.samples)),
