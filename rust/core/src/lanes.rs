@@ -8,7 +8,10 @@ use pulp::Simd;
 /// `K` vectors of lanes that go through the same operations.
 ///
 /// More than one vector hides the latency of the chain of operations within a step.
+///
+/// Aligned to a cache line: those that do not stay in registers would else be read from two.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 pub struct Lanes<S: Simd, const K: usize> {
     simd: S,
     vectors: [S::f64s; K],
