@@ -149,9 +149,10 @@ def test_parts_can_be_left_out() -> None:
 
 @pytest.mark.usefixtures("_no_pictures")
 def test_the_model_itself_is_led_almost_perfectly() -> None:
-    """With its offset: what is left is the hold of 0.02 s, half a sample late."""
-    printed = ran("track", "dahl.json", "--reference", "sine:0.5Hz,10..100um,6s", "--stage", "model",
-                  "--no-feedback", "--dt", "0.002")  # fmt: skip
+    """With its offset: what is left is the hold of 0.002 s, half a sample late."""
+    course = "sine:0.5Hz,10..100um,6s"
+    options = ("--stage", "model", "--no-feedback", "--dt", "0.002")
+    printed = ran("track", "dahl.json", "--reference", course, *options)
     assert printed.startswith("the model itself, Reference(")
     metrics = report()["metrics"]
     assert metrics["phase_lag"] == pytest.approx(np.pi * 0.001, rel=0.1)
@@ -236,7 +237,7 @@ REFUSED: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "tt": ((*TRACK, "--tt", "0.005"), ("tt is 0.005 s", "half a sampling interval")),
     "kq": ((*TRACK, "--repetitive", "--kq", "2"), ("kq is 2.0 V/um", "below 2")),
     "dt": ((*TRACK, "--dt", "0"), ("dt is 0",)),
-    "coarse": ((*TRACK, "--dt", "1.5"), ("dt is 1.5 s", "two samples")),
+    "coarse": ((*TRACK, "--dt", "1.5", "--tt", "9"), ("dt is 1.5 s", "two samples")),
     "no period": (
         ("track", "dahl.json", "--reference", "chirp:0.1..1Hz,0..50um,4s", "--repetitive"),
         ("--repetitive", "does not repeat"),
@@ -245,7 +246,10 @@ REFUSED: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "stage": ((*TRACK, "--stage", "real"), ("--stage is 'real'", "virtual or model")),
     "delay": ((*TRACK, "--delay", "-1"), ("delay is -1",)),
     "seed": ((*TRACK, "--seed", "-1"), ("seed is -1",)),
-    "duration": ((*TRACK, "--duration", "-1"), ("duration",)),
+    "duration": (
+        ("track", "dahl.json", "--reference", "sine:0.5Hz,0..110um", "--duration", "-1"),
+        ("duration is -1",),
+    ),
     "out is a file": ((*TRACK, "--out", "log.txt"), ("--out", "log.txt is a file")),
     "out of reach": (
         ("track", "dahl.json", "--reference", "sine:0.5Hz,0..150um,6s"),
