@@ -111,6 +111,9 @@ fn bad_records_are_refused() {
     assert!(lag(f64::NAN).contains("frequency is NaN Hz"));
     let nothing = message(phase_lag(&[1.0; 500], &good, DT, 0.2).map(|_| ()));
     assert!(nothing.contains("nothing at 0.2 Hz"));
+    // Figures of a run that has no such line are figures all the same.
+    let standing = tracking(&[1.0; 500], &good, DT, Some(0.2)).unwrap();
+    assert_eq!(standing.phase_lag, None);
     let periods = |period| message(each_period(&good, &good, DT, period).map(|_| ()));
     assert!(periods(11.0).contains("less than a period"));
     assert!(periods(0.03).contains("4 samples or more"));
