@@ -98,7 +98,7 @@ def force_by_scipy(stage: pt.DahlStage, path: Array) -> tuple[Array, Array]:
 @pytest.mark.parametrize("b0", [0.0, 2e3])
 @pytest.mark.parametrize("stage", STAGES)
 def test_is_equation_21(stage: str, b0: float) -> None:
-    """In an independent transcription, the sine's turning points being samples."""
+    """In an independent transcription, within 1e-6 V, which is 2 pm: the series has four terms."""
     model = dataclasses.replace(STAGES[stage], b0=b0)
     reference = pt.sine(frequency=0.5, low=0.0, high=110e-6, duration=5.0, ramp=0.0)
     volts = model.inverse().voltage(reference, LOOP)
@@ -112,12 +112,12 @@ def test_is_equation_21(stage: str, b0: float) -> None:
     total = model.mass * a + model.damping * v + model.stiffness * x + hysteresis
     expected = total / model.piezo_coefficient
     inside = np.arange(250) % 50 != 0
-    assert np.allclose(volts[inside], expected[inside], rtol=0.0, atol=1e-7)
+    assert np.allclose(volts[inside], expected[inside], rtol=0.0, atol=1e-6)
     # Where it turns, the velocity of the reference is 0 up to rounding only.
     session = model.inverse().start(LOOP)
     played = [session.step(*row[:1], velocity=row[1], acceleration=row[2]) for row in
               np.stack([x, v, a], axis=1).tolist()]  # fmt: skip
-    assert np.allclose(played, expected, rtol=0.0, atol=1e-7)
+    assert np.allclose(played, expected, rtol=0.0, atol=1e-6)
 
 
 def test_at_a_standstill_dry_friction_counts_nothing() -> None:
@@ -130,7 +130,7 @@ def test_at_a_standstill_dry_friction_counts_nothing() -> None:
         without = bare.start(LOOP).step(20e-6, **step)
         q2 = force_by_scipy(stage, np.array([0.0, 20e-6]))[1][-1]
         friction = np.sign(velocity) * 5e3 * q2 / stage.piezo_coefficient
-        assert with_b0 - without == pytest.approx(friction, rel=1e-9, abs=1e-12)
+        assert with_b0 - without == pytest.approx(friction, rel=1e-8, abs=1e-12)
 
 
 # The table.

@@ -7,7 +7,7 @@
 """
 
 from ._core import __version__
-from .control import Command, Controller, LowPass, Notch, Pid, Repetitive, Session, StateSpace
+from .control import Command, Controller, Session
 from .dataset import Dataset
 from .errors import (
     DataError,
@@ -21,6 +21,7 @@ from .estimates import Estimate, Progress, Run
 from .identification import Identification, identify
 from .inverse import Inverse, InverseSession
 from .io import read, read_drive
+from .laws import LowPass, Notch, Pid, Repetitive, StateSpace
 from .loopcheck import LoopCheck, LoopReport, LoopResponse, check_loop
 from .modelfile import IdentifiedModel, Score, load
 from .models import DahlStage, Response, StageState

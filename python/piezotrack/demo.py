@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .control import Controller, Pid, Repetitive
+from .control import Controller
 from .files import write_columns
 from .identification import Identification, identify
+from .laws import Pid, Repetitive
 from .models import DahlStage
 from .tracking import Tracking, track
 from .virtual import VirtualStage

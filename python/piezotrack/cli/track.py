@@ -71,7 +71,8 @@ def track_command(
     ] = False,
 ) -> None:
     """Let a controller lead the virtual stage along a reference: figures, a table, pictures."""
-    from ..control import Controller, Pid, Repetitive
+    from ..control import Controller
+    from ..laws import Pid, Repetitive
     from ..modelfile import load
     from ..tracking import track
     from ..virtual import VirtualStage
