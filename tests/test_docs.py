@@ -194,3 +194,13 @@ def test_the_examples_run(example: Path, tmp_path: Path) -> None:
     for path in written:
         if path.suffix == ".json":
             assert pt.load(path).model.mass > 0.0
+
+
+def test_every_public_name_is_there_and_listed() -> None:
+    lazy = {name for names in pt._HOMES.values() for name in names}
+    assert lazy <= set(pt.__all__)
+    for name in pt.__all__:
+        assert getattr(pt, name) is not None
+    assert set(pt.__all__) <= set(dir(pt))
+    with pytest.raises(AttributeError, match="'Bogus'"):
+        pt.Bogus  # noqa: B018

@@ -6,9 +6,12 @@
 26065.0
 """
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from ._core import __version__
-from .control import Command, Controller, Session
-from .dataset import Dataset
 from .errors import (
     DataError,
     Interrupted,
@@ -17,20 +20,24 @@ from .errors import (
     PiezotrackError,
     ShapeError,
 )
-from .estimates import Estimate, Progress, Run
-from .identification import Identification, identify
-from .inverse import Inverse, InverseSession
-from .io import read, read_drive
-from .laws import LowPass, Notch, Pid, Repetitive, StateSpace
-from .loopcheck import LoopCheck, LoopReport, LoopResponse, check_loop
-from .modelfile import IdentifiedModel, Score, load
-from .models import DahlStage, Response, StageState
-from .reference_text import parse_reference
-from .references import Reference, SampledReference, read_reference
-from .swarm import ParticleSwarm
-from .tracking import Metrics, Tracking, track
-from .virtual import VirtualResponse, VirtualStage
-from .waveforms import chirp, multisine, sine, staircase, triangle
+
+if TYPE_CHECKING:
+    from .control import Command, Controller, Session
+    from .dataset import Dataset
+    from .estimates import Estimate, Progress, Run
+    from .identification import Identification, identify
+    from .inverse import Inverse, InverseSession
+    from .io import read, read_drive
+    from .laws import LowPass, Notch, Pid, Repetitive, StateSpace
+    from .loopcheck import LoopCheck, LoopReport, LoopResponse, check_loop
+    from .modelfile import IdentifiedModel, Score, load
+    from .models import DahlStage, Response, StageState
+    from .reference_text import parse_reference
+    from .references import Reference, SampledReference, read_reference
+    from .swarm import ParticleSwarm
+    from .tracking import Metrics, Tracking, track
+    from .virtual import VirtualResponse, VirtualStage
+    from .waveforms import chirp, multisine, sine, staircase, triangle
 
 __all__ = [
     "Command",
@@ -84,3 +91,89 @@ __all__ = [
     "track",
     "triangle",
 ]
+
+# What is heavy is imported when it is first used.
+_HOMES = {
+    "control": (
+        "Command",
+        "Controller",
+        "Session",
+    ),
+    "dataset": ("Dataset",),
+    "estimates": (
+        "Estimate",
+        "Progress",
+        "Run",
+    ),
+    "identification": (
+        "Identification",
+        "identify",
+    ),
+    "inverse": (
+        "Inverse",
+        "InverseSession",
+    ),
+    "io": (
+        "read",
+        "read_drive",
+    ),
+    "laws": (
+        "LowPass",
+        "Notch",
+        "Pid",
+        "Repetitive",
+        "StateSpace",
+    ),
+    "loopcheck": (
+        "LoopCheck",
+        "LoopReport",
+        "LoopResponse",
+        "check_loop",
+    ),
+    "modelfile": (
+        "IdentifiedModel",
+        "Score",
+        "load",
+    ),
+    "models": (
+        "DahlStage",
+        "Response",
+        "StageState",
+    ),
+    "reference_text": ("parse_reference",),
+    "references": (
+        "Reference",
+        "SampledReference",
+        "read_reference",
+    ),
+    "swarm": ("ParticleSwarm",),
+    "tracking": (
+        "Metrics",
+        "Tracking",
+        "track",
+    ),
+    "virtual": (
+        "VirtualResponse",
+        "VirtualStage",
+    ),
+    "waveforms": (
+        "chirp",
+        "multisine",
+        "sine",
+        "staircase",
+        "triangle",
+    ),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for home, names in _HOMES.items():
+        if name in names:
+            value = getattr(import_module(f".{home}", __name__), name)
+            globals()[name] = value
+            return value
+    raise AttributeError(f"module 'piezotrack' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
