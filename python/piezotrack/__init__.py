@@ -26,6 +26,7 @@ from .modelfile import IdentifiedModel, Score, load
 from .models import DahlStage, Response, StageState
 from .reference_text import parse_reference
 from .references import Reference, SampledReference, read_reference
+from .step import StepReadings, StepResult, StepTrace, identify_step
 from .swarm import ParticleSwarm
 from .tracking import Metrics, Tracking, track
 from .virtual import VirtualResponse, VirtualStage
@@ -65,6 +66,9 @@ __all__ = [
     "ShapeError",
     "StageState",
     "StateSpace",
+    "StepReadings",
+    "StepResult",
+    "StepTrace",
     "Tracking",
     "VirtualResponse",
     "VirtualStage",
@@ -72,6 +76,7 @@ __all__ = [
     "check_loop",
     "chirp",
     "identify",
+    "identify_step",
     "load",
     "multisine",
     "parse_reference",

@@ -56,9 +56,7 @@ def step_text(step: StepResult) -> str:
     ]
     units = {"a1": ("1/m", "(9), (13)"), "a2": ("1/m^2", "(10)"), "b1": ("N/m^2", "(11)")}
     units["b0"] = ("N/m", "(12)")
-    lines += [
-        _row(name, f"{value:.7g}", *units[name]) for name, value in step.hysteresis.items()
-    ]
+    lines += [_row(name, f"{value:.7g}", *units[name]) for name, value in step.hysteresis.items()]
     ratio = step.ratios
     lines += [
         "",
