@@ -24,9 +24,10 @@ from .io import read, read_drive
 from .loopcheck import LoopCheck, LoopReport, LoopResponse, check_loop
 from .modelfile import IdentifiedModel, Score, load
 from .models import DahlStage, Response, StageState
+from .readings import StepReadings
 from .reference_text import parse_reference
 from .references import Reference, SampledReference, read_reference
-from .step import StepReadings, StepResult, StepTrace, identify_step
+from .step import StepResult, StepTrace, identify_step
 from .swarm import ParticleSwarm
 from .tracking import Metrics, Tracking, track
 from .virtual import VirtualResponse, VirtualStage

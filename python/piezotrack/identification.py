@@ -103,9 +103,7 @@ class Identification(IdentifiedModel):
             notes.append(
                 f"the model does not follow this record: {self.cost_percent:.3g} % of stroke remain"
             )
-        if self.cost_percent > remarks.REMAINS:
-            run = self.simulate(self.data, offset=self.offset)
-            notes += remarks.of_fit(self.data, run.x, self.cost_percent)
+        notes += self._shape
         if self.model.b0 != 0.0 and not self.simulate(self.data).well_posed:
             notes.append(
                 "b0 q2 falls below 0 at rest: this model has another motion under the same drive"
@@ -113,6 +111,15 @@ class Identification(IdentifiedModel):
         if len(self.runs) > 1 and self.agreeing == 1:
             notes.append("no other run ended where the best one did: try more, with runs=")
         return notes
+
+    @cached_property
+    def _shape(self) -> list[str]:
+        """What the loop's shape says of the model."""
+        if self.cost_percent <= remarks.REMAINS:
+            return []
+        x = self.simulate(self.data, offset=self.offset).x
+        held = [name for name, estimate in self.parameters.items() if not estimate.free]
+        return remarks.of_fit(self.data, x, self.cost_percent, held)
 
     @property
     def agreeing(self) -> int:

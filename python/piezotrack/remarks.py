@@ -12,6 +12,8 @@ from .errors import DataError
 from .units import best_length_unit
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from numpy.typing import NDArray
 
     from .dataset import Dataset
@@ -35,8 +37,11 @@ LOWEST_GAIN, LOWEST_GAIN_OF_COMMAND, COMMAND_VOLTS, SHORTEST = 3e-9, 2e-8, 20.0,
 # A stroke in the middle of what there is [m], to tell a factor of 1e3 from one of 1e6.
 USUAL = 30e-6
 # A remainder [% of stroke] worth a remark, and the share of it that has to follow the loop.
-REMAINS, FOLLOWS = 1.0, 0.6
+REMAINS, FOLLOWS = 1.5, 0.6
 BINS = 16
+# Share of the loop's width, squared, that is not the same above and below the middle.
+LOPSIDED = 0.05
+HYSTERESIS = ("a1", "a2", "b1")
 
 
 def refuse(data: Dataset, *, searches_hysteresis: bool) -> None:
@@ -94,7 +99,7 @@ would be 40 um if it is 1e6 too large, as um taken as m
     return [*_units(data), *_periods(data), *_clipping(data)]
 
 
-def of_fit(data: Dataset, x: Array, cost_percent: float) -> list[str]:
+def of_fit(data: Dataset, x: Array, cost_percent: float, held: Collection[str]) -> list[str]:
     """Say where what a fit leaves is the loop's shape and not noise.
 
     Parameters
@@ -105,6 +110,8 @@ def of_fit(data: Dataset, x: Array, cost_percent: float) -> list[str]:
         Displacement of the model in the window, with the offset [m].
     cost_percent : float
         What remains, in per cent of the stroke.
+    held : collection of str
+        The parameters that were not searched.
 
     Returns
     -------
@@ -116,23 +123,44 @@ def of_fit(data: Dataset, x: Array, cost_percent: float) -> list[str]:
         return []
     rest = rest - rest.mean()
     # What remains as one function of drive and direction.
-    place = np.minimum((BINS * (u - u.min()) / np.ptp(u)).astype(np.intp), BINS - 1)
-    falling = np.gradient(u) < 0.0
-    group = place + BINS * falling
-    counts = np.bincount(group, minlength=2 * BINS)
-    means = np.bincount(group, weights=rest, minlength=2 * BINS) / np.maximum(counts, 1)
+    means, counts = _branches(u, rest)
     share = float(np.sum(counts * means**2) / np.sum(rest**2))
     if share <= FOLLOWS:
         return []
-    worst = int(np.argmax(np.abs(means)))
-    volts = float(u.min() + np.ptp(u) * (worst % BINS + 0.5) / BINS)
-    way = "down" if worst >= BINS else "up"
+    way, place = np.unravel_index(int(np.argmax(np.abs(means))), means.shape)
+    volts = float(u.min() + np.ptp(u) * (place + 0.5) / BINS)
     unit, scale = best_length_unit(data.stroke)
-    return [
-        f"the loop is not of the model's shape, as where it is asymmetric: {100 * share:.0f} % "
-        f"of what remains follows drive and direction, {scale * means[worst]:+.3g} {unit} near "
-        f"{volts:.3g} {data.drive_unit} on the way {way}; no parameters of this model change that"
-    ]
+    where = (
+        f"{100 * share:.0f} % of what remains follows drive and direction, "
+        f"{scale * means[way, place]:+.3g} {unit} near {volts:.3g} {data.drive_unit} on the way "
+        f"{('up', 'down')[way]}"
+    )
+    kept = [name for name in HYSTERESIS if name in held]
+    if kept:
+        return [
+            f"the loop is not of the model's shape: {where}; {', '.join(kept)} "
+            f"{'were' if len(kept) > 1 else 'was'} held: search all of a1, a2 and b1"
+        ]
+    what = "is asymmetric, which" if _lopsided(data) else "has a shape that"
+    return [f"the loop {what} this model cannot describe: {where}"]
+
+
+def _branches(u: Array, values: Array) -> tuple[Array, Array]:
+    """Return means of values over drive and direction, up then down, and their counts."""
+    place = np.minimum((BINS * (u - u.min()) / np.ptp(u)).astype(np.intp), BINS - 1)
+    group = place + BINS * (np.gradient(u) < 0.0)
+    counts = np.bincount(group, minlength=2 * BINS).astype(np.float64)
+    sums = np.bincount(group, weights=values, minlength=2 * BINS)
+    means: Array = sums / np.maximum(counts, 1.0)
+    return means.reshape(2, BINS), counts.reshape(2, BINS)
+
+
+def _lopsided(data: Dataset) -> bool:
+    """Whether the loop is wider on one side of its middle."""
+    means, counts = _branches(data.u, data.y)
+    width = means[1] - means[0]
+    odd = (width - width[::-1]) / 2.0
+    return bool(counts.min() > 0 and np.sum(odd**2) > LOPSIDED * np.sum(width**2))
 
 
 def _turns(signal: Array) -> list[int]:
@@ -140,12 +168,16 @@ def _turns(signal: Array) -> list[int]:
 
 
 def _steps(u: Array) -> bool:
-    """Whether a drive jumps."""
-    return bool(np.abs(np.diff(u)).max() >= JUMP * np.ptp(u)) if u.size > 1 else False
+    """Whether a drive jumps, or stands still but for jumps."""
+    if u.size < 2:
+        return False
+    moves = np.abs(np.diff(u))
+    most = float(moves.max())
+    return bool(most >= JUMP * np.ptp(u) or np.mean(moves > 0.01 * most) < 0.1)
 
 
 def _units(data: Dataset) -> list[str]:
-    """Voltages, strokes and gains that only a mistaken unit explains."""
+    """Remark on voltages, strokes and gains that only a mistaken unit explains."""
     most, swing, stroke = float(np.abs(data.u).max()), float(np.ptp(data.u)), data.stroke
     gain = stroke / swing
     if most > TOO_MANY_VOLTS:
@@ -180,7 +212,7 @@ def _units(data: Dataset) -> list[str]:
 
 
 def _periods(data: Dataset) -> list[str]:
-    """A drive that does not go round once."""
+    """Remark on a drive that does not go round once."""
     u = data.u
     if _steps(u):
         return []
@@ -200,7 +232,7 @@ def _periods(data: Dataset) -> list[str]:
 
 
 def _clipping(data: Dataset) -> list[str]:
-    """A drive or a displacement that is cut off at its end."""
+    """Remark on a drive or a displacement that is cut off at its end."""
     u, y = data.u, data.y
     remarks = []
     swing, moves = float(np.ptp(u)), np.abs(np.diff(u))

@@ -96,10 +96,7 @@ impl Ringing {
         self.decrement = decrement(&heights);
         self.peaks = fine
             .iter()
-            .map(|&(at, height)| Peak {
-                time: dt * at,
-                displacement: self.steady + sign * height,
-            })
+            .map(|&(at, height)| Peak { time: dt * at, displacement: self.steady + sign * height })
             .collect();
         Ok(())
     }

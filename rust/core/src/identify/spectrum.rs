@@ -50,11 +50,13 @@ impl Spectrum {
             (re, im) = (re * turn_re - im * turn_im, re * turn_im + im * turn_re);
         }
         let plain = libm::hypot(x.0, x.1) / libm::hypot(u.0, u.1);
-        // The displacement's change is spread over an interval; a line's, as the drive's, too.
+        // A change from sample to sample is spread over the interval; so is the drive's on a
+        // line, and none at an instant.
+        let half = angle / 2.0;
+        let spread = if half == 0.0 { 1.0 } else { libm::sin(half) / half };
         match self.hold {
-            Hold::First => plain,
-            Hold::Zero if angle == 0.0 => plain,
-            Hold::Zero => plain * (angle / 2.0) / libm::sin(angle / 2.0),
+            Hold::First => plain / (spread * spread),
+            Hold::Zero => plain / spread,
         }
     }
 

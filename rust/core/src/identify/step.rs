@@ -172,11 +172,7 @@ pub(super) fn slope(over: &[f64], value: impl Fn(usize) -> f64) -> f64 {
 ///
 /// # Errors
 /// [`Error::Data`] where the levels do not tell the two apart.
-pub fn separate(
-    hysteresis: &Conventional,
-    one: (f64, f64),
-    two: (f64, f64),
-) -> Result<(f64, f64)> {
+pub fn separate(hysteresis: &Conventional, one: (f64, f64), two: (f64, f64)) -> Result<(f64, f64)> {
     for (name, (u, x)) in [("first level", one), ("second_level", two)] {
         finite(&format!("voltage of {name}"), u, "V")?;
         finite(&format!("displacement of {name}"), x, "m")?;
