@@ -39,6 +39,7 @@ USUAL = 30e-6
 # A remainder [% of stroke] worth a remark, and the share of it that has to follow the loop.
 REMAINS, FOLLOWS = 1.5, 0.6
 BINS = 16
+FEWEST = 10
 # Share of the loop's width, squared, that is not the same above and below the middle.
 LOPSIDED = 0.05
 HYSTERESIS = ("a1", "a2", "b1")
@@ -60,7 +61,8 @@ def refuse(data: Dataset, *, searches_hysteresis: bool) -> None:
         Neither drive nor displacement turns back, and hysteresis is searched.
     """
     whole = data.full
-    if not searches_hysteresis or _steps(whole.u) or np.ptp(whole.u) == 0.0:
+    # What is constant or too short is refused by the core, in its own words.
+    if len(data) < FEWEST or not searches_hysteresis or _steps(whole.u) or np.ptp(whole.u) == 0.0:
         return
     if not _turns(whole.u) and not _turns(whole.y):
         raise DataError(

@@ -39,7 +39,7 @@ fn published() -> StepReadings {
 #[test]
 fn a_step_gives_the_mode_back() {
     for (frequency, zeta) in [(160.0, 0.065), (40.0, 0.02), (400.0, 0.1)] {
-        let (u, x) = step(frequency, zeta, 4000);
+        let (u, x) = step(frequency, zeta, 10_000);
         let found = read_step(&u, &x, 1.0 / RATE, Hold::Zero).unwrap();
         let mode = found.readings.conventional().unwrap();
         assert!((mode.damping_by_decrement / zeta - 1.0).abs() < 0.01, "{mode:?}");
