@@ -1,4 +1,5 @@
 //! Step responses against the closed form of a mode, and where signals turn.
+#![allow(missing_docs, clippy::unwrap_used)]
 
 use std::f64::consts::TAU;
 
