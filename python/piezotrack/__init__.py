@@ -32,8 +32,10 @@ if TYPE_CHECKING:
     from .loopcheck import LoopCheck, LoopReport, LoopResponse, check_loop
     from .modelfile import IdentifiedModel, Score, load
     from .models import DahlStage, Response, StageState
+    from .readings import StepReadings
     from .reference_text import parse_reference
     from .references import Reference, SampledReference, read_reference
+    from .step import StepResult, StepTrace, identify_step
     from .swarm import ParticleSwarm
     from .tracking import Metrics, Tracking, track
     from .virtual import VirtualResponse, VirtualStage
@@ -73,6 +75,9 @@ __all__ = [
     "ShapeError",
     "StageState",
     "StateSpace",
+    "StepReadings",
+    "StepResult",
+    "StepTrace",
     "Tracking",
     "VirtualResponse",
     "VirtualStage",
@@ -80,6 +85,7 @@ __all__ = [
     "check_loop",
     "chirp",
     "identify",
+    "identify_step",
     "load",
     "multisine",
     "parse_reference",
@@ -94,6 +100,12 @@ __all__ = [
 
 # What is heavy is imported when it is first used.
 _HOMES = {
+    "step": (
+        "StepResult",
+        "StepTrace",
+        "identify_step",
+    ),
+    "readings": ("StepReadings",),
     "control": (
         "Command",
         "Controller",

@@ -7,10 +7,12 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = [
     "DAHL_PARAMETERS",
     "Controller",
+    "Conventional",
     "InverseSession",
     "LoopPlant",
     "Search",
     "Session",
+    "StepResponse",
     "SwarmSettings",
     "Tracked",
     "Trajectory",
@@ -29,8 +31,10 @@ __all__ = [
     "identify_dahl",
     "loop_response",
     "period_metrics",
+    "read_step",
     "track_dahl",
     "tracking_metrics",
+    "turns",
 ]
 
 __version__: str
@@ -245,3 +249,42 @@ class Tracked:
     def saturated(self) -> NDArray[np.bool_]: ...
     def motion(self) -> list[NDArray[np.float64]]: ...
     def part(self, name: str) -> NDArray[np.float64]: ...
+
+@final
+class Conventional:
+    def __new__(
+        cls,
+        *,
+        voltage: float,
+        steady_state: float,
+        peaks: list[float],
+        period: float,
+        frequency: float,
+        static_gain: float,
+        resonance_gain: float,
+        initial_slope: float,
+    ) -> Conventional: ...
+    def mode(self) -> tuple[float, float, float, float, float, float]: ...
+    def hysteresis(self) -> tuple[float, float, float, float]: ...
+    def separate(
+        self, one: tuple[float, float], two: tuple[float, float]
+    ) -> tuple[float, float]: ...
+    def piezo_coefficient(self, stiffness: float, level: tuple[float, float]) -> float: ...
+
+@final
+class StepResponse:
+    def readings(self) -> tuple[float, float, float, float, float, float, float]: ...
+    @property
+    def peaks(self) -> list[float]: ...
+    @property
+    def peak_times(self) -> list[float]: ...
+    @property
+    def samples(self) -> tuple[int, int, int]: ...
+    @property
+    def cut(self) -> bool: ...
+    @property
+    def quality(self) -> tuple[float, float, float, float]: ...
+    def spectrum(self) -> list[NDArray[np.float64]]: ...
+
+def read_step(u: ArrayLike, y: ArrayLike, dt: float, hold_name: str) -> StepResponse: ...
+def turns(signal: ArrayLike, least: float) -> list[int]: ...

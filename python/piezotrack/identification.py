@@ -7,13 +7,14 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
-from . import _core
+from . import _core, remarks
 from .bar import ProgressBar
 from .dataset import Dataset
 from .errors import Interrupted, ParameterError
 from .estimates import Estimate, Progress, Run, StopReason
 from .modelfile import IdentifiedModel, Score
 from .models import DahlStage
+from .step import StepResult
 from .swarm import ParticleSwarm
 
 if TYPE_CHECKING:
@@ -97,16 +98,12 @@ class Identification(IdentifiedModel):
     @property
     def notes(self) -> list[str]:
         """What a careful reader should know before using the result."""
-        notes = []
-        if not 1e-9 <= self.stroke <= 1e-2:
-            notes.append(
-                f"a stroke of {1e6 * self.stroke:.4g} um is not that of a nanopositioner: is the "
-                "unit of the displacement right?"
-            )
+        notes = remarks.of_record(self.data)
         if self.cost_percent > 5.0:
             notes.append(
                 f"the model does not follow this record: {self.cost_percent:.3g} % of stroke remain"
             )
+        notes += self._shape
         if self.model.b0 != 0.0 and not self.simulate(self.data).well_posed:
             notes.append(
                 "b0 q2 falls below 0 at rest: this model has another motion under the same drive"
@@ -114,6 +111,15 @@ class Identification(IdentifiedModel):
         if len(self.runs) > 1 and self.agreeing == 1:
             notes.append("no other run ended where the best one did: try more, with runs=")
         return notes
+
+    @cached_property
+    def _shape(self) -> list[str]:
+        """What the loop's shape says of the model."""
+        if self.cost_percent <= remarks.REMAINS:
+            return []
+        x = self.simulate(self.data, offset=self.offset).x
+        held = [name for name, estimate in self.parameters.items() if not estimate.free]
+        return remarks.of_fit(self.data, x, self.cost_percent, held)
 
     @property
     def agreeing(self) -> int:
@@ -180,6 +186,7 @@ def identify(
     *,
     free: Iterable[str] | None = None,
     fixed: Mapping[str, float] | None = None,
+    initial: StepResult | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     stiffness: float | None = None,
     offset: bool = True,
@@ -216,6 +223,10 @@ def identify(
         reversals, is held at 0 unless it is named here or in `fixed`.
     fixed : mapping of str to float, optional
         Parameters to hold, SI.
+    initial : StepResult, optional
+        What a step told, see `identify_step`: its a1, a2, b1 and b0 are held, as in section 3.3
+        of the paper, and b1 then fixes the scale of the forces. Those named in `fixed`, `free`
+        or `bounds` are not taken from it.
     bounds : mapping of str to (float, float), optional
         Bounds of free parameters, SI; derived from the record where not given. Where both are
         positive and two decades or more apart, the search is on a logarithmic scale.
@@ -253,7 +264,8 @@ def identify(
     ParameterError
         An argument has a value that cannot be used.
     DataError
-        The drive or the displacement is constant in the window.
+        The drive or the displacement is constant in the window, or hysteresis is searched
+        where neither ever turns back.
     NumericalError
         Not one guess could be simulated.
     Interrupted
@@ -286,6 +298,9 @@ def identify(
     seed = _core.as_count("seed", seed)
     offset = _core.as_truth("offset", offset)
     late = _delay(delay)
+    held = _held(initial, fixed, free, bounds)
+    searched = {"a1", "a2", "b1"} - set(held)
+    remarks.refuse(data, searches_hysteresis=bool(searched))
     full = data.full
     with ProgressBar(progress) as bar:
         found = _core.identify_dahl(
@@ -295,7 +310,7 @@ def identify(
             hold_name=data.hold,
             start=data.warmup,
             free=_names(free),
-            fixed=[(name, _core.as_number(name, v)) for name, v in _items("fixed", fixed)],
+            fixed=list(held.items()),
             bounds=[(name, _pair(name, pair)) for name, pair in _items("bounds", bounds)],
             stiffness=None if stiffness is None else _core.as_number("stiffness", stiffness),
             offset=offset,
@@ -335,6 +350,19 @@ def _names(free: object) -> list[str] | None:
     if isinstance(free, str) or not isinstance(free, Iterable):
         raise ParameterError(f"free is {free!r}: expected names in a list, as ['mass']")
     return [str(name) for name in free]
+
+
+def _held(initial: object, fixed: object, free: object, bounds: object) -> dict[str, float]:
+    """Merge what is held: by a step, where nothing else is said of the parameter, and by name."""
+    given = {name: _core.as_number(name, value) for name, value in _items("fixed", fixed)}
+    if initial is None:
+        return given
+    if not isinstance(initial, StepResult):
+        raise ParameterError(
+            f"initial is {type(initial).__name__}: expected a StepResult, see pt.identify_step"
+        )
+    said = {*(_names(free) or []), *(name for name, _ in _items("bounds", bounds))}
+    return {n: v for n, v in initial.hysteresis.items() if n not in said} | given
 
 
 def _items(argument: str, mapping: object) -> list[tuple[str, Any]]:

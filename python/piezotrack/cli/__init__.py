@@ -12,6 +12,7 @@ from .. import __version__
 from .demo import demo_command
 from .identify import identify_command
 from .simulate import simulate_command
+from .step import step_command
 from .track import feedforward_command, track_command
 
 __all__ = ["app", "main"]
@@ -54,6 +55,7 @@ def _options(
 
 
 app.command("identify")(identify_command)
+app.command("step")(step_command)
 app.command("simulate")(simulate_command)
 app.command("feedforward")(feedforward_command)
 app.command("track")(track_command)

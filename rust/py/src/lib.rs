@@ -8,6 +8,7 @@ mod errors;
 mod identify;
 mod numbers;
 mod stage;
+mod step;
 mod virtual_stage;
 
 use pyo3::prelude::*;
@@ -19,6 +20,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     numbers::register(module)?;
     stage::register(module)?;
     identify::register(module)?;
+    step::register(module)?;
     control::register(module)?;
     design::register(module)?;
     virtual_stage::register(module)

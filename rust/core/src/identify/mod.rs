@@ -6,9 +6,13 @@ mod deviation;
 mod identification;
 mod local;
 mod problem;
+mod ringing;
 mod search;
+mod spectrum;
+mod step;
 mod stepping;
 mod swarm;
+mod turns;
 
 pub use cost::{Costs, Evaluator, Guess};
 pub use identification::{Identification, identify};
@@ -17,4 +21,6 @@ pub use problem::{
     Coordinate, DELAY, Delay, NOMINAL_STIFFNESS, Problem, Record, Scale, Spec, Theta, stage_of,
 };
 pub use search::{Monitor, Outcome, Plan, Progress, StopReason, search};
+pub use step::{Conventional, StepReadings, StepResponse, read_step, separate};
 pub use swarm::{Boundary, Swarm, SwarmSettings, Topology, Update};
+pub use turns::turns;

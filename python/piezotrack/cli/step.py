@@ -1,0 +1,84 @@
+"""``piezotrack step``: the conventional identification from a step response."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import ParameterError
+from .options import (
+    Columns,
+    DisplacementColumn,
+    DriveColumn,
+    HoldOption,
+    Interval,
+    Out,
+    TimeColumn,
+    Units,
+    can_be_folder,
+    list_files,
+    number,
+    of_file,
+)
+from .words import in_words
+
+__all__ = ["step_command"]
+
+
+@in_words
+def step_command(
+    file: Annotated[Path, typer.Argument(help="Log in CSV, with a step and its response.")],
+    window: Annotated[
+        str | None, typer.Option(metavar="A:B", help="Seconds with the step to read.")
+    ] = None,
+    out: Out = Path("results"),
+    time: TimeColumn = None,
+    drive: DriveColumn = None,
+    displacement: DisplacementColumn = None,
+    unit: Units = None,
+    dt: Interval = None,
+    hold: HoldOption = "zoh",
+    stiffness: Annotated[float | None, typer.Option(help="Stiffness in N/m, if known.")] = None,
+    mass: Annotated[float | None, typer.Option(help="Moving mass in kg, if known.")] = None,
+    second_level: Annotated[
+        str | None,
+        typer.Option(
+            metavar="V:UM", help="Voltage and displacement, in um, where another step ends."
+        ),
+    ] = None,
+) -> None:
+    """Read a step response: frequency, damping, and the hysteresis parameters, as a table."""
+    from ..report import make_folder, save_figures
+    from ..step import identify_step
+
+    log = Columns(time, drive, displacement, unit, dt).read(file, hold)
+    with of_file(file):
+        if window is not None:
+            log = log[slice(*_seconds(window))]
+    can_be_folder(out)
+    level = None if second_level is None else _level(second_level)
+    with of_file(file):
+        step = identify_step(log, stiffness=stiffness, mass=mass, second_level=level)
+    folder = make_folder(out)
+    written = save_figures({"step": step.plot()}, folder)
+    print(step.summary())
+    options = " ".join(f"--fix {name}={value:.8g}" for name, value in step.hysteresis.items())
+    print(f"\nto go on with these: piezotrack identify LOG {options}")
+    list_files(written)
+
+
+def _seconds(window: str) -> tuple[float | None, float | None]:
+    start, colon, stop = window.partition(":")
+    if not colon:
+        raise ParameterError(f"--window is '{window}': expected A:B in seconds, as 0.1:0.5")
+    first, last = (number("--window", text) if text else None for text in (start, stop))
+    return first, last
+
+
+def _level(text: str) -> tuple[float, float]:
+    volts, colon, um = text.partition(":")
+    if not colon:
+        raise ParameterError(f"--second-level is '{text}': expected V:UM, as 37.5:60.2")
+    return number("--second-level", volts), number("--second-level", um) / 1e6
