@@ -13,6 +13,7 @@ from .checks import finite, not_negative, positive
 from .errors import ParameterError
 from .models import DahlStage
 from .motions import Spline
+from .plays import PrandtlIshlinskiiStage
 from .references import Reference
 
 if TYPE_CHECKING:
@@ -27,16 +28,17 @@ Playback = Literal["table", "online"]
 
 @dataclass(frozen=True, kw_only=True)
 class Inverse:
-    r"""Inverse of a Dahl stage, with the offset and the delay of what measured it.
+    r"""Inverse of a stage, with the offset and the delay of what measured it.
 
     .. math:: u_{FF} = (M \ddot x_d + D \dot x_d + K x_d + F_h(x_d)) / T
 
     Xu and Li 2010, equation (21), doi 10.1115/1.4001712. The hysteresis force depends on the
-    path of the reference only, so the inverse is explicit, and exact along it.
+    path of the reference only, so the inverse is explicit, and exact along it. Of a
+    Prandtl-Ishlinskii stage it is the inverse of each part in turn: see its `inverse`.
 
     Parameters
     ----------
-    stage : DahlStage
+    stage : DahlStage or PrandtlIshlinskiiStage
         The model.
     offset : float, optional
         What the sensor shows where the stage is at rest without drive [m].
@@ -62,15 +64,18 @@ class Inverse:
     True
     """
 
-    stage: DahlStage
+    stage: DahlStage | PrandtlIshlinskiiStage
     offset: float = 0.0
     delay: float = 0.0
     playback: Playback = "table"
     settle: int = 1
 
     def __post_init__(self) -> None:
-        if not isinstance(self.stage, DahlStage):
-            raise ParameterError(f"stage is {type(self.stage).__name__}: expected pt.DahlStage")
+        if not isinstance(self.stage, (DahlStage, PrandtlIshlinskiiStage)):
+            raise ParameterError(
+                f"stage is {type(self.stage).__name__}: expected pt.DahlStage or "
+                "pt.PrandtlIshlinskiiStage"
+            )
         finite("offset", self.offset, "m")
         not_negative("delay", self.delay, "s")
         if self.playback not in ("table", "online"):
@@ -108,6 +113,8 @@ class Inverse:
         else:
             longer = replace(reference, duration=reference.duration + self.delay + samples.dt)
             x, v, a = longer.at(t)
+        if isinstance(self.stage, PrandtlIshlinskiiStage):
+            return self.stage.core.feedforward(samples.dt, x - self.offset, v, a)
         return _core.dahl_feedforward(self.stage.theta, samples.dt, x - self.offset, v, a)
 
     def table(self, reference: Reference, dt: float) -> Array:
@@ -233,7 +240,12 @@ class InverseSession:
     def __init__(self, inverse: Inverse, dt: float) -> None:
         self._inverse = inverse
         self._dt = dt
-        self._core = _core.InverseSession(inverse.stage.theta, dt)
+        stage = inverse.stage
+        self._core: _core.InverseSession | _core.PlaysInverse = (
+            stage.core.inverse(dt)
+            if isinstance(stage, PrandtlIshlinskiiStage)
+            else _core.InverseSession(stage.theta, dt)
+        )
         # The last two references; none before the first.
         self._past: tuple[float, float] | None = None
 

@@ -7,6 +7,7 @@ mod enter;
 mod errors;
 mod identify;
 mod numbers;
+mod plays;
 mod stage;
 mod virtual_stage;
 
@@ -21,5 +22,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     identify::register(module)?;
     control::register(module)?;
     design::register(module)?;
+    plays::register(module)?;
     virtual_stage::register(module)
 }

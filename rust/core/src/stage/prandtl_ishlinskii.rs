@@ -149,6 +149,22 @@ impl PrandtlIshlinskiiStage {
         PlaysState { plays: self.plays.rest(), rest: RelaxationState::default() }
     }
 
+    /// The state with the drive at `volts`, V, the first plays and relaxations as given, and
+    /// displacement and velocity; a play that the drive would have pushed on stands where it does.
+    #[must_use]
+    pub fn state(&self, volts: f64, plays: &[f64], creep: &[f64], x: f64, v: f64) -> PlaysState {
+        let mut state = self.at_rest();
+        for (slot, play) in state.plays.plays.iter_mut().zip(plays) {
+            *slot = *play;
+        }
+        for (slot, reached) in state.rest.creep.iter_mut().zip(creep) {
+            *slot = *reached;
+        }
+        state.rest.input = self.plays.follow(&mut state.plays, volts) - self.zero();
+        (state.rest.x, state.rest.v) = (x, v);
+        state
+    }
+
     /// What the dead zones make of 0.
     fn zero(&self) -> f64 {
         self.plays.output(&self.plays.rest()).0

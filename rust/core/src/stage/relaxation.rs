@@ -71,7 +71,6 @@ pub struct RelaxationFlow {
 }
 
 #[derive(Clone, Copy, Debug)]
-#[expect(clippy::large_enum_variant, reason = "a few at a time, and no allocation in a step")]
 enum DynamicsFlow {
     None,
     First(f64, f64),
