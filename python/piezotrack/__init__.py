@@ -24,6 +24,9 @@ from .io import read, read_drive
 from .loopcheck import LoopCheck, LoopReport, LoopResponse, check_loop
 from .modelfile import IdentifiedModel, Score, load
 from .models import DahlStage, Response, StageState
+from .plays import PlaysResponse, PlaysState, PrandtlIshlinskiiStage
+from .playsfile import IdentifiedPlays, load_plays
+from .playsfit import PlaysIdentification, identify_plays
 from .reference_text import parse_reference
 from .references import Reference, SampledReference, read_reference
 from .swarm import ParticleSwarm
@@ -40,6 +43,7 @@ __all__ = [
     "Estimate",
     "Identification",
     "IdentifiedModel",
+    "IdentifiedPlays",
     "Interrupted",
     "Inverse",
     "InverseSession",
@@ -54,6 +58,10 @@ __all__ = [
     "ParticleSwarm",
     "Pid",
     "PiezotrackError",
+    "PlaysIdentification",
+    "PlaysResponse",
+    "PlaysState",
+    "PrandtlIshlinskiiStage",
     "Progress",
     "Reference",
     "Repetitive",
@@ -72,7 +80,9 @@ __all__ = [
     "check_loop",
     "chirp",
     "identify",
+    "identify_plays",
     "load",
+    "load_plays",
     "multisine",
     "parse_reference",
     "read",

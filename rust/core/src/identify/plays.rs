@@ -281,19 +281,22 @@ impl<'a> Fit<'a> {
                 let time = self.along(times, 1e-5, |time| Dynamics::First { time })?;
                 self.dynamics = Dynamics::First { time };
             }
-            DynamicsKind::Second => self.search_mode(times, (2.0 / length, 1.0 / dt))?,
+            DynamicsKind::Second => self.search_mode(times, (0.02 / dt, 0.5 / dt))?,
         }
         self.rms = f64::INFINITY;
         self.settle(1e-10)
     }
 
     /// Frequency and lag of the mode in turn: the lag is what a slow record shows.
+    ///
+    /// Lower frequencies than a fiftieth of the sampling rate are left out: there a mode would
+    /// stand in for what the plays do not describe.
     fn search_mode(&mut self, lags: (f64, f64), frequencies: (f64, f64)) -> Option<()> {
         let mode = |frequency: f64, lag: f64| Dynamics::Second {
             frequency,
             damping_ratio: core::f64::consts::PI * frequency * lag,
         };
-        let mut frequency = 0.25 * frequencies.1;
+        let mut frequency = 0.5 * frequencies.1;
         let mut before = f64::INFINITY;
         for _ in 0..6 {
             let lag = self.along(lags, 1e-4, |lag| mode(frequency, lag))?;
