@@ -193,6 +193,27 @@ def test_it_is_a_feedforward_for_a_controller() -> None:
     alone = pt.Controller(dt=1e-3, limits=(0.0, 75.0), feedforward=fit.inverse())
     # The mean is another matter: what the stage went through before, the inverse does not know.
     assert pt.track(virtual, alone, reference).metrics.sd_error < 0.4e-6
+    # Unless it is told.
+    settled = fit.simulate(log[1.0:8.0], offset=fit.offset)
+    knowing = replace(alone, feedforward=fit.inverse(initial=settled.final))
+    assert pt.track(virtual, knowing, reference).metrics.rms_error < 0.6e-6
+
+
+def test_the_inverse_can_begin_on_a_settled_loop() -> None:
+    u = wandering()
+    before = CREEPING.simulate(u[:10000], 0.01)
+    x = CREEPING.simulate(u[9999:], 0.01, initial=before.final).x
+    none = np.zeros_like(x)
+    back = CREEPING.core.feedforward(0.01, x, none, none, before.final.values)
+    np.testing.assert_allclose(back, u[9999:], rtol=0.0, atol=1e-11)
+    session = CREEPING.core.inverse(0.01, before.final.values)
+    assert session.step(x[0], 0.0, 0.0) == back[0]
+    session.reset()
+    assert session.step(x[0], 0.0, 0.0) == back[0]
+    with pytest.raises(pt.ParameterError, match="initial is int: expected the final"):
+        CREEPING.inverse(initial=5)  # type: ignore[arg-type]
+    with pytest.raises(pt.ShapeError, match="initial has 4 plays and 2 relaxations"):
+        PLAIN.inverse(initial=before.final).start(0.01)
 
 
 # Non-negative least squares.

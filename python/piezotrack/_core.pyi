@@ -277,9 +277,18 @@ class Plays:
         initial: tuple[float, Sequence[float], Sequence[float], float, float] | None,
     ) -> PlaysMotion: ...
     def feedforward(
-        self, dt: float, x: ArrayLike, v: ArrayLike, a: ArrayLike
+        self,
+        dt: float,
+        x: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        initial: tuple[float, Sequence[float], Sequence[float], float, float] | None = None,
     ) -> NDArray[np.float64]: ...
-    def inverse(self, dt: float) -> PlaysInverse: ...
+    def inverse(
+        self,
+        dt: float,
+        initial: tuple[float, Sequence[float], Sequence[float], float, float] | None = None,
+    ) -> PlaysInverse: ...
 
 @final
 class PlaysMotion:

@@ -13,7 +13,7 @@ from .checks import finite, not_negative, positive
 from .errors import ParameterError
 from .models import DahlStage
 from .motions import Spline
-from .plays import PrandtlIshlinskiiStage
+from .plays import PlaysState, PrandtlIshlinskiiStage
 from .references import Reference
 
 if TYPE_CHECKING:
@@ -51,6 +51,9 @@ class Inverse:
     settle : int, optional
         Periods before the one that is played again, 1 or more; those in which the reference
         starts smoothly are never the one.
+    initial : PlaysState, optional
+        What a Prandtl-Ishlinskii stage remembers before the reference begins, such as the
+        `final` of a response; that of a stage at rest that never moved where it is not given.
 
     Examples
     --------
@@ -69,6 +72,7 @@ class Inverse:
     delay: float = 0.0
     playback: Playback = "table"
     settle: int = 1
+    initial: PlaysState | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.stage, (DahlStage, PrandtlIshlinskiiStage)):
@@ -82,6 +86,13 @@ class Inverse:
             raise ParameterError(f"playback is {self.playback!r}: expected 'table' or 'online'")
         if _core.as_count("settle", self.settle) < 1:
             raise ParameterError(f"settle is {self.settle}: expected 1 period or more")
+        if self.initial is not None and not (
+            isinstance(self.initial, PlaysState) and isinstance(self.stage, PrandtlIshlinskiiStage)
+        ):
+            raise ParameterError(
+                f"initial is {type(self.initial).__name__}: expected the final of a response of a "
+                "Prandtl-Ishlinskii stage, and such a stage"
+            )
 
     def voltage(self, reference: Reference, dt: float) -> Array:
         """Voltage along the whole path of a reference, the stage being at rest before.
@@ -114,7 +125,8 @@ class Inverse:
             longer = replace(reference, duration=reference.duration + self.delay + samples.dt)
             x, v, a = longer.at(t)
         if isinstance(self.stage, PrandtlIshlinskiiStage):
-            return self.stage.core.feedforward(samples.dt, x - self.offset, v, a)
+            memory = None if self.initial is None else self.initial.values
+            return self.stage.core.feedforward(samples.dt, x - self.offset, v, a, memory)
         return _core.dahl_feedforward(self.stage.theta, samples.dt, x - self.offset, v, a)
 
     def table(self, reference: Reference, dt: float) -> Array:
@@ -242,7 +254,7 @@ class InverseSession:
         self._dt = dt
         stage = inverse.stage
         self._core: _core.InverseSession | _core.PlaysInverse = (
-            stage.core.inverse(dt)
+            stage.core.inverse(dt, None if inverse.initial is None else inverse.initial.values)
             if isinstance(stage, PrandtlIshlinskiiStage)
             else _core.InverseSession(stage.theta, dt)
         )

@@ -204,7 +204,11 @@ class PrandtlIshlinskiiStage:
         )
 
     def inverse(
-        self, *, playback: Literal["table", "online"] = "table", settle: int = 1
+        self,
+        *,
+        playback: Literal["table", "online"] = "table",
+        settle: int = 1,
+        initial: PlaysState | None = None,
     ) -> Inverse:
         """Feedforward of the bare stage: the inverse of each part in turn.
 
@@ -217,6 +221,9 @@ class PrandtlIshlinskiiStage:
             Whether one settled period is played again and again, or all is computed.
         settle : int, optional
             Periods before the one of the table.
+        initial : PlaysState, optional
+            What the stage remembers before the reference begins, such as the `final` of a
+            response to the drive that settled it; at rest where it is not given.
 
         Returns
         -------
@@ -238,7 +245,12 @@ class PrandtlIshlinskiiStage:
         """
         from .inverse import Inverse
 
-        return Inverse(stage=self, playback=playback, settle=settle)
+        return Inverse(
+            stage=self,
+            playback=playback,
+            settle=settle,
+            initial=initial,
+        )
 
     def simulate(
         self,

@@ -64,7 +64,11 @@ class IdentifiedPlays:
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def inverse(
-        self, *, playback: Literal["table", "online"] = "table", settle: int = 1
+        self,
+        *,
+        playback: Literal["table", "online"] = "table",
+        settle: int = 1,
+        initial: PlaysState | None = None,
     ) -> Inverse:
         """Feedforward with the offset of this model, as `PrandtlIshlinskiiStage.inverse`.
 
@@ -74,6 +78,9 @@ class IdentifiedPlays:
             Whether one settled period is played again and again, or all is computed.
         settle : int, optional
             Periods before the one of the table.
+        initial : PlaysState, optional
+            What the stage remembers before the reference begins, such as the `final` of a
+            response to the drive that settled it; at rest where it is not given.
 
         Returns
         -------
@@ -82,7 +89,13 @@ class IdentifiedPlays:
         """
         from .inverse import Inverse
 
-        return Inverse(stage=self.model, offset=self.offset, playback=playback, settle=settle)
+        return Inverse(
+            stage=self.model,
+            offset=self.offset,
+            playback=playback,
+            settle=settle,
+            initial=initial,
+        )
 
     def displacement(self, u: ArrayLike, dt: float, *, hold: Hold = "foh") -> Array:
         """Displacement that the sensor shows under a drive, from rest.

@@ -1,5 +1,5 @@
 //! The Prandtl-Ishlinskii stage: its inverse, its memory, and what a fit finds.
-#![allow(missing_docs, clippy::unwrap_used, clippy::float_cmp)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::panic, clippy::float_cmp)]
 
 use nalgebra::{DMatrix, DVector};
 use piezotrack_control::operator::{Operator, Play, PlayInverse};

@@ -90,7 +90,9 @@ impl PyPlays {
             .ok_or_else(|| raise(&Error::Numerical("the simulation was stopped".into())))
     }
 
-    /// The voltage along a whole reference, from a stage that never moved.
+    /// The voltage along a whole reference, from a state or from a stage that never moved.
+    #[pyo3(signature = (dt, x, v, a, initial=None))]
+    #[expect(clippy::too_many_arguments, reason = "called from one place")]
     fn feedforward<'py>(
         &self,
         py: Python<'py>,
@@ -98,11 +100,12 @@ impl PyPlays {
         x: &Bound<'py, PyAny>,
         v: &Bound<'py, PyAny>,
         a: &Bound<'py, PyAny>,
+        initial: Option<State>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let (x, v, a) = (samples("x", x)?, samples("v", v)?, samples("a", a)?);
         let volts = || -> Result<Vec<f64>> {
             let inverse = self.stage.inverse(dt)?;
-            let mut state = inverse.rest();
+            let mut state = inverse.start(&self.state(initial)?);
             let mut volts = Vec::with_capacity(x.len());
             for (k, ((&x, &v), &a)) in x.iter().zip(&v).zip(&a).enumerate() {
                 let value = inverse.step(&mut state, x, v, a);
@@ -120,9 +123,14 @@ impl PyPlays {
     }
 
     /// The inverse at work, sample by sample.
-    fn inverse(&self, dt: f64) -> PyResult<PyPlaysInverse> {
-        let inverse = self.stage.inverse(dt).map_err(|error| raise(&error))?;
-        Ok(PyPlaysInverse { inverse, state: inverse.rest() })
+    #[pyo3(signature = (dt, initial=None))]
+    fn inverse(&self, dt: f64, initial: Option<State>) -> PyResult<PyPlaysInverse> {
+        let build = || -> Result<PyPlaysInverse> {
+            let inverse = self.stage.inverse(dt)?;
+            let start = inverse.start(&self.state(initial)?);
+            Ok(PyPlaysInverse { inverse, start, state: start })
+        };
+        build().map_err(|error| raise(&error))
     }
 }
 
@@ -177,6 +185,7 @@ impl PyPlaysMotion {
 #[pyclass(name = "PlaysInverse", module = "piezotrack._core")]
 struct PyPlaysInverse {
     inverse: PlaysFeedforward,
+    start: FeedforwardState,
     state: FeedforwardState,
 }
 
@@ -188,7 +197,7 @@ impl PyPlaysInverse {
     }
 
     fn reset(&mut self) {
-        self.state = self.inverse.rest();
+        self.state = self.start;
     }
 }
 

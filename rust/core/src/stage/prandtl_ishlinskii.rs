@@ -229,6 +229,7 @@ impl PrandtlIshlinskiiStage {
     pub fn inverse(&self, dt: f64) -> Result<PlaysFeedforward> {
         positive("dt", dt, "s")?;
         Ok(PlaysFeedforward {
+            plays: self.plays,
             inverse: PlayInverse::new(&self.plays)?,
             relaxation: self.relaxation,
             flow: self.relaxation.flow(dt),
@@ -276,6 +277,7 @@ impl Plant for PrandtlIshlinskiiStage {
 /// sample to sample, dead zones and plays in closed form.
 #[derive(Clone, Copy, Debug)]
 pub struct PlaysFeedforward {
+    plays: Plays,
     inverse: PlaysInverse,
     relaxation: Relaxation,
     flow: RelaxationFlow,
@@ -298,8 +300,15 @@ impl PlaysFeedforward {
         FeedforwardState { plays: self.inverse.rest(), rest, begun: false }
     }
 
+    /// The inverse of a stage that has been somewhere: what its plays and its creep remember.
+    #[must_use]
+    pub fn start(&self, state: &PlaysState) -> FeedforwardState {
+        let plays = self.inverse.memory(&self.plays, &state.plays);
+        FeedforwardState { plays, rest: state.rest, begun: false }
+    }
+
     /// The voltage for displacement `x` (m), velocity `v` (m/s) and acceleration `a` (m/s^2) of
-    /// the reference. At the first sample the stage is taken to come straight from 0 to `x`.
+    /// the reference. At the first sample the stage is taken to come straight from where it was.
     ///
     /// NaN, with the state left as it was, where an input is not finite (or beyond 1e100).
     #[inline]
