@@ -32,6 +32,9 @@ if TYPE_CHECKING:
     from .loopcheck import LoopCheck, LoopReport, LoopResponse, check_loop
     from .modelfile import IdentifiedModel, Score, load
     from .models import DahlStage, Response, StageState
+    from .plays import PlaysResponse, PlaysState, PrandtlIshlinskiiStage
+    from .playsfile import IdentifiedPlays, load_plays
+    from .playsfit import PlaysIdentification, identify_plays
     from .readings import StepReadings
     from .reference_text import parse_reference
     from .references import Reference, SampledReference, read_reference
@@ -50,6 +53,7 @@ __all__ = [
     "Estimate",
     "Identification",
     "IdentifiedModel",
+    "IdentifiedPlays",
     "Interrupted",
     "Inverse",
     "InverseSession",
@@ -64,6 +68,10 @@ __all__ = [
     "ParticleSwarm",
     "Pid",
     "PiezotrackError",
+    "PlaysIdentification",
+    "PlaysResponse",
+    "PlaysState",
+    "PrandtlIshlinskiiStage",
     "Progress",
     "Reference",
     "Repetitive",
@@ -85,8 +93,10 @@ __all__ = [
     "check_loop",
     "chirp",
     "identify",
+    "identify_plays",
     "identify_step",
     "load",
+    "load_plays",
     "multisine",
     "parse_reference",
     "read",
@@ -100,6 +110,19 @@ __all__ = [
 
 # What is heavy is imported when it is first used.
 _HOMES = {
+    "playsfit": (
+        "PlaysIdentification",
+        "identify_plays",
+    ),
+    "playsfile": (
+        "IdentifiedPlays",
+        "load_plays",
+    ),
+    "plays": (
+        "PlaysResponse",
+        "PlaysState",
+        "PrandtlIshlinskiiStage",
+    ),
     "step": (
         "StepResult",
         "StepTrace",

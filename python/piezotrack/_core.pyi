@@ -1,4 +1,4 @@
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Literal, final
 
 import numpy as np
@@ -10,6 +10,10 @@ __all__ = [
     "Conventional",
     "InverseSession",
     "LoopPlant",
+    "Plays",
+    "PlaysFit",
+    "PlaysInverse",
+    "PlaysMotion",
     "Search",
     "Session",
     "StepResponse",
@@ -29,7 +33,9 @@ __all__ = [
     "dahl_xu_li_2010",
     "delayed",
     "identify_dahl",
+    "identify_plays",
     "loop_response",
+    "nnls",
     "period_metrics",
     "read_step",
     "track_dahl",
@@ -288,3 +294,95 @@ class StepResponse:
 
 def read_step(u: ArrayLike, y: ArrayLike, dt: float, hold_name: str) -> StepResponse: ...
 def turns(signal: ArrayLike, least: float) -> list[int]: ...
+
+_PlaysState = tuple[float, list[float], list[float], float, float]
+
+@final
+class Plays:
+    def __new__(
+        cls,
+        *,
+        linear: float,
+        thresholds: Sequence[float],
+        weights: Sequence[float],
+        corners: Sequence[float],
+        bends: Sequence[float],
+        creep_shares: Sequence[float],
+        creep_times: Sequence[float],
+        time_constant: float | None,
+        mode: tuple[float, float] | None,
+    ) -> Plays: ...
+    def simulate(
+        self,
+        u: ArrayLike,
+        dt: float,
+        hold_name: str,
+        initial: tuple[float, Sequence[float], Sequence[float], float, float] | None,
+    ) -> PlaysMotion: ...
+    def feedforward(
+        self,
+        dt: float,
+        x: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        initial: tuple[float, Sequence[float], Sequence[float], float, float] | None = None,
+    ) -> NDArray[np.float64]: ...
+    def inverse(
+        self,
+        dt: float,
+        initial: tuple[float, Sequence[float], Sequence[float], float, float] | None = None,
+    ) -> PlaysInverse: ...
+
+@final
+class PlaysMotion:
+    @property
+    def x(self) -> NDArray[np.float64]: ...
+    @property
+    def hysteresis(self) -> NDArray[np.float64]: ...
+    @property
+    def last(self) -> _PlaysState: ...
+
+@final
+class PlaysInverse:
+    def step(self, x: float, v: float, a: float) -> float: ...
+    def reset(self) -> None: ...
+
+@final
+class PlaysFit:
+    @property
+    def linear(self) -> float: ...
+    @property
+    def weights(self) -> list[float]: ...
+    @property
+    def corners(self) -> list[float]: ...
+    @property
+    def bends(self) -> list[float]: ...
+    @property
+    def creep_shares(self) -> list[float]: ...
+    @property
+    def time_constant(self) -> float | None: ...
+    @property
+    def mode(self) -> tuple[float, float] | None: ...
+    @property
+    def offset(self) -> float: ...
+    @property
+    def rms(self) -> float: ...
+    @property
+    def evaluations(self) -> int: ...
+    @property
+    def at_bound(self) -> bool: ...
+
+def identify_plays(
+    *,
+    u: ArrayLike,
+    y: ArrayLike,
+    dt: float,
+    hold_name: str,
+    start: int,
+    thresholds: Sequence[float],
+    zones: int,
+    creep_times: Sequence[float],
+    dynamics: str,
+    offset: bool,
+) -> PlaysFit: ...
+def nnls(a: Sequence[Sequence[float]], b: Sequence[float], free: Sequence[bool]) -> list[float]: ...

@@ -13,6 +13,7 @@ from .checks import finite, not_negative, positive
 from .errors import ParameterError
 from .models import DahlStage
 from .motions import Spline
+from .plays import PlaysState, PrandtlIshlinskiiStage
 from .references import Reference
 
 if TYPE_CHECKING:
@@ -27,16 +28,17 @@ Playback = Literal["table", "online"]
 
 @dataclass(frozen=True, kw_only=True)
 class Inverse:
-    r"""Inverse of a Dahl stage, with the offset and the delay of what measured it.
+    r"""Inverse of a stage, with the offset and the delay of what measured it.
 
     .. math:: u_{FF} = (M \ddot x_d + D \dot x_d + K x_d + F_h(x_d)) / T
 
     Xu and Li 2010, equation (21), doi 10.1115/1.4001712. The hysteresis force depends on the
-    path of the reference only, so the inverse is explicit, and exact along it.
+    path of the reference only, so the inverse is explicit, and exact along it. Of a
+    Prandtl-Ishlinskii stage it is the inverse of each part in turn: see its `inverse`.
 
     Parameters
     ----------
-    stage : DahlStage
+    stage : DahlStage or PrandtlIshlinskiiStage
         The model.
     offset : float, optional
         What the sensor shows where the stage is at rest without drive [m].
@@ -49,6 +51,9 @@ class Inverse:
     settle : int, optional
         Periods before the one that is played again, 1 or more; those in which the reference
         starts smoothly are never the one.
+    initial : PlaysState, optional
+        What a Prandtl-Ishlinskii stage remembers before the reference begins, such as the
+        `final` of a response; that of a stage at rest that never moved where it is not given.
 
     Examples
     --------
@@ -62,21 +67,32 @@ class Inverse:
     True
     """
 
-    stage: DahlStage
+    stage: DahlStage | PrandtlIshlinskiiStage
     offset: float = 0.0
     delay: float = 0.0
     playback: Playback = "table"
     settle: int = 1
+    initial: PlaysState | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.stage, DahlStage):
-            raise ParameterError(f"stage is {type(self.stage).__name__}: expected pt.DahlStage")
+        if not isinstance(self.stage, (DahlStage, PrandtlIshlinskiiStage)):
+            raise ParameterError(
+                f"stage is {type(self.stage).__name__}: expected pt.DahlStage or "
+                "pt.PrandtlIshlinskiiStage"
+            )
         finite("offset", self.offset, "m")
         not_negative("delay", self.delay, "s")
         if self.playback not in ("table", "online"):
             raise ParameterError(f"playback is {self.playback!r}: expected 'table' or 'online'")
         if _core.as_count("settle", self.settle) < 1:
             raise ParameterError(f"settle is {self.settle}: expected 1 period or more")
+        if self.initial is not None and not (
+            isinstance(self.initial, PlaysState) and isinstance(self.stage, PrandtlIshlinskiiStage)
+        ):
+            raise ParameterError(
+                f"initial is {type(self.initial).__name__}: expected the final of a response of a "
+                "Prandtl-Ishlinskii stage, and such a stage"
+            )
 
     def voltage(self, reference: Reference, dt: float) -> Array:
         """Voltage along the whole path of a reference, the stage being at rest before.
@@ -108,6 +124,9 @@ class Inverse:
         else:
             longer = replace(reference, duration=reference.duration + self.delay + samples.dt)
             x, v, a = longer.at(t)
+        if isinstance(self.stage, PrandtlIshlinskiiStage):
+            memory = None if self.initial is None else self.initial.values
+            return self.stage.core.feedforward(samples.dt, x - self.offset, v, a, memory)
         return _core.dahl_feedforward(self.stage.theta, samples.dt, x - self.offset, v, a)
 
     def table(self, reference: Reference, dt: float) -> Array:
@@ -233,7 +252,12 @@ class InverseSession:
     def __init__(self, inverse: Inverse, dt: float) -> None:
         self._inverse = inverse
         self._dt = dt
-        self._core = _core.InverseSession(inverse.stage.theta, dt)
+        stage = inverse.stage
+        self._core: _core.InverseSession | _core.PlaysInverse = (
+            stage.core.inverse(dt, None if inverse.initial is None else inverse.initial.values)
+            if isinstance(stage, PrandtlIshlinskiiStage)
+            else _core.InverseSession(stage.theta, dt)
+        )
         # The last two references; none before the first.
         self._past: tuple[float, float] | None = None
 

@@ -274,17 +274,22 @@ class IdentifiedModel:
         ParameterError
             Offset, stroke or delay are not finite numbers.
         """
-        import json
-
         # What load would refuse is refused now, while the fit is still there.
         numbers = {"offset": self.offset, "stroke": self.stroke, "delay": self.delay}
         for name, value in numbers.items():
             if not math.isfinite(_core.as_number(name, value)):
                 raise ParameterError(f"{name} is {value}: expected a finite number")
-        text = json.dumps(_finite(self.document()), indent=2, allow_nan=False)
-        with replacing(path) as temporary:
-            temporary.write_text(text + "\n", encoding="utf-8")
-        return Path(path)
+        return write_document(path, self.document())
+
+
+def write_document(path: str | os.PathLike[str], document: Mapping[str, Any]) -> Path:
+    """Write a model file, whole or not at all; arguments and errors as of `save`."""
+    import json
+
+    text = json.dumps(_finite(document), indent=2, allow_nan=False)
+    with replacing(path) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
+    return Path(path)
 
 
 def load(path: str | os.PathLike[str]) -> IdentifiedModel:
@@ -320,6 +325,32 @@ def load(path: str | os.PathLike[str]) -> IdentifiedModel:
     >>> pt.load(path).model == model.model
     True
     """
+    name, document = read_document(path)
+    if document.get("model") != "dahl":
+        raise DataError(f"{name} holds a model {document.get('model')!r}: expected 'dahl'")
+    return _identified(name, document)
+
+
+def read_document(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
+    """Read a model file of any kind of stage.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+
+    Returns
+    -------
+    name : str
+        Of the file, for messages.
+    document : dict
+        Its content.
+
+    Raises
+    ------
+    DataError
+        The file is missing, is not a model file, or was written by a newer version.
+    """
     import json
 
     try:
@@ -346,9 +377,7 @@ def load(path: str | os.PathLike[str]) -> IdentifiedModel:
             f"{file.name} has schema_version {version!r}: this version of piezotrack reads "
             f"{SCHEMA_VERSION}"
         )
-    if document.get("model") != "dahl":
-        raise DataError(f"{file.name} holds a model {document.get('model')!r}: expected 'dahl'")
-    return _identified(file.name, document)
+    return file.name, document
 
 
 def _identified(name: str, document: dict[str, Any]) -> IdentifiedModel:
@@ -363,17 +392,17 @@ def _identified(name: str, document: dict[str, Any]) -> IdentifiedModel:
             for key, entry in parameters.items()
         }
         for key, _, unit in _core.DAHL_PARAMETERS:
-            _require_unit(key, parameters[key], unit)
+            require_unit(key, parameters[key], unit)
         # Files of version 0.1.0 have no delay.
         late = document.get("delay", {"value": 0.0, "unit": "s"})
         delay = {k: v for k, v in late.items() if k not in ("value", "unit")}
         return IdentifiedModel(
             model=DahlStage(**values),
-            offset=_number("offset", document["offset"], "m"),
+            offset=file_number("offset", document["offset"], "m"),
             offset_fitted=_core.as_truth("offset fitted", document["offset"]["fitted"]),
             scale_assumed=_core.as_truth("scale_assumed", document["scale_assumed"]),
-            stroke=_number("stroke", document["stroke"], "m", above=0.0),
-            delay=_number("delay", late, "s", least=0.0),
+            stroke=file_number("stroke", document["stroke"], "m", above=0.0),
+            delay=file_number("delay", late, "s", least=0.0),
             details={"parameters": extra, "delay": delay, **details},
         )
     except KeyError as error:
@@ -384,12 +413,12 @@ def _identified(name: str, document: dict[str, Any]) -> IdentifiedModel:
         raise DataError(f"{name}: {error}") from None
 
 
-def _require_unit(name: str, entry: Mapping[str, Any], unit: str) -> None:
+def require_unit(name: str, entry: Mapping[str, Any], unit: str) -> None:
     if entry.get("unit") != unit:
         raise ParameterError(f"the unit of {name} is {entry.get('unit')!r}: expected {unit!r}")
 
 
-def _number(
+def file_number(
     name: str,
     entry: Mapping[str, Any],
     unit: str,
@@ -398,7 +427,7 @@ def _number(
     least: float = -math.inf,
 ) -> float:
     """Take a length or a time from the file."""
-    _require_unit(name, entry, unit)
+    require_unit(name, entry, unit)
     value = _core.as_number(name, entry["value"])
     if not math.isfinite(value) or value <= above or value < least:
         limit = " above 0" if above == 0.0 else ", 0 or above" if least == 0.0 else ""

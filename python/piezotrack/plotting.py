@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .dataset import Dataset
     from .identification import Identification
     from .models import Response
+    from .plays import PlaysResponse
 
     Array = NDArray[np.float64]
 
@@ -41,14 +42,14 @@ ERROR: dict[str, Any] = {"color": "#1b6ca8", "linewidth": 0.8}
 MOST_POINTS = 6000
 
 
-def plot_loop(data: Dataset, run: Response, ax: Axes | None = None) -> Axes:
+def plot_loop(data: Dataset, run: Response | PlaysResponse, ax: Axes | None = None) -> Axes:
     """Draw the hysteresis loop: displacement over drive, measured and simulated.
 
     Parameters
     ----------
     data : Dataset
         The record.
-    run : Response
+    run : Response or PlaysResponse
         The model on that record.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure where not given.
@@ -71,7 +72,7 @@ def plot_loop(data: Dataset, run: Response, ax: Axes | None = None) -> Axes:
 
 def plot_time(
     data: Dataset,
-    run: Response,
+    run: Response | PlaysResponse,
     axes: Sequence[Axes] | None = None,
     *,
     stroke: float | None = None,
@@ -83,7 +84,7 @@ def plot_time(
     ----------
     data : Dataset
         The record.
-    run : Response
+    run : Response or PlaysResponse
         The model on that record.
     axes : two matplotlib.axes.Axes, optional
         Where to draw; a new figure where not given.

@@ -7,6 +7,7 @@ mod enter;
 mod errors;
 mod identify;
 mod numbers;
+mod plays;
 mod stage;
 mod step;
 mod virtual_stage;
@@ -23,5 +24,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     step::register(module)?;
     control::register(module)?;
     design::register(module)?;
+    plays::register(module)?;
     virtual_stage::register(module)
 }

@@ -6,9 +6,11 @@
 
 mod dahl;
 mod play;
+mod play_inverse;
 
 pub use dahl::{Dahl, DahlBranch, DahlState};
 pub use play::{Play, PlayBranch, PlayState};
+pub use play_inverse::PlayInverse;
 
 use crate::Number;
 

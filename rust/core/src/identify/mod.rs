@@ -4,7 +4,10 @@ pub mod bounds;
 mod cost;
 mod deviation;
 mod identification;
+mod line;
 mod local;
+mod nnls;
+mod plays;
 mod problem;
 mod ringing;
 mod search;
@@ -17,6 +20,8 @@ mod turns;
 pub use cost::{Costs, Evaluator, Guess};
 pub use identification::{Identification, identify};
 pub use local::{Local, Polished, Sensitivity};
+pub use nnls::{Rows, nnls};
+pub use plays::{DynamicsKind, PlaysFit, PlaysRecord, PlaysSettings, identify_plays};
 pub use problem::{
     Coordinate, DELAY, Delay, NOMINAL_STIFFNESS, Problem, Record, Scale, Spec, Theta, stage_of,
 };

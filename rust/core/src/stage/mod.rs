@@ -3,9 +3,16 @@
 mod dahl;
 pub mod feedback;
 pub mod friction;
+mod prandtl_ishlinskii;
+mod relaxation;
 mod virtual_stage;
 
 pub use dahl::{DAHL_PARAMETERS, DahlStage, StageState};
+pub use prandtl_ishlinskii::{
+    FeedforwardState, MOST_PLAYS, MOST_ZONES, Plays, PlaysFeedforward, PlaysInverse, PlaysMotion,
+    PlaysState, PrandtlIshlinskiiStage, plays,
+};
+pub use relaxation::{Dynamics, MOST_RELAXATIONS, Relaxation, RelaxationFlow, RelaxationState};
 pub use virtual_stage::{
     Creep, DEAD_ZONES, PLAYS, RELAXATIONS, StagePlay, VirtualFlow, VirtualSettings, VirtualStage,
     VirtualState,

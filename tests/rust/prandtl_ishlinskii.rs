@@ -1,0 +1,155 @@
+//! The Prandtl-Ishlinskii stage: its inverse, its memory, and what a fit finds.
+#![allow(missing_docs, clippy::unwrap_used, clippy::panic, clippy::float_cmp)]
+
+use nalgebra::{DMatrix, DVector};
+use piezotrack_control::operator::{Operator, Play, PlayInverse};
+use piezotrack_core::identify::{
+    DynamicsKind, PlaysRecord, PlaysSettings, Rows, identify_plays, nnls,
+};
+use piezotrack_core::integrate::{Drive, Hold, NEVER};
+use piezotrack_core::simulate::Plant;
+use piezotrack_core::stage::{Dynamics, PrandtlIshlinskiiStage, Relaxation, plays};
+
+const PLAY: Play<f64, 4, 2> = Play {
+    linear: 0.6,
+    thresholds: [1.0, 2.5, 6.0, 12.0],
+    weights: [0.2, 0.1, 0.0, 0.25],
+    corners: [-5.0, 8.0],
+    bends: [0.15, -0.2],
+};
+
+fn stage(dynamics: Dynamics) -> PrandtlIshlinskiiStage {
+    let weights = [0.2e-6, 0.1e-6, 0.15e-6];
+    PrandtlIshlinskiiStage {
+        plays: plays(1e-6, &[4.0, 10.0, 20.0], &weights, &[30e-6], &[0.1]).unwrap(),
+        relaxation: Relaxation::new(&[0.01], &[0.3], dynamics).unwrap(),
+    }
+}
+
+/// A path that turns at places which do not repeat.
+fn path(count: u32) -> Vec<f64> {
+    let wave = |t: f64| 20.0 * libm::sin(t) + 12.0 * libm::sin(2.7 * t) + 3.0 * libm::sin(17.3 * t);
+    (0..count).map(|k| wave(0.01 * f64::from(k))).collect()
+}
+
+#[test]
+fn the_inverse_undoes_the_operator() {
+    let inverse = PlayInverse::new(&PLAY).unwrap();
+    let (mut there, mut back) = (PLAY.rest(), inverse.rest());
+    // What the dead zones make of 0 stands for 0 in the inverse too.
+    for input in path(20_000) {
+        let output = PLAY.follow(&mut there, input);
+        let found = inverse.follow(&mut back, output);
+        assert!((found - input).abs() < 1e-12, "{found} for {input}");
+    }
+}
+
+#[test]
+fn the_inverse_can_begin_anywhere() {
+    let inverse = PlayInverse::new(&PLAY).unwrap();
+    let mut there = PLAY.rest();
+    for input in path(777) {
+        PLAY.follow(&mut there, input);
+    }
+    let mut back = inverse.memory(&PLAY, &there);
+    for input in [10.0, -3.0, 4.0, 3.5, 30.0, -30.0, 0.0] {
+        let output = PLAY.follow(&mut there, input);
+        assert!((inverse.follow(&mut back, output) - input).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn what_is_not_finite_leaves_no_trace() {
+    let inverse = PlayInverse::new(&PLAY).unwrap();
+    let mut state = inverse.rest();
+    inverse.follow(&mut state, 5.0);
+    let before = state;
+    for bad in [f64::NAN, f64::INFINITY, -1e200] {
+        assert!(inverse.follow(&mut state, bad).is_nan());
+        assert_eq!(state, before);
+    }
+}
+
+#[test]
+fn operators_without_an_inverse_are_refused() {
+    let refused = |play: Play<f64, 4, 2>| PlayInverse::new(&play).unwrap_err().name;
+    assert_eq!(refused(Play { linear: 0.0, ..PLAY }), "linear");
+    assert_eq!(refused(Play { weights: [0.1, -0.1, 0.0, 0.0], ..PLAY }), "weights");
+    assert_eq!(refused(Play { thresholds: [2.0, 1.0, 3.0, 4.0], ..PLAY }), "thresholds");
+    assert_eq!(refused(Play { corners: [1.0, 0.0], ..PLAY }), "corners");
+    assert_eq!(refused(Play { bends: [-0.6, -0.6], ..PLAY }), "bends");
+    assert_eq!(refused(Play { bends: [f64::NAN, 0.0], ..PLAY }), "bends");
+}
+
+#[test]
+fn a_plant_moves_as_the_simulation_does() {
+    let modes = Dynamics::Second { frequency: 30.0, damping_ratio: 0.1 };
+    for dynamics in [Dynamics::None, Dynamics::First { time: 0.02 }, modes] {
+        let stage = stage(dynamics);
+        let u = path(2000);
+        let drive = Drive::new(&u, 0.01, Hold::First).unwrap();
+        let run = stage.simulate(&drive, stage.at_rest(), NEVER).unwrap().unwrap();
+        let flow = stage.flow(0.01);
+        let mut state = Plant::rest(&stage);
+        for k in 1..u.len() {
+            stage.advance(&flow, &mut state, u[k - 1], u[k]);
+            assert!((stage.displacement(&state) - run.x[k]).abs() < 1e-19, "{k}");
+        }
+    }
+}
+
+#[test]
+fn a_fit_finds_what_the_record_was_made_with() {
+    let stage = PrandtlIshlinskiiStage {
+        relaxation: Relaxation::new(&[], &[], Dynamics::First { time: 0.015 }).unwrap(),
+        plays: plays(1e-6, &[4.0, 10.0, 20.0], &[0.2e-6, 0.0, 0.15e-6], &[], &[]).unwrap(),
+    };
+    let u = path(6000);
+    for hold in [Hold::First, Hold::Zero] {
+        let drive = Drive::new(&u, 0.01, hold).unwrap();
+        let y = stage.simulate(&drive, stage.at_rest(), NEVER).unwrap().unwrap().x;
+        let settings = PlaysSettings {
+            thresholds: vec![4.0, 10.0, 20.0],
+            zones: 0,
+            times: vec![],
+            dynamics: DynamicsKind::First,
+            offset: true,
+        };
+        let record = PlaysRecord { drive, y: &y, start: 500 };
+        let fit = identify_plays(&record, &settings, NEVER).unwrap().unwrap();
+        let Dynamics::First { time } = fit.stage.relaxation.dynamics else { panic!("no lag") };
+        assert!((time - 0.015).abs() < 1e-6, "{time}");
+        for (found, made) in fit.stage.plays.weights.iter().zip(&stage.plays.weights) {
+            assert!((found - made).abs() < 1e-10, "{found} {made}");
+        }
+        assert!(fit.rms < 1e-9);
+        assert_eq!(identify_plays(&record, &settings, &|| true).unwrap(), None);
+    }
+}
+
+#[test]
+fn the_solution_satisfies_kuhn_and_tucker() {
+    let a = DMatrix::from_fn(40, 6, |i, j| {
+        let place = f64::from(u32::try_from(7 * i + 13 * j).unwrap());
+        libm::sin(place) + libm::cos(0.3 * place)
+    });
+    let b = DVector::from_fn(40, |i, _| libm::cos(f64::from(u32::try_from(i).unwrap())));
+    let x = nnls(a.clone(), &b, &[]);
+    let pull = a.tr_mul(&(&b - &a * &x));
+    assert!(x.iter().any(|value| *value > 0.0));
+    for (value, pull) in x.iter().zip(pull.iter()) {
+        assert!(*value >= 0.0);
+        assert!(if *value > 0.0 { pull.abs() < 1e-12 } else { *pull < 1e-12 });
+    }
+    // The same, its rows compressed as they come.
+    let mut rows = Rows::new(6);
+    for _ in 0..20 {
+        for i in 0..40 {
+            let row: Vec<f64> = a.row(i).iter().copied().collect();
+            rows.push(&row, b[i]);
+        }
+    }
+    for (one, other) in rows.solve(&[false; 6]).iter().zip(x.iter()) {
+        assert!((one - other).abs() < 1e-12);
+    }
+}
