@@ -92,7 +92,6 @@ impl PyPlays {
 
     /// The voltage along a whole reference, from a state or from a stage that never moved.
     #[pyo3(signature = (dt, x, v, a, initial=None))]
-    #[expect(clippy::too_many_arguments, reason = "called from one place")]
     fn feedforward<'py>(
         &self,
         py: Python<'py>,
