@@ -192,11 +192,13 @@ def test_it_is_a_feedforward_for_a_controller() -> None:
     assert worst["inverse"] < 0.5 * worst["none"]
     alone = pt.Controller(dt=1e-3, limits=(0.0, 75.0), feedforward=fit.inverse())
     # The mean is another matter: what the stage went through before, the inverse does not know.
-    assert pt.track(virtual, alone, reference).metrics.sd_error < 0.4e-6
+    untold = pt.track(virtual, alone, reference).metrics
+    assert untold.sd_error < 0.4e-6
     # Unless it is told.
     settled = fit.simulate(log[1.0:8.0], offset=fit.offset)
     knowing = replace(alone, feedforward=fit.inverse(initial=settled.final))
-    assert pt.track(virtual, knowing, reference).metrics.rms_error < 0.6e-6
+    told = pt.track(virtual, knowing, reference).metrics
+    assert told.rms_error < 0.5 * untold.rms_error
 
 
 def test_the_inverse_can_begin_on_a_settled_loop() -> None:

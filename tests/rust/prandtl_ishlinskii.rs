@@ -133,7 +133,8 @@ fn the_solution_satisfies_kuhn_and_tucker() {
         let place = f64::from(u32::try_from(7 * i + 13 * j).unwrap());
         libm::sin(place) + libm::cos(0.3 * place)
     });
-    let b = DVector::from_fn(40, |i, _| libm::cos(f64::from(u32::try_from(i).unwrap())));
+    let b =
+        DVector::from_fn(40, |i, _| a[(i, 0)] + libm::cos(f64::from(u32::try_from(i).unwrap())));
     let x = nnls(a.clone(), &b, &[]);
     let pull = a.tr_mul(&(&b - &a * &x));
     assert!(x.iter().any(|value| *value > 0.0));

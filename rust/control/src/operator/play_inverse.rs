@@ -6,7 +6,7 @@
 //!
 //! r'_i = sum_{j <= i} w_j (r_i - r_j)                     r_0 = 0
 //! w'_0 = 1 / w_0,   w'_i = 1 / W_i - 1 / W_(i-1),         W_i = w_0 + ... + w_i
-//! z'_i = sum_{j <= i} w_j z_j + sum_{j > i} w_j z_i       the same memory, z_0 = u
+//! z'_i = sum_{j <= i} w_j z_i + sum_{j > i} w_j z_j       the same memory
 //! d'_j = S(d_j),   s'_j = 1 / m_j - 1 / m_(j-1),          m_j = 1 + s_1 + ... + s_j
 //! ```
 //!
@@ -74,15 +74,15 @@ impl<const PLAYS: usize, const ZONES: usize> PlayInverse<PLAYS, ZONES> {
         state: &PlayState<f64, PLAYS>,
     ) -> PlayState<f64, PLAYS> {
         let mut inverse = self.rest();
-        // What has moved so far, and the weights that have not.
-        let mut before = play.linear * state.input;
-        let mut after: f64 = play.weights.iter().sum();
+        let mut sum = play.linear;
+        let weighted = play.weights.iter().zip(&state.plays);
+        let mut after: f64 = weighted.map(|(weight, play)| weight * play).sum();
+        inverse.input = play.linear * state.input + after;
         for i in 0..PLAYS {
-            before += play.weights[i] * state.plays[i];
-            after -= play.weights[i];
-            inverse.plays[i] = before + after * state.plays[i];
+            sum += play.weights[i];
+            after -= play.weights[i] * state.plays[i];
+            inverse.plays[i] = sum * state.plays[i] + after;
         }
-        inverse.input = before;
         inverse
     }
 
