@@ -7,6 +7,7 @@
 """
 
 from ._core import __version__
+from .bouc_wen import BoucWenStage, BoucWenState
 from .control import Command, Controller, LowPass, Notch, Pid, Repetitive, Session, StateSpace
 from .dataset import Dataset
 from .errors import (
@@ -32,6 +33,8 @@ from .virtual import VirtualResponse, VirtualStage
 from .waveforms import chirp, multisine, sine, staircase, triangle
 
 __all__ = [
+    "BoucWenStage",
+    "BoucWenState",
     "Command",
     "Controller",
     "DahlStage",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from . import _core
+from .bouc_wen import BoucWenStage
 from .checks import finite, not_negative, positive
 from .errors import ParameterError
 from .models import DahlStage
@@ -27,16 +28,21 @@ Playback = Literal["table", "online"]
 
 @dataclass(frozen=True, kw_only=True)
 class Inverse:
-    r"""Inverse of a Dahl stage, with the offset and the delay of what measured it.
+    r"""Inverse of a stage, with the offset and the delay of what measured it.
 
     .. math:: u_{FF} = (M \ddot x_d + D \dot x_d + K x_d + F_h(x_d)) / T
 
     Xu and Li 2010, equation (21), doi 10.1115/1.4001712. The hysteresis force depends on the
-    path of the reference only, so the inverse is explicit, and exact along it.
+    path of the reference only, so the inverse is explicit, and exact along it. With a
+    `BoucWenStage` the hysteresis depends on the voltage, and
+
+    .. math:: d u - h(u) = (m \ddot x_d + b \dot x_d + k x_d) / k
+
+    is solved for it sample by sample, taken to be monotone between two of them.
 
     Parameters
     ----------
-    stage : DahlStage
+    stage : DahlStage or BoucWenStage
         The model.
     offset : float, optional
         What the sensor shows where the stage is at rest without drive [m].
@@ -62,21 +68,30 @@ class Inverse:
     True
     """
 
-    stage: DahlStage
+    stage: DahlStage | BoucWenStage
     offset: float = 0.0
     delay: float = 0.0
     playback: Playback = "table"
     settle: int = 1
 
     def __post_init__(self) -> None:
-        if not isinstance(self.stage, DahlStage):
-            raise ParameterError(f"stage is {type(self.stage).__name__}: expected pt.DahlStage")
+        if not isinstance(self.stage, DahlStage | BoucWenStage):
+            raise ParameterError(
+                f"stage is {type(self.stage).__name__}: expected pt.DahlStage or pt.BoucWenStage"
+            )
+        # A stage that has no inverse is refused here.
+        _core.InverseSession(self._kind, self.stage.theta, 1.0)
         finite("offset", self.offset, "m")
         not_negative("delay", self.delay, "s")
         if self.playback not in ("table", "online"):
             raise ParameterError(f"playback is {self.playback!r}: expected 'table' or 'online'")
         if _core.as_count("settle", self.settle) < 1:
             raise ParameterError(f"settle is {self.settle}: expected 1 period or more")
+
+    @property
+    def _kind(self) -> str:
+        """Name of the model."""
+        return "dahl" if isinstance(self.stage, DahlStage) else "bouc-wen"
 
     def voltage(self, reference: Reference, dt: float) -> Array:
         """Voltage along the whole path of a reference, the stage being at rest before.
@@ -108,7 +123,7 @@ class Inverse:
         else:
             longer = replace(reference, duration=reference.duration + self.delay + samples.dt)
             x, v, a = longer.at(t)
-        return _core.dahl_feedforward(self.stage.theta, samples.dt, x - self.offset, v, a)
+        return _core.feedforward(self._kind, self.stage.theta, samples.dt, x - self.offset, v, a)
 
     def table(self, reference: Reference, dt: float) -> Array:
         """One settled period, as a lookup table to be played at the sampling instants.
@@ -233,7 +248,7 @@ class InverseSession:
     def __init__(self, inverse: Inverse, dt: float) -> None:
         self._inverse = inverse
         self._dt = dt
-        self._core = _core.InverseSession(inverse.stage.theta, dt)
+        self._core = _core.InverseSession(inverse._kind, inverse.stage.theta, dt)
         # The last two references; none before the first.
         self._past: tuple[float, float] | None = None
 

@@ -12,6 +12,7 @@ from . import _core
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from .bouc_wen import BoucWenState
     from .dataset import Hold
     from .inverse import Inverse
 
@@ -63,7 +64,7 @@ class Response:
         Velocity [m/s].
     hysteresis : ndarray, shape (n,)
         Hysteresis force [N].
-    final : StageState
+    final : StageState or BoucWenState
         State at the last sample; ``initial=final`` carries on from there.
     substeps : int
         Steps of the integrator in each sampling interval.
@@ -81,7 +82,7 @@ class Response:
     x: Array
     v: Array
     hysteresis: Array
-    final: StageState
+    final: StageState | BoucWenState
     substeps: int
     difference: float
     well_posed: bool = True

@@ -327,6 +327,11 @@ impl Number for Plain {
         Self(libm::sqrt(self.0))
     }
 
+    #[inline]
+    fn power(self, exponent: f64) -> Self {
+        Self(libm::pow(self.0, exponent))
+    }
+
     #[inline(always)]
     fn where_negative(self, yes: Self, no: Self) -> Self {
         if self.0 < 0.0 { yes } else { no }

@@ -26,6 +26,10 @@ pub trait Number:
     #[must_use]
     fn sqrt(self) -> Self;
 
+    /// `self^exponent` of numbers 0 or above, by the same lines of `libm` in every lane.
+    #[must_use]
+    fn power(self, exponent: f64) -> Self;
+
     /// `yes` in the lanes where `self < 0`, `no` in the others (and where `self` is NaN).
     #[must_use]
     fn where_negative(self, yes: Self, no: Self) -> Self;
@@ -51,6 +55,11 @@ impl Number for f64 {
     #[inline(always)]
     fn sqrt(self) -> Self {
         libm::sqrt(self)
+    }
+
+    #[inline]
+    fn power(self, exponent: f64) -> Self {
+        libm::pow(self, exponent)
     }
 
     #[inline(always)]

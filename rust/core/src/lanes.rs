@@ -108,6 +108,14 @@ impl<S: Simd, const K: usize> Number for Lanes<S, K> {
     }
 
     #[inline(always)]
+    fn power(mut self, exponent: f64) -> Self {
+        for value in self.as_mut_slice() {
+            *value = libm::pow(*value, exponent);
+        }
+        self
+    }
+
+    #[inline(always)]
     fn where_negative(mut self, yes: Self, no: Self) -> Self {
         let zero = self.simd.splat_f64s(0.0);
         for k in 0..K {

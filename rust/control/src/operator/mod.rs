@@ -4,9 +4,11 @@
 //! operator is asked for the *branch* that leaves a state in one direction, and the branch
 //! for the state a displacement further on.
 
+mod bouc_wen;
 mod dahl;
 mod play;
 
+pub use bouc_wen::{BoucWen, BoucWenBranch, BoucWenState};
 pub use dahl::{Dahl, DahlBranch, DahlState};
 pub use play::{Play, PlayBranch, PlayState};
 
