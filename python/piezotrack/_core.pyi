@@ -30,7 +30,7 @@ __all__ = [
     "dahl_xu_li_2010",
     "delayed",
     "feedforward",
-    "identify_dahl",
+    "identify",
     "loop_response",
     "period_metrics",
     "track_dahl",
@@ -59,8 +59,9 @@ def dahl_simulate_fixed(
     theta: tuple[float, ...], u: ArrayLike, dt: float, hold: str, substeps: int
 ) -> Trajectory: ...
 def delayed(x: ArrayLike, v: ArrayLike, dt: float, delay: float) -> NDArray[np.float64]: ...
-def identify_dahl(
+def identify(
     *,
+    model: str,
     u: ArrayLike,
     y: ArrayLike,
     dt: float,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -12,7 +12,6 @@ from . import _core
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from .bouc_wen import BoucWenState
     from .dataset import Hold
     from .inverse import Inverse
 
@@ -82,7 +81,7 @@ class Response:
     x: Array
     v: Array
     hysteresis: Array
-    final: StageState | BoucWenState
+    final: Any
     substeps: int
     difference: float
     well_posed: bool = True

@@ -328,8 +328,8 @@ impl Number for Plain {
     }
 
     #[inline]
-    fn power(self, exponent: f64) -> Self {
-        Self(libm::pow(self.0, exponent))
+    fn lanewise<const A: usize>(arguments: [Self; A], function: impl Fn([f64; A]) -> f64) -> Self {
+        Self(function(arguments.map(|argument| argument.0)))
     }
 
     #[inline(always)]

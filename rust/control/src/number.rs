@@ -26,9 +26,9 @@ pub trait Number:
     #[must_use]
     fn sqrt(self) -> Self;
 
-    /// `self^exponent` of numbers 0 or above, by the same lines of `libm` in every lane.
+    /// A function of plain numbers in every lane by itself: for what has no closed form.
     #[must_use]
-    fn power(self, exponent: f64) -> Self;
+    fn lanewise<const A: usize>(arguments: [Self; A], function: impl Fn([f64; A]) -> f64) -> Self;
 
     /// `yes` in the lanes where `self < 0`, `no` in the others (and where `self` is NaN).
     #[must_use]
@@ -58,8 +58,8 @@ impl Number for f64 {
     }
 
     #[inline]
-    fn power(self, exponent: f64) -> Self {
-        libm::pow(self, exponent)
+    fn lanewise<const A: usize>(arguments: [Self; A], function: impl Fn([f64; A]) -> f64) -> Self {
+        function(arguments)
     }
 
     #[inline(always)]

@@ -217,26 +217,18 @@ fn at_level(
     })
 }
 
-/// Fewest sub-steps, by powers of two, from which twice as many differ by at most `accuracy`,
-/// and the displacement with them.
+/// Fewest sub-steps, by powers of two from `first` on, from which twice as many differ by at
+/// most `accuracy`, and the displacement with them.
 ///
-/// `None` where the motion is not finite, where more than `most` would be needed, and where
-/// `stop` said so meanwhile.
+/// `None` where `run` gives none and where more than `most` would be needed.
 #[must_use]
 pub fn steps_for(
-    stage: &DahlStage,
-    drive: &Drive<'_>,
-    order: Order,
+    first: usize,
     accuracy: f64,
     most: usize,
-    stop: Stop<'_>,
+    run: impl Fn(usize) -> Option<Vec<f64>>,
 ) -> Option<(usize, Vec<f64>)> {
-    let run = |substeps| {
-        let rest = StageState::default();
-        let stepping = Stepping { order, substeps };
-        simulate_fixed(stage, drive, rest, stepping, stop).ok().flatten().map(|run| run.x)
-    };
-    let mut substeps = first_substeps(&stage.mechanics, drive.dt);
+    let mut substeps = first;
     let mut coarse = run(substeps)?;
     while substeps <= most {
         let fine = run(2 * substeps)?;

@@ -108,11 +108,17 @@ impl<S: Simd, const K: usize> Number for Lanes<S, K> {
     }
 
     #[inline(always)]
-    fn power(mut self, exponent: f64) -> Self {
-        for value in self.as_mut_slice() {
-            *value = libm::pow(*value, exponent);
+    fn lanewise<const A: usize>(arguments: [Self; A], function: impl Fn([f64; A]) -> f64) -> Self {
+        // Without an argument there is nothing to tell the lanes from.
+        let mut out = arguments[0];
+        for (lane, slot) in out.as_mut_slice().iter_mut().enumerate() {
+            let mut values = [0.0; A];
+            for (value, argument) in values.iter_mut().zip(&arguments) {
+                *value = argument.as_slice()[lane];
+            }
+            *slot = function(values);
         }
-        self
+        out
     }
 
     #[inline(always)]

@@ -16,7 +16,9 @@
 //! same formula tells in closed form. With any other exponent there is no closed form, and short
 //! steps of fourth order take its place.
 
-use super::Operator;
+use core::cmp::Ordering;
+
+use super::{Facing, Operator};
 use crate::Number;
 
 /// Bouc-Wen operator.
@@ -85,21 +87,25 @@ impl<N: Number> BoucWen<N> {
     /// Leads the output, counted along the direction of motion, over a path of length `length`.
     #[inline(always)]
     fn lead(&self, z: N, length: N) -> N {
-        if (self.exponent - 1.0).abs() > 0.0 {
-            self.lead_short(z, length)
-        } else {
-            self.lead_exact(z, length)
+        if self.is_exact() {
+            return self.lead_exact(z, length);
         }
+        let n = self.exponent;
+        let arguments = [z, length, self.rise, self.beta, self.gamma];
+        N::lanewise(arguments, move |[z, length, rise, beta, gamma]| {
+            Bend { rise, beta, gamma, n }.lead(z, length)
+        })
+    }
+
+    #[inline(always)]
+    fn is_exact(&self) -> bool {
+        (self.exponent - 1.0).abs() <= 0.0
     }
 
     /// n = 1, in pieces for which the series converge: mostly one.
     #[inline(always)]
     fn lead_exact(&self, mut z: N, length: N) -> N {
         let rate = magnitude(self.beta) + magnitude(self.gamma);
-        let beyond = rate.mul_add(-length, rate.like(PIECE));
-        if !beyond.any_negative() {
-            return self.piece(z, length);
-        }
         let longest = rate.like(PIECE) / rate;
         let mut left = length;
         for _ in 0..MOST_PIECES {
@@ -110,8 +116,11 @@ impl<N: Number> BoucWen<N> {
                 return z;
             }
         }
-        // What decays is at its limit now, and what still moves grows without one.
-        (-left).where_negative(self.settled(z, longest), z)
+        // What decays has reached its limit, and what still moves grows without one.
+        let kappa = self.side(z, longest).mul_add(self.gamma, self.beta);
+        let moving = magnitude(kappa.mul_add(-z, self.rise) * longest);
+        let still = magnitude(z).mul_add(z.like(-1e-9), moving - z.like(f64::MIN_POSITIVE));
+        (-left).where_negative(still.where_negative(z, z.like(f64::INFINITY)), z)
     }
 
     /// n = 1 over one piece: an exponential to where z changes sign, another one beyond.
@@ -134,89 +143,17 @@ impl<N: Number> BoucWen<N> {
         crossed.where_negative(beyond, end)
     }
 
-    /// Any exponent: Runge-Kutta steps of fourth order along the path, as short as they have to
-    /// be. Where z changes sign, the path to there is an integral over z.
+    /// dz/dp at the beginning of a path of length `length`.
     #[inline(always)]
-    fn lead_short(&self, mut z: N, length: N) -> N {
-        let mut left = length;
-        for _ in 0..MOST_SHORT_PIECES {
-            let side = self.side(z, left);
-            let kappa = side.mul_add(self.gamma, self.beta);
-            // The rate where |z| is largest: here, or at the limit that it tends to.
-            let bend = magnitude(kappa);
-            let here = bend * self.power(z);
-            let share = 1.0 / self.exponent;
-            let limit = magnitude(self.rise).power(1.0 - share) * bend.power(share);
-            let steepest = (here - limit).where_negative(limit, here) * z.like(self.exponent);
-            let longest = z.like(SHORT_PIECE) / steepest;
-            let more = (left - longest).where_negative(left, longest);
-            z = self.short_piece(z, more, side, kappa);
-            left = left - more;
-            if !(-left).any_negative() {
-                return z;
-            }
-        }
-        (-left).where_negative(self.settled(z, left), z)
-    }
-
-    /// The output at the end of a very long path: what decays has reached its limit, and what
-    /// still moves, grows without one.
-    #[inline(always)]
-    fn settled(&self, z: N, length: N) -> N {
+    fn slope(&self, z: N, length: N) -> N {
         let kappa = self.side(z, length).mul_add(self.gamma, self.beta);
-        let least = z.like(f64::MIN_POSITIVE);
-        let moving = magnitude(self.slope(z, kappa) * length);
-        let still = magnitude(z).mul_add(z.like(-1e-4), moving - least);
-        still.where_negative(z, z.like(f64::INFINITY))
-    }
-
-    #[inline(always)]
-    fn short_piece(&self, z: N, length: N, side: N, kappa: N) -> N {
-        let end = self.runge_kutta(z, length, kappa);
-        let crossed = side * end;
-        if !crossed.any_negative() {
-            return end;
+        if self.is_exact() {
+            return kappa.mul_add(-z, self.rise);
         }
-        // dp/dz is smooth between z and 0: Simpson's rule, or rather Boole's.
-        let slowness = |part: f64| {
-            let slope = self.slope(z * z.like(part), kappa);
-            z.like(1.0) / slope
-        };
-        let sum = z.like(7.0) * (slowness(1.0) + slowness(0.0))
-            + z.like(32.0) * (slowness(0.75) + slowness(0.25))
-            + z.like(12.0) * slowness(0.5);
-        let rest = length + z * sum * z.like(1.0 / 90.0);
-        let kappa = self.beta - side * self.gamma;
-        let beyond = self.runge_kutta(z.like(0.0), rest, kappa);
-        crossed.where_negative(beyond, end)
-    }
-
-    #[inline(always)]
-    fn runge_kutta(&self, z: N, length: N, kappa: N) -> N {
-        let half = length * length.like(0.5);
-        let k1 = self.slope(z, kappa);
-        let k2 = self.slope(half.mul_add(k1, z), kappa);
-        let k3 = self.slope(half.mul_add(k2, z), kappa);
-        let k4 = self.slope(length.mul_add(k3, z), kappa);
-        let sum = k1 + k4 + (k2 + k3) * k1.like(2.0);
-        (length * length.like(1.0 / 6.0)).mul_add(sum, z)
-    }
-
-    /// dz/dp.
-    #[inline(always)]
-    fn slope(&self, z: N, kappa: N) -> N {
-        (kappa * self.power(z)).mul_add(-z, self.rise)
-    }
-
-    /// |z|^(n-1)
-    #[inline(always)]
-    fn power(&self, z: N) -> N {
-        let size = magnitude(z);
-        if (self.exponent - 1.0).abs() > 0.0 {
-            size.power(self.exponent - 1.0)
-        } else {
-            z.like(1.0)
-        }
+        let n = self.exponent;
+        N::lanewise([z, kappa, self.rise], move |[z, kappa, rise]| {
+            Bend { rise, beta: kappa, gamma: 0.0, n }.slope(z, kappa)
+        })
     }
 
     /// +1 or -1: the side of 0 on which a move begins; from 0, the one that it leads to.
@@ -251,8 +188,78 @@ impl<N: Number> Operator<N> for BoucWen<N> {
         let BoucWenBranch { along, direction } = *branch;
         let length = direction * distance;
         let z = self.lead(along, length);
-        let kappa = self.side(z, length).mul_add(self.gamma, self.beta);
-        BoucWenState { value: direction * z, slope: self.slope(z, kappa) }
+        BoucWenState { value: direction * z, slope: self.slope(z, length) }
+    }
+}
+
+impl<N: Number> Facing<N> for BoucWen<N> {
+    #[inline(always)]
+    fn facing(&self, state: &BoucWenState<N>, distance: N, direction: N) -> BoucWenState<N> {
+        BoucWenState { slope: self.slope(direction * state.value, direction * distance), ..*state }
+    }
+}
+
+/// The operator with an exponent other than 1, in plain numbers.
+#[derive(Clone, Copy)]
+struct Bend {
+    rise: f64,
+    beta: f64,
+    gamma: f64,
+    n: f64,
+}
+
+impl Bend {
+    /// Runge-Kutta steps of fourth order along the path, as short as they have to be. Where z
+    /// changes sign, the path to there is an integral over z.
+    #[inline(never)]
+    fn lead(self, mut z: f64, length: f64) -> f64 {
+        let mut left = length;
+        for _ in 0..MOST_SHORT_PIECES {
+            let side = if z + 1e-12 * self.rise * left < 0.0 { -1.0 } else { 1.0 };
+            let kappa = self.beta + side * self.gamma;
+            // The rate where |z| is largest: here, or at the limit that it tends to.
+            let here = kappa.abs() * libm::pow(z.abs(), self.n - 1.0);
+            let share = 1.0 / self.n;
+            let limit = libm::pow(self.rise.abs(), 1.0 - share) * libm::pow(kappa.abs(), share);
+            let longest = SHORT_PIECE / (self.n * here.max(limit));
+            let more = if left < longest { left } else { longest };
+            z = self.piece(z, more, side, kappa);
+            left -= more;
+            // Also where NaN has come in.
+            if left.partial_cmp(&0.0) != Some(Ordering::Greater) {
+                return z;
+            }
+        }
+        // What decays has reached its limit, and what still moves grows without one.
+        let kappa = self.beta + if z < 0.0 { -self.gamma } else { self.gamma };
+        if (self.slope(z, kappa) * left).abs() <= 1e-4 * z.abs() { z } else { f64::INFINITY }
+    }
+
+    fn piece(self, z: f64, length: f64, side: f64, kappa: f64) -> f64 {
+        let end = self.runge_kutta(z, length, kappa);
+        if side * end >= 0.0 {
+            return end;
+        }
+        // dp/dz is smooth between z and 0: Boole's rule.
+        let slowness = |part: f64| 1.0 / self.slope(z * part, kappa);
+        let sum = 7.0 * (slowness(1.0) + slowness(0.0))
+            + 32.0 * (slowness(0.75) + slowness(0.25))
+            + 12.0 * slowness(0.5);
+        let rest = length + z * sum / 90.0;
+        self.runge_kutta(0.0, rest, self.beta - side * self.gamma)
+    }
+
+    fn runge_kutta(self, z: f64, length: f64, kappa: f64) -> f64 {
+        let k1 = self.slope(z, kappa);
+        let k2 = self.slope(z + 0.5 * length * k1, kappa);
+        let k3 = self.slope(z + 0.5 * length * k2, kappa);
+        let k4 = self.slope(z + length * k3, kappa);
+        z + length / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+    }
+
+    /// dz/dp.
+    fn slope(self, z: f64, kappa: f64) -> f64 {
+        self.rise - kappa * z * libm::pow(z.abs(), self.n - 1.0)
     }
 }
 

@@ -33,3 +33,9 @@ pub trait Operator<N: Number> {
     /// The state where the input has moved on by `distance`, signed as the direction is.
     fn along(&self, branch: &Self::Branch, distance: N) -> Self::State;
 }
+
+/// An operator that leaves a reversal with another slope than it came with.
+pub trait Facing<N: Number>: Operator<N> {
+    /// The state about to be left by `distance` in `direction`, with the slope there.
+    fn facing(&self, state: &Self::State, distance: N, direction: N) -> Self::State;
+}

@@ -161,7 +161,7 @@ pub struct BoucWenKernel {
 
 impl BoucWenKernel {
     #[inline(always)]
-    fn operator<N: Number>(&self, parameters: &Parameters<N>) -> BoucWen<N> {
+    fn operator<N: Number>(self, parameters: &Parameters<N>) -> BoucWen<N> {
         let [_, _, _, gain, alpha, beta, gamma, ..] = *parameters;
         BoucWen { rise: alpha * gain, beta, gamma, exponent: self.exponent }
     }

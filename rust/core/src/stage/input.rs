@@ -6,7 +6,7 @@
 //! the linear part is exact: fourth order, and no limit on the step, however stiff the stage is.
 
 use piezotrack_control::Number;
-use piezotrack_control::operator::Operator;
+use piezotrack_control::operator::Facing;
 
 use super::Coupling;
 use super::feedback::{FeedbackState, sign};
@@ -39,7 +39,7 @@ pub struct InputMemory<N, S> {
 /// Share of the drive below which a difference is taken for rounding.
 const ROUNDING: f64 = 1e-13;
 
-impl<N: Number, O: Operator<N>> Coupling<N> for AtInput<N, O> {
+impl<N: Number, O: Facing<N>> Coupling<N> for AtInput<N, O> {
     type Memory = InputMemory<N, O::State>;
 
     /// Here the drive is in volts.
@@ -64,7 +64,7 @@ impl<N: Number, O: Operator<N>> Coupling<N> for AtInput<N, O> {
         }
         let branch = self.operator.branch(&operator, direction);
         if !onward.any_negative() {
-            operator = self.operator.along(&branch, gap.like(0.0));
+            operator = self.operator.facing(&operator, rise, direction);
         }
         let (h0, slope0) = self.operator.output(&operator);
         let operator = self.operator.along(&branch, rise);
