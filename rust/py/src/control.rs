@@ -211,6 +211,7 @@ impl AnyInverse {
 /// The voltage along a whole reference, from a stage that never moved.
 #[pyfunction]
 #[pyo3(signature = (model, theta, dt, x, v, a))]
+#[expect(clippy::needless_pass_by_value, reason = "a tuple becomes a vector, not a slice")]
 fn feedforward<'py>(
     py: Python<'py>,
     model: &str,
@@ -246,6 +247,7 @@ struct PyInverseSession(AnyInverse);
 #[pymethods]
 impl PyInverseSession {
     #[new]
+    #[expect(clippy::needless_pass_by_value, reason = "a tuple becomes a vector, not a slice")]
     fn new(model: &str, theta: Vec<f64>, dt: f64) -> PyResult<Self> {
         AnyInverse::new(model, &theta, dt).map(Self).map_err(|error| raise(&error))
     }

@@ -164,7 +164,7 @@ impl<const K: usize> WithSimd for Bundle<'_, K> {
         if K == 1 && self.of.problem.model == Model::BoucWen {
             // Held, and so the same for all guesses.
             let exponent = self.guesses.first().map_or(1.0, |guess| guess.theta[EXPONENT]);
-            return self.kernel(simd, BoucWenKernel { exponent });
+            return self.kernel(simd, &BoucWenKernel { exponent });
         }
         match self.of.stepping.order {
             Order::Second => self.smooth::<S, FEW_TERMS, false>(simd),
@@ -205,7 +205,7 @@ impl<const K: usize> Bundle<'_, K> {
 
     /// Any model that is built from plain parameters.
     #[inline(always)]
-    fn kernel<S: Simd>(self, simd: S, kernel: impl Kernel<Lanes<S, K>>) -> Vec<Costs> {
+    fn kernel<S: Simd>(self, simd: S, kernel: &impl Kernel<Lanes<S, K>>) -> Vec<Costs> {
         let zero = Lanes::splat(simd, 0.0);
         let mut parameters = [zero; MOST_PARAMETERS];
         for (i, parameter) in parameters.iter_mut().enumerate() {
