@@ -22,6 +22,7 @@ from .errors import (
 )
 
 if TYPE_CHECKING:
+    from .bouc_wen import BoucWenStage, BoucWenState
     from .control import Command, Controller, Session
     from .dataset import Dataset
     from .estimates import Estimate, Progress, Run
@@ -45,6 +46,8 @@ if TYPE_CHECKING:
     from .waveforms import chirp, multisine, sine, staircase, triangle
 
 __all__ = [
+    "BoucWenStage",
+    "BoucWenState",
     "Command",
     "Controller",
     "DahlStage",
@@ -110,6 +113,10 @@ __all__ = [
 
 # What is heavy is imported when it is first used.
 _HOMES = {
+    "bouc_wen": (
+        "BoucWenStage",
+        "BoucWenState",
+    ),
     "playsfit": (
         "PlaysIdentification",
         "identify_plays",

@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "BOUC_WEN_PARAMETERS",
     "DAHL_PARAMETERS",
     "Controller",
     "Conventional",
@@ -25,14 +26,17 @@ __all__ = [
     "as_count",
     "as_number",
     "as_truth",
+    "bouc_wen_check",
+    "bouc_wen_simulate",
+    "bouc_wen_xu_li_2010",
     "check_loop",
     "dahl_check",
-    "dahl_feedforward",
     "dahl_simulate",
     "dahl_simulate_fixed",
     "dahl_xu_li_2010",
     "delayed",
-    "identify_dahl",
+    "feedforward",
+    "identify",
     "identify_plays",
     "loop_response",
     "nnls",
@@ -44,6 +48,7 @@ __all__ = [
 ]
 
 __version__: str
+BOUC_WEN_PARAMETERS: list[tuple[str, str, str]]
 DAHL_PARAMETERS: list[tuple[str, str, str]]
 
 def as_number(name: str, value: object) -> float: ...
@@ -64,8 +69,9 @@ def dahl_simulate_fixed(
     theta: tuple[float, ...], u: ArrayLike, dt: float, hold: str, substeps: int
 ) -> Trajectory: ...
 def delayed(x: ArrayLike, v: ArrayLike, dt: float, delay: float) -> NDArray[np.float64]: ...
-def identify_dahl(
+def identify(
     *,
+    model: str,
     u: ArrayLike,
     y: ArrayLike,
     dt: float,
@@ -158,8 +164,23 @@ class Search:
     @property
     def sensitivities(self) -> list[tuple[int, float, bool]]: ...
 
-def dahl_feedforward(
-    theta: tuple[float, ...], dt: float, x: ArrayLike, v: ArrayLike, a: ArrayLike
+def bouc_wen_check(theta: tuple[float, ...]) -> None: ...
+def bouc_wen_xu_li_2010(corrected: bool) -> list[float]: ...
+def bouc_wen_simulate(
+    theta: tuple[float, ...],
+    u: ArrayLike,
+    dt: float,
+    hold: str,
+    initial: tuple[float, ...],
+    accuracy: float,
+) -> Trajectory: ...
+def feedforward(
+    model: str,
+    theta: tuple[float, ...],
+    dt: float,
+    x: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
 ) -> NDArray[np.float64]: ...
 def track_dahl(
     theta: tuple[float, ...],
@@ -225,7 +246,7 @@ class Session:
 
 @final
 class InverseSession:
-    def __new__(cls, theta: tuple[float, ...], dt: float) -> InverseSession: ...
+    def __new__(cls, model: str, theta: tuple[float, ...], dt: float) -> InverseSession: ...
     def step(self, x: float, v: float, a: float) -> float: ...
     def reset(self) -> None: ...
 

@@ -12,6 +12,7 @@ from .bar import ProgressBar
 from .dataset import Dataset
 from .errors import Interrupted, ParameterError
 from .estimates import Estimate, Progress, Run, StopReason
+from .kinds import Kind, kind_named, kind_of
 from .modelfile import IdentifiedModel, Score
 from .models import DahlStage
 from .step import StepResult
@@ -76,7 +77,7 @@ class Identification(IdentifiedModel):
 
     def __repr__(self) -> str:
         return (
-            f"<Identification of a Dahl stage: {self.cost_um:.4g} um rms, "
+            f"<Identification of a {kind_of(self.model).title} stage: {self.cost_um:.4g} um rms, "
             f"{self.cost_percent:.3g} % of stroke; see summary()>"
         )
 
@@ -104,7 +105,8 @@ class Identification(IdentifiedModel):
                 f"the model does not follow this record: {self.cost_percent:.3g} % of stroke remain"
             )
         notes += self._shape
-        if self.model.b0 != 0.0 and not self.simulate(self.data).well_posed:
+        rubs = isinstance(self.model, DahlStage) and self.model.b0 != 0.0
+        if rubs and not self.simulate(self.data).well_posed:
             notes.append(
                 "b0 q2 falls below 0 at rest: this model has another motion under the same drive"
             )
@@ -182,7 +184,7 @@ class Identification(IdentifiedModel):
 
 def identify(
     data: Dataset,
-    model: Literal["dahl"] = "dahl",
+    model: Literal["dahl", "bouc-wen"] = "dahl",
     *,
     free: Iterable[str] | None = None,
     fixed: Mapping[str, float] | None = None,
@@ -208,7 +210,8 @@ def identify(
     before the window is simulated, from rest, and not counted.
 
     Voltage and displacement fix ratios only: mass, damping, stiffness, piezo coefficient, b1 and
-    b0 can all be multiplied by one number without changing the motion. Where nothing in the call
+    b0 of a Dahl stage, or mass, damping and stiffness of a Bouc-Wen stage, can all be multiplied
+    by one number without changing the motion. Where nothing in the call
     fixes a force, a nominal stiffness of 1e6 N/m is held, and the result says "scale assumed".
 
     Parameters
@@ -216,11 +219,12 @@ def identify(
     data : Dataset
         The record. ``log[3.0:23.0]`` counts this window only and keeps the drive before it as
         warm-up.
-    model : {"dahl"}, optional
-        The kind of stage.
+    model : {"dahl", "bouc-wen"}, optional
+        The kind of stage: `DahlStage` or `BoucWenStage`.
     free : iterable of str, optional
         Parameters to search: all that are not fixed, where not given. `b0`, dry friction at
-        reversals, is held at 0 unless it is named here or in `fixed`.
+        reversals, is held at 0 unless it is named here or in `fixed`, and the exponent of a
+        Bouc-Wen stage at 1 unless it is in `fixed`.
     fixed : mapping of str to float, optional
         Parameters to hold, SI.
     initial : StepResult, optional
@@ -288,8 +292,7 @@ def identify(
     """
     if not isinstance(data, Dataset):
         raise ParameterError(f"data is {type(data).__name__}: expected a Dataset, see pt.read")
-    if model != "dahl":
-        raise ParameterError(f"model is {model!r}: expected 'dahl'")
+    kind = kind_named(model)
     swarm = ParticleSwarm() if swarm is None else swarm
     if not isinstance(swarm, ParticleSwarm):
         raise ParameterError(f"swarm is {swarm!r}: expected a ParticleSwarm, as pt.ParticleSwarm()")
@@ -299,11 +302,13 @@ def identify(
     offset = _core.as_truth("offset", offset)
     late = _delay(delay)
     held = _held(initial, fixed, free, bounds)
-    searched = {"a1", "a2", "b1"} - set(held)
+    searched = {"a1", "a2", "b1", "alpha", "beta", "gamma"} & set(kind.stage.parameter_names())
+    searched -= set(held)
     remarks.refuse(data, searches_hysteresis=bool(searched))
     full = data.full
     with ProgressBar(progress) as bar:
-        found = _core.identify_dahl(
+        found = _core.identify(
+            model=kind.name,
             u=full.u,
             y=full.y,
             dt=data.dt,
@@ -319,12 +324,12 @@ def identify(
             seed=seed,
             runs=_core.as_count("runs", runs),
             threads=0 if threads is None else _core.as_count("threads", threads),
-            callback=None if callback is None else _telling(callback),
+            callback=None if callback is None else _telling(kind, callback),
             progress=bar.update,
         )
     if found is None:
         raise Interrupted("interrupted before the first cost was computed")
-    fit = _identification(found, data, swarm, seed, offset)
+    fit = _identification(kind, found, data, swarm, seed, offset)
     if not fit.success:
         raise Interrupted(
             f"interrupted after {fit.nit} iterations, best cost {fit.cost_um:.4g} um", fit
@@ -332,12 +337,12 @@ def identify(
     return fit
 
 
-def _telling(callback: Callable[[Progress], object]) -> Callable[..., bool]:
+def _telling(kind: Kind, callback: Callable[[Progress], object]) -> Callable[..., bool]:
     """Call back with a `Progress` where the core has plain numbers."""
-    names = DahlStage.parameter_names()
+    names = [name for name, _, _ in kind.parameters]
 
     def tell(nit: int, most: int, nfev: int, cost: float, theta: list[float]) -> bool:
-        parameters = dict(zip(names, theta[:-1], strict=True))
+        parameters = dict(zip(names, theta, strict=False))
         return bool(callback(Progress(nit, most, nfev, 1e6 * cost, parameters, theta[-1])))
 
     return tell
@@ -400,17 +405,17 @@ def _delay(delay: object) -> tuple[float, float] | None:
 
 
 def _identification(
-    found: _core.Search, data: Dataset, swarm: ParticleSwarm, seed: int, offset: bool
+    kind: Kind, found: _core.Search, data: Dataset, swarm: ParticleSwarm, seed: int, offset: bool
 ) -> Identification:
     deviations = {i: (deviation, at_bound) for i, deviation, at_bound in found.sensitivities}
     parameters = {}
-    for i, (name, symbol, unit) in enumerate([*_core.DAHL_PARAMETERS, ("delay", "Td", "s")]):
+    for i, (name, symbol, unit) in enumerate([*kind.parameters, ("delay", "Td", "s")]):
         bounds = found.bounds[i]
         deviation, at_bound = deviations.get(i, (None, False))
         parameters[name] = Estimate(
             found.theta[i], unit, symbol, bounds is not None, bounds, deviation, at_bound
         )
-    stage_names, late = DahlStage.parameter_names(), found.theta[-1]
+    late = found.theta[-1]
     if late == 0.0 and not parameters["delay"].free:
         del parameters["delay"]
     details: dict[str, Any] = {
@@ -448,7 +453,7 @@ def _identification(
         },
     }
     return Identification(
-        model=DahlStage(**dict(zip(stage_names, found.theta[:-1], strict=True))),
+        model=kind.built(found.theta[:-1]),
         delay=late,
         offset=found.offset,
         offset_fitted=offset,

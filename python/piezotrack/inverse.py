@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from . import _core
+from .bouc_wen import BoucWenStage
 from .checks import finite, not_negative, positive
 from .errors import ParameterError
 from .models import DahlStage
@@ -33,12 +34,17 @@ class Inverse:
     .. math:: u_{FF} = (M \ddot x_d + D \dot x_d + K x_d + F_h(x_d)) / T
 
     Xu and Li 2010, equation (21), doi 10.1115/1.4001712. The hysteresis force depends on the
-    path of the reference only, so the inverse is explicit, and exact along it. Of a
+    path of the reference only, so the inverse is explicit, and exact along it. With a
+    `BoucWenStage` the hysteresis depends on the voltage, and
+
+    .. math:: d u - h(u) = (m \ddot x_d + b \dot x_d + k x_d) / k
+
+    is solved for it sample by sample, taken to be monotone between two of them. Of a
     Prandtl-Ishlinskii stage it is the inverse of each part in turn: see its `inverse`.
 
     Parameters
     ----------
-    stage : DahlStage or PrandtlIshlinskiiStage
+    stage : DahlStage, BoucWenStage or PrandtlIshlinskiiStage
         The model.
     offset : float, optional
         What the sensor shows where the stage is at rest without drive [m].
@@ -67,7 +73,7 @@ class Inverse:
     True
     """
 
-    stage: DahlStage | PrandtlIshlinskiiStage
+    stage: DahlStage | BoucWenStage | PrandtlIshlinskiiStage
     offset: float = 0.0
     delay: float = 0.0
     playback: Playback = "table"
@@ -75,11 +81,14 @@ class Inverse:
     initial: PlaysState | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.stage, (DahlStage, PrandtlIshlinskiiStage)):
+        if not isinstance(self.stage, (DahlStage, BoucWenStage, PrandtlIshlinskiiStage)):
             raise ParameterError(
-                f"stage is {type(self.stage).__name__}: expected pt.DahlStage or "
+                f"stage is {type(self.stage).__name__}: expected pt.DahlStage, pt.BoucWenStage or "
                 "pt.PrandtlIshlinskiiStage"
             )
+        if not isinstance(self.stage, PrandtlIshlinskiiStage):
+            # A stage that has no inverse is refused here.
+            _core.InverseSession(self._kind, self.stage.theta, 1.0)
         finite("offset", self.offset, "m")
         not_negative("delay", self.delay, "s")
         if self.playback not in ("table", "online"):
@@ -93,6 +102,11 @@ class Inverse:
                 f"initial is {type(self.initial).__name__}: expected the final of a response of a "
                 "Prandtl-Ishlinskii stage, and such a stage"
             )
+
+    @property
+    def _kind(self) -> str:
+        """Name of the model."""
+        return "dahl" if isinstance(self.stage, DahlStage) else "bouc-wen"
 
     def voltage(self, reference: Reference, dt: float) -> Array:
         """Voltage along the whole path of a reference, the stage being at rest before.
@@ -127,7 +141,7 @@ class Inverse:
         if isinstance(self.stage, PrandtlIshlinskiiStage):
             memory = None if self.initial is None else self.initial.values
             return self.stage.core.feedforward(samples.dt, x - self.offset, v, a, memory)
-        return _core.dahl_feedforward(self.stage.theta, samples.dt, x - self.offset, v, a)
+        return _core.feedforward(self._kind, self.stage.theta, samples.dt, x - self.offset, v, a)
 
     def table(self, reference: Reference, dt: float) -> Array:
         """One settled period, as a lookup table to be played at the sampling instants.
@@ -256,7 +270,7 @@ class InverseSession:
         self._core: _core.InverseSession | _core.PlaysInverse = (
             stage.core.inverse(dt, None if inverse.initial is None else inverse.initial.values)
             if isinstance(stage, PrandtlIshlinskiiStage)
-            else _core.InverseSession(stage.theta, dt)
+            else _core.InverseSession(inverse._kind, stage.theta, dt)
         )
         # The last two references; none before the first.
         self._past: tuple[float, float] | None = None

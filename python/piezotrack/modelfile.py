@@ -14,7 +14,8 @@ from . import _core
 from .dataset import Dataset
 from .errors import DataError, ParameterError, PiezotrackError
 from .files import replacing
-from .models import DahlStage, Response
+from .kinds import Kind, kind_named, kind_of
+from .models import Response
 
 if TYPE_CHECKING:
     import os
@@ -71,7 +72,7 @@ class IdentifiedModel:
 
     Attributes
     ----------
-    model : DahlStage
+    model : DahlStage or BoucWenStage
         The stage.
     offset : float
         Displacement of the sensor where the stage is at rest without drive [m].
@@ -89,7 +90,7 @@ class IdentifiedModel:
         Everything else that is kept in the file: fit, provenance.
     """
 
-    model: DahlStage
+    model: Any
     offset: float
     offset_fitted: bool
     scale_assumed: bool
@@ -233,18 +234,18 @@ class IdentifiedModel:
         dict
             Of numbers, texts, lists and dicts only.
         """
-        details = dict(self.details)
+        details, kind = dict(self.details), kind_of(self.model)
         found = details.pop("parameters", {})
         delay = dict(details.pop("delay", {}))
         parameters = {
             name: {"value": getattr(self.model, name), "unit": unit, "symbol": symbol}
             | dict(found.get(name, {}))
-            for name, symbol, unit in _core.DAHL_PARAMETERS
+            for name, symbol, unit in kind.parameters
         }
         return {
             "format": FORMAT,
             "schema_version": SCHEMA_VERSION,
-            "model": "dahl",
+            "model": kind.name,
             "parameters": parameters,
             "scale_assumed": self.scale_assumed,
             "offset": {"value": self.offset, "unit": "m", "fitted": self.offset_fitted},
@@ -326,9 +327,11 @@ def load(path: str | os.PathLike[str]) -> IdentifiedModel:
     True
     """
     name, document = read_document(path)
-    if document.get("model") != "dahl":
-        raise DataError(f"{name} holds a model {document.get('model')!r}: expected 'dahl'")
-    return _identified(name, document)
+    try:
+        kind = kind_named(document.get("model"))
+    except ParameterError as error:
+        raise DataError(f"{name} holds a {str(error).replace(' is', '', 1)}") from None
+    return _identified(name, document, kind)
 
 
 def read_document(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
@@ -380,24 +383,24 @@ def read_document(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
     return file.name, document
 
 
-def _identified(name: str, document: dict[str, Any]) -> IdentifiedModel:
+def _identified(name: str, document: dict[str, Any], kind: Kind) -> IdentifiedModel:
     own = {"format", "schema_version", "model", "parameters"}
     own |= {"scale_assumed", "offset", "stroke", "delay"}
     try:
         parameters = document["parameters"]
-        values = {key: parameters[key]["value"] for key in DahlStage.parameter_names()}
+        values = {key: parameters[key]["value"] for key, _, _ in kind.parameters}
         details = {key: value for key, value in document.items() if key not in own}
         extra = {
             key: {k: v for k, v in entry.items() if k not in ("value", "unit", "symbol")}
             for key, entry in parameters.items()
         }
-        for key, _, unit in _core.DAHL_PARAMETERS:
+        for key, _, unit in kind.parameters:
             require_unit(key, parameters[key], unit)
         # Files of version 0.1.0 have no delay.
         late = document.get("delay", {"value": 0.0, "unit": "s"})
         delay = {k: v for k, v in late.items() if k not in ("value", "unit")}
         return IdentifiedModel(
-            model=DahlStage(**values),
+            model=kind.stage(**values),
             offset=file_number("offset", document["offset"], "m"),
             offset_fitted=_core.as_truth("offset fitted", document["offset"]["fitted"]),
             scale_assumed=_core.as_truth("scale_assumed", document["scale_assumed"]),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -63,7 +63,7 @@ class Response:
         Velocity [m/s].
     hysteresis : ndarray, shape (n,)
         Hysteresis force [N].
-    final : StageState
+    final : StageState or BoucWenState
         State at the last sample; ``initial=final`` carries on from there.
     substeps : int
         Steps of the integrator in each sampling interval.
@@ -81,7 +81,7 @@ class Response:
     x: Array
     v: Array
     hysteresis: Array
-    final: StageState
+    final: Any
     substeps: int
     difference: float
     well_posed: bool = True

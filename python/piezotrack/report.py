@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 from .errors import DataError
 from .files import replacing
+from .kinds import kind_of
+from .models import DahlStage
 
 if TYPE_CHECKING:
     import os
@@ -35,9 +37,9 @@ def summary_text(fit: Identification) -> str:
     str
         Several lines.
     """
-    data = fit.data
+    data, kind = fit.data, kind_of(fit.model)
     lines = [
-        f"Dahl stage identified from {data.source or 'a record'}: {len(data)} samples, "
+        f"{kind.title} stage identified from {data.source or 'a record'}: {len(data)} samples, "
         f"{data.duration:.4g} s at {1 / data.dt:.6g} Hz, stroke {1e6 * data.stroke:.4g} um",
         f"cost  {fit.cost_um:.4g} um rms = {fit.cost_percent:.3g} % of stroke"
         + (f", offset {1e6 * fit.offset:.5g} um fitted" if fit.offset_fitted else ""),
@@ -51,12 +53,13 @@ def summary_text(fit: Identification) -> str:
     if fit.scale_assumed:
         lines += [
             f"parameters, scale assumed: K = {fit.model.stiffness:g} N/m is nominal. Voltage and",
-            "displacement fix no force; with the true stiffness=, M, D, T, b1 and b0 scale along.",
+            f"displacement fix no force; with the true stiffness=, {kind.forces} scale along.",
         ]
     else:
         lines.append("parameters")
-    lines.append(f"  {'':<18}{'':<4}{'value':>13}  {'':<9}{'standard deviation'}")
-    lines += [_row(name, estimate) for name, estimate in fit.parameters.items()]
+    width = 1 + max(3, *(len(estimate.symbol) for estimate in fit.parameters.values()))
+    lines.append(f"  {'':<18}{'':<{width}}{'value':>13}  {'':<9}{'standard deviation'}")
+    lines += [_row(name, estimate, width) for name, estimate in fit.parameters.items()]
     if unclear := [n for n, e in fit.parameters.items() if not e.identified]:
         lines += ["", "Not fixed by this record: " + ", ".join(unclear) + "."]
     if fit.nfail:
@@ -76,20 +79,9 @@ def _runs(fit: Identification) -> list[str]:
 
 def _known(fit: Identification) -> list[str]:
     """List what the data tell, whatever the scale of the forces, and what they do not."""
-    stage, stiffness = fit.model, fit.model.stiffness
-    frequency = math.sqrt(stiffness / stage.mass) / (2 * math.pi)
-    ratios = [
-        ("piezo_coefficient", "T/K", 1e6 * stage.piezo_coefficient / stiffness, "um/V"),
-        ("damping", "D/K", 1e3 * stage.damping / stiffness, "ms"),
-        ("mass", "M/K", stage.mass / stiffness, f"s^2, a natural frequency of {frequency:.4g} Hz"),
-        ("b1", "b1 up/K", stage.b1 * stage.up / stiffness, "1/m"),
-        ("a1", "a1", stage.a1, "1/m"),
-        ("a2", "a2", stage.a2, "1/m^2"),
-    ]
+    ratios = _ratios(fit)
     if "delay" in fit.parameters:
         ratios.append(("delay", "delay", 1e3 * fit.delay, "ms"))
-    if fit.parameters["b0"].free or stage.b0:
-        ratios.append(("b0", "b0 up/K", stage.b0 * stage.up / stiffness, ""))
     # A ratio to a stiffness that was searched is known where both are; a stiffness that presses
     # against its bound takes the others along.
     whole = fit.parameters["stiffness"]
@@ -97,7 +89,7 @@ def _known(fit: Identification) -> list[str]:
     unknown: list[tuple[str, str]] = []
     for name, symbol, value, unit in ratios:
         estimate = fit.parameters[name]
-        alone = name in ("a1", "a2", "delay")
+        alone = "/" not in symbol
         held = not estimate.free and (not whole.free or alone)
         sure = estimate.identified and (whole.precise or alone)
         if not held:
@@ -109,7 +101,34 @@ def _known(fit: Identification) -> list[str]:
     return lines
 
 
-def _row(name: str, estimate: Estimate) -> str:
+def _ratios(fit: Identification) -> list[tuple[str, str, float, str]]:
+    """Parameter, symbol, value and unit of what does not depend on the scale of the forces."""
+    stage, stiffness = fit.model, fit.model.stiffness
+    frequency = math.sqrt(stiffness / stage.mass) / (2 * math.pi)
+    hertz = f"s^2, a natural frequency of {frequency:.4g} Hz"
+    if not isinstance(stage, DahlStage):
+        return [
+            ("piezo_coefficient", "d", 1e6 * stage.piezo_coefficient, "um/V"),
+            ("damping", "b/k", 1e3 * stage.damping / stiffness, "ms"),
+            ("mass", "m/k", stage.mass / stiffness, hertz),
+            ("alpha", "alpha", stage.alpha, ""),
+            ("beta", "beta", stage.beta, "1/V"),
+            ("gamma", "gamma", stage.gamma, "1/V"),
+        ]
+    ratios = [
+        ("piezo_coefficient", "T/K", 1e6 * stage.piezo_coefficient / stiffness, "um/V"),
+        ("damping", "D/K", 1e3 * stage.damping / stiffness, "ms"),
+        ("mass", "M/K", stage.mass / stiffness, hertz),
+        ("b1", "b1 up/K", stage.b1 * stage.up / stiffness, "1/m"),
+        ("a1", "a1", stage.a1, "1/m"),
+        ("a2", "a2", stage.a2, "1/m^2"),
+    ]
+    if fit.parameters["b0"].free or stage.b0:
+        ratios.append(("b0", "b0 up/K", stage.b0 * stage.up / stiffness, ""))
+    return ratios
+
+
+def _row(name: str, estimate: Estimate, width: int) -> str:
     if not estimate.free:
         note = "held"
     elif estimate.deviation is None:
@@ -123,7 +142,7 @@ def _row(name: str, estimate: Estimate) -> str:
     if estimate.at_bound:
         note += ", on a bound"
     return (
-        f"  {name:<18}{estimate.symbol:<4}{estimate.value:>13.6g}  {estimate.unit:<9}{note}"
+        f"  {name:<18}{estimate.symbol:<{width}}{estimate.value:>13.6g}  {estimate.unit:<9}{note}"
     ).rstrip()
 
 
@@ -192,7 +211,7 @@ def save_identification(
     fit: Identification,
     folder: str | os.PathLike[str],
     *,
-    name: str = "dahl",
+    name: str | None = None,
     shown: Dataset | None = None,
 ) -> list[Path]:
     """Write the model and its pictures.
@@ -204,7 +223,7 @@ def save_identification(
     folder : path-like
         Where to; made where it is missing.
     name : str, optional
-        Beginning of the names of the files.
+        Beginning of the names of the files; that of the model where it is not given.
     shown : Dataset, optional
         A longer record that the pictures show, with the end of the fit marked.
 
@@ -217,6 +236,7 @@ def save_identification(
     from .plotting import plot_convergence, plot_loop, plot_time
 
     path = make_folder(folder)
+    name = kind_of(fit.model).name if name is None else name
     record = fit.data if shown is None else shown
     run = fit.simulate(record, offset=fit.offset)
     until = None if shown is None else float(fit.data.t[-1])

@@ -282,7 +282,8 @@ def track(
     """
     offset = late = 0.0
     if isinstance(stage, IdentifiedModel):
-        offset, late, stage = stage.offset, stage.delay, stage.model
+        bare: DahlStage = stage.model
+        offset, late, stage = stage.offset, stage.delay, bare
     for name, value, kind in (
         ("stage", stage, (VirtualStage, DahlStage)),
         ("controller", controller, (Controller,)),

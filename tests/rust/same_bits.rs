@@ -2,7 +2,7 @@
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use piezotrack_core::identify::{
-    Delay, Evaluator, Guess, Monitor, Outcome, Plan, Problem, Progress, Record, Spec,
+    Delay, Evaluator, Guess, Model, Monitor, Outcome, Plan, Problem, Progress, Record, Spec,
     SwarmSettings, search,
 };
 use piezotrack_core::integrate::{Drive, Hold, Method, NEVER, simulate};
@@ -101,6 +101,33 @@ fn one_lane_and_many_with_friction_and_delay() {
         assert_eq!(bits(&evaluator, &asked), expected, "{arch:?}");
         let alone: Vec<_> = asked.iter().flat_map(|one| bits(&evaluator, &[*one])).collect();
         assert_eq!(alone, expected, "{arch:?}, one by one");
+    }
+}
+
+/// Zeros of the hysteresis inside the step, jumps, and another exponent.
+#[test]
+fn one_lane_and_many_of_bouc_wen_stages() {
+    let (u, y) = log();
+    for (hold, exponent) in [(Hold::First, 1.0), (Hold::Zero, 1.0), (Hold::First, 1.5)] {
+        let record = Record::new(&u, &y, DT, hold, 100).unwrap();
+        let spec = Spec {
+            model: Model::BoucWen,
+            fixed: vec![("exponent".into(), exponent)],
+            stiffness: Some(19567.0),
+            offset: true,
+            delay: Delay::Between(0.0, 0.02),
+            ..Spec::default()
+        };
+        let problem = Problem::new(&record, &spec).unwrap();
+        let asked = guesses(&problem);
+        let expected = bits(&Evaluator::new(&record, &problem, NEVER), &asked);
+        assert!(expected.iter().filter(|c| f64::from_bits(c.0).is_finite()).count() > 10);
+        for arch in instruction_sets() {
+            let evaluator = Evaluator::new(&record, &problem, NEVER).on(arch);
+            assert_eq!(bits(&evaluator, &asked), expected, "{arch:?} {exponent}");
+            let alone: Vec<_> = asked.iter().flat_map(|one| bits(&evaluator, &[*one])).collect();
+            assert_eq!(alone, expected, "{arch:?} {exponent}, one by one");
+        }
     }
 }
 

@@ -41,7 +41,7 @@ __all__ = ["identify_command"]
 def identify_command(
     file: Annotated[Path, typer.Argument(help="Log in CSV, with units in its header.")],
     window: Seconds = None,
-    model: Annotated[str, typer.Option(help="Kind of stage: dahl.")] = "dahl",
+    model: Annotated[str, typer.Option(help="Kind of stage: dahl or bouc-wen.")] = "dahl",
     out: Out = Path("results"),
     time: TimeColumn = None,
     drive: DriveColumn = None,
@@ -125,7 +125,9 @@ def _windowed(log: Dataset, file: Path, option: str, window: str | None) -> Data
         raise ParameterError(f"{file.name}: {option} {window}: {error}") from None
 
 
-PARTIAL = "dahl.partial.json"
+def _partial(model: str) -> str:
+    """Name of the file that an interrupted search leaves."""
+    return f"{model}.partial.json"
 
 
 def _search(log: Dataset, out: Path, **arguments: Any) -> Identification:
@@ -138,7 +140,7 @@ def _search(log: Dataset, out: Path, **arguments: Any) -> Identification:
     except Interrupted as stopped:
         if stopped.partial is None:
             raise
-        path = stopped.partial.save(make_folder(out) / PARTIAL)
+        path = stopped.partial.save(make_folder(out) / _partial(arguments["model"]))
         raise KeyboardInterrupt(f"{stopped}; the best so far is in {path}") from None
 
 
@@ -146,6 +148,7 @@ def _write(
     fit: Identification, out: Path, second: Dataset | None, score: Score | None
 ) -> list[Path]:
     """Write the model, with what it is worth on a second log, and the pictures."""
+    from ..kinds import kind_of
     from ..plotting import plot_loop, plot_time
     from ..report import save_figures, save_identification
 
@@ -169,7 +172,7 @@ def _write(
         }
         written += save_figures(figures, out)  # type: ignore[arg-type]
     # The result is whole now; what an interrupted search left is not needed.
-    (out / PARTIAL).unlink(missing_ok=True)
+    (out / _partial(kind_of(fit.model).name)).unlink(missing_ok=True)
     return written
 
 

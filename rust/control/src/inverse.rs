@@ -327,6 +327,11 @@ impl Number for Plain {
         Self(libm::sqrt(self.0))
     }
 
+    #[inline]
+    fn lanewise<const A: usize>(arguments: [Self; A], function: impl Fn([f64; A]) -> f64) -> Self {
+        Self(function(arguments.map(|argument| argument.0)))
+    }
+
     #[inline(always)]
     fn where_negative(self, yes: Self, no: Self) -> Self {
         if self.0 < 0.0 { yes } else { no }

@@ -9,6 +9,7 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 #![forbid(unsafe_code)]
 
+pub mod bouc_wen_inverse;
 pub mod controller;
 mod error;
 pub mod feedback;
@@ -21,6 +22,7 @@ pub mod pid;
 pub mod repetitive;
 pub mod state_space;
 
+pub use bouc_wen_inverse::{BoucWenInverse, BoucWenInverseState};
 pub use controller::{Command, Controller, ControllerState};
 pub use error::{Error, Result};
 pub use feedback::Feedback;

@@ -26,6 +26,10 @@ pub trait Number:
     #[must_use]
     fn sqrt(self) -> Self;
 
+    /// A function of plain numbers in every lane by itself: for what has no closed form.
+    #[must_use]
+    fn lanewise<const A: usize>(arguments: [Self; A], function: impl Fn([f64; A]) -> f64) -> Self;
+
     /// `yes` in the lanes where `self < 0`, `no` in the others (and where `self` is NaN).
     #[must_use]
     fn where_negative(self, yes: Self, no: Self) -> Self;
@@ -51,6 +55,11 @@ impl Number for f64 {
     #[inline(always)]
     fn sqrt(self) -> Self {
         libm::sqrt(self)
+    }
+
+    #[inline]
+    fn lanewise<const A: usize>(arguments: [Self; A], function: impl Fn([f64; A]) -> f64) -> Self {
+        function(arguments)
     }
 
     #[inline(always)]

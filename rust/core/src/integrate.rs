@@ -1,13 +1,14 @@
 //! Simulation of a stage under a sampled drive, to a stated accuracy.
 
-use piezotrack_control::Number;
 use piezotrack_control::operator::DahlState;
 use pulp::{Simd, WithSimd};
 
 use crate::classical::{self, Rk4, Rk45};
+pub use crate::delay::delayed;
+pub(crate) use crate::delay::{Late, between};
 use crate::error::{Error, Result, positive};
 use crate::march::{FEW_TERMS, March, Order, Sink, Stepping, TERMS};
-use crate::mechanics::{Propagator, halvings};
+use crate::mechanics::{Mechanics, Propagator, halvings};
 use crate::stage::feedback::{FeedbackState, Smooth};
 use crate::stage::friction::{Friction, FrictionMemory};
 use crate::stage::{Coupling, DahlStage, StageState};
@@ -85,7 +86,7 @@ pub struct Trajectory {
 }
 
 /// Most sub-steps in one sampling interval that are tried.
-const MOST_SUBSTEPS: usize = 1 << 17;
+pub(crate) const MOST_SUBSTEPS: usize = 1 << 17;
 
 /// How a stage is integrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -117,7 +118,8 @@ pub fn simulate(
     stop: Stop<'_>,
 ) -> Result<Option<Trajectory>> {
     positive("accuracy", accuracy, "m")?;
-    let mut level = if method == Method::Rk45 { 6 } else { first_substeps(stage, drive.dt) };
+    let mut level =
+        if method == Method::Rk45 { 6 } else { first_substeps(&stage.mechanics, drive.dt) };
     let last = if method == Method::Rk45 { 14 } else { MOST_SUBSTEPS };
     if method != Method::Exponential && stage.has_friction() {
         let expected = "0 with a Runge-Kutta method, which steps over sticking (or \
@@ -174,7 +176,7 @@ fn second_order(
     Some(fine)
 }
 
-fn out_of_reach(accuracy: f64, substeps: usize, difference: f64) -> Error {
+pub(crate) fn out_of_reach(accuracy: f64, substeps: usize, difference: f64) -> Error {
     Error::Numerical(format!(
         "accuracy {accuracy} m is out of reach: {substeps} sub-steps a sample differ from a \
          coarser simulation by {difference:.3e} m; ask for less with accuracy=, or check that \
@@ -215,26 +217,18 @@ fn at_level(
     })
 }
 
-/// Fewest sub-steps, by powers of two, from which twice as many differ by at most `accuracy`,
-/// and the displacement with them.
+/// Fewest sub-steps, by powers of two from `first` on, from which twice as many differ by at
+/// most `accuracy`, and the displacement with them.
 ///
-/// `None` where the motion is not finite, where more than `most` would be needed, and where
-/// `stop` said so meanwhile.
+/// `None` where `run` gives none and where more than `most` would be needed.
 #[must_use]
 pub fn steps_for(
-    stage: &DahlStage,
-    drive: &Drive<'_>,
-    order: Order,
+    first: usize,
     accuracy: f64,
     most: usize,
-    stop: Stop<'_>,
+    run: impl Fn(usize) -> Option<Vec<f64>>,
 ) -> Option<(usize, Vec<f64>)> {
-    let run = |substeps| {
-        let rest = StageState::default();
-        let stepping = Stepping { order, substeps };
-        simulate_fixed(stage, drive, rest, stepping, stop).ok().flatten().map(|run| run.x)
-    };
-    let mut substeps = first_substeps(stage, drive.dt);
+    let mut substeps = first;
     let mut coarse = run(substeps)?;
     while substeps <= most {
         let fine = run(2 * substeps)?;
@@ -416,57 +410,13 @@ impl<M: Force> Sink<f64, M> for Keep<'_> {
 /// Where the search for sub-steps begins: a radian of the oscillation in each.
 ///
 /// Coarser steps could agree with each other by chance, both blind to the oscillation.
-fn first_substeps(stage: &DahlStage, dt: f64) -> usize {
-    let radians = stage.mechanics.oscillation() * dt;
+pub(crate) fn first_substeps(mechanics: &Mechanics, dt: f64) -> usize {
+    let radians = mechanics.oscillation() * dt;
     let mut substeps = 1;
     while index(substeps) < radians && substeps < MOST_SUBSTEPS / 2 {
         substeps *= 2;
     }
     substeps
-}
-
-/// Displacement that is late by `delay` seconds, between the samples on the cubic through
-/// displacements and velocities, m; before the first sample the stage is where it starts.
-#[must_use]
-pub fn delayed(x: &[f64], v: &[f64], dt: f64, delay: f64) -> Vec<f64> {
-    if delay == 0.0 {
-        return x.to_vec();
-    }
-    let Late { whole, part } = Late::new(delay, dt);
-    let at =
-        |k: Option<usize>| k.map_or((x.first().copied().unwrap_or(0.0), 0.0), |k| (x[k], v[k]));
-    let values = (0..x.len().min(v.len())).map(|k| {
-        let ((x0, v0), (x1, v1)) = (at(k.checked_sub(whole + 1)), at(k.checked_sub(whole)));
-        between(x0, v0 * dt, x1, v1 * dt, part)
-    });
-    values.collect()
-}
-
-/// A delay in samples.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Late {
-    /// Whole samples.
-    pub whole: usize,
-    /// Where between the sample before and that one the displacement is read off, 0 to 1.
-    pub part: f64,
-}
-
-impl Late {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 or above")]
-    pub(crate) fn new(delay: f64, dt: f64) -> Self {
-        let samples = (delay / dt).max(0.0);
-        let whole = libm::floor(samples);
-        Self { whole: whole as usize, part: 1.0 - (samples - whole) }
-    }
-}
-
-/// The cubic through values and scaled slopes at 0 and 1, at `s`.
-#[inline(always)]
-pub(crate) fn between<N: Number>(x0: N, w0: N, x1: N, w1: N, s: N) -> N {
-    let rise = x1 - x0;
-    let c3 = rise.mul_add(rise.like(-2.0), w0 + w1);
-    let c2 = rise - w0 - c3;
-    s.mul_add(s.mul_add(s.mul_add(c3, c2), w0), x0)
 }
 
 /// A number of samples as a factor; exact below 2^53.
@@ -476,6 +426,6 @@ pub(crate) fn index(n: usize) -> f64 {
     n as f64
 }
 
-fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).fold(0.0, |most, (a, b)| f64::max(most, (a - b).abs()))
 }

@@ -111,6 +111,20 @@ impl<S: Simd, const K: usize> Number for Lanes<S, K> {
     }
 
     #[inline(always)]
+    fn lanewise<const A: usize>(arguments: [Self; A], function: impl Fn([f64; A]) -> f64) -> Self {
+        // Without an argument there is nothing to tell the lanes from.
+        let mut out = arguments[0];
+        for (lane, slot) in out.as_mut_slice().iter_mut().enumerate() {
+            let mut values = [0.0; A];
+            for (value, argument) in values.iter_mut().zip(&arguments) {
+                *value = argument.as_slice()[lane];
+            }
+            *slot = function(values);
+        }
+        out
+    }
+
+    #[inline(always)]
     fn where_negative(mut self, yes: Self, no: Self) -> Self {
         let zero = self.simd.splat_f64s(0.0);
         for k in 0..K {

@@ -4,7 +4,9 @@
 //! of Python, prints nothing, and returns an [`Error`] where an argument cannot be used.
 #![forbid(unsafe_code)]
 
+pub mod alone;
 mod classical;
+mod delay;
 pub mod design;
 pub mod error;
 pub mod identify;

@@ -2,8 +2,8 @@
 
 use numpy::{PyArray1, ToPyArray};
 use piezotrack_control::{
-    Command, Controller, ControllerState, DahlInverse, Filter, InverseState, Limits, Pid,
-    Repetitive, SampledDahlInverse, Smoothing, StateSpace,
+    BoucWenInverse, BoucWenInverseState, Command, Controller, ControllerState, DahlInverse, Filter,
+    InverseState, Limits, Pid, Repetitive, SampledDahlInverse, Smoothing, StateSpace,
 };
 use piezotrack_core::simulate::{Law, LawState};
 use piezotrack_core::{Error, Result};
@@ -11,13 +11,12 @@ use pyo3::prelude::*;
 
 use crate::arrays::samples;
 use crate::errors::raise;
-use crate::stage::Theta;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyController>()?;
     module.add_class::<PySession>()?;
     module.add_class::<PyInverseSession>()?;
-    module.add_function(wrap_pyfunction!(dahl_feedforward, module)?)
+    module.add_function(wrap_pyfunction!(feedforward, module)?)
 }
 
 /// kp, ti, td, and tt where it is given.
@@ -171,17 +170,52 @@ impl PySession {
     }
 }
 
-/// The inverse of a stage.
-pub fn inverse(theta: Theta) -> Result<DahlInverse> {
-    let [mass, damping, stiffness, piezo_coefficient, a1, a2, b1, b0, up] = theta;
-    Ok(DahlInverse::new(mass, damping, stiffness, piezo_coefficient, a1, a2, b1, b0, up)?)
+/// The inverse of a stage for one sampling interval.
+enum AnyInverse {
+    Dahl(SampledDahlInverse, InverseState),
+    BoucWen(BoucWenInverse, BoucWenInverseState),
+}
+
+impl AnyInverse {
+    /// By the name of the model.
+    fn new(model: &str, theta: &[f64], dt: f64) -> Result<Self> {
+        match (model, theta) {
+            ("dahl", &[m, d, k, t, a1, a2, b1, b0, up]) => {
+                let inverse = DahlInverse::new(m, d, k, t, a1, a2, b1, b0, up)?.at(dt)?;
+                Ok(Self::Dahl(inverse, inverse.rest()))
+            }
+            ("bouc-wen", &[m, b, k, d, alpha, beta, gamma, n]) => {
+                piezotrack_core::error::positive("dt", dt, "s")?;
+                let inverse = BoucWenInverse::new(m, b, k, d, alpha, beta, gamma, n)?;
+                Ok(Self::BoucWen(inverse, inverse.rest()))
+            }
+            _ => Err(Error::parameter("model", format!("'{model}'"), "one that has an inverse")),
+        }
+    }
+
+    fn step(&mut self, x: f64, v: f64, a: f64) -> f64 {
+        match self {
+            Self::Dahl(inverse, state) => inverse.step(state, x, v, a),
+            Self::BoucWen(inverse, state) => inverse.step(state, x, v, a),
+        }
+    }
+
+    fn reset(&mut self) {
+        match self {
+            Self::Dahl(inverse, state) => *state = inverse.rest(),
+            Self::BoucWen(inverse, state) => *state = inverse.rest(),
+        }
+    }
 }
 
 /// The voltage along a whole reference, from a stage that never moved.
 #[pyfunction]
-fn dahl_feedforward<'py>(
+#[pyo3(signature = (model, theta, dt, x, v, a))]
+#[expect(clippy::needless_pass_by_value, reason = "a tuple becomes a vector, not a slice")]
+fn feedforward<'py>(
     py: Python<'py>,
-    theta: Theta,
+    model: &str,
+    theta: Vec<f64>,
     dt: f64,
     x: &Bound<'py, PyAny>,
     v: &Bound<'py, PyAny>,
@@ -189,11 +223,10 @@ fn dahl_feedforward<'py>(
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let (x, v, a) = (samples("x", x)?, samples("v", v)?, samples("a", a)?);
     let volts = || -> Result<Vec<f64>> {
-        let inverse = inverse(theta)?.at(dt)?;
-        let mut state = inverse.rest();
+        let mut inverse = AnyInverse::new(model, &theta, dt)?;
         let mut volts = Vec::with_capacity(x.len());
         for (k, ((&x, &v), &a)) in x.iter().zip(v.iter()).zip(a.iter()).enumerate() {
-            let value = inverse.step(&mut state, x, v, a);
+            let value = inverse.step(x, v, a);
             if !value.is_finite() {
                 return Err(Error::Numerical(format!(
                     "the inverse has no voltage for sample {k} of the reference ({x:e} m, \
@@ -209,28 +242,22 @@ fn dahl_feedforward<'py>(
 
 /// The inverse at work, sample by sample.
 #[pyclass(name = "InverseSession", module = "piezotrack._core")]
-struct PyInverseSession {
-    inverse: SampledDahlInverse,
-    state: InverseState,
-}
+struct PyInverseSession(AnyInverse);
 
 #[pymethods]
 impl PyInverseSession {
     #[new]
-    fn new(theta: Theta, dt: f64) -> PyResult<Self> {
-        let build = || -> Result<Self> {
-            let inverse = inverse(theta)?.at(dt)?;
-            Ok(Self { inverse, state: inverse.rest() })
-        };
-        build().map_err(|error| raise(&error))
+    #[expect(clippy::needless_pass_by_value, reason = "a tuple becomes a vector, not a slice")]
+    fn new(model: &str, theta: Vec<f64>, dt: f64) -> PyResult<Self> {
+        AnyInverse::new(model, &theta, dt).map(Self).map_err(|error| raise(&error))
     }
 
     /// NaN where there is no voltage.
     fn step(&mut self, x: f64, v: f64, a: f64) -> f64 {
-        self.inverse.step(&mut self.state, x, v, a)
+        self.0.step(x, v, a)
     }
 
     fn reset(&mut self) {
-        self.state = self.inverse.rest();
+        self.0.reset();
     }
 }

@@ -2,8 +2,8 @@
 
 use numpy::{PyArray1, ToPyArray};
 use piezotrack_core::identify::{
-    Boundary, Coordinate, Delay, Identification, Outcome, Plan, Record, Spec, StopReason,
-    SwarmSettings, Theta, Topology, Update, identify,
+    Boundary, Coordinate, DELAY, Delay, Identification, Model, Outcome, Plan, Record, Spec,
+    StopReason, SwarmSettings, Topology, Update, identify as identified,
 };
 use piezotrack_core::march::Order;
 use piezotrack_core::{Error, Result};
@@ -17,7 +17,7 @@ use crate::stage::hold;
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PySettings>()?;
     module.add_class::<PySearch>()?;
-    module.add_function(wrap_pyfunction!(identify_dahl, module)?)
+    module.add_function(wrap_pyfunction!(identify, module)?)
 }
 
 /// Checked settings of a swarm.
@@ -127,8 +127,8 @@ struct PySearch {
 impl PySearch {
     /// The parameters of the stage, then the delay.
     #[getter]
-    fn theta(&self) -> Theta {
-        self.outcome.theta
+    fn theta(&self) -> Vec<f64> {
+        self.places().map(|i| self.outcome.theta[i]).collect()
     }
 
     #[getter]
@@ -200,29 +200,38 @@ impl PySearch {
     /// Bounds of each parameter; None for one that was held.
     #[getter]
     fn bounds(&self) -> Vec<Option<(f64, f64)>> {
-        let bounds = self.found.problem.coordinates.iter().map(|coordinate| match *coordinate {
+        let bound = |i: usize| match self.found.problem.coordinates[i] {
             Coordinate::Fixed(_) => None,
             Coordinate::Free { low, high, .. } => Some((low, high)),
-        });
-        bounds.collect()
+        };
+        self.places().map(bound).collect()
     }
 
     /// (index of the parameter, standard deviation, whether it lies on a bound).
     #[getter]
     fn sensitivities(&self) -> Vec<(usize, f64, bool)> {
         let found = self.found.sensitivities.iter();
-        found.map(|s| (s.parameter, s.deviation, s.at_bound)).collect()
+        let place = |i: usize| i.min(self.found.problem.model.facts().parameters.len());
+        found.map(|s| (place(s.parameter), s.deviation, s.at_bound)).collect()
     }
 }
 
-/// Identifies a Dahl stage, its `delay` between two bounds, known where they are equal, or
+impl PySearch {
+    /// Indices of the model's parameters, and of the delay.
+    fn places(&self) -> impl Iterator<Item = usize> {
+        (0..self.found.problem.model.facts().parameters.len()).chain([DELAY])
+    }
+}
+
+/// Identifies a stage, its `delay` between two bounds, known where they are equal, or
 /// between bounds of its own choice where there are none; None where the search was stopped before its first cost.
 #[pyfunction]
-#[pyo3(signature = (*, u, y, dt, hold_name, start, free, fixed, bounds, stiffness, offset,
+#[pyo3(signature = (*, model, u, y, dt, hold_name, start, free, fixed, bounds, stiffness, offset,
     delay, settings, seed, runs, threads, callback, progress))]
 #[expect(clippy::too_many_arguments, reason = "keyword-only, called from one place")]
-fn identify_dahl(
+fn identify(
     py: Python<'_>,
+    model: &str,
     u: &Bound<'_, PyAny>,
     y: &Bound<'_, PyAny>,
     dt: f64,
@@ -248,12 +257,13 @@ fn identify_dahl(
         Some((low, high)) if low == high => Delay::Fixed(low),
         Some((low, high)) => Delay::Between(low, high),
     };
-    let spec = Spec { free, fixed, bounds, stiffness, offset, delay };
+    let model = Model::named(model).map_err(|error| raise(&error))?;
+    let spec = Spec { model, free, fixed, bounds, stiffness, offset, delay };
     let plan = Plan { settings: settings.0.clone(), seed, runs };
     let watchers = Watchers { callback, progress };
     let found = enter_pool(py, threads, &watchers, |monitor, stop| {
         let record = Record::new(&u, &y, dt, hold(hold_name)?, start)?;
-        identify(&record, &spec, &plan, monitor, stop)
+        identified(&record, &spec, &plan, monitor, stop)
     })?;
     Ok(found.best.map(|best| PySearch { outcome: found.runs[best].clone(), found }))
 }

@@ -3,7 +3,10 @@
 use numpy::{PyArray1, ToPyArray};
 use piezotrack_core::integrate::{self, Drive, Hold, Method, Trajectory};
 use piezotrack_core::march::{Order, Stepping};
-use piezotrack_core::stage::{DAHL_PARAMETERS, DahlStage, StageState};
+use piezotrack_core::stage::{
+    BOUC_WEN_PARAMETERS, BoucWenMotion, BoucWenStage, DAHL_PARAMETERS, DahlStage, ParameterInfo,
+    StageState,
+};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
@@ -14,19 +17,26 @@ use crate::errors::raise;
 /// Values of the nine parameters, in the order of `DAHL_PARAMETERS`.
 pub type Theta = [f64; 9];
 
-/// Displacement, velocity, q1 and q2.
+/// Displacement, velocity, and two numbers that the hysteresis remembers.
 type State = (f64, f64, f64, f64);
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    let parameters: Vec<_> =
-        DAHL_PARAMETERS.iter().map(|info| (info.name, info.symbol, info.unit)).collect();
-    module.add("DAHL_PARAMETERS", parameters)?;
+    module.add("DAHL_PARAMETERS", plain(&DAHL_PARAMETERS))?;
+    module.add("BOUC_WEN_PARAMETERS", plain(&BOUC_WEN_PARAMETERS))?;
     module.add_class::<PyTrajectory>()?;
     module.add_function(wrap_pyfunction!(delayed, module)?)?;
     module.add_function(wrap_pyfunction!(dahl_check, module)?)?;
     module.add_function(wrap_pyfunction!(dahl_xu_li_2010, module)?)?;
     module.add_function(wrap_pyfunction!(dahl_simulate, module)?)?;
-    module.add_function(wrap_pyfunction!(dahl_simulate_fixed, module)?)
+    module.add_function(wrap_pyfunction!(dahl_simulate_fixed, module)?)?;
+    module.add_function(wrap_pyfunction!(bouc_wen_check, module)?)?;
+    module.add_function(wrap_pyfunction!(bouc_wen_xu_li_2010, module)?)?;
+    module.add_function(wrap_pyfunction!(bouc_wen_simulate, module)?)
+}
+
+/// Name, symbol and unit of each.
+fn plain(parameters: &[ParameterInfo]) -> Vec<(&str, &str, &str)> {
+    parameters.iter().map(|info| (info.name, info.symbol, info.unit)).collect()
 }
 
 /// The hold by its name.
@@ -51,44 +61,65 @@ fn method_named(name: &str) -> Result<Method> {
 
 /// A simulated motion.
 #[pyclass(name = "Trajectory", frozen, module = "piezotrack._core")]
-struct PyTrajectory(Trajectory);
+struct PyTrajectory {
+    x: Vec<f64>,
+    v: Vec<f64>,
+    hysteresis: Vec<f64>,
+    #[pyo3(get)]
+    last: State,
+    #[pyo3(get)]
+    substeps: usize,
+    #[pyo3(get)]
+    well_posed: bool,
+    #[pyo3(get)]
+    difference: f64,
+}
 
 #[pymethods]
 impl PyTrajectory {
     #[getter]
     fn x<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.0.x.to_pyarray(py)
+        self.x.to_pyarray(py)
     }
 
     #[getter]
     fn v<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.0.v.to_pyarray(py)
+        self.v.to_pyarray(py)
     }
 
     #[getter]
     fn hysteresis<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.0.hysteresis.to_pyarray(py)
+        self.hysteresis.to_pyarray(py)
     }
+}
 
-    #[getter]
-    fn last(&self) -> State {
-        let StageState { x, v, q1, q2 } = self.0.last;
-        (x, v, q1, q2)
+impl From<Trajectory> for PyTrajectory {
+    fn from(run: Trajectory) -> Self {
+        let StageState { x, v, q1, q2 } = run.last;
+        Self {
+            x: run.x,
+            v: run.v,
+            hysteresis: run.hysteresis,
+            last: (x, v, q1, q2),
+            substeps: run.substeps,
+            well_posed: run.well_posed,
+            difference: run.difference,
+        }
     }
+}
 
-    #[getter]
-    fn substeps(&self) -> usize {
-        self.0.substeps
-    }
-
-    #[getter]
-    fn well_posed(&self) -> bool {
-        self.0.well_posed
-    }
-
-    #[getter]
-    fn difference(&self) -> f64 {
-        self.0.difference
+impl From<BoucWenMotion> for PyTrajectory {
+    fn from(run: BoucWenMotion) -> Self {
+        let memory = &run.last.memory;
+        Self {
+            x: run.x,
+            v: run.v,
+            hysteresis: run.hysteresis,
+            last: (run.last.x, run.last.v, memory.input, memory.operator.value),
+            substeps: run.substeps,
+            well_posed: true,
+            difference: run.difference,
+        }
     }
 }
 
@@ -163,18 +194,55 @@ fn run(
     hold_name: &str,
     job: impl FnOnce(&DahlStage, &Drive<'_>, integrate::Stop<'_>) -> Result<Option<Trajectory>> + Send,
 ) -> PyResult<PyTrajectory> {
+    driven(py, u, dt, hold_name, |drive, stop| job(&DahlStage::from_theta(&theta)?, drive, stop))
+}
+
+fn driven<T: Send + Into<PyTrajectory>>(
+    py: Python<'_>,
+    u: &Bound<'_, PyAny>,
+    dt: f64,
+    hold_name: &str,
+    job: impl FnOnce(&Drive<'_>, integrate::Stop<'_>) -> Result<Option<T>> + Send,
+) -> PyResult<PyTrajectory> {
     let u = samples("u", u)?;
-    let trajectory = enter(py, |stop| {
-        let stage = DahlStage::from_theta(&theta)?;
-        let drive = Drive::new(&u, dt, hold(hold_name)?)?;
-        job(&stage, &drive, stop)
-    })?;
+    let run = enter(py, |stop| job(&Drive::new(&u, dt, hold(hold_name)?)?, stop))?;
     // None means stopped, for which `enter` has raised.
-    trajectory
-        .map(PyTrajectory)
-        .ok_or_else(|| raise(&Error::Numerical("the simulation was stopped".into())))
+    run.map(Into::into).ok_or_else(|| raise(&Error::Numerical("the simulation was stopped".into())))
 }
 
 fn state((x, v, q1, q2): State) -> StageState {
     StageState { x, v, q1, q2 }
+}
+
+/// Raises where the eight values make no stage.
+#[pyfunction]
+fn bouc_wen_check(theta: [f64; 8]) -> PyResult<()> {
+    BoucWenStage::from_theta(&theta).map(|_| ()).map_err(|error| raise(&error))
+}
+
+/// The parameters of Xu and Li 2010, as printed or with the stiffness corrected.
+#[pyfunction]
+fn bouc_wen_xu_li_2010(corrected: bool) -> [f64; 8] {
+    let printed = BoucWenStage::xu_li_2010();
+    let stage = if corrected { BoucWenStage::xu_li_2010_corrected() } else { printed };
+    let [mass, damping, stiffness, piezo, alpha, beta, gamma, exponent, _] = stage.parameters();
+    [mass, damping, stiffness, piezo, alpha, beta, gamma, exponent]
+}
+
+/// Simulates a Bouc-Wen stage to an accuracy, choosing the sub-steps.
+#[pyfunction]
+#[pyo3(signature = (theta, u, dt, hold, initial, accuracy))]
+fn bouc_wen_simulate(
+    py: Python<'_>,
+    theta: [f64; 8],
+    u: &Bound<'_, PyAny>,
+    dt: f64,
+    hold: &str,
+    initial: State,
+    accuracy: f64,
+) -> PyResult<PyTrajectory> {
+    let (x, v, input, h) = initial;
+    driven(py, u, dt, hold, |drive, stop| {
+        BoucWenStage::from_theta(&theta)?.simulate(drive, [x, v, input, h], accuracy, stop)
+    })
 }

@@ -4,10 +4,12 @@
 //! operator is asked for the *branch* that leaves a state in one direction, and the branch
 //! for the state a displacement further on.
 
+mod bouc_wen;
 mod dahl;
 mod play;
 mod play_inverse;
 
+pub use bouc_wen::{BoucWen, BoucWenBranch, BoucWenState};
 pub use dahl::{Dahl, DahlBranch, DahlState};
 pub use play::{Play, PlayBranch, PlayState};
 pub use play_inverse::PlayInverse;
@@ -32,4 +34,10 @@ pub trait Operator<N: Number> {
 
     /// The state where the input has moved on by `distance`, signed as the direction is.
     fn along(&self, branch: &Self::Branch, distance: N) -> Self::State;
+}
+
+/// An operator that leaves a reversal with another slope than it came with.
+pub trait Facing<N: Number>: Operator<N> {
+    /// The state about to be left by `distance` in `direction`, with the slope there.
+    fn facing(&self, state: &Self::State, distance: N, direction: N) -> Self::State;
 }

@@ -4,10 +4,10 @@
 //! stiffness, and the hysteresis force relative to the elastic one. Each ratio gets a generous
 //! range from the stroke, the drive and the sampling, and the stiffness turns it into a bound.
 
+use super::model::Model;
 use super::problem::{Coordinate, Record, range};
 use crate::error::{Error, Result, shown};
 use crate::integrate::index;
-use crate::stage::DAHL_PARAMETERS;
 
 /// What the ranges are built from.
 struct Measures {
@@ -51,7 +51,11 @@ impl Measures {
 /// # Errors
 /// [`Error::Data`] where the record's values are absurd; [`Error::Parameter`] where a derived
 /// range is empty, which other records that passed [`Record::new`] do not lead to.
-pub fn derive(record: &Record<'_>, fixed: &[Option<f64>; 9]) -> Result<[Coordinate; 9]> {
+pub fn derive(
+    record: &Record<'_>,
+    model: Model,
+    fixed: &[Option<f64>; 9],
+) -> Result<[Coordinate; 9]> {
     let of = Measures::of(record);
     let usable = |value: f64| (1e-60..1e60).contains(&value);
     if ![of.stroke, of.gain, of.frequency, of.dt].into_iter().all(usable) {
@@ -63,19 +67,46 @@ pub fn derive(record: &Record<'_>, fixed: &[Option<f64>; 9]) -> Result<[Coordina
             shown(of.frequency)
         )));
     }
-    let up = fixed[8].unwrap_or(30.0);
-    let (soft, hard) = stiffness_range(&of, fixed, up);
+    let ranges = match model {
+        Model::Dahl => dahl_ranges(&of, fixed),
+        Model::BoucWen => bouc_wen_ranges(&of, fixed),
+    };
+    let mut coordinates = [Coordinate::Fixed(0.0); 9];
+    for (i, info) in model.facts().parameters.iter().enumerate() {
+        coordinates[i] = match (fixed[i], ranges.get(i)) {
+            (Some(value), _) => Coordinate::Fixed(value),
+            (None, Some(&(low, high))) => Coordinate::between(info.name, low, high)?,
+            (None, None) => Coordinate::Fixed(0.0),
+        };
+    }
+    Ok(coordinates)
+}
+
+/// Ranges of mass, damping and stiffness.
+fn mechanical_ranges(of: &Measures, (soft, hard): (f64, f64)) -> [(f64, f64); 3] {
     // Ten times the drive's frequency up to a tenth of the sampling rate, where the paper's
     // rule for sampling still holds; never less than two octaves.
     let slowest = 10.0 * of.frequency;
     let fastest = (0.2 * core::f64::consts::PI / of.dt).max(4.0 * slowest);
-    // A force of half the elastic one at full stroke, either way.
-    let curvature = hard / (up.abs().max(f64::MIN_POSITIVE) * of.stroke);
-    let piezo = (soft * of.gain / 3.0, hard * of.gain * 3.0);
-    let ranges = [
+    [
         (soft / (fastest * fastest), hard / (slowest * slowest)),
         (soft * 5e-3 / of.frequency, hard / of.slow),
         (soft, hard),
+    ]
+}
+
+/// Ranges of the parameters of a Dahl stage, up to b0.
+fn dahl_ranges(of: &Measures, fixed: &[Option<f64>; 9]) -> [(f64, f64); 8] {
+    let up = fixed[8].unwrap_or(30.0);
+    let (soft, hard) = stiffness_range(of, fixed, up);
+    let [mass, damping, stiffness] = mechanical_ranges(of, (soft, hard));
+    // A force of half the elastic one at full stroke, either way.
+    let curvature = hard / (up.abs().max(f64::MIN_POSITIVE) * of.stroke);
+    let piezo = (soft * of.gain / 3.0, hard * of.gain * 3.0);
+    [
+        mass,
+        damping,
+        stiffness,
         if of.inverted { (-piezo.1, -piezo.0) } else { piezo },
         // From 100 strokes of memory to a tenth: with a1 = 0 the operator is a lossless spring.
         (1e-2 / of.stroke, 10.0 / of.stroke),
@@ -83,16 +114,29 @@ pub fn derive(record: &Record<'_>, fixed: &[Option<f64>; 9]) -> Result<[Coordina
         (-2.0 * curvature, 2.0 * curvature),
         // q2 is about up times the path: a friction of half the elastic force.
         (0.0, 0.5 * hard / up.abs().max(f64::MIN_POSITIVE)),
-    ];
-    let mut coordinates = [Coordinate::Fixed(0.0); 9];
-    for i in 0..9 {
-        coordinates[i] = match (fixed[i], ranges.get(i)) {
-            (Some(value), _) => Coordinate::Fixed(value),
-            (None, Some(&(low, high))) => Coordinate::between(DAHL_PARAMETERS[i].name, low, high)?,
-            (None, None) => Coordinate::Fixed(0.0),
-        };
-    }
-    Ok(coordinates)
+    ]
+}
+
+/// Ranges of the parameters of a Bouc-Wen stage, up to gamma.
+fn bouc_wen_ranges(of: &Measures, fixed: &[Option<f64>; 9]) -> [(f64, f64); 8] {
+    let [mass, damping, stiffness, ..] = *fixed;
+    let scale = [mass, damping, stiffness, None, None, None, None, None, None];
+    let [mass, damping, stiffness] = mechanical_ranges(of, stiffness_range(of, &scale, 0.0));
+    let piezo = (of.gain / 3.0, of.gain * 3.0);
+    // The memory fades over the whole drive's range, or a twentieth of it; with another exponent
+    // than 1, at a hysteresis of a tenth of the stroke.
+    let exponent = fixed[7].unwrap_or(1.0);
+    let fade = of.gain / of.stroke * libm::pow(0.1 * of.stroke, 1.0 - exponent);
+    [
+        mass,
+        damping,
+        stiffness,
+        if of.inverted { (-piezo.1, -piezo.0) } else { piezo },
+        (0.02, 1.5),
+        (0.05 * fade, 20.0 * fade),
+        (-10.0 * fade, 10.0 * fade),
+        (exponent, exponent),
+    ]
 }
 
 /// Longest delay that is searched where no bounds are given, s.

@@ -13,15 +13,16 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::deviation::{Delayed, Sums};
+use super::model::{EXPONENT, Model};
 use super::problem::{Problem, Record, Theta};
 use super::stepping;
 use crate::integrate::{Stop, index};
 use crate::lanes::Lanes;
 use crate::march::{FEW_TERMS, March, Order, Stepping, TERMS};
 use crate::mechanics::{Mechanics, Propagator, halvings};
-use crate::stage::Coupling;
 use crate::stage::feedback::{FeedbackState, Smooth};
 use crate::stage::friction::{Friction, FrictionParameters};
+use crate::stage::{BoucWenKernel, Coupling, Kernel, MOST_PARAMETERS};
 
 /// Vectors that go through the step together, to hide each other's latency.
 const VECTORS: usize = 3;
@@ -103,9 +104,9 @@ impl<'a> Evaluator<'a> {
         guesses.par_chunks(size).flat_map_iter(|chunk| self.bundle(chunk, width, stop)).collect()
     }
 
-    /// Most vectors in a bundle: a step with friction fills the registers with one.
+    /// Most vectors in a bundle: a step with friction fills the registers with one, as do most.
     fn most(&self) -> usize {
-        if self.problem.has_friction() { 1 } else { VECTORS }
+        if self.problem.has_friction() || self.problem.model != Model::Dahl { 1 } else { VECTORS }
     }
 
     /// Costs of as many guesses as one bundle of lanes takes.
@@ -159,6 +160,12 @@ impl<const K: usize> WithSimd for Bundle<'_, K> {
         if self.of.problem.has_friction() {
             return self.with_friction(simd);
         }
+        // One vector at most, so that these steps are not compiled for several as well.
+        if K == 1 && self.of.problem.model == Model::BoucWen {
+            // Held, and so the same for all guesses.
+            let exponent = self.guesses.first().map_or(1.0, |guess| guess.theta[EXPONENT]);
+            return self.kernel(simd, &BoucWenKernel { exponent });
+        }
         match self.of.stepping.order {
             Order::Second => self.smooth::<S, FEW_TERMS, false>(simd),
             Order::Fourth => self.smooth::<S, TERMS, true>(simd),
@@ -192,7 +199,22 @@ impl<const K: usize> Bundle<'_, K> {
         };
         let zero = Lanes::splat(simd, 0.0);
         let start = FeedbackState { x: zero, w: zero, memory: operator.rest() };
-        self.march(simd, Smooth::<_, _, FOURTH> { linear, operator }, start)
+        let gain = self.lanes(simd, |theta| theta[3]);
+        self.march(Smooth::<_, _, FOURTH> { linear, operator }, start, gain)
+    }
+
+    /// Any model that is built from plain parameters.
+    #[inline(always)]
+    fn kernel<S: Simd>(self, simd: S, kernel: &impl Kernel<Lanes<S, K>>) -> Vec<Costs> {
+        let zero = Lanes::splat(simd, 0.0);
+        let mut parameters = [zero; MOST_PARAMETERS];
+        for (i, parameter) in parameters.iter_mut().enumerate() {
+            *parameter = self.lanes(simd, |theta| theta[i]);
+        }
+        let coupling = kernel.coupling(&parameters, self.of.step(), self.of.halvings);
+        let start = FeedbackState { x: zero, w: zero, memory: kernel.rest(&parameters) };
+        let gain = kernel.gain(&parameters);
+        self.march(coupling, start, gain)
     }
 
     #[inline(always)]
@@ -206,19 +228,20 @@ impl<const K: usize> Bundle<'_, K> {
         let coupling = Friction::new(parameters, self.of.step(), self.of.halvings);
         let zero = Lanes::splat(simd, 0.0);
         let start = coupling.start(zero, zero, DahlState { force: zero, slope: zero });
-        self.march(simd, coupling, start)
+        let gain = self.lanes(simd, |theta| theta[3]);
+        self.march(coupling, start, gain)
     }
 
     /// Leads the lanes along the drive and concludes.
     #[inline(always)]
     fn march<S: Simd, C: Coupling<Lanes<S, K>>>(
         self,
-        simd: S,
         coupling: C,
         start: FeedbackState<Lanes<S, K>, C::Memory>,
+        gain: Lanes<S, K>,
     ) -> Vec<Costs> {
         let (drive, substeps) = (&self.of.record.drive, self.of.stepping.substeps);
-        let march = March { coupling, gain: self.lanes(simd, |theta| theta[3]) };
+        let march = March { coupling, gain };
         let mut sums = Sums::new(&self, start.x);
         let ended = if self.of.problem.has_delay() {
             let mut late = Delayed::new(sums, index(substeps));

@@ -12,9 +12,8 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::cost::{Costs, Evaluator, Guess};
-use super::problem::{Coordinate, DELAY, Problem, Record, stage_of};
-use crate::integrate::{Stop, delayed, index, simulate_fixed};
-use crate::stage::StageState;
+use super::problem::{Coordinate, DELAY, Problem, Record};
+use crate::integrate::{Stop, delayed, index};
 
 /// Most samples that enter the Jacobian: more would hardly change what it says.
 const MOST_ROWS: usize = 200_000;
@@ -162,11 +161,9 @@ impl Local<'_> {
     /// Every stride-th sample of the window, simulated as the search does.
     fn displacement(&self, place: &[f64], stride: usize) -> Option<Vec<f64>> {
         let theta = self.problem.theta(place);
-        let stage = stage_of(&theta).ok()?;
         let (drive, stepping) = (&self.record.drive, self.evaluator.stepping);
-        let run = simulate_fixed(&stage, drive, StageState::default(), stepping, self.stop);
-        let run = run.ok().flatten()?;
-        let x = delayed(&run.x, &run.v, drive.dt, theta[DELAY]);
+        let [x, v] = self.problem.model.motion(&theta, drive, stepping, self.stop)?;
+        let x = delayed(&x, &v, drive.dt, theta[DELAY]);
         Some(x[self.record.window.clone()].iter().step_by(stride).copied().collect())
     }
 

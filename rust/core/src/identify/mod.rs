@@ -6,6 +6,7 @@ mod deviation;
 mod identification;
 mod line;
 mod local;
+mod model;
 mod nnls;
 mod plays;
 mod problem;
@@ -22,8 +23,9 @@ pub use identification::{Identification, identify};
 pub use local::{Local, Polished, Sensitivity};
 pub use nnls::{Rows, nnls};
 pub use plays::{DynamicsKind, PlaysFit, PlaysRecord, PlaysSettings, identify_plays};
+pub use model::{Facts, Model};
 pub use problem::{
-    Coordinate, DELAY, Delay, NOMINAL_STIFFNESS, Problem, Record, Scale, Spec, Theta, stage_of,
+    Coordinate, DELAY, Delay, NOMINAL_STIFFNESS, Problem, Record, Scale, Spec, Theta,
 };
 pub use search::{Monitor, Outcome, Plan, Progress, StopReason, search};
 pub use step::{Conventional, StepReadings, StepResponse, read_step, separate};

@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use super::bounds;
+use super::model::Model;
 use crate::error::{Error, Result, positive, shown};
 use crate::integrate::{Drive, Hold};
-use crate::stage::{DAHL_PARAMETERS, DahlStage};
 
 /// A drive and the displacement measured under it.
 #[derive(Clone, Debug)]
@@ -139,6 +139,8 @@ impl Coordinate {
 /// What the caller asked for.
 #[derive(Clone, Debug, Default)]
 pub struct Spec {
+    /// The kind of stage.
+    pub model: Model,
     /// Parameters to search; all that are not fixed where `None`.
     pub free: Option<Vec<String>>,
     /// Parameters held, SI.
@@ -197,20 +199,12 @@ impl Delay {
     }
 }
 
-/// Parameters in the order of [`DAHL_PARAMETERS`], and after them the delay, s.
+/// Parameters in the order of [`Model::facts`], 0 for those that the model does not have, and
+/// after them the delay, s.
 pub type Theta = [f64; 10];
 
 /// Index of the delay in [`Theta`].
 pub const DELAY: usize = 9;
-
-/// The stage of a guess.
-///
-/// # Errors
-/// As [`DahlStage::from_theta`].
-pub fn stage_of(theta: &Theta) -> Result<DahlStage> {
-    let [mass, damping, stiffness, piezo, a1, a2, b1, b0, up, _delay] = *theta;
-    DahlStage::from_theta(&[mass, damping, stiffness, piezo, a1, a2, b1, b0, up])
-}
 
 /// Stiffness held where nothing in the input fixes a force, N/m.
 pub const NOMINAL_STIFFNESS: f64 = 1e6;
@@ -218,7 +212,9 @@ pub const NOMINAL_STIFFNESS: f64 = 1e6;
 /// A search made definite.
 #[derive(Clone, Debug)]
 pub struct Problem {
-    /// One for each of [`DAHL_PARAMETERS`], and the delay.
+    /// The kind of stage.
+    pub model: Model,
+    /// One for each place in [`Theta`].
     pub coordinates: [Coordinate; 10],
     /// Whether the stiffness is nominal because nothing fixes a force.
     pub scale_assumed: bool,
@@ -227,8 +223,6 @@ pub struct Problem {
 }
 
 const STIFFNESS: usize = 2;
-/// The parameters that carry force: mass, damping, stiffness, `piezo_coefficient`, b1, b0.
-const FORCES: [usize; 6] = [0, 1, STIFFNESS, 3, 6, 7];
 
 impl Problem {
     /// Settles which parameters are free, and between which bounds.
@@ -240,7 +234,8 @@ impl Problem {
     pub fn new(record: &Record<'_>, spec: &Spec) -> Result<Self> {
         let mut fixed = fixed_values(spec)?;
         let free = free_parameters(spec, &mut fixed)?;
-        let holds_scale = FORCES.iter().any(|&i| fixed[i].is_some_and(|value| value != 0.0));
+        let holds_scale =
+            spec.model.facts().forces.iter().any(|&i| fixed[i].is_some_and(|value| value != 0.0));
         let mut scale_assumed = false;
         if !holds_scale {
             let asked =
@@ -256,12 +251,12 @@ impl Problem {
             fixed[STIFFNESS] = Some(NOMINAL_STIFFNESS);
             scale_assumed = true;
         }
-        check_fixed(&fixed)?;
+        check_fixed(spec.model, &fixed)?;
         let mut coordinates = [Coordinate::Fixed(0.0); 10];
-        coordinates[..DELAY].copy_from_slice(&bounds::derive(record, &fixed)?);
+        coordinates[..DELAY].copy_from_slice(&bounds::derive(record, spec.model, &fixed)?);
         coordinates[DELAY] = spec.delay.coordinate(record)?;
         for (name, (low, high)) in &spec.bounds {
-            let i = parameter("bounds", name)?;
+            let i = parameter(spec.model, "bounds", name)?;
             if !free[i] {
                 return Err(Error::parameter(
                     format!("bounds of {name}"),
@@ -276,10 +271,10 @@ impl Problem {
             return Err(Error::parameter(
                 "bounds of stiffness",
                 "given, while no parameter that carries force is held",
-                "stiffness= or one of mass, damping, piezo_coefficient, b1, b0 in fixed=",
+                "stiffness=, or a value other than 0 for another of them in fixed=",
             ));
         }
-        let problem = Self { coordinates, scale_assumed, offset: spec.offset };
+        let problem = Self { model: spec.model, coordinates, scale_assumed, offset: spec.offset };
         problem.check_corners()?;
         Ok(problem)
     }
@@ -303,7 +298,7 @@ impl Problem {
     /// Whether any guess has dry friction.
     #[must_use]
     pub fn has_friction(&self) -> bool {
-        self.coordinates[7] != Coordinate::Fixed(0.0)
+        self.model == Model::Dahl && self.coordinates[7] != Coordinate::Fixed(0.0)
     }
 
     /// Whether any guess is late.
@@ -319,18 +314,19 @@ impl Problem {
             return Err(Error::parameter("free", "empty", "at least one parameter to search"));
         }
         for corner in [0.0, 1.0] {
-            stage_of(&self.theta(&vec![corner; count]))?;
+            self.model.check(&self.theta(&vec![corner; count]))?;
         }
         Ok(())
     }
 }
 
-/// Values of `fixed=` and `stiffness=`, with the defaults of b0 and up.
+/// Values of `fixed=` and `stiffness=`, with the model's defaults.
 fn fixed_values(spec: &Spec) -> Result<[Option<f64>; 9]> {
+    let facts = spec.model.facts();
     let mut fixed: [Option<f64>; 9] = [None; 9];
     for (name, value) in &spec.fixed {
-        let i = parameter("fixed", name)?;
-        let unit = DAHL_PARAMETERS[i].unit;
+        let i = parameter(spec.model, "fixed", name)?;
+        let unit = facts.parameters[i].unit;
         fixed[i] = Some(crate::error::finite(&format!("fixed {name}"), *value, unit)?);
     }
     if let Some(stiffness) = spec.stiffness {
@@ -344,20 +340,26 @@ fn fixed_values(spec: &Spec) -> Result<[Option<f64>; 9]> {
         }
         fixed[STIFFNESS] = Some(stiffness);
     }
-    fixed[7] = fixed[7].or(Some(0.0));
-    fixed[8] = fixed[8].or(Some(30.0));
+    for &(i, value) in facts.defaults {
+        fixed[i] = fixed[i].or(Some(value));
+    }
+    for missing in &mut fixed[facts.parameters.len()..] {
+        *missing = Some(0.0);
+    }
     Ok(fixed)
 }
 
 /// Refuses held values with which no stage exists, by their own names.
-fn check_fixed(fixed: &[Option<f64>; 9]) -> Result<()> {
-    let mut theta = [1.0; 9];
-    theta[7] = 0.0;
+fn check_fixed(model: Model, fixed: &[Option<f64>; 9]) -> Result<()> {
+    let mut theta = [1.0; 10];
+    for &(i, value) in model.facts().defaults {
+        theta[i] = value;
+    }
     for (value, held) in theta.iter_mut().zip(fixed) {
         *value = held.unwrap_or(*value);
     }
-    DahlStage::from_theta(&theta)?;
-    if theta[8] == 0.0 {
+    model.check(&theta)?;
+    if model == Model::Dahl && theta[8] == 0.0 {
         return Err(Error::parameter("up", 0, "a value other than 0: without it no hysteresis"));
     }
     Ok(())
@@ -370,14 +372,14 @@ fn free_parameters(spec: &Spec, fixed: &mut [Option<f64>; 9]) -> Result<[bool; 9
     };
     let mut free = [false; 9];
     for name in names {
-        let i = parameter("free", name)?;
+        let i = parameter(spec.model, "free", name)?;
         if spec.fixed.iter().any(|(other, _)| other == name)
             || (i == STIFFNESS && fixed[i].is_some())
         {
             return Err(Error::parameter("free", name, "a parameter that is not fixed as well"));
         }
-        if name == "up" {
-            let reason = "up held: only the products b1 up and b0 up show in the data";
+        let (held, reason) = spec.model.facts().held;
+        if i == held {
             return Err(Error::parameter("free", name, reason));
         }
         free[i] = true;
@@ -386,7 +388,7 @@ fn free_parameters(spec: &Spec, fixed: &mut [Option<f64>; 9]) -> Result<[bool; 9
     for i in 0..9 {
         let scale = i == STIFFNESS;
         if !free[i] && fixed[i].is_none() && !scale {
-            let name = DAHL_PARAMETERS[i].name;
+            let name = spec.model.facts().parameters[i].name;
             return Err(Error::parameter(
                 "free",
                 names.join(", "),
@@ -398,9 +400,10 @@ fn free_parameters(spec: &Spec, fixed: &mut [Option<f64>; 9]) -> Result<[bool; 9
 }
 
 /// Index of a parameter by its name.
-fn parameter(argument: &str, name: &str) -> Result<usize> {
-    DAHL_PARAMETERS.iter().position(|info| info.name == name).ok_or_else(|| {
-        let names: Vec<&str> = DAHL_PARAMETERS.iter().map(|info| info.name).collect();
+fn parameter(model: Model, argument: &str, name: &str) -> Result<usize> {
+    let parameters = model.facts().parameters;
+    parameters.iter().position(|info| info.name == name).ok_or_else(|| {
+        let names: Vec<&str> = parameters.iter().map(|info| info.name).collect();
         Error::parameter(argument, format!("'{name}'"), format!("one of {}", names.join(", ")))
     })
 }

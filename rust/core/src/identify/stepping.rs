@@ -2,10 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::problem::{Problem, Record, Theta, range, stage_of};
-use crate::integrate::{Drive, Stop, steps_for};
+use super::model::Model;
+use super::problem::{Problem, Record, Theta, range};
+use crate::integrate::{Drive, Stop, first_substeps, steps_for};
 use crate::march::{Order, Stepping};
-use crate::stage::DahlStage;
+use crate::mechanics::Mechanics;
 
 /// Accuracy that a search asks of its simulations, m.
 const ACCURACY: f64 = 2e-10;
@@ -26,31 +27,53 @@ pub(super) fn choose(record: &Record<'_>, problem: &Problem, stop: Stop<'_>) -> 
     let excerpts = excerpts(&record.drive);
     let stroke = 2.0 * record.stroke();
     let thetas = corners(problem);
-    let trials: Vec<(DahlStage, Drive<'_>, usize)> = thetas
+    let trials: Vec<(&Theta, Drive<'_>, usize)> = thetas
         .par_iter()
-        .filter_map(|theta| stage_of(theta).ok())
-        .flat_map_iter(|stage| excerpts.iter().map(move |drive| (stage, *drive)))
-        .filter_map(|(stage, drive)| {
-            let (steps, x) = steps_for(&stage, &drive, Order::Fourth, ACCURACY, MOST, stop)?;
+        .flat_map_iter(|theta| excerpts.iter().map(move |drive| (theta, *drive)))
+        .filter_map(|(theta, drive)| {
+            let trial = Trial { model: problem.model, theta, drive: &drive, stop };
+            let (steps, x) = trial.steps(Order::Fourth, MOST)?;
             let (low, high) = range(&x);
-            (high - low <= stroke).then_some((stage, drive, steps))
+            (high - low <= stroke).then_some((theta, drive, steps))
         })
         .collect();
     let fourth = trials.iter().map(|trial| trial.2).max().unwrap_or(1);
-    if problem.has_friction() {
+    if problem.has_friction() || problem.model != Model::Dahl {
         return Stepping { order: Order::Fourth, substeps: fourth };
     }
     let most = WORTH * fourth;
     let second: Option<Vec<usize>> = trials
         .par_iter()
-        .map(|(stage, drive, _)| {
-            let found = steps_for(stage, drive, Order::Second, ACCURACY, most, stop)?;
+        .map(|&(theta, ref drive, _)| {
+            let trial = Trial { model: problem.model, theta, drive, stop };
+            let found = trial.steps(Order::Second, most)?;
             (found.0 <= most).then_some(found.0)
         })
         .collect();
     match second.map(|steps| steps.into_iter().max().unwrap_or(1)) {
         Some(substeps) => Stepping { order: Order::Second, substeps },
         None => Stepping { order: Order::Fourth, substeps: fourth },
+    }
+}
+
+/// A guess on a part of the drive.
+struct Trial<'a> {
+    model: Model,
+    theta: &'a Theta,
+    drive: &'a Drive<'a>,
+    stop: Stop<'a>,
+}
+
+impl Trial<'_> {
+    /// The sub-steps that make it accurate, and the displacement with them.
+    fn steps(&self, order: Order, most: usize) -> Option<(usize, Vec<f64>)> {
+        let &Self { model, theta, drive, stop } = self;
+        let [mass, damping, stiffness, ..] = *theta;
+        let first = first_substeps(&Mechanics { mass, damping, stiffness }, drive.dt);
+        steps_for(first, ACCURACY, most, |substeps| {
+            let [x, _] = model.motion(theta, drive, Stepping { order, substeps }, stop)?;
+            Some(x)
+        })
     }
 }
 

@@ -1,12 +1,15 @@
 //! Stages: one hysteresis operator coupled with linear mechanics.
 
+mod bouc_wen;
 mod dahl;
 pub mod feedback;
 pub mod friction;
+pub mod input;
 mod prandtl_ishlinskii;
 mod relaxation;
 mod virtual_stage;
 
+pub use bouc_wen::{BOUC_WEN_PARAMETERS, BoucWenKernel, BoucWenMotion, BoucWenStage};
 pub use dahl::{DAHL_PARAMETERS, DahlStage, StageState};
 pub use prandtl_ishlinskii::{
     FeedforwardState, MOST_PLAYS, MOST_ZONES, Plays, PlaysFeedforward, PlaysInverse, PlaysMotion,
@@ -30,6 +33,34 @@ pub trait Coupling<N> {
         drive: N,
         rise: N,
     ) -> feedback::FeedbackState<N, Self::Memory>;
+}
+
+/// Parameters of a model, SI, mass, damping and stiffness first; those it does not have are 0.
+pub type Parameters<N> = [N; MOST_PARAMETERS];
+
+/// Most parameters that a model has.
+pub const MOST_PARAMETERS: usize = 9;
+
+/// A model built from plain parameters, for one stage or for lanes of them.
+pub trait Kernel<N> {
+    /// Its step.
+    type Coupling: Coupling<N>;
+
+    /// What 1 V enters the step as.
+    fn gain(&self, parameters: &Parameters<N>) -> N;
+
+    /// The step for steps of `step` seconds.
+    fn coupling(&self, parameters: &Parameters<N>, step: f64, halvings: u32) -> Self::Coupling;
+
+    /// The memory before any motion.
+    fn rest(&self, parameters: &Parameters<N>) -> <Self::Coupling as Coupling<N>>::Memory;
+
+    /// Hysteresis force, N.
+    fn force(
+        &self,
+        parameters: &Parameters<N>,
+        memory: &<Self::Coupling as Coupling<N>>::Memory,
+    ) -> N;
 }
 
 /// Name, symbol and unit of one parameter of a stage.

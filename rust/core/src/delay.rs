@@ -1,0 +1,47 @@
+//! A displacement that is read late.
+
+use piezotrack_control::Number;
+
+/// Displacement that is late by `delay` seconds, between the samples on the cubic through
+/// displacements and velocities, m; before the first sample the stage is where it starts.
+#[must_use]
+pub fn delayed(x: &[f64], v: &[f64], dt: f64, delay: f64) -> Vec<f64> {
+    if delay == 0.0 {
+        return x.to_vec();
+    }
+    let Late { whole, part } = Late::new(delay, dt);
+    let at =
+        |k: Option<usize>| k.map_or((x.first().copied().unwrap_or(0.0), 0.0), |k| (x[k], v[k]));
+    let values = (0..x.len().min(v.len())).map(|k| {
+        let ((x0, v0), (x1, v1)) = (at(k.checked_sub(whole + 1)), at(k.checked_sub(whole)));
+        between(x0, v0 * dt, x1, v1 * dt, part)
+    });
+    values.collect()
+}
+
+/// A delay in samples.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Late {
+    /// Whole samples.
+    pub whole: usize,
+    /// Where between the sample before and that one the displacement is read off, 0 to 1.
+    pub part: f64,
+}
+
+impl Late {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 or above")]
+    pub(crate) fn new(delay: f64, dt: f64) -> Self {
+        let samples = (delay / dt).max(0.0);
+        let whole = libm::floor(samples);
+        Self { whole: whole as usize, part: 1.0 - (samples - whole) }
+    }
+}
+
+/// The cubic through values and scaled slopes at 0 and 1, at `s`.
+#[inline(always)]
+pub(crate) fn between<N: Number>(x0: N, w0: N, x1: N, w1: N, s: N) -> N {
+    let rise = x1 - x0;
+    let c3 = rise.mul_add(rise.like(-2.0), w0 + w1);
+    let c2 = rise - w0 - c3;
+    s.mul_add(s.mul_add(s.mul_add(c3, c2), w0), x0)
+}
