@@ -183,3 +183,8 @@ def test_a_missing_file_is_named() -> None:
     for text in ("missing.csv", "C:\\data\\missing.csv", "folder/missing.csv"):
         with pytest.raises(pt.DataError, match=re.escape("missing.csv: there is no such file")):
             pt.parse_reference(text)
+
+
+def test_three_dots_are_no_decimal_point() -> None:
+    with pytest.raises(pt.ParameterError, match="three dots"):
+        pt.parse_reference("sine:0.2Hz,0...110um")

@@ -148,7 +148,8 @@ def numbers(
     >>> numbers("levels", [0, 1e-5], "m")
     array([0.e+00, 1.e-05])
     """
-    entries = values if isinstance(values, (Sequence, np.ndarray)) else [values]
+    several = isinstance(values, Sequence) or (isinstance(values, np.ndarray) and values.ndim > 0)
+    entries: list[object] = list(values) if several else [values]  # type: ignore[arg-type]
     array = np.array([_core.as_number(name, value) for value in entries])
     if array.size < least:
         raise ParameterError(f"{name} has {array.size} entries: expected at least {least}")

@@ -39,6 +39,8 @@ class Command(NamedTuple):
         Whether it was clipped.
     measured_well : bool
         False where the measurement was not a number, and feedback and learning paused.
+    reference_well : bool
+        False where the reference or the feedforward was not a number; the last one is kept.
     """
 
     volts: float
@@ -49,6 +51,7 @@ class Command(NamedTuple):
     error: float
     saturated: bool
     measured_well: bool
+    reference_well: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,7 +168,9 @@ class Controller:
 
 
 def _limits(limits: object) -> tuple[float, float]:
-    pair = list(limits) if isinstance(limits, Sequence) and not isinstance(limits, str) else []
+    # An array counts as well.
+    listed = limits.tolist() if hasattr(limits, "tolist") else limits
+    pair = list(listed) if isinstance(listed, Sequence) and not isinstance(listed, str) else []
     if len(pair) != 2:
         raise ParameterError(f"limits are {limits!r}: expected (low, high) in V")
     low, high = (finite(f"limits[{i}]", value, "V") for i, value in enumerate(pair))
@@ -236,7 +241,16 @@ class Session:
         -------
         float
             Voltage within the limits [V].
+
+        Raises
+        ------
+        ParameterError
+            `reference` is a metre or more: it must be in another unit.
         """
+        if isinstance(reference, float) and 1.0 <= abs(reference) < math.inf:
+            raise ParameterError(
+                f"reference is {reference:g} m: expected metres, and no piezo stage goes so far"
+            )
         volts = 0.0 if feedforward is None else feedforward
         if feedforward is None and self._inverse is not None:
             volts = self._inverse.step(

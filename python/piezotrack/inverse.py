@@ -93,8 +93,8 @@ class Inverse:
         not_negative("delay", self.delay, "s")
         if self.playback not in ("table", "online"):
             raise ParameterError(f"playback is {self.playback!r}: expected 'table' or 'online'")
-        if _core.as_count("settle", self.settle) < 1:
-            raise ParameterError(f"settle is {self.settle}: expected 1 period or more")
+        if not 1 <= _core.as_count("settle", self.settle) <= 1000:
+            raise ParameterError(f"settle is {self.settle}: expected 1 period or more, up to 1000")
         if self.initial is not None and not (
             isinstance(self.initial, PlaysState) and isinstance(self.stage, PrandtlIshlinskiiStage)
         ):

@@ -11,9 +11,12 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
     from .loopcheck import LoopReport
     from .tracking import Tracking
+
+    Array = NDArray[np.float64]
 
 __all__ = [
     "plot_effort",
@@ -149,6 +152,28 @@ def plot_effort(run: Tracking, ax: Axes | None = None) -> Axes:
     return ax
 
 
+def plot_feedforward(t: Array, volts: Array, x: Array) -> Figure:
+    """Plot a voltage table over time and over the reference.
+
+    Parameters
+    ----------
+    t, volts, x : ndarray, shape (n,)
+        Time [s], voltage [V], reference [m].
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Two panels.
+    """
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.2), layout="constrained")
+    left.step(t, volts, where="post", color="C0", linewidth=1.1)
+    left.set(xlabel="time [s]", ylabel="feedforward [V]", title="Voltage over time")
+    left.margins(x=0)
+    right.plot(1e6 * x, volts, color="C0", linewidth=1.0)
+    right.set(xlabel="reference [um]", ylabel="feedforward [V]", title="Voltage over reference")
+    return figure
+
+
 def plot_loop_report(report: LoopReport) -> Figure:
     """Plot open loop, sensitivity and, with a repetitive part, what a period leaves of an error.
 
@@ -202,5 +227,6 @@ def plot_tracking(run: Tracking) -> Figure:
     plot_following(run, axes[0, 1])
     plot_error(run, axes[1, 0])
     plot_effort(run, axes[1, 1])
-    figure.suptitle(str(run.metrics))
+    since = f"from {run.settled:g} s on: " if run.settled else ""
+    figure.suptitle(f"{since}{run.metrics}")
     return figure

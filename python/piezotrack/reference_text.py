@@ -212,6 +212,8 @@ def _values(kind: _Kind, text: str) -> dict[str, Any]:
 
 def _item(text: str) -> tuple[list[float], str, str]:
     """Read one value or several: the numbers in SI, what they measure and how they are joined."""
+    if "..." in text:
+        raise ParameterError(f"{text!r} has three dots: expected two, as in 0..110um")
     join = next((mark for mark in ("..", "/") if mark in text), "")
     found = []
     for part in text.split(join) if join else [text]:

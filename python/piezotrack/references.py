@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .checks import finite, in_range, not_negative, plain, positive
+from .checks import check_reach, finite, in_range, not_negative, plain, positive
 from .dataset import _signal, check_dt
 from .errors import DataError, ParameterError
 from .motions import Spline, blended, extremes
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["Reference", "SampledReference", "read_reference"]
 
 MIN_SAMPLES = 6
+MOST_SAMPLES = 10**7
 # What a quotient of two decimal numbers may be off, in samples.
 ROUNDING = 1e-3
 
@@ -218,7 +219,12 @@ class Reference:
                 f"dt is {interval:g} s: expected at most {0.5 * self.shortest:g} s, two samples "
                 f"in the shortest period of the reference ({self.name}), {self.shortest:g} s"
             )
-        count = math.ceil(self.duration / interval - ROUNDING)
+        count = math.ceil(min(self.duration / interval, 2.0 * MOST_SAMPLES) - ROUNDING)
+        if count > MOST_SAMPLES:
+            raise ParameterError(
+                f"dt is {interval:g} s: expected at most {MOST_SAMPLES} samples in the reference's "
+                f"{self.duration:g} s"
+            )
         if count < 2:
             raise ParameterError(
                 f"dt is {interval:g} s: expected less than the reference's {self.duration:g} s"
@@ -316,6 +322,7 @@ class Reference:
             )
         motion = Spline(values, dt, cyclic)
         low, high = extremes(motion, min(length, record), 8.0 * dt)
+        check_reach(low, high)
         return cls(
             name=name,
             duration=length,

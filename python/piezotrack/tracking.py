@@ -296,9 +296,10 @@ def track(
     delay = not_negative("delay", delay, "s") + late
     substeps = _core.as_count("substeps", substeps)
     samples = reference.sample(controller.dt)
-    if not unstable:
+    _check_period(controller, reference)
+    if not _core.as_truth("unstable", unstable):
         _check_stable(stage, controller, delay)
-    if not beyond_reach:
+    if not _core.as_truth("beyond_reach", beyond_reach):
         _check_reach(stage, controller, samples, offset)
     if controller.feedforward is None:
         volts, note = np.zeros(len(samples)), "no feedforward"
@@ -330,6 +331,23 @@ def track(
         fine_voltage=fine_voltage,
         note=note,
     )
+
+
+def _check_period(controller: Controller, reference: Reference) -> None:
+    """Refuse a repetitive part that learns another period than that of the reference."""
+    if controller.addon is None:
+        return
+    if reference.period is None:
+        raise ParameterError(
+            f"reference ({reference.name}) does not repeat: expected one that does, for the "
+            "repetitive part"
+        )
+    turns = controller.addon.period / reference.period
+    if abs(turns - max(1, round(turns))) > 1e-6 * turns:
+        raise ParameterError(
+            f"addon has a period of {controller.addon.period:g} s: expected that of the "
+            f"reference ({reference.name}), {reference.period:g} s, or a multiple"
+        )
 
 
 def _check_stable(stage: VirtualStage | DahlStage, controller: Controller, delay: float) -> None:

@@ -14,6 +14,9 @@ from .options import Out, can_be_folder, list_files, number_range
 from .words import in_words
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ..control import Controller
     from ..modelfile import IdentifiedModel
     from ..references import Reference
@@ -97,6 +100,8 @@ def track_command(
     written = _write(run, known, loop, out)
     print(f"the {stage} stage" if stage == "virtual" else "the model itself", end=", ")
     print(run.summary())
+    if feedforward:
+        _note_range(known, run.voltage)
     if loop.feedback is not None or loop.addon is not None:
         print(f"loop at {loop.check(led, delay=delay).middle}")
     list_files(written)
@@ -117,7 +122,7 @@ def feedforward_command(
     """Write the voltage table that leads a stage along a reference."""
     from ..files import write_columns
     from ..modelfile import load
-    from ..plotting import plot_response
+    from ..plotting_tracking import plot_feedforward
     from ..report import make_folder, save_figures
 
     known = load(model)
@@ -129,14 +134,19 @@ def feedforward_command(
     folder = make_folder(out)
     table = {"time_s": samples.t, "voltage_V": volts, "displacement_um": 1e6 * samples.x}
     written = [write_columns(folder / "feedforward.csv", table)]
-    written += save_figures({"feedforward": plot_response(samples.t, volts, samples.x)}, folder)
+    written += save_figures({"feedforward": plot_feedforward(samples.t, volts, samples.x)}, folder)
     print(f"{course!r} at {1.0 / interval:g} Hz; {how}")
     print(f"{volts.size} samples, voltage from {volts.min():.4g} to {volts.max():.4g} V")
+    _note_range(known, volts)
+    list_files(written)
+
+
+def _note_range(known: IdentifiedModel, volts: NDArray[np.float64]) -> None:
+    """Say where a model is used outside of the voltages that it was fitted at."""
     if fitted := known.drive_range:
         margin = 0.01 * (fitted[1] - fitted[0])
         if volts.min() < fitted[0] - margin or volts.max() > fitted[1] + margin:
             print(f"note  the model was fitted from {fitted[0]:.4g} to {fitted[1]:.4g} V only")
-    list_files(written)
 
 
 def _reference(text: str, duration: float | None, period: float | None) -> Reference:

@@ -123,8 +123,9 @@ struct PySession {
     state: ControllerState<LawState, Vec<f64>>,
 }
 
-/// volts, unclipped, feedforward, feedback, repetitive, error, saturated, measured well.
-type CommandParts = (f64, f64, f64, f64, f64, f64, bool, bool);
+/// volts, unclipped, feedforward, feedback, repetitive, error, saturated, measured well, reference
+/// well.
+type CommandParts = (f64, f64, f64, f64, f64, f64, bool, bool, bool);
 
 #[pymethods]
 impl PySession {
@@ -142,9 +143,10 @@ impl PySession {
             error,
             saturated,
             measurement_ok,
-            ..
+            reference_ok,
         } = *self.state.last();
-        (volts, unclipped, feedforward, feedback, repetitive, error, saturated, measurement_ok)
+        let well = (measurement_ok, reference_ok);
+        (volts, unclipped, feedforward, feedback, repetitive, error, saturated, well.0, well.1)
     }
 
     fn applied(&mut self, volts: f64) -> PyResult<()> {

@@ -21,9 +21,9 @@ mod turns;
 pub use cost::{Costs, Evaluator, Guess};
 pub use identification::{Identification, identify};
 pub use local::{Local, Polished, Sensitivity};
+pub use model::{Facts, Model};
 pub use nnls::{Rows, nnls};
 pub use plays::{DynamicsKind, PlaysFit, PlaysRecord, PlaysSettings, identify_plays};
-pub use model::{Facts, Model};
 pub use problem::{
     Coordinate, DELAY, Delay, NOMINAL_STIFFNESS, Problem, Record, Scale, Spec, Theta,
 };
