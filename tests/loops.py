@@ -19,7 +19,7 @@ WINDING = replace(PID, tt=float("inf"))
 
 @cache
 def record() -> pt.Dataset:
-    """0.25 Hz, 0 to 75 V, 12 s at 5 kHz: SPEC section 4."""
+    """0.25 Hz, 0 to 75 V, 12 s at 5 kHz, as in section 3.3 of the paper."""
     return STAGE.record(slow_sine(np.arange(60000) / 5000.0), 1 / 5000.0)
 
 

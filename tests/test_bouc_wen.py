@@ -80,7 +80,7 @@ def reference(stage: pt.BoucWenStage, u: Array, dt: float, hold: str = "foh") ->
 
 
 @pytest.mark.parametrize(("stage", "reached"), [(PUBLISHED, 99.7), (CORRECTED, 120.06)])
-def test_published_parameters_reach_what_the_specification_computed(
+def test_published_parameters_reach_what_they_were_computed_to(
     stage: pt.BoucWenStage, reached: float
 ) -> None:
     u = sine(60001, 2e-4, 0.25)

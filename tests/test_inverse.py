@@ -153,7 +153,7 @@ def test_the_table_is_the_settled_period(settle: int) -> None:
 
 
 def test_the_printed_model_drifts_and_its_table_does_not() -> None:
-    """SPEC section 2: V* attracts the hysteresis along the path, so periods never repeat."""
+    """V* attracts the hysteresis along the path, so periods never repeat."""
     reference = dataclasses.replace(REFERENCES["sine"](), duration=40.0)
     table, how = TABLE_1.inverse().played(reference, LOOP)
     online, other = dataclasses.replace(TABLE_1.inverse(), playback="online").played(

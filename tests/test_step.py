@@ -95,7 +95,7 @@ def test_the_published_readings_give_the_published_values() -> None:
 
 def test_the_published_readings_are_at_hand() -> None:
     assert pt.StepReadings.xu_li_2010() == pt.StepReadings.from_um(**TYPED)
-    # SPEC: zeta by the decrement 0.056, the first overshoot 63 %.
+    # Of the published peaks: zeta by the decrement 0.056, the first overshoot 63 %.
     step = pt.identify_step(pt.StepReadings.xu_li_2010())
     assert step.damping_by_decrement == pytest.approx(0.056, abs=5e-4)
     assert step.overshoot_ratio == pytest.approx(0.635, abs=5e-4)
@@ -107,7 +107,7 @@ def test_the_published_readings_are_at_hand() -> None:
 def test_one_step_tells_ratios_only() -> None:
     step = pt.identify_step(pt.StepReadings.xu_li_2010())
     assert step.ratios["T/K"] == pytest.approx(117.7622e-6 / 75.0)
-    # SPEC, section 3: at M = 0.1828 kg, D is about 24 N s/m and K about 1.85e5 N/m.
+    # At M = 0.1828 kg, D is about 24 N s/m and K about 1.85e5 N/m.
     assert 0.1828 * step.ratios["K/M"] == pytest.approx(1.85e5, rel=2e-3)
     assert 0.1828 * step.ratios["D/M"] == pytest.approx(24.0, rel=2e-3)
     assert (step.stiffness, step.mass, step.damping, step.piezo_coefficient) == (None,) * 4

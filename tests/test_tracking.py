@@ -437,7 +437,7 @@ def test_an_unstable_loop_is_refused_with_the_numbers() -> None:
     assert pt.track(stage, loop, slow, unstable=True).metrics.max_error > 10e-6
 
 
-def test_margins_are_those_of_the_specification() -> None:
+def test_margins_are_those_computed_apart() -> None:
     # The published limit of 2.34 um/V and so on is for other modes; ours has 160 Hz and 225 Hz
     # of amplifier, between 1.81 (none) and 1.98 um/V (1 ms).
     loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())

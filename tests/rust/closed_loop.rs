@@ -105,7 +105,7 @@ fn ringing(gain: f64, frequency: f64, lag: f64) -> f64 {
 
 #[test]
 fn the_sampled_loop_is_stable_up_to_the_gains_known_without_hysteresis() {
-    // SPEC section 7: overall gain in um/V by frequency and amplifier lag. Its sample of delay is
+    // Limits computed apart: overall gain in um/V by frequency and amplifier lag. Its sample of delay is
     // that of the hold: a command acts at once, and shows in the next reading.
     for (limit, frequency, lag) in [
         (2.34, 150.0, 0.0),

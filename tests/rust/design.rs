@@ -43,7 +43,7 @@ fn table_1() -> LoopPlant {
 
 #[test]
 fn limits_of_the_published_gains() {
-    // The specification's numbers are the first of a search in steps of 0.01, and so above.
+    // The expected numbers are the first of a search in steps of 0.01, and so above.
     let check = |plant: &LoopPlant, published: f64| {
         let found = limit(plant, None);
         println!("limit {found:.4} um/V, published {published}");
