@@ -8,6 +8,8 @@
 
 use super::line::least;
 use super::nnls::Rows;
+use super::problem::range;
+use super::turns::turns;
 use crate::error::{Error, Result};
 use crate::integrate::{Drive, Hold, Stop, index};
 use crate::stage::{
@@ -125,7 +127,7 @@ fn check(record: &PlaysRecord<'_>, settings: &PlaysSettings) -> Result<()> {
             "the displacement stays at {least:e} m: is the sensor alive?"
         )));
     }
-    if turns(drive.u, 0.01 * (high - low)) == 0 {
+    if turns(drive.u, 0.01 * (high - low)).is_empty() {
         return Err(Error::Data(
             "the drive never reverses: hysteresis shows where it does, so record a full cycle"
                 .into(),
@@ -140,30 +142,6 @@ fn check(record: &PlaysRecord<'_>, settings: &PlaysSettings) -> Result<()> {
         ));
     }
     Ok(())
-}
-
-fn range(values: &[f64]) -> (f64, f64) {
-    let fold = |(low, high): (f64, f64), &value: &f64| (low.min(value), high.max(value));
-    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), fold)
-}
-
-/// Reversals of a drive by more than `least`.
-fn turns(u: &[f64], least: f64) -> usize {
-    let (mut low, mut high) = (u[0], u[0]);
-    let (mut direction, mut count) = (0, 0);
-    for &volts in u {
-        (low, high) = (low.min(volts), high.max(volts));
-        let next = if volts - low > least && direction <= 0 {
-            1
-        } else if high - volts > least && direction >= 0 {
-            -1
-        } else {
-            continue;
-        };
-        count += usize::from(direction != 0);
-        (direction, low, high) = (next, volts, volts);
-    }
-    count
 }
 
 /// Creep and dynamics behind one signal of a record.
