@@ -4,7 +4,7 @@ use pulp::{Simd, WithSimd};
 
 use crate::error::{Error, Result, positive};
 use crate::integrate::{
-    Drive, MOST_SUBSTEPS, Stop, first_substeps, index, largest_difference, out_of_reach,
+    Drive, MOST_SUBSTEPS, Stop, all_finite, first_substeps, index, largest_difference, out_of_reach,
 };
 use crate::march::{March, Sink};
 use crate::mechanics::{Mechanics, halvings};
@@ -80,14 +80,8 @@ impl<K: Kernel<f64> + Copy> Alone<'_, K> {
         }
         let run = Run { of: *self, drive, start, substeps, stop };
         let Some(motion) = pulp::Arch::new().dispatch(run) else { return Ok(None) };
-        match motion.x.iter().position(|x| !x.is_finite()) {
-            None => Ok(Some(motion)),
-            Some(k) => Err(Error::Numerical(format!(
-                "the simulated displacement is not finite from sample {k} on ({:.6} s): check \
-                 that parameters and drive are in SI units",
-                drive.dt * index(k)
-            ))),
-        }
+        all_finite(&motion.x, drive.dt)?;
+        Ok(Some(motion))
     }
 
     /// Simulates so that twice the sub-steps moved no sample by more than `accuracy`, m, and

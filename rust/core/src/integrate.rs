@@ -266,14 +266,18 @@ fn stepped(single: Single<'_>) -> Result<Option<Trajectory>> {
     let dt = single.drive.dt;
     let trajectory = pulp::Arch::new().dispatch(single);
     let Some(trajectory) = trajectory else { return Ok(None) };
-    match trajectory.x.iter().position(|x| !x.is_finite()) {
-        None => Ok(Some(trajectory)),
-        Some(k) => Err(Error::Numerical(format!(
-            "the simulated displacement is not finite from sample {k} on ({:.6} s): check that \
-             parameters and drive are in SI units",
-            dt * index(k)
-        ))),
-    }
+    all_finite(&trajectory.x, dt)?;
+    Ok(Some(trajectory))
+}
+
+/// Refuses a motion that does not stay finite.
+pub(crate) fn all_finite(x: &[f64], dt: f64) -> Result<()> {
+    let Some(k) = x.iter().position(|x| !x.is_finite()) else { return Ok(()) };
+    Err(Error::Numerical(format!(
+        "the simulated displacement is not finite from sample {k} on ({:.6} s): check that \
+         parameters and drive are in SI units",
+        dt * index(k)
+    )))
 }
 
 /// One stage, all its samples kept.
