@@ -17,8 +17,7 @@ pub use prandtl_ishlinskii::{
 };
 pub use relaxation::{Dynamics, MOST_RELAXATIONS, Relaxation, RelaxationFlow, RelaxationState};
 pub use virtual_stage::{
-    Creep, DEAD_ZONES, PLAYS, RELAXATIONS, StagePlay, VirtualFlow, VirtualSettings, VirtualStage,
-    VirtualState,
+    Creep, DEAD_ZONES, PLAYS, RELAXATIONS, StagePlay, VirtualSettings, VirtualStage, VirtualState,
 };
 
 /// A hysteresis coupled with linear mechanics, as one step in time sees it.

@@ -173,7 +173,7 @@ impl Relaxation {
     #[must_use]
     pub fn target(&self, state: &RelaxationState) -> f64 {
         let crept = self.creep.iter().zip(&state.creep).take(self.count);
-        state.input + crept.map(|(creep, reached)| creep.share * reached).sum::<f64>()
+        crept.fold(state.input, |sum, (creep, reached)| sum + creep.share * reached)
     }
 
     /// What comes in jumps to `input`, m.
@@ -185,7 +185,7 @@ impl Relaxation {
     }
 
     /// One step in which what comes in goes straight to `input`, m.
-    #[inline]
+    #[inline(always)]
     pub fn step(&self, flow: &RelaxationFlow, state: &mut RelaxationState, input: f64) {
         let before = self.target(state);
         let rise = input - state.input;
@@ -209,11 +209,11 @@ impl Relaxation {
                 };
                 let (force, ramp) = (stiffness * before, stiffness * (target - before));
                 let (x, w) = (state.x, state.v * flow.step);
-                state.x =
-                    p.position.x * x + p.velocity.x * w + p.constant.x * force + p.ramp.x * ramp;
-                state.v =
-                    (p.position.w * x + p.velocity.w * w + p.constant.w * force + p.ramp.w * ramp)
-                        / flow.step;
+                let end = |position: f64, velocity: f64, constant: f64, slope: f64| {
+                    position.mul_add(x, velocity.mul_add(w, constant.mul_add(force, slope * ramp)))
+                };
+                state.x = end(p.position.x, p.velocity.x, p.constant.x, p.ramp.x);
+                state.v = end(p.position.w, p.velocity.w, p.constant.w, p.ramp.w) / flow.step;
             }
         }
     }

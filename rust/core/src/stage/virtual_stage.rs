@@ -13,9 +13,9 @@
 
 use piezotrack_control::operator::{Operator, Play, PlayState};
 
+use super::relaxation::{Dynamics, MOST_RELAXATIONS, Relaxation, RelaxationFlow, RelaxationState};
 use crate::error::{Error, Result, finite, not_negative, positive};
 use crate::integrate::{Drive, Stop};
-use crate::mechanics::{Mechanics, Propagator, halvings};
 use crate::simulate::{Amplifier, Apparatus, ApparatusState, OpenLoop, Plant, Sensor, open_loop};
 
 /// Plays of a virtual stage; those with weight 0 do nothing.
@@ -85,7 +85,8 @@ pub struct VirtualSettings {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VirtualStage {
     settings: VirtualSettings,
-    mechanics: Mechanics,
+    /// Creep and mode.
+    relaxation: Relaxation,
 }
 
 /// Memory of a virtual stage.
@@ -93,25 +94,8 @@ pub struct VirtualStage {
 pub struct VirtualState {
     /// Plays.
     pub play: PlayState<f64, PLAYS>,
-    /// Voltage out of the hysteresis, y, V.
-    pub hysteresis: f64,
-    /// What each relaxation of the creep has reached, q, m.
-    pub creep: [f64; RELAXATIONS],
-    /// Displacement that the mode is drawn to, d, m.
-    pub target: f64,
-    /// Displacement, m.
-    pub x: f64,
-    /// Velocity, m/s.
-    pub v: f64,
-}
-
-/// Steps of a virtual stage.
-#[derive(Clone, Copy, Debug)]
-pub struct VirtualFlow {
-    linear: Propagator<f64>,
-    step: f64,
-    /// exp(-step / tau) of each relaxation, and tau / step.
-    creep: [(f64, f64); RELAXATIONS],
+    /// Creep and mode, with the displacement.
+    pub relaxation: RelaxationState,
 }
 
 /// Cycles of the preconditioning: after 32 s a creep of 10 s has settled to 4 %.
@@ -285,14 +269,12 @@ impl VirtualStage {
     }
 
     fn built(settings: &VirtualSettings) -> Self {
-        // Mass 1: only ratios matter, and the force is wn^2 d.
-        let natural = core::f64::consts::TAU * settings.frequency;
-        let mechanics = Mechanics {
-            mass: 1.0,
-            damping: 2.0 * settings.damping_ratio * natural,
-            stiffness: natural * natural,
-        };
-        Self { settings: *settings, mechanics }
+        let VirtualSettings { frequency, damping_ratio, .. } = *settings;
+        let mut creep = [Creep { share: 0.0, time: 1.0 }; MOST_RELAXATIONS];
+        creep[..RELAXATIONS].copy_from_slice(&settings.creep);
+        let dynamics = Dynamics::Second { frequency, damping_ratio };
+        let relaxation = Relaxation { creep, count: RELAXATIONS, dynamics };
+        Self { settings: *settings, relaxation }
     }
 
     /// The settings.
@@ -330,7 +312,7 @@ impl VirtualStage {
         if self.settings.preconditioned {
             self.cycle(&mut state.plant);
             self.wait(&mut state.plant);
-            apparatus.sensor.set_zero(&mut state.sensor, state.plant.x);
+            apparatus.sensor.set_zero(&mut state.sensor, state.plant.relaxation.x);
         }
         state
     }
@@ -375,70 +357,30 @@ impl VirtualStage {
 
 impl Plant for VirtualStage {
     type State = VirtualState;
-    type Flow = VirtualFlow;
+    type Flow = RelaxationFlow;
 
     fn rest(&self) -> VirtualState {
-        let play = self.settings.play.rest();
-        let creep = [0.0; RELAXATIONS];
-        VirtualState { play, hysteresis: 0.0, creep, target: 0.0, x: 0.0, v: 0.0 }
+        let relaxation = RelaxationState::default();
+        VirtualState { play: self.settings.play.rest(), relaxation }
     }
 
-    fn flow(&self, step: f64) -> VirtualFlow {
-        let m = &self.mechanics;
-        VirtualFlow {
-            linear: Propagator::new(
-                1.0,
-                m.damping,
-                m.stiffness,
-                step,
-                halvings(m.rate().max(m.damping), step),
-            ),
-            step,
-            creep: self
-                .settings
-                .creep
-                .map(|creep| (libm::exp(-step / creep.time), creep.time / step)),
-        }
+    fn flow(&self, step: f64) -> RelaxationFlow {
+        self.relaxation.flow(step)
     }
 
     #[inline(always)]
-    fn advance(&self, flow: &VirtualFlow, state: &mut VirtualState, from: f64, to: f64) {
-        let Self { settings, mechanics } = self;
-        let gain = settings.gain;
+    fn advance(&self, flow: &RelaxationFlow, state: &mut VirtualState, from: f64, to: f64) {
+        let Self { settings: VirtualSettings { play, gain, .. }, relaxation } = self;
         if (from - state.play.input).abs() > 0.0 {
             // The voltage has jumped, and with it the immediate part of the displacement.
-            let jumped = settings.play.follow(&mut state.play, from);
-            state.target += gain * (jumped - state.hysteresis);
-            state.hysteresis = jumped;
+            relaxation.jump(&mut state.relaxation, gain * play.follow(&mut state.play, from));
         }
-        let before = state.hysteresis;
-        state.hysteresis = settings.play.follow(&mut state.play, to);
-        let now = gain * state.hysteresis;
-        let rise = gain * (state.hysteresis - before);
-        let mut target = now;
-        for ((reached, creep), (decay, lag)) in
-            state.creep.iter_mut().zip(&settings.creep).zip(&flow.creep)
-        {
-            // Behind a ramp it settles to trail; the rest of the gap decays.
-            let trail = rise * lag;
-            let gap = (now - rise - *reached - trail) * decay + trail;
-            *reached = now - gap;
-            target += creep.share * *reached;
-        }
-        let force = mechanics.stiffness * state.target;
-        let ramp = mechanics.stiffness * (target - state.target);
-        let (x, w) = (state.x, state.v * flow.step);
-        let p = &flow.linear;
-        let end = |position: f64, velocity: f64, constant: f64, slope: f64| {
-            position.mul_add(x, velocity.mul_add(w, constant.mul_add(force, slope * ramp)))
-        };
-        state.x = end(p.position.x, p.velocity.x, p.constant.x, p.ramp.x);
-        state.v = end(p.position.w, p.velocity.w, p.constant.w, p.ramp.w) / flow.step;
-        state.target = target;
+        let input = gain * play.follow(&mut state.play, to);
+        relaxation.step(flow, &mut state.relaxation, input);
     }
 
     #[inline(always)]
     fn displacement(&self, state: &VirtualState) -> f64 {
-        state.x
+        state.relaxation.x
     }
 }
