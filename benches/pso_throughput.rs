@@ -4,45 +4,19 @@
 //! Everything that a ratio is made of runs here, in one process.
 #![allow(missing_docs, clippy::unwrap_used)]
 
+mod paper;
+
 use std::hint::black_box;
 
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
-use piezotrack_core::identify::{Evaluator, Guess, Plan, Problem, Progress, Record, Spec};
+use paper::{Peak, RATE, SAMPLES, Width, drive, guesses, paper_spec};
+use piezotrack_core::identify::{Evaluator, Guess, Plan, Problem, Progress, Record};
 use piezotrack_core::identify::{SwarmSettings, search};
 use piezotrack_core::integrate::{Drive, Hold, Method, NEVER, simulate};
 use piezotrack_core::march::{Order, Stepping};
 use piezotrack_core::stage::{DahlStage, StageState};
-use pulp::{Arch, Simd, WithSimd};
-
-const RATE: f64 = 5000.0;
-const SAMPLES: u32 = 20_001;
-
-fn drive() -> Vec<f64> {
-    let turn = core::f64::consts::TAU * 0.25 / RATE;
-    (0..SAMPLES).map(|k| 37.5 * (1.0 - (turn * f64::from(k)).cos())).collect()
-}
-
-fn paper_spec() -> Spec {
-    let named = |pairs: &[(&str, f64)]| pairs.iter().map(|&(n, v)| (n.into(), v)).collect();
-    Spec {
-        fixed: named(&[("a1", 121.9874), ("a2", 1.1773e6), ("b1", 1.8485e6)]),
-        bounds: vec![
-            ("mass".into(), (0.1, 0.2)),
-            ("damping".into(), (1e3, 5e3)),
-            ("stiffness".into(), (1e4, 5e4)),
-            ("piezo_coefficient".into(), (0.01, 0.1)),
-        ],
-        ..Spec::default()
-    }
-}
-
-fn guesses(problem: &Problem, particles: u32) -> Vec<Guess> {
-    (0..particles)
-        .map(|i| problem.theta(&[f64::from(i) / f64::from(particles); 4]))
-        .map(|theta| Guess { theta, limit: f64::INFINITY })
-        .collect()
-}
+use pulp::Arch;
 
 fn instruction_sets() -> Vec<(&'static str, Arch)> {
     let mut sets = vec![("scalar", Arch::Scalar)];
@@ -122,45 +96,6 @@ fn throughput(criterion: &mut Criterion) {
         });
     }
     group.finish();
-}
-
-/// Independent chains of multiply-adds: what the core can do at most.
-struct Peak(f64);
-
-impl Peak {
-    const CHAINS: usize = 12;
-    const ROUNDS: u64 = 10_000;
-    const COUNT: u64 = Self::ROUNDS * 12;
-}
-
-impl WithSimd for Peak {
-    type Output = f64;
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> f64 {
-        let (factor, term) = (simd.splat_f64s(self.0), simd.splat_f64s(1.0));
-        let mut chains = [simd.splat_f64s(0.0); Self::CHAINS];
-        for _ in 0..Self::ROUNDS {
-            for chain in &mut chains {
-                *chain = simd.mul_add_f64s(*chain, factor, term);
-            }
-        }
-        let mut sum = simd.splat_f64s(0.0);
-        for chain in chains {
-            sum = simd.add_f64s(sum, chain);
-        }
-        simd.reduce_sum_f64s(sum)
-    }
-}
-
-/// Lanes of an instruction set.
-struct Width;
-
-impl WithSimd for Width {
-    type Output = u64;
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) -> u64 {
-        S::F64_LANES as u64
-    }
 }
 
 /// RK4 on x, x', q1, q2 as one would write it, with the four steps that the box needs.
