@@ -26,13 +26,16 @@ if TYPE_CHECKING:
     from .control import Command, Controller, Session
     from .dataset import Dataset
     from .estimates import Estimate, Progress, Run
+    from .first_order_dahl import FirstOrderDahlStage
     from .identification import Identification, identify
     from .inverse import Inverse, InverseSession
     from .io import read, read_drive
+    from .kinked import FeedbackState
     from .laws import LowPass, Notch, Pid, Repetitive, StateSpace
     from .loopcheck import LoopCheck, LoopReport, LoopResponse, check_loop
     from .modelfile import IdentifiedModel, Score, load
     from .models import DahlStage, Response, StageState
+    from .oscillator import BoucWenOscillator
     from .plays import PlaysResponse, PlaysState, PrandtlIshlinskiiStage
     from .playsfile import IdentifiedPlays, load_plays
     from .playsfit import PlaysIdentification, identify_plays
@@ -46,6 +49,7 @@ if TYPE_CHECKING:
     from .waveforms import chirp, multisine, sine, staircase, triangle
 
 __all__ = [
+    "BoucWenOscillator",
     "BoucWenStage",
     "BoucWenState",
     "Command",
@@ -54,6 +58,8 @@ __all__ = [
     "DataError",
     "Dataset",
     "Estimate",
+    "FeedbackState",
+    "FirstOrderDahlStage",
     "Identification",
     "IdentifiedModel",
     "IdentifiedPlays",
@@ -117,6 +123,9 @@ _HOMES = {
         "BoucWenStage",
         "BoucWenState",
     ),
+    "first_order_dahl": ("FirstOrderDahlStage",),
+    "kinked": ("FeedbackState",),
+    "oscillator": ("BoucWenOscillator",),
     "playsfit": (
         "PlaysIdentification",
         "identify_plays",

@@ -5,8 +5,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "BOUC_WEN_OSCILLATOR_PARAMETERS",
     "BOUC_WEN_PARAMETERS",
     "DAHL_PARAMETERS",
+    "FIRST_ORDER_DAHL_PARAMETERS",
     "Controller",
     "Conventional",
     "InverseSession",
@@ -26,6 +28,7 @@ __all__ = [
     "as_count",
     "as_number",
     "as_truth",
+    "bouc_wen_benchmark",
     "bouc_wen_check",
     "bouc_wen_simulate",
     "bouc_wen_xu_li_2010",
@@ -38,18 +41,22 @@ __all__ = [
     "feedforward",
     "identify",
     "identify_plays",
+    "kinked_simulate",
     "loop_response",
     "nnls",
     "period_metrics",
     "read_step",
+    "stage_check",
     "track_dahl",
     "tracking_metrics",
     "turns",
 ]
 
 __version__: str
+BOUC_WEN_OSCILLATOR_PARAMETERS: list[tuple[str, str, str]]
 BOUC_WEN_PARAMETERS: list[tuple[str, str, str]]
 DAHL_PARAMETERS: list[tuple[str, str, str]]
+FIRST_ORDER_DAHL_PARAMETERS: list[tuple[str, str, str]]
 
 def as_number(name: str, value: object) -> float: ...
 def as_count(name: str, value: object) -> int: ...
@@ -167,6 +174,17 @@ class Search:
 def bouc_wen_check(theta: tuple[float, ...]) -> None: ...
 def bouc_wen_xu_li_2010(corrected: bool) -> list[float]: ...
 def bouc_wen_simulate(
+    theta: tuple[float, ...],
+    u: ArrayLike,
+    dt: float,
+    hold: str,
+    initial: tuple[float, ...],
+    accuracy: float,
+) -> Trajectory: ...
+def stage_check(model: str, theta: tuple[float, ...]) -> None: ...
+def bouc_wen_benchmark() -> list[float]: ...
+def kinked_simulate(
+    model: str,
     theta: tuple[float, ...],
     u: ArrayLike,
     dt: float,

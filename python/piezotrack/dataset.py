@@ -264,9 +264,7 @@ class Dataset:
         """
         from .resample import low_passed
 
-        if isinstance(factor, bool) or not isinstance(factor, Integral) or factor < 2:
-            raise ParameterError(f"factor is {factor!r}: expected a whole number, 2 or more")
-        factor = int(factor)
+        factor = _factor(factor)
         if len(self) < MIN_SAMPLES * factor:
             raise ParameterError(
                 f"factor is {factor}: that leaves fewer than {MIN_SAMPLES} of {len(self)} samples"
@@ -284,6 +282,61 @@ class Dataset:
         )
         less._start = self._start // factor
         return less
+
+    def interpolate(self, factor: int) -> Dataset:
+        """Return the record at a higher sampling rate, with what was between the samples.
+
+        For a drive whose highest frequencies are near half the sampling rate, where a line from
+        sample to sample falls short: at a tenth of the sampling rate by 3 %. Drive, displacement
+        and further columns are interpolated band-limited, exactly up to 0.8 times the old
+        Nyquist frequency (80 dB), and keep their samples. Only for a drive that the low-pass
+        before the log, or the signal itself, kept below that; not for steps.
+
+        Parameters
+        ----------
+        factor : int
+            How many samples one becomes, 2 or more.
+
+        Returns
+        -------
+        Dataset
+            The window begins with the same sample as before; the drive goes straight from sample
+            to sample.
+
+        Raises
+        ------
+        ParameterError
+            `factor` is not a whole number of 2 or more, or the record's hold is "zoh", which
+            says what was between the samples.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import piezotrack as pt
+        >>> t = np.arange(2000) / 1000.0
+        >>> log = pt.Dataset(u=np.sin(2 * np.pi * 200 * t), y=np.cos(2 * np.pi * 200 * t), t=t)
+        >>> fine = log.interpolate(5)
+        >>> error = fine.u - np.sin(2 * np.pi * 200 * fine.t)
+        >>> bool(np.abs(error[500:-500]).max() < 2e-4)
+        True
+        """
+        from .resample import interpolated
+
+        factor = _factor(factor)
+        if self._hold == "zoh":
+            raise ParameterError("hold is 'zoh': expected 'foh', as nothing is between the samples")
+        fine = Dataset(
+            u=interpolated(self._u, factor),
+            y=interpolated(self._y, factor),
+            t=self._t[0] + np.arange((self._t.size - 1) * factor + 1) * (self._dt / factor),
+            hold="foh",
+            drive_unit=self._drive_unit,
+            columns={k: interpolated(v, factor) for k, v in self._columns.items()},
+            column_units=self._column_units,
+            source=self._source,
+        )
+        fine._start = self._start * factor
+        return fine
 
     def _samples(self, start: float | None, stop: float | None) -> tuple[int, int]:
         """Turn the bounds of a window [s] into sample numbers of the arrays kept."""
@@ -385,6 +438,12 @@ def _real(value: object) -> float:
         return float(value)
     except OverflowError:
         return math.inf
+
+
+def _factor(value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < 2:
+        raise ParameterError(f"factor is {value!r}: expected a whole number, 2 or more")
+    return int(value)
 
 
 def _seconds(name: str, value: object) -> float:

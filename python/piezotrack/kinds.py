@@ -7,11 +7,13 @@ from typing import NamedTuple
 from . import _core
 from .bouc_wen import BoucWenStage
 from .errors import ParameterError
+from .first_order_dahl import FirstOrderDahlStage
 from .models import DahlStage
+from .oscillator import BoucWenOscillator
 
 __all__ = ["Kind", "Stage", "kind_named", "kind_of"]
 
-Stage = DahlStage | BoucWenStage
+Stage = DahlStage | BoucWenStage | FirstOrderDahlStage | BoucWenOscillator
 
 
 class Kind(NamedTuple):
@@ -46,6 +48,20 @@ class Kind(NamedTuple):
 KINDS = (
     Kind("dahl", "Dahl", DahlStage, _core.DAHL_PARAMETERS, "M, D, T, b1 and b0"),
     Kind("bouc-wen", "Bouc-Wen", BoucWenStage, _core.BOUC_WEN_PARAMETERS, "m and b"),
+    Kind(
+        "first-order-dahl",
+        "first-order Dahl",
+        FirstOrderDahlStage,
+        FirstOrderDahlStage.PARAMETERS,
+        "M, D, T, sigma and Fc",
+    ),
+    Kind(
+        "bouc-wen-oscillator",
+        "Bouc-Wen oscillator",
+        BoucWenOscillator,
+        BoucWenOscillator.PARAMETERS,
+        "",
+    ),
 )
 
 

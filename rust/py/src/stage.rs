@@ -1,11 +1,14 @@
 //! The Dahl stage and its simulation.
 
 use numpy::{PyArray1, ToPyArray};
+use piezotrack_core::identify::Model;
 use piezotrack_core::integrate::{self, Drive, Hold, Method, Trajectory};
 use piezotrack_core::march::{Order, Stepping};
+use piezotrack_core::stage::kinked::KinkedMotion;
 use piezotrack_core::stage::{
-    BOUC_WEN_PARAMETERS, BoucWenMotion, BoucWenStage, DAHL_PARAMETERS, DahlStage, ParameterInfo,
-    StageState,
+    BOUC_WEN_OSCILLATOR_PARAMETERS, BOUC_WEN_PARAMETERS, BoucWenMotion, BoucWenOscillator,
+    BoucWenStage, DAHL_PARAMETERS, DahlStage, FIRST_ORDER_DAHL_PARAMETERS, FirstOrderDahlStage,
+    ParameterInfo, StageState,
 };
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
@@ -23,6 +26,8 @@ type State = (f64, f64, f64, f64);
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("DAHL_PARAMETERS", plain(&DAHL_PARAMETERS))?;
     module.add("BOUC_WEN_PARAMETERS", plain(&BOUC_WEN_PARAMETERS))?;
+    module.add("FIRST_ORDER_DAHL_PARAMETERS", plain(&FIRST_ORDER_DAHL_PARAMETERS))?;
+    module.add("BOUC_WEN_OSCILLATOR_PARAMETERS", plain(&BOUC_WEN_OSCILLATOR_PARAMETERS))?;
     module.add_class::<PyTrajectory>()?;
     module.add_function(wrap_pyfunction!(delayed, module)?)?;
     module.add_function(wrap_pyfunction!(dahl_check, module)?)?;
@@ -31,7 +36,10 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(dahl_simulate_fixed, module)?)?;
     module.add_function(wrap_pyfunction!(bouc_wen_check, module)?)?;
     module.add_function(wrap_pyfunction!(bouc_wen_xu_li_2010, module)?)?;
-    module.add_function(wrap_pyfunction!(bouc_wen_simulate, module)?)
+    module.add_function(wrap_pyfunction!(bouc_wen_simulate, module)?)?;
+    module.add_function(wrap_pyfunction!(stage_check, module)?)?;
+    module.add_function(wrap_pyfunction!(bouc_wen_benchmark, module)?)?;
+    module.add_function(wrap_pyfunction!(kinked_simulate, module)?)
 }
 
 /// Name, symbol and unit of each.
@@ -116,6 +124,20 @@ impl From<BoucWenMotion> for PyTrajectory {
             v: run.v,
             hysteresis: run.hysteresis,
             last: (run.last.x, run.last.v, memory.input, memory.operator.value),
+            substeps: run.substeps,
+            well_posed: true,
+            difference: run.difference,
+        }
+    }
+}
+
+impl From<KinkedMotion> for PyTrajectory {
+    fn from(run: KinkedMotion) -> Self {
+        Self {
+            x: run.x,
+            v: run.v,
+            hysteresis: run.hysteresis,
+            last: (run.last.x, run.last.v, run.last.memory.value, 0.0),
             substeps: run.substeps,
             well_posed: true,
             difference: run.difference,
@@ -244,5 +266,55 @@ fn bouc_wen_simulate(
     let (x, v, input, h) = initial;
     driven(py, u, dt, hold, |drive, stop| {
         BoucWenStage::from_theta(&theta)?.simulate(drive, [x, v, input, h], accuracy, stop)
+    })
+}
+
+/// Raises where the values make no stage of the model.
+#[pyfunction]
+#[expect(clippy::needless_pass_by_value, reason = "extracted from a tuple")]
+fn stage_check(model: &str, theta: Vec<f64>) -> PyResult<()> {
+    let check = || Model::named(model)?.check(&leading(&theta));
+    check().map_err(|error| raise(&error))
+}
+
+/// As many values as asked for, zeros after the last.
+fn leading<const N: usize>(theta: &[f64]) -> [f64; N] {
+    core::array::from_fn(|i| theta.get(i).copied().unwrap_or(0.0))
+}
+
+/// Parameters of the Bouc-Wen benchmark.
+#[pyfunction]
+fn bouc_wen_benchmark() -> [f64; 8] {
+    leading(&BoucWenOscillator::benchmark().parameters())
+}
+
+/// Simulates a stage whose hysteresis has kinks at reversals, from displacement, velocity and
+/// hysteresis force.
+#[pyfunction]
+#[pyo3(signature = (model, theta, u, dt, hold, initial, accuracy))]
+#[expect(clippy::too_many_arguments, reason = "called from one place")]
+#[expect(clippy::needless_pass_by_value, reason = "extracted from a tuple")]
+fn kinked_simulate(
+    py: Python<'_>,
+    model: &str,
+    theta: Vec<f64>,
+    u: &Bound<'_, PyAny>,
+    dt: f64,
+    hold: &str,
+    initial: [f64; 3],
+    accuracy: f64,
+) -> PyResult<PyTrajectory> {
+    driven(py, u, dt, hold, |drive, stop| match Model::named(model)? {
+        Model::FirstOrderDahl => {
+            let stage = FirstOrderDahlStage::from_theta(&leading(&theta))?;
+            stage.simulate(drive, initial, accuracy, stop)
+        }
+        Model::BoucWenOscillator => {
+            let oscillator = BoucWenOscillator::from_theta(&leading(&theta))?;
+            oscillator.simulate(drive, initial, accuracy, stop)
+        }
+        Model::Dahl | Model::BoucWen => {
+            Err(Error::parameter("model", model, "one with kinks in feedback"))
+        }
     })
 }

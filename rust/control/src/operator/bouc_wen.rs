@@ -66,8 +66,8 @@ pub struct BoucWenState<N> {
 #[derive(Clone, Copy, Debug)]
 pub struct BoucWenBranch<N> {
     /// Output counted along the direction.
-    along: N,
-    direction: N,
+    pub(super) along: N,
+    pub(super) direction: N,
 }
 
 /// Longest piece with n = 1, times the rate: the series below are summed for it.

@@ -6,11 +6,13 @@
 
 mod bouc_wen;
 mod dahl;
+mod first_order_dahl;
 mod play;
 mod play_inverse;
 
 pub use bouc_wen::{BoucWen, BoucWenBranch, BoucWenState};
 pub use dahl::{Dahl, DahlBranch, DahlState};
+pub use first_order_dahl::FirstOrderDahl;
 pub use play::{Play, PlayBranch, PlayState};
 pub use play_inverse::PlayInverse;
 

@@ -32,10 +32,8 @@ impl Measures {
         let (low, high) = range(u);
         let stroke = record.stroke();
         let mean = u.iter().sum::<f64>() / index(u.len());
-        let size: f64 = u.iter().map(|v| (v - mean) * (v - mean)).sum();
-        let change: f64 = u.windows(2).map(|w| (w[1] - w[0]) * (w[1] - w[0])).sum();
         let dt = record.drive.dt;
-        let frequency = libm::sqrt(change / size) / dt;
+        let (_, frequency) = size_and_rate(u, dt);
         let y = &record.y[record.window.clone()];
         let level = y.iter().sum::<f64>() / index(y.len());
         let together: f64 = u.iter().zip(y).map(|(u, y)| (u - mean) * (y - level)).sum();
@@ -70,6 +68,8 @@ pub fn derive(
     let ranges = match model {
         Model::Dahl => dahl_ranges(&of, fixed),
         Model::BoucWen => bouc_wen_ranges(&of, fixed),
+        Model::FirstOrderDahl => first_order_dahl_ranges(&of, fixed),
+        Model::BoucWenOscillator => oscillator_ranges(&of, record, fixed),
     };
     let mut coordinates = [Coordinate::Fixed(0.0); 9];
     for (i, info) in model.facts().parameters.iter().enumerate() {
@@ -98,7 +98,10 @@ fn mechanical_ranges(of: &Measures, (soft, hard): (f64, f64)) -> [(f64, f64); 3]
 /// Ranges of the parameters of a Dahl stage, up to b0.
 fn dahl_ranges(of: &Measures, fixed: &[Option<f64>; 9]) -> [(f64, f64); 8] {
     let up = fixed[8].unwrap_or(30.0);
-    let (soft, hard) = stiffness_range(of, fixed, up);
+    let value = |i: usize| fixed[i].filter(|value| *value != 0.0);
+    // Half the curvature times the stroke is a stiffness.
+    let hints = [value(6).map(|b1| 0.5 * b1 * up * of.stroke), value(7).map(|b0| b0 * up)];
+    let (soft, hard) = stiffness_range(of, fixed, &hints);
     let [mass, damping, stiffness] = mechanical_ranges(of, (soft, hard));
     // A force of half the elastic one at full stroke, either way.
     let curvature = hard / (up.abs().max(f64::MIN_POSITIVE) * of.stroke);
@@ -121,7 +124,7 @@ fn dahl_ranges(of: &Measures, fixed: &[Option<f64>; 9]) -> [(f64, f64); 8] {
 fn bouc_wen_ranges(of: &Measures, fixed: &[Option<f64>; 9]) -> [(f64, f64); 8] {
     let [mass, damping, stiffness, ..] = *fixed;
     let scale = [mass, damping, stiffness, None, None, None, None, None, None];
-    let [mass, damping, stiffness] = mechanical_ranges(of, stiffness_range(of, &scale, 0.0));
+    let [mass, damping, stiffness] = mechanical_ranges(of, stiffness_range(of, &scale, &[]));
     let piezo = (of.gain / 3.0, of.gain * 3.0);
     // The memory fades over the whole drive's range, or a twentieth of it; with another exponent
     // than 1, at a hysteresis of a tenth of the stroke.
@@ -139,25 +142,78 @@ fn bouc_wen_ranges(of: &Measures, fixed: &[Option<f64>; 9]) -> [(f64, f64); 8] {
     ]
 }
 
+/// Ranges of the parameters of a first-order Dahl stage, up to the Coulomb force.
+fn first_order_dahl_ranges(of: &Measures, fixed: &[Option<f64>; 9]) -> [(f64, f64); 8] {
+    let hints = [fixed[4], fixed[5].map(|limit| 10.0 * limit / of.stroke)];
+    let hints = hints.map(|hint| hint.filter(|value| *value != 0.0));
+    let (soft, hard) = stiffness_range(of, fixed, &hints);
+    let [mass, damping, stiffness] = mechanical_ranges(of, (soft, hard));
+    let piezo = (soft * of.gain / 3.0, hard * of.gain * 3.0);
+    [
+        mass,
+        damping,
+        stiffness,
+        if of.inverted { (-piezo.1, -piezo.0) } else { piezo },
+        // The way to the Coulomb force is a hundredth of the stroke or all of it.
+        (1e-2 * soft, 10.0 * hard),
+        (1e-3 * soft * of.stroke, hard * of.stroke),
+        (0.0, 0.0),
+        (0.0, 0.0),
+    ]
+}
+
+/// Ranges of the parameters of a Bouc-Wen oscillator, up to delta: the drive is a force, and may
+/// well shake it at its resonance.
+fn oscillator_ranges(
+    of: &Measures,
+    record: &Record<'_>,
+    fixed: &[Option<f64>; 9],
+) -> [(f64, f64); 8] {
+    let (size, rate) = size_and_rate(&record.y[record.window.clone()], of.dt);
+    let (force, _) = size_and_rate(&record.drive.u[record.window.clone()], of.dt);
+    let stiff = force / size;
+    let spring = (0.02 * stiff, 3.0 * stiff);
+    // The restoring force reaches about stiff * stroke/2.
+    let [beta, exponent] = [fixed[4].unwrap_or(1.0), fixed[7].unwrap_or(1.0)];
+    let fade = libm::pow(0.25 * stiff * of.stroke, 1.0 - exponent) / (beta * of.stroke);
+    let (low, high) = if fade < 0.0 { (20.0 * fade, 0.0) } else { (0.0, 20.0 * fade) };
+    [
+        (0.05 * stiff / (rate * rate), 10.0 * stiff / (rate * rate)),
+        (1e-4 * stiff / rate, 3.0 * stiff / rate),
+        spring,
+        spring,
+        (0.0, 0.0),
+        (low, high),
+        (-20.0 * fade.abs(), 20.0 * fade.abs()),
+        (0.0, 0.0),
+    ]
+}
+
+/// RMS about the mean, and the rate of change over it, rad/s: amplitude and frequency of a sine.
+fn size_and_rate(values: &[f64], dt: f64) -> (f64, f64) {
+    let mean = values.iter().sum::<f64>() / index(values.len());
+    let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
+    let change: f64 = values.windows(2).map(|w| (w[1] - w[0]) * (w[1] - w[0])).sum();
+    (libm::sqrt(squares / index(values.len())), libm::sqrt(change / squares) / dt)
+}
+
 /// Longest delay that is searched where no bounds are given, s.
 pub(super) fn longest_delay(record: &Record<'_>) -> f64 {
     let of = Measures::of(record);
     (20.0 * of.dt).min(0.1 * core::f64::consts::TAU / of.frequency)
 }
 
-/// Range of the stiffness from whichever parameter that carries force is held.
-fn stiffness_range(of: &Measures, fixed: &[Option<f64>; 9], up: f64) -> (f64, f64) {
-    let [mass, damping, stiffness, piezo, _, _, b1, b0, _] = *fixed;
+/// Range of the stiffness from whichever parameter that carries force is held; `hints` are
+/// stiffnesses that parameters of the hysteresis tell, to a factor of 30.
+fn stiffness_range(of: &Measures, fixed: &[Option<f64>; 9], hints: &[Option<f64>]) -> (f64, f64) {
+    let [mass, damping, stiffness, piezo, ..] = *fixed;
     let around = |value: f64, factor: f64| (value.abs() / factor, value.abs() * factor);
     if let Some(value) = stiffness {
         (value, value)
     } else if let Some(value) = piezo {
         around(value / of.gain, 3.0)
-    } else if let Some(value) = b1.filter(|value| *value != 0.0) {
-        // Half the curvature times the stroke is a stiffness: a tenth of K to ten times K.
-        around(0.5 * value * up * of.stroke, 30.0)
-    } else if let Some(value) = b0.filter(|value| *value != 0.0) {
-        around(value * up, 30.0)
+    } else if let Some(value) = hints.iter().copied().flatten().next() {
+        around(value, 30.0)
     } else if let Some(value) = damping.filter(|value| *value != 0.0) {
         (value * of.frequency, value * of.frequency * 1e3)
     } else if let Some(value) = mass {

@@ -13,7 +13,7 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::deviation::{Delayed, Sums};
-use super::model::{EXPONENT, Model};
+use super::model::Model;
 use super::problem::{Problem, Record, Theta};
 use super::stepping;
 use crate::integrate::{Stop, index};
@@ -22,7 +22,9 @@ use crate::march::{FEW_TERMS, March, Order, Stepping, TERMS};
 use crate::mechanics::{Mechanics, Propagator, halvings};
 use crate::stage::feedback::{FeedbackState, Smooth};
 use crate::stage::friction::{Friction, FrictionParameters};
-use crate::stage::{BoucWenKernel, Coupling, Kernel, MOST_PARAMETERS};
+use crate::stage::{
+    BoucWenKernel, BoucWenOscillatorKernel, Coupling, FirstOrderDahlKernel, Kernel, MOST_PARAMETERS,
+};
 
 /// Vectors that go through the step together, to hide each other's latency.
 const VECTORS: usize = 3;
@@ -161,10 +163,19 @@ impl<const K: usize> WithSimd for Bundle<'_, K> {
             return self.with_friction(simd);
         }
         // One vector at most, so that these steps are not compiled for several as well.
-        if K == 1 && self.of.problem.model == Model::BoucWen {
-            // Held, and so the same for all guesses.
-            let exponent = self.guesses.first().map_or(1.0, |guess| guess.theta[EXPONENT]);
-            return self.kernel(simd, &BoucWenKernel { exponent });
+        if K == 1 {
+            let model = self.of.problem.model;
+            let exponent = self.guesses.first().map_or(1.0, |guess| model.exponent(&guess.theta));
+            match model {
+                Model::Dahl => {}
+                Model::BoucWen => return self.kernel(simd, &BoucWenKernel { exponent }),
+                Model::FirstOrderDahl => {
+                    return self.kernel(simd, &FirstOrderDahlKernel { exponent });
+                }
+                Model::BoucWenOscillator => {
+                    return self.kernel(simd, &BoucWenOscillatorKernel { exponent });
+                }
+            }
         }
         match self.of.stepping.order {
             Order::Second => self.smooth::<S, FEW_TERMS, false>(simd),

@@ -6,8 +6,9 @@ use crate::error::{Error, Result};
 use crate::integrate::{Drive, Stop, simulate_fixed};
 use crate::march::Stepping;
 use crate::stage::{
-    BOUC_WEN_PARAMETERS, BoucWenKernel, BoucWenStage, DAHL_PARAMETERS, DahlStage, Kernel,
-    ParameterInfo, StageState,
+    BOUC_WEN_OSCILLATOR_PARAMETERS, BOUC_WEN_PARAMETERS, BoucWenKernel, BoucWenOscillator,
+    BoucWenOscillatorKernel, BoucWenStage, DAHL_PARAMETERS, DahlStage, FIRST_ORDER_DAHL_PARAMETERS,
+    FirstOrderDahlKernel, FirstOrderDahlStage, Kernel, ParameterInfo, StageState,
 };
 
 /// A kind of stage. The first three parameters of each are mass, damping and stiffness.
@@ -18,6 +19,10 @@ pub enum Model {
     Dahl,
     /// Bouc-Wen hysteresis at the input: [`BoucWenStage`].
     BoucWen,
+    /// First-order Dahl friction in feedback: [`FirstOrderDahlStage`].
+    FirstOrderDahl,
+    /// Bouc-Wen hysteresis in feedback, under a force: [`BoucWenOscillator`].
+    BoucWenOscillator,
 }
 
 /// What distinguishes one model's search from another's.
@@ -27,17 +32,19 @@ pub struct Facts {
     pub name: &'static str,
     /// Its parameters, in their order.
     pub parameters: &'static [ParameterInfo],
-    /// Indices of those that carry force: all of them can be multiplied by one number.
+    /// Indices of those that carry force: all of them can be multiplied by one number. None
+    /// where the drive is a force itself.
     pub forces: &'static [usize],
     /// Values of those that are held where the caller says nothing.
     pub defaults: &'static [(usize, f64)],
-    /// The one that is never searched, and why.
-    pub held: (usize, &'static str),
+    /// Those that are never searched, and why.
+    pub held: &'static [(usize, &'static str)],
 }
 
 impl Model {
     /// All of them.
-    pub const ALL: [Self; 2] = [Self::Dahl, Self::BoucWen];
+    pub const ALL: [Self; 4] =
+        [Self::Dahl, Self::BoucWen, Self::FirstOrderDahl, Self::BoucWenOscillator];
 
     /// The model of a name.
     ///
@@ -59,14 +66,31 @@ impl Model {
                 parameters: &DAHL_PARAMETERS,
                 forces: &[0, 1, 2, 3, 6, 7],
                 defaults: &[(7, 0.0), (8, 30.0)],
-                held: (8, "up held: only the products b1 up and b0 up show in the data"),
+                held: &[(8, "up held: only the products b1 up and b0 up show in the data")],
             },
             Self::BoucWen => Facts {
                 name: "bouc-wen",
                 parameters: &BOUC_WEN_PARAMETERS,
                 forces: &[0, 1, 2],
                 defaults: &[(7, 1.0)],
-                held: (7, "exponent held, in fixed=: it decides the unit of beta and gamma"),
+                held: &[(7, "exponent held, in fixed=: it decides the unit of beta and gamma")],
+            },
+            Self::FirstOrderDahl => Facts {
+                name: "first-order-dahl",
+                parameters: &FIRST_ORDER_DAHL_PARAMETERS,
+                forces: &[0, 1, 2, 3, 4, 5],
+                defaults: &[(6, 1.0)],
+                held: &[(6, "exponent held, in fixed=: all guesses of a search share it")],
+            },
+            Self::BoucWenOscillator => Facts {
+                name: "bouc-wen-oscillator",
+                parameters: &BOUC_WEN_OSCILLATOR_PARAMETERS,
+                forces: &[],
+                defaults: &[(4, 1.0), (7, 1.0)],
+                held: &[
+                    (4, "beta held: only the products beta gamma and beta delta show in the data"),
+                    (7, "exponent held, in fixed=: it decides the unit of gamma and delta"),
+                ],
             },
         }
     }
@@ -78,10 +102,18 @@ impl Model {
     pub fn check(self, theta: &Theta) -> Result<()> {
         match self {
             Self::Dahl => dahl(theta).map(|_| ()),
-            Self::BoucWen => {
-                let [m, b, k, d, alpha, beta, gamma, n, ..] = *theta;
-                BoucWenStage::from_theta(&[m, b, k, d, alpha, beta, gamma, n]).map(|_| ())
-            }
+            Self::BoucWen => BoucWenStage::from_theta(&first(theta)).map(|_| ()),
+            Self::FirstOrderDahl => FirstOrderDahlStage::from_theta(&first(theta)).map(|_| ()),
+            Self::BoucWenOscillator => BoucWenOscillator::from_theta(&first(theta)).map(|_| ()),
+        }
+    }
+
+    /// The exponent, which all guesses of a search share; 1 for a model without one.
+    pub(super) fn exponent(self, theta: &Theta) -> f64 {
+        match self {
+            Self::Dahl => 1.0,
+            Self::FirstOrderDahl => theta[6],
+            Self::BoucWen | Self::BoucWenOscillator => theta[7],
         }
     }
 
@@ -101,19 +133,28 @@ impl Model {
                 run.ok().flatten().map(|run| [run.x, run.v])
             }
             Self::BoucWen => {
-                let kernel = BoucWenKernel { exponent: theta[EXPONENT] };
+                let kernel = BoucWenKernel { exponent: self.exponent(theta) };
+                alone(&kernel, theta, drive, stepping, stop)
+            }
+            Self::FirstOrderDahl => {
+                let kernel = FirstOrderDahlKernel { exponent: self.exponent(theta) };
+                alone(&kernel, theta, drive, stepping, stop)
+            }
+            Self::BoucWenOscillator => {
+                let kernel = BoucWenOscillatorKernel { exponent: self.exponent(theta) };
                 alone(&kernel, theta, drive, stepping, stop)
             }
         }
     }
 }
 
-/// Index of the exponent of a Bouc-Wen stage.
-pub(super) const EXPONENT: usize = 7;
-
 fn dahl(theta: &Theta) -> Result<DahlStage> {
-    let [mass, damping, stiffness, piezo, a1, a2, b1, b0, up, _delay] = *theta;
-    DahlStage::from_theta(&[mass, damping, stiffness, piezo, a1, a2, b1, b0, up])
+    DahlStage::from_theta(&first(theta))
+}
+
+/// The parameters that a model has.
+fn first<const N: usize>(theta: &Theta) -> [f64; N] {
+    core::array::from_fn(|i| theta[i])
 }
 
 fn alone<K: Kernel<f64> + Copy>(

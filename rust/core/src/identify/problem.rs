@@ -234,8 +234,9 @@ impl Problem {
     pub fn new(record: &Record<'_>, spec: &Spec) -> Result<Self> {
         let mut fixed = fixed_values(spec)?;
         let free = free_parameters(spec, &mut fixed)?;
+        let forces = spec.model.facts().forces;
         let holds_scale =
-            spec.model.facts().forces.iter().any(|&i| fixed[i].is_some_and(|value| value != 0.0));
+            forces.is_empty() || forces.iter().any(|&i| fixed[i].is_some_and(|value| value != 0.0));
         let mut scale_assumed = false;
         if !holds_scale {
             let asked =
@@ -378,15 +379,14 @@ fn free_parameters(spec: &Spec, fixed: &mut [Option<f64>; 9]) -> Result<[bool; 9
         {
             return Err(Error::parameter("free", name, "a parameter that is not fixed as well"));
         }
-        let (held, reason) = spec.model.facts().held;
-        if i == held {
-            return Err(Error::parameter("free", name, reason));
+        if let Some((_, reason)) = spec.model.facts().held.iter().find(|(held, _)| *held == i) {
+            return Err(Error::parameter("free", name, *reason));
         }
         free[i] = true;
         fixed[i] = None;
     }
     for i in 0..9 {
-        let scale = i == STIFFNESS;
+        let scale = i == STIFFNESS && !spec.model.facts().forces.is_empty();
         if !free[i] && fixed[i].is_none() && !scale {
             let name = spec.model.facts().parameters[i].name;
             return Err(Error::parameter(

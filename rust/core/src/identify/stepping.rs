@@ -11,6 +11,9 @@ use crate::mechanics::Mechanics;
 /// Accuracy that a search asks of its simulations, m.
 const ACCURACY: f64 = 2e-10;
 
+/// The same as a share of the stroke, where that is more: of what moves by millimetres.
+const SHARE: f64 = 2e-6;
+
 /// Most sub-steps that a search takes in one sampling interval.
 const MOST: usize = 256;
 
@@ -18,7 +21,7 @@ const MOST: usize = 256;
 const WORTH: usize = 2;
 
 /// The cheapest stepping with which the stages at the corners of the box and in its middle are
-/// accurate to 0.2 nm.
+/// accurate to 0.2 nm, or to two millionths of the stroke.
 ///
 /// A stage that goes more than twice the measured stroke is left out, and so is one that no
 /// sub-steps make accurate: such a guess costs more than any stage worth finding, however
@@ -26,12 +29,13 @@ const WORTH: usize = 2;
 pub(super) fn choose(record: &Record<'_>, problem: &Problem, stop: Stop<'_>) -> Stepping {
     let excerpts = excerpts(&record.drive);
     let stroke = 2.0 * record.stroke();
-    let thetas = corners(problem);
+    let accuracy = ACCURACY.max(SHARE * record.stroke());
+    let thetas = representatives(problem);
     let trials: Vec<(&Theta, Drive<'_>, usize)> = thetas
         .par_iter()
         .flat_map_iter(|theta| excerpts.iter().map(move |drive| (theta, *drive)))
         .filter_map(|(theta, drive)| {
-            let trial = Trial { model: problem.model, theta, drive: &drive, stop };
+            let trial = Trial { model: problem.model, theta, drive: &drive, accuracy, stop };
             let (steps, x) = trial.steps(Order::Fourth, MOST)?;
             let (low, high) = range(&x);
             (high - low <= stroke).then_some((theta, drive, steps))
@@ -45,7 +49,7 @@ pub(super) fn choose(record: &Record<'_>, problem: &Problem, stop: Stop<'_>) -> 
     let second: Option<Vec<usize>> = trials
         .par_iter()
         .map(|&(theta, ref drive, _)| {
-            let trial = Trial { model: problem.model, theta, drive, stop };
+            let trial = Trial { model: problem.model, theta, drive, accuracy, stop };
             let found = trial.steps(Order::Second, most)?;
             (found.0 <= most).then_some(found.0)
         })
@@ -61,19 +65,30 @@ struct Trial<'a> {
     model: Model,
     theta: &'a Theta,
     drive: &'a Drive<'a>,
+    accuracy: f64,
     stop: Stop<'a>,
 }
 
 impl Trial<'_> {
     /// The sub-steps that make it accurate, and the displacement with them.
     fn steps(&self, order: Order, most: usize) -> Option<(usize, Vec<f64>)> {
-        let &Self { model, theta, drive, stop } = self;
+        let &Self { model, theta, drive, accuracy, stop } = self;
         let [mass, damping, stiffness, ..] = *theta;
         let first = first_substeps(&Mechanics { mass, damping, stiffness }, drive.dt);
-        steps_for(first, ACCURACY, most, |substeps| {
+        steps_for(first, accuracy, most, |substeps| {
             let [x, _] = model.motion(theta, drive, Stepping { order, substeps }, stop)?;
             Some(x)
         })
+    }
+}
+
+/// The guesses that have to be accurate. Corners of an oscillator's box have hysteresis that
+/// grows without bound, which no steps follow, so its middle stands for all.
+fn representatives(problem: &Problem) -> Vec<Theta> {
+    let all = corners(problem);
+    match problem.model {
+        Model::BoucWenOscillator => all.last().copied().into_iter().collect(),
+        Model::Dahl | Model::BoucWen | Model::FirstOrderDahl => all,
     }
 }
 

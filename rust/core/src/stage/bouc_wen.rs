@@ -11,11 +11,11 @@ use piezotrack_control::Number;
 use piezotrack_control::operator::{BoucWen, BoucWenState, Operator};
 
 use super::input::{AtInput, InputMemory};
-use super::{Kernel, ParameterInfo, Parameters};
+use super::{Kernel, ParameterInfo, Parameters, linear};
 use crate::alone::{Alone, Motion};
 use crate::error::{Error, Result, finite, shown};
 use crate::integrate::{Drive, Stop};
-use crate::mechanics::{Mechanics, Propagator};
+use crate::mechanics::Mechanics;
 
 /// The stage's parameters, in the order of [`BoucWenStage::from_theta`]. The unit of beta and
 /// gamma is that for n = 1; in general it is 1/(V m^(n-1)).
@@ -178,9 +178,8 @@ impl<N: Number> Kernel<N> for BoucWenKernel {
 
     #[inline(always)]
     fn coupling(&self, parameters: &Parameters<N>, step: f64, halvings: u32) -> Self::Coupling {
-        let [mass, damping, stiffness, gain, ..] = *parameters;
-        let inverse = mass.like(1.0) / mass;
-        let linear = Propagator::new(inverse, damping / mass, stiffness / mass, step, halvings);
+        let [_, _, stiffness, gain, ..] = *parameters;
+        let linear = linear(parameters, step, halvings);
         AtInput { linear, operator: self.operator(parameters), stiffness, gain }
     }
 

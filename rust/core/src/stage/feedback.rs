@@ -91,7 +91,17 @@ pub(super) fn correct<N: Number, O: Operator<N>>(
     ahead: &Prediction<N>,
     from: N,
 ) -> (N, N) {
-    let (force, slope) = operator.output(&operator.along(branch, ahead.x - from));
+    conclude(linear, ahead, operator.output(&operator.along(branch, ahead.x - from)))
+}
+
+/// Displacement and scaled velocity with the cubic through the forces at both ends, the one at
+/// the end given with its slope along the path.
+#[inline(always)]
+pub(super) fn conclude<N: Number>(
+    linear: &Propagator<N>,
+    ahead: &Prediction<N>,
+    (force, slope): (N, N),
+) -> (N, N) {
     let excess = ahead.force + ahead.change - force;
     let bend = ahead.change - slope * ahead.w;
     let x = linear.excess.x.mul_add(excess, linear.bend.x.mul_add(bend, ahead.x));
@@ -123,20 +133,38 @@ fn fourth_order<N: Number, O: Operator<N>>(
     rise: N,
 ) -> FeedbackState<N, O::State> {
     let ahead = predict(linear, operator, state, drive, rise);
-    // At rest the predicted velocity tells the direction; else it is too small to matter.
-    let heading = ahead.w.mul_add(ahead.w.like(1e-12), state.w);
-    let branch = operator.branch(&state.memory, sign(heading));
+    let direction = sign(heading(state, &ahead));
+    let branch = operator.branch(&state.memory, direction);
     let (x, w) = correct(linear, operator, &branch, &ahead, state.x);
-    let turned = state.w * w;
-    let memory = if turned.any_negative() {
+    let memory = lead(operator, state, &branch, x, w);
+    FeedbackState { x, w, memory }
+}
+
+/// What has the sign of the motion over the step: at rest the predicted velocity tells the
+/// direction; else it is too small to matter.
+#[inline(always)]
+pub(super) fn heading<N: Number, M>(from: &FeedbackState<N, M>, ahead: &Prediction<N>) -> N {
+    ahead.w.mul_add(ahead.w.like(1e-12), from.w)
+}
+
+/// The operator's memory where a step ends: along the branch, or to the turning point and back.
+#[inline(always)]
+pub(super) fn lead<N: Number, O: Operator<N>>(
+    operator: &O,
+    from: &FeedbackState<N, O::State>,
+    branch: &O::Branch,
+    x: N,
+    w: N,
+) -> O::State {
+    let turned = from.w * w;
+    if turned.any_negative() {
         // Lanes that did not turn go to the end on the first leg; their second has length 0.
-        let turning = turned.where_negative(turning_point(state, x, w), x);
-        let there = operator.along(&branch, turning - state.x);
+        let turning = turned.where_negative(turning_point(from, x, w), x);
+        let there = operator.along(branch, turning - from.x);
         operator.along(&operator.branch(&there, sign(w)), x - turning)
     } else {
-        operator.along(&branch, x - state.x)
-    };
-    FeedbackState { x, w, memory }
+        operator.along(branch, x - from.x)
+    }
 }
 
 /// +1 or -1; +1 for 0.

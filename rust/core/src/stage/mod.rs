@@ -1,16 +1,25 @@
 //! Stages: one hysteresis operator coupled with linear mechanics.
 
 mod bouc_wen;
+mod bouc_wen_oscillator;
 mod dahl;
 pub mod feedback;
+mod first_order_dahl;
 pub mod friction;
 pub mod input;
+pub mod kinked;
 mod prandtl_ishlinskii;
 mod relaxation;
 mod virtual_stage;
 
 pub use bouc_wen::{BOUC_WEN_PARAMETERS, BoucWenKernel, BoucWenMotion, BoucWenStage};
+pub use bouc_wen_oscillator::{
+    BOUC_WEN_OSCILLATOR_PARAMETERS, BoucWenOscillator, BoucWenOscillatorKernel,
+};
 pub use dahl::{DAHL_PARAMETERS, DahlStage, StageState};
+pub use first_order_dahl::{
+    FIRST_ORDER_DAHL_PARAMETERS, FirstOrderDahlKernel, FirstOrderDahlStage,
+};
 pub use prandtl_ishlinskii::{
     FeedforwardState, MOST_PLAYS, MOST_ZONES, Plays, PlaysFeedforward, PlaysInverse, PlaysMotion,
     PlaysState, PrandtlIshlinskiiStage, plays,
@@ -19,6 +28,10 @@ pub use relaxation::{Dynamics, MOST_RELAXATIONS, Relaxation, RelaxationFlow, Rel
 pub use virtual_stage::{
     Creep, DEAD_ZONES, PLAYS, RELAXATIONS, StagePlay, VirtualSettings, VirtualStage, VirtualState,
 };
+
+use piezotrack_control::Number;
+
+use crate::mechanics::Propagator;
 
 /// A hysteresis coupled with linear mechanics, as one step in time sees it.
 pub trait Coupling<N> {
@@ -60,6 +73,14 @@ pub trait Kernel<N> {
         parameters: &Parameters<N>,
         memory: &<Self::Coupling as Coupling<N>>::Memory,
     ) -> N;
+}
+
+/// The linear part of a stage over steps of `step` seconds.
+#[inline(always)]
+fn linear<N: Number>(parameters: &Parameters<N>, step: f64, halvings: u32) -> Propagator<N> {
+    let [mass, damping, stiffness, ..] = *parameters;
+    let inverse = mass.like(1.0) / mass;
+    Propagator::new(inverse, damping / mass, stiffness / mass, step, halvings)
 }
 
 /// Name, symbol and unit of one parameter of a stage.
