@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from .errors import DataError
 from .files import replacing
 from .kinds import kind_of
-from .models import DahlStage
 
 if TYPE_CHECKING:
     import os
@@ -103,29 +102,9 @@ def _known(fit: Identification) -> list[str]:
 
 def _ratios(fit: Identification) -> list[tuple[str, str, float, str]]:
     """Parameter, symbol, value and unit of what does not depend on the scale of the forces."""
-    stage, stiffness = fit.model, fit.model.stiffness
-    frequency = math.sqrt(stiffness / stage.mass) / (2 * math.pi)
-    hertz = f"s^2, a natural frequency of {frequency:.4g} Hz"
-    if not isinstance(stage, DahlStage):
-        return [
-            ("piezo_coefficient", "d", 1e6 * stage.piezo_coefficient, "um/V"),
-            ("damping", "b/k", 1e3 * stage.damping / stiffness, "ms"),
-            ("mass", "m/k", stage.mass / stiffness, hertz),
-            ("alpha", "alpha", stage.alpha, ""),
-            ("beta", "beta", stage.beta, "1/V"),
-            ("gamma", "gamma", stage.gamma, "1/V"),
-        ]
-    ratios = [
-        ("piezo_coefficient", "T/K", 1e6 * stage.piezo_coefficient / stiffness, "um/V"),
-        ("damping", "D/K", 1e3 * stage.damping / stiffness, "ms"),
-        ("mass", "M/K", stage.mass / stiffness, hertz),
-        ("b1", "b1 up/K", stage.b1 * stage.up / stiffness, "1/m"),
-        ("a1", "a1", stage.a1, "1/m"),
-        ("a2", "a2", stage.a2, "1/m^2"),
-    ]
-    if fit.parameters["b0"].free or stage.b0:
-        ratios.append(("b0", "b0 up/K", stage.b0 * stage.up / stiffness, ""))
-    return ratios
+    ratios = kind_of(fit.model).ratios(fit.model)
+    # Friction that was neither searched nor there is not worth a line.
+    return [r for r in ratios if r[0] != "b0" or fit.parameters["b0"].free or r[2]]
 
 
 def _row(name: str, estimate: Estimate, width: int) -> str:

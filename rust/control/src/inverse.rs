@@ -10,11 +10,10 @@
 //! A reference may turn between two samples: there it is taken as the cubic through displacement
 //! and velocity at both ends, and the operator is led to its turning points.
 
-use core::ops::{Add, Div, Mul, Neg, Sub};
-
-use crate::Number;
 use crate::error::{Result, check, finite, not_negative, positive, usable};
 use crate::operator::{Dahl, DahlState, Operator};
+use crate::path::{is_straight, legs};
+use crate::plain::Plain;
 
 /// Parameters of the inverse of a Dahl stage.
 ///
@@ -174,29 +173,12 @@ impl SampledDahlInverse {
         }
         let rise = x - state.x;
         let w = v * self.dt;
-        let straight = match state.w {
-            None => true,
-            Some(w0) => {
-                // The cubic is known not to turn where no end is steeper than three times the
-                // mean (Fritsch and Carlson 1980).
-                let steepest = 3.0 * rise.abs();
-                let along = w0 * rise >= 0.0 && w * rise >= 0.0;
-                along && w0.abs() <= steepest && w.abs() <= steepest
-            }
-        };
-        let memory = if straight {
-            self.travel(state.memory, rise)
-        } else {
-            self.travel_cubic(state.memory, rise, state.w.unwrap_or(0.0), w)
+        let memory = match state.w {
+            Some(w0) if !is_straight(w0, rise, w) => self.travel_turning(state.memory, w0, rise, w),
+            _ => self.travel(state.memory, rise),
         };
         let Some(memory) = memory else { return f64::NAN };
-        let sign = if v > 0.0 {
-            1.0
-        } else if v < 0.0 {
-            -1.0
-        } else {
-            0.0
-        };
+        let sign = f64::from(i8::from(v > 0.0) - i8::from(v < 0.0));
         let linear = self.inertia * a + self.damping * v + self.stiffness * x;
         let hysteresis = self.level * memory.force.0 + sign * self.friction * memory.slope.0;
         let volts = linear + hysteresis;
@@ -231,114 +213,16 @@ impl SampledDahlInverse {
 
     /// The operator along the cubic with velocities `w0` and `w1` that rises by `rise`.
     #[cold]
-    fn travel_cubic(
+    fn travel_turning(
         &self,
         mut memory: DahlState<Plain>,
-        rise: f64,
         w0: f64,
+        rise: f64,
         w1: f64,
     ) -> Option<DahlState<Plain>> {
-        // Hermite form about the start: w0 s + c2 s^2 + c3 s^3, s from 0 to 1
-        let c3 = w0 + w1 - 2.0 * rise;
-        let c2 = rise - w0 - c3;
-        let mut here = 0.0;
-        for s in turning_times(w0, c2, c3) {
-            if s > 0.0 && s < 1.0 {
-                let there = s * (w0 + s * (c2 + s * c3));
-                memory = self.travel(memory, there - here)?;
-                here = there;
-            }
+        for leg in legs(w0, rise, w1) {
+            memory = self.travel(memory, leg)?;
         }
-        self.travel(memory, rise - here)
-    }
-}
-
-/// Where w0 + 2 c2 s + 3 c3 s^2 is 0, in order; NaN where it is not.
-fn turning_times(w0: f64, c2: f64, c3: f64) -> [f64; 2] {
-    let root = libm::sqrt(c2 * c2 - 3.0 * c3 * w0);
-    let q = -(c2 + if c2 < 0.0 { -root } else { root });
-    let (a, b) = (q / (3.0 * c3), w0 / q);
-    if a < b { [a, b] } else { [b, a] }
-}
-
-/// A number whose `mul_add` rounds twice. A processor built for without a fused instruction
-/// calls a function for each one that rounds once, which takes longer than the whole step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Plain(f64);
-
-impl Add for Plain {
-    type Output = Self;
-
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Self(self.0 + other.0)
-    }
-}
-
-impl Sub for Plain {
-    type Output = Self;
-
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Self(self.0 - other.0)
-    }
-}
-
-impl Mul for Plain {
-    type Output = Self;
-
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        Self(self.0 * other.0)
-    }
-}
-
-impl Div for Plain {
-    type Output = Self;
-
-    #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        Self(self.0 / other.0)
-    }
-}
-
-impl Neg for Plain {
-    type Output = Self;
-
-    #[inline(always)]
-    fn neg(self) -> Self {
-        Self(-self.0)
-    }
-}
-
-impl Number for Plain {
-    #[inline(always)]
-    fn like(self, value: f64) -> Self {
-        Self(value)
-    }
-
-    #[inline(always)]
-    fn mul_add(self, factor: Self, term: Self) -> Self {
-        self * factor + term
-    }
-
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        Self(libm::sqrt(self.0))
-    }
-
-    #[inline]
-    fn lanewise<const A: usize>(arguments: [Self; A], function: impl Fn([f64; A]) -> f64) -> Self {
-        Self(function(arguments.map(|argument| argument.0)))
-    }
-
-    #[inline(always)]
-    fn where_negative(self, yes: Self, no: Self) -> Self {
-        if self.0 < 0.0 { yes } else { no }
-    }
-
-    #[inline(always)]
-    fn any_negative(self) -> bool {
-        self.0 < 0.0
+        Some(memory)
     }
 }

@@ -2,8 +2,9 @@
 
 use numpy::{PyArray1, ToPyArray};
 use piezotrack_control::{
-    BoucWenInverse, BoucWenInverseState, Command, Controller, ControllerState, DahlInverse, Filter,
-    InverseState, Limits, Pid, Repetitive, SampledDahlInverse, Smoothing, StateSpace,
+    BoucWenInverse, BoucWenInverseState, Command, Controller, ControllerState, DahlInverse,
+    FeedbackInverseState, Filter, FirstOrderDahlInverse, InverseState, Limits, OscillatorInverse,
+    Pid, Repetitive, SampledDahlInverse, Smoothing, StateSpace,
 };
 use piezotrack_core::simulate::{Law, LawState};
 use piezotrack_core::{Error, Result};
@@ -176,6 +177,8 @@ impl PySession {
 enum AnyInverse {
     Dahl(SampledDahlInverse, InverseState),
     BoucWen(BoucWenInverse, BoucWenInverseState),
+    FirstOrderDahl(FirstOrderDahlInverse, FeedbackInverseState),
+    Oscillator(OscillatorInverse, FeedbackInverseState),
 }
 
 impl AnyInverse {
@@ -191,6 +194,15 @@ impl AnyInverse {
                 let inverse = BoucWenInverse::new(m, b, k, d, alpha, beta, gamma, n)?;
                 Ok(Self::BoucWen(inverse, inverse.rest()))
             }
+            ("first-order-dahl", &[m, d, k, t, sigma, limit, i]) => {
+                let inverse = FirstOrderDahlInverse::new(m, d, k, t, (sigma, limit, i), dt)?;
+                Ok(Self::FirstOrderDahl(inverse, inverse.rest()))
+            }
+            ("bouc-wen-oscillator", &[m, c, k, alpha, beta, gamma, delta, nu]) => {
+                let hysteresis = (alpha, beta * gamma, beta * delta, nu);
+                let inverse = OscillatorInverse::new(m, c, k, hysteresis, dt)?;
+                Ok(Self::Oscillator(inverse, inverse.rest()))
+            }
             _ => Err(Error::parameter("model", format!("'{model}'"), "one that has an inverse")),
         }
     }
@@ -199,6 +211,8 @@ impl AnyInverse {
         match self {
             Self::Dahl(inverse, state) => inverse.step(state, x, v, a),
             Self::BoucWen(inverse, state) => inverse.step(state, x, v, a),
+            Self::FirstOrderDahl(inverse, state) => inverse.step(state, x, v, a),
+            Self::Oscillator(inverse, state) => inverse.step(state, x, v, a),
         }
     }
 
@@ -206,6 +220,8 @@ impl AnyInverse {
         match self {
             Self::Dahl(inverse, state) => *state = inverse.rest(),
             Self::BoucWen(inverse, state) => *state = inverse.rest(),
+            Self::FirstOrderDahl(inverse, state) => *state = inverse.rest(),
+            Self::Oscillator(inverse, state) => *state = inverse.rest(),
         }
     }
 }
