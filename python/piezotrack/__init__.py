@@ -27,14 +27,15 @@ if TYPE_CHECKING:
     from .dataset import Dataset
     from .estimates import Estimate, Progress, Run
     from .identification import Identification, identify
+    from .identified import Score
     from .inverse import Inverse, InverseSession
     from .io import read, read_drive
     from .laws import LowPass, Notch, Pid, Repetitive, StateSpace
     from .loopcheck import LoopCheck, LoopReport, LoopResponse, check_loop
-    from .modelfile import IdentifiedModel, Score, load
+    from .modelfile import IdentifiedModel, load
     from .models import DahlStage, Response, StageState
     from .plays import PlaysResponse, PlaysState, PrandtlIshlinskiiStage
-    from .playsfile import IdentifiedPlays, load_plays
+    from .playsfile import IdentifiedPlays
     from .playsfit import PlaysIdentification, identify_plays
     from .readings import StepReadings
     from .reference_text import parse_reference
@@ -99,7 +100,6 @@ __all__ = [
     "identify_plays",
     "identify_step",
     "load",
-    "load_plays",
     "multisine",
     "parse_reference",
     "read",
@@ -121,10 +121,7 @@ _HOMES = {
         "PlaysIdentification",
         "identify_plays",
     ),
-    "playsfile": (
-        "IdentifiedPlays",
-        "load_plays",
-    ),
+    "playsfile": ("IdentifiedPlays",),
     "plays": (
         "PlaysResponse",
         "PlaysState",
@@ -147,6 +144,7 @@ _HOMES = {
         "Progress",
         "Run",
     ),
+    "identified": ("Score",),
     "identification": (
         "Identification",
         "identify",
@@ -174,7 +172,6 @@ _HOMES = {
     ),
     "modelfile": (
         "IdentifiedModel",
-        "Score",
         "load",
     ),
     "models": (

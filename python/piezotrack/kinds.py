@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from . import _core
 from .bouc_wen import BoucWenStage
 from .errors import ParameterError
 from .models import DahlStage
+from .plays import PARAMETERS as PLAYS_PARAMETERS
+from .plays import PrandtlIshlinskiiStage
 
-__all__ = ["Kind", "Stage", "kind_named", "kind_of"]
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
-Stage = DahlStage | BoucWenStage
+__all__ = ["KINDS", "Kind", "Searched", "Stage", "kind_named", "kind_of"]
+
+Stage = DahlStage | BoucWenStage | PrandtlIshlinskiiStage
+# Names of those that a swarm searches, for types.
+Searched = Literal["dahl", "bouc-wen"]
 
 
 class Kind(NamedTuple):
@@ -29,23 +36,34 @@ class Kind(NamedTuple):
         Name, symbol and unit of each parameter.
     forces : str
         Symbols of what scales along with the stiffness.
+    searched : bool
+        Whether a swarm searches its parameters; else they follow by least squares.
     """
 
     name: str
     title: str
     stage: type[Stage]
-    parameters: list[tuple[str, str, str]]
-    forces: str
+    parameters: Sequence[tuple[str, str, str]]
+    forces: str = ""
+    searched: bool = True
 
     def built(self, values: list[float]) -> Stage:
         """Make a stage of values in the order of the parameters."""
-        names = self.stage.parameter_names()
-        return self.stage(**dict(zip(names, values, strict=True)))
+        names = [name for name, _, _ in self.parameters]
+        named: dict[str, Any] = dict(zip(names, values, strict=True))
+        return self.stage(**named)
 
 
 KINDS = (
     Kind("dahl", "Dahl", DahlStage, _core.DAHL_PARAMETERS, "M, D, T, b1 and b0"),
     Kind("bouc-wen", "Bouc-Wen", BoucWenStage, _core.BOUC_WEN_PARAMETERS, "m and b"),
+    Kind(
+        "prandtl-ishlinskii",
+        "Prandtl-Ishlinskii",
+        PrandtlIshlinskiiStage,
+        PLAYS_PARAMETERS,
+        searched=False,
+    ),
 )
 
 

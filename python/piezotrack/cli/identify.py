@@ -31,7 +31,7 @@ from .words import in_words
 if TYPE_CHECKING:
     from ..dataset import Dataset
     from ..identification import Identification
-    from ..modelfile import Score
+    from ..identified import Score
     from ..swarm import ParticleSwarm
 
 __all__ = ["identify_command"]
