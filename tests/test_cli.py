@@ -109,8 +109,35 @@ def test_a_second_log_judges_the_model() -> None:
     )
     score = pt.load("results/dahl.json").score(pt.read("second.csv")[1.0:3.0])
     assert f"not fitted, with an offset of its own: {score}" in printed
-    validation = [f"validation_{panel}.{e}" for panel in ("loop", "time") for e in ("png", "svg")]
+    validation = [
+        f"dahl_validation_{panel}.{e}" for panel in ("loop", "time") for e in ("png", "svg")
+    ]
     assert names("results") == sorted([*RESULTS, *validation])
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_several_kinds_are_identified_in_one_go() -> None:
+    models = ("--model", "prandtl-ishlinskii", "--model", "dahl")
+    printed = ran("identify", "log.csv", *models, "--window", "1:", "--seed", "2", "--runs", "1")
+    assert names("results") == ["dahl.json", "prandtl-ishlinskii.json"]
+    log = pt.read("log.csv")[1.0:]
+    for fit in (pt.identify_plays(log), pt.identify(log, seed=2, runs=1)):
+        kind = "dahl" if isinstance(fit, pt.Identification) else "prandtl-ishlinskii"
+        assert fit.summary() in printed
+        expected = fit.save("expected.json").read_bytes()
+        assert Path("results", f"{kind}.json").read_bytes() == expected
+    assert printed.index("Prandtl-Ishlinskii stage") < printed.index("Dahl stage")
+
+
+def test_pictures_of_several_kinds_do_not_collide() -> None:
+    models = ("--model", "prandtl-ishlinskii", "--model", "dahl")
+    second = ("--validate", "log.csv", "--runs", "1")
+    ran("identify", "log.csv", *models, *second)
+    panels = ["loop", "time", "validation_loop", "validation_time"]
+    pictures = {f"{m}_{panel}" for m in ("dahl", "prandtl-ishlinskii") for panel in panels}
+    pictures.add("dahl_convergence")
+    endings = {f"{name}.{ending}" for name in pictures for ending in ("png", "svg")}
+    assert names("results") == sorted(endings | {"dahl.json", "prandtl-ishlinskii.json"})
 
 
 def test_simulate_writes_the_displacement() -> None:

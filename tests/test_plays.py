@@ -338,6 +338,39 @@ def fitted() -> pt.PlaysIdentification:
     return pt.identify_plays(record(stage), creep=(0.1, 1.0))
 
 
+def test_identify_finds_the_same() -> None:
+    log = record(PLAIN, samples=1000)
+    fit = pt.identify(log, model="prandtl-ishlinskii", seed=3, threads=1)
+    assert fit.document() == pt.identify_plays(log).document()
+    bare = pt.identify(log, model="prandtl-ishlinskii", offset=False)
+    assert bare.offset == 0.0
+    assert not bare.offset_fitted
+
+
+REFUSED_BY_NAME: dict[str, Any] = {
+    "free": ["linear"],
+    "fixed": {"linear": 1e-6},
+    "bounds": {"linear": (0.0, 1e-6)},
+    "stiffness": 1e6,
+    "delay": 1e-3,
+    "swarm": pt.ParticleSwarm(),
+    "callback": print,
+    "initial": 5,
+}
+
+
+@pytest.mark.parametrize("name", REFUSED_BY_NAME)
+def test_what_has_no_meaning_for_plays_is_refused(name: str) -> None:
+    arguments: dict[str, Any] = {name: REFUSED_BY_NAME[name]}
+    with pytest.raises(pt.ParameterError, match=f"^{name} is .*: expected none with the model"):
+        pt.identify(record(PLAIN, samples=1000), model="prandtl-ishlinskii", **arguments)
+
+
+def test_the_number_of_values_fitted_counts_the_offset() -> None:
+    # 1 + 10 weights, 2 bends, 2 shares of the creep, a time constant, an offset.
+    assert fitted().free_count == 1 + 10 + 2 + 2 + 1 + 1
+
+
 def test_a_file_gives_back_the_same_bits(tmp_path: Path) -> None:
     fit = fitted()
     found = pt.load(fit.save(tmp_path / "pi.json"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 from . import _core, remarks
 from .bar import ProgressBar
@@ -13,9 +13,10 @@ from .documents import provenance
 from .errors import Interrupted, ParameterError
 from .estimates import Estimate, Progress, Run, StopReason
 from .identified import Fitted
-from .kinds import Kind, kind_named
+from .kinds import Kind, Searched, kind_named
 from .modelfile import IdentifiedModel
 from .models import DahlStage, Response
+from .playsfit import PlaysIdentification, identify_plays
 from .step import StepResult
 from .swarm import ParticleSwarm
 
@@ -125,9 +126,23 @@ class Identification(Fitted[Response], IdentifiedModel):
         return summary_text(self)
 
 
+@overload
 def identify(
     data: Dataset,
-    model: Literal["dahl", "bouc-wen"] = "dahl",
+    model: Literal["prandtl-ishlinskii"],
+    *,
+    offset: bool = True,
+    seed: int = 0,
+    runs: int = 4,
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> PlaysIdentification: ...
+
+
+@overload
+def identify(
+    data: Dataset,
+    model: Searched = "dahl",
     *,
     free: Iterable[str] | None = None,
     fixed: Mapping[str, float] | None = None,
@@ -142,7 +157,40 @@ def identify(
     threads: int | None = None,
     progress: bool | None = None,
     callback: Callable[[Progress], object] | None = None,
-) -> Identification:
+) -> Identification: ...
+
+
+@overload
+def identify(
+    data: Dataset,
+    model: str,
+    *,
+    offset: bool = True,
+    seed: int = 0,
+    runs: int = 4,
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> Identification | PlaysIdentification: ...
+
+
+def identify(
+    data: Dataset,
+    model: str = "dahl",
+    *,
+    free: Iterable[str] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    initial: StepResult | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    stiffness: float | None = None,
+    offset: bool = True,
+    delay: bool | float | tuple[float, float] = False,
+    swarm: ParticleSwarm | None = None,
+    seed: int = 0,
+    runs: int = 4,
+    threads: int | None = None,
+    progress: bool | None = None,
+    callback: Callable[[Progress], object] | None = None,
+) -> Identification | PlaysIdentification:
     r"""Find the parameters with which a stage model follows a record best.
 
     Minimises the RMS deviation over the record's window,
@@ -162,8 +210,11 @@ def identify(
     data : Dataset
         The record. ``log[3.0:23.0]`` counts this window only and keeps the drive before it as
         warm-up.
-    model : {"dahl", "bouc-wen"}, optional
-        The kind of stage: `DahlStage` or `BoucWenStage`.
+    model : {"dahl", "bouc-wen", "prandtl-ishlinskii"}, optional
+        The kind of stage: `DahlStage`, `BoucWenStage` or `PrandtlIshlinskiiStage`. The last is
+        found by least squares, as `identify_plays` does with its defaults: nothing is searched
+        at random, so `offset` alone of what follows has a meaning, and `seed`, `runs`, `threads`
+        and `progress` make no difference.
     free : iterable of str, optional
         Parameters to search: all that are not fixed, where not given. `b0`, dry friction at
         reversals, is held at 0 unless it is named here or in `fixed`, and the exponent of a
@@ -203,13 +254,14 @@ def identify(
 
     Returns
     -------
-    Identification
-        The model, its parameters and how they were found.
+    Identification or PlaysIdentification
+        The model, its parameters and how they were found; the latter of a Prandtl-Ishlinskii
+        stage.
 
     Raises
     ------
     ParameterError
-        An argument has a value that cannot be used.
+        An argument has a value that cannot be used, or no meaning for this kind of stage.
     DataError
         The drive or the displacement is constant in the window, or hysteresis is searched
         where neither ever turns back.
@@ -236,6 +288,12 @@ def identify(
     if not isinstance(data, Dataset):
         raise ParameterError(f"data is {type(data).__name__}: expected a Dataset, see pt.read")
     kind = kind_named(model)
+    if not kind.searched:
+        _refuse_search(
+            *(kind, "free", free, "fixed", fixed, "initial", initial, "bounds", bounds),
+            *("stiffness", stiffness, "delay", delay, "swarm", swarm, "callback", callback),
+        )
+        return identify_plays(data, offset=offset)
     swarm = ParticleSwarm() if swarm is None else swarm
     if not isinstance(swarm, ParticleSwarm):
         raise ParameterError(f"swarm is {swarm!r}: expected a ParticleSwarm, as pt.ParticleSwarm()")
@@ -278,6 +336,16 @@ def identify(
             f"interrupted after {fit.nit} iterations, best cost {fit.cost_um:.4g} um", fit
         )
     return fit
+
+
+def _refuse_search(kind: Kind, *given: object) -> None:
+    """Refuse what only a search of parameters by their names can use: names and values in turn."""
+    for name, value in zip(given[::2], given[1::2], strict=True):
+        if not (value is None or value is False or value == {}):
+            raise ParameterError(
+                f"{name} is {value!r}: expected none with the model {kind.name!r}, whose "
+                "parameters follow by least squares"
+            )
 
 
 def _telling(kind: Kind, callback: Callable[[Progress], object]) -> Callable[..., bool]:

@@ -325,6 +325,21 @@ class Fitted(Identified[R]):
         """Score on the record that was identified, converged in the sub-steps."""
         return self.score(self.data, offset=self.offset)
 
+    @property
+    def notes(self) -> list[str]:
+        """What a careful reader should know before using the result."""
+        raise NotImplementedError
+
+    def summary(self) -> str:
+        """Table of the result.
+
+        Returns
+        -------
+        str
+            Several lines: the cost, then the parameters.
+        """
+        raise NotImplementedError
+
     def _remarks(self, held: Collection[str]) -> list[str]:
         """Say what is odd about the record, and what the fit leaves of its loop."""
         notes = remarks.of_record(self.data)
