@@ -23,6 +23,7 @@ from .errors import (
 
 if TYPE_CHECKING:
     from .bouc_wen import BoucWenStage, BoucWenState
+    from .comparison import Compared, Comparison, compare
     from .control import Command, Controller, Session
     from .dataset import Dataset
     from .estimates import Estimate, Progress, Run
@@ -50,6 +51,8 @@ __all__ = [
     "BoucWenStage",
     "BoucWenState",
     "Command",
+    "Compared",
+    "Comparison",
     "Controller",
     "DahlStage",
     "DataError",
@@ -96,6 +99,7 @@ __all__ = [
     "__version__",
     "check_loop",
     "chirp",
+    "compare",
     "identify",
     "identify_plays",
     "identify_step",
@@ -133,6 +137,11 @@ _HOMES = {
         "identify_step",
     ),
     "readings": ("StepReadings",),
+    "comparison": (
+        "Compared",
+        "Comparison",
+        "compare",
+    ),
     "control": (
         "Command",
         "Controller",

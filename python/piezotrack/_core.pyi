@@ -42,6 +42,7 @@ __all__ = [
     "nnls",
     "period_metrics",
     "read_step",
+    "residual",
     "track_dahl",
     "tracking_metrics",
     "turns",
@@ -197,6 +198,7 @@ def tracking_metrics(
 def period_metrics(
     desired: ArrayLike, actual: ArrayLike, dt: float, period: float
 ) -> list[tuple[float, float, float, float, float, float | None, float | None]]: ...
+def residual(errors: ArrayLike, fitted: int) -> tuple[float, float, float, float, float]: ...
 def check_loop(controller: Controller, plant: LoopPlant) -> dict[str, Any]: ...
 def loop_response(
     controller: Controller, plant: LoopPlant, frequency: list[float]

@@ -35,6 +35,7 @@ __all__ = [
     "plot_loop",
     "plot_response",
     "plot_time",
+    "thinned",
 ]
 
 # Told apart in black and white as well, also where many cycles lie on each other.
@@ -65,7 +66,7 @@ def plot_loop(data: Dataset, run: Response | PlaysResponse, ax: Axes | None = No
     (ax,) = axes_or_new(ax, 1)
     unit, scale = best_length_unit(data.stroke)
     for y, style in ((data.y, MEASURED), (run.x, SIMULATED)):
-        kept = _kept(y)
+        kept = thinned(y)
         ax.plot(data.u[kept], scale * y[kept], **style)
     ax.set(xlabel=f"drive [{data.drive_unit}]", ylabel=f"displacement [{unit}]")
     ax.set_title("Hysteresis loop")
@@ -106,14 +107,14 @@ def plot_time(
     error = data.y - run.x
     small, fine = best_length_unit(float(np.abs(error).max()))
     for y, style in ((data.y, MEASURED), (run.x, SIMULATED)):
-        kept = _kept(y)
+        kept = thinned(y)
         above.plot(data.t[kept], scale * y[kept], **style)
     above.set(ylabel=f"displacement [{unit}]", title="Displacement over time")
     above.margins(x=0.0, y=0.05)
     top = above.get_ylim()[1] - above.get_ylim()[0]
     above.set_ylim(top=above.get_ylim()[1] + 0.22 * top)
     above.legend(loc="upper right", ncols=2, frameon=False)
-    kept = _kept(error)
+    kept = thinned(error)
     below.plot(data.t[kept], fine * error[kept], **ERROR)
     below.axhline(0.0, color="0.7", linewidth=0.8, zorder=0)
     below.set(xlabel="time [s]", ylabel=f"error [{small}]")
@@ -196,7 +197,7 @@ def plot_response(t: Array, u: Array, x: Array) -> Figure:
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.2), layout="constrained")
     unit, scale = best_length_unit(float(np.ptp(x)))
-    kept = _kept(x)
+    kept = thinned(x)
     left.plot(t[kept], scale * x[kept], **SIMULATED)
     left.set(xlabel="time [s]", ylabel=f"displacement [{unit}]", title="Displacement over time")
     left.margins(x=0.0)
@@ -250,7 +251,7 @@ def axes_or_new(given: Axes | Sequence[Axes] | None, count: int) -> list[Axes]:
     return list(given) if isinstance(given, (list, tuple, np.ndarray)) else [given]  # type: ignore[list-item]
 
 
-def _kept(values: Array) -> NDArray[np.intp]:
+def thinned(values: Array) -> NDArray[np.intp]:
     """Choose the samples to draw: of a long signal, the extremes of each stretch.
 
     A glitch of one sample is just what one looks for.
