@@ -1,5 +1,29 @@
-"""What all tests share: pictures are drawn without a screen."""
+"""What all tests share: pictures are drawn without a screen, and left out where asked for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import matplotlib as mpl
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
 
 mpl.use("Agg")
+
+
+@pytest.fixture
+def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave the pictures out, which take longer than all the rest."""
+    import matplotlib.pyplot as plt
+
+    def none(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
+        del figures, folder
+        plt.close("all")
+        return []
+
+    monkeypatch.setattr("piezotrack.report.save_figures", none)

@@ -104,7 +104,8 @@ def quick_fit(**arguments: Any) -> pt.Identification:
         "seed": 1,
     }
     wanted.update(arguments)
-    return pt.identify(wanted.pop("data", quick()), **wanted)
+    fit: pt.Identification = pt.identify(wanted.pop("data", quick()), **wanted)
+    return fit
 
 
 def bits(fit: pt.Identification) -> dict[str, Any]:

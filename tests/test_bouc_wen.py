@@ -319,7 +319,7 @@ def test_what_a_search_of_this_model_refuses() -> None:
     with pytest.raises(pt.ParameterError, match="a1"):
         pt.identify(log(), model="bouc-wen", fixed={"a1": 1.0})
     with pytest.raises(pt.ParameterError, match="'dahl' or 'bouc-wen'"):
-        pt.identify(log(), model="preisach")  # type: ignore[arg-type]
+        pt.identify(log(), model="preisach")
 
 
 def test_without_a_force_the_scale_is_assumed() -> None:

@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 import json
-import re
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import piezotrack as pt
+from commands import ran, refusal
 from loops import PID, STAGE, fitted, loop, sine
-from piezotrack.cli import app
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from matplotlib.figure import Figure
 
 COURSE = "sine:0.5Hz,0..110um,6s"
 ROWS = "time_s,desired_um,measured_um,voltage_V,feedforward_V,feedback_V,repetitive_V"
@@ -37,38 +30,6 @@ def model_text() -> str:
 def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("dahl.json").write_text(model_text(), encoding="utf-8")
-
-
-@pytest.fixture
-def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    import matplotlib.pyplot as plt
-
-    def none(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
-        del figures, folder
-        plt.close("all")
-        return []
-
-    monkeypatch.setattr("piezotrack.report.save_figures", none)
-
-
-def run(*arguments: str) -> Any:
-    return CliRunner().invoke(app, arguments)
-
-
-def ran(*arguments: str) -> str:
-    result = run(*arguments)
-    assert (result.exit_code, result.stderr) == (0, ""), result.output
-    return str(result.stdout)
-
-
-def refusal(*arguments: str) -> str:
-    """Call the command, which has to refuse, and return its one sentence."""
-    result = run(*arguments)
-    assert result.exit_code == 2, result.output
-    assert isinstance(result.exception, SystemExit)
-    assert result.stdout == ""
-    assert re.fullmatch(r"piezotrack: [^\n]+\n", result.stderr), result.stderr
-    return str(result.stderr).removeprefix("piezotrack: ").rstrip("\n")
 
 
 def table(path: str) -> Any:

@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import piezotrack as pt
@@ -193,7 +194,7 @@ def test_the_examples_run(example: Path, tmp_path: Path) -> None:
     assert written
     for path in written:
         if path.suffix == ".json":
-            assert pt.load(path).model.mass > 0.0
+            assert np.isfinite(pt.load(path).model.simulate([0.0, 1.0], 0.01).x).all()
 
 
 def test_every_public_name_is_there_and_listed() -> None:

@@ -51,7 +51,7 @@ def content_of(path: Path) -> dict[str, Any]:
     return content
 
 
-def in_bits(model: pt.IdentifiedModel) -> list[str]:
+def in_bits(model: pt.IdentifiedModel | pt.IdentifiedPlays) -> list[str]:
     stage = asdict(model.model)
     return [stage[name].hex() for name in NAMES] + [model.offset.hex(), model.stroke.hex()]
 
@@ -95,6 +95,7 @@ def test_there_and_back_bit_for_bit(tmp_path: Path, seed: int) -> None:
     back = pt.load(path)
     assert in_bits(back) == in_bits(model)
     assert back.offset_fitted == model.offset_fitted
+    assert isinstance(back, pt.IdentifiedModel)
     assert back.scale_assumed == model.scale_assumed
 
 

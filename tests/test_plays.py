@@ -338,9 +338,42 @@ def fitted() -> pt.PlaysIdentification:
     return pt.identify_plays(record(stage), creep=(0.1, 1.0))
 
 
+def test_identify_finds_the_same() -> None:
+    log = record(PLAIN, samples=1000)
+    fit = pt.identify(log, model="prandtl-ishlinskii", seed=3, threads=1)
+    assert fit.document() == pt.identify_plays(log).document()
+    bare = pt.identify(log, model="prandtl-ishlinskii", offset=False)
+    assert bare.offset == 0.0
+    assert not bare.offset_fitted
+
+
+REFUSED_BY_NAME: dict[str, Any] = {
+    "free": ["linear"],
+    "fixed": {"linear": 1e-6},
+    "bounds": {"linear": (0.0, 1e-6)},
+    "stiffness": 1e6,
+    "delay": 1e-3,
+    "swarm": pt.ParticleSwarm(),
+    "callback": print,
+    "initial": 5,
+}
+
+
+@pytest.mark.parametrize("name", REFUSED_BY_NAME)
+def test_what_has_no_meaning_for_plays_is_refused(name: str) -> None:
+    arguments: dict[str, Any] = {name: REFUSED_BY_NAME[name]}
+    with pytest.raises(pt.ParameterError, match=f"^{name} is .*: expected none with the model"):
+        pt.identify(record(PLAIN, samples=1000), model="prandtl-ishlinskii", **arguments)
+
+
+def test_the_number_of_values_fitted_counts_the_offset() -> None:
+    # 1 + 10 weights, 2 bends, 2 shares of the creep, a time constant, an offset.
+    assert fitted().free_count == 1 + 10 + 2 + 2 + 1 + 1
+
+
 def test_a_file_gives_back_the_same_bits(tmp_path: Path) -> None:
     fit = fitted()
-    found = pt.load_plays(fit.save(tmp_path / "pi.json"))
+    found = pt.load(fit.save(tmp_path / "pi.json"))
     assert found.model == fit.model
     assert (found.offset, found.stroke, found.offset_fitted) == (fit.offset, fit.stroke, True)
     again = found.save(tmp_path / "again.json")
@@ -357,7 +390,8 @@ BROKEN: dict[str, tuple[Any, str]] = {
     "weight": (lambda d: d["parameters"]["weights"]["value"].pop(), "weights has 9 entries"),
     "form": (lambda d: d["parameters"]["weights"].update(value=5.0), "is not of the form"),
     "stroke": (lambda d: d["stroke"].update(value=0.0), "stroke is 0.0 m"),
-    "model": (lambda d: d.update(model="dahl"), "holds a model 'dahl'"),
+    "model": (lambda d: d.update(model="dahl"), "the entry 'mass' is missing"),
+    "no model": (lambda d: d.update(model="plays"), "holds a model 'plays': expected 'dahl'"),
     "version": (lambda d: d.update(schema_version=2), "has schema_version 2"),
 }
 
@@ -370,12 +404,7 @@ def test_a_broken_file_is_refused(name: str, tmp_path: Path) -> None:
     breaks(document)
     (tmp_path / "broken.json").write_text(json.dumps(document))
     with pytest.raises(pt.DataError, match=words):
-        pt.load_plays(tmp_path / "broken.json")
-
-
-def test_the_other_loader_names_the_model(tmp_path: Path) -> None:
-    with pytest.raises(pt.DataError, match="holds a model 'prandtl-ishlinskii'"):
-        pt.load(fitted().save(tmp_path / "pi.json"))
+        pt.load(tmp_path / "broken.json")
 
 
 def test_the_summary_names_every_part() -> None:

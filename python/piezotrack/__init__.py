@@ -23,21 +23,23 @@ from .errors import (
 
 if TYPE_CHECKING:
     from .bouc_wen import BoucWenStage, BoucWenState
+    from .comparison import Compared, Comparison, compare
     from .control import Command, Controller, Session
     from .dataset import Dataset
     from .estimates import Estimate, Progress, Run
     from .first_order_dahl import FirstOrderDahlStage
     from .identification import Identification, identify
+    from .identified import Score
     from .inverse import Inverse, InverseSession
     from .io import read, read_drive
     from .kinked import FeedbackState
     from .laws import LowPass, Notch, Pid, Repetitive, StateSpace
     from .loopcheck import LoopCheck, LoopReport, LoopResponse, check_loop
-    from .modelfile import IdentifiedModel, Score, load
+    from .modelfile import IdentifiedModel, load
     from .models import DahlStage, Response, StageState
     from .oscillator import BoucWenOscillator
     from .plays import PlaysResponse, PlaysState, PrandtlIshlinskiiStage
-    from .playsfile import IdentifiedPlays, load_plays
+    from .playsfile import IdentifiedPlays
     from .playsfit import PlaysIdentification, identify_plays
     from .readings import StepReadings
     from .reference_text import parse_reference
@@ -53,6 +55,8 @@ __all__ = [
     "BoucWenStage",
     "BoucWenState",
     "Command",
+    "Compared",
+    "Comparison",
     "Controller",
     "DahlStage",
     "DataError",
@@ -101,11 +105,11 @@ __all__ = [
     "__version__",
     "check_loop",
     "chirp",
+    "compare",
     "identify",
     "identify_plays",
     "identify_step",
     "load",
-    "load_plays",
     "multisine",
     "parse_reference",
     "read",
@@ -130,10 +134,7 @@ _HOMES = {
         "PlaysIdentification",
         "identify_plays",
     ),
-    "playsfile": (
-        "IdentifiedPlays",
-        "load_plays",
-    ),
+    "playsfile": ("IdentifiedPlays",),
     "plays": (
         "PlaysResponse",
         "PlaysState",
@@ -145,6 +146,11 @@ _HOMES = {
         "identify_step",
     ),
     "readings": ("StepReadings",),
+    "comparison": (
+        "Compared",
+        "Comparison",
+        "compare",
+    ),
     "control": (
         "Command",
         "Controller",
@@ -156,6 +162,7 @@ _HOMES = {
         "Progress",
         "Run",
     ),
+    "identified": ("Score",),
     "identification": (
         "Identification",
         "identify",
@@ -183,7 +190,6 @@ _HOMES = {
     ),
     "modelfile": (
         "IdentifiedModel",
-        "Score",
         "load",
     ),
     "models": (

@@ -29,11 +29,9 @@ __all__ = [
     "as_number",
     "as_truth",
     "bouc_wen_benchmark",
-    "bouc_wen_check",
     "bouc_wen_simulate",
     "bouc_wen_xu_li_2010",
     "check_loop",
-    "dahl_check",
     "dahl_simulate",
     "dahl_simulate_fixed",
     "dahl_xu_li_2010",
@@ -46,6 +44,7 @@ __all__ = [
     "nnls",
     "period_metrics",
     "read_step",
+    "residual",
     "stage_check",
     "track_dahl",
     "tracking_metrics",
@@ -61,7 +60,6 @@ FIRST_ORDER_DAHL_PARAMETERS: list[tuple[str, str, str]]
 def as_number(name: str, value: object) -> float: ...
 def as_count(name: str, value: object) -> int: ...
 def as_truth(name: str, value: object) -> bool: ...
-def dahl_check(theta: tuple[float, ...]) -> None: ...
 def dahl_xu_li_2010() -> list[float]: ...
 def dahl_simulate(
     theta: tuple[float, ...],
@@ -171,7 +169,6 @@ class Search:
     @property
     def sensitivities(self) -> list[tuple[int, float, bool]]: ...
 
-def bouc_wen_check(theta: tuple[float, ...]) -> None: ...
 def bouc_wen_xu_li_2010(corrected: bool) -> list[float]: ...
 def bouc_wen_simulate(
     theta: tuple[float, ...],
@@ -215,6 +212,7 @@ def tracking_metrics(
 def period_metrics(
     desired: ArrayLike, actual: ArrayLike, dt: float, period: float
 ) -> list[tuple[float, float, float, float, float, float | None, float | None]]: ...
+def residual(errors: ArrayLike, fitted: int) -> tuple[float, float, float, float, float]: ...
 def check_loop(controller: Controller, plant: LoopPlant) -> dict[str, Any]: ...
 def loop_response(
     controller: Controller, plant: LoopPlant, frequency: list[float]

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Literal
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from . import _core
+from .lumped import LumpedStage
 from .models import Response
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from .dataset import Hold
-    from .inverse import Inverse
 
 __all__ = ["BoucWenStage", "BoucWenState"]
 
@@ -47,7 +47,7 @@ class BoucWenState:
 
 
 @dataclass(frozen=True, kw_only=True)
-class BoucWenStage:
+class BoucWenStage(LumpedStage):
     r"""A stage with Bouc-Wen hysteresis at its input.
 
     .. math::
@@ -109,25 +109,8 @@ class BoucWenStage:
     gamma: float
     exponent: float = 1.0
 
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = _core.as_number(field.name, getattr(self, field.name))
-            object.__setattr__(self, field.name, value)
-        _core.bouc_wen_check(self.theta)
-
-    @property
-    def theta(self) -> tuple[float, ...]:
-        """The parameters in their order."""
-        return (
-            self.mass,
-            self.damping,
-            self.stiffness,
-            self.piezo_coefficient,
-            self.alpha,
-            self.beta,
-            self.gamma,
-            self.exponent,
-        )
+    _parameters = _core.BOUC_WEN_PARAMETERS
+    _kind = "bouc-wen"
 
     @classmethod
     def xu_li_2010(cls) -> BoucWenStage:
@@ -163,38 +146,6 @@ class BoucWenStage:
     def _published(cls, *, corrected: bool) -> BoucWenStage:
         values = _core.bouc_wen_xu_li_2010(corrected)
         return cls(**dict(zip(cls.parameter_names(), values, strict=True)))
-
-    @staticmethod
-    def parameter_names() -> tuple[str, ...]:
-        """Names of the parameters, in their order.
-
-        Returns
-        -------
-        tuple of str
-            As the constructor takes them.
-        """
-        return tuple(name for name, _, _ in _core.BOUC_WEN_PARAMETERS)
-
-    def inverse(
-        self, *, playback: Literal["table", "online"] = "table", settle: int = 1
-    ) -> Inverse:
-        """Feedforward of the bare stage, as `Inverse` describes.
-
-        Parameters
-        ----------
-        playback : {"table", "online"}, optional
-            Whether one settled period is played again and again, or all is computed.
-        settle : int, optional
-            Periods before the one of the table.
-
-        Returns
-        -------
-        Inverse
-            For `Controller` or on its own.
-        """
-        from .inverse import Inverse
-
-        return Inverse(stage=self, playback=playback, settle=settle)
 
     def simulate(
         self,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from . import _core
 from .checks import finite, positive
@@ -14,8 +14,8 @@ from .inverse import Inverse, InverseSession
 from .laws import LowPass, Notch, Pid, Repetitive, StateSpace
 
 if TYPE_CHECKING:
+    from .identified import Identified
     from .loopcheck import LoopReport
-    from .modelfile import IdentifiedModel
     from .models import DahlStage
     from .virtual import VirtualStage
 
@@ -130,7 +130,7 @@ class Controller:
         object.__setattr__(self, "core", core)
 
     def check(
-        self, stage: VirtualStage | DahlStage | IdentifiedModel, *, delay: float = 0.0
+        self, stage: VirtualStage | DahlStage | Identified[Any], *, delay: float = 0.0
     ) -> LoopReport:
         """Gain and phase margins on a stage, and whether the loop is stable: see `check_loop`.
 

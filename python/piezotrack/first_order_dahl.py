@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from . import _core
 from .kinked import KinkedStage
@@ -66,8 +65,8 @@ class FirstOrderDahlStage(KinkedStage):
     [11.0023 11.0157 11.0157] 0.02 nm
     """
 
-    KIND: ClassVar[str] = "first-order-dahl"
-    PARAMETERS: ClassVar[list[tuple[str, str, str]]] = _core.FIRST_ORDER_DAHL_PARAMETERS
+    _kind = "first-order-dahl"
+    _parameters = _core.FIRST_ORDER_DAHL_PARAMETERS
 
     mass: float
     damping: float

@@ -4,41 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 from . import _core, remarks
 from .bar import ProgressBar
 from .dataset import Dataset
+from .documents import provenance
 from .errors import Interrupted, ParameterError
 from .estimates import Estimate, Progress, Run, StopReason
-from .kinds import Kind, kind_named, kind_of
-from .modelfile import IdentifiedModel, Score
-from .models import DahlStage
+from .identified import Fitted
+from .kinds import Kind, Searched, kind_named
+from .modelfile import IdentifiedModel
+from .models import DahlStage, Response
+from .playsfit import PlaysIdentification, identify_plays
 from .step import StepResult
 from .swarm import ParticleSwarm
 
 if TYPE_CHECKING:
     import numpy as np
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
 __all__ = ["Identification", "identify"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Identification(IdentifiedModel):
+class Identification(Fitted[Response], IdentifiedModel):
     """What a search found; see `IdentifiedModel` for what can be done with it.
 
     Attributes
     ----------
-    data : Dataset
-        The record.
     parameters : dict of str to Estimate
         The parameters with units, bounds and standard deviations; the delay with them where it
         was fitted.
-    cost : float
-        RMS deviation in the window [m], equation (16) of Xu and Li 2010.
     history : ndarray, shape (nit + 1,)
         Best cost after each iteration [m].
     nit : int
@@ -60,9 +57,7 @@ class Identification(IdentifiedModel):
         Settings of the search.
     """
 
-    data: Dataset
     parameters: Mapping[str, Estimate]
-    cost: float
     history: NDArray[np.float64]
     nit: int
     nfev: int
@@ -75,36 +70,16 @@ class Identification(IdentifiedModel):
     seed: int
     swarm: ParticleSwarm
 
-    def __repr__(self) -> str:
-        return (
-            f"<Identification of a {kind_of(self.model).title} stage: {self.cost_um:.4g} um rms, "
-            f"{self.cost_percent:.3g} % of stroke; see summary()>"
-        )
-
     @property
     def fun(self) -> float:
         """The cost [m], under SciPy's name."""
         return self.cost
 
     @property
-    def cost_um(self) -> float:
-        """The cost [um]."""
-        return 1e6 * self.cost
-
-    @property
-    def cost_percent(self) -> float:
-        """The cost in per cent of the stroke."""
-        return 100.0 * self.cost / self.stroke
-
-    @property
     def notes(self) -> list[str]:
         """What a careful reader should know before using the result."""
-        notes = remarks.of_record(self.data)
-        if self.cost_percent > 5.0:
-            notes.append(
-                f"the model does not follow this record: {self.cost_percent:.3g} % of stroke remain"
-            )
-        notes += self._shape
+        held = [name for name, estimate in self.parameters.items() if not estimate.free]
+        notes = self._remarks(held)
         rubs = isinstance(self.model, DahlStage) and self.model.b0 != 0.0
         if rubs and not self.simulate(self.data).well_posed:
             notes.append(
@@ -113,15 +88,6 @@ class Identification(IdentifiedModel):
         if len(self.runs) > 1 and self.agreeing == 1:
             notes.append("no other run ended where the best one did: try more, with runs=")
         return notes
-
-    @cached_property
-    def _shape(self) -> list[str]:
-        """What the loop's shape says of the model."""
-        if self.cost_percent <= remarks.REMAINS:
-            return []
-        x = self.simulate(self.data, offset=self.offset).x
-        held = [name for name, estimate in self.parameters.items() if not estimate.free]
-        return remarks.of_fit(self.data, x, self.cost_percent, held)
 
     @property
     def agreeing(self) -> int:
@@ -147,11 +113,6 @@ class Identification(IdentifiedModel):
             "interrupted": "interrupted",
         }[self.stop_reason]
 
-    @cached_property
-    def fitted(self) -> Score:
-        """Score on the record that was identified, converged in the sub-steps."""
-        return self.score(self.data, offset=self.offset)
-
     def summary(self) -> str:
         """Table of the result.
 
@@ -164,27 +125,24 @@ class Identification(IdentifiedModel):
 
         return summary_text(self)
 
-    def plot(self, data: Dataset | None = None) -> Figure:
-        """Loop, displacement with its error over time, and convergence of the swarm.
 
-        Parameters
-        ----------
-        data : Dataset, optional
-            Another record to show the model on.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            Not yet shown or saved.
-        """
-        from .plotting import plot_identification
-
-        return plot_identification(self, data)
-
-
+@overload
 def identify(
     data: Dataset,
-    model: Literal["dahl", "bouc-wen"] = "dahl",
+    model: Literal["prandtl-ishlinskii"],
+    *,
+    offset: bool = True,
+    seed: int = 0,
+    runs: int = 4,
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> PlaysIdentification: ...
+
+
+@overload
+def identify(
+    data: Dataset,
+    model: Searched = "dahl",
     *,
     free: Iterable[str] | None = None,
     fixed: Mapping[str, float] | None = None,
@@ -199,7 +157,40 @@ def identify(
     threads: int | None = None,
     progress: bool | None = None,
     callback: Callable[[Progress], object] | None = None,
-) -> Identification:
+) -> Identification: ...
+
+
+@overload
+def identify(
+    data: Dataset,
+    model: str,
+    *,
+    offset: bool = True,
+    seed: int = 0,
+    runs: int = 4,
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> Identification | PlaysIdentification: ...
+
+
+def identify(
+    data: Dataset,
+    model: str = "dahl",
+    *,
+    free: Iterable[str] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    initial: StepResult | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    stiffness: float | None = None,
+    offset: bool = True,
+    delay: bool | float | tuple[float, float] = False,
+    swarm: ParticleSwarm | None = None,
+    seed: int = 0,
+    runs: int = 4,
+    threads: int | None = None,
+    progress: bool | None = None,
+    callback: Callable[[Progress], object] | None = None,
+) -> Identification | PlaysIdentification:
     r"""Find the parameters with which a stage model follows a record best.
 
     Minimises the RMS deviation over the record's window,
@@ -219,8 +210,11 @@ def identify(
     data : Dataset
         The record. ``log[3.0:23.0]`` counts this window only and keeps the drive before it as
         warm-up.
-    model : {"dahl", "bouc-wen"}, optional
-        The kind of stage: `DahlStage` or `BoucWenStage`.
+    model : {"dahl", "bouc-wen", "prandtl-ishlinskii"}, optional
+        The kind of stage: `DahlStage`, `BoucWenStage` or `PrandtlIshlinskiiStage`. The last is
+        found by least squares, as `identify_plays` does with its defaults: nothing is searched
+        at random, so `offset` alone of what follows has a meaning, and `seed`, `runs`, `threads`
+        and `progress` make no difference.
     free : iterable of str, optional
         Parameters to search: all that are not fixed, where not given. `b0`, dry friction at
         reversals, is held at 0 unless it is named here or in `fixed`, and the exponent of a
@@ -260,13 +254,14 @@ def identify(
 
     Returns
     -------
-    Identification
-        The model, its parameters and how they were found.
+    Identification or PlaysIdentification
+        The model, its parameters and how they were found; the latter of a Prandtl-Ishlinskii
+        stage.
 
     Raises
     ------
     ParameterError
-        An argument has a value that cannot be used.
+        An argument has a value that cannot be used, or no meaning for this kind of stage.
     DataError
         The drive or the displacement is constant in the window, or hysteresis is searched
         where neither ever turns back.
@@ -293,6 +288,12 @@ def identify(
     if not isinstance(data, Dataset):
         raise ParameterError(f"data is {type(data).__name__}: expected a Dataset, see pt.read")
     kind = kind_named(model)
+    if not kind.searched:
+        _refuse_search(
+            *(kind, "free", free, "fixed", fixed, "initial", initial, "bounds", bounds),
+            *("stiffness", stiffness, "delay", delay, "swarm", swarm, "callback", callback),
+        )
+        return identify_plays(data, offset=offset)
     swarm = ParticleSwarm() if swarm is None else swarm
     if not isinstance(swarm, ParticleSwarm):
         raise ParameterError(f"swarm is {swarm!r}: expected a ParticleSwarm, as pt.ParticleSwarm()")
@@ -302,8 +303,8 @@ def identify(
     offset = _core.as_truth("offset", offset)
     late = _delay(delay)
     held = _held(initial, fixed, free, bounds)
-    searched = {"a1", "a2", "b1", "alpha", "beta", "gamma"} & set(kind.stage.parameter_names())
-    searched -= set(held)
+    searched = {name for name, _, _ in kind.parameters} - set(held)
+    searched &= {"a1", "a2", "b1", "alpha", "beta", "gamma"}
     remarks.refuse(data, searches_hysteresis=bool(searched))
     full = data.full
     with ProgressBar(progress) as bar:
@@ -335,6 +336,16 @@ def identify(
             f"interrupted after {fit.nit} iterations, best cost {fit.cost_um:.4g} um", fit
         )
     return fit
+
+
+def _refuse_search(kind: Kind, *given: object) -> None:
+    """Refuse what only a search of parameters by their names can use: names and values in turn."""
+    for name, value in zip(given[::2], given[1::2], strict=True):
+        if not (value is None or value is False or value == {}):
+            raise ParameterError(
+                f"{name} is {value!r}: expected none with the model {kind.name!r}, whose "
+                "parameters follow by least squares"
+            )
 
 
 def _telling(kind: Kind, callback: Callable[[Progress], object]) -> Callable[..., bool]:
@@ -434,23 +445,7 @@ def _identification(
             "substeps": found.substeps,
             "order": found.order,
         },
-        "provenance": {
-            "package": "piezotrack",
-            "version": _core.__version__,
-            "seed": seed,
-            "swarm": asdict(swarm),
-            "data": {
-                "source": data.source,
-                "sha256": data.sha256,
-                "samples": len(data),
-                "warmup_samples": data.warmup,
-                "window_s": [float(data.t[0]), float(data.t[-1])],
-                "dt_s": data.dt,
-                "drive_range": [float(data.full.u.min()), float(data.full.u.max())],
-                "drive_unit": data.drive_unit,
-                "hold": data.hold,
-            },
-        },
+        "provenance": provenance(data, seed=seed, swarm=asdict(swarm)),
     }
     return Identification(
         model=kind.built(found.theta[:-1]),

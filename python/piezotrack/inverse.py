@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from . import _core
-from .bouc_wen import BoucWenStage
 from .checks import finite, not_negative, positive
 from .errors import ParameterError
-from .models import DahlStage
+from .kinds import Stage, kind_of
 from .motions import Spline
 from .plays import PlaysState, PrandtlIshlinskiiStage
 from .references import Reference
@@ -44,7 +43,7 @@ class Inverse:
 
     Parameters
     ----------
-    stage : DahlStage, BoucWenStage or PrandtlIshlinskiiStage
+    stage : DahlStage or another kind of stage
         The model.
     offset : float, optional
         What the sensor shows where the stage is at rest without drive [m].
@@ -73,7 +72,7 @@ class Inverse:
     True
     """
 
-    stage: DahlStage | BoucWenStage | PrandtlIshlinskiiStage
+    stage: Stage
     offset: float = 0.0
     delay: float = 0.0
     playback: Playback = "table"
@@ -81,14 +80,10 @@ class Inverse:
     initial: PlaysState | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.stage, (DahlStage, BoucWenStage, PrandtlIshlinskiiStage)):
-            raise ParameterError(
-                f"stage is {type(self.stage).__name__}: expected pt.DahlStage, pt.BoucWenStage or "
-                "pt.PrandtlIshlinskiiStage"
-            )
+        kind = kind_of(self.stage)
         if not isinstance(self.stage, PrandtlIshlinskiiStage):
             # A stage that has no inverse is refused here.
-            _core.InverseSession(self._kind, self.stage.theta, 1.0)
+            _core.InverseSession(kind.name, self.stage.theta, 1.0)
         finite("offset", self.offset, "m")
         not_negative("delay", self.delay, "s")
         if self.playback not in ("table", "online"):
@@ -106,7 +101,7 @@ class Inverse:
     @property
     def _kind(self) -> str:
         """Name of the model."""
-        return "dahl" if isinstance(self.stage, DahlStage) else "bouc-wen"
+        return kind_of(self.stage).name
 
     def voltage(self, reference: Reference, dt: float) -> Array:
         """Voltage along the whole path of a reference, the stage being at rest before.

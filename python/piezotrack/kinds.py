@@ -2,74 +2,27 @@
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from . import _core
+from . import _core, ratios
 from .bouc_wen import BoucWenStage
 from .errors import ParameterError
 from .first_order_dahl import FirstOrderDahlStage
 from .models import DahlStage
 from .oscillator import BoucWenOscillator
+from .plays import PARAMETERS as PLAYS_PARAMETERS
+from .plays import PrandtlIshlinskiiStage
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
-__all__ = ["Kind", "Stage", "kind_named", "kind_of"]
+    from .ratios import Ratio
 
-Stage = DahlStage | BoucWenStage | FirstOrderDahlStage | BoucWenOscillator
+__all__ = ["KINDS", "Kind", "Searched", "Stage", "kind_named", "kind_of"]
 
-
-Ratio = tuple[str, str, float, str]
-
-
-def _mechanical(stage: Any, damping: str, mass: str) -> list[Ratio]:
-    """Viscous time and mass over stiffness, with the natural frequency that they mean."""
-    frequency = math.sqrt(stage.stiffness / stage.mass) / (2 * math.pi)
-    hertz = f"s^2, a natural frequency of {frequency:.4g} Hz"
-    return [
-        ("damping", damping, 1e3 * stage.damping / stage.stiffness, "ms"),
-        ("mass", mass, stage.mass / stage.stiffness, hertz),
-    ]
-
-
-def _dahl(stage: DahlStage) -> list[Ratio]:
-    gain = 1e6 * stage.piezo_coefficient / stage.stiffness
-    return [
-        ("piezo_coefficient", "T/K", gain, "um/V"),
-        *_mechanical(stage, "D/K", "M/K"),
-        ("b1", "b1 up/K", stage.b1 * stage.up / stage.stiffness, "1/m"),
-        ("a1", "a1", stage.a1, "1/m"),
-        ("a2", "a2", stage.a2, "1/m^2"),
-        ("b0", "b0 up/K", stage.b0 * stage.up / stage.stiffness, ""),
-    ]
-
-
-def _bouc_wen(stage: BoucWenStage) -> list[Ratio]:
-    return [
-        ("piezo_coefficient", "d", 1e6 * stage.piezo_coefficient, "um/V"),
-        *_mechanical(stage, "b/k", "m/k"),
-        ("alpha", "alpha", stage.alpha, ""),
-        ("beta", "beta", stage.beta, "1/V"),
-        ("gamma", "gamma", stage.gamma, "1/V"),
-    ]
-
-
-def _first_order_dahl(stage: FirstOrderDahlStage) -> list[Ratio]:
-    gain = 1e6 * stage.piezo_coefficient / stage.stiffness
-    reach = 1e6 * stage.coulomb_force / stage.stiffness
-    return [
-        ("piezo_coefficient", "T/K", gain, "um/V"),
-        *_mechanical(stage, "D/K", "M/K"),
-        ("rest_stiffness", "sigma/K", stage.rest_stiffness / stage.stiffness, ""),
-        ("coulomb_force", "Fc/K", reach, "um"),
-    ]
-
-
-def _oscillator(stage: BoucWenOscillator) -> list[Ratio]:
-    """All of it: the drive is a force."""
-    values = zip(stage.PARAMETERS, stage.theta, strict=True)
-    return [(name, symbol, value, unit) for (name, symbol, unit), value in values]
+Stage = DahlStage | BoucWenStage | PrandtlIshlinskiiStage | FirstOrderDahlStage | BoucWenOscillator
+# Names of those that a swarm searches, for types.
+Searched = Literal["dahl", "bouc-wen", "first-order-dahl", "bouc-wen-oscillator"]
 
 
 class Kind(NamedTuple):
@@ -87,41 +40,69 @@ class Kind(NamedTuple):
         Name, symbol and unit of each parameter.
     forces : str
         Symbols of what scales along with the stiffness.
+    searched : bool
+        Whether a swarm searches its parameters; else they follow by least squares.
     ratios : callable
-        Parameter, symbol, value and unit of all that does not depend on the scale of the forces.
+        What of a stage does not depend on the scale of the forces, for those searched.
+    drive_unit : str
+        Unit of the drive.
     """
 
     name: str
     title: str
     stage: type[Stage]
-    parameters: list[tuple[str, str, str]]
-    forces: str
-    ratios: Callable[[Any], list[Ratio]]
+    parameters: Sequence[tuple[str, str, str]]
+    forces: str = ""
+    searched: bool = True
+    ratios: Callable[[Any], list[Ratio]] = lambda _: []
+    drive_unit: str = "V"
 
     def built(self, values: list[float]) -> Stage:
         """Make a stage of values in the order of the parameters."""
-        names = self.stage.parameter_names()
-        return self.stage(**dict(zip(names, values, strict=True)))
+        names = [name for name, _, _ in self.parameters]
+        named: dict[str, Any] = dict(zip(names, values, strict=True))
+        return self.stage(**named)
 
 
 KINDS = (
-    Kind("dahl", "Dahl", DahlStage, _core.DAHL_PARAMETERS, "M, D, T, b1 and b0", _dahl),
-    Kind("bouc-wen", "Bouc-Wen", BoucWenStage, _core.BOUC_WEN_PARAMETERS, "m and b", _bouc_wen),
+    Kind(
+        "dahl",
+        "Dahl",
+        DahlStage,
+        _core.DAHL_PARAMETERS,
+        "M, D, T, b1 and b0",
+        ratios=ratios.dahl,
+    ),
+    Kind(
+        "bouc-wen",
+        "Bouc-Wen",
+        BoucWenStage,
+        _core.BOUC_WEN_PARAMETERS,
+        "m and b",
+        ratios=ratios.bouc_wen,
+    ),
+    Kind(
+        "prandtl-ishlinskii",
+        "Prandtl-Ishlinskii",
+        PrandtlIshlinskiiStage,
+        PLAYS_PARAMETERS,
+        searched=False,
+    ),
     Kind(
         "first-order-dahl",
         "first-order Dahl",
         FirstOrderDahlStage,
-        FirstOrderDahlStage.PARAMETERS,
+        _core.FIRST_ORDER_DAHL_PARAMETERS,
         "M, D, T, sigma and Fc",
-        _first_order_dahl,
+        ratios=ratios.first_order_dahl,
     ),
     Kind(
         "bouc-wen-oscillator",
         "Bouc-Wen oscillator",
         BoucWenOscillator,
-        BoucWenOscillator.PARAMETERS,
-        "",
-        _oscillator,
+        _core.BOUC_WEN_OSCILLATOR_PARAMETERS,
+        ratios=ratios.bouc_wen_oscillator,
+        drive_unit="N",
     ),
 )
 
@@ -140,4 +121,4 @@ def kind_of(stage: Stage) -> Kind:
     for kind in KINDS:
         if isinstance(stage, kind.stage):
             return kind
-    raise ParameterError(f"model is {type(stage).__name__}: expected a stage")
+    raise ParameterError(f"model is {type(stage).__name__}: expected a stage, as a pt.DahlStage")

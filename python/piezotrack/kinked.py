@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from . import _core
 from .errors import ParameterError
+from .lumped import LumpedStage
 from .models import Response
 
 if TYPE_CHECKING:
@@ -43,32 +44,8 @@ class FeedbackState:
         return self.x, self.v, self.force
 
 
-class KinkedStage:
-    """Base of such stages: frozen dataclasses of numbers."""
-
-    KIND: ClassVar[str]
-    PARAMETERS: ClassVar[list[tuple[str, str, str]]]
-
-    def __post_init__(self) -> None:
-        for name in self.parameter_names():
-            object.__setattr__(self, name, _core.as_number(name, getattr(self, name)))
-        _core.stage_check(self.KIND, self.theta)
-
-    @property
-    def theta(self) -> tuple[float, ...]:
-        """The parameters in their order."""
-        return tuple(getattr(self, name) for name in self.parameter_names())
-
-    @classmethod
-    def parameter_names(cls) -> tuple[str, ...]:
-        """Names of the parameters, in their order.
-
-        Returns
-        -------
-        tuple of str
-            As the constructor takes them.
-        """
-        return tuple(name for name, _, _ in cls.PARAMETERS)
+class KinkedStage(LumpedStage):
+    """Base of such stages."""
 
     def simulate(
         self,
@@ -129,7 +106,7 @@ class KinkedStage:
             raise ParameterError(f"initial is {start!r}: expected a pt.FeedbackState")
         dt = _core.as_number("dt", dt)
         accuracy = _core.as_number("accuracy", accuracy)
-        run = _core.kinked_simulate(self.KIND, self.theta, u, dt, hold, start.values, accuracy)
+        run = _core.kinked_simulate(self._kind, self.theta, u, dt, hold, start.values, accuracy)
         x, v, force, _ = run.last
         return Response(
             t=np.arange(run.x.size, dtype=np.float64) * dt,

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _core
 from .checks import not_negative
 from .errors import ParameterError
-from .modelfile import IdentifiedModel
+from .identified import Identified
 from .models import DahlStage
 from .virtual import VirtualStage
 
@@ -201,7 +201,7 @@ class LoopReport:
 
 def check_loop(
     controller: Controller,
-    stage: VirtualStage | DahlStage | IdentifiedModel,
+    stage: VirtualStage | DahlStage | Identified[Any],
     *,
     delay: float = 0.0,
 ) -> LoopReport:
@@ -234,7 +234,7 @@ def check_loop(
     True
     """
     late = not_negative("delay", delay, "s")
-    if isinstance(stage, IdentifiedModel):
+    if isinstance(stage, Identified):
         late, stage = late + stage.delay, stage.model
     if isinstance(stage, VirtualStage):
         gains = stage.core().gains()

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from . import _core
+from .lumped import LumpedStage
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from .dataset import Hold
-    from .inverse import Inverse
 
     Array = NDArray[np.float64]
 
@@ -88,7 +88,7 @@ class Response:
 
 
 @dataclass(frozen=True, kw_only=True)
-class DahlStage:
+class DahlStage(LumpedStage):
     r"""A stage with second-order Dahl hysteresis in feedback on its displacement.
 
     .. math::
@@ -159,27 +159,8 @@ class DahlStage:
     b0: float = 0.0
     up: float = 30.0
 
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = _core.as_number(field.name, getattr(self, field.name))
-            object.__setattr__(self, field.name, value)
-        _core.dahl_check(self.theta)
-
-    @property
-    def theta(self) -> tuple[float, ...]:
-        """The parameters in their order."""
-        # Not dataclasses.astuple, which copies deeply and takes longer than a short simulation.
-        return (
-            self.mass,
-            self.damping,
-            self.stiffness,
-            self.piezo_coefficient,
-            self.a1,
-            self.a2,
-            self.b1,
-            self.b0,
-            self.up,
-        )
+    _parameters = _core.DAHL_PARAMETERS
+    _kind = "dahl"
 
     @classmethod
     def xu_li_2010(cls) -> DahlStage:
@@ -191,38 +172,6 @@ class DahlStage:
             The stage of the paper's x axis.
         """
         return cls(**dict(zip(cls.parameter_names(), _core.dahl_xu_li_2010(), strict=True)))
-
-    @staticmethod
-    def parameter_names() -> tuple[str, ...]:
-        """Names of the parameters, in their order.
-
-        Returns
-        -------
-        tuple of str
-            As the constructor takes them.
-        """
-        return tuple(name for name, _, _ in _core.DAHL_PARAMETERS)
-
-    def inverse(
-        self, *, playback: Literal["table", "online"] = "table", settle: int = 1
-    ) -> Inverse:
-        """Feedforward of the bare stage, as `Inverse` describes.
-
-        Parameters
-        ----------
-        playback : {"table", "online"}, optional
-            Whether one settled period is played again and again, or all is computed.
-        settle : int, optional
-            Periods before the one of the table.
-
-        Returns
-        -------
-        Inverse
-            For `Controller` or on its own.
-        """
-        from .inverse import Inverse
-
-        return Inverse(stage=self, playback=playback, settle=settle)
 
     def simulate(
         self,

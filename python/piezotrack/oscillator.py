@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from . import _core
 from .kinked import KinkedStage
@@ -62,8 +61,8 @@ class BoucWenOscillator(KinkedStage):
     0.67 mm
     """
 
-    KIND: ClassVar[str] = "bouc-wen-oscillator"
-    PARAMETERS: ClassVar[list[tuple[str, str, str]]] = _core.BOUC_WEN_OSCILLATOR_PARAMETERS
+    _kind = "bouc-wen-oscillator"
+    _parameters = _core.BOUC_WEN_OSCILLATOR_PARAMETERS
 
     mass: float
     damping: float

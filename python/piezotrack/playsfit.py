@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from . import _core
 from .dataset import Dataset
+from .documents import provenance
 from .errors import DataError, ParameterError
-from .plays import PrandtlIshlinskiiStage, as_numbers
+from .identified import Fitted
+from .plays import PlaysResponse, PrandtlIshlinskiiStage, as_numbers
 from .playsfile import IdentifiedPlays
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from matplotlib.figure import Figure
-
-    from .modelfile import Score
 
 __all__ = ["PlaysIdentification", "identify_plays"]
 
@@ -27,60 +24,24 @@ MOST_PLAYS, MOST_ZONES, MOST_RELAXATIONS = 32, 8, 8
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class PlaysIdentification(IdentifiedPlays):
+class PlaysIdentification(Fitted[PlaysResponse], IdentifiedPlays):
     """What a fit found; see `IdentifiedPlays` for what can be done with it.
 
     Attributes
     ----------
-    data : Dataset
-        The record.
-    cost : float
-        RMS deviation in the window [m].
     nfev : int
         Simulations of the record.
     at_bound : bool
         Whether a time constant or a frequency lies on the edge of what was searched.
     """
 
-    data: Dataset
-    cost: float
     nfev: int
     at_bound: bool
-
-    def __repr__(self) -> str:
-        return (
-            f"<Identification of a Prandtl-Ishlinskii stage: {self.cost_um:.4g} um rms, "
-            f"{self.cost_percent:.3g} % of stroke; see summary()>"
-        )
-
-    @property
-    def cost_um(self) -> float:
-        """The cost [um]."""
-        return 1e6 * self.cost
-
-    @property
-    def cost_percent(self) -> float:
-        """The cost in per cent of the stroke."""
-        return 100.0 * self.cost / self.stroke
-
-    @cached_property
-    def fitted(self) -> Score:
-        """Score on the record that was identified."""
-        return self.score(self.data, offset=self.offset)
 
     @property
     def notes(self) -> list[str]:
         """What a careful reader should know before using the result."""
-        notes = []
-        if not 1e-9 <= self.stroke <= 1e-2:
-            notes.append(
-                f"a stroke of {1e6 * self.stroke:.4g} um is not that of a nanopositioner: is the "
-                "unit of the displacement right?"
-            )
-        if self.cost_percent > 5.0:
-            notes.append(
-                f"the model does not follow this record: {self.cost_percent:.3g} % of stroke remain"
-            )
+        notes = self._remarks([])
         if self.at_bound:
             notes.append("the record does not fix the dynamics: they lie on the edge of the search")
         if self.model.linear + sum(self.model.weights) > 100.0 * self.model.linear:
@@ -95,62 +56,9 @@ class PlaysIdentification(IdentifiedPlays):
         str
             Several lines: the cost, then the parameters.
         """
-        data, model = self.data, self.model
-        lines = [
-            f"Prandtl-Ishlinskii stage identified from {data.source or 'a record'}: {len(data)} "
-            f"samples, {data.duration:.4g} s at {1 / data.dt:.6g} Hz, stroke "
-            f"{1e6 * data.stroke:.4g} um",
-            f"cost  {self.cost_um:.4g} um rms = {self.cost_percent:.3g} % of stroke"
-            + (f", offset {1e6 * self.offset:.5g} um fitted" if self.offset_fitted else ""),
-            f"      {self.nfev} simulations",
-            *(f"note  {note}" for note in self.notes),
-            "",
-            f"  {'linear':<16}{'w0':<6}{1e6 * model.linear:>12.6g}  um/V",
-            f"  {'plays':<16}{'r':<6}{'threshold [V]':>14}  {'w':<4}{'weight [um/V]':>14}",
-        ]
-        for r, w in zip(model.thresholds, model.weights, strict=True):
-            lines.append(f"  {'':<22}{r:>14.6g}  {'':<4}{1e6 * w:>14.6g}")
-        if model.corners:
-            lines.append(f"  {'dead zones':<16}{'d':<6}{'corner [um]':>14}  {'s':<4}{'bend':>14}")
-            for d, s in zip(model.corners, model.bends, strict=True):
-                lines.append(f"  {'':<22}{1e6 * d:>14.6g}  {'':<4}{s:>14.6g}")
-        if model.creep_times:
-            lines.append(f"  {'creep':<16}{'tau':<6}{'time [s]':>14}  {'c':<4}{'share':>14}")
-            for tau, c in zip(model.creep_times, model.creep_shares, strict=True):
-                lines.append(f"  {'':<22}{tau:>14.6g}  {'':<4}{c:>14.6g}")
-        if model.time_constant is not None:
-            lines.append(f"  {'time_constant':<16}{'T':<6}{1e3 * model.time_constant:>12.6g}  ms")
-        if model.frequency is not None:
-            lines.append(f"  {'frequency':<16}{'fn':<6}{model.frequency:>12.6g}  Hz")
-            lines.append(f"  {'damping_ratio':<16}{'zeta':<6}{model.damping_ratio:>12.6g}")
-        return "\n".join(lines)
+        from .report import plays_text
 
-    def plot(self, data: Dataset | None = None) -> Figure:
-        """Loop, and displacement with its error over time.
-
-        Parameters
-        ----------
-        data : Dataset, optional
-            Another record to show the model on.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            Three panels.
-        """
-        import matplotlib.pyplot as plt
-
-        from .plotting import plot_loop, plot_time
-
-        record = self.data if data is None else data
-        run = self.simulate(record, offset=self.offset if data is None else "own")
-        figure = plt.figure(figsize=(11.0, 5.4), layout="constrained")
-        grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.35])
-        plot_loop(record, run, figure.add_subplot(grid[:, 0]))
-        above = figure.add_subplot(grid[0, 1])
-        below = figure.add_subplot(grid[1, 1], sharex=above)
-        plot_time(record, run, (above, below), stroke=self.stroke)
-        return figure
+        return plays_text(self)
 
 
 def identify_plays(
@@ -258,7 +166,7 @@ def identify_plays(
         offset=found.offset,
         offset_fitted=offset,
         stroke=data.stroke,
-        details={"fit": fit, "provenance": _provenance(data)},
+        details={"fit": fit, "provenance": provenance(data)},
         data=data,
         cost=found.rms,
         nfev=found.evaluations,
@@ -296,21 +204,3 @@ def _times(data: Dataset, creep: object) -> tuple[float, ...]:
             f"{20.0 * shortest:.4g} s, or creep=False"
         )
     return tuple(decades[-MOST_RELAXATIONS:])
-
-
-def _provenance(data: Dataset) -> dict[str, Any]:
-    return {
-        "package": "piezotrack",
-        "version": _core.__version__,
-        "data": {
-            "source": data.source,
-            "sha256": data.sha256,
-            "samples": len(data),
-            "warmup_samples": data.warmup,
-            "window_s": [float(data.t[0]), float(data.t[-1])],
-            "dt_s": data.dt,
-            "drive_range": [float(data.full.u.min()), float(data.full.u.max())],
-            "drive_unit": data.drive_unit,
-            "hold": data.hold,
-        },
-    }

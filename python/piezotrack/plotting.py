@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .kinds import kind_of
 from .units import best_length_unit
 
 if TYPE_CHECKING:
@@ -21,17 +22,20 @@ if TYPE_CHECKING:
 
     from .dataset import Dataset
     from .identification import Identification
+    from .identified import Fitted
     from .models import Response
     from .plays import PlaysResponse
 
     Array = NDArray[np.float64]
 
 __all__ = [
+    "axes_or_new",
     "plot_convergence",
     "plot_identification",
     "plot_loop",
     "plot_response",
     "plot_time",
+    "thinned",
 ]
 
 # Told apart in black and white as well, also where many cycles lie on each other.
@@ -59,10 +63,10 @@ def plot_loop(data: Dataset, run: Response | PlaysResponse, ax: Axes | None = No
     matplotlib.axes.Axes
         The axes drawn on.
     """
-    (ax,) = _axes(ax, 1)
+    (ax,) = axes_or_new(ax, 1)
     unit, scale = best_length_unit(data.stroke)
     for y, style in ((data.y, MEASURED), (run.x, SIMULATED)):
-        kept = _kept(y)
+        kept = thinned(y)
         ax.plot(data.u[kept], scale * y[kept], **style)
     ax.set(xlabel=f"drive [{data.drive_unit}]", ylabel=f"displacement [{unit}]")
     ax.set_title("Hysteresis loop")
@@ -98,19 +102,19 @@ def plot_time(
     tuple of two matplotlib.axes.Axes
         Displacement, error.
     """
-    above, below = _axes(axes, 2)
+    above, below = axes_or_new(axes, 2)
     unit, scale = best_length_unit(data.stroke)
     error = data.y - run.x
     small, fine = best_length_unit(float(np.abs(error).max()))
     for y, style in ((data.y, MEASURED), (run.x, SIMULATED)):
-        kept = _kept(y)
+        kept = thinned(y)
         above.plot(data.t[kept], scale * y[kept], **style)
     above.set(ylabel=f"displacement [{unit}]", title="Displacement over time")
     above.margins(x=0.0, y=0.05)
     top = above.get_ylim()[1] - above.get_ylim()[0]
     above.set_ylim(top=above.get_ylim()[1] + 0.22 * top)
     above.legend(loc="upper right", ncols=2, frameon=False)
-    kept = _kept(error)
+    kept = thinned(error)
     below.plot(data.t[kept], fine * error[kept], **ERROR)
     below.axhline(0.0, color="0.7", linewidth=0.8, zorder=0)
     below.set(xlabel="time [s]", ylabel=f"error [{small}]")
@@ -150,7 +154,7 @@ def plot_convergence(fit: Identification, ax: Axes | None = None) -> Axes:
     matplotlib.axes.Axes
         The axes drawn on.
     """
-    (ax,) = _axes(ax, 1)
+    (ax,) = axes_or_new(ax, 1)
     # Nothing is left to draw on a logarithmic scale where a fit is exact.
     finite = np.isfinite(fit.history) & (fit.history > 0.0)
     iterations = np.arange(fit.history.size)[finite]
@@ -193,7 +197,7 @@ def plot_response(t: Array, u: Array, x: Array) -> Figure:
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.2), layout="constrained")
     unit, scale = best_length_unit(float(np.ptp(x)))
-    kept = _kept(x)
+    kept = thinned(x)
     left.plot(t[kept], scale * x[kept], **SIMULATED)
     left.set(xlabel="time [s]", ylabel=f"displacement [{unit}]", title="Displacement over time")
     left.margins(x=0.0)
@@ -202,37 +206,39 @@ def plot_response(t: Array, u: Array, x: Array) -> Figure:
     return figure
 
 
-def plot_identification(fit: Identification, data: Dataset | None = None) -> Figure:
-    """Put loop, displacement, error and convergence on one sheet.
+def plot_identification(fit: Fitted[Any], data: Dataset | None = None) -> Figure:
+    """Put loop, displacement and error on one sheet, and convergence where a swarm searched.
 
     Parameters
     ----------
-    fit : Identification
-        What a search found.
+    fit : Identification or PlaysIdentification
+        What a fit found.
     data : Dataset, optional
         Another record to show the model on.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Four panels.
+        Four panels, or three.
     """
     import matplotlib.pyplot as plt
 
     own = data is None
     record = fit.data if data is None else data
     run = fit.simulate(record, offset=fit.offset if own else "own")
-    figure = plt.figure(figsize=(11.0, 6.4), layout="constrained")
+    searched = kind_of(fit.model).searched
+    figure = plt.figure(figsize=(11.0, 6.4 if searched else 5.4), layout="constrained")
     grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.35])
-    plot_loop(record, run, figure.add_subplot(grid[0, 0]))
-    plot_convergence(fit, figure.add_subplot(grid[1, 0]))
+    plot_loop(record, run, figure.add_subplot(grid[0 if searched else slice(None), 0]))
+    if searched:
+        plot_convergence(fit, figure.add_subplot(grid[1, 0]))  # type: ignore[arg-type]
     above = figure.add_subplot(grid[0, 1])
     below = figure.add_subplot(grid[1, 1], sharex=above)
     plot_time(record, run, (above, below), stroke=fit.stroke)
     return figure
 
 
-def _axes(given: Axes | Sequence[Axes] | None, count: int) -> list[Axes]:
+def axes_or_new(given: Axes | Sequence[Axes] | None, count: int) -> list[Axes]:
     """Take the axes given, or make a figure with some."""
     if given is None:
         import matplotlib.pyplot as plt
@@ -245,7 +251,7 @@ def _axes(given: Axes | Sequence[Axes] | None, count: int) -> list[Axes]:
     return list(given) if isinstance(given, (list, tuple, np.ndarray)) else [given]  # type: ignore[list-item]
 
 
-def _kept(values: Array) -> NDArray[np.intp]:
+def thinned(values: Array) -> NDArray[np.intp]:
     """Choose the samples to draw: of a long signal, the extremes of each stretch.
 
     A glitch of one sample is just what one looks for.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .errors import ParameterError
+from .plotting import axes_or_new
 from .units import best_length_unit
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def plot_step(step: StepResult, ax: Axes | None = None) -> Axes:
     ParameterError
         The readings were typed in.
     """
-    trace, ax = _trace(step), _axes(ax)
+    trace, (ax,) = _trace(step), axes_or_new(ax, 1)
     read = step.readings
     unit, scale = best_length_unit(max(abs(peak) for peak in read.peaks))
     until = trace.peak_times[-1] + 2.0 * read.period
@@ -106,7 +107,7 @@ def plot_spectrum(step: StepResult, ax: Axes | None = None) -> Axes:
     ParameterError
         The readings were typed in.
     """
-    trace, ax = _trace(step), _axes(ax)
+    trace, (ax,) = _trace(step), axes_or_new(ax, 1)
     read = step.readings
     unit, scale = best_length_unit(abs(read.steady_state))
     static, resonance = scale * abs(read.static_gain), scale * abs(read.resonance_gain)
@@ -181,11 +182,3 @@ def _trace(step: StepResult) -> StepTrace:
     if step.trace is None:
         raise ParameterError("the readings were typed in: expected a record, to have what to draw")
     return step.trace
-
-
-def _axes(ax: Axes | None) -> Axes:
-    if ax is not None:
-        return ax
-    import matplotlib.pyplot as plt
-
-    return plt.subplots(figsize=(6.4, 4.2), layout="constrained")[1]

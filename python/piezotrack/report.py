@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .errors import DataError
 from .files import replacing
@@ -19,8 +19,10 @@ if TYPE_CHECKING:
     from .dataset import Dataset
     from .estimates import Estimate
     from .identification import Identification
+    from .identified import Fitted
+    from .playsfit import PlaysIdentification
 
-__all__ = ["make_folder", "save_figures", "save_identification", "summary_text"]
+__all__ = ["make_folder", "plays_text", "save_figures", "save_identification", "summary_text"]
 
 
 def summary_text(fit: Identification) -> str:
@@ -36,12 +38,9 @@ def summary_text(fit: Identification) -> str:
     str
         Several lines.
     """
-    data, kind = fit.data, kind_of(fit.model)
+    kind = kind_of(fit.model)
     lines = [
-        f"{kind.title} stage identified from {data.source or 'a record'}: {len(data)} samples, "
-        f"{data.duration:.4g} s at {1 / data.dt:.6g} Hz, stroke {1e6 * data.stroke:.4g} um",
-        f"cost  {fit.cost_um:.4g} um rms = {fit.cost_percent:.3g} % of stroke"
-        + (f", offset {1e6 * fit.offset:.5g} um fitted" if fit.offset_fitted else ""),
+        *_heading(fit),
         f"      {fit.nit} iterations, {fit.nfev} simulations, seed {fit.seed}: {fit.message}",
         *_runs(fit),
         *(f"note  {note}" for note in fit.notes),
@@ -64,6 +63,58 @@ def summary_text(fit: Identification) -> str:
     if fit.nfail:
         lines += ["", f"{fit.nfail} simulations did not stay finite and counted as infinitely bad."]
     return "\n".join(lines)
+
+
+def plays_text(fit: PlaysIdentification) -> str:
+    """Write a fit of play operators as a table.
+
+    Parameters
+    ----------
+    fit : PlaysIdentification
+        What a fit found.
+
+    Returns
+    -------
+    str
+        Several lines.
+    """
+    model = fit.model
+    lines = [
+        *_heading(fit),
+        f"      {fit.nfev} simulations",
+        *(f"note  {note}" for note in fit.notes),
+        "",
+        f"  {'linear':<16}{'w0':<6}{1e6 * model.linear:>12.6g}  um/V",
+        f"  {'plays':<16}{'r':<6}{'threshold [V]':>14}  {'w':<4}{'weight [um/V]':>14}",
+    ]
+    for r, w in zip(model.thresholds, model.weights, strict=True):
+        lines.append(f"  {'':<22}{r:>14.6g}  {'':<4}{1e6 * w:>14.6g}")
+    if model.corners:
+        lines.append(f"  {'dead zones':<16}{'d':<6}{'corner [um]':>14}  {'s':<4}{'bend':>14}")
+        for d, s in zip(model.corners, model.bends, strict=True):
+            lines.append(f"  {'':<22}{1e6 * d:>14.6g}  {'':<4}{s:>14.6g}")
+    if model.creep_times:
+        lines.append(f"  {'creep':<16}{'tau':<6}{'time [s]':>14}  {'c':<4}{'share':>14}")
+        for tau, c in zip(model.creep_times, model.creep_shares, strict=True):
+            lines.append(f"  {'':<22}{tau:>14.6g}  {'':<4}{c:>14.6g}")
+    if model.time_constant is not None:
+        lines.append(f"  {'time_constant':<16}{'T':<6}{1e3 * model.time_constant:>12.6g}  ms")
+    if model.frequency is not None:
+        lines.append(f"  {'frequency':<16}{'fn':<6}{model.frequency:>12.6g}  Hz")
+        lines.append(f"  {'damping_ratio':<16}{'zeta':<6}{model.damping_ratio:>12.6g}")
+    return "\n".join(lines)
+
+
+def _heading(fit: Fitted[Any]) -> list[str]:
+    """Say what was identified from which record, and what is left."""
+    data = fit.data
+    return [
+        f"{kind_of(fit.model).title} stage identified from {data.source or 'a record'}: "
+        f"{len(data)} samples, {data.duration:.4g} s at {1 / data.dt:.6g} Hz, "
+        f"stroke {1e6 * data.stroke:.4g} um",
+        f"cost  {fit.cost_um:.4g} um rms = {fit.cost_percent:.3g} % of stroke"
+        + (f", offset {1e6 * fit.offset:.5g} um fitted" if fit.offset_fitted else ""),
+    ]
 
 
 def _runs(fit: Identification) -> list[str]:
@@ -187,7 +238,7 @@ def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
 
 
 def save_identification(
-    fit: Identification,
+    fit: Fitted[Any],
     folder: str | os.PathLike[str],
     *,
     name: str | None = None,
@@ -197,8 +248,8 @@ def save_identification(
 
     Parameters
     ----------
-    fit : Identification
-        What a search found.
+    fit : Identification or PlaysIdentification
+        What a fit found.
     folder : path-like
         Where to; made where it is missing.
     name : str, optional
@@ -209,19 +260,21 @@ def save_identification(
     Returns
     -------
     list of pathlib.Path
-        ``{name}.json``, and as PNG and SVG ``{name}_loop``, ``{name}_time`` and
-        ``{name}_convergence``.
+        ``{name}.json``, and as PNG and SVG ``{name}_loop``, ``{name}_time`` and, where a swarm
+        searched, ``{name}_convergence``.
     """
     from .plotting import plot_convergence, plot_loop, plot_time
 
     path = make_folder(folder)
-    name = kind_of(fit.model).name if name is None else name
+    kind = kind_of(fit.model)
+    name = kind.name if name is None else name
     record = fit.data if shown is None else shown
     run = fit.simulate(record, offset=fit.offset)
     until = None if shown is None else float(fit.data.t[-1])
     figures = {
         f"{name}_loop": plot_loop(record, run).figure,
         f"{name}_time": plot_time(record, run, stroke=fit.stroke, fitted_until=until)[0].figure,
-        f"{name}_convergence": plot_convergence(fit).figure,
     }
+    if kind.searched:
+        figures[f"{name}_convergence"] = plot_convergence(fit).figure  # type: ignore[arg-type]
     return [fit.save(path / f"{name}.json"), *save_figures(figures, path)]  # type: ignore[arg-type]

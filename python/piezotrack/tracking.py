@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,8 +13,8 @@ from . import _core
 from .checks import not_negative
 from .control import Controller
 from .errors import ParameterError
+from .identified import Identified
 from .loopcheck import check_loop
-from .modelfile import IdentifiedModel
 from .models import DahlStage
 from .references import Reference, SampledReference
 from .virtual import VirtualStage
@@ -225,7 +225,7 @@ def _metrics(
 
 
 def track(
-    stage: VirtualStage | DahlStage | IdentifiedModel,
+    stage: VirtualStage | DahlStage | Identified[Any],
     controller: Controller,
     reference: Reference,
     *,
@@ -281,7 +281,7 @@ def track(
     0.06 rad
     """
     offset = late = 0.0
-    if isinstance(stage, IdentifiedModel):
+    if isinstance(stage, Identified):
         bare: DahlStage = stage.model
         offset, late, stage = stage.offset, stage.delay, bare
     for name, value, kind in (

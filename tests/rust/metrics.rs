@@ -3,7 +3,9 @@
 
 use core::f64::consts::{PI, TAU};
 
-use piezotrack_core::metrics::{each_period, fundamental, phase_lag, tracking, widest_loop};
+use piezotrack_core::metrics::{
+    each_period, fundamental, phase_lag, residual, tracking, widest_loop,
+};
 
 const DT: f64 = 0.02;
 
@@ -117,4 +119,25 @@ fn bad_records_are_refused() {
     let periods = |period| message(each_period(&good, &good, DT, period).map(|_| ()));
     assert!(periods(11.0).contains("less than a period"));
     assert!(periods(0.03).contains("4 samples or more"));
+}
+
+#[test]
+fn information_criteria_prefer_what_pays_for_its_parameters() {
+    // A sine of amplitude a has the mean square a^2/2 and, at w dt apart, the correlation cos(w dt).
+    let errors: Vec<f64> = (0..1000).map(|k| (TAU * f64::from(k) / 50.0).sin()).collect();
+    let seven = residual(&errors, 7).unwrap();
+    assert!((seven.rms - 0.5_f64.sqrt()).abs() < 1e-12 && (seven.max - 1.0).abs() < 2e-3);
+    assert!((seven.autocorrelation - (TAU / 50.0).cos()).abs() < 1e-3);
+    assert!((seven.aic - (1000.0 * 0.5_f64.ln() + 16.0)).abs() < 1e-9);
+    assert!((seven.bic - (1000.0 * 0.5_f64.ln() + 8.0 * 1000.0_f64.ln())).abs() < 1e-9);
+    // A factor in the errors is a constant in both, so the unit does not matter.
+    let scaled: Vec<f64> = errors.iter().map(|e| 1e-6 * e).collect();
+    let shift = residual(&scaled, 7).unwrap().aic - seven.aic;
+    assert!(
+        (residual(&scaled, 15).unwrap().aic - residual(&errors, 15).unwrap().aic - shift).abs()
+            < 1e-6
+    );
+    // An exact fit is infinitely good; nothing to fit is an error.
+    assert!(residual(&[0.0; 10], 1).unwrap().aic < -1e300);
+    assert!(residual(&[], 1).is_err() && residual(&[f64::NAN], 1).is_err());
 }

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from .. import __version__
+from .compare import compare_command
 from .demo import demo_command
 from .identify import identify_command
 from .simulate import simulate_command
@@ -55,6 +56,7 @@ def _options(
 
 
 app.command("identify")(identify_command)
+app.command("compare")(compare_command)
 app.command("step")(step_command)
 app.command("simulate")(simulate_command)
 app.command("feedforward")(feedforward_command)

@@ -25,13 +25,13 @@ from .options import (
     number_range,
     of_file,
     pairs,
+    windowed,
 )
 from .words import in_words
 
 if TYPE_CHECKING:
     from ..dataset import Dataset
-    from ..identification import Identification
-    from ..modelfile import Score
+    from ..identified import Fitted, Score
     from ..swarm import ParticleSwarm
 
 __all__ = ["identify_command"]
@@ -41,7 +41,10 @@ __all__ = ["identify_command"]
 def identify_command(
     file: Annotated[Path, typer.Argument(help="Log in CSV, with units in its header.")],
     window: Seconds = None,
-    model: Annotated[str, typer.Option(help="Kind of stage: dahl or bouc-wen.")] = "dahl",
+    model: Annotated[
+        list[str] | None,
+        typer.Option(metavar="KIND", help="Kind of stage, as dahl or bouc-wen. Repeatable."),
+    ] = None,
     out: Out = Path("results"),
     time: TimeColumn = None,
     drive: DriveColumn = None,
@@ -77,18 +80,18 @@ def identify_command(
     ] = None,
     validate_window: Seconds = None,
 ) -> None:
-    """Identify a stage from a log: a table, a JSON model, pictures."""
+    """Identify a stage from a log, as each kind named: a table, a JSON model, pictures."""
+    kinds = _kinds(model)
     columns = Columns(time, drive, displacement, unit, dt)
     if validate is None and validate_window is not None:
         raise ParameterError("--validate-window is given without --validate")
-    log = _windowed(columns.read(file, hold), file, "--window", window)
+    log = windowed(columns.read(file, hold), file, "--window", window)
     second = None
     if validate is not None:
         whole = columns.read(validate, hold)
-        second = _windowed(whole, validate, "--validate-window", validate_window)
+        second = windowed(whole, validate, "--validate-window", validate_window)
     can_be_folder(out)
     arguments = {
-        "model": model,
         "free": None if free is None else [name.strip() for name in free.split(",")],
         "fixed": {name: number("--fix", text) for name, text in pairs("--fix", fix)},
         "bounds": {name: number_range("--bound", text) for name, text in pairs("--bound", bound)},
@@ -100,29 +103,31 @@ def identify_command(
         "runs": runs,
         "threads": threads,
     }
-    with of_file(file):
-        fit = _search(log, out, **arguments)
-    score = None if second is None else fit.score(second)
-    written = _write(fit, out, second, score)
-    print(fit.summary())
-    if second is not None and score is not None:
-        own = ", with an offset of its own" if offset else ""
-        first, last = second.t[0], second.t[-1]
-        print(f"\non {second.source} from {first:.6g} to {last:.6g} s, not fitted{own}: {score}")
+    told, written = [], []
+    for kind in kinds:
+        with of_file(file):
+            fit = _search(log, out, kind, **arguments)
+        score = None if second is None else fit.score(second)
+        written += _write(fit, out, second, score)
+        told.append(fit.summary())
+        if second is not None and score is not None:
+            own = ", with an offset of its own" if offset else ""
+            span = f"from {second.t[0]:.6g} to {second.t[-1]:.6g} s"
+            told.append(f"on {second.source} {span}, not fitted{own}: {score}")
+    print("\n\n".join(told))
     list_files(written)
 
 
-def _windowed(log: Dataset, file: Path, option: str, window: str | None) -> Dataset:
-    if window is None:
-        return log
-    start, colon, stop = window.partition(":")
-    if not colon:
-        raise ParameterError(f"{option} is '{window}': expected A:B in seconds, as 3:23")
-    bounds = [number(option, text) if text else None for text in (start, stop)]
-    try:
-        return log[bounds[0] : bounds[1]]
-    except ParameterError as error:
-        raise ParameterError(f"{file.name}: {option} {window}: {error}") from None
+def _kinds(given: list[str] | None) -> list[str]:
+    """Check the kinds named before anything is searched."""
+    from ..kinds import kind_named
+
+    kinds = given or ["dahl"]
+    for i, name in enumerate(kinds):
+        kind_named(name)
+        if name in kinds[:i]:
+            raise ParameterError(f"--model names {name} twice: expected it once")
+    return kinds
 
 
 def _partial(model: str) -> str:
@@ -130,28 +135,27 @@ def _partial(model: str) -> str:
     return f"{model}.partial.json"
 
 
-def _search(log: Dataset, out: Path, **arguments: Any) -> Identification:
+def _search(log: Dataset, out: Path, kind: str, **arguments: Any) -> Fitted[Any]:
     """Identify; on Ctrl-C keep the best so far as a file."""
     from ..identification import identify
     from ..report import make_folder
 
     try:
-        return identify(log, **arguments)
+        return identify(log, kind, **arguments)
     except Interrupted as stopped:
         if stopped.partial is None:
             raise
-        path = stopped.partial.save(make_folder(out) / _partial(arguments["model"]))
+        path = stopped.partial.save(make_folder(out) / _partial(kind))
         raise KeyboardInterrupt(f"{stopped}; the best so far is in {path}") from None
 
 
-def _write(
-    fit: Identification, out: Path, second: Dataset | None, score: Score | None
-) -> list[Path]:
+def _write(fit: Fitted[Any], out: Path, second: Dataset | None, score: Score | None) -> list[Path]:
     """Write the model, with what it is worth on a second log, and the pictures."""
     from ..kinds import kind_of
     from ..plotting import plot_loop, plot_time
     from ..report import save_figures, save_identification
 
+    kind = kind_of(fit.model)
     if second is None or score is None:
         written = save_identification(fit, out)
     else:
@@ -167,12 +171,12 @@ def _write(
         written = save_identification(fit, out)
         run = fit.simulate(second)
         figures = {
-            "validation_loop": plot_loop(second, run).figure,
-            "validation_time": plot_time(second, run, stroke=fit.stroke)[0].figure,
+            f"{kind.name}_validation_loop": plot_loop(second, run).figure,
+            f"{kind.name}_validation_time": plot_time(second, run, stroke=fit.stroke)[0].figure,
         }
         written += save_figures(figures, out)  # type: ignore[arg-type]
     # The result is whole now; what an interrupted search left is not needed.
-    (out / _partial(kind_of(fit.model).name)).unlink(missing_ok=True)
+    (out / _partial(kind.name)).unlink(missing_ok=True)
     return written
 
 

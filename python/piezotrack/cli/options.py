@@ -33,6 +33,8 @@ __all__ = [
     "number_range",
     "of_file",
     "pairs",
+    "seconds",
+    "windowed",
 ]
 
 Seconds = Annotated[
@@ -120,6 +122,26 @@ def list_files(written: Iterable[Path]) -> None:
     print("\nwritten")
     for path in written:
         print(f"  {path}")
+
+
+def seconds(option: str, text: str) -> tuple[float | None, float | None]:
+    """Take A:B in seconds from a text; either end may be open."""
+    start, colon, stop = text.partition(":")
+    if not colon:
+        raise ParameterError(f"{option} is '{text}': expected A:B in seconds, as 3:23")
+    first, last = (number(option, end) if end else None for end in (start, stop))
+    return first, last
+
+
+def windowed(log: Dataset, file: Path, option: str, window: str | None) -> Dataset:
+    """Take the window of a log that an option names; all of it where there is none."""
+    if window is None:
+        return log
+    start, stop = seconds(option, window)
+    try:
+        return log[start:stop]
+    except ParameterError as error:
+        raise ParameterError(f"{file.name}: {option} {window}: {error}") from None
 
 
 def pairs(option: str, given: list[str] | None) -> list[tuple[str, str]]:

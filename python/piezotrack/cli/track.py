@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..control import Controller
-    from ..modelfile import IdentifiedModel
+    from ..identified import Identified
     from ..references import Reference
     from ..tracking import Tracking
 
@@ -141,7 +141,7 @@ def feedforward_command(
     list_files(written)
 
 
-def _note_range(known: IdentifiedModel, volts: NDArray[np.float64]) -> None:
+def _note_range(known: Identified[Any], volts: NDArray[np.float64]) -> None:
     """Say where a model is used outside of the voltages that it was fitted at."""
     if fitted := known.drive_range:
         margin = 0.01 * (fitted[1] - fitted[0])
@@ -161,7 +161,7 @@ def _reference(text: str, duration: float | None, period: float | None) -> Refer
     return parse_reference(text, duration=duration)
 
 
-def _write(run: Tracking, known: IdentifiedModel, loop: Controller, out: Path) -> list[Path]:
+def _write(run: Tracking, known: Identified[Any], loop: Controller, out: Path) -> list[Path]:
     """Write the samples, the figures as JSON, and the pictures."""
     from .. import __version__
     from ..files import replacing, write_columns

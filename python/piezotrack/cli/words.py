@@ -60,7 +60,10 @@ ADVICE = [
     (re.compile(r"\bbeyond_reach=True"), "--beyond-reach"),
     (re.compile(r"\bunstable=True"), "--unstable"),
     (re.compile(r"pt\.Pid\.from_um\(kp=.*\)"), "a value in V/um"),
-    (re.compile(r"(?<!--unit )\b(time|drive|displacement|dt|stiffness|runs)=(?!\d)"), r"--\1"),
+    (
+        re.compile(r"(?<!--unit )\b(time|drive|displacement|dt|stiffness|runs|train|test)=(?!\d)"),
+        r"--\1",
+    ),
 ]
 
 

@@ -112,6 +112,66 @@ pub fn each_period(desired: &[f64], actual: &[f64], dt: f64, period: f64) -> Res
     Ok(out)
 }
 
+/// What a model leaves of a record that it was fitted to by least squares.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Residual {
+    /// Root of the mean square, m.
+    pub rms: f64,
+    /// Largest absolute value, m.
+    pub max: f64,
+    /// Correlation of each sample with the next, about the mean: near 0 where the residual is
+    /// white, near 1 where the model is what limits the fit.
+    pub autocorrelation: f64,
+    /// Akaike's information criterion.
+    pub aic: f64,
+    /// Schwarz's Bayesian information criterion.
+    pub bic: f64,
+}
+
+/// Figures of a residual, m, that `fitted` parameters were fitted to leave.
+///
+/// ```text
+/// AIC = n ln(RSS/n) + 2 K,   BIC = n ln(RSS/n) + K ln n,   K = fitted + 1
+/// ```
+///
+/// for independent, normal residuals, whose variance counts as one parameter more; only
+/// differences between models of the same samples mean anything. Burnham and Anderson 2002,
+/// Model Selection and Multimodel Inference, 2nd edition, sections 2.2 and 6.4, doi
+/// 10.1007/b97636; Schwarz 1978, doi 10.1214/aos/1176344136. Where neighbouring residuals are
+/// alike, n samples count for fewer, and both criteria ask for too many parameters.
+///
+/// ```
+/// use piezotrack_core::metrics::residual;
+///
+/// let figures = residual(&[1.0, -1.0, 1.0, -1.0], 2).unwrap();
+/// assert_eq!((figures.rms, figures.aic), (1.0, 6.0));
+/// ```
+///
+/// # Errors
+/// [`Error::Shape`] where there is no sample; [`Error::Data`] where one is not finite.
+pub fn residual(errors: &[f64], fitted: usize) -> Result<Residual> {
+    if errors.is_empty() {
+        let (found, expected) = ("0 samples".into(), "at least 1".into());
+        return Err(Error::Shape { name: "errors".into(), found, expected });
+    }
+    if let Some(k) = errors.iter().position(|value| !value.is_finite()) {
+        return Err(Error::Data(format!("errors has {} at sample {k}", errors[k])));
+    }
+    let n = index(errors.len());
+    let square = errors.iter().map(|e| e * e).sum::<f64>() / n;
+    let mean = errors.iter().sum::<f64>() / n;
+    let spread: f64 = errors.iter().map(|e| (e - mean) * (e - mean)).sum();
+    let shared: f64 = errors.windows(2).map(|pair| (pair[0] - mean) * (pair[1] - mean)).sum();
+    let (fit, count) = (n * libm::log(square), index(fitted) + 1.0);
+    Ok(Residual {
+        rms: square.sqrt(),
+        max: errors.iter().fold(0.0, |most, e| f64::max(most, e.abs())),
+        autocorrelation: if spread > 0.0 { shared / spread } else { 0.0 },
+        aic: fit + 2.0 * count,
+        bic: fit + count * libm::log(n),
+    })
+}
+
 /// Mean, and the sine that fits best at one frequency: `mean + amplitude cos(w t + phase)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fundamental {

@@ -30,11 +30,9 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("BOUC_WEN_OSCILLATOR_PARAMETERS", plain(&BOUC_WEN_OSCILLATOR_PARAMETERS))?;
     module.add_class::<PyTrajectory>()?;
     module.add_function(wrap_pyfunction!(delayed, module)?)?;
-    module.add_function(wrap_pyfunction!(dahl_check, module)?)?;
     module.add_function(wrap_pyfunction!(dahl_xu_li_2010, module)?)?;
     module.add_function(wrap_pyfunction!(dahl_simulate, module)?)?;
     module.add_function(wrap_pyfunction!(dahl_simulate_fixed, module)?)?;
-    module.add_function(wrap_pyfunction!(bouc_wen_check, module)?)?;
     module.add_function(wrap_pyfunction!(bouc_wen_xu_li_2010, module)?)?;
     module.add_function(wrap_pyfunction!(bouc_wen_simulate, module)?)?;
     module.add_function(wrap_pyfunction!(stage_check, module)?)?;
@@ -158,12 +156,6 @@ fn delayed<'py>(
     Ok(integrate::delayed(&x, &v, dt, delay).to_pyarray(py))
 }
 
-/// Raises where the nine values make no stage.
-#[pyfunction]
-fn dahl_check(theta: Theta) -> PyResult<()> {
-    DahlStage::from_theta(&theta).map(|_| ()).map_err(|error| raise(&error))
-}
-
 /// Table 1 of Xu and Li 2010.
 #[pyfunction]
 fn dahl_xu_li_2010() -> Theta {
@@ -234,12 +226,6 @@ fn driven<T: Send + Into<PyTrajectory>>(
 
 fn state((x, v, q1, q2): State) -> StageState {
     StageState { x, v, q1, q2 }
-}
-
-/// Raises where the eight values make no stage.
-#[pyfunction]
-fn bouc_wen_check(theta: [f64; 8]) -> PyResult<()> {
-    BoucWenStage::from_theta(&theta).map(|_| ()).map_err(|error| raise(&error))
 }
 
 /// The parameters of Xu and Li 2010, as printed or with the stiffness corrected.

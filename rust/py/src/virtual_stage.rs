@@ -23,7 +23,8 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyTracked>()?;
     module.add_function(wrap_pyfunction!(track_dahl, module)?)?;
     module.add_function(wrap_pyfunction!(tracking_metrics, module)?)?;
-    module.add_function(wrap_pyfunction!(period_metrics, module)?)
+    module.add_function(wrap_pyfunction!(period_metrics, module)?)?;
+    module.add_function(wrap_pyfunction!(residual, module)?)
 }
 
 /// Plain numbers of a virtual stage, as a dict in Python.
@@ -381,4 +382,12 @@ fn period_metrics(
     let (desired, actual) = (samples("desired", desired)?, samples("actual", actual)?);
     let found = metrics::each_period(&desired, &actual, dt, period);
     found.map(|found| found.iter().map(figures).collect()).map_err(|error| raise(&error))
+}
+
+/// RMS, largest, correlation of neighbours, AIC, BIC of what a model leaves.
+#[pyfunction]
+fn residual(errors: &Bound<'_, PyAny>, fitted: usize) -> PyResult<(f64, f64, f64, f64, f64)> {
+    let errors = samples("errors", errors)?;
+    let found = metrics::residual(&errors, fitted).map_err(|error| raise(&error))?;
+    Ok((found.rms, found.max, found.autocorrelation, found.aic, found.bic))
 }

@@ -1,0 +1,84 @@
+"""``piezotrack compare``: several models of one log, judged where they were not fitted."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import (
+    Columns,
+    DisplacementColumn,
+    DriveColumn,
+    HoldOption,
+    Interval,
+    Out,
+    TimeColumn,
+    Units,
+    can_be_folder,
+    list_files,
+    of_file,
+    seconds,
+    windowed,
+)
+from .words import in_words
+
+__all__ = ["compare_command"]
+
+
+@in_words
+def compare_command(
+    file: Annotated[Path, typer.Argument(help="Log in CSV, with units in its header.")],
+    model: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KIND|FILE",
+            help="Kind of stage, as dahl, or a model file in JSON; else all kinds. Repeatable.",
+        ),
+    ] = None,
+    train: Annotated[
+        str | None, typer.Option(metavar="A:B", help="Seconds to fit; else the first half.")
+    ] = None,
+    test: Annotated[
+        str | None,
+        typer.Option(metavar="A:B", help="Seconds to judge on; else what follows --train."),
+    ] = None,
+    test_log: Annotated[
+        Path | None, typer.Option(help="Another log, to judge on in place of this one.")
+    ] = None,
+    out: Out = Path("results"),
+    time: TimeColumn = None,
+    drive: DriveColumn = None,
+    displacement: DisplacementColumn = None,
+    unit: Units = None,
+    dt: Interval = None,
+    hold: HoldOption = "foh",
+    seed: Annotated[int, typer.Option(help="Same seed, same result.")] = 0,
+    runs: Annotated[int, typer.Option(help="Swarms that search apart; do they agree?")] = 4,
+    threads: Annotated[int | None, typer.Option(help="Up to 256; else all cores.")] = None,
+) -> None:
+    """Fit several models on a part of a log and judge them on the rest: a table, a picture."""
+    from ..comparison import compare
+
+    columns = Columns(time, drive, displacement, unit, dt)
+    log = columns.read(file, hold)
+    fitted = None if train is None else seconds("--train", train)
+    judged = None if test is None else seconds("--test", test)
+    second = None
+    if test_log is not None:
+        second = windowed(columns.read(test_log, hold), test_log, "--test", test)
+    can_be_folder(out)
+    with of_file(file):
+        found = compare(
+            log,
+            model or None,
+            train=fitted,
+            test=judged if second is None else second,
+            seed=seed,
+            runs=runs,
+            threads=threads,
+        )
+    written = found.save(out)
+    print(found.summary())
+    list_files(written)

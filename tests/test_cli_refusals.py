@@ -1,0 +1,195 @@
+"""The command given bad input: one sentence, exit code 2, nothing written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from commands import HEADER, column, lines_with, log_text, refusal, run, write, write_model
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("log.csv").write_text(log_text(), encoding="utf-8")
+
+
+# The file, the line that is named, and pieces of the sentence.
+BAD_LOGS: dict[str, tuple[Callable[[], str | bytes], int | None, tuple[str, ...]]] = {
+    "empty": (lambda: "", None, ("is empty", "expected a header")),
+    "only a header": (lambda: HEADER + "\n", 1, ("no samples",)),
+    "no displacement": (
+        lambda: lines_with(1, "time_s,voltage_V,strain"),
+        1,
+        ("displacement", "'strain'"),
+    ),
+    "text": (lambda: lines_with(6, "0.016,high,1.0"), 6, ("'high'", "'voltage_V'", "number")),
+    "nothing": (lambda: lines_with(6, "0.016,,1.0"), 6, ("'voltage_V'", "empty")),
+    "NaN": (lambda: lines_with(6, "0.016,1.0,nan"), 6, ("'nan'", "'displacement_um'", "finite")),
+    "infinity": (lambda: lines_with(6, "0.016,inf,1.0"), 6, ("'inf'", "'voltage_V'", "finite")),
+    "a short line": (lambda: lines_with(6, "0.016,1.0"), 6, ("2 fields", "expected 3")),
+    "a long line": (lambda: lines_with(6, "0.016,1.0,2.0,3.0"), 6, ("4 fields", "expected 3")),
+    "cut off": (lambda: log_text()[: log_text().rfind(",")], 1002, ("2 fields", "cut off")),
+    "time backwards": (
+        lambda: lines_with(6, "0.008,1.0,1.0"),
+        6,
+        ("'time_s'", "goes from", "increasing"),
+    ),
+    "a gap": (lambda: lines_with(6), 6, ("'time_s'", "not even", "0.008 s")),
+    "an unknown unit": (
+        lambda: lines_with(1, "time_s,voltage [furlong],displacement_um"),
+        1,
+        ("furlong", "V, mV"),
+    ),
+    "no unit": (lambda: lines_with(1, "time_s,voltage,displacement_um"), 1, ("no unit",)),
+    "constant drive": (lambda: column(1, "5"), None, ("drive is constant at 5 V", "expected")),
+    "dead sensor": (lambda: column(2, "7"), None, ("displacement is constant", "sensor")),
+    "binary": (lambda: bytes(range(256)) * 10, 1, ("is not a text log",)),
+    "an archive": (lambda: b"PK\x03\x04" + bytes(100), 1, ("is not a text log",)),
+}
+
+
+@pytest.mark.parametrize("name", BAD_LOGS)
+def test_refuses_a_bad_log(name: str) -> None:
+    content, line, pieces = BAD_LOGS[name]
+    write("bad.csv", content())
+    sentence = refusal("identify", "bad.csv")
+    assert sentence.startswith(f"bad.csv:{line}: " if line else "bad.csv: ")
+    assert sentence.count("bad.csv") == 1
+    for piece in pieces:
+        assert piece in sentence
+    assert not any(Path().rglob("*.json"))
+    # The same for the log that judges, and it is read before the search.
+    if name not in ("constant drive", "dead sensor"):
+        assert refusal("identify", "log.csv", "--validate", "bad.csv") == sentence
+
+
+BAD_DRIVES = ("empty", "text", "infinity", "a short line", "a gap", "an unknown unit", "binary")
+
+
+@pytest.mark.parametrize("name", BAD_DRIVES)
+def test_refuses_a_bad_drive(name: str) -> None:
+    content, line, pieces = BAD_LOGS[name]
+    write("bad.csv", content())
+    write_model()
+    sentence = refusal("simulate", "dahl.json", "bad.csv", "--out", "run")
+    assert sentence.startswith(f"bad.csv:{line}: " if line else "bad.csv: ")
+    for piece in pieces:
+        assert piece in sentence
+    assert not Path("run").exists()
+
+
+BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
+    "identify gone.csv": ("gone.csv: there is no such file",),
+    "identify .": ("is a directory",),
+    "identify log.csv --window 5": ("--window is '5'", "expected A:B"),
+    "identify log.csv --window a:b": ("--window has 'a'", "number"),
+    "identify log.csv --window 30:40": ("log.csv", "--window", "30 s to 40 s", "0 s to 4 s"),
+    "identify log.csv --window 3:1": ("--window", "3 s to 1 s", "start < stop"),
+    "identify log.csv --window nan:3": ("start is nan",),
+    "identify log.csv --window 1:1.02": ("the window has 5 samples",),
+    "identify log.csv --bound mass=0.2:0.1": ("bounds of mass", "(0.2, 0.1)", "lower one first"),
+    "identify log.csv --bound mass=1": ("--bound", "'1'", "LOW:HIGH"),
+    "identify log.csv --bound mass=a:b": ("--bound has 'a'", "number"),
+    "identify log.csv --bound mass": ("--bound is 'mass'", "NAME="),
+    "identify log.csv --bound weight=1:2": ("'weight'", "one of mass, damping"),
+    "identify log.csv --fix mass=-1": ("mass is -1", "above 0"),
+    "identify log.csv --fix mass=heavy": ("--fix has 'heavy'", "number"),
+    "identify log.csv --fix mass": ("--fix is 'mass'", "NAME=VALUE"),
+    "identify log.csv --fix mass=nan": ("mass is NaN", "finite"),
+    "identify log.csv --fix weight=1": ("'weight'", "one of mass, damping"),
+    "identify log.csv --fix b0=nan": ("b0 is NaN", "finite"),
+    "identify log.csv --delay -1": ("delay is -1 s", "0 s or above"),
+    "identify log.csv --delay 5:1": ("bounds of delay", "the lower one first"),
+    "identify log.csv --delay late": ("--delay has 'late'", "number"),
+    "identify log.csv --free weight": ("free is 'weight'", "one of mass, damping"),
+    "identify log.csv --free b0": ("free is b0", "mass as well"),
+    "identify log.csv --stiffness 0": ("stiffness is 0 N/m", "above 0"),
+    "identify log.csv --stiffness -5": ("stiffness is -5 N/m", "above 0"),
+    "identify log.csv --stiffness nan": ("stiffness is NaN", "above 0"),
+    "identify log.csv --dt 0": ("log.csv", "dt is 0", "above 0"),
+    "identify log.csv --dt -1": ("log.csv", "dt is -1", "above 0"),
+    "identify log.csv --dt nan": ("log.csv", "dt is nan", "above 0"),
+    "identify log.csv --model unknown": ("model is 'unknown'", "'dahl'"),
+    "identify log.csv --model dahl --model dahl": ("--model names dahl twice",),
+    "identify log.csv --model dahl --model unknown": ("model is 'unknown'", "'bouc-wen' or"),
+    "identify log.csv --model prandtl-ishlinskii --fix mass=1": (
+        "fixed is {'mass': 1.0}",
+        "expected none",
+        "least squares",
+    ),
+    "identify log.csv --model prandtl-ishlinskii --delay fit": ("delay is True", "expected none"),
+    "identify log.csv --swarm fish": ("--swarm is 'fish'", "xu-li-2010"),
+    "identify log.csv --seed -1": ("seed is -1", "0 or above"),
+    "identify log.csv --runs 0": ("runs is 0", "1 or more"),
+    "identify log.csv --threads -1": ("threads is -1", "0 or above"),
+    "identify log.csv --unit drive": ("--unit is 'drive'", "NAME="),
+    "identify log.csv --unit drive=furlong": ("log.csv", "'furlong'", "V, mV"),
+    "identify log.csv --unit drive=um": ("log.csv", "'um' is a unit of displacement"),
+    "identify log.csv --drive volts": ("log.csv", "drive", "'volts'", "'voltage_V'"),
+    "identify log.csv --out file": ("file cannot be made a folder",),
+    "identify log.csv --out file/sub": ("cannot be made a folder",),
+    "identify log.csv --validate gone.csv": ("gone.csv: there is no such file",),
+    "identify log.csv --validate log.csv --validate-window 8:9": ("--validate-window", "log.csv"),
+    "identify log.csv --validate-window 1:2": ("--validate-window", "--validate"),
+    "simulate gone.json log.csv": ("gone.json: no such file",),
+    "simulate log.csv log.csv": ("log.csv:1: not JSON",),
+    "simulate other.json log.csv": ("other.json is not a piezotrack model",),
+    "simulate dahl.json gone.csv": ("gone.csv: there is no such file",),
+    "simulate dahl.json log.csv --dt 0": ("log.csv", "dt is 0", "above 0"),
+    "simulate dahl.json log.csv --out file": ("file cannot be made a folder",),
+    "simulate dahl.json huge.csv": ("huge.csv", "finite"),
+    "demo --out file": ("file cannot be made a folder",),
+    "demo --seed -1": ("seed is -1", "0 or above"),
+}
+
+
+@pytest.mark.usefixtures("_no_pictures")
+@pytest.mark.parametrize("command", BAD_ARGUMENTS)
+def test_refuses_a_bad_argument(command: str) -> None:
+    write("file", "not a folder")
+    write("other.json", "{}")
+    write("huge.csv", "time_s,voltage_V\n0,0\n1,-1e9\n2,0\n3,1e9\n")
+    write_model()
+    before = {path for path in Path().rglob("*") if path.is_file()}
+    sentence = refusal(*command.split())
+    for piece in BAD_ARGUMENTS[command]:
+        assert piece in sentence
+    assert {path for path in Path().rglob("*") if path.is_file()} == before
+
+
+@pytest.mark.parametrize(
+    ("command", "piece"),
+    [
+        ("identify log.csv --dt often", "--dt"),
+        ("identify log.csv --seed lucky", "--seed"),
+        ("identify log.csv --threads two", "--threads"),
+        ("identify log.csv --hold spline", "--hold"),
+        ("identify log.csv --colour red", "--colour"),
+        ("identify", "file"),
+        ("simulate dahl.json", "DRIVE"),
+        ("fly", "fly"),
+    ],
+)
+def test_refuses_what_is_no_option(command: str, piece: str) -> None:
+    # These are typer's own words.
+    result = run(*command.split())
+    assert result.exit_code == 2
+    assert "Traceback" not in result.output
+    assert result.stdout == ""
+    last = result.stderr.rstrip("\n").splitlines()[-1]
+    assert last.startswith("Error: ")
+    assert piece in last
+
+
+def test_advice_is_for_the_command_line() -> None:
+    # Whoever types a command cannot write units={'drive': 'V'}.
+    write("bad.csv", lines_with(1, "time_s,voltage,displacement_um"))
+    assert "--unit" in refusal("identify", "bad.csv")
+    write("bad.csv", log_text().partition("\n")[2])
+    assert "--drive" in refusal("identify", "bad.csv")
