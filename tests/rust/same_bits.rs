@@ -104,14 +104,16 @@ fn one_lane_and_many_with_friction_and_delay() {
     }
 }
 
-/// Zeros of the hysteresis inside the step, jumps, and another exponent.
+/// Reversals and zeros of the hysteresis inside the step, jumps, and another exponent.
 #[test]
-fn one_lane_and_many_of_bouc_wen_stages() {
+fn one_lane_and_many_of_models_with_an_exponent() {
     let (u, y) = log();
-    for (hold, exponent) in [(Hold::First, 1.0), (Hold::Zero, 1.0), (Hold::First, 1.5)] {
+    let cases = [(Hold::First, 1.0), (Hold::Zero, 1.0), (Hold::First, 1.5)];
+    let models = [Model::BoucWen, Model::FirstOrderDahl, Model::BoucWenOscillator];
+    for (model, (hold, exponent)) in models.into_iter().flat_map(|m| cases.map(|case| (m, case))) {
         let record = Record::new(&u, &y, DT, hold, 100).unwrap();
         let spec = Spec {
-            model: Model::BoucWen,
+            model,
             fixed: vec![("exponent".into(), exponent)],
             stiffness: Some(19567.0),
             offset: true,
@@ -124,9 +126,9 @@ fn one_lane_and_many_of_bouc_wen_stages() {
         assert!(expected.iter().filter(|c| f64::from_bits(c.0).is_finite()).count() > 10);
         for arch in instruction_sets() {
             let evaluator = Evaluator::new(&record, &problem, NEVER).on(arch);
-            assert_eq!(bits(&evaluator, &asked), expected, "{arch:?} {exponent}");
+            assert_eq!(bits(&evaluator, &asked), expected, "{model:?} {arch:?} {exponent}");
             let alone: Vec<_> = asked.iter().flat_map(|one| bits(&evaluator, &[*one])).collect();
-            assert_eq!(alone, expected, "{arch:?} {exponent}, one by one");
+            assert_eq!(alone, expected, "{model:?} {arch:?} {exponent}, one by one");
         }
     }
 }
