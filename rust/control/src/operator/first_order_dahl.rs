@@ -63,10 +63,7 @@ impl<N: Number> FirstOrderDahl<N> {
     fn slope(&self, force: N) -> N {
         let i = self.exponent;
         N::lanewise([force, self.rest_stiffness, self.coulomb_force], move |[f, sigma, limit]| {
-            let left = 1.0 - f / limit;
-            // Also for i = 0, where a power of 0 would be 1.
-            let share = if left.abs() > 0.0 { libm::pow(left.abs(), i) } else { 0.0 };
-            sigma * libm::copysign(share, left)
+            sigma * power(1.0 - f / limit, i)
         })
     }
 }
@@ -115,7 +112,17 @@ impl<N: Number> Facing<N> for FirstOrderDahl<N> {
     }
 }
 
+/// |w|^i sgn(w), 0 at the limit also for i = 0.
+///
+/// Not inlined, as the bits then depend on the instruction set that its caller is compiled for.
+#[inline(never)]
+fn power(w: f64, i: f64) -> f64 {
+    let share = if w.abs() > 0.0 { libm::pow(w.abs(), i) } else { 0.0 };
+    libm::copysign(share, w)
+}
+
 /// What is left of `left` after a path of `length` Fc/sigma, for an exponent i other than 1.
+#[inline(never)]
 fn remainder(left: f64, length: f64, i: f64) -> f64 {
     let size = left.abs();
     if size <= 0.0 {
