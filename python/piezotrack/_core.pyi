@@ -43,7 +43,7 @@ __all__ = [
     "period_metrics",
     "read_step",
     "residual",
-    "track_dahl",
+    "track_model",
     "tracking_metrics",
     "turns",
 ]
@@ -183,7 +183,8 @@ def feedforward(
     v: ArrayLike,
     a: ArrayLike,
 ) -> NDArray[np.float64]: ...
-def track_dahl(
+def track_model(
+    model: str,
     theta: tuple[float, ...],
     step: float,
     controller: Controller,
@@ -217,6 +218,10 @@ class LoopPlant:
     ) -> LoopPlant: ...
     @staticmethod
     def dahl(
+        theta: tuple[float, ...], low: float, high: float, delay: float
+    ) -> list[LoopPlant]: ...
+    @staticmethod
+    def bouc_wen(
         theta: tuple[float, ...], low: float, high: float, delay: float
     ) -> list[LoopPlant]: ...
     @property
@@ -342,6 +347,16 @@ class Plays:
         hold_name: str,
         initial: tuple[float, Sequence[float], Sequence[float], float, float] | None,
     ) -> PlaysMotion: ...
+    def track(
+        self,
+        step: float,
+        controller: Controller,
+        reference: ArrayLike,
+        feedforward: ArrayLike,
+        delay: float,
+        substeps: int,
+    ) -> Tracked: ...
+    def loop_plants(self, low: float, high: float, delay: float) -> list[LoopPlant]: ...
     def feedforward(
         self,
         dt: float,
