@@ -46,7 +46,7 @@ __all__ = [
     "read_step",
     "residual",
     "stage_check",
-    "track_dahl",
+    "track_model",
     "tracking_metrics",
     "turns",
 ]
@@ -197,7 +197,8 @@ def feedforward(
     v: ArrayLike,
     a: ArrayLike,
 ) -> NDArray[np.float64]: ...
-def track_dahl(
+def track_model(
+    model: str,
     theta: tuple[float, ...],
     step: float,
     controller: Controller,
@@ -231,6 +232,10 @@ class LoopPlant:
     ) -> LoopPlant: ...
     @staticmethod
     def dahl(
+        theta: tuple[float, ...], low: float, high: float, delay: float
+    ) -> list[LoopPlant]: ...
+    @staticmethod
+    def bouc_wen(
         theta: tuple[float, ...], low: float, high: float, delay: float
     ) -> list[LoopPlant]: ...
     @property
@@ -356,6 +361,16 @@ class Plays:
         hold_name: str,
         initial: tuple[float, Sequence[float], Sequence[float], float, float] | None,
     ) -> PlaysMotion: ...
+    def track(
+        self,
+        step: float,
+        controller: Controller,
+        reference: ArrayLike,
+        feedforward: ArrayLike,
+        delay: float,
+        substeps: int,
+    ) -> Tracked: ...
+    def loop_plants(self, low: float, high: float, delay: float) -> list[LoopPlant]: ...
     def feedforward(
         self,
         dt: float,

@@ -15,9 +15,8 @@ from .laws import LowPass, Notch, Pid, Repetitive, StateSpace
 
 if TYPE_CHECKING:
     from .identified import Identified
+    from .led import Led
     from .loopcheck import LoopReport
-    from .models import DahlStage
-    from .virtual import VirtualStage
 
 __all__ = ["Command", "Controller", "Session"]
 
@@ -129,15 +128,13 @@ class Controller:
         )
         object.__setattr__(self, "core", core)
 
-    def check(
-        self, stage: VirtualStage | DahlStage | Identified[Any], *, delay: float = 0.0
-    ) -> LoopReport:
+    def check(self, stage: Led | Identified[Any], *, delay: float = 0.0) -> LoopReport:
         """Gain and phase margins on a stage, and whether the loop is stable: see `check_loop`.
 
         Parameters
         ----------
-        stage : VirtualStage, DahlStage or IdentifiedModel
-            The stage.
+        stage : VirtualStage, DahlStage, BoucWenStage or PrandtlIshlinskiiStage
+            The stage, or an identified one.
         delay : float, optional
             Delay in the loop besides the hold [s].
 

@@ -11,15 +11,15 @@ import numpy as np
 from . import _core
 from .checks import not_negative
 from .errors import ParameterError
-from .identified import Identified
-from .models import DahlStage
-from .virtual import VirtualStage
+from .led import bare, loop_plants
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from .control import Controller
+    from .identified import Identified
+    from .led import Led
 
     Array = NDArray[np.float64]
 
@@ -201,22 +201,24 @@ class LoopReport:
 
 def check_loop(
     controller: Controller,
-    stage: VirtualStage | DahlStage | Identified[Any],
+    stage: Led | Identified[Any],
     *,
     delay: float = 0.0,
 ) -> LoopReport:
     """Tell whether a controller is stable on a stage, and by how much.
 
-    The stage is taken for small motions: the mode of a virtual stage with its amplifier, or a
-    Dahl stage with the slope of its hysteresis force for a spring; the voltage is held from
-    sample to sample, and the repetitive part is that which really runs, taps and all.
+    The stage is taken for small motions: the mode of a virtual stage with its amplifier, a Dahl
+    stage with the slope of its hysteresis force for a spring, or a stage with its hysteresis at
+    the input with the slope of that on the settled loop between the limits, without creep. The
+    voltage is held from sample to sample, and the repetitive part is that which really runs, taps
+    and all.
 
     Parameters
     ----------
     controller : Controller
         The controller.
-    stage : VirtualStage, DahlStage or IdentifiedModel
-        The stage. A model's own delay counts.
+    stage : VirtualStage, DahlStage, BoucWenStage or PrandtlIshlinskiiStage
+        The stage, or an identified one, whose own delay counts.
     delay : float, optional
         Time from a reading to the effect of its voltage [s], besides the hold.
 
@@ -233,25 +235,8 @@ def check_loop(
     >>> report.stable
     True
     """
-    late = not_negative("delay", delay, "s")
-    if isinstance(stage, Identified):
-        late, stage = late + stage.delay, stage.model
-    if isinstance(stage, VirtualStage):
-        gains = stage.core().gains()
-        plants = [
-            _core.LoopPlant.mode(gain, stage.frequency, stage.damping_ratio, stage.bandwidth, late)
-            for gain in gains
-        ]
-    elif isinstance(stage, DahlStage):
-        reach = stage.piezo_coefficient * np.array(controller.limits) / stage.stiffness
-        low, high = float(reach.min()), float(reach.max())
-        soft, stiff = _core.LoopPlant.dahl(stage.theta, low, high, late)
-        half = 0.5 * (low + high)
-        plants = [stiff, _core.LoopPlant.dahl(stage.theta, half, half, late)[0], soft]
-    else:
-        raise ParameterError(
-            f"stage is {type(stage).__name__}: expected a VirtualStage, a DahlStage or a model"
-        )
+    led, _, late = bare(stage)
+    plants = loop_plants(led, controller.limits, not_negative("delay", delay, "s") + late)
     cases = [_check(controller, plant) for plant in plants]
     return LoopReport(
         controller=controller, low=cases[0], middle=cases[1], high=cases[2], plant=plants[1]

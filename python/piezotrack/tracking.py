@@ -13,22 +13,20 @@ from . import _core
 from .checks import not_negative
 from .control import Controller
 from .errors import ParameterError
-from .identified import Identified
+from .led import bare, lead
 from .loopcheck import check_loop
-from .models import DahlStage
 from .references import Reference, SampledReference
-from .virtual import VirtualStage
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from .identified import Identified
+    from .led import Led
+
     Array = NDArray[np.float64]
 
 __all__ = ["Metrics", "Tracking", "track"]
-
-# Fastest step with which the model's mechanics are followed under a jumping voltage [s].
-MODEL_STEP = 5e-5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -225,7 +223,7 @@ def _metrics(
 
 
 def track(
-    stage: VirtualStage | DahlStage | Identified[Any],
+    stage: Led | Identified[Any],
     controller: Controller,
     reference: Reference,
     *,
@@ -241,9 +239,9 @@ def track(
 
     Parameters
     ----------
-    stage : VirtualStage, DahlStage or IdentifiedModel
-        What is led. A model is without noise and amplifier; with an identified one its offset and
-        delay are in the displacement.
+    stage : VirtualStage, DahlStage, BoucWenStage or PrandtlIshlinskiiStage
+        What is led, or an identified one. A model is without noise and amplifier, and starts at
+        rest; with an identified one its offset and delay are in the displacement.
     controller : Controller
         What leads it.
     reference : Reference
@@ -280,38 +278,27 @@ def track(
     >>> print(f"{run.metrics.phase_lag:.2f} rad")
     0.06 rad
     """
-    offset = late = 0.0
-    if isinstance(stage, Identified):
-        bare: DahlStage = stage.model
-        offset, late, stage = stage.offset, stage.delay, bare
+    led, offset, late = bare(stage)
     for name, value, kind in (
-        ("stage", stage, (VirtualStage, DahlStage)),
-        ("controller", controller, (Controller,)),
-        ("reference", reference, (Reference,)),
+        ("controller", controller, Controller),
+        ("reference", reference, Reference),
     ):
         if not isinstance(value, kind):
-            expected = " or ".join(f"pt.{one.__name__}" for one in kind)
-            raise ParameterError(f"{name} is {type(value).__name__}: expected {expected}")
+            raise ParameterError(f"{name} is {type(value).__name__}: expected pt.{kind.__name__}")
     # A displacement that is late shows the same as a voltage that is late.
     delay = not_negative("delay", delay, "s") + late
     substeps = _core.as_count("substeps", substeps)
     samples = reference.sample(controller.dt)
     _check_period(controller, reference)
     if not _core.as_truth("unstable", unstable):
-        _check_stable(stage, controller, delay)
+        _check_stable(led, controller, delay)
     if not _core.as_truth("beyond_reach", beyond_reach):
-        _check_reach(stage, controller, samples, offset)
+        _check_reach(led, controller, samples, offset)
     if controller.feedforward is None:
         volts, note = np.zeros(len(samples)), "no feedforward"
     else:
         volts, note = controller.feedforward.played(reference, controller.dt)
-    if isinstance(stage, VirtualStage):
-        run = stage.core().track(controller.core, samples.x, volts, delay, substeps)
-    else:
-        step = min(MODEL_STEP, controller.dt / 4)
-        run = _core.track_dahl(
-            stage.theta, step, controller.core, samples.x - offset, volts, delay, substeps
-        )
+    run = lead(led, controller, samples.x - offset, volts, delay, substeps)
     fine_t, fine_displacement, fine_voltage = run.motion()
     fine_displacement = fine_displacement + offset
     return Tracking(
@@ -350,7 +337,7 @@ def _check_period(controller: Controller, reference: Reference) -> None:
         )
 
 
-def _check_stable(stage: VirtualStage | DahlStage, controller: Controller, delay: float) -> None:
+def _check_stable(stage: Led, controller: Controller, delay: float) -> None:
     """Refuse a loop that is unstable at the middle gain of the stage."""
     if controller.feedback is None and controller.addon is None:
         return
@@ -370,7 +357,7 @@ def _check_stable(stage: VirtualStage | DahlStage, controller: Controller, delay
 
 
 def _check_reach(
-    stage: VirtualStage | DahlStage,
+    stage: Led,
     controller: Controller,
     samples: SampledReference,
     offset: float,

@@ -3,14 +3,15 @@
 
 use core::f64::consts::TAU;
 
+use piezotrack_core::alone::Alone;
 use piezotrack_core::integrate::{Drive, Hold, Method, NEVER, simulate};
 use piezotrack_core::metrics::{each_period, tracking};
 use piezotrack_core::simulate::{
     Amplifier, Apparatus, ClosedLoop, Plant, Sensor, Timing, closed_loop, open_loop,
 };
 use piezotrack_core::stage::{
-    Creep, DEAD_ZONES, DahlStage, PLAYS, RELAXATIONS, StageState, VirtualSettings, VirtualStage,
-    VirtualState,
+    BoucWenKernel, BoucWenStage, Creep, DEAD_ZONES, DahlStage, PLAYS, RELAXATIONS, StageState,
+    VirtualSettings, VirtualStage, VirtualState,
 };
 
 const UM: f64 = 1e-6;
@@ -240,4 +241,26 @@ fn a_run_stops_when_asked() {
     let run =
         closed_loop(&stage.apparatus(), stage.start(), &timing(9, 0.0, 1), |_, _| 0.0, &|| true);
     assert_eq!(run.unwrap(), None);
+}
+
+#[test]
+fn a_kernel_led_step_by_step_moves_as_it_does_alone() {
+    let stage = BoucWenStage::xu_li_2010_corrected();
+    let kernel = BoucWenKernel { exponent: stage.exponent };
+    let plant = Alone { kernel: &kernel, parameters: &stage.parameters() };
+    let u: Vec<f64> = sine(75.0, 0.5, 400);
+    for hold in [Hold::First, Hold::Zero] {
+        let drive = Drive::new(&u, TS, hold).unwrap();
+        let alone = stage.simulate(&drive, [0.0; 4], 1e-12, NEVER).unwrap().unwrap();
+        let largest = |step: f64| {
+            let apparatus = Apparatus::bare(&plant, step);
+            let run = open_loop(&apparatus, apparatus.rest(), &drive, NEVER).unwrap().unwrap();
+            let gaps = run.displacement.iter().zip(&alone.x).map(|(a, b)| (a - b).abs());
+            gaps.fold(0.0, f64::max)
+        };
+        // Under a held voltage every step is exact; under a ramp those of fourth order.
+        let (long, short) = (largest(TS), largest(TS / 8.0));
+        assert!(short < 1e-12, "{hold:?}: {short:e}");
+        assert!(if hold == Hold::Zero { long < 1e-15 } else { long > 100.0 * short }, "{long:e}");
+    }
 }

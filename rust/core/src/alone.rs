@@ -58,7 +58,8 @@ impl<K: Kernel<f64> + Copy> Alone<'_, K> {
         Instant { x: 0.0, v: 0.0, memory: self.kernel.rest(self.parameters) }
     }
 
-    fn mechanics(&self) -> Mechanics {
+    /// Mass, damping and stiffness.
+    pub(crate) fn mechanics(&self) -> Mechanics {
         let [mass, damping, stiffness, ..] = *self.parameters;
         Mechanics { mass, damping, stiffness }
     }

@@ -2,7 +2,7 @@
 
 use piezotrack_core::Result;
 use piezotrack_core::design::{GainRange, LoopPlant, SampledLoop, Verdict};
-use piezotrack_core::stage::DahlStage;
+use piezotrack_core::stage::{BoucWenStage, DahlStage};
 use pyo3::prelude::*;
 
 use crate::control::PyController;
@@ -19,7 +19,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 /// A stage for small motions, from the controller's voltage to displacement.
 #[pyclass(name = "LoopPlant", frozen, module = "piezotrack._core")]
 #[derive(Clone)]
-struct PyLoopPlant(LoopPlant);
+pub struct PyLoopPlant(LoopPlant);
 
 #[pymethods]
 impl PyLoopPlant {
@@ -50,9 +50,28 @@ impl PyLoopPlant {
         build().map(|both| both.map(Self)).map_err(|error| raise(&error))
     }
 
+    /// A Bouc-Wen stage between two voltages, with a delay: least, mean and largest gain.
+    #[staticmethod]
+    fn bouc_wen(theta: [f64; 8], low: f64, high: f64, delay: f64) -> PyResult<[Self; 3]> {
+        let stage = BoucWenStage::from_theta(&theta);
+        Self::late(stage.and_then(|stage| LoopPlant::bouc_wen(&stage, low, high)), delay)
+    }
+
     #[getter]
     fn static_gain(&self) -> f64 {
         self.0.static_gain()
+    }
+}
+
+impl PyLoopPlant {
+    /// Three plants, with a delay more.
+    pub fn late(plants: Result<[LoopPlant; 3]>, delay: f64) -> PyResult<[Self; 3]> {
+        let build = || -> Result<[Self; 3]> {
+            let [low, middle, high] = plants?;
+            let late = |plant: LoopPlant| plant.with_delay(delay).map(Self);
+            Ok([late(low)?, late(middle)?, late(high)?])
+        };
+        build().map_err(|error| raise(&error))
     }
 }
 

@@ -10,6 +10,7 @@ mod numbers;
 mod plays;
 mod stage;
 mod step;
+mod tracking;
 mod virtual_stage;
 
 use pyo3::prelude::*;
@@ -25,5 +26,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     control::register(module)?;
     design::register(module)?;
     plays::register(module)?;
-    virtual_stage::register(module)
+    virtual_stage::register(module)?;
+    tracking::register(module)
 }

@@ -1,6 +1,7 @@
 //! The Prandtl-Ishlinskii stage: simulation, inverse, identification.
 
 use numpy::{PyArray1, ToPyArray};
+use piezotrack_core::design::LoopPlant;
 use piezotrack_core::identify::{
     DynamicsKind, PlaysFit, PlaysRecord, PlaysSettings, Rows, identify_plays,
 };
@@ -13,9 +14,12 @@ use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
 use crate::arrays::samples;
+use crate::control::PyController;
+use crate::design::PyLoopPlant;
 use crate::enter::enter;
 use crate::errors::raise;
 use crate::stage::hold;
+use crate::tracking::{Arrays, PyTracked};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyPlays>()?;
@@ -119,6 +123,27 @@ impl PyPlays {
             Ok(volts)
         };
         volts().map(|volts| volts.to_pyarray(py)).map_err(|error| raise(&error))
+    }
+
+    /// Lets a controller lead the stage along a course, in steps of at most `step` seconds.
+    #[expect(clippy::too_many_arguments, reason = "called from one place")]
+    fn track(
+        &self,
+        py: Python<'_>,
+        step: f64,
+        controller: &PyController,
+        reference: &Bound<'_, PyAny>,
+        feedforward: &Bound<'_, PyAny>,
+        delay: f64,
+        substeps: usize,
+    ) -> PyResult<PyTracked> {
+        let course = Arrays::new(reference, feedforward)?;
+        enter(py, |stop| course.bare(&self.stage, step, controller, (delay, substeps), stop))
+    }
+
+    /// The stage for small motions between two voltages: least, mean and largest gain.
+    fn loop_plants(&self, low: f64, high: f64, delay: f64) -> PyResult<[PyLoopPlant; 3]> {
+        PyLoopPlant::late(LoopPlant::plays(&self.stage, low, high), delay)
     }
 
     /// The inverse at work, sample by sample.

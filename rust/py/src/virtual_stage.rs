@@ -1,30 +1,21 @@
-//! The virtual stage, and a controller on it or on a model.
+//! The virtual stage: its settings, its simulation, a controller on it.
 
 use numpy::{PyArray1, ToPyArray};
-use piezotrack_core::integrate::{Drive, Stop};
-use piezotrack_core::metrics::{self, Tracking};
-use piezotrack_core::simulate::{
-    Amplifier, Apparatus, ApparatusState, Course, Plant, Sensor, Timing, Tracked, track,
-};
-use piezotrack_core::stage::{
-    Creep, DahlStage, RELAXATIONS, StagePlay, VirtualSettings, VirtualStage,
-};
+use piezotrack_core::integrate::Drive;
+use piezotrack_core::simulate::{Amplifier, Sensor};
+use piezotrack_core::stage::{Creep, RELAXATIONS, StagePlay, VirtualSettings, VirtualStage};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
 use crate::arrays::samples;
 use crate::control::PyController;
 use crate::enter::enter;
-use crate::errors::{raise, shape};
-use crate::stage::{Theta, hold};
+use crate::errors::raise;
+use crate::stage::hold;
+use crate::tracking::{Arrays, PyTracked, stopped};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<PyVirtualStage>()?;
-    module.add_class::<PyTracked>()?;
-    module.add_function(wrap_pyfunction!(track_dahl, module)?)?;
-    module.add_function(wrap_pyfunction!(tracking_metrics, module)?)?;
-    module.add_function(wrap_pyfunction!(period_metrics, module)?)?;
-    module.add_function(wrap_pyfunction!(residual, module)?)
+    module.add_class::<PyVirtualStage>()
 }
 
 /// Plain numbers of a virtual stage, as a dict in Python.
@@ -226,168 +217,4 @@ impl PyVirtualStage {
             course.run(&apparatus, self.0.start(), controller, (delay, substeps), stop)
         })
     }
-}
-
-/// Lets a controller lead a model along a course, in steps of at most `step` seconds.
-#[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "called from one place")]
-fn track_dahl(
-    py: Python<'_>,
-    theta: Theta,
-    step: f64,
-    controller: &PyController,
-    reference: &Bound<'_, PyAny>,
-    feedforward: &Bound<'_, PyAny>,
-    delay: f64,
-    substeps: usize,
-) -> PyResult<PyTracked> {
-    let course = Arrays::new(reference, feedforward)?;
-    enter(py, |stop| {
-        let stage = DahlStage::from_theta(&theta)?;
-        let apparatus = Apparatus::bare(&stage, step);
-        course.run(&apparatus, apparatus.rest(), controller, (delay, substeps), stop)
-    })
-}
-
-/// A stopped simulation, for which `enter` raises.
-fn stopped<T>(run: Option<T>) -> Result<T> {
-    run.ok_or_else(|| Error::Numerical("the simulation was stopped".into()))
-}
-
-/// Reference and feedforward as Python gives them.
-struct Arrays {
-    reference: Vec<f64>,
-    feedforward: Vec<f64>,
-}
-
-impl Arrays {
-    fn new(reference: &Bound<'_, PyAny>, feedforward: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let reference = samples("reference", reference)?;
-        let feedforward = samples("feedforward", feedforward)?;
-        if reference.len() < 2 {
-            let found = format!("{} samples", reference.len());
-            return Err(shape("reference", &found, "at least 2"));
-        }
-        Ok(Self { reference, feedforward })
-    }
-
-    fn run<P: Plant>(
-        &self,
-        apparatus: &Apparatus<'_, P>,
-        start: ApparatusState<P::State>,
-        controller: &PyController,
-        (delay, substeps): (f64, usize),
-        stop: Stop<'_>,
-    ) -> Result<PyTracked> {
-        let (interval, samples) = (controller.dt, self.reference.len());
-        let timing = Timing { interval, samples, delay, substeps };
-        let course = Course { reference: &self.reference, feedforward: &self.feedforward };
-        let run = track(apparatus, start, &timing, &controller.controller, course, stop)?;
-        Ok(PyTracked::new(stopped(run)?))
-    }
-}
-
-/// A controlled motion.
-#[pyclass(name = "Tracked", frozen, module = "piezotrack._core")]
-struct PyTracked {
-    /// At the instants kept: time, true displacement, applied voltage.
-    motion: [Vec<f64>; 3],
-    /// At the control samples.
-    commands: Vec<piezotrack_control::Command>,
-    measured: Vec<f64>,
-}
-
-impl PyTracked {
-    fn new<S>(run: Tracked<S>) -> Self {
-        let Tracked { motion, commands } = run;
-        let substeps = (motion.time.len() - 1) / (commands.len() - 1).max(1);
-        let measured = motion.measured.iter().step_by(substeps.max(1)).copied().collect();
-        Self { motion: [motion.time, motion.displacement, motion.applied], commands, measured }
-    }
-}
-
-#[pymethods]
-impl PyTracked {
-    /// Time, true displacement, applied voltage at the instants kept.
-    fn motion<'py>(&self, py: Python<'py>) -> [Bound<'py, PyArray1<f64>>; 3] {
-        [0, 1, 2].map(|i| self.motion[i].to_pyarray(py))
-    }
-
-    /// Reading of the sensor at the control samples.
-    #[getter]
-    fn measured<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.measured.to_pyarray(py)
-    }
-
-    /// A part of the commands by its name.
-    fn part<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let pick: fn(&piezotrack_control::Command) -> f64 = match name {
-            "volts" => |command| command.volts,
-            "unclipped" => |command| command.unclipped,
-            "feedforward" => |command| command.feedforward,
-            "feedback" => |command| command.feedback,
-            "repetitive" => |command| command.repetitive,
-            "error" => |command| command.error,
-            other => {
-                let error = Error::parameter("name", other, "a part of the command");
-                return Err(raise(&error));
-            }
-        };
-        Ok(PyArray1::from_iter(py, self.commands.iter().map(pick)))
-    }
-
-    /// Whether each command was clipped.
-    #[getter]
-    fn saturated<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
-        PyArray1::from_iter(py, self.commands.iter().map(|command| command.saturated))
-    }
-}
-
-/// Largest, RMS, mean error, its deviation and peak to peak, phase lag, widest loop.
-type Figures = (f64, f64, f64, f64, f64, Option<f64>, Option<f64>);
-
-fn figures(of: &Tracking) -> Figures {
-    (
-        of.max_error,
-        of.rms_error,
-        of.mean_error,
-        of.error_sd,
-        of.error_peak_to_peak,
-        of.phase_lag,
-        of.widest_loop,
-    )
-}
-
-/// Figures of a motion against its reference.
-#[pyfunction]
-fn tracking_metrics(
-    desired: &Bound<'_, PyAny>,
-    actual: &Bound<'_, PyAny>,
-    dt: f64,
-    frequency: Option<f64>,
-) -> PyResult<Figures> {
-    let (desired, actual) = (samples("desired", desired)?, samples("actual", actual)?);
-    let found = metrics::tracking(&desired, &actual, dt, frequency);
-    found.map(|found| figures(&found)).map_err(|error| raise(&error))
-}
-
-/// Figures of each whole period.
-#[pyfunction]
-fn period_metrics(
-    desired: &Bound<'_, PyAny>,
-    actual: &Bound<'_, PyAny>,
-    dt: f64,
-    period: f64,
-) -> PyResult<Vec<Figures>> {
-    let (desired, actual) = (samples("desired", desired)?, samples("actual", actual)?);
-    let found = metrics::each_period(&desired, &actual, dt, period);
-    found.map(|found| found.iter().map(figures).collect()).map_err(|error| raise(&error))
-}
-
-/// RMS, largest, correlation of neighbours, AIC, BIC of what a model leaves.
-#[pyfunction]
-fn residual(errors: &Bound<'_, PyAny>, fitted: usize) -> PyResult<(f64, f64, f64, f64, f64)> {
-    let errors = samples("errors", errors)?;
-    let found = metrics::residual(&errors, fitted).map_err(|error| raise(&error))?;
-    Ok((found.rms, found.max, found.autocorrelation, found.aic, found.bic))
 }

@@ -96,7 +96,9 @@ impl<N: Number> Operator<N> for FirstOrderDahl<N> {
         let i = self.exponent;
         let arguments = [along, direction * distance, self.rest_stiffness, self.coulomb_force];
         let force = N::lanewise(arguments, move |[f, length, sigma, limit]| {
-            limit * (1.0 - remainder(1.0 - f / limit, sigma * length / limit, i))
+            let left = 1.0 - f / limit;
+            // A way of no length changes nothing, to the bit.
+            f + limit * (left - remainder(left, sigma * length / limit, i))
         });
         BoucWenState { value: direction * force, slope: self.slope(force) }
     }
@@ -113,16 +115,12 @@ impl<N: Number> Facing<N> for FirstOrderDahl<N> {
 }
 
 /// |w|^i sgn(w), 0 at the limit also for i = 0.
-///
-/// Not inlined, as the bits then depend on the instruction set that its caller is compiled for.
-#[inline(never)]
 fn power(w: f64, i: f64) -> f64 {
     let share = if w.abs() > 0.0 { libm::pow(w.abs(), i) } else { 0.0 };
     libm::copysign(share, w)
 }
 
 /// What is left of `left` after a path of `length` Fc/sigma, for an exponent i other than 1.
-#[inline(never)]
 fn remainder(left: f64, length: f64, i: f64) -> f64 {
     let size = left.abs();
     if size <= 0.0 {

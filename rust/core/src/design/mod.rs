@@ -14,6 +14,7 @@
 //! even a static plant answers one sample later.
 
 mod check;
+mod input_gain;
 mod jet;
 mod margins;
 mod plant;

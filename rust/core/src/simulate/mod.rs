@@ -14,7 +14,7 @@ mod tracking;
 pub use amplifier::{Amplifier, AmplifierFlow};
 pub use closed_loop::{ClosedLoop, Timing, closed_loop};
 pub use open_loop::{OpenLoop, open_loop};
-pub use plant::{DahlFlow, Plant};
+pub use plant::{DahlFlow, KernelFlow, Plant};
 pub use sensor::{Sensor, SensorState};
 pub use tracking::{Course, Law, LawState, MOST_STATES, Tracked, track};
 

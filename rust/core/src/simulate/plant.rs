@@ -2,11 +2,12 @@
 
 use piezotrack_control::operator::{Dahl, DahlState};
 
+use crate::alone::{Alone, Instant, Memory};
 use crate::march::TERMS;
 use crate::mechanics::{Propagator, halvings};
 use crate::stage::feedback::{FeedbackState, Smooth};
 use crate::stage::friction::Friction;
-use crate::stage::{Coupling, DahlStage, StageState};
+use crate::stage::{Coupling, DahlStage, Kernel, StageState};
 
 /// A stage from its terminals to its displacement: configuration in `&self`, memory in `State`.
 pub trait Plant {
@@ -87,6 +88,41 @@ impl Plant for DahlStage {
     }
 
     fn displacement(&self, state: &StageState) -> f64 {
+        state.x
+    }
+}
+
+/// Steps of a stage of any kind that a kernel describes.
+#[derive(Clone, Copy, Debug)]
+pub struct KernelFlow<C> {
+    coupling: C,
+    step: f64,
+}
+
+/// With the operator at the input, steps under a held voltage are exact, however long they are.
+impl<K: Kernel<f64> + Copy> Plant for Alone<'_, K> {
+    type State = Instant<Memory<K>>;
+    type Flow = KernelFlow<K::Coupling>;
+
+    fn rest(&self) -> Self::State {
+        Alone::rest(self)
+    }
+
+    fn flow(&self, step: f64) -> Self::Flow {
+        let halvings = halvings(self.mechanics().rate(), step);
+        KernelFlow { coupling: self.kernel.coupling(self.parameters, step, halvings), step }
+    }
+
+    #[inline(always)]
+    fn advance(&self, flow: &Self::Flow, state: &mut Self::State, from: f64, to: f64) {
+        let KernelFlow { coupling, step } = flow;
+        let gain = self.kernel.gain(self.parameters);
+        let start = FeedbackState { x: state.x, w: state.v * step, memory: state.memory };
+        let end = coupling.step(&start, gain * from, gain * (to - from));
+        *state = Instant { x: end.x, v: end.w / step, memory: end.memory };
+    }
+
+    fn displacement(&self, state: &Self::State) -> f64 {
         state.x
     }
 }
