@@ -11,6 +11,7 @@ mod plays;
 mod stage;
 mod step;
 mod virtual_stage;
+mod xy;
 
 use pyo3::prelude::*;
 
@@ -25,5 +26,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     control::register(module)?;
     design::register(module)?;
     plays::register(module)?;
-    virtual_stage::register(module)
+    virtual_stage::register(module)?;
+    xy::register(module)
 }

@@ -164,12 +164,12 @@ impl Settings {
 }
 
 /// True displacement, reading of the sensor and applied voltage.
-type OpenLoopArrays<'py> =
+pub type OpenLoopArrays<'py> =
     (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
 /// A stage to experiment on.
 #[pyclass(name = "VirtualStage", frozen, module = "piezotrack._core")]
-struct PyVirtualStage(VirtualStage);
+pub struct PyVirtualStage(pub VirtualStage);
 
 #[pymethods]
 impl PyVirtualStage {
@@ -183,6 +183,11 @@ impl PyVirtualStage {
     #[staticmethod]
     fn xu_li_2010(seed: u64) -> Settings {
         Settings::of(&VirtualSettings::xu_li_2010(seed))
+    }
+
+    #[staticmethod]
+    fn xu_li_2010_y(seed: u64) -> Settings {
+        Settings::of(&VirtualSettings::xu_li_2010_y(seed))
     }
 
     /// Lowest, mean and highest gain for small motions, m/V.
@@ -249,18 +254,18 @@ fn track_dahl(
 }
 
 /// A stopped simulation, for which `enter` raises.
-fn stopped<T>(run: Option<T>) -> Result<T> {
+pub fn stopped<T>(run: Option<T>) -> Result<T> {
     run.ok_or_else(|| Error::Numerical("the simulation was stopped".into()))
 }
 
 /// Reference and feedforward as Python gives them.
-struct Arrays {
+pub struct Arrays {
     reference: Vec<f64>,
     feedforward: Vec<f64>,
 }
 
 impl Arrays {
-    fn new(reference: &Bound<'_, PyAny>, feedforward: &Bound<'_, PyAny>) -> PyResult<Self> {
+    pub fn new(reference: &Bound<'_, PyAny>, feedforward: &Bound<'_, PyAny>) -> PyResult<Self> {
         let reference = samples("reference", reference)?;
         let feedforward = samples("feedforward", feedforward)?;
         if reference.len() < 2 {
@@ -268,6 +273,10 @@ impl Arrays {
             return Err(shape("reference", &found, "at least 2"));
         }
         Ok(Self { reference, feedforward })
+    }
+
+    pub fn course(&self) -> Course<'_> {
+        Course { reference: &self.reference, feedforward: &self.feedforward }
     }
 
     fn run<P: Plant>(
@@ -280,15 +289,14 @@ impl Arrays {
     ) -> Result<PyTracked> {
         let (interval, samples) = (controller.dt, self.reference.len());
         let timing = Timing { interval, samples, delay, substeps };
-        let course = Course { reference: &self.reference, feedforward: &self.feedforward };
-        let run = track(apparatus, start, &timing, &controller.controller, course, stop)?;
+        let run = track(apparatus, start, &timing, &controller.controller, self.course(), stop)?;
         Ok(PyTracked::new(stopped(run)?))
     }
 }
 
 /// A controlled motion.
 #[pyclass(name = "Tracked", frozen, module = "piezotrack._core")]
-struct PyTracked {
+pub struct PyTracked {
     /// At the instants kept: time, true displacement, applied voltage.
     motion: [Vec<f64>; 3],
     /// At the control samples.
@@ -297,7 +305,7 @@ struct PyTracked {
 }
 
 impl PyTracked {
-    fn new<S>(run: Tracked<S>) -> Self {
+    pub fn new<S>(run: Tracked<S>) -> Self {
         let Tracked { motion, commands } = run;
         let substeps = (motion.time.len() - 1) / (commands.len() - 1).max(1);
         let measured = motion.measured.iter().step_by(substeps.max(1)).copied().collect();
