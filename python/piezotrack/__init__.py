@@ -23,7 +23,9 @@ from .errors import (
 
 if TYPE_CHECKING:
     from .bouc_wen import BoucWenStage, BoucWenState
+    from .contouring import Contour, contour
     from .control import Command, Controller, Session
+    from .cross_talk import CrossTalk, identify_cross_talk
     from .dataset import Dataset
     from .estimates import Estimate, Progress, Run
     from .identification import Identification, identify
@@ -33,6 +35,9 @@ if TYPE_CHECKING:
     from .loopcheck import LoopCheck, LoopReport, LoopResponse, check_loop
     from .modelfile import IdentifiedModel, Score, load
     from .models import DahlStage, Response, StageState
+    from .noise import Noise, identify_noise
+    from .path_text import parse_path
+    from .paths import circle, lissajous, raster, spiral
     from .plays import PlaysResponse, PlaysState, PrandtlIshlinskiiStage
     from .playsfile import IdentifiedPlays, load_plays
     from .playsfit import PlaysIdentification, identify_plays
@@ -41,15 +46,20 @@ if TYPE_CHECKING:
     from .references import Reference, SampledReference, read_reference
     from .step import StepResult, StepTrace, identify_step
     from .swarm import ParticleSwarm
-    from .tracking import Metrics, Tracking, track
+    from .table_2 import Table2, run_table_2
+    from .tracking import Metrics, Spread, Tracking, track
     from .virtual import VirtualResponse, VirtualStage
     from .waveforms import chirp, multisine, sine, staircase, triangle
+    from .xyreference import XYReference, read_path
+    from .xystage import XYStage
 
 __all__ = [
     "BoucWenStage",
     "BoucWenState",
     "Command",
+    "Contour",
     "Controller",
+    "CrossTalk",
     "DahlStage",
     "DataError",
     "Dataset",
@@ -65,6 +75,7 @@ __all__ = [
     "LoopResponse",
     "LowPass",
     "Metrics",
+    "Noise",
     "Notch",
     "NumericalError",
     "ParameterError",
@@ -84,28 +95,42 @@ __all__ = [
     "Score",
     "Session",
     "ShapeError",
+    "Spread",
     "StageState",
     "StateSpace",
     "StepReadings",
     "StepResult",
     "StepTrace",
+    "Table2",
     "Tracking",
     "VirtualResponse",
     "VirtualStage",
+    "XYReference",
+    "XYStage",
     "__version__",
     "check_loop",
     "chirp",
+    "circle",
+    "contour",
     "identify",
+    "identify_cross_talk",
+    "identify_noise",
     "identify_plays",
     "identify_step",
+    "lissajous",
     "load",
     "load_plays",
     "multisine",
+    "parse_path",
     "parse_reference",
+    "raster",
     "read",
     "read_drive",
+    "read_path",
     "read_reference",
+    "run_table_2",
     "sine",
+    "spiral",
     "staircase",
     "track",
     "triangle",
@@ -113,6 +138,34 @@ __all__ = [
 
 # What is heavy is imported when it is first used.
 _HOMES = {
+    "contouring": (
+        "Contour",
+        "contour",
+    ),
+    "cross_talk": (
+        "CrossTalk",
+        "identify_cross_talk",
+    ),
+    "noise": (
+        "Noise",
+        "identify_noise",
+    ),
+    "paths": (
+        "circle",
+        "lissajous",
+        "raster",
+        "spiral",
+    ),
+    "xyreference": (
+        "XYReference",
+        "read_path",
+    ),
+    "xystage": ("XYStage",),
+    "path_text": ("parse_path",),
+    "table_2": (
+        "Table2",
+        "run_table_2",
+    ),
     "bouc_wen": (
         "BoucWenStage",
         "BoucWenState",
@@ -191,6 +244,7 @@ _HOMES = {
     "swarm": ("ParticleSwarm",),
     "tracking": (
         "Metrics",
+        "Spread",
         "Tracking",
         "track",
     ),

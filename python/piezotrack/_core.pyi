@@ -22,6 +22,7 @@ __all__ = [
     "Tracked",
     "Trajectory",
     "VirtualStage",
+    "XYStage",
     "__version__",
     "as_count",
     "as_number",
@@ -30,6 +31,8 @@ __all__ = [
     "bouc_wen_simulate",
     "bouc_wen_xu_li_2010",
     "check_loop",
+    "circle_errors",
+    "cross_talk_share",
     "dahl_check",
     "dahl_simulate",
     "dahl_simulate_fixed",
@@ -40,8 +43,11 @@ __all__ = [
     "identify_plays",
     "loop_response",
     "nnls",
+    "path_errors",
     "period_metrics",
     "read_step",
+    "sensor_noise",
+    "spread",
     "track_dahl",
     "tracking_metrics",
     "turns",
@@ -255,6 +261,8 @@ class VirtualStage:
     def __new__(cls, settings: dict[str, Any]) -> VirtualStage: ...
     @staticmethod
     def xu_li_2010(seed: int) -> dict[str, Any]: ...
+    @staticmethod
+    def xu_li_2010_y(seed: int) -> dict[str, Any]: ...
     def gains(self) -> list[float]: ...
     def simulate(
         self, u: ArrayLike, dt: float, hold_name: str
@@ -267,6 +275,39 @@ class VirtualStage:
         delay: float,
         substeps: int,
     ) -> Tracked: ...
+
+_Axis = VirtualStage | tuple[tuple[float, ...], float]
+_Motion = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+_Spread = tuple[float, float, float, float, float]
+
+@final
+class XYStage:
+    def __new__(
+        cls, x: _Axis, y: _Axis, cross_talk: tuple[float, float], lag: float
+    ) -> XYStage: ...
+    def simulate(
+        self, ux: ArrayLike, uy: ArrayLike, dt: float, hold_name: str
+    ) -> list[_Motion]: ...
+    def track(
+        self,
+        controllers: tuple[Controller, Controller],
+        references: tuple[ArrayLike, ArrayLike],
+        feedforwards: tuple[ArrayLike, ArrayLike],
+        delay: float,
+        substeps: int,
+    ) -> tuple[Tracked, Tracked]: ...
+
+def circle_errors(
+    x: ArrayLike, y: ArrayLike, centre: tuple[float, float], radius: float
+) -> NDArray[np.float64]: ...
+def path_errors(
+    x: ArrayLike, y: ArrayLike, path_x: ArrayLike, path_y: ArrayLike
+) -> NDArray[np.float64]: ...
+def spread(errors: ArrayLike) -> _Spread: ...
+def cross_talk_share(driven: ArrayLike, other: ArrayLike) -> tuple[float, float, float]: ...
+def sensor_noise(
+    record: ArrayLike, dt: float
+) -> tuple[_Spread, float, float, int, float, float, float | None]: ...
 
 @final
 class Tracked:

@@ -18,8 +18,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Columns",
+    "ControlInterval",
     "DisplacementColumn",
     "DriveColumn",
+    "Duration",
     "HoldOption",
     "Interval",
     "Out",
@@ -33,6 +35,7 @@ __all__ = [
     "number_range",
     "of_file",
     "pairs",
+    "window_seconds",
 ]
 
 Seconds = Annotated[
@@ -57,6 +60,8 @@ HoldOption = Annotated[
     Literal["foh", "zoh"],
     typer.Option(help="Between samples the drive is a line (foh) or constant (zoh)."),
 ]
+ControlInterval = Annotated[float, typer.Option(help="Sampling interval of the controller in s.")]
+Duration = Annotated[float | None, typer.Option(help="Length of the reference in s.")]
 Out = Annotated[Path, typer.Option(help="Folder for the results.")]
 
 
@@ -149,3 +154,12 @@ def number_range(option: str, text: str) -> tuple[float, float]:
     if not colon:
         raise ParameterError(f"{option} has '{text}': expected LOW:HIGH")
     return number(option, low), number(option, high)
+
+
+def window_seconds(window: str) -> tuple[float | None, float | None]:
+    """Take A:B of a window; either may be left out."""
+    start, colon, stop = window.partition(":")
+    if not colon:
+        raise ParameterError(f"--window is '{window}': expected A:B in seconds, as 0.1:0.5")
+    first, last = (number("--window", text) if text else None for text in (start, stop))
+    return first, last

@@ -21,6 +21,7 @@ from .options import (
     list_files,
     number,
     of_file,
+    window_seconds,
 )
 from .words import in_words
 
@@ -56,7 +57,7 @@ def step_command(
     log = Columns(time, drive, displacement, unit, dt).read(file, hold)
     with of_file(file):
         if window is not None:
-            log = log[slice(*_seconds(window))]
+            log = log[slice(*window_seconds(window))]
     can_be_folder(out)
     level = None if second_level is None else _level(second_level)
     with of_file(file):
@@ -67,14 +68,6 @@ def step_command(
     options = " ".join(f"--fix {name}={value:.8g}" for name, value in step.hysteresis.items())
     print(f"\nto go on with these: piezotrack identify LOG {options}")
     list_files(written)
-
-
-def _seconds(window: str) -> tuple[float | None, float | None]:
-    start, colon, stop = window.partition(":")
-    if not colon:
-        raise ParameterError(f"--window is '{window}': expected A:B in seconds, as 0.1:0.5")
-    first, last = (number("--window", text) if text else None for text in (start, stop))
-    return first, last
 
 
 def _level(text: str) -> tuple[float, float]:
