@@ -149,13 +149,14 @@ def plot_contour(run: Contour) -> Figure:
     plot_path(run, figure.add_subplot(grid[0, 0]))
     plot_magnified(run, figure.add_subplot(grid[0, 1]))
     part, shared = _last(run), None
+    inner = grid[1, 0].subgridspec(2, 1, hspace=0.1)
     for row, (name, axis) in enumerate((("x", run.x), ("y", run.y))):
-        inner = grid[1, 0].subgridspec(2, 1)
         ax = figure.add_subplot(inner[row], sharex=shared, sharey=shared)
         ax.plot(run.t[part], 1e6 * axis.error[part], color="C0", linewidth=0.8)
         ax.axhline(0.0, color="0.7", linewidth=0.6)
         ax.set(xlabel="time [s]" if row else "", ylabel=f"error of {name} [um]")
         ax.tick_params(labelbottom=bool(row))
+        ax.locator_params(axis="y", nbins=4, prune="both")
         ax.margins(x=0)
         shared = shared or ax
     contour = figure.add_subplot(grid[1, 1])

@@ -92,7 +92,7 @@ fn a_lag_makes_the_ellipse_of_its_angle() {
     let axis = Apparatus::bare(&plant, 1.0);
     let (cosine, sine) =
         (wave(1001, 0.0, radius, frequency, 0.0), wave(1001, 0.0, radius, frequency, TAU / 4.0));
-    for intervals in [1.0, 2.0, 5.0] {
+    for (whole, intervals) in [(1, 1.0), (2, 2.0), (5, 5.0)] {
         let axes = TwoAxes { x: axis, y: axis, cross_talk: [0.0, 0.0], lag: intervals * TS };
         let courses = [&cosine, &sine].map(|volts| Course { reference: volts, feedforward: volts });
         let start = (axis.rest(), axis.rest());
@@ -114,7 +114,7 @@ fn a_lag_makes_the_ellipse_of_its_angle() {
         assert!((found.peak_to_peak / (edge(1.0) - edge(-1.0)) - 1.0).abs() < 1e-3);
         // Sample by sample it is the same motion, so much later.
         for k in turn {
-            assert!((y.motion.measured[k] - UM * sine[k - 1 - intervals as usize]).abs() < 1e-18);
+            assert!((y.motion.measured[k] - UM * sine[k - 1 - whole]).abs() < 1e-18);
         }
     }
 }
@@ -126,21 +126,22 @@ fn a_lag_of_a_part_of_an_interval_is_kept_to_the_instant() {
     let axis = Apparatus::bare(&plant, 1.0);
     let steps: Vec<f64> = (0..20).map(|k| f64::from(k % 2)).collect();
     let course = Course { reference: &steps, feedforward: &steps };
-    for (lag, delay) in [(0.3, 0.0), (0.0, 0.3), (0.2, 0.1), (0.3, 0.4), (1.3, 0.0), (0.9, 2.2)] {
-        let axes = TwoAxes { x: axis, y: axis, cross_talk: [0.0, 0.0], lag: lag * TS };
+    for (lag, delay) in [(3, 0), (0, 3), (2, 1), (3, 4), (13, 0), (9, 22)] {
+        // In tenths of an interval.
+        let seconds = |tenths: usize| 0.1 * TS * tenths as f64;
+        let axes = TwoAxes { x: axis, y: axis, cross_talk: [0.0, 0.0], lag: seconds(lag) };
         let start = (axis.rest(), axis.rest());
-        let timing = timing(delay * TS, 10);
+        let timing = timing(seconds(delay), 10);
         let run = track_both(&axes, start, &timing, (&open(), &open()), [course; 2], NEVER);
         let (x, y) = run.unwrap().unwrap();
-        let tenths = |part: f64| (10.0 * part).round() as usize;
         for j in 50..190 {
             // An instant shows what acted before it.
             let at = |late: usize| UM * steps[(j - 1 - late) / 10];
-            assert_eq!(x.motion.displacement[j], at(tenths(delay)), "{j} {lag} {delay}");
-            assert_eq!(y.motion.displacement[j], at(tenths(lag + delay)), "{j} {lag} {delay}");
+            assert_eq!(x.motion.displacement[j], at(delay), "{j} {lag} {delay}");
+            assert_eq!(y.motion.displacement[j], at(lag + delay), "{j} {lag} {delay}");
         }
         // The command beside an instant is the last one computed.
-        let late = tenths(lag).div_ceil(10);
+        let late = lag.div_ceil(10);
         assert_eq!(y.commands[12].volts, steps[12 - late]);
     }
 }

@@ -32,7 +32,7 @@ pub fn cross_talk(driven: &[f64], other: &[f64]) -> Result<CrossTalk> {
     let ((driven, _), (other, _)) = (without_drift(driven), without_drift(other));
     let pairs = || driven.iter().zip(&other);
     let square: f64 = pairs().map(|(d, _)| d * d).sum();
-    if square <= 1e-20 * total {
+    if total <= 0.0 || square <= 1e-20 * total {
         return Err(Error::Data(
             "the axis that is driven does not move, or as drift does: drive it up and down".into(),
         ));
