@@ -50,6 +50,21 @@ def test_the_options_reach_the_stage_and_the_loops() -> None:
     assert table("a/b/contour.csv").size == 200
 
 
+def test_a_file_is_run_again_and_again() -> None:
+    angle = 2.0 * np.pi * np.arange(200) / 200
+    rows = zip(0.01 * np.arange(200), 50 + 8 * np.cos(angle), 50 + 4 * np.sin(angle), strict=True)
+    text = "\n".join(f"{t:.2f},{x:.9f},{y:.9f}" for t, x, y in rows)
+    Path("ellipse.csv").write_text("time_s,x_um,y_um\n" + text + "\n", encoding="utf-8")
+    printed = ran("contour", "--path", "ellipse.csv", "--period", "2", "--duration", "6")
+    assert "XYReference(ellipse.csv, 42 to 58 by 46 to 54 um, 6 s)" in printed
+    rows_written = table("results/contour.csv")
+    assert rows_written["desired_x_um"][0] == 0.0
+    assert np.abs(rows_written["contour_error_um"][100:]).max() < 1.5
+    assert "--period is for a path from a file" in refusal(
+        "contour", "--path", "circle:1Hz,1um", "--period", "2"
+    )
+
+
 @pytest.mark.usefixtures("_no_pictures_at_all")
 def test_table_2_is_one_command() -> None:
     printed = ran("contour", "--table-2")

@@ -113,6 +113,9 @@ def test_a_path_is_read_from_two_columns(tmp_path: Path) -> None:
     with pytest.raises(pt.ParameterError, match="'z' is not a column"):
         pt.read_path(file, y="z")
     assert pt.parse_path(str(file)).duration == pytest.approx(5.0)
+    # One that repeats begins at home, one that does not where it begins.
+    starts = [pt.read_path(file, period=period).x.at(0.0)[0] for period in (5.0, None)]
+    assert starts == pytest.approx([0.0, 50 * UM])
 
 
 def test_texts_make_the_paths_that_python_makes() -> None:
@@ -422,6 +425,10 @@ BAD: dict[str, tuple[Callable[[], object], str]] = {
         "expected a common period",
     ),
     "text": (lambda: pt.parse_path("circle:0.1Hz"), "there is no radius: expected circle:"),
+    "long": (
+        lambda: pt.parse_path("spiral:1Hz,20um,pitch=2um", duration=5.0),
+        "duration is 5 s: expected none",
+    ),
     "kind": (lambda: pt.parse_path("square:1Hz"), "path 'square:1Hz' is neither a file"),
     "halves": (
         lambda: pt.XYReference(name="two", x=PATH.x, y=pt.circle(frequency=0.1, radius=UM).y),

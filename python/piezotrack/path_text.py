@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from .errors import ParameterError
 from .paths import circle, lissajous, raster, spiral
 from .reference_text import Kind, made_from_text
 from .xyreference import read_path
@@ -83,7 +84,7 @@ def parse_path(text: str, *, duration: float | None = None) -> XYReference:
     text : str
         The kind and what is to be known of it, as for `parse_reference`.
     duration : float, optional
-        Length [s], where `text` has none. A spiral has its own.
+        Length [s], where `text` has none; not for a spiral, which has its own.
 
     Returns
     -------
@@ -104,7 +105,10 @@ def parse_path(text: str, *, duration: float | None = None) -> XYReference:
     >>> pt.parse_path("circle:0.1Hz,10um,centre=50/50um")
     XYReference(circle 10 um, 0.1 Hz, 40 to 60 by 40 to 60 um, 30 s)
     """
-    if duration is not None and str(text).strip().lower().startswith("spiral"):
-        duration = None
+    if duration is not None and str(text).strip().lower().startswith("spiral:"):
+        raise ParameterError(
+            f"duration is {duration:g} s: expected none, as radius, pitch and frequency of a "
+            "spiral are its length"
+        )
     path: XYReference = made_from_text("path", text, PATHS, read_path, duration)
     return path

@@ -13,7 +13,7 @@ from .checks import check_length, check_reach, finite, in_range, positive
 from .errors import ParameterError
 from .motions import Cosines, common_period, extremes, s_curve
 from .references import Reference
-from .xyreference import XYReference
+from .xyreference import HOME, START, XYReference
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,9 +24,6 @@ __all__ = ["circle", "lissajous", "raster", "spiral"]
 
 # The middle of the workspace of Xu and Li 2010, 117 um by 117 um [m].
 MIDDLE = (58.5e-6, 58.5e-6)
-HOME = (0.0, 0.0)
-# Time from home to the path [s]: 100 um at 94 um/s at most, for a stage of 0.1 s.
-START = 2.0
 # Times that a closed path is run: the first has the start in it.
 PERIODS = 3.0
 

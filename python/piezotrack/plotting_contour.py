@@ -12,6 +12,8 @@ from .plotting_tracking import ACTUAL, DESIRED, _above
 from .units import best_length_unit
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
@@ -193,36 +195,45 @@ def plot_table_2(table: Table2) -> Figure:
     circles.set_title("0.1 Hz, contour error x 5")
     if legend := circles.get_legend():
         legend.remove()
-    over = figure.add_subplot(grid[0, 3:])
-    # One above the other, each about a line of its own.
-    apart = 1.15 * max(1e6 * run.metrics.peak_to_peak for run in slow)
-    for row, run in enumerate(slow):
+    _over_angle(slow, figure.add_subplot(grid[0, 3:]))
+    for column, name in enumerate(("max", "mean", "SD")):
+        _bars(table, name, figure.add_subplot(grid[1, 2 * column : 2 * column + 2]))
+    return figure
+
+
+def _over_angle(runs: Sequence[Contour], ax: Axes) -> None:
+    """Plot the last turn of circles, one above the other, each about a line of its own."""
+    apart = 1.15 * max(1e6 * run.metrics.peak_to_peak for run in runs)
+    for row, run in enumerate(runs):
         part = _last(run)
         angle = 360.0 * np.arange(part.sum()) / part.sum()
-        over.axhline(row * apart, color="0.75", linewidth=0.8)
-        over.plot(angle, row * apart + 1e6 * run.error[part], color="C3", linewidth=0.8)
+        ax.axhline(row * apart, color="0.75", linewidth=0.8)
+        ax.plot(angle, row * apart + 1e6 * run.error[part], color="C3", linewidth=0.8)
         label = f"{1e6 * (run.path.radius or 0.0):g} um"
-        over.annotate(label, (362.0, row * apart), va="center", annotation_clip=False)
-    over.set(xlabel="angle [deg]", ylabel="contour error [um], one radius above the other")
-    over.set(xticks=range(0, 361, 90), title="0.1 Hz, last turn")
-    over.margins(x=0)
-    names = (("max", 2, "peak_to_peak"), ("mean", 3, "mean_error"), ("SD", 4, "sd_error"))
+        ax.annotate(label, (362.0, row * apart), va="center", annotation_clip=False)
+    ax.set(xlabel="angle [deg]", ylabel="contour error [um], one radius above the other")
+    ax.set(xticks=range(0, 361, 90), xlim=(0, 360), title="0.1 Hz, last turn")
+
+
+def _bars(table: Table2, name: str, ax: Axes) -> None:
+    """Plot one figure of the nine cases, published beside obtained."""
+    from .table_2 import PUBLISHED
+
+    column, attribute = {
+        "max": (2, "peak_to_peak"),
+        "mean": (3, "mean_error"),
+        "SD": (4, "sd_error"),
+    }[name]
     places = np.arange(len(PUBLISHED))
-    for column, (name, index, attribute) in enumerate(names):
-        bars = figure.add_subplot(grid[1, 2 * column : 2 * column + 2])
-        bars.bar(places - 0.2, [1e6 * case[index] for case in PUBLISHED], 0.4, color="0.75",
-                 edgecolor="0.3", label="published")  # fmt: skip
-        found = [1e6 * getattr(run.metrics, attribute) for run in table.runs]
-        bars.bar(places + 0.2, found, 0.4, color="C0", edgecolor="0.1", label="obtained")
-        bars.set(ylabel=f"{name} [um]", xlabel="radius [um], and frequency [Hz]")
-        bars.set_xticks(
-            places,
-            [f"{1e6 * case.radius:g}\n{case.frequency:g}" for case in PUBLISHED],
-            fontsize="small",
-        )
-        bars.axhline(0.0, color="0.4", linewidth=0.6)
-        _above(bars)
-    return figure
+    published = [1e6 * case[column] for case in PUBLISHED]
+    found = [1e6 * getattr(run.metrics, attribute) for run in table.runs]
+    ax.bar(places - 0.2, published, 0.4, color="0.75", edgecolor="0.3", label="published")
+    ax.bar(places + 0.2, found, 0.4, color="C0", edgecolor="0.1", label="obtained")
+    ax.set(ylabel=f"{name} [um]", xlabel="radius [um], and frequency [Hz]")
+    labels = [f"{1e6 * case.radius:g}\n{case.frequency:g}" for case in PUBLISHED]
+    ax.set_xticks(places, labels, fontsize="small")
+    ax.axhline(0.0, color="0.4", linewidth=0.6)
+    _above(ax)
 
 
 def plot_noise(noise: Noise) -> Figure:

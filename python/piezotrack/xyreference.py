@@ -29,6 +29,10 @@ __all__ = ["XYReference", "read_path"]
 # How far a chord of the outline may be off the curve [m]: far below any sensor.
 SAGITTA = 1e-10
 COARSE, FINEST = 2000, 400_000
+# Where a stage is before a path, and the time from there to the path [s]: 100 um at 94 um/s at
+# most, for a stage of 0.1 s.
+HOME = (0.0, 0.0)
+START = 2.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -216,8 +220,8 @@ def read_path(
     dt: float | None = None,
     period: float | None = None,
     duration: float | None = None,
-    ramp: float = 0.0,
-    origin: tuple[float, float] | None = None,
+    ramp: float | None = None,
+    origin: tuple[float, float] | None = HOME,
 ) -> XYReference:
     r"""Read a path from a text file with a time and two displacements.
 
@@ -227,11 +231,13 @@ def read_path(
         As in `read`.
     x, y : str or int, optional
         The columns of the axes, by title or number.
-    period, duration, ramp
+    period, duration
         As in `Reference.from_samples`.
-    origin : (float, float), optional
-        Where a smooth start of the length `ramp` leaves from [m]; the first point where it is
-        not given.
+    ramp : float, optional
+        Length of the smooth start [s]. Where it is not given, 2 s of a path that repeats, and 0
+        of one that does not, which would lose its beginning: let it begin at home.
+    origin : (float, float) or None, optional
+        Where a smooth start leaves from [m]; None for the first point.
 
     Returns
     -------
@@ -258,6 +264,8 @@ def read_path(
     >>> folder.cleanup()
     """
     starts = (None, None) if origin is None else origin
+    if ramp is None:
+        ramp = 0.0 if period is None else min(START, duration or period)
     axes = [
         replace(
             read_reference(

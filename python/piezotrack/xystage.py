@@ -110,7 +110,7 @@ class XYStage:
         hysteresis in place of 10 % and reaches 115 um in place of 117.8 um, as two stacks of one
         batch may differ, and noise of its own; 1.5 % of y shows in x and 1 % of x in y; the lag is
         half of the control interval of 0.02 s, as when two axes are served in turn. None of these
-        was fitted to Table 2: see docs/contouring.md for what each of them does.
+        was fitted to Table 2; docs/contouring.md tells what lag and cross-talk do.
 
         Parameters
         ----------
@@ -151,17 +151,19 @@ class XYStage:
             A number is out of its range, or the drives differ in length.
         """
         dt = _core.as_number("dt", dt)
-        runs = self.core().simulate(ux, uy, dt, hold)
-        return tuple(  # type: ignore[return-value]
+        x, y = (
             VirtualResponse(
-                t=np.arange(x.size, dtype=np.float64) * dt,
+                t=np.arange(true.size, dtype=np.float64) * dt,
                 u=np.array(u, dtype=np.float64),
                 applied=applied,
-                x=x,
-                y=y,
+                x=true,
+                y=read,
             )
-            for u, (x, y, applied) in zip((ux, uy), runs, strict=True)
+            for u, (true, read, applied) in zip(
+                (ux, uy), self.core().simulate(ux, uy, dt, hold), strict=True
+            )
         )
+        return x, y
 
     def record(self, ux: ArrayLike, uy: ArrayLike, dt: float, *, hold: Hold = "foh") -> XYLog:
         """Record a log of both axes.

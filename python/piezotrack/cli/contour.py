@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import ParameterError
-from .options import ControlInterval, Duration, Out, can_be_folder, list_files, number_range
+from .options import ControlInterval, Duration, Out, Period, can_be_folder, list_files, number_range
 from .words import in_words
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from ..cross_talk import CrossTalk
     from ..inverse import Inverse
     from ..table_2 import Table2
+    from ..xyreference import XYReference
     from ..xystage import XYStage
 
 __all__ = ["contour_command"]
@@ -64,6 +65,7 @@ def contour_command(
     td: Annotated[float, typer.Option(help="Derivative time in s.")] = 0.044,
     delay: Annotated[float, typer.Option(help="Delay in the loops in s, besides the hold.")] = 0.0,
     duration: Duration = None,
+    period: Period = None,
     seed: Annotated[int, typer.Option(help="Of the sensors' noise.")] = 1,
     beyond_reach: Annotated[
         bool, typer.Option("--beyond-reach", help="Let the path leave the stage's reach.")
@@ -76,15 +78,16 @@ def contour_command(
     from ..contouring import contour
     from ..control import Controller
     from ..laws import Pid
-    from ..path_text import parse_path
     from ..table_2 import run_table_2
 
     if table_2 == (path is not None):
         given = "both are" if table_2 else "neither is"
         raise ParameterError(f"--path and --table-2: expected one of them, {given} given")
-    if table_2 and (duration is not None or beyond_reach or unstable):
-        raise ParameterError("--duration, --beyond-reach, --unstable: expected none with --table-2")
-    course = None if path is None else parse_path(path, duration=duration)
+    if table_2 and (duration or period or beyond_reach or unstable):
+        raise ParameterError(
+            "--duration, --period, --beyond-reach, --unstable: expected none with --table-2"
+        )
+    course = None if path is None else _path(path, duration, period)
     stage = _stage(seed, lag, cross_talk)
     can_be_folder(out)
     inverse, how = _inverse(model, seed) if feedforward else (None, "no feedforward")
@@ -111,6 +114,18 @@ def contour_command(
     print(f"the virtual XY stage: y lags by {stage.lag:g} s, {xy} of y in x, {yx} of x in y; {how}")
     print(words)
     list_files(written)
+
+
+def _path(text: str, duration: float | None, period: float | None) -> XYReference:
+    """Read a file where the text names one, else a description."""
+    from ..path_text import parse_path
+    from ..xyreference import read_path
+
+    if Path(text).is_file():
+        return read_path(text, duration=duration, period=period)
+    if period is not None:
+        raise ParameterError(f"--period is for a path from a file: expected none with {text}")
+    return parse_path(text, duration=duration)
 
 
 def _stage(seed: int, lag: float | None, cross_talk: str | None) -> XYStage:

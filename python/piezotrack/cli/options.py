@@ -25,6 +25,7 @@ __all__ = [
     "HoldOption",
     "Interval",
     "Out",
+    "Period",
     "Seconds",
     "TimeColumn",
     "Units",
@@ -62,6 +63,9 @@ HoldOption = Annotated[
 ]
 ControlInterval = Annotated[float, typer.Option(help="Sampling interval of the controller in s.")]
 Duration = Annotated[float | None, typer.Option(help="Length of the reference in s.")]
+Period = Annotated[
+    float | None, typer.Option(help="Time in s after which a reference from a file repeats.")
+]
 Out = Annotated[Path, typer.Option(help="Folder for the results.")]
 
 

@@ -102,14 +102,18 @@ impl<X: Plant, Y: Plant> TwoAxes<'_, X, Y> {
         let marks = [run.commands[0].fraction(), run.lag.fraction, run.commands[1].fraction()];
         let mut parts = Vec::new();
         let mut from = 0.0;
+        let mut waits = run.lag.fraction > 0.0;
         for (end, kept) in ends(substeps, &marks) {
+            // Once in an interval, however near its neighbours are.
+            let samples_y = waits && (end - run.lag.fraction).abs() <= SAME;
+            waits &= !samples_y;
             let duration = (end - from) * interval;
             parts.push(Part {
                 x: self.x.stretch(duration)?,
                 y: self.y.stretch(duration)?,
                 newer: [run.commands[0].newer(from), run.commands[1].newer(from)],
                 kept,
-                samples_y: run.lag.fraction > 0.0 && (end - run.lag.fraction).abs() <= SAME,
+                samples_y,
             });
             from = end;
         }
