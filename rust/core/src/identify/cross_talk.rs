@@ -22,6 +22,15 @@ pub struct CrossTalk {
 /// follow each other as a first-order process of correlation r count as n (1 - r) / (1 + r)
 /// independent ones: Bartlett 1935, doi 10.2307/2342284, for a drive that is slow beside them.
 ///
+/// ```
+/// use piezotrack_core::identify::cross_talk;
+///
+/// let driven: Vec<f64> = (0..100).map(|k| f64::from(k % 20)).collect();
+/// let other: Vec<f64> = driven.iter().map(|d| 5.0 + 0.015 * d).collect();
+/// assert!((cross_talk(&driven, &other)?.share - 0.015).abs() < 1e-12);
+/// # Ok::<(), piezotrack_core::Error>(())
+/// ```
+///
 /// # Errors
 /// [`Error::Shape`] where there are less than 10 samples or the records differ in length;
 /// [`Error::Data`] where a sample is not finite, or the driven axis does not move.

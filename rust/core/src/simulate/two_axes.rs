@@ -293,6 +293,25 @@ pub fn track_both<X: Plant, Y: Plant, F: Feedback, G: Feedback>(
 ///
 /// Both sensors are read at once, at the samples of the drives.
 ///
+/// ```
+/// use piezotrack_core::integrate::{Drive, Hold, NEVER};
+/// use piezotrack_core::simulate::{TwoAxes, open_loops};
+/// use piezotrack_core::stage::VirtualStage;
+///
+/// # fn main() -> piezotrack_core::Result<()> {
+/// let (x, y) = (VirtualStage::xu_li_2010(1), VirtualStage::xu_li_2010_y(1));
+/// let axes =
+///     TwoAxes { x: x.apparatus(), y: y.apparatus(), cross_talk: [0.015, 0.010], lag: 0.0 };
+/// let (up, held) = ([75.0; 1500], [0.0; 1500]);
+/// let drives = [Drive::new(&up, 2e-4, Hold::Zero)?, Drive::new(&held, 2e-4, Hold::Zero)?];
+/// let run = open_loops(&axes, (x.start(), y.start()), [&drives[0], &drives[1]], NEVER)?;
+/// let (along_x, along_y) = run.unwrap();
+/// assert!((along_x.displacement[1499] - 117.76e-6).abs() < 0.2e-6);
+/// assert!((along_y.displacement[1499] - 1.18e-6).abs() < 0.2e-6);
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Errors
 /// [`Error::Shape`] where the drives differ in length, [`Error::Parameter`] where they differ in
 /// interval; otherwise as [`super::open_loop`].
