@@ -299,7 +299,7 @@ def test_online_the_delay_leads_too() -> None:
 
 SINE = REFERENCES["sine"]()
 BAD: dict[str, tuple[Callable[[], Any], str]] = {
-    "stage": (lambda: pt.Inverse(stage=5), "stage is int: expected pt.DahlStage, pt"),  # type: ignore[arg-type]
+    "stage": (lambda: pt.Inverse(stage=5), "stage is int: expected a stage, as a pt.DahlStage"),  # type: ignore[arg-type]
     "offset": (lambda: pt.Inverse(stage=TABLE_1, offset=math.nan), "offset is nan"),
     "delay": (lambda: pt.Inverse(stage=TABLE_1, delay=-1e-3), "delay is -0.001"),
     "playback": (

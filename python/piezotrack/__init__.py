@@ -24,7 +24,9 @@ from .errors import (
 if TYPE_CHECKING:
     from .bouc_wen import BoucWenStage, BoucWenState
     from .comparison import Compared, Comparison, compare
+    from .contouring import Contour, contour
     from .control import Command, Controller, Session
+    from .cross_talk import CrossTalk, identify_cross_talk
     from .dataset import Dataset
     from .estimates import Estimate, Progress, Run
     from .first_order_dahl import FirstOrderDahlStage
@@ -37,7 +39,10 @@ if TYPE_CHECKING:
     from .loopcheck import LoopCheck, LoopReport, LoopResponse, check_loop
     from .modelfile import IdentifiedModel, load
     from .models import DahlStage, Response, StageState
+    from .noise import Noise, identify_noise
     from .oscillator import BoucWenOscillator
+    from .path_text import parse_path
+    from .paths import circle, lissajous, raster, spiral
     from .plays import PlaysResponse, PlaysState, PrandtlIshlinskiiStage
     from .playsfile import IdentifiedPlays
     from .playsfit import PlaysIdentification, identify_plays
@@ -46,9 +51,12 @@ if TYPE_CHECKING:
     from .references import Reference, SampledReference, read_reference
     from .step import StepResult, StepTrace, identify_step
     from .swarm import ParticleSwarm
-    from .tracking import Metrics, Tracking, track
+    from .table_2 import Table2, run_table_2
+    from .tracking import Metrics, Spread, Tracking, track
     from .virtual import VirtualResponse, VirtualStage
     from .waveforms import chirp, multisine, sine, staircase, triangle
+    from .xyreference import XYReference, read_path
+    from .xystage import XYStage
 
 __all__ = [
     "BoucWenOscillator",
@@ -57,7 +65,9 @@ __all__ = [
     "Command",
     "Compared",
     "Comparison",
+    "Contour",
     "Controller",
+    "CrossTalk",
     "DahlStage",
     "DataError",
     "Dataset",
@@ -75,6 +85,7 @@ __all__ = [
     "LoopResponse",
     "LowPass",
     "Metrics",
+    "Noise",
     "Notch",
     "NumericalError",
     "ParameterError",
@@ -94,28 +105,42 @@ __all__ = [
     "Score",
     "Session",
     "ShapeError",
+    "Spread",
     "StageState",
     "StateSpace",
     "StepReadings",
     "StepResult",
     "StepTrace",
+    "Table2",
     "Tracking",
     "VirtualResponse",
     "VirtualStage",
+    "XYReference",
+    "XYStage",
     "__version__",
     "check_loop",
     "chirp",
+    "circle",
     "compare",
+    "contour",
     "identify",
+    "identify_cross_talk",
+    "identify_noise",
     "identify_plays",
     "identify_step",
+    "lissajous",
     "load",
     "multisine",
+    "parse_path",
     "parse_reference",
+    "raster",
     "read",
     "read_drive",
+    "read_path",
     "read_reference",
+    "run_table_2",
     "sine",
+    "spiral",
     "staircase",
     "track",
     "triangle",
@@ -123,6 +148,34 @@ __all__ = [
 
 # What is heavy is imported when it is first used.
 _HOMES = {
+    "contouring": (
+        "Contour",
+        "contour",
+    ),
+    "cross_talk": (
+        "CrossTalk",
+        "identify_cross_talk",
+    ),
+    "noise": (
+        "Noise",
+        "identify_noise",
+    ),
+    "paths": (
+        "circle",
+        "lissajous",
+        "raster",
+        "spiral",
+    ),
+    "xyreference": (
+        "XYReference",
+        "read_path",
+    ),
+    "xystage": ("XYStage",),
+    "path_text": ("parse_path",),
+    "table_2": (
+        "Table2",
+        "run_table_2",
+    ),
     "bouc_wen": (
         "BoucWenStage",
         "BoucWenState",
@@ -206,6 +259,7 @@ _HOMES = {
     "swarm": ("ParticleSwarm",),
     "tracking": (
         "Metrics",
+        "Spread",
         "Tracking",
         "track",
     ),

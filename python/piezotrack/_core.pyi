@@ -24,6 +24,7 @@ __all__ = [
     "Tracked",
     "Trajectory",
     "VirtualStage",
+    "XYStage",
     "__version__",
     "as_count",
     "as_number",
@@ -32,6 +33,8 @@ __all__ = [
     "bouc_wen_simulate",
     "bouc_wen_xu_li_2010",
     "check_loop",
+    "circle_errors",
+    "cross_talk_share",
     "dahl_simulate",
     "dahl_simulate_fixed",
     "dahl_xu_li_2010",
@@ -42,9 +45,12 @@ __all__ = [
     "kinked_simulate",
     "loop_response",
     "nnls",
+    "path_errors",
     "period_metrics",
     "read_step",
     "residual",
+    "sensor_noise",
+    "spread",
     "stage_check",
     "track_model",
     "tracking_metrics",
@@ -238,6 +244,10 @@ class LoopPlant:
     def bouc_wen(
         theta: tuple[float, ...], low: float, high: float, delay: float
     ) -> list[LoopPlant]: ...
+    @staticmethod
+    def first_order_dahl(
+        theta: tuple[float, ...], low: float, high: float, delay: float
+    ) -> list[LoopPlant]: ...
     @property
     def static_gain(self) -> float: ...
 
@@ -276,6 +286,8 @@ class VirtualStage:
     def __new__(cls, settings: dict[str, Any]) -> VirtualStage: ...
     @staticmethod
     def xu_li_2010(seed: int) -> dict[str, Any]: ...
+    @staticmethod
+    def xu_li_2010_y(seed: int) -> dict[str, Any]: ...
     def gains(self) -> list[float]: ...
     def simulate(
         self, u: ArrayLike, dt: float, hold_name: str
@@ -288,6 +300,39 @@ class VirtualStage:
         delay: float,
         substeps: int,
     ) -> Tracked: ...
+
+_Axis = VirtualStage | tuple[tuple[float, ...], float]
+_Motion = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+_Spread = tuple[float, float, float, float, float]
+
+@final
+class XYStage:
+    def __new__(
+        cls, x: _Axis, y: _Axis, cross_talk: tuple[float, float], lag: float
+    ) -> XYStage: ...
+    def simulate(
+        self, ux: ArrayLike, uy: ArrayLike, dt: float, hold_name: str
+    ) -> list[_Motion]: ...
+    def track(
+        self,
+        controllers: tuple[Controller, Controller],
+        references: tuple[ArrayLike, ArrayLike],
+        feedforwards: tuple[ArrayLike, ArrayLike],
+        delay: float,
+        substeps: int,
+    ) -> tuple[Tracked, Tracked]: ...
+
+def circle_errors(
+    x: ArrayLike, y: ArrayLike, centre: tuple[float, float], radius: float
+) -> NDArray[np.float64]: ...
+def path_errors(
+    x: ArrayLike, y: ArrayLike, path_x: ArrayLike, path_y: ArrayLike
+) -> NDArray[np.float64]: ...
+def spread(errors: ArrayLike) -> _Spread: ...
+def cross_talk_share(driven: ArrayLike, other: ArrayLike) -> tuple[float, float, float]: ...
+def sensor_noise(
+    record: ArrayLike, dt: float
+) -> tuple[_Spread, float, float, int, float, float, float | None]: ...
 
 @final
 class Tracked:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "bounds",
+    "check_length",
     "check_reach",
     "finite",
     "in_range",
@@ -130,12 +131,17 @@ def bounds(low: object, high: object) -> tuple[float, float]:
 
 def check_reach(low: float, high: float) -> None:
     """Raise ParameterError if a displacement [m] is so large that it must be in another unit."""
-    for name, value in (("low", low), ("high", high)):
-        if abs(value) >= TOO_FAR:
-            raise ParameterError(
-                f"{name} is {value:g}: expected metres, and no piezo stage goes so far; "
-                f"{plain(value)} um is {plain(value)}e-6"
-            )
+    check_length("low", low)
+    check_length("high", high)
+
+
+def check_length(name: str, value: float) -> None:
+    """Raise ParameterError if a length [m] is so large that it must be in another unit."""
+    if abs(value) >= TOO_FAR:
+        raise ParameterError(
+            f"{name} is {value:g}: expected metres, and no piezo stage goes so far; "
+            f"{plain(value)} um is {plain(value)}e-6"
+        )
 
 
 def numbers(

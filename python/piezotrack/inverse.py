@@ -80,7 +80,7 @@ class Inverse:
     initial: PlaysState | None = None
 
     def __post_init__(self) -> None:
-        kind = kind_of(self.stage)
+        kind = kind_of(self.stage, "stage")
         if not isinstance(self.stage, PrandtlIshlinskiiStage):
             # A stage that has no inverse is refused here.
             _core.InverseSession(kind.name, self.stage.theta, 1.0)

@@ -116,9 +116,11 @@ def kind_named(name: object) -> Kind:
     raise ParameterError(f"model is {name!r}: expected {expected}")
 
 
-def kind_of(stage: Stage) -> Kind:
-    """Find the kind of a stage."""
+def kind_of(stage: Stage, argument: str = "model") -> Kind:
+    """Find the kind of a stage, given as an argument of this name."""
     for kind in KINDS:
         if isinstance(stage, kind.stage):
             return kind
-    raise ParameterError(f"model is {type(stage).__name__}: expected a stage, as a pt.DahlStage")
+    raise ParameterError(
+        f"{argument} is {type(stage).__name__}: expected a stage, as a pt.DahlStage"
+    )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from . import _core
 from .bouc_wen import BoucWenStage
 from .errors import ParameterError
+from .first_order_dahl import FirstOrderDahlStage
 from .identified import Identified
 from .kinds import kind_of
 from .models import DahlStage
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Led", "bare", "lead", "loop_plants"]
 
-Led = VirtualStage | DahlStage | BoucWenStage | PrandtlIshlinskiiStage
-LED = (VirtualStage, DahlStage, BoucWenStage, PrandtlIshlinskiiStage)
+Led = VirtualStage | DahlStage | BoucWenStage | PrandtlIshlinskiiStage | FirstOrderDahlStage
+LED = (VirtualStage, DahlStage, BoucWenStage, PrandtlIshlinskiiStage, FirstOrderDahlStage)
 
 # Longest step in which a model's mechanics are followed under a jumping voltage [s].
 MODEL_STEP = 5e-5
@@ -70,6 +71,8 @@ def loop_plants(stage: Led, limits: tuple[float, float], delay: float) -> list[_
         return [_core.LoopPlant.mode(gain, *mode) for gain in stage.core().gains()]
     if isinstance(stage, BoucWenStage):
         return _core.LoopPlant.bouc_wen(stage.theta, low, high, delay)
+    if isinstance(stage, FirstOrderDahlStage):
+        return _core.LoopPlant.first_order_dahl(stage.theta, low, high, delay)
     if isinstance(stage, PrandtlIshlinskiiStage):
         return stage.core.loop_plants(low, high, delay)
     ends = [stage.piezo_coefficient * volts / stage.stiffness for volts in (low, high)]

@@ -60,8 +60,10 @@ def s_curve(u: Array) -> tuple[Array, Array, Array]:
     )
 
 
-def blended(motion: Motion, t: Array, ramp: float) -> tuple[Array, Array, Array]:
-    """Evaluate a motion that leaves its place at time 0 from rest and is itself from `ramp` on.
+def blended(
+    motion: Motion, t: Array, ramp: float, origin: float | None = None
+) -> tuple[Array, Array, Array]:
+    """Evaluate a motion that leaves a place from rest and is itself from `ramp` on.
 
     Parameters
     ----------
@@ -71,18 +73,19 @@ def blended(motion: Motion, t: Array, ramp: float) -> tuple[Array, Array, Array]
         Times [s], 0 or above.
     ramp : float
         Length of the start [s]; 0 for none.
+    origin : float, optional
+        The place o that is left [m]; the motion's own at time 0 where it is not given.
 
     Returns
     -------
     x, v, a : ndarray
-        ``x(0) + s(t / ramp) (x(t) - x(0))`` with the quintic ``s`` of `s_curve`, and its
-        derivatives.
+        ``o + s(t / ramp) (x(t) - o)`` with the quintic ``s`` of `s_curve`, and its derivatives.
     """
     x, v, a = motion(t)
     if ramp <= 0.0:
         return x, v, a
     s, slope, curvature = s_curve(t / ramp)
-    start = motion(np.zeros(1))[0][0]
+    start = motion(np.zeros(1))[0][0] if origin is None else origin
     way = x - start
     at_start = t < ramp
     return (

@@ -39,13 +39,13 @@ PLAIN = Unit("", "number", "")
 
 
 @dataclass(frozen=True)
-class _Kind:
+class Kind:
     """How a kind of reference is written, and what its items are for.
 
     An item without keyword is told by what it measures and how its values are joined.
     """
 
-    make: Callable[..., Reference]
+    make: Callable[..., Any]
     form: str
     example: str
     items: Mapping[tuple[str, str], tuple[str, ...]]
@@ -62,7 +62,7 @@ RANGE: dict[tuple[str, str], tuple[str, ...]] = {
     ("time", ""): ("duration",),
 }
 KINDS = {
-    "sine": _Kind(
+    "sine": Kind(
         sine,
         "sine:FREQUENCY,LOW..HIGH[,DURATION][,phase=ANGLE][,ramp=TIME]",
         "sine:0.2Hz,0..110um",
@@ -70,7 +70,7 @@ KINDS = {
         {"phase": "angle", "ramp": "time"},
         ("frequency", "low", "duration"),
     ),
-    "triangle": _Kind(
+    "triangle": Kind(
         triangle,
         "triangle:FREQUENCY,LOW..HIGH[,DURATION][,rounding=SHARE][,ramp=TIME]",
         "triangle:1Hz,0..50um",
@@ -78,7 +78,7 @@ KINDS = {
         {"rounding": "number", "ramp": "time"},
         ("frequency", "low", "duration"),
     ),
-    "staircase": _Kind(
+    "staircase": Kind(
         staircase,
         "staircase:STEPS,LOW..HIGH,dwell=TIME[,rise=TIME][,DURATION]",
         "staircase:5,0..100um,dwell=1s or staircase:levels=0/30/10um,dwell=1s",
@@ -86,7 +86,7 @@ KINDS = {
         {"levels": "displacement", "dwell": "time", "rise": "time"},
         ("dwell",),
     ),
-    "chirp": _Kind(
+    "chirp": Kind(
         chirp,
         "chirp:START..STOP,LOW..HIGH,DURATION[,ramp=TIME]",
         "chirp:0.1..5Hz,0..110um,20s",
@@ -94,7 +94,7 @@ KINDS = {
         {"ramp": "time"},
         ("start_frequency", "low", "duration"),
     ),
-    "multisine": _Kind(
+    "multisine": Kind(
         multisine,
         "multisine:FREQUENCY/FREQUENCY/...,LOW..HIGH,DURATION[,seed=NUMBER][,ramp=TIME]",
         "multisine:0.5/1.3/2.7Hz,0..50um,20s",
@@ -104,7 +104,7 @@ KINDS = {
     ),
 }
 # Arguments that take a list, and what the rest is called where it is missing.
-LISTS = ("levels", "frequencies")
+LISTS = ("levels", "frequencies", "sizes", "centre")
 MISSING = {"low": "range", "start_frequency": "frequencies"}
 
 _VALUE = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\W\d_]*)")
@@ -156,19 +156,31 @@ def parse_reference(text: str, *, duration: float | None = None) -> Reference:
     >>> pt.parse_reference("staircase:levels=0/30/10um,dwell=500ms")
     Reference(staircase of 3 levels, 0 to 30 um, 1.7 s)
     """
-    examples = ", ".join(kind.example for kind in KINDS.values())
+    reference: Reference = made_from_text("reference", text, KINDS, read_reference, duration)
+    return reference
+
+
+def made_from_text(
+    what: str,
+    text: str,
+    kinds: Mapping[str, Kind],
+    read: Callable[..., Any],
+    duration: float | None,
+) -> Any:
+    """Make what a text describes, or read it where the text is a file's name."""
+    examples = ", ".join(kind.example for kind in kinds.values())
     if not isinstance(text, str) or not text.strip():
-        raise ParameterError(f"reference is {text!r}: expected a file or one of {examples}")
+        raise ParameterError(f"{what} is {text!r}: expected a file or one of {examples}")
     name, colon, rest = (part.strip() for part in text.partition(":"))
-    kind = KINDS.get(name.lower())
+    kind = kinds.get(name.lower())
     is_there = os.path.exists(text)
     if kind is None or (is_there and not colon):
         # A colon after one letter is that of a drive.
         is_path = not colon or len(name) == 1
         if is_there or (is_path and Path(text).suffix):
-            return read_reference(text, duration=duration)
+            return read(text, duration=duration)
         raise ParameterError(
-            f"reference {text!r} is neither a file nor a known kind: expected a file or one of "
+            f"{what} {text!r} is neither a file nor a known kind: expected a file or one of "
             f"{examples}"
         )
     try:
@@ -178,14 +190,14 @@ def parse_reference(text: str, *, duration: float | None = None) -> Reference:
         elif kind.make in (sine, triangle) and values.get("frequency", 0.0) > 0.0:
             values.setdefault("duration", PERIODS / values["frequency"])
         if missing := [argument for argument in kind.needed if argument not in values]:
-            what = MISSING.get(missing[0], missing[0])
-            raise ParameterError(f"there is no {what}: {kind.expected}")
+            called = MISSING.get(missing[0], missing[0])
+            raise ParameterError(f"there is no {called}: {kind.expected}")
         return kind.make(**values)
     except ParameterError as error:
-        raise ParameterError(f"reference {text!r}: {error}") from None
+        raise ParameterError(f"{what} {text!r}: {error}") from None
 
 
-def _values(kind: _Kind, text: str) -> dict[str, Any]:
+def _values(kind: Kind, text: str) -> dict[str, Any]:
     """Return the values in a text by the arguments that they are for."""
     values: dict[str, Any] = {}
     for item in filter(None, (part.strip() for part in text.split(","))):

@@ -87,6 +87,9 @@ class Reference:
         Length of the smooth start [s]; 0 for none.
     shortest : float, optional
         The shortest period in `motion` [s]; a sampling interval above half of it is refused.
+    origin : float, optional
+        Where the smooth start leaves from [m]; the first displacement of `motion` where it is
+        not given. Without a smooth start it has no effect.
 
     Raises
     ------
@@ -100,11 +103,11 @@ class Reference:
 
     .. math::
 
-        x(t) = m(0) + s(t / r) \, (m(t) - m(0)), \qquad s(u) = 10 u^3 - 15 u^4 + 6 u^5
+        x(t) = o + s(t / r) \, (m(t) - o), \qquad s(u) = 10 u^3 - 15 u^4 + 6 u^5
 
-    for t < r. Displacement, velocity and acceleration have no jump, the first displacement is
-    kept at velocity and acceleration 0, and the range is not left. A motion that itself begins
-    at full velocity is up to 1.8 times as fast meanwhile.
+    for t < r, with o = `origin`, or else m(0). Displacement, velocity and acceleration have no
+    jump, the first displacement is kept at velocity and acceleration 0, and the range is not
+    left. A motion that itself begins at full velocity is up to 1.8 times as fast meanwhile.
 
     Examples
     --------
@@ -125,6 +128,7 @@ class Reference:
     period: float | None = None
     ramp: float = 0.0
     shortest: float = 0.0
+    origin: float | None = None
 
     def __post_init__(self) -> None:
         duration = positive("duration", self.duration, "s")
@@ -135,6 +139,7 @@ class Reference:
             "period": None if self.period is None else positive("period", self.period, "s"),
             "ramp": in_range("ramp", self.ramp, duration, "s"),
             "shortest": not_negative("shortest", self.shortest, "s"),
+            "origin": None if self.origin is None else finite("origin", self.origin, "m"),
         }
         for name, number in numbers.items():
             object.__setattr__(self, name, number)
@@ -184,7 +189,7 @@ class Reference:
                 f"from 0 to {self.duration:.10g} s"
             )
         inside = np.clip(np.atleast_1d(times), 0.0, self.duration)
-        x, v, a = blended(self.motion, inside, self.ramp)
+        x, v, a = blended(self.motion, inside, self.ramp, self.origin)
         return x.reshape(times.shape), v.reshape(times.shape), a.reshape(times.shape)
 
     def sample(self, dt: float) -> SampledReference:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,8 @@ from .loopcheck import check_loop
 from .references import Reference, SampledReference
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
@@ -26,12 +28,12 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Metrics", "Tracking", "track"]
+__all__ = ["Metrics", "Spread", "Tracking", "track"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Metrics:
-    """How well a motion follows its reference; errors are desired less actual.
+class Spread:
+    """How a signed error is spread.
 
     Attributes
     ----------
@@ -41,10 +43,6 @@ class Metrics:
         Mean of the signed error and standard deviation about it [m].
     peak_to_peak : float
         Largest less smallest error [m].
-    phase_lag : float or None
-        Of the fundamental [rad]; None where the reference does not repeat.
-    widest_loop : float or None
-        Of actual against desired, as a part of the travel; None where it never turns.
     """
 
     max_error: float
@@ -52,6 +50,39 @@ class Metrics:
     mean_error: float
     sd_error: float
     peak_to_peak: float
+
+    @classmethod
+    def of(cls, figures: Sequence[float]) -> Spread:
+        """Name the core's figures.
+
+        Parameters
+        ----------
+        figures : sequence of 5 float
+            In the order of the attributes [m].
+
+        Returns
+        -------
+        Spread
+            The same with names.
+        """
+        return cls(**dict(zip(SPREAD, figures, strict=True)))
+
+
+SPREAD = tuple(field.name for field in fields(Spread))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Metrics(Spread):
+    """How well a motion follows its reference; errors are desired less actual.
+
+    Attributes
+    ----------
+    phase_lag : float or None
+        Of the fundamental [rad]; None where the reference does not repeat.
+    widest_loop : float or None
+        Of actual against desired, as a part of the travel; None where it never turns.
+    """
+
     phase_lag: float | None
     widest_loop: float | None
 
@@ -150,14 +181,7 @@ class Tracking:
         Metrics
             The figures.
         """
-        first = self.settled if start is None else not_negative("start", start, "s")
-        last = math.inf if stop is None else _core.as_number("stop", stop)
-        part = (self.t >= first - 1e-9) & (self.t < last - 1e-9)
-        if part.sum() < 2:
-            raise ParameterError(
-                f"start and stop are {first:g} and {last:g} s: expected a part of the run, 0 to "
-                f"{self.t[-1]:g} s, with two samples"
-            )
+        part = self.part(self.t, start, stop)
         actual = self.displacement if true else self.measured
         dt, period = self.controller.dt, self.reference.period
         # A phase needs a whole period, and more than two samples of it.
@@ -165,6 +189,36 @@ class Tracking:
         if frequency and not (part.sum() * dt * frequency >= 0.999 and frequency * dt < 0.5):
             frequency = None
         return _metrics(_core.tracking_metrics(self.desired[part], actual[part], dt, frequency))
+
+    def part(self, t: Array, start: float | None, stop: float | None) -> NDArray[np.bool_]:
+        """Tell which instants lie in a part of the run.
+
+        Parameters
+        ----------
+        t : ndarray, shape (n,)
+            Instants [s].
+        start, stop : float or None
+            As in `score`.
+
+        Returns
+        -------
+        ndarray of bool, shape (n,)
+            True for two instants at least.
+
+        Raises
+        ------
+        ParameterError
+            There are less.
+        """
+        first = self.settled if start is None else not_negative("start", start, "s")
+        last = math.inf if stop is None else _core.as_number("stop", stop)
+        part: NDArray[np.bool_] = (t >= first - 1e-9) & (t < last - 1e-9)
+        if part.sum() < 2:
+            raise ParameterError(
+                f"start and stop are {first:g} and {last:g} s: expected a part of the run, 0 to "
+                f"{t[-1]:g} s, with two samples"
+            )
+        return part
 
     @cached_property
     def periods(self) -> list[Metrics]:
@@ -217,9 +271,8 @@ class Tracking:
 def _metrics(
     figures: tuple[float, float, float, float, float, float | None, float | None],
 ) -> Metrics:
-    names = ("max_error", "rms_error", "mean_error", "sd_error", "peak_to_peak")
     *errors, lag, loop = figures
-    return Metrics(**dict(zip(names, errors, strict=True)), phase_lag=lag, widest_loop=loop)
+    return Metrics(**dict(zip(SPREAD, errors, strict=True)), phase_lag=lag, widest_loop=loop)
 
 
 def track(
@@ -289,16 +342,33 @@ def track(
     delay = not_negative("delay", delay, "s") + late
     substeps = _core.as_count("substeps", substeps)
     samples = reference.sample(controller.dt)
-    _check_period(controller, reference)
+    check_period(controller, reference)
     if not _core.as_truth("unstable", unstable):
-        _check_stable(led, controller, delay)
+        check_stable(led, controller, delay)
     if not _core.as_truth("beyond_reach", beyond_reach):
-        _check_reach(led, controller, samples, offset)
-    if controller.feedforward is None:
-        volts, note = np.zeros(len(samples)), "no feedforward"
-    else:
-        volts, note = controller.feedforward.played(reference, controller.dt)
+        check_within_reach(led, controller, samples, offset)
+    volts, note = feedforward_of(controller, reference)
     run = lead(led, controller, samples.x - offset, volts, delay, substeps)
+    return followed(run, controller, reference, note, substeps, offset)
+
+
+def feedforward_of(controller: Controller, reference: Reference) -> tuple[Array, str]:
+    """Compute the feedforward of a whole run [V], and say how."""
+    if controller.feedforward is None:
+        return np.zeros(len(reference.sample(controller.dt))), "no feedforward"
+    return controller.feedforward.played(reference, controller.dt)
+
+
+def followed(
+    run: _core.Tracked,
+    controller: Controller,
+    reference: Reference,
+    note: str,
+    substeps: int,
+    offset: float = 0.0,
+) -> Tracking:
+    """Put together what the core returns of one axis, its sensor `offset` [m] off."""
+    samples = reference.sample(controller.dt)
     fine_t, fine_displacement, fine_voltage = run.motion()
     fine_displacement = fine_displacement + offset
     return Tracking(
@@ -320,7 +390,7 @@ def track(
     )
 
 
-def _check_period(controller: Controller, reference: Reference) -> None:
+def check_period(controller: Controller, reference: Reference) -> None:
     """Refuse a repetitive part that learns another period than that of the reference."""
     if controller.addon is None:
         return
@@ -337,7 +407,7 @@ def _check_period(controller: Controller, reference: Reference) -> None:
         )
 
 
-def _check_stable(stage: Led, controller: Controller, delay: float) -> None:
+def check_stable(stage: Led, controller: Controller, delay: float) -> None:
     """Refuse a loop that is unstable at the middle gain of the stage."""
     if controller.feedback is None and controller.addon is None:
         return
@@ -356,7 +426,7 @@ def _check_stable(stage: Led, controller: Controller, delay: float) -> None:
     raise ParameterError(f"{found}{hint}: expected a stable one, or unstable=True")
 
 
-def _check_reach(
+def check_within_reach(
     stage: Led,
     controller: Controller,
     samples: SampledReference,

@@ -10,8 +10,10 @@ import typer
 
 from .. import __version__
 from .compare import compare_command
+from .contour import contour_command
 from .demo import demo_command
 from .identify import identify_command
+from .noise import noise_command
 from .simulate import simulate_command
 from .step import step_command
 from .track import feedforward_command, track_command
@@ -61,4 +63,6 @@ app.command("step")(step_command)
 app.command("simulate")(simulate_command)
 app.command("feedforward")(feedforward_command)
 app.command("track")(track_command)
+app.command("contour")(contour_command)
+app.command("noise")(noise_command)
 app.command("demo")(demo_command)

@@ -18,11 +18,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Columns",
+    "ControlInterval",
     "DisplacementColumn",
     "DriveColumn",
+    "Duration",
     "HoldOption",
     "Interval",
     "Out",
+    "Period",
     "Seconds",
     "TimeColumn",
     "Units",
@@ -58,6 +61,11 @@ Interval = Annotated[
 HoldOption = Annotated[
     Literal["foh", "zoh"],
     typer.Option(help="Between samples the drive is a line (foh) or constant (zoh)."),
+]
+ControlInterval = Annotated[float, typer.Option(help="Sampling interval of the controller in s.")]
+Duration = Annotated[float | None, typer.Option(help="Length of the reference in s.")]
+Period = Annotated[
+    float | None, typer.Option(help="Time in s after which a reference from a file repeats.")
 ]
 Out = Annotated[Path, typer.Option(help="Folder for the results.")]
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ..errors import ParameterError
-from .options import Out, can_be_folder, list_files, number_range
+from .options import ControlInterval, Duration, Out, Period, can_be_folder, list_files, number_range
 from .words import in_words
 
 if TYPE_CHECKING:
@@ -25,13 +25,8 @@ if TYPE_CHECKING:
 __all__ = ["feedforward_command", "track_command"]
 
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file in JSON.")]
-ControlInterval = Annotated[float, typer.Option(help="Sampling interval of the controller in s.")]
 Online = Annotated[
     bool, typer.Option("--online", help="Compute all of the feedforward; else a table repeats.")
-]
-Duration = Annotated[float | None, typer.Option(help="Length of the reference in s.")]
-Period = Annotated[
-    float | None, typer.Option(help="Time in s after which a reference from a file repeats.")
 ]
 
 

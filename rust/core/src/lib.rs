@@ -6,6 +6,7 @@
 
 pub mod alone;
 mod classical;
+pub mod contour;
 mod delay;
 pub mod design;
 pub mod error;

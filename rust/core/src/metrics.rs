@@ -29,6 +29,39 @@ pub struct Tracking {
     pub widest_loop: Option<f64>,
 }
 
+/// How a signed error is spread, in its own unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spread {
+    /// Largest absolute value.
+    pub largest: f64,
+    /// Root of the mean square.
+    pub rms: f64,
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation about the mean, over all values (not less one).
+    pub sd: f64,
+    /// Largest less smallest.
+    pub peak_to_peak: f64,
+}
+
+impl Spread {
+    /// Figures of some errors; NaN where there are none.
+    pub fn of(errors: impl Iterator<Item = f64> + Clone) -> Self {
+        let n = index(errors.clone().count());
+        let mean = errors.clone().sum::<f64>() / n;
+        let square = |sum: f64| (sum / n).sqrt();
+        let highest = errors.clone().fold(f64::NEG_INFINITY, f64::max);
+        let lowest = errors.clone().fold(f64::INFINITY, f64::min);
+        Self {
+            largest: highest.max(-lowest),
+            rms: square(errors.clone().map(|e| e * e).sum()),
+            mean,
+            sd: square(errors.map(|e| (e - mean) * (e - mean)).sum()),
+            peak_to_peak: highest - lowest,
+        }
+    }
+}
+
 /// Figures of a whole record, `dt` seconds from sample to sample.
 ///
 /// `frequency`, Hz, is the fundamental's where the reference has one.
@@ -53,22 +86,18 @@ pub fn tracking(
     frequency: Option<f64>,
 ) -> Result<Tracking> {
     check(desired, actual)?;
-    let n = index(desired.len());
-    let errors = || desired.iter().zip(actual).map(|(d, a)| d - a);
-    let mean = errors().sum::<f64>() / n;
-    let square = |sum: f64| (sum / n).sqrt();
-    let highest = errors().fold(f64::NEG_INFINITY, f64::max);
-    let lowest = errors().fold(f64::INFINITY, f64::min);
+    let Spread { largest, rms, mean, sd, peak_to_peak } =
+        Spread::of(desired.iter().zip(actual).map(|(d, a)| d - a));
     let phase_lag = match frequency {
         Some(frequency) => lag(desired, actual, dt, frequency)?,
         None => None,
     };
     Ok(Tracking {
-        max_error: highest.max(-lowest),
-        rms_error: square(errors().map(|e| e * e).sum()),
+        max_error: largest,
+        rms_error: rms,
         mean_error: mean,
-        error_sd: square(errors().map(|e| (e - mean) * (e - mean)).sum()),
-        error_peak_to_peak: highest - lowest,
+        error_sd: sd,
+        error_peak_to_peak: peak_to_peak,
         phase_lag,
         widest_loop: widest_loop(desired, actual)?,
     })

@@ -2,7 +2,7 @@
 
 use piezotrack_core::Result;
 use piezotrack_core::design::{GainRange, LoopPlant, SampledLoop, Verdict};
-use piezotrack_core::stage::{BoucWenStage, DahlStage};
+use piezotrack_core::stage::{BoucWenStage, DahlStage, FirstOrderDahlStage};
 use pyo3::prelude::*;
 
 use crate::control::PyController;
@@ -55,6 +55,13 @@ impl PyLoopPlant {
     fn bouc_wen(theta: [f64; 8], low: f64, high: f64, delay: f64) -> PyResult<[Self; 3]> {
         let stage = BoucWenStage::from_theta(&theta);
         Self::late(stage.and_then(|stage| LoopPlant::bouc_wen(&stage, low, high)), delay)
+    }
+
+    /// A stage with first-order Dahl friction in the same way.
+    #[staticmethod]
+    fn first_order_dahl(theta: [f64; 7], low: f64, high: f64, delay: f64) -> PyResult<[Self; 3]> {
+        let stage = FirstOrderDahlStage::from_theta(&theta);
+        Self::late(stage.and_then(|stage| LoopPlant::first_order_dahl(&stage, low, high)), delay)
     }
 
     #[getter]

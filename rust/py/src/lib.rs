@@ -12,6 +12,7 @@ mod stage;
 mod step;
 mod tracking;
 mod virtual_stage;
+mod xy;
 
 use pyo3::prelude::*;
 
@@ -27,5 +28,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     design::register(module)?;
     plays::register(module)?;
     virtual_stage::register(module)?;
-    tracking::register(module)
+    tracking::register(module)?;
+    xy::register(module)
 }

@@ -5,7 +5,9 @@ use piezotrack_core::alone::Alone;
 use piezotrack_core::integrate::Stop;
 use piezotrack_core::metrics::{self, Tracking};
 use piezotrack_core::simulate::{Apparatus, ApparatusState, Course, Plant, Timing, Tracked, track};
-use piezotrack_core::stage::{BoucWenKernel, BoucWenStage, DahlStage};
+use piezotrack_core::stage::{
+    BoucWenKernel, BoucWenStage, DahlStage, FirstOrderDahlKernel, FirstOrderDahlStage,
+};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
@@ -42,6 +44,12 @@ fn track_model(
         "dahl" => {
             let stage = DahlStage::from_theta(exactly(&theta)?)?;
             course.bare(&stage, step, controller, (delay, substeps), stop)
+        }
+        "first-order-dahl" => {
+            let stage = FirstOrderDahlStage::from_theta(exactly(&theta)?)?;
+            let kernel = FirstOrderDahlKernel { exponent: stage.exponent };
+            let plant = Alone { kernel: &kernel, parameters: &stage.parameters() };
+            course.bare(&plant, step, controller, (delay, substeps), stop)
         }
         "bouc-wen" => {
             let stage = BoucWenStage::from_theta(exactly(&theta)?)?;
@@ -84,6 +92,10 @@ impl Arrays {
         Ok(Self { reference, feedforward })
     }
 
+    pub fn course(&self) -> Course<'_> {
+        Course { reference: &self.reference, feedforward: &self.feedforward }
+    }
+
     /// Leads a plant with nothing around it, from rest.
     pub fn bare<P: Plant>(
         &self,
@@ -107,8 +119,7 @@ impl Arrays {
     ) -> Result<PyTracked> {
         let (interval, samples) = (controller.dt, self.reference.len());
         let timing = Timing { interval, samples, delay, substeps };
-        let course = Course { reference: &self.reference, feedforward: &self.feedforward };
-        let run = track(apparatus, start, &timing, &controller.controller, course, stop)?;
+        let run = track(apparatus, start, &timing, &controller.controller, self.course(), stop)?;
         Ok(PyTracked::new(stopped(run)?))
     }
 }
@@ -124,7 +135,7 @@ pub struct PyTracked {
 }
 
 impl PyTracked {
-    fn new<S>(run: Tracked<S>) -> Self {
+    pub fn new<S>(run: Tracked<S>) -> Self {
         let Tracked { motion, commands } = run;
         let substeps = (motion.time.len() - 1) / (commands.len() - 1).max(1);
         let measured = motion.measured.iter().step_by(substeps.max(1)).copied().collect();

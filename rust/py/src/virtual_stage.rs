@@ -156,12 +156,12 @@ impl Settings {
 }
 
 /// True displacement, reading of the sensor and applied voltage.
-type OpenLoopArrays<'py> =
+pub type OpenLoopArrays<'py> =
     (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
 /// A stage to experiment on.
 #[pyclass(name = "VirtualStage", frozen, module = "piezotrack._core")]
-struct PyVirtualStage(VirtualStage);
+pub struct PyVirtualStage(pub VirtualStage);
 
 #[pymethods]
 impl PyVirtualStage {
@@ -175,6 +175,11 @@ impl PyVirtualStage {
     #[staticmethod]
     fn xu_li_2010(seed: u64) -> Settings {
         Settings::of(&VirtualSettings::xu_li_2010(seed))
+    }
+
+    #[staticmethod]
+    fn xu_li_2010_y(seed: u64) -> Settings {
+        Settings::of(&VirtualSettings::xu_li_2010_y(seed))
     }
 
     /// Lowest, mean and highest gain for small motions, m/V.

@@ -1,11 +1,11 @@
-//! The gain of a stage with its hysteresis at the input, for small motions.
+//! The gain of a stage on its settled loop, for small motions.
 
 use piezotrack_control::operator::{BoucWen, Operator};
 
 use super::LoopPlant;
 use crate::error::{Error, Result, finite};
 use crate::mechanics::Mechanics;
-use crate::stage::{BoucWenStage, Dynamics, PrandtlIshlinskiiStage};
+use crate::stage::{BoucWenStage, Dynamics, FirstOrderDahlStage, PrandtlIshlinskiiStage};
 
 /// Cycles after which the loop counts as settled.
 const CYCLES: u32 = 20;
@@ -89,6 +89,24 @@ impl LoopPlant {
         let natural = libm::sqrt(stiffness / mass);
         let ratio = 0.5 * damping / (mass * natural);
         gains.plants(|gain| Self::mode(gain, natural / core::f64::consts::TAU, ratio))
+    }
+
+    /// A stage with first-order Dahl friction on its settled loop between the displacements that
+    /// two voltages lead to without friction: `T/(K + dF/dx)` in the same way.
+    ///
+    /// # Errors
+    /// As [`Self::bouc_wen`].
+    pub fn first_order_dahl(stage: &FirstOrderDahlStage, low: f64, high: f64) -> Result<[Self; 3]> {
+        let (Mechanics { mass, damping, stiffness }, piezo) =
+            (stage.mechanics, stage.piezo_coefficient);
+        let ends = [low, high].map(|volts| piezo * volts / stiffness);
+        let ends = if piezo < 0.0 { [ends[1], ends[0]] } else { ends };
+        let gain = |slope: f64| piezo / (stiffness + slope);
+        let gains = Gains::of(&stage.operator(), ends[0], ends[1], gain)?;
+        gains.plants(|gain| {
+            let mechanics = Mechanics { mass, damping, stiffness: piezo / gain };
+            Self::mechanical(&mechanics, piezo)
+        })
     }
 
     /// A Prandtl-Ishlinskii stage in the same way; its creep is slower than a loop and left out.

@@ -2,12 +2,15 @@
 
 pub mod bounds;
 mod cost;
+mod cross_talk;
 mod deviation;
+mod drift;
 mod identification;
 mod line;
 mod local;
 mod model;
 mod nnls;
+mod noise;
 mod plays;
 mod problem;
 mod ringing;
@@ -19,10 +22,12 @@ mod swarm;
 mod turns;
 
 pub use cost::{Costs, Evaluator, Guess};
+pub use cross_talk::{CrossTalk, cross_talk};
 pub use identification::{Identification, identify};
 pub use local::{Local, Polished, Sensitivity};
 pub use model::{Facts, Model};
 pub use nnls::{Rows, nnls};
+pub use noise::{Noise, noise_at_rest};
 pub use plays::{DynamicsKind, PlaysFit, PlaysRecord, PlaysSettings, identify_plays};
 pub use problem::{
     Coordinate, DELAY, Delay, NOMINAL_STIFFNESS, Problem, Record, Scale, Spec, Theta,

@@ -47,14 +47,14 @@ struct Part<F> {
 }
 
 /// A delay as whole control intervals and a fraction of one.
-struct Delay {
-    whole: usize,
-    fraction: f64,
+pub(super) struct Delay {
+    pub(super) whole: usize,
+    pub(super) fraction: f64,
 }
 
 impl Delay {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-    fn new(seconds: f64, interval: f64) -> Self {
+    pub(super) fn new(seconds: f64, interval: f64) -> Self {
         let intervals = seconds / interval;
         // 0.06 s are three intervals of 0.02 s, whatever the division says.
         let nearest = intervals.round();
@@ -63,6 +63,66 @@ impl Delay {
         }
         Self { whole: intervals as usize, fraction: intervals.fract() }
     }
+}
+
+/// Commands of one controller in their order, and when each takes effect.
+pub(super) struct Commands {
+    issued: Vec<f64>,
+    /// What the amplifier follows before the first.
+    held: f64,
+    delay: Delay,
+}
+
+impl Commands {
+    /// Room for `samples` commands, each of which acts `delay` after its control interval begins.
+    pub(super) fn new(samples: usize, held: f64, delay: Delay) -> Self {
+        Self { issued: Vec::with_capacity(samples), held, delay }
+    }
+
+    /// Takes the next command, V.
+    pub(super) fn push(&mut self, volts: f64) {
+        self.issued.push(volts);
+    }
+
+    /// The last command, V.
+    pub(super) fn last(&self) -> f64 {
+        self.issued.last().copied().unwrap_or(self.held)
+    }
+
+    /// Where in a control interval the newer command comes into effect, as a part of it.
+    pub(super) fn fraction(&self) -> f64 {
+        self.delay.fraction
+    }
+
+    /// Whether the newer command acts from the part `from` of a control interval on.
+    pub(super) fn newer(&self, from: f64) -> bool {
+        from > self.delay.fraction - SAME
+    }
+
+    /// The newer or the older of the two commands that act in control interval `k`, V.
+    pub(super) fn acting(&self, k: usize, newer: bool) -> f64 {
+        let back = self.delay.whole.saturating_add(usize::from(!newer));
+        k.checked_sub(back).and_then(|j| self.issued.get(j)).copied().unwrap_or(self.held)
+    }
+}
+
+/// Parts of a control interval nearer than this are one.
+pub(super) const SAME: f64 = 1e-9;
+
+/// Ends of the parts of a control interval, ascending to 1: the instants kept, told by `true`,
+/// and `marks` beside them.
+///
+/// The end of the interval itself is kept as the next control sample, once read.
+pub(super) fn ends(substeps: usize, marks: &[f64]) -> Vec<(f64, bool)> {
+    let mut ends: Vec<(f64, bool)> =
+        (1..=substeps).map(|j| (index(j) / index(substeps), j < substeps)).collect();
+    for &mark in marks {
+        if mark > 0.0 && ends.iter().all(|end| (end.0 - mark).abs() > SAME) {
+            ends.push((mark, false));
+        }
+    }
+    ends.sort_by(|a, b| a.0.total_cmp(&b.0));
+    ends
 }
 
 /// Lets a controller move an apparatus; `None` where `stop` said so meanwhile.
@@ -104,31 +164,26 @@ pub fn closed_loop<P: Plant>(
     apparatus.validate()?;
     let mut record = Record::new(timing, start)?;
     let delay = Delay::new(timing.delay, timing.interval);
-    let parts = parts(apparatus, timing, delay.fraction)?;
-    let held = record.run.last.command;
-    let mut commands = Vec::with_capacity(timing.samples);
+    let mut commands = Commands::new(timing.samples, record.run.last.command, delay);
+    let parts = parts(apparatus, timing, &commands)?;
     for k in 0..timing.samples {
         if stop() {
             return Ok(None);
         }
         let interval = if k == 0 { 0.0 } else { timing.interval };
         let measured = apparatus.read(&mut record.run.last, interval);
-        let command = controller(k, measured);
-        record.control(k, measured, command)?;
-        record.keep(apparatus)?;
+        let command = checked(k, measured, controller(k, measured))?;
         commands.push(command);
+        record.control(measured, command);
+        record.keep(apparatus.displacement(&record.run.last))?;
         if k + 1 == timing.samples {
             break;
         }
-        let issued = |back: usize| {
-            k.checked_sub(back).and_then(|j| commands.get(j)).copied().unwrap_or(held)
-        };
-        let (older, newer) = (issued(delay.whole.saturating_add(1)), issued(delay.whole));
         for part in &parts {
-            let volts = if part.newer { newer } else { older };
+            let volts = commands.acting(k, part.newer);
             apparatus.lead(&part.stretch, &mut record.run.last, volts, volts);
             if part.kept {
-                record.keep(apparatus)?;
+                record.keep(apparatus.displacement(&record.run.last))?;
             }
         }
     }
@@ -139,30 +194,31 @@ pub fn closed_loop<P: Plant>(
 fn parts<P: Plant>(
     apparatus: &Apparatus<'_, P>,
     timing: &Timing,
-    fraction: f64,
+    commands: &Commands,
 ) -> Result<Vec<Part<P::Flow>>> {
-    let n = timing.substeps;
-    let mut ends: Vec<(f64, bool)> = (1..=n).map(|j| (index(j) / index(n), true)).collect();
-    let apart = |end: &(f64, bool)| (end.0 - fraction).abs() > 1e-9;
-    if fraction > 0.0 && ends.iter().all(apart) {
-        ends.push((fraction, false));
-        ends.sort_by(|a, b| a.0.total_cmp(&b.0));
-    }
     let mut from = 0.0;
-    let mut parts = Vec::with_capacity(ends.len());
-    for (end, kept) in ends {
+    let mut parts = Vec::new();
+    for (end, kept) in ends(timing.substeps, &[commands.fraction()]) {
         let stretch = apparatus.stretch((end - from) * timing.interval)?;
-        // The end of the interval itself is kept as the next control sample, once read.
-        let kept = kept && end < 1.0;
-        parts.push(Part { stretch, newer: from > fraction - 1e-9, kept });
+        parts.push(Part { stretch, newer: commands.newer(from), kept });
         from = end;
     }
     Ok(parts)
 }
 
+/// Refuses a command at sample `k` that is not finite.
+pub(super) fn checked(k: usize, measured: f64, command: f64) -> Result<f64> {
+    if command.is_finite() {
+        return Ok(command);
+    }
+    Err(Error::Numerical(format!(
+        "the controller asks for {command} V at sample {k}, where the sensor reads {measured:e} m"
+    )))
+}
+
 /// The run so far.
-struct Record<S> {
-    run: ClosedLoop<S>,
+pub(super) struct Record<S> {
+    pub(super) run: ClosedLoop<S>,
     /// Time between two instants, s.
     spacing: f64,
     measured: f64,
@@ -170,7 +226,7 @@ struct Record<S> {
 }
 
 impl<S> Record<S> {
-    fn new(timing: &Timing, start: ApparatusState<S>) -> Result<Self> {
+    pub(super) fn new(timing: &Timing, start: ApparatusState<S>) -> Result<Self> {
         positive("interval", timing.interval, "s")?;
         not_negative("delay", timing.delay, "s")?;
         for (name, value) in [("samples", timing.samples), ("substeps", timing.substeps)] {
@@ -192,23 +248,16 @@ impl<S> Record<S> {
         Ok(Self { run, spacing, measured: 0.0, command: 0.0 })
     }
 
-    /// Takes what the controller read and asked for at sample `k`.
-    fn control(&mut self, k: usize, measured: f64, command: f64) -> Result<()> {
-        if !command.is_finite() {
-            return Err(Error::Numerical(format!(
-                "the controller asks for {command} V at sample {k}, where the sensor reads \
-                 {measured:e} m"
-            )));
-        }
+    /// Takes what was read last and what was asked for.
+    pub(super) fn control(&mut self, measured: f64, command: f64) {
         (self.measured, self.command) = (measured, command);
-        Ok(())
     }
 
-    /// Keeps the present instant.
-    fn keep<P: Plant<State = S>>(&mut self, apparatus: &Apparatus<'_, P>) -> Result<()> {
+    /// Keeps the present instant, at which the true displacement is `displacement`.
+    pub(super) fn keep(&mut self, displacement: f64) -> Result<()> {
         let run = &mut self.run;
         let time = self.spacing * index(run.time.len());
-        run.displacement.push(still_finite(apparatus.displacement(&run.last), time)?);
+        run.displacement.push(still_finite(displacement, time)?);
         run.time.push(time);
         run.measured.push(self.measured);
         run.command.push(self.command);

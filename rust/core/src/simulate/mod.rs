@@ -10,6 +10,7 @@ mod open_loop;
 mod plant;
 mod sensor;
 mod tracking;
+mod two_axes;
 
 pub use amplifier::{Amplifier, AmplifierFlow};
 pub use closed_loop::{ClosedLoop, Timing, closed_loop};
@@ -17,6 +18,9 @@ pub use open_loop::{OpenLoop, open_loop};
 pub use plant::{DahlFlow, KernelFlow, Plant};
 pub use sensor::{Sensor, SensorState};
 pub use tracking::{Course, Law, LawState, MOST_STATES, Tracked, track};
+pub use two_axes::{
+    TwoAxes, TwoLogs, TwoMotions, TwoStates, TwoTracked, closed_loops, open_loops, track_both,
+};
 
 use pulp::{Simd, WithSimd};
 
@@ -80,7 +84,13 @@ impl<'a, P: Plant> Apparatus<'a, P> {
 
     /// Reads the sensor `interval` seconds after the last reading, m.
     pub fn read(&self, state: &mut ApparatusState<P::State>, interval: f64) -> f64 {
-        self.sensor.read(&mut state.sensor, self.plant.displacement(&state.plant), interval)
+        self.read_beside(state, 0.0, interval)
+    }
+
+    /// As [`Self::read`], with `other` m of another axis in what the sensor sees.
+    fn read_beside(&self, state: &mut ApparatusState<P::State>, other: f64, interval: f64) -> f64 {
+        let seen = self.plant.displacement(&state.plant) + other;
+        self.sensor.read(&mut state.sensor, seen, interval)
     }
 
     /// Checks amplifier, sensor and step.

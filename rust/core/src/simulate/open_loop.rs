@@ -1,6 +1,6 @@
 //! A drive without feedback: what a log is made of.
 
-use super::{Apparatus, ApparatusState, Plant, instants, still_finite};
+use super::{Apparatus, ApparatusState, Plant, Stretch, instants, still_finite};
 use crate::error::{Result, finite};
 use crate::integrate::{Drive, Stop, index};
 
@@ -18,7 +18,7 @@ pub struct OpenLoop<S> {
 }
 
 /// Samples between two questions whether to stop.
-const BLOCK: usize = 64;
+pub(super) const BLOCK: usize = 64;
 
 /// Drives an apparatus; `None` where `stop` said so meanwhile.
 ///
@@ -34,27 +34,59 @@ pub fn open_loop<P: Plant>(
     stop: Stop<'_>,
 ) -> Result<Option<OpenLoop<P::State>>> {
     apparatus.validate()?;
-    let n = instants("u", Some(drive.u.len()))?;
-    for &volts in drive.u {
-        finite("u", volts, "V")?;
-    }
+    let n = checked(drive)?;
     let stretch = apparatus.stretch(drive.dt)?;
-    let empty = || Vec::with_capacity(n);
-    let mut run =
-        OpenLoop { displacement: empty(), measured: empty(), applied: empty(), last: start };
+    let mut run = OpenLoop::from_start(n, start);
     for k in 0..n {
-        if k > 0 {
-            let (from, change) = drive.interval(k - 1);
-            apparatus.lead(&stretch, &mut run.last, from, from + change);
-        }
+        run.drive(apparatus, &stretch, drive, k);
         if k % BLOCK == 0 && stop() {
             return Ok(None);
         }
-        let interval = if k == 0 { 0.0 } else { drive.dt };
-        run.measured.push(apparatus.read(&mut run.last, interval));
-        let displacement = apparatus.displacement(&run.last);
-        run.displacement.push(still_finite(displacement, drive.dt * index(k))?);
-        run.applied.push(run.last.applied);
+        let measured = apparatus.read(&mut run.last, since(drive, k));
+        run.keep(apparatus.displacement(&run.last), measured, drive.dt * index(k))?;
     }
     Ok(Some(run))
+}
+
+/// Number of samples of a drive that is finite.
+pub(super) fn checked(drive: &Drive<'_>) -> Result<usize> {
+    for &volts in drive.u {
+        finite("u", volts, "V")?;
+    }
+    instants("u", Some(drive.u.len()))
+}
+
+/// Time since the last reading at sample `k`, s.
+pub(super) fn since(drive: &Drive<'_>, k: usize) -> f64 {
+    if k == 0 { 0.0 } else { drive.dt }
+}
+
+impl<S> OpenLoop<S> {
+    /// Room for `n` samples, none of them kept yet.
+    pub(super) fn from_start(n: usize, last: ApparatusState<S>) -> Self {
+        let empty = || Vec::with_capacity(n);
+        Self { displacement: empty(), measured: empty(), applied: empty(), last }
+    }
+
+    /// Leads an apparatus to sample `k`.
+    pub(super) fn drive<P: Plant<State = S>>(
+        &mut self,
+        apparatus: &Apparatus<'_, P>,
+        stretch: &Stretch<P::Flow>,
+        drive: &Drive<'_>,
+        k: usize,
+    ) {
+        if let Some(before) = k.checked_sub(1) {
+            let (from, change) = drive.interval(before);
+            apparatus.lead(stretch, &mut self.last, from, from + change);
+        }
+    }
+
+    /// Keeps the present sample, at `time` s.
+    pub(super) fn keep(&mut self, displacement: f64, measured: f64, time: f64) -> Result<()> {
+        self.measured.push(measured);
+        self.displacement.push(still_finite(displacement, time)?);
+        self.applied.push(self.last.applied);
+        Ok(())
+    }
 }

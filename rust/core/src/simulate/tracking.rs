@@ -1,7 +1,8 @@
 //! A controller in the loop: reference and feedforward in, motion and commands out.
 
 use piezotrack_control::{
-    Command, Controller, Feedback, PidState, SampledPid, StateSpace, StateSpaceState,
+    Command, Controller, ControllerState, Feedback, PidState, SampledPid, StateSpace,
+    StateSpaceState,
 };
 
 use super::{Apparatus, ApparatusState, ClosedLoop, Plant, Timing, closed_loop};
@@ -110,29 +111,42 @@ pub fn track<P: Plant, F: Feedback>(
     course: Course<'_>,
     stop: Stop<'_>,
 ) -> Result<Option<Tracked<P::State>>> {
-    let samples = course.reference.len();
-    if course.feedforward.len() != samples {
-        return Err(Error::Shape {
-            name: "feedforward".into(),
-            found: format!("{} samples", course.feedforward.len()),
-            expected: format!("{samples}, as many as the reference"),
-        });
+    let mut leader = Leader::new(controller, course)?;
+    let timing = Timing { samples: course.reference.len(), ..*timing };
+    let lead = |k, measured| leader.lead(k, measured);
+    let motion = closed_loop(apparatus, start, &timing, lead, stop)?;
+    Ok(motion.map(|motion| Tracked { motion, commands: leader.commands }))
+}
+
+/// A controller on its course.
+pub(super) struct Leader<'a, F: Feedback> {
+    controller: &'a Controller<F>,
+    course: Course<'a>,
+    state: ControllerState<F::State, Vec<f64>>,
+    /// The commands so far.
+    pub(super) commands: Vec<Command>,
+}
+
+impl<'a, F: Feedback> Leader<'a, F> {
+    pub(super) fn new(controller: &'a Controller<F>, course: Course<'a>) -> Result<Self> {
+        let samples = course.reference.len();
+        if course.feedforward.len() != samples {
+            return Err(Error::Shape {
+                name: "feedforward".into(),
+                found: format!("{} samples", course.feedforward.len()),
+                expected: format!("{samples}, as many as the reference"),
+            });
+        }
+        let length = controller.repetitive.map_or(0, |part| part.length());
+        let state = controller.rest(vec![0.0; length])?;
+        Ok(Self { controller, course, state, commands: Vec::with_capacity(samples) })
     }
-    let length = controller.repetitive.map_or(0, |part| part.length());
-    let mut state = controller.rest(vec![0.0; length])?;
-    let mut commands = Vec::with_capacity(samples);
-    let timing = Timing { samples, ..*timing };
-    let motion = closed_loop(
-        apparatus,
-        start,
-        &timing,
-        |k, measured| {
-            let (reference, feedforward) = (course.reference[k], course.feedforward[k]);
-            let command = controller.step(&mut state, reference, measured, feedforward);
-            commands.push(command);
-            command.volts
-        },
-        stop,
-    )?;
-    Ok(motion.map(|motion| Tracked { motion, commands }))
+
+    /// The command at sample `k`, V.
+    pub(super) fn lead(&mut self, k: usize, measured: f64) -> f64 {
+        let (reference, feedforward) = (self.course.reference[k], self.course.feedforward[k]);
+        let command = self.controller.step(&mut self.state, reference, measured, feedforward);
+        self.commands.push(command);
+        command.volts
+    }
 }

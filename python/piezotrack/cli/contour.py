@@ -1,0 +1,226 @@
+"""``piezotrack contour``: an XY stage along a path, or the nine circles of Table 2."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import ParameterError
+from .options import ControlInterval, Duration, Out, Period, can_be_folder, list_files, number_range
+from .words import in_words
+
+if TYPE_CHECKING:
+    from ..contouring import Contour
+    from ..cross_talk import CrossTalk
+    from ..inverse import Inverse
+    from ..table_2 import Table2
+    from ..xyreference import XYReference
+    from ..xystage import XYStage
+
+__all__ = ["contour_command"]
+
+
+@in_words
+def contour_command(
+    model: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[MODEL]",
+            help="Model file in JSON, for the feedforward of both axes; where it is not given one "
+            "is identified from a log of x.",
+        ),
+    ] = None,
+    path: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TEXT",
+            help="As circle:0.1Hz,10um, lissajous:, raster:, spiral:, or a CSV file with x and y.",
+        ),
+    ] = None,
+    table_2: Annotated[
+        bool, typer.Option("--table-2", help="The nine circles of Xu and Li 2010 instead.")
+    ] = False,
+    out: Out = Path("results"),
+    lag: Annotated[
+        float | None, typer.Option(help="Time in s from serving x to serving y.")
+    ] = None,
+    cross_talk: Annotated[
+        str | None, typer.Option(metavar="XY:YX", help="Shares of y in x and of x in y.")
+    ] = None,
+    decouple: Annotated[
+        bool, typer.Option("--decouple", help="Identify the cross-talk, and feed it forward.")
+    ] = False,
+    dt: ControlInterval = 0.02,
+    limits: Annotated[
+        str, typer.Option(metavar="LOW:HIGH", help="Voltage limits of the amplifiers.")
+    ] = "0:75",
+    feedforward: Annotated[bool, typer.Option(help="Feedforward by the model's inverse.")] = True,
+    feedback: Annotated[bool, typer.Option(help="PID feedback.")] = True,
+    kp: Annotated[float, typer.Option(help="Proportional gain in V/um.")] = 0.120,
+    ti: Annotated[float, typer.Option(help="Integral time in s.")] = 0.009,
+    td: Annotated[float, typer.Option(help="Derivative time in s.")] = 0.044,
+    delay: Annotated[float, typer.Option(help="Delay in the loops in s, besides the hold.")] = 0.0,
+    duration: Duration = None,
+    period: Period = None,
+    seed: Annotated[int, typer.Option(help="Of the sensors' noise.")] = 1,
+    beyond_reach: Annotated[
+        bool, typer.Option("--beyond-reach", help="Let the path leave the stage's reach.")
+    ] = False,
+    unstable: Annotated[
+        bool, typer.Option("--unstable", help="Run loops that are unstable for small motions.")
+    ] = False,
+) -> None:
+    """Let two controllers lead the virtual XY stage along a path: figures, a table, pictures."""
+    from ..contouring import contour
+    from ..control import Controller
+    from ..laws import Pid
+    from ..table_2 import run_table_2
+
+    if table_2 == (path is not None):
+        given = "both are" if table_2 else "neither is"
+        raise ParameterError(f"--path and --table-2: expected one of them, {given} given")
+    if table_2 and (duration or period or beyond_reach or unstable):
+        raise ParameterError(
+            "--duration, --period, --beyond-reach, --unstable: expected none with --table-2"
+        )
+    course = None if path is None else _path(path, duration, period)
+    stage = _stage(seed, lag, cross_talk)
+    can_be_folder(out)
+    inverse, how = _inverse(model, seed) if feedforward else (None, "no feedforward")
+    loop = Controller(
+        dt=dt,
+        limits=number_range("--limits", limits),
+        feedforward=inverse,
+        feedback=Pid.from_um(kp=kp, ti=ti, td=td) if feedback else None,
+    )
+    mixing: dict[str, Any] = {"delay": delay}
+    if decouple:
+        found = _cross_talk(stage)
+        mixing["decoupling"] = found.matrix
+        how += f"\ncross-talk identified: {found}"
+    loops = (loop, loop)
+    free = {"beyond_reach": beyond_reach, "unstable": unstable}
+    if course is None:
+        table = run_table_2(stage, loops, **mixing)
+        written, words = _write_table(table, out), str(table)
+    else:
+        run = contour(stage, loops, course, **mixing, **free)
+        written, words = _write(run, out), run.summary()
+    xy, yx = (f"{100 * share:g} %" for share in stage.cross_talk)
+    print(f"the virtual XY stage: y lags by {stage.lag:g} s, {xy} of y in x, {yx} of x in y; {how}")
+    print(words)
+    list_files(written)
+
+
+def _path(text: str, duration: float | None, period: float | None) -> XYReference:
+    """Read a file where the text names one, else a description."""
+    from ..path_text import parse_path
+    from ..xyreference import read_path
+
+    if Path(text).is_file():
+        return read_path(text, duration=duration, period=period)
+    if period is not None:
+        raise ParameterError(f"--period is for a path from a file: expected none with {text}")
+    return parse_path(text, duration=duration)
+
+
+def _stage(seed: int, lag: float | None, cross_talk: str | None) -> XYStage:
+    """Take the virtual stage with what the options change of it."""
+    from ..xystage import XYStage
+
+    stage = XYStage.xu_li_2010(seed=seed)
+    if lag is not None:
+        stage = replace(stage, lag=lag)
+    if cross_talk is not None:
+        stage = replace(stage, cross_talk=number_range("--cross-talk", cross_talk))
+    return stage
+
+
+def _inverse(model: Path | None, seed: int) -> tuple[Inverse, str]:
+    """Invert the model, or identify one as the paper does."""
+    from ..demo import demo_log, identify_demo
+    from ..modelfile import load
+
+    if model is not None:
+        return load(model).inverse(), f"feedforward by {model.name} on both axes"
+    fit = identify_demo(demo_log(seed), seed=seed, progress=False)
+    words = f"feedforward on both axes by a model of x, fitted to {fit.cost_um:.3g} um rms"
+    return fit.inverse(), words
+
+
+def _cross_talk(stage: XYStage) -> CrossTalk:
+    """Drive one axis after the other, as an experimenter does, and find the cross-talk."""
+    import numpy as np
+
+    from ..cross_talk import identify_cross_talk
+
+    t = np.arange(8000) / 1000.0
+    slow, held = 37.5 * (1.0 - np.cos(2.0 * np.pi * 0.25 * t)), np.zeros(t.size)
+    return identify_cross_talk(stage.record(slow, held, 1e-3), stage.record(held, slow, 1e-3))
+
+
+def _write(run: Contour, out: Path) -> list[Path]:
+    """Write the samples, the figures as JSON, and the picture."""
+    from .. import __version__
+    from ..files import replacing, write_columns
+    from ..report import make_folder, save_figures
+
+    folder = make_folder(out)
+    table = {"time_s": run.t}
+    for name, axis in (("x", run.x), ("y", run.y)):
+        table |= {
+            f"desired_{name}_um": 1e6 * axis.desired,
+            f"measured_{name}_um": 1e6 * axis.measured,
+            f"voltage_{name}_V": axis.voltage,
+        }
+    table["contour_error_um"] = 1e6 * run.error
+    written = [write_columns(folder / "contour.csv", table)]
+    document = {
+        "format": "piezotrack-contour",
+        "schema_version": 1,
+        "path": repr(run.path),
+        "unit": "errors in m, phase lag in rad, widest loop as a part of the travel",
+        "from_s": run.settled,
+        "contour": asdict(run.metrics),
+        "contour_true": asdict(run.score(true=True)),
+        "x": asdict(run.x.metrics),
+        "y": asdict(run.y.metrics),
+        "feedforward": run.x.note,
+        "provenance": {"package": "piezotrack", "version": __version__},
+    }
+    file = folder / "contour.json"
+    with replacing(file) as temporary:
+        temporary.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+    return [*written, file, *save_figures({"contour": run.plot()}, folder)]
+
+
+def _write_table(table: Table2, out: Path) -> list[Path]:
+    """Write the table, published beside obtained, and pictures of it and of each circle."""
+    import numpy as np
+
+    from ..files import write_columns
+    from ..report import make_folder, save_figures
+    from ..table_2 import PUBLISHED
+
+    folder = make_folder(out)
+    columns = {
+        "radius_um": [1e6 * case.radius for case in PUBLISHED],
+        "frequency_Hz": [case.frequency for case in PUBLISHED],
+    }
+    for name, ours in (
+        ("peak_to_peak", "peak_to_peak"),
+        ("mean", "mean_error"),
+        ("sd", "sd_error"),
+    ):
+        columns[f"published_{name}_um"] = [1e6 * getattr(case, name) for case in PUBLISHED]
+        columns[f"obtained_{name}_um"] = [1e6 * getattr(run.metrics, ours) for run in table.runs]
+    arrays = {name: np.array(values) for name, values in columns.items()}
+    written = [write_columns(folder / "table_2.csv", arrays)]
+    figures = {"table_2": table.plot()}
+    for case, run in zip(PUBLISHED, table.runs, strict=True):
+        figures[f"circle_{1e6 * case.radius:.0f}um_{case.frequency:g}Hz"] = run.plot()
+    return written + save_figures(figures, folder)

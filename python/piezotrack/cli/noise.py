@@ -1,0 +1,86 @@
+"""``piezotrack noise``: what a sensor shows at rest."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .options import (
+    Columns,
+    DisplacementColumn,
+    Interval,
+    Out,
+    TimeColumn,
+    Units,
+    can_be_folder,
+    list_files,
+    of_file,
+    windowed,
+)
+from .words import in_words
+
+if TYPE_CHECKING:
+    from ..noise import Noise
+
+__all__ = ["noise_command"]
+
+
+@in_words
+def noise_command(
+    file: Annotated[Path, typer.Argument(help="Log in CSV, of a sensor at rest.")],
+    window: Annotated[
+        str | None, typer.Option(metavar="A:B", help="Seconds in which nothing moves.")
+    ] = None,
+    out: Out = Path("results"),
+    time: TimeColumn = None,
+    displacement: DisplacementColumn = None,
+    unit: Units = None,
+    dt: Interval = None,
+) -> None:
+    """Read a record at rest: rms, steps, spectrum and a model of the noise."""
+    from ..io import read_displacement
+    from ..noise import identify_noise
+    from ..report import make_folder, save_figures
+
+    columns = Columns(time, None, displacement, unit, dt)
+    log = read_displacement(
+        file, time=columns.time, displacement=columns.displacement, units=columns.units, dt=dt
+    )
+    can_be_folder(out)
+    log = windowed(log, file, "--window", window)
+    with of_file(file):
+        found = identify_noise(log)
+    folder = make_folder(out)
+    written = [_write(found, folder), *save_figures({"noise": found.plot()}, folder)]
+    print(found.summary())
+    list_files(written)
+
+
+def _write(found: Noise, folder: Path) -> Path:
+    """Write the figures as JSON."""
+    from .. import __version__
+    from ..files import replacing
+
+    document = {
+        "format": "piezotrack-noise",
+        "schema_version": 1,
+        "unit": "m, Hz",
+        "spread": asdict(found.spread),
+        "drift": found.drift,
+        "resolution": found.resolution,
+        "levels": found.levels,
+        "noise": found.noise,
+        # JSON has no infinity.
+        "bandwidth": None if found.bandwidth_sd is None else found.bandwidth,
+        "bandwidth_sd": found.bandwidth_sd,
+        "data": {"source": found.data.source, "sha256": found.data.sha256},
+        "provenance": {"package": "piezotrack", "version": __version__},
+    }
+    path = folder / "noise.json"
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+    return path

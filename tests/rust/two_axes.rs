@@ -1,0 +1,268 @@
+//! Two axes in one time: what couples them, and what does not.
+#![allow(missing_docs, clippy::unwrap_used, clippy::float_cmp, clippy::cast_precision_loss)]
+
+use core::f64::consts::TAU;
+
+use piezotrack_control::{Controller, Limits, Pid};
+use piezotrack_core::contour::radial_errors;
+use piezotrack_core::identify::{cross_talk, noise_at_rest};
+use piezotrack_core::integrate::{Drive, Hold, NEVER};
+use piezotrack_core::metrics::Spread;
+use piezotrack_core::simulate::{
+    Apparatus, Course, Law, Plant, Timing, TwoAxes, open_loops, track, track_both,
+};
+use piezotrack_core::stage::{DahlStage, VirtualSettings, VirtualStage};
+
+const UM: f64 = 1e-6;
+const TS: f64 = 0.02;
+
+/// What moves at once: 1 um for 1 V.
+#[derive(Clone, Copy)]
+struct Rigid;
+
+impl Plant for Rigid {
+    type State = f64;
+    type Flow = ();
+
+    fn rest(&self) -> f64 {
+        0.0
+    }
+
+    fn flow(&self, _: f64) {}
+
+    fn advance(&self, (): &(), state: &mut f64, _: f64, to: f64) {
+        *state = UM * to;
+    }
+
+    fn displacement(&self, state: &f64) -> f64 {
+        *state
+    }
+}
+
+fn pid() -> Controller<Law> {
+    Controller::new(Limits::new(0.0, 75.0).unwrap(), Law::Pid(Pid::xu_li_2010().at(TS).unwrap()))
+}
+
+fn open() -> Controller<Law> {
+    Controller::new(Limits::new(-1e3, 1e3).unwrap(), Law::None)
+}
+
+/// `middle + radius cos(2 pi f t - behind)` at the control samples.
+fn wave(samples: usize, middle: f64, radius: f64, frequency: f64, behind: f64) -> Vec<f64> {
+    let at = |k: usize| middle + radius * (TAU * frequency * TS * k as f64 - behind).cos();
+    (0..samples).map(at).collect()
+}
+
+fn timing(delay: f64, substeps: usize) -> Timing {
+    Timing { interval: TS, samples: 0, delay, substeps }
+}
+
+#[test]
+fn without_cross_talk_and_lag_each_axis_is_alone() {
+    // Bit by bit, whatever the delay, and for different plants.
+    let (stage, model) = (VirtualStage::xu_li_2010(3), DahlStage::xu_li_2010());
+    let (x, y) = (stage.apparatus(), Apparatus::bare(&model, 5e-5));
+    let (to_x, to_y) =
+        (wave(150, 50.0 * UM, 10.0 * UM, 0.5, 0.0), wave(150, 40.0 * UM, 20.0 * UM, 0.5, 1.0));
+    let none = vec![0.0; 150];
+    let courses = [&to_x, &to_y].map(|reference| Course { reference, feedforward: &none });
+    for (delay, substeps) in [(0.0, 1), (0.7e-3, 10), (0.027, 3)] {
+        let timing = timing(delay, substeps);
+        let axes = TwoAxes { x, y, cross_talk: [0.0, 0.0], lag: 0.0 };
+        let start = (stage.start(), y.rest());
+        let both = track_both(&axes, start, &timing, (&pid(), &pid()), courses, NEVER);
+        let (along_x, along_y) = both.unwrap().unwrap();
+        let alone = track(&x, stage.start(), &timing, &pid(), courses[0], NEVER);
+        let alone = alone.unwrap().unwrap();
+        assert_eq!(along_x.motion, alone.motion);
+        assert_eq!(along_x.commands, alone.commands);
+        let alone = track(&y, y.rest(), &timing, &pid(), courses[1], NEVER).unwrap().unwrap();
+        assert_eq!(along_y.motion, alone.motion);
+        assert_eq!(along_y.commands, alone.commands);
+    }
+}
+
+#[test]
+fn a_lag_makes_the_ellipse_of_its_angle() {
+    // x = R cos a, y = R sin(a - b): with b = 2 pi f lag, r^2 = R^2 (1 - sin b sin(2 a - b)), so
+    // the SD of the radial error is R sin(b) / sqrt 8 but for terms of b^2, and its largest and
+    // smallest are on the diagonals. A voltage that is held for an interval is late by one.
+    let (radius, frequency) = (40.0, 0.1);
+    let plant = Rigid;
+    let axis = Apparatus::bare(&plant, 1.0);
+    let (cosine, sine) =
+        (wave(1001, 0.0, radius, frequency, 0.0), wave(1001, 0.0, radius, frequency, TAU / 4.0));
+    for (whole, intervals) in [(1, 1.0), (2, 2.0), (5, 5.0)] {
+        let axes = TwoAxes { x: axis, y: axis, cross_talk: [0.0, 0.0], lag: intervals * TS };
+        let courses = [&cosine, &sine].map(|volts| Course { reference: volts, feedforward: volts });
+        let start = (axis.rest(), axis.rest());
+        let run = track_both(&axes, start, &timing(0.0, 1), (&open(), &open()), courses, NEVER);
+        let (x, y) = run.unwrap().unwrap();
+        let angle = TAU * frequency * intervals * TS;
+        // One turn, after the lag.
+        let turn = 501..1001;
+        let errors = radial_errors(
+            &x.motion.measured[turn.clone()],
+            &y.motion.measured[turn.clone()],
+            [0.0, 0.0],
+            radius * UM,
+        );
+        let found = Spread::of(errors.unwrap().into_iter());
+        let expected = radius * UM * angle.sin() / 8.0_f64.sqrt();
+        assert!((found.sd / expected - 1.0).abs() < angle, "{} {expected}", found.sd);
+        let edge = |sign: f64| radius * UM * (1.0 + sign * angle.sin()).sqrt();
+        assert!((found.peak_to_peak / (edge(1.0) - edge(-1.0)) - 1.0).abs() < 1e-3);
+        // Sample by sample it is the same motion, so much later.
+        for k in turn {
+            assert!((y.motion.measured[k] - UM * sine[k - 1 - whole]).abs() < 1e-18);
+        }
+    }
+}
+
+#[test]
+fn a_lag_of_a_part_of_an_interval_is_kept_to_the_instant() {
+    // Seen ten times in an interval, the step of y is 0.3 of it behind that of x.
+    let plant = Rigid;
+    let axis = Apparatus::bare(&plant, 1.0);
+    let steps: Vec<f64> = (0..20).map(|k| f64::from(k % 2)).collect();
+    let course = Course { reference: &steps, feedforward: &steps };
+    for (lag, delay) in [(3, 0), (0, 3), (2, 1), (3, 4), (13, 0), (9, 22)] {
+        // In tenths of an interval.
+        let seconds = |tenths: usize| 0.1 * TS * tenths as f64;
+        let axes = TwoAxes { x: axis, y: axis, cross_talk: [0.0, 0.0], lag: seconds(lag) };
+        let start = (axis.rest(), axis.rest());
+        let timing = timing(seconds(delay), 10);
+        let run = track_both(&axes, start, &timing, (&open(), &open()), [course; 2], NEVER);
+        let (x, y) = run.unwrap().unwrap();
+        for j in 50..190 {
+            // An instant shows what acted before it.
+            let at = |late: usize| UM * steps[(j - 1 - late) / 10];
+            assert_eq!(x.motion.displacement[j], at(delay), "{j} {lag} {delay}");
+            assert_eq!(y.motion.displacement[j], at(lag + delay), "{j} {lag} {delay}");
+        }
+        // The command beside an instant is the last one computed.
+        let late = lag.div_ceil(10);
+        assert_eq!(y.commands[12].volts, steps[12 - late]);
+    }
+}
+
+#[test]
+fn cross_talk_mixes_what_the_sensors_see() {
+    let plant = Rigid;
+    let axis = Apparatus::bare(&plant, 1.0);
+    let [xy, yx] = [0.03, -0.02];
+    let axes = TwoAxes { x: axis, y: axis, cross_talk: [xy, yx], lag: 0.0 };
+    let (ux, uy) = (vec![3.0, 5.0, -1.0, 2.0], vec![0.0, 7.0, 4.0, -6.0]);
+    let drives = [&ux, &uy].map(|u| Drive::new(u, 1e-3, Hold::First).unwrap());
+    let start = (axis.rest(), axis.rest());
+    let (x, y) = open_loops(&axes, start, [&drives[0], &drives[1]], NEVER).unwrap().unwrap();
+    for k in 1..4 {
+        assert!((x.measured[k] - UM * (ux[k] + xy * uy[k])).abs() < 1e-18);
+        assert!((y.measured[k] - UM * (uy[k] + yx * ux[k])).abs() < 1e-18);
+        assert_eq!(x.displacement[k], x.measured[k]);
+    }
+
+    // Under integrating feedback both readings settle where they should in spite of it.
+    let level = [vec![20.0 * UM; 400], vec![60.0 * UM; 400]];
+    let none = vec![0.0; 400];
+    let courses =
+        [0, 1].map(|i| Course { reference: level[i].as_slice(), feedforward: none.as_slice() });
+    let integral = Law::Pid(Pid::new(0.3e6, 0.02, 0.0, None).unwrap().at(TS).unwrap());
+    let loops = Controller::new(Limits::new(-100.0, 100.0).unwrap(), integral);
+    let run = track_both(
+        &TwoAxes { lag: 0.008, ..axes },
+        (axis.rest(), axis.rest()),
+        &timing(0.0, 1),
+        (&loops, &loops),
+        courses,
+        NEVER,
+    );
+    let (x, y) = run.unwrap().unwrap();
+    let (dx, dy) = (UM * x.motion.command[399], UM * y.motion.command[399]);
+    assert!((dx + xy * dy - 20.0 * UM).abs() < 1e-15);
+    assert!((dy + yx * dx - 60.0 * UM).abs() < 1e-15);
+}
+
+#[test]
+fn identified_cross_talk_is_the_stage_s_within_its_deviation() {
+    // Over thirty seeds the deviations are those that are claimed.
+    let u: Vec<f64> = (0..2000).map(|k| 37.5 - 37.5 * (TAU * 1e-3 * f64::from(k)).cos()).collect();
+    let held = vec![0.0; u.len()];
+    let (mut square, mut count) = (0.0, 0.0);
+    for seed in 0..30 {
+        let (x, y) = (VirtualStage::xu_li_2010(seed), VirtualStage::xu_li_2010_y(seed));
+        let axes =
+            TwoAxes { x: x.apparatus(), y: y.apparatus(), cross_talk: [0.015, 0.01], lag: 0.01 };
+        let drives = [&u, &held].map(|u| Drive::new(u, 1e-3, Hold::First).unwrap());
+        let start = (x.start(), y.start());
+        let run = open_loops(&axes, start, [&drives[0], &drives[1]], NEVER).unwrap().unwrap();
+        let found = cross_talk(&run.0.measured, &run.1.measured).unwrap();
+        assert!((found.share - 0.01).abs() < 5.0 * found.sd, "{found:?}");
+        square += ((found.share - 0.01) / found.sd).powi(2);
+        count += 1.0;
+    }
+    let ratio = (square / count).sqrt();
+    assert!((0.5..2.0).contains(&ratio), "{ratio}");
+    let still = vec![3.0 * UM; 100];
+    assert!(cross_talk(&still, &still).unwrap_err().to_string().contains("does not move"));
+}
+
+#[test]
+fn noise_is_found_again_beside_the_creep() {
+    for (noise, bandwidth, seed) in [(0.0964, 200.0, 1), (0.05, 50.0, 2), (0.2, 800.0, 3)] {
+        let mut settings = VirtualSettings::xu_li_2010(seed);
+        settings.sensor.noise = noise * UM;
+        settings.sensor.bandwidth = bandwidth;
+        let stage = VirtualStage::new(&settings).unwrap();
+        let held = vec![0.0; 50_000];
+        let run = stage.simulate(&Drive::new(&held, 2e-4, Hold::Zero).unwrap(), NEVER);
+        let found = noise_at_rest(&run.unwrap().unwrap().measured, 2e-4).unwrap();
+        assert!((found.noise / (noise * UM) - 1.0).abs() < 0.05, "{found:?}");
+        assert!((found.resolution / settings.sensor.resolution - 1.0).abs() < 1e-9);
+        let sd = found.bandwidth_sd.unwrap();
+        assert!((found.bandwidth - bandwidth).abs() < 4.0 * sd, "{found:?}");
+        assert!(sd < 0.05 * bandwidth);
+    }
+}
+
+#[test]
+fn white_noise_and_numbers_on_no_grid_are_told_as_such() {
+    let mut settings = VirtualSettings::xu_li_2010(1);
+    settings.sensor.bandwidth = f64::INFINITY;
+    settings.sensor.resolution = 0.0;
+    let stage = VirtualStage::new(&settings).unwrap();
+    let held = vec![0.0; 5000];
+    let run = stage.simulate(&Drive::new(&held, 2e-4, Hold::Zero).unwrap(), NEVER);
+    let found = noise_at_rest(&run.unwrap().unwrap().measured, 2e-4).unwrap();
+    assert_eq!(found.resolution, 0.0);
+    assert!(found.bandwidth.is_infinite() && found.bandwidth_sd.is_none());
+    assert!(noise_at_rest(&vec![1e-6; 200], 1e-3).is_err());
+    assert!(noise_at_rest(&[1e-6; 20], 1e-3).is_err());
+}
+
+#[test]
+fn refusals_name_the_argument() {
+    let plant = Rigid;
+    let axis = Apparatus::bare(&plant, 1.0);
+    let told = |cross_talk, lag| {
+        TwoAxes { x: axis, y: axis, cross_talk, lag }.validate().unwrap_err().to_string()
+    };
+    assert!(told([0.1, f64::NAN], 0.0).starts_with("cross_talk[1] is NaN"));
+    assert!(told([1.0, 1.0], 0.0).contains("product is below 1"));
+    assert!(told([0.0, 0.0], -0.1).starts_with("lag is -0.1 s"));
+}
+
+#[test]
+fn a_run_stops_when_told() {
+    let plant = Rigid;
+    let axis = Apparatus::bare(&plant, 1.0);
+    let axes = TwoAxes { x: axis, y: axis, cross_talk: [0.0, 0.0], lag: 0.01 };
+    let volts = [1.0; 9];
+    let course = Course { reference: &volts, feedforward: &volts };
+    let start = (axis.rest(), axis.rest());
+    let stop = &|| true;
+    let run = track_both(&axes, start, &timing(0.0, 1), (&open(), &open()), [course; 2], stop);
+    assert!(run.unwrap().is_none());
+    let drive = Drive::new(&volts, 1e-3, Hold::First).unwrap();
+    assert!(open_loops(&axes, start, [&drive, &drive], stop).unwrap().is_none());
+}
