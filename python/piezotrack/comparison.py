@@ -225,7 +225,8 @@ def compare(
         The record.
     models : iterable, optional
         Kinds of stage by name, as for `identify`, which are fitted; files of models and models
-        that are identified already, which are taken as they are. All kinds where not given.
+        that are identified already, which are taken as they are. Where not given, all kinds that
+        the drive suits: a Bouc-Wen oscillator is for forces, ``drive_unit="N"``.
     train : (float, float), optional
         Window to fit [s], either end may be None. Where not given, the first half of the record,
         or all that is before `test`, or all of it where `test` is another record.
@@ -265,7 +266,7 @@ def compare(
     """
     if not isinstance(log, Dataset):
         raise ParameterError(f"log is {type(log).__name__}: expected a Dataset, see pt.read")
-    wanted = _wanted(models)
+    wanted = _wanted(models, log.drive_unit)
     first, second, carried = _parts(log, train, test)
     rows = []
     for name, title, source in wanted:
@@ -279,10 +280,12 @@ def compare(
     return Comparison(rows=tuple(rows), train=first, test=second, carried=carried)
 
 
-def _wanted(models: object) -> list[tuple[str, str, Kind | Identified[Any]]]:
+def _wanted(models: object, drive_unit: str) -> list[tuple[str, str, Kind | Identified[Any]]]:
     """Name, title and source of what is to be compared: kinds to fit, and models."""
     if models is None:
-        return [(kind.name, kind.title, kind) for kind in KINDS]
+        # A voltage is no force; a force may be taken for one, in its own scale.
+        kinds = [kind for kind in KINDS if kind.drive_unit in ("V", drive_unit)]
+        return [(kind.name, kind.title, kind) for kind in kinds]
     if isinstance(models, (str, os.PathLike, Mapping)) or not isinstance(models, Iterable):
         raise ParameterError(f"models is {models!r}: expected several in a list, as ['dahl']")
     sources = [_source(model) for model in models]

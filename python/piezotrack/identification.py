@@ -13,7 +13,7 @@ from .documents import provenance
 from .errors import Interrupted, ParameterError
 from .estimates import Estimate, Progress, Run, StopReason
 from .identified import Fitted
-from .kinds import Kind, Searched, kind_named
+from .kinds import Kind, Searched, kind_named, kind_of
 from .modelfile import IdentifiedModel
 from .models import DahlStage, Response
 from .playsfit import PlaysIdentification, identify_plays
@@ -25,6 +25,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 __all__ = ["Identification", "identify"]
+
+# Parameters that a record without a reversal says nothing of.
+HYSTERESIS = {
+    *("a1", "a2", "b1", "alpha", "beta", "gamma", "delta", "rest_stiffness", "coulomb_force"),
+}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -80,6 +85,9 @@ class Identification(Fitted[Response], IdentifiedModel):
         """What a careful reader should know before using the result."""
         held = [name for name, estimate in self.parameters.items() if not estimate.free]
         notes = self._remarks(held)
+        unit = kind_of(self.model).drive_unit
+        if unit == "N" and self.data.drive_unit != "N":
+            notes.append(f"the drive is in {self.data.drive_unit}: forces are in it too, not in N")
         rubs = isinstance(self.model, DahlStage) and self.model.b0 != 0.0
         if rubs and not self.simulate(self.data).well_posed:
             notes.append(
@@ -202,23 +210,27 @@ def identify(
 
     Voltage and displacement fix ratios only: mass, damping, stiffness, piezo coefficient, b1 and
     b0 of a Dahl stage, or mass, damping and stiffness of a Bouc-Wen stage, can all be multiplied
-    by one number without changing the motion. Where nothing in the call
-    fixes a force, a nominal stiffness of 1e6 N/m is held, and the result says "scale assumed".
+    by one number without changing the motion. Where nothing in the call fixes a force, a nominal
+    stiffness of 1e6 N/m is held, and the result says "scale assumed". The drive of a Bouc-Wen
+    oscillator is a force itself; of one that is given in volts, forces come out in volts too.
 
     Parameters
     ----------
     data : Dataset
         The record. ``log[3.0:23.0]`` counts this window only and keeps the drive before it as
         warm-up.
-    model : {"dahl", "bouc-wen", "prandtl-ishlinskii"}, optional
-        The kind of stage: `DahlStage`, `BoucWenStage` or `PrandtlIshlinskiiStage`. The last is
-        found by least squares, as `identify_plays` does with its defaults: nothing is searched
-        at random, so `offset` alone of what follows has a meaning, and `seed`, `runs`, `threads`
-        and `progress` make no difference.
+    model : {"dahl", "bouc-wen", "first-order-dahl", "bouc-wen-oscillator", \
+             "prandtl-ishlinskii"}, optional
+        The kind of stage: `DahlStage`, `BoucWenStage`, `FirstOrderDahlStage`,
+        `BoucWenOscillator` or `PrandtlIshlinskiiStage`. The last is found by least squares, as
+        `identify_plays` does with its defaults: nothing is searched at random, so `offset` alone
+        of what follows has a meaning, and `seed`, `runs`, `threads` and `progress` make no
+        difference.
     free : iterable of str, optional
         Parameters to search: all that are not fixed, where not given. `b0`, dry friction at
-        reversals, is held at 0 unless it is named here or in `fixed`, and the exponent of a
-        Bouc-Wen stage at 1 unless it is in `fixed`.
+        reversals, is held at 0 unless it is named here or in `fixed`; exponents, and the beta of
+        an oscillator, of which the data tell the products with gamma and delta only, at 1 unless
+        they are in `fixed`.
     fixed : mapping of str to float, optional
         Parameters to hold, SI.
     initial : StepResult, optional
@@ -304,7 +316,7 @@ def identify(
     late = _delay(delay)
     held = _held(initial, fixed, free, bounds)
     searched = {name for name, _, _ in kind.parameters} - set(held)
-    searched &= {"a1", "a2", "b1", "alpha", "beta", "gamma"}
+    searched &= HYSTERESIS
     remarks.refuse(data, searches_hysteresis=bool(searched))
     full = data.full
     with ProgressBar(progress) as bar:

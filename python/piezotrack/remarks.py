@@ -68,7 +68,7 @@ def refuse(data: Dataset, *, searches_hysteresis: bool) -> None:
         raise DataError(
             f"the drive never reverses: it goes from {whole.u[0]:.4g} to {whole.u[-1]:.4g} "
             f"{data.drive_unit} and never back, where hysteresis does not show; record a drive "
-            "that goes up and down, or hold a1, a2, b1 with fixed="
+            "that goes up and down, or hold the parameters of the hysteresis with fixed="
         )
 
 
@@ -180,6 +180,8 @@ def _steps(u: Array) -> bool:
 
 def _units(data: Dataset) -> list[str]:
     """Remark on voltages, strokes and gains that only a mistaken unit explains."""
+    if data.drive_unit == "N":
+        return []
     most, swing, stroke = float(np.abs(data.u).max()), float(np.ptp(data.u)), data.stroke
     gain = stroke / swing
     if most > TOO_MANY_VOLTS:
