@@ -4,6 +4,8 @@ Noel and Schoukens 2016, doi 10.4121/12967592: a multisine of 5 to 150 Hz and 50
 15 kHz and handed out at 750 Hz; noise of 7 um rms is added here. Run as
 
     python python/examples/bouc_wen_benchmark.py
+
+It writes what it finds to oscillator.json.
 """
 
 from __future__ import annotations
@@ -65,6 +67,7 @@ def main() -> None:
     began = time.perf_counter()
     fit = pt.identify(log, "bouc-wen-oscillator", fixed={"beta": true.beta}, seed=1)
     spent = time.perf_counter() - began
+    fit.save("oscillator.json")
     print(
         f"identified in {spent:.0f} s, {fit.agreeing} of {len(fit.runs)} runs agree, "
         f"{fit.cost_um:.2f} um rms remain"

@@ -4,7 +4,7 @@ Prints where the displacement is lowest in some of the cycles, and draws the loo
 
     python python/examples/hundred_cycles.py docs
 
-writes drift.png there.
+writes drift.png there, or here where no folder is given.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def drive(cycles: int) -> np.ndarray:
     return 37.5 * (1 - np.cos(2 * np.pi * 0.25 * t))
 
 
-def main(folder: Path | None) -> None:
+def main(folder: Path) -> None:
     """Simulate both, print and draw."""
     u = drive(CYCLES)
     figure, axes = plt.subplots(1, 3, figsize=(11, 3.6), layout="constrained")
@@ -66,10 +66,9 @@ def main(folder: Path | None) -> None:
         )
     axes[2].set(title="creep of the loop", xlabel="cycle", ylabel="lowest, from cycle 2 on [um]")
     axes[2].legend(frameon=False, fontsize="small")
-    if folder is not None:
-        figure.savefig(folder / "drift.png", dpi=110)
+    figure.savefig(folder / "drift.png", dpi=110)
 
 
 if __name__ == "__main__":
     mpl.use("Agg")
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else None)
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "."))
