@@ -1,4 +1,4 @@
-"""Stages with their hysteresis at the input as the stage that is led and checked."""
+"""Stages beside Dahl's as the stage that is led and checked."""
 
 from __future__ import annotations
 
@@ -27,8 +27,17 @@ PLAYS = pt.PrandtlIshlinskiiStage(
     corners=(20e-6, 50e-6),
     bends=(0.08, -0.05),
 )
+FRICTION = pt.FirstOrderDahlStage(
+    mass=0.1828,
+    damping=100.0,
+    stiffness=26065.0,
+    piezo_coefficient=0.0468,
+    rest_stiffness=9e3,
+    coulomb_force=0.15,
+)
 STAGES: dict[str, Led] = {
     "bouc-wen": BOUC_WEN,
+    "first-order dahl": FRICTION,
     "plays": PLAYS,
     "plays with a lag": replace(PLAYS, time_constant=5e-3),
     "plays with a mode": replace(PLAYS, frequency=160.0, damping_ratio=0.5),
@@ -80,7 +89,7 @@ def test_a_static_stage_under_its_own_inverse_is_one_sample_late_and_no_more() -
         assert np.abs(run.measured[1:] - run.desired[:-1]).max() < 1e-18
 
 
-@pytest.mark.parametrize("name", ["bouc-wen", "plays with a mode"])
+@pytest.mark.parametrize("name", ["bouc-wen", "first-order dahl", "plays with a mode"])
 def test_mechanics_under_their_own_inverse_are_half_a_sample_late(name: str) -> None:
     """As Dahl's: the held voltage is half an interval behind the one that is wanted."""
     fastest = math.pi * 0.5 * 60e-6
@@ -166,6 +175,14 @@ def test_a_bouc_wen_loop_over_a_wide_range_has_the_slopes_of_the_paper() -> None
     low, _, high = gains(BOUC_WEN, (-500.0, 500.0))
     assert low == pytest.approx(d * (1.0 - 2.0 * alpha * beta / (beta + gamma)), rel=1e-6)
     assert high == pytest.approx(d, rel=1e-6)
+
+
+def test_a_loop_with_friction_is_stiffest_just_after_a_reversal() -> None:
+    """There the friction adds twice its rest stiffness, and at the Coulomb force none."""
+    low, middle, high = gains(FRICTION)
+    assert low == pytest.approx(0.0468 / (26065.0 + 2.0 * 9e3), rel=0.02)
+    assert high == pytest.approx(0.0468 / 26065.0, rel=0.02)
+    assert middle == pytest.approx(0.0468 / (26065.0 + 2.0 * 0.15 / 130e-6), rel=0.02)
 
 
 def test_gains_of_a_stage_that_pulls_are_negative() -> None:

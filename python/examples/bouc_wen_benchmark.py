@@ -63,7 +63,7 @@ def main() -> None:
     log = pt.Dataset(u=u[:: FINE // COARSE], y=y, dt=1 / COARSE, drive_unit="N")
     # The first period is warm-up. At 750 Hz a line from sample to sample falls short of the
     # drive by 0.7 % at the resonance: the record is interpolated.
-    log = log[SAMPLES / COARSE :].interpolate(3)
+    log = log[SAMPLES / COARSE :].interpolate(2)
     began = time.perf_counter()
     fit = pt.identify(log, "bouc-wen-oscillator", fixed={"beta": true.beta}, seed=1)
     spent = time.perf_counter() - began
