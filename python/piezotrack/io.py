@@ -19,8 +19,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .columns import Column, Columns
-from .dataset import Dataset, check_dt, time_fault
+from .dataset import Dataset
 from .errors import DataError, ParameterError, ShapeError
+from .samples import check_dt, time_fault
 from .units import lookup, require
 
 if TYPE_CHECKING:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .checks import check_reach, finite, in_range, not_negative, plain, positive
-from .dataset import _signal, check_dt
 from .errors import DataError, ParameterError
 from .motions import Spline, blended, extremes
+from .samples import check_dt, signal_of
 from .units import best_length_unit
 
 if TYPE_CHECKING:
@@ -299,7 +299,7 @@ class Reference:
         >>> pt.Reference.from_samples(x, 0.02, period=2.0, duration=8.0)
         Reference(samples, -10 to 10 um, 8 s)
         """
-        values = _signal("x", x)
+        values = signal_of("x", x)
         dt = check_dt(dt)
         if values.size < MIN_SAMPLES:
             raise DataError(f"x has {values.size} samples: expected at least {MIN_SAMPLES}")
