@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from .control import Command, Controller, Session
     from .cross_talk import CrossTalk, identify_cross_talk
     from .dataset import Dataset
+    from .driven import FeedbackState
     from .estimates import Estimate, Progress, Run
     from .first_order_dahl import FirstOrderDahlStage
     from .identification import Identification, identify
     from .identified import Score
     from .inverse import Inverse, InverseSession
     from .io import read, read_drive
-    from .kinked import FeedbackState
     from .laws import LowPass, Notch, Pid, Repetitive, StateSpace
     from .loopcheck import LoopCheck, LoopReport, LoopResponse, check_loop
     from .modelfile import IdentifiedModel, load
@@ -181,7 +181,7 @@ _HOMES = {
         "BoucWenState",
     ),
     "first_order_dahl": ("FirstOrderDahlStage",),
-    "kinked": ("FeedbackState",),
+    "driven": ("FeedbackState",),
     "oscillator": ("BoucWenOscillator",),
     "playsfit": (
         "PlaysIdentification",

@@ -30,7 +30,6 @@ __all__ = [
     "as_number",
     "as_truth",
     "bouc_wen_benchmark",
-    "bouc_wen_simulate",
     "bouc_wen_xu_li_2010",
     "check_loop",
     "circle_errors",
@@ -42,7 +41,6 @@ __all__ = [
     "feedforward",
     "identify",
     "identify_plays",
-    "kinked_simulate",
     "loop_response",
     "nnls",
     "path_errors",
@@ -52,6 +50,7 @@ __all__ = [
     "sensor_noise",
     "spread",
     "stage_check",
+    "stage_simulate",
     "track_model",
     "tracking_metrics",
     "turns",
@@ -176,17 +175,9 @@ class Search:
     def sensitivities(self) -> list[tuple[int, float, bool]]: ...
 
 def bouc_wen_xu_li_2010(corrected: bool) -> list[float]: ...
-def bouc_wen_simulate(
-    theta: tuple[float, ...],
-    u: ArrayLike,
-    dt: float,
-    hold: str,
-    initial: tuple[float, ...],
-    accuracy: float,
-) -> Trajectory: ...
 def stage_check(model: str, theta: tuple[float, ...]) -> None: ...
 def bouc_wen_benchmark() -> list[float]: ...
-def kinked_simulate(
+def stage_simulate(
     model: str,
     theta: tuple[float, ...],
     u: ArrayLike,

@@ -3,18 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
-import numpy as np
 
 from . import _core
-from .lumped import LumpedStage
-from .models import Response
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from .dataset import Hold
+from .driven import DrivenStage
 
 __all__ = ["BoucWenStage", "BoucWenState"]
 
@@ -47,7 +38,7 @@ class BoucWenState:
 
 
 @dataclass(frozen=True, kw_only=True)
-class BoucWenStage(LumpedStage):
+class BoucWenStage(DrivenStage[BoucWenState]):
     r"""A stage with Bouc-Wen hysteresis at its input.
 
     .. math::
@@ -111,6 +102,7 @@ class BoucWenStage(LumpedStage):
 
     _parameters = _core.BOUC_WEN_PARAMETERS
     _kind = "bouc-wen"
+    _state = BoucWenState
 
     @classmethod
     def xu_li_2010(cls) -> BoucWenStage:
@@ -146,74 +138,3 @@ class BoucWenStage(LumpedStage):
     def _published(cls, *, corrected: bool) -> BoucWenStage:
         values = _core.bouc_wen_xu_li_2010(corrected)
         return cls(**dict(zip(cls.parameter_names(), values, strict=True)))
-
-    def simulate(
-        self,
-        u: ArrayLike,
-        dt: float,
-        *,
-        hold: Hold = "foh",
-        initial: BoucWenState | None = None,
-        accuracy: float = 1e-10,
-    ) -> Response:
-        """Displacement under a sampled drive.
-
-        The linear part is exact, the hysteresis is exact in the drive, and the force between
-        two steps is the cubic through its values and slopes. The number of steps in a sampling
-        interval is doubled until no sample moves by more than `accuracy`.
-
-        Parameters
-        ----------
-        u : array_like, shape (n,)
-            Drive [V].
-        dt : float
-            Sampling interval [s].
-        hold : {"foh", "zoh"}, optional
-            Between two samples the drive goes straight from one to the next (``"foh"``), or
-            stays where it is until the next (``"zoh"``).
-        initial : BoucWenState, optional
-            State at the first sample; where it is not given, at rest at 0 V, from where the
-            drive jumps to its first sample.
-        accuracy : float, optional
-            Largest error of the displacement [m] that is accepted.
-
-        Returns
-        -------
-        Response
-            Motion at the n samples; its `hysteresis` is the force k h, its `final` a
-            `BoucWenState`.
-
-        Raises
-        ------
-        ParameterError
-            `dt` or `accuracy` is not above 0, or `hold` is unknown.
-        ShapeError, DataError
-            `u` is not one-dimensional, is empty, or holds NaN or infinity.
-        NumericalError
-            The motion does not stay finite, or the accuracy is out of reach.
-
-        Examples
-        --------
-        >>> import piezotrack as pt
-        >>> stage = pt.BoucWenStage.xu_li_2010_corrected()
-        >>> u = [0.0, 10.0, 20.0, 10.0, 0.0]
-        >>> whole = stage.simulate(u, 0.02)
-        >>> first = stage.simulate(u[:3], 0.02)
-        >>> second = stage.simulate(u[2:], 0.02, initial=first.final)
-        >>> bool(abs(second.x[-1] - whole.x[-1]) < 1e-10)
-        True
-        """
-        start = BoucWenState() if initial is None else initial
-        dt = _core.as_number("dt", dt)
-        accuracy = _core.as_number("accuracy", accuracy)
-        run = _core.bouc_wen_simulate(self.theta, u, dt, hold, start.values, accuracy)
-        return Response(
-            t=np.arange(run.x.size, dtype=np.float64) * dt,
-            u=np.array(u, dtype=np.float64),
-            x=run.x,
-            v=run.v,
-            hysteresis=run.hysteresis,
-            final=BoucWenState(**dict(zip(("x", "v", "u", "h"), run.last, strict=True))),
-            substeps=run.substeps,
-            difference=run.difference,
-        )

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from . import _core
-from .kinked import KinkedStage
+from .driven import DrivenStage, FeedbackState
 
 __all__ = ["FirstOrderDahlStage"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class FirstOrderDahlStage(KinkedStage):
+class FirstOrderDahlStage(DrivenStage[FeedbackState]):
     r"""A stage with first-order Dahl friction in feedback on its displacement.
 
     .. math::
@@ -66,6 +66,7 @@ class FirstOrderDahlStage(KinkedStage):
     """
 
     _kind = "first-order-dahl"
+    _state = FeedbackState
     _parameters = _core.FIRST_ORDER_DAHL_PARAMETERS
 
     mass: float

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from . import _core
-from .kinked import KinkedStage
+from .driven import DrivenStage, FeedbackState
 
 __all__ = ["BoucWenOscillator"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class BoucWenOscillator(KinkedStage):
+class BoucWenOscillator(DrivenStage[FeedbackState]):
     r"""A mass on a spring with Bouc-Wen hysteresis, driven by a force.
 
     .. math::
@@ -62,6 +62,7 @@ class BoucWenOscillator(KinkedStage):
     """
 
     _kind = "bouc-wen-oscillator"
+    _state = FeedbackState
     _parameters = _core.BOUC_WEN_OSCILLATOR_PARAMETERS
 
     mass: float

@@ -34,10 +34,9 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(dahl_simulate, module)?)?;
     module.add_function(wrap_pyfunction!(dahl_simulate_fixed, module)?)?;
     module.add_function(wrap_pyfunction!(bouc_wen_xu_li_2010, module)?)?;
-    module.add_function(wrap_pyfunction!(bouc_wen_simulate, module)?)?;
     module.add_function(wrap_pyfunction!(stage_check, module)?)?;
     module.add_function(wrap_pyfunction!(bouc_wen_benchmark, module)?)?;
-    module.add_function(wrap_pyfunction!(kinked_simulate, module)?)
+    module.add_function(wrap_pyfunction!(stage_simulate, module)?)
 }
 
 /// Name, symbol and unit of each.
@@ -237,24 +236,6 @@ fn bouc_wen_xu_li_2010(corrected: bool) -> [f64; 8] {
     [mass, damping, stiffness, piezo, alpha, beta, gamma, exponent]
 }
 
-/// Simulates a Bouc-Wen stage to an accuracy, choosing the sub-steps.
-#[pyfunction]
-#[pyo3(signature = (theta, u, dt, hold, initial, accuracy))]
-fn bouc_wen_simulate(
-    py: Python<'_>,
-    theta: [f64; 8],
-    u: &Bound<'_, PyAny>,
-    dt: f64,
-    hold: &str,
-    initial: State,
-    accuracy: f64,
-) -> PyResult<PyTrajectory> {
-    let (x, v, input, h) = initial;
-    driven(py, u, dt, hold, |drive, stop| {
-        BoucWenStage::from_theta(&theta)?.simulate(drive, [x, v, input, h], accuracy, stop)
-    })
-}
-
 /// Raises where the values make no stage of the model.
 #[pyfunction]
 #[expect(clippy::needless_pass_by_value, reason = "extracted from a tuple")]
@@ -274,33 +255,39 @@ fn bouc_wen_benchmark() -> [f64; 8] {
     leading(&BoucWenOscillator::benchmark().parameters())
 }
 
-/// Simulates a stage whose hysteresis has kinks at reversals, from displacement, velocity and
-/// hysteresis force.
+/// Simulates a stage of a model, by its name, from a state: displacement, velocity and what the
+/// hysteresis remembers.
 #[pyfunction]
 #[pyo3(signature = (model, theta, u, dt, hold, initial, accuracy))]
 #[expect(clippy::too_many_arguments, reason = "called from one place")]
 #[expect(clippy::needless_pass_by_value, reason = "extracted from a tuple")]
-fn kinked_simulate(
+fn stage_simulate(
     py: Python<'_>,
     model: &str,
     theta: Vec<f64>,
     u: &Bound<'_, PyAny>,
     dt: f64,
     hold: &str,
-    initial: [f64; 3],
+    initial: Vec<f64>,
     accuracy: f64,
 ) -> PyResult<PyTrajectory> {
     driven(py, u, dt, hold, |drive, stop| match Model::named(model)? {
+        Model::BoucWen => {
+            let stage = BoucWenStage::from_theta(&leading(&theta))?;
+            let run = stage.simulate(drive, leading(&initial), accuracy, stop)?;
+            Ok(run.map(PyTrajectory::from))
+        }
         Model::FirstOrderDahl => {
             let stage = FirstOrderDahlStage::from_theta(&leading(&theta))?;
-            stage.simulate(drive, initial, accuracy, stop)
+            let run = stage.simulate(drive, leading(&initial), accuracy, stop)?;
+            Ok(run.map(PyTrajectory::from))
         }
         Model::BoucWenOscillator => {
             let oscillator = BoucWenOscillator::from_theta(&leading(&theta))?;
-            oscillator.simulate(drive, initial, accuracy, stop)
+            let run = oscillator.simulate(drive, leading(&initial), accuracy, stop)?;
+            Ok(run.map(PyTrajectory::from))
         }
-        Model::Dahl | Model::BoucWen => {
-            Err(Error::parameter("model", model, "one with kinks in feedback"))
-        }
+        // Other methods than one are offered for it.
+        Model::Dahl => Err(Error::parameter("model", "'dahl'", "dahl_simulate for it")),
     })
 }

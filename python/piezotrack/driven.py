@@ -1,9 +1,9 @@
-"""What stages with hysteresis in feedback that kinks at reversals have in common."""
+"""What stages have in common that the core simulates from their kind and a state."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 
@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 
     from .dataset import Hold
 
-__all__ = ["FeedbackState", "KinkedStage"]
+__all__ = ["DrivenStage", "FeedbackState"]
+
+State = TypeVar("State")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,8 +46,10 @@ class FeedbackState:
         return self.x, self.v, self.force
 
 
-class KinkedStage(LumpedStage):
-    """Base of such stages."""
+class DrivenStage(LumpedStage, Generic[State]):
+    """Base of such stages. A subclass says what a state of it is."""
+
+    _state: ClassVar[type[Any]]
 
     def simulate(
         self,
@@ -53,14 +57,15 @@ class KinkedStage(LumpedStage):
         dt: float,
         *,
         hold: Hold = "foh",
-        initial: FeedbackState | None = None,
+        initial: State | None = None,
         accuracy: float = 1e-10,
     ) -> Response:
         """Displacement under a sampled drive.
 
-        The linear part is exact, the hysteresis is exact in the displacement, and the two are
-        coupled by a predictor and a corrector that locate reversals. The number of steps in a
-        sampling interval is doubled until no sample moves by more than `accuracy`.
+        The linear part is exact, the hysteresis is exact along its input, and the force between
+        two steps is the cubic through its values and slopes; where the displacement leads the
+        hysteresis, a predictor and a corrector find them. The number of steps in a sampling
+        interval is doubled until no sample moves by more than `accuracy`.
 
         Parameters
         ----------
@@ -71,15 +76,17 @@ class KinkedStage(LumpedStage):
         hold : {"foh", "zoh"}, optional
             Between two samples the drive goes straight from one to the next (``"foh"``), or
             stays where it is until the next (``"zoh"``).
-        initial : FeedbackState, optional
-            State at the first sample; at rest where it is not given.
+        initial : FeedbackState or BoucWenState, optional
+            State at the first sample. Where it is not given, at rest; a `BoucWenStage` at 0 V,
+            from where the drive jumps to its first sample.
         accuracy : float, optional
             Largest error of the displacement [m] that is accepted.
 
         Returns
         -------
         Response
-            Motion at the n samples; its `final` is a `FeedbackState`.
+            Motion at the n samples; its `hysteresis` is a force, k h of a `BoucWenStage`, and its
+            `final` a state to carry on from.
 
         Raises
         ------
@@ -101,20 +108,20 @@ class KinkedStage(LumpedStage):
         >>> bool(abs(second.x[-1] - whole.x[-1]) < 1e-10)
         True
         """
-        start = FeedbackState() if initial is None else initial
-        if not isinstance(start, FeedbackState):
-            raise ParameterError(f"initial is {start!r}: expected a pt.FeedbackState")
+        start: Any = self._state() if initial is None else initial
+        if not isinstance(start, self._state):
+            raise ParameterError(f"initial is {start!r}: expected a pt.{self._state.__name__}")
         dt = _core.as_number("dt", dt)
         accuracy = _core.as_number("accuracy", accuracy)
-        run = _core.kinked_simulate(self._kind, self.theta, u, dt, hold, start.values, accuracy)
-        x, v, force, _ = run.last
+        run = _core.stage_simulate(self._kind, self.theta, u, dt, hold, start.values, accuracy)
+        names = [field.name for field in fields(self._state)]
         return Response(
             t=np.arange(run.x.size, dtype=np.float64) * dt,
             u=np.array(u, dtype=np.float64),
             x=run.x,
             v=run.v,
             hysteresis=run.hysteresis,
-            final=FeedbackState(x=x, v=v, force=force),
+            final=self._state(**dict(zip(names, run.last, strict=False))),
             substeps=run.substeps,
             difference=run.difference,
         )
