@@ -6,7 +6,6 @@ import json
 import pickle
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
@@ -16,6 +15,8 @@ import pytest
 import piezotrack as pt
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import NDArray
 
 STAGE = pt.PrandtlIshlinskiiStage(
