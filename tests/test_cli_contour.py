@@ -129,3 +129,15 @@ def test_what_cannot_be_done_is_refused_in_one_sentence() -> None:
     Path("short.csv").write_text("\n".join(lines), encoding="utf-8")
     assert "short.csv: record has 39 samples: expected 100" in refusal("noise", "short.csv")
     assert not Path("results").exists()
+
+
+def test_a_path_of_two_columns_needs_an_interval() -> None:
+    t = np.arange(201) / 20.0
+    rows = np.column_stack([50.0 + 10.0 * np.cos(t), 50.0 + 10.0 * np.sin(t)])
+    np.savetxt("path.csv", rows, delimiter=",", header="x_um,y_um", comments="", fmt="%.4f")
+    words = refusal("contour", "dahl.json", "--path", "path.csv")
+    assert words.startswith("path.csv:1: no column is known to be the time: expected time_s")
+    assert "--path-dt" in words
+    printed = ran("contour", "dahl.json", "--path", "path.csv", "--path-dt", "0.05")
+    assert "XYReference(path.csv, 40 to 60 by 40 to 60 um, 10 s)" in printed
+    assert "expected none" in refusal("contour", "--path", "circle:1Hz,10um", "--path-dt", "0.05")

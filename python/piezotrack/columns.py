@@ -147,7 +147,8 @@ class Columns(list[Column]):
         if found:
             several = f"several columns could be the {role}: {_titles(found)}"
             raise DataError(f"{several}; choose one with {role}=")
-        nothing = f"no column is known to be the {role}: name it with {role}="
+        instead = ", or give the sampling interval with dt=" if role == "time" else ""
+        nothing = f"no column is known to be the {role}: name it with {role}={instead}"
         raise DataError(f"{nothing}; the columns are {_titles(self)}")
 
 

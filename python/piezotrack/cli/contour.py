@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import ParameterError
+from ..errors import DataError, ParameterError
 from .options import ControlInterval, Duration, Out, Period, can_be_folder, list_files, number_range
 from .words import in_words
 
@@ -66,6 +66,9 @@ def contour_command(
     delay: Annotated[float, typer.Option(help="Delay in the loops in s, besides the hold.")] = 0.0,
     duration: Duration = None,
     period: Period = None,
+    path_dt: Annotated[
+        float | None, typer.Option(help="Sampling interval in s of a path file without times.")
+    ] = None,
     seed: Annotated[int, typer.Option(help="Of the sensors' noise.")] = 1,
     beyond_reach: Annotated[
         bool, typer.Option("--beyond-reach", help="Let the path leave the stage's reach.")
@@ -83,11 +86,12 @@ def contour_command(
     if table_2 == (path is not None):
         given = "both are" if table_2 else "neither is"
         raise ParameterError(f"--path and --table-2: expected one of them, {given} given")
-    if table_2 and (duration or period or beyond_reach or unstable):
+    if table_2 and (duration or period or path_dt or beyond_reach or unstable):
         raise ParameterError(
-            "--duration, --period, --beyond-reach, --unstable: expected none with --table-2"
+            "--duration, --period, --path-dt, --beyond-reach, --unstable: expected none with "
+            "--table-2"
         )
-    course = None if path is None else _path(path, duration, period)
+    course = None if path is None else _path(path, duration, period, path_dt)
     stage = _stage(seed, lag, cross_talk)
     can_be_folder(out)
     inverse, how = _inverse(model, seed) if feedforward else (None, "no feedforward")
@@ -116,15 +120,21 @@ def contour_command(
     list_files(written)
 
 
-def _path(text: str, duration: float | None, period: float | None) -> XYReference:
+def _path(text: str, duration: float | None, period: float | None, dt: float | None) -> XYReference:
     """Read a file where the text names one, else a description."""
     from ..path_text import parse_path
     from ..xyreference import read_path
 
     if Path(text).is_file():
-        return read_path(text, duration=duration, period=period)
-    if period is not None:
-        raise ParameterError(f"--period is for a path from a file: expected none with {text}")
+        try:
+            return read_path(text, duration=duration, period=period, dt=dt)
+        except DataError as error:
+            # --time and --dt are not about the path here.
+            words = str(error).replace("name it with time=, or give the", "expected time_s, or the")
+            raise DataError(words.replace("interval with dt=", "interval with --path-dt")) from None
+    for option, value in (("--period", period), ("--path-dt", dt)):
+        if value is not None:
+            raise ParameterError(f"{option} is for a path from a file: expected none with {text}")
     return parse_path(text, duration=duration)
 
 
