@@ -35,6 +35,10 @@ if TYPE_CHECKING:
 __all__ = ["Contour", "contour"]
 
 
+# A start so far from the stage, as a part of the path's size, is worth a note.
+JUMP = 0.05
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Contour:
     """A path that was run.
@@ -118,6 +122,18 @@ class Contour:
 
         return plot_contour(self)
 
+    @property
+    def notes(self) -> list[str]:
+        """What a careful reader should know of the run."""
+        jump = float(np.hypot(self.x.error[0], self.y.error[0]))
+        reach = max(float(np.ptp(axis.desired)) for axis in (self.x, self.y))
+        if jump <= JUMP * reach:
+            return []
+        return [
+            f"the path begins {1e6 * jump:.3g} um from where the stage is, which has to jump "
+            "there: let it begin at home, (0, 0), or give it a smooth start"
+        ]
+
     def summary(self) -> str:
         """Table of the run: contour error, and each axis.
 
@@ -130,6 +146,7 @@ class Contour:
         return "\n".join(
             [
                 f"{self.path!r} at {1.0 / self.x.controller.dt:g} Hz; {self.x.note}",
+                *(f"note  {note}" for note in self.notes),
                 f"contour error {since}, signed, positive to the left of the path",
                 f"  measured: {_words(self.metrics)}",
                 f"  true, between the samples too: {_words(self.score(true=True))}",
