@@ -386,3 +386,16 @@ def test_on_the_measured_log_plays_are_best() -> None:
     assert comparison.best is plays
     # Even there neighbours are alike, so the criteria are to be read with care.
     assert plays.autocorrelation > 0.5
+
+
+def test_a_record_that_is_a_part_of_what_was_fitted_does_not_judge() -> None:
+    with pytest.raises(pt.ParameterError, match="expected windows that do not overlap"):
+        pt.compare(log(), ["prandtl-ishlinskii"], train=(1.0, 3.0), test=log()[2.0:4.0])
+
+
+def test_a_model_that_was_fitted_on_what_judges_it_is_remarked_upon() -> None:
+    named = pt.Dataset(u=log().full.u, y=log().full.y, dt=log().dt, source="log.csv")
+    fit = pt.identify(named[1.0:6.0], "prandtl-ishlinskii")
+    found = pt.compare(named, [fit, "prandtl-ishlinskii"], train=(1.0, 3.0), test=(4.0, 7.0))
+    assert len(found.notes) == 1
+    assert "was fitted on 1 to 5.9" in found.summary()

@@ -453,3 +453,22 @@ def test_refuses(name: str) -> None:
     call, message = BAD[name]
     with pytest.raises(pt.PiezotrackError, match=message):
         call()
+
+
+def test_the_way_home_is_not_scored() -> None:
+    """On a repeated path of one period only what comes after the smooth start counts."""
+    circle = pt.circle(frequency=0.2, radius=20e-6, duration=3.5)
+    stage = pt.XYStage.xu_li_2010(seed=1)
+    loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+    run = pt.contour(stage, (loop, loop), circle)
+    assert run.settled == pytest.approx(2.0)
+    assert run.metrics.peak_to_peak < 5e-6
+
+
+def test_a_record_that_moves_is_not_at_rest() -> None:
+    t = np.arange(5000) / 1000.0
+    u = 10.0 * np.sin(2 * np.pi * t)
+    with pytest.raises(pt.DataError, match="the displacement follows the drive"):
+        pt.identify_noise(pt.Dataset(u=u, y=1e-6 * u, t=t))
+    with pytest.raises(pt.ParameterError, match="expected at most 10000"):
+        pt.spiral(frequency=0.5, radius=20e-6, pitch=1e-12)

@@ -343,3 +343,11 @@ def test_interpolated_records() -> None:
         log.interpolate(1)
     with pytest.raises(pt.ParameterError, match="hold is 'zoh'"):
         pt.Dataset(u=t, y=t, dt=0.01, hold="zoh").interpolate(2)
+
+
+@pytest.mark.parametrize(("scale", "accuracy"), [(1e300, 1e-10), (1.0, 1e-30)])
+def test_what_cannot_be_computed_is_refused_soon(scale: float, accuracy: float) -> None:
+    """A drive and an accuracy that no steps lead to."""
+    u = scale * slow_drive(4000, 1e-3)
+    with pytest.raises(pt.NumericalError, match=r"accuracy .* is out of reach: \d+ sub-steps"):
+        FRICTION.simulate(u, 1e-3, accuracy=accuracy)

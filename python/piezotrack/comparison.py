@@ -8,6 +8,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
 from . import _core
 from .dataset import Dataset
 from .documents import provenance, write_document
@@ -18,7 +20,6 @@ from .kinds import KINDS, Kind, kind_of
 from .modelfile import load
 
 if TYPE_CHECKING:
-    import numpy as np
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
@@ -101,6 +102,17 @@ class Comparison:
     def fits(self) -> dict[str, Identified[Any]]:
         """The models by name."""
         return {row.name: row.fit for row in self.rows}
+
+    @property
+    def notes(self) -> list[str]:
+        """What a careful reader should know: models that were fitted to what judges them."""
+        seen = ((row, row.fit.window_on(self.test)) for row in self.rows)
+        return [
+            f"{row.title} was fitted on {window[0]:.6g} to {window[1]:.6g} s of "
+            f"{self.test.source}, a part of what judges it here"
+            for row, window in seen
+            if window is not None
+        ]
 
     def followed(self, row: Compared, part: Literal["train", "test"]) -> Array:
         """Displacement of a model on one of the two parts.
@@ -341,7 +353,9 @@ def _parts(log: Dataset, train: object, test: object) -> tuple[Dataset, Dataset,
     """Give the parts to fit and to judge on, and whether the second goes on in the same record."""
     first = _bounds("train", train)
     if isinstance(test, Dataset):
-        return _windowed("train", log, first), test, False
+        one = _windowed("train", log, first)
+        _check_apart(one, test)
+        return one, test, False
     second = _bounds("test", test)
     if train is None and test is None:
         middle = float(log.t[len(log) // 2])
@@ -361,12 +375,20 @@ def _parts(log: Dataset, train: object, test: object) -> tuple[Dataset, Dataset,
             )
         second = (first[1], None)
     one, two = _windowed("train", log, first), _windowed("test", log, second)
-    if two.warmup < one.warmup + len(one) and one.warmup < two.warmup + len(two):
-        raise ParameterError(
-            f"test goes from {two.t[0]:.6g} to {two.t[-1]:.6g} s and train from {one.t[0]:.6g} to "
-            f"{one.t[-1]:.6g} s: expected windows that do not overlap"
-        )
+    _check_apart(one, two)
     return one, two, True
+
+
+def _check_apart(one: Dataset, two: Dataset) -> None:
+    """Refuse two windows that share a part of one record."""
+    begin, end = max(one.t[0], two.t[0]), min(one.t[-1], two.t[-1])
+    shared = [(part.t >= begin) & (part.t <= end) for part in (one, two)]
+    if not shared[0].any() or not np.array_equal(one.y[shared[0]], two.y[shared[1]]):
+        return
+    raise ParameterError(
+        f"test goes from {two.t[0]:.6g} to {two.t[-1]:.6g} s and train from {one.t[0]:.6g} to "
+        f"{one.t[-1]:.6g} s: expected windows that do not overlap"
+    )
 
 
 def _bounds(name: str, window: object) -> Window:

@@ -66,8 +66,14 @@ class Contour:
 
     @property
     def settled(self) -> float:
-        """Time from which on `metrics` counts [s], as for `Tracking`."""
-        return self.x.settled
+        """Time from which on `metrics` counts [s].
+
+        As for `Tracking`, but never before the path itself has begun: on the smooth way to it
+        there is no path to be compared with.
+        """
+        ramp = max(self.path.x.ramp, self.path.y.ramp)
+        late = ramp if ramp < self.t[-1] - 1e-9 else 0.0
+        return max(self.x.settled, late)
 
     @cached_property
     def error(self) -> Array:
@@ -108,7 +114,8 @@ class Contour:
             There are less than two samples in it.
         """
         t, errors = (self.x.fine_t, self.fine_error) if true else (self.t, self.error)
-        return Spread.of(_core.spread(errors[self.x.part(t, start, stop)]))
+        first = self.settled if start is None else start
+        return Spread.of(_core.spread(errors[self.x.part(t, first, stop)]))
 
     def plot(self) -> Figure:
         """Path and positions, the error magnified along the path, and the errors over time.

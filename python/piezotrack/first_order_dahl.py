@@ -48,8 +48,8 @@ class FirstOrderDahlStage(DrivenStage[FeedbackState]):
     Notes
     -----
     The force stays within the Coulomb force and dissipates; under a periodic drive its loops
-    close after the first cycle or two. The second-order form of Xu and Li 2010, `DahlStage`,
-    does neither: docs/drift.md shows the two over a hundred cycles.
+    close after a few cycles. The second-order form of Xu and Li 2010, `DahlStage`, does neither:
+    docs/feedback.md shows the two over a hundred cycles.
 
     Examples
     --------

@@ -133,6 +133,25 @@ class Identified(Generic[R]):
         """
         return self._record.get("sha256") == data.sha256
 
+    def window_on(self, data: Dataset) -> tuple[float, float] | None:
+        """Tell which seconds of a record were fitted, as far as its name tells.
+
+        Parameters
+        ----------
+        data : Dataset
+            The record.
+
+        Returns
+        -------
+        (float, float) or None
+            The window [s] where `data` has a part of it; None where not.
+        """
+        window = self._record.get("window_s")
+        same = data.source is not None and self._record.get("source") == data.source
+        if not same or not window or window[0] > data.t[-1] or window[1] < data.t[0]:
+            return None
+        return float(window[0]), float(window[1])
+
     def inverse(
         self, *, playback: Literal["table", "online"] = "table", settle: int = 1
     ) -> Inverse:

@@ -10,7 +10,7 @@ import numpy as np
 
 from . import _core
 from .dataset import Dataset
-from .errors import ParameterError
+from .errors import DataError, ParameterError
 from .tracking import Spread
 
 if TYPE_CHECKING:
@@ -22,6 +22,11 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 __all__ = ["Noise", "identify_noise"]
+
+# Displacement and drive this alike are no noise.
+FOLLOWS = 0.5
+# Turns that the noise model's bandwidth must make in a record to be noise [1].
+SLOWEST = 10.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -125,6 +130,16 @@ class Noise:
         power = 2.0 * dt * (self.noise**2 * shape + self.resolution**2 / 12.0)
         return np.asarray(np.sqrt(power))
 
+    @property
+    def notes(self) -> list[str]:
+        """What a careful reader should know before using the figures."""
+        if self.bandwidth_sd is None or self.bandwidth * self.data.duration >= SLOWEST:
+            return []
+        return [
+            f"what moves here is slower than noise, {self.bandwidth:.3g} Hz in a record of "
+            f"{self.data.duration:.4g} s: was the stage at rest?"
+        ]
+
     def summary(self) -> str:
         """Table of the figures.
 
@@ -142,6 +157,7 @@ class Noise:
             [
                 f"at rest: {data.source or 'a record'}, {len(data)} samples, "
                 f"{data.duration:.4g} s at {1.0 / data.dt:.6g} Hz",
+                *(f"note  {note}" for note in self.notes),
                 f"rms           {1e6 * self.rms:.5g} um about the drift",
                 f"peak to peak  {1e6 * self.spread.peak_to_peak:.5g} um",
                 f"drift         {1e6 * self.drift:.4g} um over the record",
@@ -199,6 +215,14 @@ def identify_noise(log: Dataset) -> Noise:
     """
     if not isinstance(log, Dataset):
         raise ParameterError(f"log is {type(log).__name__}: expected pt.Dataset")
+    if np.ptp(log.u) > 0.0 and np.ptp(log.y) > 0.0:
+        alike = float(np.corrcoef(log.u, log.y)[0, 1])
+        if abs(alike) > FOLLOWS:
+            raise DataError(
+                f"the displacement follows the drive, which goes from {log.u.min():.4g} to "
+                f"{log.u.max():.4g} {log.drive_unit} (correlation {alike:.2f}): expected a record "
+                "of a stage at rest"
+            )
     figures, drift, resolution, levels, noise, bandwidth, sd = _core.sensor_noise(log.y, log.dt)
     return Noise(
         data=log,

@@ -26,6 +26,8 @@ __all__ = ["circle", "lissajous", "raster", "spiral"]
 MIDDLE = (58.5e-6, 58.5e-6)
 # Times that a closed path is run: the first has the start in it.
 PERIODS = 3.0
+# Most turns of a spiral.
+MOST_TURNS = 10000
 
 
 def circle(
@@ -264,6 +266,10 @@ def spiral(
     radius, pitch = _size("radius", radius), _size("pitch", pitch)
     if pitch >= radius:
         raise ParameterError(f"pitch is {pitch:g}: expected less than the radius, {radius:g} m")
+    if radius > MOST_TURNS * pitch:
+        raise ParameterError(
+            f"pitch is {pitch:g} m, for {radius / pitch:g} turns: expected at most {MOST_TURNS}"
+        )
     cx, cy = _pair("centre", centre)
     motions = (
         _Spiral(cx, pitch, frequency, 0.0),

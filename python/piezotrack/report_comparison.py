@@ -11,10 +11,11 @@ if TYPE_CHECKING:
 __all__ = ["comparison_text"]
 
 NOTES = """\
-* has the lowest rms where it was not fitted, which has the last word. K: values fitted. dAIC and
-dBIC: above the lowest, of n ln(RSS/n) + 2 (K + 1) and n ln(RSS/n) + (K + 1) ln n, for residuals
-that are independent. These are not: r1 is the correlation of one sample with the next, so n counts
-for less and both ask for too many parameters (Burnham and Anderson 2002, doi 10.1007/b97636)."""
+* has the lowest rms where it was not fitted, which has the last word. K: values fitted, - for a
+model that was given. dAIC and dBIC: above the lowest, of n ln(RSS/n) + 2 (K + 1) and n ln(RSS/n) +
+(K + 1) ln n, for residuals that are independent. These are not: r1 is the correlation of one sample
+with the next, so n counts for less and both ask for too many parameters (Burnham and Anderson 2002,
+doi 10.1007/b97636)."""
 
 
 def comparison_text(comparison: Comparison) -> str:
@@ -48,6 +49,7 @@ def comparison_text(comparison: Comparison) -> str:
     for row in rows:
         mark = "*" if row is comparison.best else " "
         lines.append(f"{mark} {row.title:<{width}}  {_figures(row, aic, bic)}")
+    lines += ["", *(f"note  {note}" for note in comparison.notes)] if comparison.notes else []
     return "\n".join([*(line.rstrip() for line in lines), "", NOTES])
 
 

@@ -11,6 +11,13 @@ use crate::mechanics::{Mechanics, halvings};
 use crate::stage::feedback::FeedbackState;
 use crate::stage::{Coupling, Kernel, Parameters};
 
+/// Share of the displacement below which no steps make it more accurate.
+const ROUNDING: f64 = 1e-16;
+
+/// Most steps of one simulation, beyond [`FEW_SUBSTEPS`] in an interval: some ten seconds.
+const MOST_STEPS: usize = 100_000_000;
+const FEW_SUBSTEPS: usize = 64;
+
 /// Memory of a kernel's step.
 pub type Memory<K> = <<K as Kernel<f64>>::Coupling as Coupling<f64>>::Memory;
 
@@ -99,7 +106,8 @@ impl<K: Kernel<f64> + Copy> Alone<'_, K> {
         stop: Stop<'_>,
     ) -> Result<Option<Motion<Memory<K>>>> {
         positive("accuracy", accuracy, "m")?;
-        let mut substeps = first_substeps(&self.mechanics(), drive.dt);
+        let limit = (MOST_STEPS / drive.u.len().max(1)).clamp(FEW_SUBSTEPS, MOST_SUBSTEPS);
+        let mut substeps = first_substeps(&self.mechanics(), drive.dt).min(limit / 2);
         let Some(mut coarse) = self.simulate_fixed(drive, start, substeps, stop)? else {
             return Ok(None);
         };
@@ -112,7 +120,8 @@ impl<K: Kernel<f64> + Copy> Alone<'_, K> {
             if fine.difference <= accuracy {
                 return Ok(Some(fine));
             }
-            if substeps >= MOST_SUBSTEPS {
+            let most = fine.x.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+            if substeps > limit / 2 || accuracy < ROUNDING * most {
                 return Err(out_of_reach(accuracy, substeps, fine.difference));
             }
             coarse = fine;

@@ -151,7 +151,8 @@ fn first_order_dahl_ranges(of: &Measures, fixed: &[Option<f64>; 9]) -> [(f64, f6
     let piezo = (soft * of.gain / 3.0, hard * of.gain * 3.0);
     [
         mass,
-        damping,
+        // The loop's width is the friction's: the damping may be far too small to show.
+        (1e-2 * damping.0, damping.1),
         stiffness,
         if of.inverted { (-piezo.1, -piezo.0) } else { piezo },
         // The way to the Coulomb force is a hundredth of the stroke or all of it.
