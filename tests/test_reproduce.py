@@ -1,0 +1,238 @@
+"""The paper, published beside obtained: observables, conclusions, the report."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import shutil
+import subprocess
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import piezotrack as pt
+from piezotrack import _core
+from piezotrack.reproduce.apparatus import Apparatus, calibration_file
+from piezotrack.reproduce.conclusions import conclusions
+from piezotrack.reproduce.observables import Observable, Obtained, observables
+
+PUBLISHED = Path(__file__).resolve().parents[2] / "shared" / "published.json"
+
+
+@cache
+def quick() -> pt.Reproduction:
+    return pt.reproduce_xu_li_2010(seeds=2)
+
+
+def by_key() -> dict[str, Observable]:
+    return {one.key: one for one in observables()}
+
+
+# Observables.
+
+
+def test_the_published_numbers_are_those_of_the_paper() -> None:
+    # Typed again from the paper, not read from the package.
+    expected = {
+        "rest.rms": 0.097e-6,
+        "step.steady": 117.7622e-6,
+        "step.peak_1": 192.5302e-6,
+        "step.period": 0.0058,
+        "forward.max": 5.69e-6,
+        "back.lag": 0.063,
+        "back.loop": 0.0624,
+        "both.loop": 0.0176,
+        "windup.without": 6.35e-6,
+        "repetitive.without": 2.29e-6,
+        "circle.20um.0.2Hz.sd": 0.480e-6,
+        "circle.40um.0.5Hz.max": 7.048e-6,
+    }
+    known = by_key()
+    for key, value in expected.items():
+        assert known[key].published == pytest.approx(value, rel=1e-12), key
+    assert known["step.zeta"].published == pytest.approx(1.5759 / (2 * 12.0806), rel=1e-4)
+
+
+def test_what_was_to_be_left_out_is() -> None:
+    for one in observables():
+        left_out = one.figure[:2] in ("13", "14") or one.key.startswith("circle.40um")
+        assert one.calibrated != left_out, one.key
+    fitted = {entry["key"] for entry in calibration_file().get("observables", [])}
+    assert fitted <= {one.key for one in observables() if one.calibrated}
+
+
+def made(kind: str, published: float, *, calibrated: bool, unit: str = "um") -> Observable:
+    return Observable(
+        key="k", figure="1", name="n", unit=unit, published=published, kind=kind,  # type: ignore[arg-type]
+        calibrated=calibrated, how="",
+    )  # fmt: skip
+
+
+def test_goals() -> None:
+    # 15 % or one step of the sensor, 30 % or two.
+    large, small = made("value", 2e-6, calibrated=True), made("value", 0.1e-6, calibrated=True)
+    assert large.agrees(2.29e-6)
+    assert not large.agrees(2.31e-6)
+    assert small.agrees(0.061e-6)
+    assert not small.agrees(0.145e-6)
+    assert made("value", 2e-6, calibrated=False).agrees(2.59e-6)
+    assert not made("value", 0.063, calibrated=True, unit="rad").agrees(0.073)
+    bound = made("bound", 1.5e-6, calibrated=False)
+    assert bound.agrees(0.2e-6)
+    assert not bound.agrees(1.51e-6)
+
+
+def test_medians_and_quartiles_of_a_hand_made_array() -> None:
+    found = Obtained(observable=made("value", 2.0, calibrated=True), values=(1.0, 5.0, 2.0, 4.0))
+    assert found.median == 3.0
+    assert found.quartiles == (1.75, 4.25)
+    assert found.ratio == 1.5
+
+
+def test_conclusions_tell_what_is_not_so() -> None:
+    seen = dict(quick().values[0])
+    seen.update({"models.dahl": 3e-6, "models.bouc-wen": 2e-6, "both.max": 1e-6})
+    seen.update({"forward.max": 5e-6, "back.max": 4e-6})
+    turned = {**seen, "models.bouc-wen": 4e-6, "both.max": 4.5e-6, "circle.20um.0.2Hz.sd": 1.0}
+    before, after = conclusions([seen]), conclusions([turned])
+    assert [one.holds for one in before][0::5] == [True, False]
+    assert [one.holds for one in after][0::5] == [False, True]
+    grows = [one for one in after if "radius" in one.text]
+    assert [one.holds for one in grows] == [False]
+
+
+# The way.
+
+
+def test_noise_and_steps_are_the_published_ones() -> None:
+    found = {one.observable.key: one for one in quick().obtained}
+    assert found["rest.rms"].median == pytest.approx(0.097e-6, rel=0.03)
+    assert found["rest.step"].median == pytest.approx(2.5e-3 / 2**16, rel=1e-6)
+
+
+def test_the_errors_are_those_of_the_samples() -> None:
+    run = quick().way.compensation["back"]
+    part = run.t >= 5.0 - 1e-9
+    e = (run.desired - run.measured)[part]
+    values = quick().values[0]
+    assert values["back.max"] == pytest.approx(np.abs(e).max(), rel=1e-12)
+    # The lag, by a Fourier sum of our own over three whole periods.
+    z = np.exp(-2j * math.pi * 0.2 * run.t[part])
+    lag = np.angle(run.desired[part] @ z) - np.angle(run.measured[part] @ z)
+    assert values["back.lag"] == pytest.approx(lag, abs=2e-4)
+    true = (run.desired - run.displacement)[part]
+    assert quick().true_values[0]["back.max"] == pytest.approx(np.abs(true).max(), rel=1e-12)
+
+
+def test_the_readings_are_those_of_a_sensor() -> None:
+    # 50 Hz, whole steps, and noise between reading and truth.
+    run = quick().way.compensation["both"]
+    assert np.allclose(np.diff(run.t), 0.02)
+    steps = run.measured / (2.5e-3 / 2**16)
+    assert np.abs(steps - np.round(steps)).max() < 1e-6
+    assert np.std(run.measured - run.displacement) == pytest.approx(0.097e-6, rel=0.1)
+
+
+def test_the_same_seeds_give_the_same_numbers() -> None:
+    again = pt.reproduce_xu_li_2010(seeds=2)
+    assert again.values == quick().values
+    assert again.values[0] != again.values[1]
+
+
+def test_an_apparatus_survives_its_file() -> None:
+    apparatus = Apparatus.calibrated()
+    assert Apparatus.of(json.loads(json.dumps(apparatus.document()))) == apparatus
+    assert apparatus.seeded(3).x.seed != apparatus.seeded(3).y.seed
+
+
+@pytest.mark.parametrize("seeds", [0, 1001])
+def test_seeds_are_refused(seeds: int) -> None:
+    with pytest.raises(pt.ParameterError, match=f"seeds is {seeds}: expected 1 to 1000"):
+        pt.reproduce_xu_li_2010(seeds=seeds)
+
+
+# The swarm that calibrates.
+
+
+def test_the_swarm_finds_the_bottom_of_a_bowl() -> None:
+    settings = pt.ParticleSwarm(particles=20, iterations=80, stall_iterations=80)
+    swarm = _core.Swarm(settings.checked(), 3, 1)
+    bottom = np.array([0.2, 0.5, 0.9])
+    while not swarm.done:
+        places = swarm.ask()
+        swarm.tell([float(np.sum((np.array(p) - bottom) ** 2)) for p in places if p is not None])
+    place, cost = swarm.best
+    assert np.allclose(place, bottom, atol=1e-3)
+    assert cost == pytest.approx(np.sum((np.array(place) - bottom) ** 2), rel=1e-9)
+
+
+def test_the_swarm_refuses_no_coordinates() -> None:
+    with pytest.raises(pt.ParameterError, match="coordinates"):
+        _core.Swarm(pt.ParticleSwarm().checked(), 0, 1)
+
+
+# The report.
+
+
+@cache
+def report(folder: Path) -> tuple[Path, ...]:
+    return tuple(quick().save(folder))
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ...]:
+    return report(tmp_path_factory.mktemp("report"))
+
+
+def test_the_page_needs_no_network(files: tuple[Path, ...]) -> None:
+    page = files[0].read_text(encoding="utf-8")
+    assert 'name="viewport"' in page
+    loads = re.findall(
+        r'(?:src|href)="(?!#)([^"]*)"', re.sub(r"<svg.*?</svg>", "", page, flags=re.S)
+    )
+    assert loads == ["https://doi.org/10.1115/1.4001712"]
+    for name in ("fig_03", "fig_04", "fig_06", "fig_07", "fig_12", "fig_13", "fig_14", "fig_15"):
+        assert f'<figure id="{name}">' in page
+    for one in observables():
+        assert one.name in page
+
+
+def test_the_json_has_every_number(files: tuple[Path, ...]) -> None:
+    document = json.loads(files[2].read_text(encoding="utf-8"))
+    entries = {entry["key"]: entry for entry in document["observables"]}
+    assert set(entries) == set(by_key())
+    lag = entries["back.lag"]
+    assert lag["published"] == 0.063
+    assert lag["median"] == pytest.approx(np.median([v["back.lag"] for v in quick().values]))
+    forward = entries["forward.max"]
+    assert forward["unit"] == "um"
+    assert forward["median"] == pytest.approx(
+        1e6 * np.median([v["forward.max"] for v in quick().values])
+    )
+
+
+def test_the_pdf_has_all_pages(files: tuple[Path, ...]) -> None:
+    data = files[1].read_bytes()
+    assert data.startswith(b"%PDF")
+    assert len(re.findall(rb"/Type /Page\b", data)) >= 10
+
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium to open the report in")
+@pytest.mark.parametrize("width", [1280, 390])
+def test_a_browser_draws_every_figure(files: tuple[Path, ...], width: int, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [str(CHROMIUM), "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr",
+         "--v=0", f"--window-size={width},900", f"--user-data-dir={tmp_path}", "--dump-dom",
+         files[0].as_uri()],
+        capture_output=True, text=True, timeout=120.0, check=True,
+    )  # fmt: skip
+    pictures = done.stdout.count('<div class="picture')
+    assert pictures >= 9
+    assert f'data-drawn="{pictures} of {pictures}"' in done.stdout
+    assert "CONSOLE" not in done.stderr
