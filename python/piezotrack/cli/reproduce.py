@@ -20,12 +20,19 @@ def reproduce_command(
         int, typer.Option(help="Seeds of the sensors' noise; the table has medians over them.")
     ] = 20,
     quick: Annotated[bool, typer.Option("--quick", help="Two seeds, for a first look.")] = False,
+    dbo: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="With training.csv and tracking.csv of the measured DBO log: the same way on it.",
+        ),
+    ] = None,
 ) -> None:
     """Go the way of Xu and Li 2010 on the virtual stage: a report as HTML, PDF and JSON."""
     from ..reproduce import reproduce_xu_li_2010
 
     can_be_folder(out)
-    found = reproduce_xu_li_2010(seeds=2 if quick else seeds)
+    found = reproduce_xu_li_2010(seeds=2 if quick else seeds, dbo=dbo)
     written = found.save(out)
     print(found.summary())
     list_files(written)

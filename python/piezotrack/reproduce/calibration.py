@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
-from ..dataset import Dataset
 from ..demo import FITTED_SECONDS, SEARCH_BOX
 from ..errors import PiezotrackError
 from ..identification import identify
@@ -127,7 +126,7 @@ def values_of(apparatus: Apparatus) -> dict[str, float]:
         A loop is unstable or runs away, or the step has no overshoot.
     """
     log = search.record(apparatus)
-    thin = Dataset(u=log.u[::THINNED], y=log.y[::THINNED], dt=THINNED * log.dt)
+    thin = search.thinned(log, THINNED)
     published = DahlStage.xu_li_2010()
     fit = identify(
         thin[:FITTED_SECONDS],

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..tracking import Tracking
+    from .measured import Drives
     from .tracked import Runs
     from .way import Way
 
@@ -29,8 +30,15 @@ class Drawn(NamedTuple):
     figure: Figure
 
 
-def drawn(way: Way) -> list[Drawn]:
+def drawn(way: Way, drives: Drives | None) -> list[Drawn]:
     """Draw all figures of the paper that show results; 5 and 8 to 11 are block diagrams."""
+    measured = [] if drives is None else [
+        Drawn(
+            *("measured", "A measured log: drive of our inverse and of its authors'"),
+            "Both less the straight line through the latter, over two periods.",
+            drives.plot(),
+        )
+    ]  # fmt: skip
     return [
         Drawn(
             *("fig_03", "Fig. 3: the sensor at rest"),
@@ -79,6 +87,7 @@ def drawn(way: Way) -> list[Drawn]:
             "Bars: published beside obtained.",
             circles.draw(way.table),
         ),
+        *measured,
     ]
 
 
@@ -114,4 +123,8 @@ def _grid(runs: Runs, names: dict[str, str], columns: tuple[str, ...]) -> Figure
                 # What counts fills the panel; the way from home is cut off.
                 reach = 1.25e6 * run.metrics.max_error
                 ax.set_ylim(-reach, reach)
+            if panel == "effort":
+                # Two lines, or it would be wider than the panel.
+                place = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "frameon": False}
+                ax.legend(ncols=2, fontsize="small", borderaxespad=0.2, **place)
     return figure

@@ -51,6 +51,7 @@ def html_text(found: Reproduction, figures: Sequence[Drawn]) -> str:
         f"<p>Of the first seed, {found.seeds[0]}. Zoom with the buttons or the wheel, drag to "
         "move. Figs. 5 and 8 to 11 are block diagrams and have nothing to reproduce.</p>",
         *(_figure(one) for one in figures),
+        *_beyond(found),
         *_stage(found),
     ]
     return (
@@ -94,6 +95,18 @@ def _conclusions(found: Reproduction) -> list[str]:
         for one in found.conclusions
     ]  # fmt: skip
     return ["<h2>Conclusions</h2>", table(("the paper says", "", "runs", "what is seen"), rows)]
+
+
+def _beyond(found: Reproduction) -> list[str]:
+    parts = ["<h2>Beyond the paper</h2>", "<p>On the same stage, with the noise of one seed.</p>"]
+    for one in found.sections:
+        rows = [[escape(cell) for cell in row] for row in one.rows]
+        parts += [
+            f"<h3>{escape(one.title)}</h3>",
+            f"<p>{escape(one.text)}</p>",
+            table(map(escape, one.heads), rows),
+        ]
+    return parts
 
 
 def _stage(found: Reproduction) -> list[str]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from .observables import SI
 
 if TYPE_CHECKING:
+    from .beyond import Section
     from .observables import Obtained
     from .reproduction import Reproduction
 
@@ -34,7 +36,22 @@ def summary_text(found: Reproduction) -> str:
     lines += ["", tally(found), "", "What the paper concludes"]
     lines += [f"  {'seen    ' if one.holds else 'NOT SEEN'}  {one.text}\n            {one.words} "
               f"({one.seen} of {one.seeds} runs)" for one in found.conclusions]  # fmt: skip
+    for part in found.sections:
+        lines += ["", part.title, *wrap(part.text, 118), *_columns(part)]
     return "\n".join(lines)
+
+
+def _columns(part: Section) -> list[str]:
+    """Write a table in columns, the first to the left."""
+    table = [part.heads, *part.rows]
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    return [
+        "  " + "  ".join(
+            cell.rjust(width) if i else cell.ljust(width)
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in table
+    ]  # fmt: skip
 
 
 def tally(found: Reproduction) -> str:

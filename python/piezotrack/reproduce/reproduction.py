@@ -11,7 +11,9 @@ import numpy as np
 from .. import _core
 from ..errors import ParameterError
 from .apparatus import Apparatus, calibration_file
+from .beyond import Section, sections
 from .conclusions import Conclusion, conclusions
+from .measured import Drives, drives
 from .observables import SI, Obtained, gathered
 from .sines import RULES
 from .way import Way, go
@@ -43,6 +45,10 @@ class Reproduction:
         Seeds of the sensors and searches.
     apparatus : Apparatus
         The stage and its computer.
+    sections : tuple of Section
+        What goes beyond the paper.
+    drives : Drives or None
+        Of a measured log, where one was given.
     """
 
     way: Way
@@ -50,6 +56,8 @@ class Reproduction:
     true_values: tuple[dict[str, float], ...]
     seeds: tuple[int, ...]
     apparatus: Apparatus
+    sections: tuple[Section, ...]
+    drives: Drives | None
 
     def __repr__(self) -> str:
         reached = sum(one.reached for one in self.obtained)
@@ -118,6 +126,7 @@ class Reproduction:
                  "seen": one.words}
                 for one in self.conclusions
             ],
+            "beyond": [one.document() for one in self.sections],
             "apparatus": self.apparatus.document(),
             "calibration": calibration_file()["provenance"],
             "provenance": {
@@ -150,7 +159,12 @@ class Reproduction:
         return save_report(self, folder)
 
 
-def reproduce_xu_li_2010(*, seeds: int = SEEDS, apparatus: Apparatus | None = None) -> Reproduction:
+def reproduce_xu_li_2010(
+    *,
+    seeds: int = SEEDS,
+    apparatus: Apparatus | None = None,
+    dbo: str | os.PathLike[str] | None = None,
+) -> Reproduction:
     """Go the way of Xu and Li 2010, doi 10.1115/1.4001712, on the calibrated virtual stage.
 
     Sensor at rest, step test, particle swarm, comparison with a Bouc-Wen model, feedforward, PID,
@@ -164,6 +178,10 @@ def reproduce_xu_li_2010(*, seeds: int = SEEDS, apparatus: Apparatus | None = No
         How many, 1 to 1000; none of them was used in the calibration.
     apparatus : Apparatus, optional
         Another stage in place of the calibrated one.
+    dbo : path-like, optional
+        Folder with ``training.csv`` and ``tracking.csv`` of the measured log of a piezo stack of
+        github.com/yan9a/DiscreteBacklashOperator, with times and units added: the same way on it,
+        up to the feedforward.
 
     Returns
     -------
@@ -174,6 +192,8 @@ def reproduce_xu_li_2010(*, seeds: int = SEEDS, apparatus: Apparatus | None = No
     ------
     ParameterError
         `seeds` is out of its range.
+    DataError
+        A file of `dbo` is missing or is not of that log.
 
     Examples
     --------
@@ -189,10 +209,21 @@ def reproduce_xu_li_2010(*, seeds: int = SEEDS, apparatus: Apparatus | None = No
         raise ParameterError(f"seeds is {count}: expected 1 to 1000")
     apparatus = Apparatus.calibrated() if apparatus is None else apparatus
     chosen = tuple(range(FIRST_SEED, FIRST_SEED + count))
+    # What may be missing is looked at first.
+    log = None if dbo is None else drives(dbo)
     way = go(apparatus, chosen[0])
+    more = sections(apparatus.seeded(chosen[0]), way)
     rest = _scored(apparatus, chosen[1:])
     values, true = zip((way.values, way.true_values), *rest, strict=True)
-    return Reproduction(way=way, values=values, true_values=true, seeds=chosen, apparatus=apparatus)
+    return Reproduction(
+        way=way,
+        values=values,
+        true_values=true,
+        seeds=chosen,
+        apparatus=apparatus,
+        sections=tuple(more if log is None else [*more, log.section()]),
+        drives=log,
+    )
 
 
 def _scored(

@@ -29,7 +29,7 @@ def save_report(found: Reproduction, folder: str | os.PathLike[str]) -> list[Pat
     import matplotlib.pyplot as plt
 
     path = make_folder(folder)
-    figures = drawn(found.way)
+    figures = drawn(found.way, found.drives)
     try:
         page = html_text(found, figures)
         with replacing(path / "report.html") as temporary:
