@@ -17,6 +17,7 @@ import piezotrack as pt
 from commands import refusal
 from piezotrack import _core
 from piezotrack.reproduce.apparatus import Apparatus, calibration_file
+from piezotrack.reproduce.calibration import Free, apparatus_at, cost, values_of
 from piezotrack.reproduce.conclusions import conclusions
 from piezotrack.reproduce.measured import drives
 from piezotrack.reproduce.observables import Observable, Obtained, observables
@@ -207,7 +208,49 @@ def test_the_command_refuses(tmp_path: Path) -> None:
     assert not (tmp_path / "report").exists()
 
 
-# The swarm that calibrates.
+# Calibration.
+
+
+def test_the_file_is_what_the_calibration_gives() -> None:
+    document = calibration_file()
+    theta = {one["name"]: one["value"] for one in document["free"]}
+    apparatus = apparatus_at(theta)
+    # The file has what the report loads.
+    assert Apparatus.calibrated().x.weights == pytest.approx(apparatus.x.weights, rel=1e-9)
+    values = values_of(apparatus)
+    for one in document["observables"]:
+        assert values[one["key"]] == pytest.approx(one["obtained"], rel=1e-6), one["key"]
+    assert cost(values) == pytest.approx(document["provenance"]["cost"], rel=1e-6)
+
+
+def test_what_agrees_costs_nothing() -> None:
+    exact = {one.key: one.published for one in observables()}
+    assert cost(exact) == 0.0
+    assert cost({**exact, "both.max": 1.0e-6, "windup.without": 1.0}) == 0.0
+    # One goal off is ln 2 of the 35 that count.
+    off = cost({**exact, "forward.max": 1.15 * 5.69e-6})
+    assert off == pytest.approx(math.log(2.0) / sum(one.calibrated for one in observables()))
+
+
+@pytest.mark.parametrize(("share", "slope"), [(0.1, 0.0), (0.2, 2.0)])
+def test_the_share_is_the_widest_loop(share: float, slope: float) -> None:
+    theta = {one["name"]: one["value"] for one in calibration_file()["free"]}
+    theta |= {"share_x": share, "slope_x": slope, "bend_x": 0.0}
+    theta |= {"creep_fast": 0.0, "creep_1s": 0.0, "creep_10s": 0.0}
+    stage = apparatus_at(theta).x
+    up = np.linspace(0.0, 75.0, 4001)
+    x = stage.simulate(np.concatenate([up, up[::-1]]), 1e-3).x
+    there, back = x[:4001], x[4001:][::-1]
+    assert x.max() == pytest.approx(117.7622e-6, rel=1e-3)
+    assert (back - there).max() / np.ptp(there) == pytest.approx(share, rel=0.02)
+
+
+def test_the_second_box_is_about_the_first_best() -> None:
+    free = Free("a", 0.0, 6.0, "")
+    assert (free.about(3.0).low, free.about(3.0).high) == (2.0, 4.0)
+    # It may go beyond the first one, but not below 0, and not at all where that is firm.
+    assert (free.about(0.5).low, free.about(5.5).high) == (0.0, 6.5)
+    assert Free("a", 0.0, 6.0, "", firm=True).about(5.5).high == 6.0
 
 
 def test_the_swarm_finds_the_bottom_of_a_bowl() -> None:
@@ -247,7 +290,17 @@ def test_the_page_needs_no_network(files: tuple[Path, ...]) -> None:
         r'(?:src|href)="(?!#)([^"]*)"', re.sub(r"<svg.*?</svg>", "", page, flags=re.S)
     )
     assert loads == ["https://doi.org/10.1115/1.4001712"]
-    for name in ("fig_03", "fig_04", "fig_06", "fig_07", "fig_12", "fig_13", "fig_14", "fig_15"):
+    for name in (
+        "fig_03",
+        "fig_04",
+        "fig_05",
+        "fig_06",
+        "fig_07",
+        "fig_12",
+        "fig_13",
+        "fig_14",
+        "fig_15",
+    ):
         assert f'<figure id="{name}">' in page
     for one in observables():
         assert one.name in page
@@ -286,6 +339,6 @@ def test_a_browser_draws_every_figure(files: tuple[Path, ...], width: int, tmp_p
         capture_output=True, text=True, timeout=120.0, check=True,
     )  # fmt: skip
     pictures = done.stdout.count('<div class="picture')
-    assert pictures >= 9
+    assert pictures == 10
     assert f'data-drawn="{pictures} of {pictures}"' in done.stdout
     assert "CONSOLE" not in done.stderr

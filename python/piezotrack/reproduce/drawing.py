@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from . import circles, models, rest, search, step_test
+from . import circles, diagrams, models, rest, search, step_test
 from .sines import RULES
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ class Drawn(NamedTuple):
 
 
 def drawn(way: Way, drives: Drives | None) -> list[Drawn]:
-    """Draw all figures of the paper that show results; 5 and 8 to 11 are block diagrams."""
+    """Draw all figures of the paper from 3 on, and the measured log where there is one."""
     measured = [] if drives is None else [
         Drawn(
             *("measured", "A measured log: drive of our inverse and of its authors'"),
@@ -49,6 +49,11 @@ def drawn(way: Way, drives: Drives | None) -> list[Drawn]:
             *("fig_04", "Fig. 4: step of 75 V"),
             "What is read off it gives equations (4) to (13).",
             step_test.draw(way.step),
+        ),
+        Drawn(
+            *("fig_05", "Figs. 5 and 8 to 11: block diagrams"),
+            "What is connected with what, as it is built here.",
+            diagrams.draw(),
         ),
         Drawn(
             *("fig_06", "Fig. 6: convergence of the swarm"),

@@ -8,6 +8,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from .apparatus import calibration_file
+from .observables import observables
 from .report_text import number, reading, seen, tally
 from .sines import RULES
 
@@ -48,8 +49,8 @@ def html_text(found: Reproduction, figures: Sequence[Drawn]) -> str:
         *_numbers(found),
         *_conclusions(found),
         "<h2>Figures</h2>",
-        f"<p>Of the first seed, {found.seeds[0]}. Zoom with the buttons or the wheel, drag to "
-        "move. Figs. 5 and 8 to 11 are block diagrams and have nothing to reproduce.</p>",
+        f"<p>Of the first seed, {found.seeds[0]}. Zoom with the buttons, a double click or "
+        "Ctrl and the wheel; then drag to move.</p>",
         *(_figure(one) for one in figures),
         *_beyond(found),
         *_stage(found),
@@ -84,7 +85,7 @@ def _numbers(found: Reproduction) -> list[str]:
     return [
         "<h2>Numbers</h2>",
         f"<p>{escape(tally(found).replace(' * marks the others.', ''))}</p>",
-        table(heads, rows),
+        f'<div class="numbers">{table(heads, rows)}</div>',
     ]
 
 
@@ -123,8 +124,31 @@ def _stage(found: Reproduction) -> list[str]:
         f"<p>Lag of y {1e3 * parts['lag']:.3g} ms, delay {1e3 * parts['delay']:.3g} ms, cross-talk "
         f"{100 * xy:.3g} % and {100 * yx:.3g} %. SI units:</p>",
         table(("parameter", "x", "y"), rows),
+        *_calibration(),
         "<p>What the paper does not state, and the rule in its place, written down before the "
         f"calibration:</p><ul>{rules}</ul>",
+    ]
+
+
+def _calibration() -> list[str]:
+    """Table of the free parameters against the observables that they move most."""
+    named = {one.key: one.name for one in observables()}
+    rows = [
+        [
+            escape(one["meaning"]),
+            _short(one["value"]),
+            f"{_short(one['bounds'][0])} to {_short(one['bounds'][1])}",
+            escape(
+                "; ".join(f"{named[key]} {change:+.1f}" for key, change in one["moves"].items())
+            ),
+        ]
+        for one in calibration_file()["free"]
+    ]
+    return [
+        "<h3>Free parameters against observables</h3>",
+        "<p>Right the three numbers that each moves most, in units of the goal, 15 % or 0.04 um, "
+        "for a step of 5 % of its range. SI units.</p>",
+        table(("parameter", "found", "searched in", "what it moves"), rows),
     ]
 
 

@@ -20,7 +20,7 @@ SIGNS = {"value": "", "about": "about ", "bound": "within "}
 def summary_text(found: Reproduction) -> str:
     """Write table and conclusions; arguments and result as of `Reproduction.summary`."""
     lines = [
-        f"{'figure':<9}{'':<47}{'published':>14}  {'obtained':>9}  {'quartiles':<17}"
+        f"{'figure':<9}{'':<50}{'published':>14}  {'obtained':>9}  {'quartiles':<17}"
         f"{'true':>8}  {'ratio':>5}"
     ]
     for one in found.obtained:
@@ -29,7 +29,7 @@ def summary_text(found: Reproduction) -> str:
         mark = " " if one.reached else "*"
         use = "" if one.observable.calibrated else "left out"
         lines.append(
-            f"{one.observable.figure:<9}{_name(one):<47}{reading(one):>14}  "
+            f"{one.observable.figure:<9}{_name(one):<50}{reading(one):>14}  "
             f"{number(one, one.median):>8}{mark}  {low + ' to ' + high:<17}"
             f"{'' if true is None else number(one, true):>8}  {one.ratio:>5.2f}  {use}".rstrip()
         )

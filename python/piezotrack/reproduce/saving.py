@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 from ..documents import write_document
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["save_report"]
 
 # Lines of small type on a page.
-LINES = 62
+LINES = 54
 
 
 def save_report(found: Reproduction, folder: str | os.PathLike[str]) -> list[Path]:
@@ -54,8 +55,10 @@ def _write_pdf(found: Reproduction, figures: Sequence[Drawn], file: Path) -> Non
         for first in range(0, len(lines), LINES):
             page = plt.figure(figsize=(11.7, 8.3))
             text = "\n".join(lines[first : first + LINES])
-            page.text(0.04, 0.96, text, family="monospace", fontsize=7.5, va="top")
+            page.text(0.04, 0.96, text, family="monospace", fontsize=9, va="top")
             pdf.savefig(page)
             plt.close(page)
         for one in figures:
-            pdf.savefig(one.figure)
+            words = f"{one.title}\n{one.caption}"
+            one.figure.text(0.01, 1.02, "\n".join(fill(line, 150) for line in words.splitlines()))
+            pdf.savefig(one.figure, bbox_inches="tight", pad_inches=0.3)
