@@ -251,7 +251,7 @@ def refine(
 ) -> dict[str, Any]:
     """Do the second round; arguments and result as of `calibrate`, after the first."""
     box = [free.about(first[1][free.name]) for free in FREE]
-    shorter = replace(settings, iterations=settings.iterations // 3)
+    shorter = replace(settings, iterations=max(1, settings.iterations // 3))
     least, theta = min((first, _round(box, shorter, seed, progress)), key=lambda found: found[0])
     return _document(theta, least, box, settings, seed)
 

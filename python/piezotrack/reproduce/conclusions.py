@@ -129,6 +129,7 @@ CHECKS: tuple[tuple[str, Callable[[Values], bool], str], ...] = (
     (
         "The Dahl model is better than the Bouc-Wen model (Fig. 7).",
         _dahl,
-        "largest error {models_dahl} um, Bouc-Wen {models_bouc_wen} um",
+        "largest error {models_dahl} um, Bouc-Wen {models_bouc_wen} um; below, on what stages it "
+        "is so",
     ),
 )

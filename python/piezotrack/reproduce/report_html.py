@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from html import escape
 from importlib.resources import files
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .apparatus import calibration_file
 from .observables import observables
@@ -13,7 +13,7 @@ from .report_text import number, reading, seen, tally
 from .sines import RULES
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from .drawing import Drawn
     from .reproduction import Reproduction
@@ -136,7 +136,7 @@ def _calibration() -> list[str]:
     rows = [
         [
             escape(one["meaning"]),
-            _short(one["value"]),
+            _short(one["value"]) + (", on a bound" if _on_a_bound(one) else ""),
             f"{_short(one['bounds'][0])} to {_short(one['bounds'][1])}",
             escape(
                 "; ".join(f"{named[key]} {change:+.1f}" for key, change in one["moves"].items())
@@ -150,6 +150,11 @@ def _calibration() -> list[str]:
         "for a step of 5 % of its range. SI units.</p>",
         table(("parameter", "found", "searched in", "what it moves"), rows),
     ]
+
+
+def _on_a_bound(one: Mapping[str, Any]) -> bool:
+    low, high = one["bounds"]
+    return bool(min(one["value"] - low, high - one["value"]) < 1e-3 * (high - low))
 
 
 def _short(value: object) -> str:
