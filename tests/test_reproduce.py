@@ -107,6 +107,11 @@ def test_conclusions_tell_what_is_not_so() -> None:
     assert [one.holds for one in grows] == [False]
 
 
+def test_another_apparatus_has_to_be_one() -> None:
+    with pytest.raises(pt.ParameterError, match="apparatus is int: expected"):
+        pt.reproduce_xu_li_2010(apparatus=5)  # type: ignore[arg-type]
+
+
 # The way.
 
 
@@ -329,16 +334,46 @@ def test_the_pdf_has_all_pages(files: tuple[Path, ...]) -> None:
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="no chromium to open the report in")
-@pytest.mark.parametrize("width", [1280, 390])
-def test_a_browser_draws_every_figure(files: tuple[Path, ...], width: int, tmp_path: Path) -> None:
+def opened(page: Path, width: int, folder: Path) -> tuple[str, str]:
+    """The page as a browser has it after its scripts, and what the browser had to say."""
     done = subprocess.run(
         [str(CHROMIUM), "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr",
-         "--v=0", f"--window-size={width},900", f"--user-data-dir={tmp_path}", "--dump-dom",
-         files[0].as_uri()],
+         "--v=0", f"--window-size={width},900", f"--user-data-dir={folder}", "--dump-dom",
+         page.as_uri()],
         capture_output=True, text=True, timeout=120.0, check=True,
     )  # fmt: skip
-    pictures = done.stdout.count('<div class="picture')
+    return done.stdout, done.stderr
+
+
+in_a_browser = pytest.mark.skipif(CHROMIUM is None, reason="no chromium to open the report in")
+
+
+@in_a_browser
+@pytest.mark.parametrize("width", [1280, 390])
+def test_a_browser_draws_every_figure(files: tuple[Path, ...], width: int, tmp_path: Path) -> None:
+    page, said = opened(files[0], width, tmp_path)
+    pictures = page.count('<div class="picture')
     assert pictures == 10
-    assert f'data-drawn="{pictures} of {pictures}"' in done.stdout
-    assert "CONSOLE" not in done.stderr
+    assert f'data-drawn="{pictures} of {pictures}"' in page
+    assert "CONSOLE" not in said
+
+
+@in_a_browser
+def test_a_picture_is_zoomed(files: tuple[Path, ...], tmp_path: Path) -> None:
+    # A button pressed by a script behind the page's own: 1.8 times as near, about the middle.
+    script = "<script>document.querySelector('.zoom button').click()</script></body>"
+    pressed = tmp_path / "pressed.html"
+    pressed.write_text(files[0].read_text(encoding="utf-8").replace("</body>", script))
+    before, after = (
+        [float(part) for part in re.findall(r'viewBox="([^"]*)"', page)[0].split()]
+        for page in (files[0].read_text(encoding="utf-8"), opened(pressed, 1280, tmp_path)[0])
+    )
+    assert after[2] == pytest.approx(before[2] / 1.8, rel=1e-4)
+    assert after[0] + after[2] / 2 == pytest.approx(before[2] / 2, rel=1e-4)
+
+
+@in_a_browser
+def test_a_broken_page_would_be_noticed(tmp_path: Path) -> None:
+    broken = tmp_path / "broken.html"
+    broken.write_text("<html><body><script>nothing_of_this_name()</script></body></html>")
+    assert "CONSOLE" in opened(broken, 390, tmp_path)[1]

@@ -164,6 +164,7 @@ def reproduce_xu_li_2010(
     seeds: int = SEEDS,
     apparatus: Apparatus | None = None,
     dbo: str | os.PathLike[str] | None = None,
+    progress: bool | None = None,
 ) -> Reproduction:
     """Go the way of Xu and Li 2010, doi 10.1115/1.4001712, on the calibrated virtual stage.
 
@@ -182,6 +183,8 @@ def reproduce_xu_li_2010(
         Folder with ``training.csv`` and ``tracking.csv`` of the measured log of a piezo stack of
         github.com/yan9a/DiscreteBacklashOperator, with times and units added: the same way on it,
         up to the feedforward.
+    progress : bool, optional
+        Whether a progress bar is shown; where not given, in a terminal only.
 
     Returns
     -------
@@ -191,7 +194,7 @@ def reproduce_xu_li_2010(
     Raises
     ------
     ParameterError
-        `seeds` is out of its range.
+        `seeds` is out of its range, or `apparatus` is something else.
     DataError
         A file of `dbo` is missing or is not of that log.
 
@@ -208,12 +211,15 @@ def reproduce_xu_li_2010(
     if not 1 <= count <= 1000:
         raise ParameterError(f"seeds is {count}: expected 1 to 1000")
     apparatus = Apparatus.calibrated() if apparatus is None else apparatus
+    if not isinstance(apparatus, Apparatus):
+        kind = type(apparatus).__name__
+        raise ParameterError(f"apparatus is {kind}: expected a piezotrack.reproduce.Apparatus")
     chosen = tuple(range(FIRST_SEED, FIRST_SEED + count))
     # What may be missing is looked at first.
     log = None if dbo is None else drives(dbo)
     way = go(apparatus, chosen[0])
     more = sections(apparatus.seeded(chosen[0]), way)
-    rest = _scored(apparatus, chosen[1:])
+    rest = _scored(apparatus, chosen[1:], progress)
     values, true = zip((way.values, way.true_values), *rest, strict=True)
     return Reproduction(
         way=way,
@@ -227,7 +233,7 @@ def reproduce_xu_li_2010(
 
 
 def _scored(
-    apparatus: Apparatus, seeds: Sequence[int]
+    apparatus: Apparatus, seeds: Sequence[int], progress: bool | None
 ) -> list[tuple[dict[str, float], dict[str, float]]]:
     """Go the way with other seeds, and keep the numbers only."""
 
@@ -235,6 +241,24 @@ def _scored(
         way = go(apparatus, seed)
         return way.values, way.true_values
 
+    from rich.console import Console
+    from rich.progress import track
+
+    console = Console(stderr=True)
+    shown = console.is_terminal if progress is None else progress
     # The core releases Python's lock, so threads do.
-    with ThreadPoolExecutor(max_workers=2) as pool:
-        return list(pool.map(score, seeds))
+    pool = ThreadPoolExecutor(max_workers=2)
+    try:
+        return list(
+            track(
+                pool.map(score, seeds),
+                total=len(seeds),
+                description="seeds",
+                console=console,
+                transient=True,
+                disable=not shown,
+            )
+        )
+    finally:
+        # After Ctrl-C those that have not begun are given up.
+        pool.shutdown(cancel_futures=True)
