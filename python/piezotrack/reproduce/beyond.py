@@ -135,7 +135,7 @@ def _which_model(apparatus: Apparatus, way: Way) -> Section:
         judged = way.judged
         if log is not None:
             thin = search.thinned(log, THINNED)
-            judged = models.judge(thin, search.search(thin, 1), 1)
+            judged = models.judge(thin, search.search(thin, 1), 1, every=1)
         found = models.largest(judged)
         better = "Dahl" if found["dahl"] < found["bouc-wen"] else "Bouc-Wen"
         rows.append((name, _um(found["dahl"]), _um(found["bouc-wen"]), better))
