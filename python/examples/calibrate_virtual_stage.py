@@ -2,8 +2,8 @@
 
 ``python calibrate_virtual_stage.py [FILE [PARTICLES [ITERATIONS]]]`` writes what
 ``piezotrack reproduce`` loads, which is kept as ``python/piezotrack/reproduce/calibrated.json``:
-30 particles and 90 iterations, some ten minutes on two cores. Without arguments it does a small
-search, to show the way.
+30 particles and 90 iterations, a quarter of an hour on two cores. Without arguments it does a
+small search, to show the way.
 """
 
 import sys
