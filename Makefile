@@ -1,18 +1,21 @@
 # What a person types. Needs a Rust toolchain and Python 3.11 or newer; all else is put in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint rust-test python-test bench docs clean
+.PHONY: help demo reproduce test lint rust-test python-test bench docs clean
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 WHEELS := target/wheels
-SOURCES := $(shell find rust python/piezotrack -name '*.rs' -o -name '*.py' -o -name '*.pyi' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
+SOURCES := $(shell find rust python/piezotrack -name '*.rs' -o -name '*.py' -o -name '*.pyi' -o -name '*.json' -o -name '*.css' -o -name '*.js' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
 help: ## What can be typed
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/'
 
 demo: $(VENV)/installed ## Build, then the way from a log to a model on a built-in stage
 	$(BIN)/piezotrack demo --out demo
+
+reproduce: $(VENV)/installed ## Every figure and table of the paper, published beside obtained
+	$(BIN)/piezotrack reproduce --out report
 
 test: lint rust-test python-test ## Everything that must hold before a change lands
 
@@ -38,7 +41,7 @@ docs: ## The crates' pages
 	cargo doc --locked --no-deps
 
 clean: ## Remove what was built, not your results
-	rm -rf $(VENV) target demo
+	rm -rf $(VENV) target demo report
 
 $(VENV)/pip:
 	$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(None if v >= (3, 11) else f"Python 3.11 or newer is needed, this is {v.major}.{v.minor}")'

@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from .readings import StepReadings
     from .reference_text import parse_reference
     from .references import Reference, SampledReference, read_reference
+    from .reproduce import Reproduction, reproduce_xu_li_2010
     from .step import StepResult, StepTrace, identify_step
     from .swarm import ParticleSwarm
     from .table_2 import Table2, run_table_2
@@ -99,6 +100,7 @@ __all__ = [
     "Progress",
     "Reference",
     "Repetitive",
+    "Reproduction",
     "Response",
     "Run",
     "SampledReference",
@@ -138,6 +140,7 @@ __all__ = [
     "read_drive",
     "read_path",
     "read_reference",
+    "reproduce_xu_li_2010",
     "run_table_2",
     "sine",
     "spiral",
@@ -255,6 +258,10 @@ _HOMES = {
         "Reference",
         "SampledReference",
         "read_reference",
+    ),
+    "reproduce": (
+        "Reproduction",
+        "reproduce_xu_li_2010",
     ),
     "swarm": ("ParticleSwarm",),
     "tracking": (

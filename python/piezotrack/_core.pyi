@@ -20,6 +20,7 @@ __all__ = [
     "Search",
     "Session",
     "StepResponse",
+    "Swarm",
     "SwarmSettings",
     "Tracked",
     "Trajectory",
@@ -117,6 +118,16 @@ class Trajectory:
     def difference(self) -> float: ...
     @property
     def well_posed(self) -> bool: ...
+
+@final
+class Swarm:
+    def __new__(cls, settings: SwarmSettings, coordinates: int, seed: int) -> Swarm: ...
+    def ask(self) -> list[list[float] | None]: ...
+    def tell(self, costs: Sequence[float]) -> None: ...
+    @property
+    def best(self) -> tuple[list[float], float]: ...
+    @property
+    def done(self) -> bool: ...
 
 @final
 class SwarmSettings:

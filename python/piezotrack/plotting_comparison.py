@@ -104,7 +104,7 @@ def _bars(comparison: Comparison, ax: Axes) -> None:
     ax.invert_yaxis()
     ax.margins(x=0.15)
     ax.set(xlabel="rms error [% of stroke]")
-    ax.legend(fontsize="small", frameon=False, loc="best")
+    ax.legend(fontsize="small", frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
 
 
 def _errors(comparison: Comparison, axes: list[Axes]) -> None:

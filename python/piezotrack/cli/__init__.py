@@ -14,6 +14,7 @@ from .contour import contour_command
 from .demo import demo_command
 from .identify import identify_command
 from .noise import noise_command
+from .reproduce import reproduce_command
 from .simulate import simulate_command
 from .step import step_command
 from .track import feedforward_command, track_command
@@ -65,4 +66,5 @@ app.command("feedforward")(feedforward_command)
 app.command("track")(track_command)
 app.command("contour")(contour_command)
 app.command("noise")(noise_command)
+app.command("reproduce")(reproduce_command)
 app.command("demo")(demo_command)

@@ -22,7 +22,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 
 /// Checked settings of a swarm.
 #[pyclass(name = "SwarmSettings", frozen, module = "piezotrack._core")]
-pub struct PySettings(SwarmSettings);
+pub struct PySettings(pub SwarmSettings);
 
 #[pymethods]
 impl PySettings {

@@ -10,6 +10,7 @@ mod numbers;
 mod plays;
 mod stage;
 mod step;
+mod swarm;
 mod tracking;
 mod virtual_stage;
 mod xy;
@@ -24,6 +25,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     stage::register(module)?;
     identify::register(module)?;
     step::register(module)?;
+    swarm::register(module)?;
     control::register(module)?;
     design::register(module)?;
     plays::register(module)?;

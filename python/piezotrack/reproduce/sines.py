@@ -1,0 +1,39 @@
+"""The sines that Figs. 12 to 14 follow, and the rules for what the paper does not state."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..waveforms import sine
+
+if TYPE_CHECKING:
+    from ..references import Reference
+
+__all__ = ["RULES", "SHRUNK", "fast", "shrunk", "slow"]
+
+# Fig. 13: the limits of the amplifier [V].
+SHRUNK = (6.0, 28.0)
+RANGE = 110e-6
+
+# Written down before the stage was calibrated. 8 to 39 um is older than this package: it is the
+# range of docs/tracking.md.
+RULES = {
+    "13": "0.2 Hz as in Fig. 12, 8 to 39 um, so that 28 V clip its top.",
+    "14": "0 to 110 um as in Fig. 12, ten periods.",
+}
+LOW, HIGH = 8e-6, 39e-6
+
+
+def slow() -> Reference:
+    """Fig. 12: 0.2 Hz over 110 um, four periods."""
+    return sine(frequency=0.2, low=0.0, high=RANGE, duration=20.0)
+
+
+def shrunk(part: float = 1.0) -> Reference:
+    """Fig. 13: 0.2 Hz over a range that leaves the shrunk limits, times `part`."""
+    return sine(frequency=0.2, low=LOW, high=LOW + part * (HIGH - LOW), duration=20.0)
+
+
+def fast(part: float = 1.0) -> Reference:
+    """Fig. 14: 0.5 Hz over 110 um times `part`, ten periods."""
+    return sine(frequency=0.5, low=0.0, high=part * RANGE, duration=20.0)
