@@ -472,7 +472,10 @@ def test_the_command(tmp_path: Path) -> None:
     step = pt.identify_step(pt.read(file, hold="zoh"), stiffness=26065.0)
     assert done.stdout.startswith(step.summary())
     assert f"--fix a1={step.hysteresis['a1']:.8g}" in done.stdout
-    assert {path.name for path in Path(out).iterdir()} == {"step.png", "step.svg"}
+    assert {path.name for path in Path(out).iterdir()} == {"step.json", "step.png", "step.svg"}
+    document = json.loads(Path(out, "step.json").read_text(encoding="utf-8"))
+    assert document["hysteresis"] == step.hysteresis
+    assert document["damping_ratio"] == step.damping_ratio
     level = runner.invoke(app, ["step", str(file), "--out", out, "--second-level", "37.5:61"])
     assert level.exit_code == 0
     assert "with a second static level" in level.stdout

@@ -1,4 +1,4 @@
-"""Model files in JSON: written whole, read with a sentence for whatever is wrong with them."""
+"""JSON files: written whole, and model files read with a sentence for whatever is wrong."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SCHEMA_VERSION = 1
 
 
 def write_document(path: str | os.PathLike[str], document: Mapping[str, Any]) -> Path:
-    """Write a model file, whole or not at all; arguments and errors as of `save`."""
+    """Write a JSON file, whole or not at all; arguments and errors as of `save`."""
     import json
 
     text = json.dumps(_finite(document), indent=2, allow_nan=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -176,7 +175,8 @@ def _cross_talk(stage: XYStage) -> CrossTalk:
 def _write(run: Contour, out: Path) -> list[Path]:
     """Write the samples, the figures as JSON, and the picture."""
     from .. import __version__
-    from ..files import replacing, write_columns
+    from ..documents import write_document
+    from ..files import write_columns
     from ..report import make_folder, save_figures
 
     folder = make_folder(out)
@@ -202,10 +202,8 @@ def _write(run: Contour, out: Path) -> list[Path]:
         "feedforward": run.x.note,
         "provenance": {"package": "piezotrack", "version": __version__},
     }
-    file = folder / "contour.json"
-    with replacing(file) as temporary:
-        temporary.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
-    return [*written, file, *save_figures({"contour": run.plot()}, folder)]
+    written.append(write_document(folder / "contour.json", document))
+    return [*written, *save_figures({"contour": run.plot()}, folder)]
 
 
 def _write_table(table: Table2, out: Path) -> list[Path]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -63,7 +62,7 @@ def noise_command(
 def _write(found: Noise, folder: Path) -> Path:
     """Write the figures as JSON."""
     from .. import __version__
-    from ..files import replacing
+    from ..documents import write_document
 
     document = {
         "format": "piezotrack-noise",
@@ -80,7 +79,4 @@ def _write(found: Noise, folder: Path) -> Path:
         "data": {"source": found.data.source, "sha256": found.data.sha256},
         "provenance": {"package": "piezotrack", "version": __version__},
     }
-    path = folder / "noise.json"
-    with replacing(path) as temporary:
-        temporary.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
-    return path
+    return write_document(folder / "noise.json", document)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -24,6 +25,9 @@ from .options import (
     windowed,
 )
 from .words import in_words
+
+if TYPE_CHECKING:
+    from ..step import StepResult
 
 __all__ = ["step_command"]
 
@@ -61,11 +65,32 @@ def step_command(
     with of_file(file):
         step = identify_step(log, stiffness=stiffness, mass=mass, second_level=level)
     folder = make_folder(out)
-    written = save_figures({"step": step.plot()}, folder)
+    written = [_write(step, folder), *save_figures({"step": step.plot()}, folder)]
     print(step.summary())
     options = " ".join(f"--fix {name}={value:.8g}" for name, value in step.hysteresis.items())
     print(f"\nto go on with these: piezotrack identify LOG {options}")
     list_files(written)
+
+
+def _write(step: StepResult, folder: Path) -> Path:
+    """Write readings and results as JSON, SI."""
+    from .. import __version__
+    from ..documents import write_document
+
+    document = {
+        "format": "piezotrack-step",
+        "schema_version": 1,
+        "unit": "V, m, s, Hz, rad/s; a1 1/m, a2 1/m^2, b1 N/m^2, b0 N/m",
+        "readings": asdict(step.readings),
+        "natural_frequency": step.natural_frequency,
+        "damping_ratio": step.damping_ratio,
+        "damping_by_decrement": step.damping_by_decrement,
+        "time_constant": step.time_constant,
+        "hysteresis": step.hysteresis,
+        "ratios": step.ratios,
+        "provenance": {"package": "piezotrack", "version": __version__},
+    }
+    return write_document(folder / "step.json", document)
 
 
 def _level(text: str) -> tuple[float, float]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -159,7 +158,8 @@ def _reference(text: str, duration: float | None, period: float | None) -> Refer
 def _write(run: Tracking, known: Identified[Any], loop: Controller, out: Path) -> list[Path]:
     """Write the samples, the figures as JSON, and the pictures."""
     from .. import __version__
-    from ..files import replacing, write_columns
+    from ..documents import write_document
+    from ..files import write_columns
     from ..report import make_folder, save_figures
 
     folder = make_folder(out)
@@ -189,7 +189,5 @@ def _write(run: Tracking, known: Identified[Any], loop: Controller, out: Path) -
         "model_drive_range": known.drive_range,
         "provenance": {"package": "piezotrack", "version": __version__},
     }
-    path = folder / "tracking.json"
-    with replacing(path) as temporary:
-        temporary.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
-    return [*written, path, *save_figures({"tracking": run.plot()}, folder)]
+    written.append(write_document(folder / "tracking.json", document))
+    return [*written, *save_figures({"tracking": run.plot()}, folder)]
