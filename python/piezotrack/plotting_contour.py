@@ -229,7 +229,8 @@ def _bars(table: Table2, name: str, ax: Axes) -> None:
     found = [1e6 * getattr(run.metrics, attribute) for run in table.runs]
     ax.bar(places - 0.2, published, 0.4, color="0.75", edgecolor="0.3", label="published")
     ax.bar(places + 0.2, found, 0.4, color="C0", edgecolor="0.1", label="obtained")
-    ax.set(ylabel=f"{name} [um]", xlabel="radius [um], and frequency [Hz]")
+    what = "peak to peak" if name == "max" else name
+    ax.set(ylabel=f"{what} [um]", xlabel="radius [um], and frequency [Hz]")
     labels = [f"{1e6 * case.radius:g}\n{case.frequency:g}" for case in PUBLISHED]
     ax.set_xticks(places, labels, fontsize="small")
     ax.axhline(0.0, color="0.4", linewidth=0.6)
