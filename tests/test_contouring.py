@@ -335,7 +335,11 @@ def test_the_table_has_words_and_a_picture() -> None:
     assert "0.957 /" in rows[2]
     figure = table().plot()
     figure.canvas.draw()
-    assert [ax.get_ylabel() for ax in figure.axes[2:]] == ["max [um]", "mean [um]", "SD [um]"]
+    assert [ax.get_ylabel() for ax in figure.axes[2:]] == [
+        "peak to peak [um]",
+        "mean [um]",
+        "SD [um]",
+    ]
     plt.close(figure)
 
 
