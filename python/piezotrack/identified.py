@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
@@ -73,7 +74,7 @@ class Score:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Identified(Generic[R]):
+class Identified(ABC, Generic[R]):
     """A stage as identified, with what is needed to use it on a record.
 
     Attributes
@@ -114,9 +115,9 @@ class Identified(Generic[R]):
         return found
 
     @property
+    @abstractmethod
     def free_count(self) -> int | None:
         """Number of values fitted, the offset with them; None where the file does not tell."""
-        raise NotImplementedError
 
     def fitted_on(self, data: Dataset) -> bool:
         """Tell whether a record is the one identified, sample by sample.
@@ -269,6 +270,7 @@ class Identified(Generic[R]):
             return shift
         return float(np.mean(data.y - x)) if self.offset_fitted else 0.0
 
+    @abstractmethod
     def document(self) -> dict[str, Any]:
         """Content of the JSON file.
 
@@ -277,7 +279,6 @@ class Identified(Generic[R]):
         dict
             Of numbers, texts, lists and dicts only.
         """
-        raise NotImplementedError
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the model to a JSON file that `load` reads back bit for bit.
@@ -345,10 +346,11 @@ class Fitted(Identified[R]):
         return self.score(self.data, offset=self.offset)
 
     @property
+    @abstractmethod
     def notes(self) -> list[str]:
         """What a careful reader should know before using the result."""
-        raise NotImplementedError
 
+    @abstractmethod
     def summary(self) -> str:
         """Table of the result.
 
@@ -357,7 +359,6 @@ class Fitted(Identified[R]):
         str
             Several lines: the cost, then the parameters.
         """
-        raise NotImplementedError
 
     def _remarks(self, held: Collection[str]) -> list[str]:
         """Say what is odd about the record, and what the fit leaves of its loop."""

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "axes_or_new",
+    "plain_log_ticks",
     "plot_convergence",
     "plot_identification",
     "plot_loop",
@@ -164,7 +165,7 @@ def plot_convergence(fit: Identification, ax: Axes | None = None) -> Axes:
     ax.set(xlabel="iteration", ylabel="best cost, rms [um]", title="Convergence of the swarm")
     ax.margins(x=0.02)
     if finite.any():
-        _plain_log_ticks(ax)
+        plain_log_ticks(ax)
     told = f"{1e6 * fit.history[-1]:.4g} um after {fit.nit} iterations,\n{fit.nfev} simulations"
     if fit.npolish and fit.cost > 0.0:
         ax.plot(fit.nit, fit.cost_um, "o", color="#b3400a", markersize=5)
@@ -268,7 +269,7 @@ def thinned(values: Array) -> NDArray[np.intp]:
     return np.unique(np.concatenate([extremes.ravel(), tail, ends]))
 
 
-def _plain_log_ticks(ax: Axes) -> None:
+def plain_log_ticks(ax: Axes) -> None:
     """Label a short logarithmic axis with plain numbers."""
     from matplotlib.ticker import FuncFormatter, LogFormatter, LogLocator
 

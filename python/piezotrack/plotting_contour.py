@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import matplotlib.pyplot as plt
 import numpy as np
 
-from .plotting import _plain_log_ticks
-from .plotting_tracking import ACTUAL, DESIRED, _above
+from .plotting import axes_or_new, plain_log_ticks
+from .plotting_tracking import ACTUAL, DESIRED, above
 from .units import best_length_unit
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def plot_path(run: Contour, ax: Axes | None = None) -> Axes:
     matplotlib.axes.Axes
         With the picture.
     """
-    ax = plt.figure().add_subplot() if ax is None else ax
+    (ax,) = axes_or_new(ax, 1)
     x, y = run.path.outline
     ax.plot(1e6 * x, 1e6 * y, **{**DESIRED, "linewidth": 2.6, "color": "0.72"})
     way, part = run.t < run.settled, _last(run)
@@ -61,7 +61,7 @@ def plot_path(run: Contour, ax: Axes | None = None) -> Axes:
     )
     ax.plot(1e6 * run.x.measured[part], 1e6 * run.y.measured[part], **{**ACTUAL, "linewidth": 0.9})
     _plane(ax, run)
-    _above(ax)
+    above(ax)
     return ax
 
 
@@ -82,7 +82,7 @@ def plot_magnified(run: Contour, ax: Axes | None = None, factor: float | None = 
     matplotlib.axes.Axes
         With the picture.
     """
-    ax = plt.figure().add_subplot() if ax is None else ax
+    (ax,) = axes_or_new(ax, 1)
     part = _last(run)
     if factor is None:
         side = min(float(np.ptp(axis)) for axis in run.path.outline)
@@ -101,7 +101,7 @@ def plot_magnified(run: Contour, ax: Axes | None = None, factor: float | None = 
         label=f"contour error x {factor:g}",
     )
     _plane(ax, run)
-    _above(ax)
+    above(ax)
     return ax
 
 
@@ -120,7 +120,7 @@ def plot_contour_error(run: Contour, ax: Axes | None = None) -> Axes:
     matplotlib.axes.Axes
         With the picture.
     """
-    ax = plt.figure().add_subplot() if ax is None else ax
+    (ax,) = axes_or_new(ax, 1)
     part = _last(run)
     found = run.metrics
     mean, sd = 1e6 * found.mean_error, 1e6 * found.sd_error
@@ -128,7 +128,7 @@ def plot_contour_error(run: Contour, ax: Axes | None = None) -> Axes:
     ax.plot(run.t[part], 1e6 * run.error[part], color="C3", linewidth=0.8, label="contour error")
     ax.axhline(mean, color="0.4", linewidth=0.8, linestyle="--")
     ax.set(xlabel="time [s]", ylabel="contour error [um]")
-    _above(ax)
+    above(ax)
     ax.margins(x=0)
     return ax
 
@@ -234,7 +234,7 @@ def _bars(table: Table2, name: str, ax: Axes) -> None:
     labels = [f"{1e6 * case.radius:g}\n{case.frequency:g}" for case in PUBLISHED]
     ax.set_xticks(places, labels, fontsize="small")
     ax.axhline(0.0, color="0.4", linewidth=0.6)
-    _above(ax)
+    above(ax)
 
 
 def plot_noise(noise: Noise) -> Figure:
@@ -269,9 +269,9 @@ def plot_noise(noise: Noise) -> Figure:
         f, 1e9 * noise.density(f), color="C3", linewidth=1.6, linestyle="--",
         label=f"model: {1e6 * noise.noise:.4g} um rms, {colour}",
     )  # fmt: skip
-    _plain_log_ticks(right)
+    plain_log_ticks(right)
     right.set(xlabel="frequency [Hz]", ylabel="amplitude spectral density [nm/sqrt(Hz)]")
-    _above(right)
+    above(right)
     return figure
 
 

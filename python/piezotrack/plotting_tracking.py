@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import matplotlib.pyplot as plt
 import numpy as np
 
+from .plotting import axes_or_new
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -19,6 +21,9 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 __all__ = [
+    "ACTUAL",
+    "DESIRED",
+    "above",
     "plot_effort",
     "plot_error",
     "plot_following",
@@ -31,7 +36,7 @@ DESIRED: dict[str, Any] = {"color": "0.35", "linewidth": 1.6, "label": "desired"
 ACTUAL: dict[str, Any] = {"color": "C0", "linewidth": 1.1, "label": "actual"}
 
 
-def _above(ax: Axes) -> None:
+def above(ax: Axes) -> None:
     """Put the legend above the axes, where it hides nothing."""
     ax.legend(
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, frameon=False, borderaxespad=0.2
@@ -53,11 +58,11 @@ def plot_motion(run: Tracking, ax: Axes | None = None) -> Axes:
     matplotlib.axes.Axes
         With the picture.
     """
-    ax = plt.figure().add_subplot() if ax is None else ax
+    (ax,) = axes_or_new(ax, 1)
     ax.plot(run.t, 1e6 * run.desired, **DESIRED)
     ax.plot(run.fine_t, 1e6 * run.fine_displacement, **ACTUAL)
     ax.set(xlabel="time [s]", ylabel="displacement [um]")
-    _above(ax)
+    above(ax)
     ax.margins(x=0)
     return ax
 
@@ -77,7 +82,7 @@ def plot_error(run: Tracking, ax: Axes | None = None) -> Axes:
     matplotlib.axes.Axes
         With the picture.
     """
-    ax = plt.figure().add_subplot() if ax is None else ax
+    (ax,) = axes_or_new(ax, 1)
     ax.plot(run.t, 1e6 * run.error, color="C3", linewidth=0.9)
     if run.saturated.any():
         low, high = ax.get_ylim()
@@ -85,7 +90,7 @@ def plot_error(run: Tracking, ax: Axes | None = None) -> Axes:
             run.t, low, high, where=run.saturated, color="0.85", zorder=0, label="voltage clipped"
         )
         ax.set_ylim(low, high)
-        _above(ax)
+        above(ax)
     period = run.reference.period
     for i, one in enumerate(run.periods):
         assert period is not None
@@ -112,7 +117,7 @@ def plot_following(run: Tracking, ax: Axes | None = None) -> Axes:
     matplotlib.axes.Axes
         With the picture.
     """
-    ax = plt.figure().add_subplot() if ax is None else ax
+    (ax,) = axes_or_new(ax, 1)
     part = run.t >= run.settled
     ax.plot(1e6 * run.desired[part], 1e6 * run.measured[part], color="C0", linewidth=0.9)
     ends = np.array([run.desired.min(), run.desired.max()]) * 1e6
@@ -136,7 +141,7 @@ def plot_effort(run: Tracking, ax: Axes | None = None) -> Axes:
     matplotlib.axes.Axes
         With the picture.
     """
-    ax = plt.figure().add_subplot() if ax is None else ax
+    (ax,) = axes_or_new(ax, 1)
     ax.step(run.t, run.voltage, where="post", color="0.55", linewidth=2.4, label="total")
     parts = {
         "feedforward": (run.feedforward, "C0"),
@@ -147,7 +152,7 @@ def plot_effort(run: Tracking, ax: Axes | None = None) -> Axes:
         if np.any(volts):
             ax.step(run.t, volts, where="post", color=colour, linewidth=1.0, label=name)
     ax.set(xlabel="time [s]", ylabel="voltage [V]")
-    _above(ax)
+    above(ax)
     ax.margins(x=0)
     return ax
 
@@ -203,7 +208,7 @@ def plot_loop_report(report: LoopReport) -> Figure:
     parts.axhline(1.0, color="0.7", linewidth=0.8)
     parts.set(xlabel="frequency [Hz]", ylabel="closed loop")
     parts.set_ylim(bottom=max(1e-3, parts.get_ylim()[0]))
-    _above(parts)
+    above(parts)
     figure.suptitle("\n".join(textwrap.wrap(str(report.middle), 75)), fontsize="medium")
     return figure
 
