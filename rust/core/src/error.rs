@@ -76,6 +76,26 @@ pub fn finite(name: &str, value: f64, unit: &str) -> Result<f64> {
     check(name, value, unit, true, "a finite number")
 }
 
+/// Refuses 0 and what is not a finite number.
+///
+/// # Errors
+/// [`Error::Parameter`] naming the argument, its value and unit.
+pub fn not_zero(name: &str, value: f64, unit: &str) -> Result<f64> {
+    finite(name, value, unit)?;
+    // 0 is added, so that -0 is shown as 0.
+    check(name, value + 0.0, unit, value != 0.0, "a value other than 0")
+}
+
+/// Refuses a number without a unit that is not finite or not within two others.
+///
+/// # Errors
+/// [`Error::Parameter`] naming the argument and its value.
+pub fn within(name: &str, value: f64, low: f64, high: f64) -> Result<f64> {
+    finite(name, value, "")?;
+    let expected = format!("a number from {low} to {high}");
+    check(name, value, "", (low..=high).contains(&value), &expected)
+}
+
 /// A number as a person would write it, never with hundreds of digits.
 #[must_use]
 pub fn shown(value: f64) -> String {

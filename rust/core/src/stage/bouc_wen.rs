@@ -13,7 +13,7 @@ use piezotrack_control::operator::{BoucWen, BoucWenState, Operator};
 use super::input::{AtInput, InputMemory};
 use super::{Kernel, ParameterInfo, Parameters, linear};
 use crate::alone::{Alone, Motion};
-use crate::error::{Error, Result, finite, shown};
+use crate::error::{Result, finite, not_zero, within};
 use crate::integrate::{Drive, Stop};
 use crate::mechanics::Mechanics;
 
@@ -65,19 +65,12 @@ impl BoucWenStage {
     /// The stage with parameters in the order of [`BOUC_WEN_PARAMETERS`].
     ///
     /// # Errors
-    /// [`Error::Parameter`] naming the parameter that is out of its range.
+    /// [`crate::Error::Parameter`] naming the parameter that is out of its range.
     pub fn from_theta(theta: &[f64; 8]) -> Result<Self> {
         let [mass, damping, stiffness, piezo_coefficient, alpha, beta, gamma, exponent] = *theta;
         let mechanics = Mechanics::new(mass, damping, stiffness)?;
-        finite("piezo_coefficient", piezo_coefficient, "m/V")?;
-        if piezo_coefficient == 0.0 {
-            return Err(Error::parameter("piezo_coefficient", "0 m/V", "a value other than 0"));
-        }
-        finite("exponent", exponent, "")?;
-        if !(1.0..=MOST_EXPONENT).contains(&exponent) {
-            let expected = format!("a number from 1 to {MOST_EXPONENT}");
-            return Err(Error::parameter("exponent", shown(exponent), expected));
-        }
+        not_zero("piezo_coefficient", piezo_coefficient, "m/V")?;
+        within("exponent", exponent, 1.0, MOST_EXPONENT)?;
         Ok(Self {
             mechanics,
             piezo_coefficient,

@@ -13,7 +13,7 @@ use piezotrack_control::operator::{BoucWen, BoucWenState, Operator};
 
 use super::kinked::{Kinked, KinkedMotion, simulate};
 use super::{Kernel, ParameterInfo, Parameters, linear};
-use crate::error::{Error, Result, finite, shown};
+use crate::error::{Result, finite, not_zero, within};
 use crate::integrate::{Drive, Stop};
 use crate::mechanics::Mechanics;
 
@@ -65,19 +65,12 @@ impl BoucWenOscillator {
     /// The oscillator with parameters in the order of [`BOUC_WEN_OSCILLATOR_PARAMETERS`].
     ///
     /// # Errors
-    /// [`Error::Parameter`] naming the parameter that is out of its range.
+    /// [`crate::Error::Parameter`] naming the parameter that is out of its range.
     pub fn from_theta(theta: &[f64; 8]) -> Result<Self> {
         let [mass, damping, stiffness, alpha, beta, gamma, delta, exponent] = *theta;
         let mechanics = Mechanics::new(mass, damping, stiffness)?;
-        finite("beta", beta, "")?;
-        if beta == 0.0 {
-            return Err(Error::parameter("beta", 0, "a value other than 0"));
-        }
-        finite("exponent", exponent, "")?;
-        if !(1.0..=MOST_EXPONENT).contains(&exponent) {
-            let expected = format!("a number from 1 to {MOST_EXPONENT}");
-            return Err(Error::parameter("exponent", shown(exponent), expected));
-        }
+        not_zero("beta", beta, "")?;
+        within("exponent", exponent, 1.0, MOST_EXPONENT)?;
         Ok(Self {
             mechanics,
             alpha: finite("alpha", alpha, "N/m")?,

@@ -11,7 +11,7 @@ use piezotrack_control::operator::{Dahl, DahlState};
 
 use super::ParameterInfo;
 use super::friction::FrictionParameters;
-use crate::error::{Error, Result, finite, not_negative};
+use crate::error::{Result, finite, not_negative, not_zero};
 use crate::mechanics::Mechanics;
 
 /// The stage's parameters, in the order of [`DahlStage::from_theta`].
@@ -72,14 +72,11 @@ impl DahlStage {
     /// The stage with parameters in the order of [`DAHL_PARAMETERS`].
     ///
     /// # Errors
-    /// [`Error::Parameter`] naming the parameter that is out of its range.
+    /// [`crate::Error::Parameter`] naming the parameter that is out of its range.
     pub fn from_theta(theta: &[f64; 9]) -> Result<Self> {
         let [mass, damping, stiffness, piezo_coefficient, a1, a2, b1, b0, up] = *theta;
         let mechanics = Mechanics::new(mass, damping, stiffness)?;
-        finite("piezo_coefficient", piezo_coefficient, "N/V")?;
-        if piezo_coefficient == 0.0 {
-            return Err(Error::parameter("piezo_coefficient", "0 N/V", "a value other than 0"));
-        }
+        not_zero("piezo_coefficient", piezo_coefficient, "N/V")?;
         Ok(Self {
             mechanics,
             piezo_coefficient,

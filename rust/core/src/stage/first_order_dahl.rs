@@ -14,7 +14,7 @@ use piezotrack_control::operator::{BoucWenState, FirstOrderDahl, Operator};
 
 use super::kinked::{Kinked, KinkedMotion, simulate};
 use super::{Kernel, ParameterInfo, Parameters, linear};
-use crate::error::{Error, Result, finite, not_negative, positive, shown};
+use crate::error::{Result, not_negative, not_zero, positive, within};
 use crate::integrate::{Drive, Stop};
 use crate::mechanics::Mechanics;
 
@@ -59,20 +59,13 @@ impl FirstOrderDahlStage {
     /// The stage with parameters in the order of [`FIRST_ORDER_DAHL_PARAMETERS`].
     ///
     /// # Errors
-    /// [`Error::Parameter`] naming the parameter that is out of its range.
+    /// [`crate::Error::Parameter`] naming the parameter that is out of its range.
     pub fn from_theta(theta: &[f64; 7]) -> Result<Self> {
         let [mass, damping, stiffness, piezo_coefficient, rest_stiffness, coulomb, exponent] =
             *theta;
         let mechanics = Mechanics::new(mass, damping, stiffness)?;
-        finite("piezo_coefficient", piezo_coefficient, "N/V")?;
-        if piezo_coefficient == 0.0 {
-            return Err(Error::parameter("piezo_coefficient", "0 N/V", "a value other than 0"));
-        }
-        finite("exponent", exponent, "")?;
-        if !(0.0..=MOST_EXPONENT).contains(&exponent) {
-            let expected = format!("a number from 0 to {MOST_EXPONENT}");
-            return Err(Error::parameter("exponent", shown(exponent), expected));
-        }
+        not_zero("piezo_coefficient", piezo_coefficient, "N/V")?;
+        within("exponent", exponent, 0.0, MOST_EXPONENT)?;
         Ok(Self {
             mechanics,
             piezo_coefficient,
