@@ -201,6 +201,9 @@ def test_the_lag_moves_y_and_leaves_x() -> None:
     one, other = (pt.contour(one, led(), path) for one in (stage, late))
     assert np.array_equal(one.x.measured, other.x.measured)
     assert np.allclose(one.y.measured[:-3], other.y.measured[3:], rtol=0, atol=1e-13)
+    # Its controller saw nothing of that.
+    assert np.allclose(one.y.loop_error[:-3], other.y.loop_error[3:], rtol=0, atol=1e-13)
+    assert not np.allclose(one.y.error[:-3], other.y.error[3:], rtol=0, atol=1e-7)
     # R sin(b) / sqrt 8 on top of what the two had before.
     angle = math.tau * 0.5 * 3 * DT
     assert other.metrics.sd_error == pytest.approx(10 * UM * math.sin(angle) / 8**0.5, rel=0.1)

@@ -228,7 +228,7 @@ def test_the_same_seed_gives_the_same_bits_and_another_other_noise() -> None:
     assert one.metrics.rms_error == pytest.approx(other.metrics.rms_error, rel=0.05)
 
 
-# Other stages, delay.
+# Other stages, delay, jitter.
 
 
 def test_a_model_is_led_by_its_own_inverse() -> None:
@@ -263,6 +263,30 @@ def test_an_identified_model_has_its_offset_and_delay(delay: float) -> None:
     bare = pt.track(known, dataclasses.replace(controller, feedforward=inverse), course)
     assert bare.metrics.mean_error == pytest.approx(3 * UM, rel=0.01)
     assert bare.metrics.phase_lag == pytest.approx(math.pi * (0.5e-3 + delay), rel=0.05)
+
+
+def test_late_samples_see_the_stage_further_on() -> None:
+    # Feedforward along a triangle, 20 um/s: a sample that is late reads so much more, while the
+    # motion is late by the mean, as all its voltages are.
+    controller = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=TABLE_1.inverse())
+    reference = pt.triangle(frequency=0.1, low=10e-6, high=110e-6, duration=200.0)
+    prompt, late = (
+        pt.track(TABLE_1, controller, reference, jitter=jitter) for jitter in (0.0, 2e-3)
+    )
+    rising = np.gradient(reference.sample(0.02).x, 0.02) > 19.9e-6
+    rising &= np.roll(rising, 25) & (prompt.t > 20.0)
+    later = (late.measured - prompt.measured)[rising] / 20e-6
+    assert rising.sum() > 3000
+    assert abs(later.mean()) < 0.15e-3
+    assert later.std() == pytest.approx(2e-3, rel=0.15)
+    assert (late.loop_error == late.error).all()
+    # The same draws again, and others with another seed.
+    again = pt.track(TABLE_1, controller, reference, jitter=2e-3)
+    assert (again.measured == late.measured).all()
+    stages = [pt.VirtualStage.xu_li_2010(seed=seed) for seed in (1, 2)]
+    quiet = [dataclasses.replace(stage, noise=0.0) for stage in stages]
+    first, second = (pt.track(stage, loop(), sine(0.5, 2.0), jitter=1e-3) for stage in quiet)
+    assert (first.measured != second.measured).any()
 
 
 def test_a_delay_in_the_loop_is_a_delay_of_the_motion() -> None:
@@ -307,6 +331,7 @@ BAD: dict[str, tuple[Callable[[], Any], str]] = {
     "stage": (lambda: pt.track(5, loop(), sine(0.5, 2.0)), "stage is int: expected pt.VirtualSt"),  # type: ignore[arg-type]
     "controller": (lambda: pt.track(STAGE, PID, sine(0.5, 2.0)), "controller is Pid"),  # type: ignore[arg-type]
     "reference": (lambda: pt.track(STAGE, loop(), np.zeros(9)), "reference is ndarray"),  # type: ignore[arg-type]
+    "jitter": (lambda: pt.track(STAGE, loop(), sine(0.5, 2.0), jitter=-0.1), "jitter is -0.1"),
     "delay": (lambda: pt.track(STAGE, loop(), sine(0.5, 2.0), delay=-0.1), "delay is -0.1"),
     "substeps": (lambda: pt.track(STAGE, loop(), sine(0.5, 2.0), substeps=0), "substeps is 0"),
     "many": (lambda: pt.track(STAGE, loop(), sine(0.5, 2.0), substeps=10**12), "too many"),

@@ -212,8 +212,7 @@ def track_model(
     controller: Controller,
     reference: ArrayLike,
     feedforward: ArrayLike,
-    delay: float,
-    substeps: int,
+    pace: _Pace,
 ) -> Tracked: ...
 def tracking_metrics(
     desired: ArrayLike, actual: ArrayLike, dt: float, frequency: float | None
@@ -299,10 +298,11 @@ class VirtualStage:
         controller: Controller,
         reference: ArrayLike,
         feedforward: ArrayLike,
-        delay: float,
-        substeps: int,
+        pace: _Pace,
     ) -> Tracked: ...
 
+# Delay and jitter [s], and instants kept in each control interval.
+_Pace = tuple[float, float, int]
 _Axis = VirtualStage | tuple[tuple[float, ...], float]
 _Motion = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 _Spread = tuple[float, float, float, float, float]
@@ -320,8 +320,7 @@ class XYStage:
         controllers: tuple[Controller, Controller],
         references: tuple[ArrayLike, ArrayLike],
         feedforwards: tuple[ArrayLike, ArrayLike],
-        delay: float,
-        substeps: int,
+        pace: _Pace,
     ) -> tuple[Tracked, Tracked]: ...
 
 def circle_errors(
@@ -414,8 +413,7 @@ class Plays:
         controller: Controller,
         reference: ArrayLike,
         feedforward: ArrayLike,
-        delay: float,
-        substeps: int,
+        pace: _Pace,
     ) -> Tracked: ...
     def loop_plants(self, low: float, high: float, delay: float) -> list[LoopPlant]: ...
     def feedforward(

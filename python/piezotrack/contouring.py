@@ -177,6 +177,7 @@ def contour(
     *,
     decoupling: ArrayLike | None = None,
     delay: float = 0.0,
+    jitter: float = 0.0,
     substeps: int = 10,
     beyond_reach: bool = False,
     unstable: bool = False,
@@ -200,6 +201,8 @@ def contour(
         inverse, so that what each axis adds to the other is what the other leaves out.
     delay : float, optional
         Time from a reading to the effect of its voltage [s], besides the hold.
+    jitter : float, optional
+        How late a sample comes on average [s], as for `track`: of each axis by its own time.
     substeps : int, optional
         Instants kept in each sampling interval.
     beyond_reach, unstable : bool, optional
@@ -237,6 +240,7 @@ def contour(
         raise ParameterError(f"path is {type(path).__name__}: expected pt.XYReference")
     both = _two(controllers)
     delay = not_negative("delay", delay, "s")
+    jitter = not_negative("jitter", jitter, "s")
     substeps = _core.as_count("substeps", substeps)
     forward = path if decoupling is None else path.transformed(_inverse(decoupling))
     free = (_core.as_truth("unstable", unstable), _core.as_truth("beyond_reach", beyond_reach))
@@ -257,8 +261,7 @@ def contour(
         (both[0].core, both[1].core),
         (samples[0].x, samples[1].x),
         (volts[0][0], volts[1][0]),
-        delay,
-        substeps,
+        (delay, jitter, substeps),
     )
     x, y = (
         followed(run, controller, reference, note, substeps)

@@ -51,10 +51,17 @@ def bare(stage: Led | Identified[Any]) -> tuple[Led, float, float]:
 
 
 def lead(
-    stage: Led, controller: Controller, reference: Array, volts: Array, delay: float, substeps: int
+    stage: Led,
+    controller: Controller,
+    reference: Array,
+    volts: Array,
+    pace: tuple[float, float, int],
 ) -> _core.Tracked:
-    """Let a controller lead a stage from rest along a reference [m], with a feedforward [V]."""
-    course = (controller.core, reference, volts, delay, substeps)
+    """Let a controller lead a stage from rest along a reference [m], with a feedforward [V].
+
+    `pace` is delay and jitter [s], and the instants kept in each control interval.
+    """
+    course = (controller.core, reference, volts, pace)
     if isinstance(stage, VirtualStage):
         return stage.core().track(*course)
     step = min(MODEL_STEP, controller.dt / 4)

@@ -99,7 +99,9 @@ def run_table_2(
     *,
     decoupling: ArrayLike | None = None,
     delay: float = 0.0,
+    jitter: float = 0.0,
     largest: float = 1.0,
+    checked: bool = True,
 ) -> Table2:
     """Run the nine circles of Table 2 of Xu and Li 2010, doi 10.1115/1.4001712.
 
@@ -112,10 +114,12 @@ def run_table_2(
         What is led.
     controllers : (Controller, Controller)
         Those of x and y.
-    decoupling, delay
+    decoupling, delay, jitter
         As for `contour`.
     largest : float, optional
         Radius up to which circles are run [m]: 20e-6 leaves out the last three.
+    checked : bool, optional
+        Whether reach and stability are checked before each circle.
 
     Returns
     -------
@@ -144,6 +148,9 @@ def run_table_2(
                 circle(frequency=case.frequency, radius=case.radius),
                 decoupling=decoupling,
                 delay=delay,
+                jitter=jitter,
+                beyond_reach=not checked,
+                unstable=not checked,
             )
             for case in PUBLISHED
             if case.radius <= largest

@@ -110,6 +110,10 @@ class Tracking:
     desired, measured, displacement : ndarray, shape (n,)
         Reference, reading of the sensor, true displacement [m]; the reading is that which the
         voltage of the same sample was computed from.
+    loop_error : ndarray, shape (n,)
+        Error that the controller computed last [m]: of its own reading, after its filters. Of an
+        axis that is served later than the other it is of the point of the path that it was served
+        with, and 0 before.
     voltage : ndarray, shape (n,)
         Command to the amplifier [V].
     feedforward, feedback, repetitive : ndarray, shape (n,)
@@ -128,6 +132,7 @@ class Tracking:
     desired: Array
     measured: Array
     displacement: Array
+    loop_error: Array
     voltage: Array
     feedforward: Array
     feedback: Array
@@ -281,6 +286,7 @@ def track(
     reference: Reference,
     *,
     delay: float = 0.0,
+    jitter: float = 0.0,
     substeps: int = 10,
     beyond_reach: bool = False,
     unstable: bool = False,
@@ -301,6 +307,10 @@ def track(
         What is to be followed, as ``pt.sine(...)``.
     delay : float, optional
         Time from a reading to the effect of its voltage [s], besides the hold.
+    jitter : float, optional
+        How late a sample comes on average [s], as on a computer that has other things to do: each
+        by its own time, drawn from an exponential distribution that ends at nine tenths of the
+        sampling interval. The draws follow from the seed of the stage's sensor.
     substeps : int, optional
         Instants kept for plots in each sampling interval.
     beyond_reach : bool, optional
@@ -348,7 +358,8 @@ def track(
     if not _core.as_truth("beyond_reach", beyond_reach):
         check_within_reach(led, controller, samples, offset)
     volts, note = feedforward_of(controller, reference)
-    run = lead(led, controller, samples.x - offset, volts, delay, substeps)
+    pace = (delay, not_negative("jitter", jitter, "s"), substeps)
+    run = lead(led, controller, samples.x - offset, volts, pace)
     return followed(run, controller, reference, note, substeps, offset)
 
 
@@ -378,6 +389,7 @@ def followed(
         desired=samples.x,
         measured=run.measured + offset,
         displacement=fine_displacement[::substeps],
+        loop_error=run.part("error"),
         voltage=run.part("volts"),
         feedforward=run.part("feedforward"),
         feedback=run.part("feedback"),

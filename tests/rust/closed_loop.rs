@@ -42,7 +42,7 @@ fn sine(high: f64, frequency: f64, samples: usize) -> Vec<f64> {
 }
 
 fn timing(samples: usize, delay: f64, substeps: usize) -> Timing {
-    Timing { interval: TS, samples, delay, substeps }
+    Timing { interval: TS, samples, delay, jitter: 0.0, substeps }
 }
 
 fn tracked(stage: &VirtualStage, reference: &[f64], timing: &Timing) -> ClosedLoop<VirtualState> {
@@ -165,6 +165,95 @@ fn a_delay_between_the_instants_kept_acts_where_it_should() {
     }
 }
 
+/// What rolls on at 1 um/s, and at 3 um/s when it has a voltage.
+struct Rolling;
+
+impl Plant for Rolling {
+    type State = f64;
+    type Flow = f64;
+
+    fn rest(&self) -> f64 {
+        0.0
+    }
+
+    fn flow(&self, step: f64) -> f64 {
+        step
+    }
+
+    fn advance(&self, step: &f64, state: &mut f64, from: f64, _: f64) {
+        *state += UM * step * (1.0 + 2.0 * from);
+    }
+
+    fn displacement(&self, state: &f64) -> f64 {
+        *state
+    }
+}
+
+#[test]
+fn late_samples_read_and_act_late() {
+    // The voltage is on in every other interval, from when the sample of that came.
+    let apparatus = Apparatus::bare(&Rolling, 1.0);
+    let (samples, jitter, substeps) = (4001, 3e-3, 4);
+    for delay in [0.0, 0.3 * TS, 1.95 * TS] {
+        let timing = Timing { jitter, ..timing(samples, delay, substeps) };
+        let blind = |k: usize, _: f64| if k % 2 == 0 { 1.0 } else { 0.0 };
+        let run = closed_loop(&apparatus, apparatus.rest(), &timing, blind, NEVER);
+        let run = run.unwrap().unwrap();
+        assert_eq!(run.measured.len(), (samples - 1) * substeps + 1);
+        // Without a command yet it rolls at 1 um/s, so the first reading tells how late it was;
+        // from then on what was on before a reading does.
+        let mut late = Vec::new();
+        let mut on = 0.0;
+        for k in 0..samples {
+            // With the commands before k known, x(t) is known from their effects on.
+            let effects: Vec<f64> =
+                late.iter().enumerate().map(|(j, late)| TS * j as f64 + late + delay).collect();
+            if k % 2 == 0 && k / 2 > 4 {
+                let i = k / 2 - 5;
+                on += effects[2 * i + 1] - effects[2 * i];
+            }
+            let at = |t: f64| {
+                let spans = effects.iter().step_by(2).enumerate().skip((k / 2).saturating_sub(4));
+                let recent: f64 = spans
+                    .map(|(i, &from)| {
+                        let to = effects.get(2 * i + 1).copied().unwrap_or(f64::INFINITY);
+                        (t.min(to) - from).max(0.0)
+                    })
+                    .sum();
+                UM * (t + 2.0 * (on + recent))
+            };
+            let (mut low, mut high) = (TS * k as f64, TS * (k + 1) as f64);
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                if at(middle) < run.measured[k * substeps] { low = middle } else { high = middle }
+            }
+            late.push(low - TS * k as f64);
+        }
+        let mean = late.iter().sum::<f64>() / late.len() as f64;
+        let longer = late.iter().filter(|&&late| late > jitter).count() as f64 / samples as f64;
+        assert!((mean / jitter - 1.0).abs() < 0.05, "{mean}");
+        assert!((longer - (-1.0_f64).exp()).abs() < 0.03, "{longer}");
+        assert!(late.iter().all(|late| *late < 0.9 * TS + 1e-9));
+    }
+}
+
+#[test]
+fn a_jitter_of_next_to_nothing_changes_nothing() {
+    let stage = VirtualStage::xu_li_2010(1);
+    let reference = sine(50.0 * UM, 0.5, 100);
+    for delay in [0.0, 7.1e-3, TS] {
+        let prompt = tracked(&stage, &reference, &timing(100, delay, 3));
+        let late = Timing { jitter: 1e-9, ..timing(100, delay, 3) };
+        let late = tracked(&stage, &reference, &late);
+        for (a, b) in prompt.measured.iter().zip(&late.measured).skip(3).step_by(3) {
+            assert!((a - b).abs() < 0.08 * UM, "{a:e} {b:e}");
+        }
+        for (a, b) in prompt.displacement.iter().zip(&late.displacement) {
+            assert!((a - b).abs() < 0.08 * UM, "{a:e} {b:e}");
+        }
+    }
+}
+
 #[test]
 fn instants_kept_for_plots_change_nothing() {
     let stage = VirtualStage::xu_li_2010(1);
@@ -225,6 +314,8 @@ fn no_bad_number_gets_through() {
     assert!(refused(&timing(0, 0.0, 1), |_, _| 0.0).starts_with("samples is 0"));
     assert!(refused(&timing(9, 0.0, 0), |_, _| 0.0).starts_with("substeps is 0"));
     assert!(refused(&timing(9, -1.0, 1), |_, _| 0.0).starts_with("delay is -1 s"));
+    let early = Timing { jitter: -1.0, ..timing(9, 0.0, 1) };
+    assert!(refused(&early, |_, _| 0.0).starts_with("jitter is -1 s"));
     assert!(refused(&timing(usize::MAX, 0.0, 2), |_, _| 0.0).starts_with("samples is too many"));
     let long = Timing { interval: 1e9, ..timing(9, 0.0, 1) };
     assert!(refused(&long, |_, _| 0.0).starts_with("step is 2e-5 s"));

@@ -9,7 +9,7 @@ use piezotrack_core::identify::{cross_talk, noise_at_rest};
 use piezotrack_core::integrate::{Drive, Hold, NEVER};
 use piezotrack_core::metrics::Spread;
 use piezotrack_core::simulate::{
-    Apparatus, Course, Law, Plant, Timing, TwoAxes, open_loops, track, track_both,
+    Apparatus, ApparatusState, Course, Law, Plant, Timing, TwoAxes, open_loops, track, track_both,
 };
 use piezotrack_core::stage::{DahlStage, VirtualSettings, VirtualStage};
 
@@ -39,6 +39,31 @@ impl Plant for Rigid {
     }
 }
 
+/// What rolls on under a voltage: 1 um/s for 1 V.
+#[derive(Clone, Copy)]
+struct Rolling;
+
+impl Plant for Rolling {
+    type State = f64;
+    type Flow = f64;
+
+    fn rest(&self) -> f64 {
+        0.0
+    }
+
+    fn flow(&self, step: f64) -> f64 {
+        step
+    }
+
+    fn advance(&self, step: &f64, state: &mut f64, from: f64, to: f64) {
+        *state += 0.5 * UM * step * (from + to);
+    }
+
+    fn displacement(&self, state: &f64) -> f64 {
+        *state
+    }
+}
+
 fn pid() -> Controller<Law> {
     Controller::new(Limits::new(0.0, 75.0).unwrap(), Law::Pid(Pid::xu_li_2010().at(TS).unwrap()))
 }
@@ -54,7 +79,7 @@ fn wave(samples: usize, middle: f64, radius: f64, frequency: f64, behind: f64) -
 }
 
 fn timing(delay: f64, substeps: usize) -> Timing {
-    Timing { interval: TS, samples: 0, delay, substeps }
+    Timing { interval: TS, samples: 0, delay, jitter: 0.0, substeps }
 }
 
 #[test]
@@ -115,6 +140,80 @@ fn a_lag_makes_the_ellipse_of_its_angle() {
         // Sample by sample it is the same motion, so much later.
         for k in turn {
             assert!((y.motion.measured[k] - UM * sine[k - 1 - whole]).abs() < 1e-18);
+        }
+    }
+}
+
+#[test]
+fn late_axes_without_cross_talk_and_lag_move_as_each_alone() {
+    // Time is cut at the samples of both, so that steps differ, and nothing else does.
+    let (stage, other) = (VirtualStage::xu_li_2010(3), VirtualStage::xu_li_2010_y(4));
+    let (x, y) = (stage.apparatus(), other.apparatus());
+    let reference = wave(150, 50.0 * UM, 10.0 * UM, 0.5, 0.0);
+    let course = Course { reference: &reference, feedforward: &vec![0.0; 150] };
+    for (delay, jitter, substeps) in [(0.0, 2e-3, 1), (0.027, 4e-3, 3)] {
+        let timing = Timing { jitter, ..timing(delay, substeps) };
+        let axes = TwoAxes { x, y, cross_talk: [0.0, 0.0], lag: 0.0 };
+        let start = (stage.start(), other.start());
+        let both = track_both(&axes, start, &timing, (&pid(), &pid()), [course; 2], NEVER);
+        let (along_x, along_y) = both.unwrap().unwrap();
+        for (together, stage, axis) in [(&along_x, &stage, &x), (&along_y, &other, &y)] {
+            let alone = track(axis, stage.start(), &timing, &pid(), course, NEVER);
+            let alone = alone.unwrap().unwrap();
+            for (a, b) in together.motion.displacement.iter().zip(&alone.motion.displacement) {
+                assert!((a - b).abs() < 0.2 * UM, "{a:e} {b:e}");
+            }
+            assert_eq!(together.commands.len(), alone.commands.len());
+        }
+    }
+}
+
+#[test]
+fn each_axis_is_late_by_its_own_time() {
+    // Under a ramp without feedback: what the controllers read tells when they did.
+    let (x, y) = (VirtualStage::xu_li_2010(1), VirtualStage::xu_li_2010_y(1));
+    let plant = Rolling;
+    let seeded = |stage: &VirtualStage| {
+        let mut apparatus = Apparatus::bare(&plant, 1.0);
+        apparatus.sensor.seed = stage.settings().sensor.seed;
+        apparatus
+    };
+    let axes = TwoAxes { x: seeded(&x), y: seeded(&y), cross_talk: [0.0; 2], lag: 0.0 };
+    let ones = vec![1.0; 3000];
+    let zeros = vec![0.0; 3000];
+    let course = Course { reference: &zeros, feedforward: &ones };
+    let lateness = |lag: f64| {
+        let timing = Timing { jitter: 2e-3, ..timing(0.0, 1) };
+        let axes = TwoAxes { lag, ..axes };
+        let begun = |rest: &mut ApparatusState<f64>| rest.command = 1.0;
+        let mut start = (axes.x.rest(), axes.y.rest());
+        begun(&mut start.0);
+        begun(&mut start.1);
+        let run = track_both(&axes, start, &timing, (&open(), &open()), [course; 2], NEVER);
+        let (x, y) = run.unwrap().unwrap();
+        let of = |motion: &[f64]| -> Vec<f64> {
+            motion.iter().enumerate().map(|(k, x)| x / UM - TS * k as f64).collect()
+        };
+        let served: Vec<f64> = y.commands.iter().map(|command| -command.error / UM).collect();
+        (of(&x.motion.measured), of(&y.motion.measured), served)
+    };
+    let (prompt_x, prompt_y, _) = lateness(0.0);
+    let mean = |late: &[f64]| late.iter().sum::<f64>() / late.len() as f64;
+    for late in [&prompt_x, &prompt_y] {
+        assert!((mean(late) / 2e-3 - 1.0).abs() < 0.06, "{}", mean(late));
+    }
+    let together: f64 = prompt_x.iter().zip(&prompt_y).map(|(a, b)| (a - 2e-3) * (b - 2e-3)).sum();
+    assert!((together / 3000.0).abs() < 0.06 * 4e-6, "{together:e}");
+    // A lag moves when y's controller looks, not what is recorded.
+    for (lag, whole) in [(0.013, 1), (0.04, 2), (0.047, 3)] {
+        let (late_x, late_y, served) = lateness(lag);
+        for k in 0..3000 {
+            assert!((late_x[k] - prompt_x[k]).abs() < 1e-9);
+            assert!((late_y[k] - prompt_y[k]).abs() < 1e-9, "{lag} {k}");
+        }
+        for k in whole..3000 {
+            let late = served[k] - (TS * (k - whole) as f64 + lag);
+            assert!((-1e-9..0.9 * TS).contains(&late), "{lag} {k} {late:e}");
         }
     }
 }

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import DataError, ParameterError
-from .options import ControlInterval, Duration, Out, Period, can_be_folder, list_files, number_range
+from .options import (
+    ControlInterval,
+    Duration,
+    Jitter,
+    Out,
+    Period,
+    can_be_folder,
+    list_files,
+    number_range,
+)
 from .words import in_words
 
 if TYPE_CHECKING:
@@ -63,6 +72,7 @@ def contour_command(
     ti: Annotated[float, typer.Option(help="Integral time in s.")] = 0.009,
     td: Annotated[float, typer.Option(help="Derivative time in s.")] = 0.044,
     delay: Annotated[float, typer.Option(help="Delay in the loops in s, besides the hold.")] = 0.0,
+    jitter: Jitter = 0.0,
     duration: Duration = None,
     period: Period = None,
     path_dt: Annotated[
@@ -100,7 +110,7 @@ def contour_command(
         feedforward=inverse,
         feedback=Pid.from_um(kp=kp, ti=ti, td=td) if feedback else None,
     )
-    mixing: dict[str, Any] = {"delay": delay}
+    mixing: dict[str, Any] = {"delay": delay, "jitter": jitter}
     if decouple:
         found = _cross_talk(stage)
         mixing["decoupling"] = found.matrix

@@ -24,6 +24,7 @@ __all__ = [
     "Duration",
     "HoldOption",
     "Interval",
+    "Jitter",
     "Out",
     "Period",
     "Seconds",
@@ -63,6 +64,9 @@ HoldOption = Annotated[
     typer.Option(help="Between samples the drive is a line (foh) or constant (zoh)."),
 ]
 ControlInterval = Annotated[float, typer.Option(help="Sampling interval of the controller in s.")]
+Jitter = Annotated[
+    float, typer.Option(help="How late a sample comes on average in s, each by chance.")
+]
 Duration = Annotated[float | None, typer.Option(help="Length of the reference in s.")]
 Period = Annotated[
     float | None, typer.Option(help="Time in s after which a reference from a file repeats.")

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ..errors import ParameterError
-from .options import ControlInterval, Duration, Out, Period, can_be_folder, list_files, number_range
+from .options import (
+    ControlInterval,
+    Duration,
+    Jitter,
+    Out,
+    Period,
+    can_be_folder,
+    list_files,
+    number_range,
+)
 from .words import in_words
 
 if TYPE_CHECKING:
@@ -57,6 +66,7 @@ def track_command(
     kq: Annotated[float, typer.Option(help="Learning gain in V/um.")] = 1.0,
     tq: Annotated[float, typer.Option(help="Time constant of the learning's filter in s.")] = 0.2,
     delay: Annotated[float, typer.Option(help="Delay in the loop in s, besides the hold.")] = 0.0,
+    jitter: Jitter = 0.0,
     duration: Duration = None,
     period: Period = None,
     seed: Annotated[int, typer.Option(help="Of the virtual stage's noise.")] = 1,
@@ -90,7 +100,8 @@ def track_command(
         raise ParameterError(f"--stage is '{stage}': expected virtual or model")
     led = VirtualStage.xu_li_2010(seed=seed) if stage == "virtual" else known
     can_be_folder(out)
-    run = track(led, loop, course, delay=delay, beyond_reach=beyond_reach, unstable=unstable)
+    free = {"beyond_reach": beyond_reach, "unstable": unstable}
+    run = track(led, loop, course, delay=delay, jitter=jitter, **free)
     written = _write(run, known, loop, out)
     print(f"the {stage} stage" if stage == "virtual" else "the model itself", end=", ")
     print(run.summary())

@@ -34,10 +34,13 @@ class Apparatus:
         Both axes, their cross-talk and the lag between them.
     delay : float
         From a reading to the effect of its voltage [s].
+    jitter : float
+        How late a sample comes on average [s].
     """
 
     stage: XYStage
     delay: float
+    jitter: float = 0.0
 
     @property
     def x(self) -> VirtualStage:
@@ -50,6 +53,11 @@ class Apparatus:
         """The other one."""
         assert isinstance(self.stage.y, VirtualStage)
         return self.stage.y
+
+    @property
+    def pace(self) -> dict[str, Any]:
+        """Delay and jitter, as `track` and `contour` take them."""
+        return {"delay": self.delay, "jitter": self.jitter}
 
     def seeded(self, seed: int) -> Apparatus:
         """Return the same apparatus with other noise of both sensors."""
@@ -64,6 +72,7 @@ class Apparatus:
             "cross_talk": list(self.stage.cross_talk),
             "lag": self.stage.lag,
             "delay": self.delay,
+            "jitter": self.jitter,
         }
 
     @classmethod
@@ -71,7 +80,9 @@ class Apparatus:
         """Make the apparatus that `document` describes."""
         x, y = (VirtualStage(**document[axis], seed=0) for axis in "xy")
         stage = XYStage(x=x, y=y, cross_talk=document["cross_talk"], lag=document["lag"])
-        return cls(stage=stage, delay=document["delay"]).seeded(0)
+        return cls(stage=stage, delay=document["delay"], jitter=document.get("jitter", 0.0)).seeded(
+            0
+        )
 
     @classmethod
     def calibrated(cls) -> Apparatus:

@@ -32,7 +32,7 @@ def compensation(apparatus: Apparatus, inverse: Inverse) -> Runs:
         "both": loop(inverse, feedback=PID),
     }
     return {
-        name: track(apparatus.x, one, slow(), delay=apparatus.delay, unstable=True)
+        name: track(apparatus.x, one, slow(), **apparatus.pace, unstable=True)
         for name, one in loops.items()
     }
 
@@ -47,7 +47,7 @@ def antiwindup(apparatus: Apparatus, inverse: Inverse, part: float = 1.0) -> Run
     return {
         name: track(
             *(apparatus.x, one, shrunk(part)),
-            delay=apparatus.delay,
+            **apparatus.pace,
             beyond_reach=True,
             unstable=True,
         )
@@ -65,7 +65,7 @@ def repetitive(apparatus: Apparatus, inverse: Inverse, part: float = 1.0) -> Run
         "with": loop(inverse, feedback=PID, addon=learning),
     }
     return {
-        name: track(apparatus.x, one, reference, delay=apparatus.delay, unstable=True)
+        name: track(apparatus.x, one, reference, **apparatus.pace, unstable=True)
         for name, one in loops.items()
     }
 

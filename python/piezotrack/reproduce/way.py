@@ -31,6 +31,8 @@ class Way:
         Figs. 12, 13 and 14.
     table : Table2
         Fig. 15 and Table 2.
+    lag : float
+        From serving x to serving y [s].
     """
 
     noise: Noise
@@ -41,6 +43,7 @@ class Way:
     antiwindup: Runs
     repetitive: Runs
     table: Table2
+    lag: float
 
     @property
     def values(self) -> dict[str, float]:
@@ -50,7 +53,7 @@ class Way:
             **step_test.observe(self.step),
             **models.observe(self.judged),
             **tracked.observe(self.compensation, self.antiwindup, self.repetitive),
-            **circles.observe(self.table),
+            **circles.observe(self.table, self.lag),
         }
 
     @property
@@ -58,7 +61,7 @@ class Way:
         """The same of the true displacement, for what is followed under control."""
         return {
             **tracked.observe(self.compensation, self.antiwindup, self.repetitive, true=True),
-            **circles.observe(self.table, true=True),
+            **circles.observe(self.table, self.lag, true=True),
         }
 
 
@@ -90,4 +93,5 @@ def go(apparatus: Apparatus, seed: int) -> Way:
         antiwindup=tracked.antiwindup(apparatus, inverse),
         repetitive=tracked.repetitive(apparatus, inverse),
         table=circles.circles(apparatus, inverse),
+        lag=apparatus.stage.lag,
     )

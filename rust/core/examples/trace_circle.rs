@@ -56,6 +56,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             interval: INTERVAL,
             samples: courses[0].reference.len(),
             delay: 0.0,
+            jitter: 0.0,
             substeps: 1,
         };
         let start = (x.start(), y.start());

@@ -34,8 +34,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let stage = VirtualStage::xu_li_2010(1);
     for (name, law, feedforward) in situations {
         let controller = Controller::new(Limits::new(0.0, 75.0)?, law);
-        let timing =
-            Timing { interval: INTERVAL, samples: reference.len(), delay: 0.0, substeps: 1 };
+        let timing = Timing {
+            interval: INTERVAL,
+            samples: reference.len(),
+            delay: 0.0,
+            jitter: 0.0,
+            substeps: 1,
+        };
         let course = Course { reference: &reference, feedforward };
         let run = track(&stage.apparatus(), stage.start(), &timing, &controller, course, NEVER)?;
         let Some(run) = run else { continue };

@@ -12,6 +12,9 @@ const WORDS: u128 = 128;
 /// Stream of a sensor's noise: no search counts this many runs.
 const SENSOR: u64 = u64::MAX;
 
+/// Stream of how late the samples of a controller come.
+const LATENESS: u64 = u64::MAX - 1;
+
 /// Which of a run's streams draws the links between particles.
 const LINKS: u64 = 1 << 63;
 
@@ -49,6 +52,11 @@ impl Draws {
     /// A normal deviate for one sample of a sensor.
     pub(crate) fn normal(seed: u64, sample: u64) -> f64 {
         Self::at(seed, SENSOR, sample, 0, 1).two_normals()[0]
+    }
+
+    /// How late one sample of a controller comes, in units of the mean.
+    pub(crate) fn lateness(seed: u64, sample: u64) -> f64 {
+        Self::at(seed, LATENESS, sample, 0, 1).exponential()
     }
 
     /// A whole number below `count`.

@@ -19,7 +19,7 @@ use crate::design::PyLoopPlant;
 use crate::enter::enter;
 use crate::errors::raise;
 use crate::stage::hold;
-use crate::tracking::{Arrays, PyTracked};
+use crate::tracking::{Arrays, Pace, PyTracked};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyPlays>()?;
@@ -134,11 +134,10 @@ impl PyPlays {
         controller: &PyController,
         reference: &Bound<'_, PyAny>,
         feedforward: &Bound<'_, PyAny>,
-        delay: f64,
-        substeps: usize,
+        pace: Pace,
     ) -> PyResult<PyTracked> {
         let course = Arrays::new(reference, feedforward)?;
-        enter(py, |stop| course.bare(&self.stage, step, controller, (delay, substeps), stop))
+        enter(py, |stop| course.bare(&self.stage, step, controller, pace, stop))
     }
 
     /// The stage for small motions between two voltages: least, mean and largest gain.

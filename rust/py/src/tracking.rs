@@ -36,26 +36,25 @@ fn track_model(
     controller: &PyController,
     reference: &Bound<'_, PyAny>,
     feedforward: &Bound<'_, PyAny>,
-    delay: f64,
-    substeps: usize,
+    pace: Pace,
 ) -> PyResult<PyTracked> {
     let course = Arrays::new(reference, feedforward)?;
     enter(py, |stop| match model {
         "dahl" => {
             let stage = DahlStage::from_theta(exactly(&theta)?)?;
-            course.bare(&stage, step, controller, (delay, substeps), stop)
+            course.bare(&stage, step, controller, pace, stop)
         }
         "first-order-dahl" => {
             let stage = FirstOrderDahlStage::from_theta(exactly(&theta)?)?;
             let kernel = FirstOrderDahlKernel { exponent: stage.exponent };
             let plant = Alone { kernel: &kernel, parameters: &stage.parameters() };
-            course.bare(&plant, step, controller, (delay, substeps), stop)
+            course.bare(&plant, step, controller, pace, stop)
         }
         "bouc-wen" => {
             let stage = BoucWenStage::from_theta(exactly(&theta)?)?;
             let kernel = BoucWenKernel { exponent: stage.exponent };
             let plant = Alone { kernel: &kernel, parameters: &stage.parameters() };
-            course.bare(&plant, step, controller, (delay, substeps), stop)
+            course.bare(&plant, step, controller, pace, stop)
         }
         other => Err(Error::parameter("model", format!("'{other}'"), "one that can be led")),
     })
@@ -73,6 +72,15 @@ fn exactly<const N: usize>(theta: &[f64]) -> Result<&[f64; N]> {
 /// A stopped simulation, for which `enter` raises.
 pub fn stopped<T>(run: Option<T>) -> Result<T> {
     run.ok_or_else(|| Error::Numerical("the simulation was stopped".into()))
+}
+
+/// Delay and jitter, s, and instants kept in each control interval.
+pub type Pace = (f64, f64, usize);
+
+/// When a controller looks and acts.
+pub fn timing(controller: &PyController, samples: usize, pace: Pace) -> Timing {
+    let (delay, jitter, substeps) = pace;
+    Timing { interval: controller.dt, samples, delay, jitter, substeps }
 }
 
 /// Reference and feedforward as Python gives them.
@@ -102,11 +110,11 @@ impl Arrays {
         plant: &P,
         step: f64,
         controller: &PyController,
-        (delay, substeps): (f64, usize),
+        pace: Pace,
         stop: Stop<'_>,
     ) -> Result<PyTracked> {
         let apparatus = Apparatus::bare(plant, step);
-        self.run(&apparatus, apparatus.rest(), controller, (delay, substeps), stop)
+        self.run(&apparatus, apparatus.rest(), controller, pace, stop)
     }
 
     pub fn run<P: Plant>(
@@ -114,11 +122,10 @@ impl Arrays {
         apparatus: &Apparatus<'_, P>,
         start: ApparatusState<P::State>,
         controller: &PyController,
-        (delay, substeps): (f64, usize),
+        pace: Pace,
         stop: Stop<'_>,
     ) -> Result<PyTracked> {
-        let (interval, samples) = (controller.dt, self.reference.len());
-        let timing = Timing { interval, samples, delay, substeps };
+        let timing = timing(controller, self.reference.len(), pace);
         let run = track(apparatus, start, &timing, &controller.controller, self.course(), stop)?;
         Ok(PyTracked::new(stopped(run)?))
     }

@@ -12,7 +12,7 @@ use crate::control::PyController;
 use crate::enter::enter;
 use crate::errors::raise;
 use crate::stage::hold;
-use crate::tracking::{Arrays, PyTracked, stopped};
+use crate::tracking::{Arrays, Pace, PyTracked, stopped};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyVirtualStage>()
@@ -213,13 +213,12 @@ impl PyVirtualStage {
         controller: &PyController,
         reference: &Bound<'_, PyAny>,
         feedforward: &Bound<'_, PyAny>,
-        delay: f64,
-        substeps: usize,
+        pace: Pace,
     ) -> PyResult<PyTracked> {
         let course = Arrays::new(reference, feedforward)?;
         enter(py, |stop| {
             let apparatus = self.0.apparatus();
-            course.run(&apparatus, self.0.start(), controller, (delay, substeps), stop)
+            course.run(&apparatus, self.0.start(), controller, pace, stop)
         })
     }
 }

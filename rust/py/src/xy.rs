@@ -6,7 +6,7 @@ use piezotrack_core::identify::{cross_talk, noise_at_rest};
 use piezotrack_core::integrate::{Drive, Stop};
 use piezotrack_core::metrics::Spread;
 use piezotrack_core::simulate::{
-    Apparatus, ApparatusState, Plant, Timing, TwoAxes, TwoStates, open_loops, track_both,
+    Apparatus, ApparatusState, Plant, TwoAxes, TwoStates, open_loops, track_both,
 };
 use piezotrack_core::stage::{DahlStage, StageState, VirtualStage, VirtualState};
 use piezotrack_core::{Error, Result};
@@ -17,7 +17,7 @@ use crate::control::PyController;
 use crate::enter::enter;
 use crate::errors::raise;
 use crate::stage::{Theta, hold};
-use crate::tracking::{Arrays, PyTracked, stopped};
+use crate::tracking::{Arrays, Pace, PyTracked, stopped, timing};
 use crate::virtual_stage::{OpenLoopArrays, PyVirtualStage};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -125,8 +125,7 @@ impl PyXyStage {
 struct Following<'a> {
     controllers: [&'a PyController; 2],
     courses: [Arrays; 2],
-    delay: f64,
-    substeps: usize,
+    pace: Pace,
 }
 
 impl Job for Following<'_> {
@@ -138,8 +137,8 @@ impl Job for Following<'_> {
         start: TwoStates<X::State, Y::State>,
         stop: Stop<'_>,
     ) -> Result<Self::Done> {
-        let Self { controllers: [x, y], courses, delay, substeps } = self;
-        let timing = Timing { interval: x.dt, samples: 0, delay: *delay, substeps: *substeps };
+        let Self { controllers: [x, y], courses, pace } = self;
+        let timing = timing(x, 0, *pace);
         let courses = [courses[0].course(), courses[1].course()];
         let controllers = (&x.controller, &y.controller);
         let (x, y) = stopped(track_both(axes, start, &timing, controllers, courses, stop)?)?;
@@ -219,15 +218,14 @@ impl PyXyStage {
         controllers: [PyRef<'_, PyController>; 2],
         references: [Bound<'_, PyAny>; 2],
         feedforwards: [Bound<'_, PyAny>; 2],
-        delay: f64,
-        substeps: usize,
+        pace: Pace,
     ) -> PyResult<(PyTracked, PyTracked)> {
         let courses = [
             Arrays::new(&references[0], &feedforwards[0])?,
             Arrays::new(&references[1], &feedforwards[1])?,
         ];
         let controllers = [&*controllers[0], &*controllers[1]];
-        let job = Following { controllers, courses, delay, substeps };
+        let job = Following { controllers, courses, pace };
         enter(py, |stop| self.with(&job, stop))
     }
 }

@@ -5,6 +5,7 @@
 //! ```
 
 mod amplifier;
+mod clock;
 mod closed_loop;
 mod open_loop;
 mod plant;
@@ -13,7 +14,8 @@ mod tracking;
 mod two_axes;
 
 pub use amplifier::{Amplifier, AmplifierFlow};
-pub use closed_loop::{ClosedLoop, Timing, closed_loop};
+pub use clock::Timing;
+pub use closed_loop::{ClosedLoop, closed_loop};
 pub use open_loop::{OpenLoop, open_loop};
 pub use plant::{DahlFlow, KernelFlow, Plant};
 pub use sensor::{Sensor, SensorState};

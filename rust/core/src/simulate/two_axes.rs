@@ -9,10 +9,11 @@
 
 use piezotrack_control::{Command, Controller, Feedback};
 
-use super::closed_loop::{Commands, Delay, Record, SAME, checked, ends};
+use super::clock::{Clock, Commands, Delay, Event, SAMPLES, Timing, events};
+use super::closed_loop::{Record, checked};
 use super::open_loop::{BLOCK, checked as checked_drive, since};
 use super::tracking::{Leader, Tracked};
-use super::{Apparatus, ApparatusState, ClosedLoop, Course, OpenLoop, Plant, Stretch, Timing};
+use super::{Apparatus, ApparatusState, ClosedLoop, Course, OpenLoop, Plant, Stretch};
 use crate::error::{Error, Result, finite, not_negative};
 use crate::integrate::{Drive, Stop, index};
 
@@ -96,85 +97,80 @@ impl<X: Plant, Y: Plant> TwoAxes<'_, X, Y> {
         [self.x.read_beside(x, to_x, since_x), self.y.read_beside(y, to_y, since_y)]
     }
 
-    /// Cuts a control interval at all that happens in it.
-    fn parts(&self, run: &Pair<X::State, Y::State>) -> Result<Vec<Part<X::Flow, Y::Flow>>> {
-        let Timing { interval, substeps, .. } = run.timing;
-        let marks = [run.commands[0].fraction(), run.lag.fraction, run.commands[1].fraction()];
-        let mut parts = Vec::new();
+    /// Cuts control interval `k` at all that happens in it.
+    fn cut(&self, run: &Pair<X::State, Y::State>, k: usize) -> Result<Parts<X::Flow, Y::Flow>> {
+        let effects: Vec<f64> = run.commands.iter().flat_map(|one| one.effects(k)).collect();
+        let samples = run.clocks.map(|clock| clock.at(k));
         let mut from = 0.0;
-        let mut waits = run.lag.fraction > 0.0;
-        for (end, kept) in ends(substeps, &marks) {
-            // Once in an interval, however near its neighbours are.
-            let samples_y = waits && (end - run.lag.fraction).abs() <= SAME;
-            waits &= !samples_y;
-            let duration = (end - from) * interval;
-            parts.push(Part {
-                x: self.x.stretch(duration)?,
-                y: self.y.stretch(duration)?,
-                newer: [run.commands[0].newer(from), run.commands[1].newer(from)],
-                kept,
-                samples_y,
-            });
-            from = end;
+        let mut parts = Vec::new();
+        for event in events(run.timing.substeps, &effects, samples) {
+            let duration = (event.end - from) * run.timing.interval;
+            let (x, y) = (self.x.stretch(duration)?, self.y.stretch(duration)?);
+            parts.push(Part { x, y, from, event });
+            from = event.end;
         }
         Ok(parts)
     }
 }
 
-/// A part of each control interval: a stretch between neighbouring events.
+type Parts<X, Y> = Vec<Part<X, Y>>;
+
+/// A part of a control interval: a stretch between neighbouring events.
 struct Part<X, Y> {
     x: Stretch<X>,
     y: Stretch<Y>,
-    /// Whether the newer of the two commands of each axis acts in it.
-    newer: [bool; 2],
-    /// Whether an instant that is kept is at its end.
-    kept: bool,
-    /// Whether y is read and its command computed at its end.
-    samples_y: bool,
+    /// Where it begins, as a part of the interval.
+    from: f64,
+    /// What happens at its end.
+    event: Event,
 }
 
 /// The run of both axes so far.
 struct Pair<X, Y> {
     timing: Timing,
     lag: Delay,
+    /// When x is read, y for the record, and y for its controller.
+    clocks: [Clock; 3],
     x: Record<X>,
     y: Record<Y>,
     commands: [Commands; 2],
 }
 
 impl<X, Y> Pair<X, Y> {
-    fn new(timing: &Timing, lag: f64, start: TwoStates<X, Y>) -> Result<Self> {
+    fn new(timing: &Timing, lag: f64, seeds: [u64; 2], start: TwoStates<X, Y>) -> Result<Self> {
         let (x, y) = (Record::new(timing, start.0)?, Record::new(timing, start.1)?);
         let Timing { interval, samples, delay, .. } = *timing;
+        let whole = Delay::new(lag, interval);
+        let [clock_x, clock_y] = seeds.map(|seed| Clock::new(timing, seed));
+        let late_y = clock_y.later(whole.fraction);
+        let held = [x.run.last.command, y.run.last.command];
+        let acts = [delay, lag + delay].map(|delay| Delay::new(delay, interval));
         let commands = [
-            Commands::new(samples, x.run.last.command, Delay::new(delay, interval)),
-            Commands::new(samples, y.run.last.command, Delay::new(lag + delay, interval)),
+            Commands::new(samples, held[0], acts[0], clock_x, 0),
+            Commands::new(samples, held[1], acts[1], late_y, whole.whole),
         ];
-        let lag = Delay::new(lag, interval);
-        Ok(Self { timing: *timing, lag, x, y, commands })
+        let clocks = [clock_x, clock_y, late_y];
+        Ok(Self { timing: *timing, lag: whole, clocks, x, y, commands })
     }
 
-    /// Reads both sensors at the beginning of control interval `k`, for the record and for x.
-    fn read<P, Q>(&mut self, axes: &TwoAxes<'_, P, Q>, k: usize) -> [f64; 2]
+    /// Reads x at the part `now` of the present control interval.
+    fn read_x<P, Q>(&mut self, axes: &TwoAxes<'_, P, Q>, now: f64) -> f64
     where
         P: Plant<State = X>,
         Q: Plant<State = Y>,
     {
-        let Timing { interval, .. } = self.timing;
-        let since_x = if k == 0 { 0.0 } else { interval };
-        // Between two such readings y's controller has read it, `lag` after the first.
-        let sampled_between = self.lag.fraction > 0.0 && k > self.lag.whole;
-        let since_y = if sampled_between { (1.0 - self.lag.fraction) * interval } else { since_x };
-        axes.read(&mut self.x.run.last, &mut self.y.run.last, [since_x, since_y])
+        let since = self.x.since(now);
+        let [to_x, _] = axes.added(&self.x.run.last, &self.y.run.last);
+        axes.x.read_beside(&mut self.x.run.last, to_x, since)
     }
 
-    /// Reads y alone, `lag` into control interval `k`.
-    fn read_late<P, Q>(&mut self, axes: &TwoAxes<'_, P, Q>) -> f64
+    /// Reads y likewise.
+    fn read_y<P, Q>(&mut self, axes: &TwoAxes<'_, P, Q>, now: f64) -> f64
     where
         P: Plant<State = X>,
         Q: Plant<State = Y>,
     {
-        let since = self.lag.fraction * self.timing.interval;
+        let since = self.y.since(now);
         let [_, to_y] = axes.added(&self.x.run.last, &self.y.run.last);
         axes.y.read_beside(&mut self.y.run.last, to_y, since)
     }
@@ -196,8 +192,8 @@ impl<X, Y> Pair<X, Y> {
 /// Each controller is called as in [`super::closed_loop`]; that of y at `lag` after that of x,
 /// with a reading of its own. `timing.delay` counts from each axis's own sampling. The record is of
 /// the instants of x: both `measured` are read at once there, whatever the lag, as a recorder
-/// beside the controllers would. Of two axes without cross-talk and lag each has the bits of
-/// [`super::closed_loop`].
+/// beside the controllers would; with jitter each comes late by a time of its own. Of two axes without cross-talk, lag and jitter each has the
+/// bits of [`super::closed_loop`].
 ///
 /// # Errors
 /// Those of [`super::closed_loop`], for both axes.
@@ -210,42 +206,60 @@ pub fn closed_loops<X: Plant, Y: Plant>(
     stop: Stop<'_>,
 ) -> Result<Option<TwoMotions<X, Y>>> {
     axes.validate()?;
-    let mut run = Pair::new(timing, axes.lag, start)?;
-    let parts = axes.parts(&run)?;
-    let mut serve_y = |run: &mut Pair<X::State, Y::State>, k: usize, measured: f64| -> Result<()> {
-        // Before the lag has passed there is nothing to follow.
-        let Some(sample) = k.checked_sub(run.lag.whole) else { return Ok(()) };
-        run.commands[1].push(checked(sample, measured, y(sample, measured))?);
-        Ok(())
-    };
+    let mut run = Pair::new(timing, axes.lag, [axes.x.sensor.seed, axes.y.sensor.seed], start)?;
+    let mut parts = Vec::new();
+    let mut serve =
+        |run: &mut Pair<X::State, Y::State>, k: usize, come: [bool; SAMPLES]| -> Result<()> {
+            let [now_x, now_y, now_late] = run.clocks.map(|clock| clock.at(k));
+            if come[0] {
+                let measured = run.read_x(axes, now_x);
+                run.commands[0].push(checked(k, measured, x(k, measured))?);
+                run.x.control(k, measured, run.commands[0].last());
+            }
+            // For the record and, where it is the same, for the controller.
+            let measured = come[1].then(|| run.read_y(axes, now_y));
+            // Before the lag has passed there is nothing to follow.
+            if let Some(sample) = k.checked_sub(run.lag.whole).filter(|_| come[2]) {
+                let seen = measured.unwrap_or_else(|| run.read_y(axes, now_late));
+                run.commands[1].push(checked(sample, seen, y(sample, seen))?);
+            }
+            if let Some(measured) = measured {
+                run.y.control(k, measured, run.commands[1].last());
+            }
+            Ok(())
+        };
     for k in 0..timing.samples {
         if stop() {
             return Ok(None);
         }
-        let [read_x, read_y] = run.read(axes, k);
-        run.commands[0].push(checked(k, read_x, x(k, read_x))?);
-        if run.lag.fraction == 0.0 {
-            serve_y(&mut run, k, read_y)?;
+        if parts.is_empty() || timing.jitter > 0.0 {
+            parts = axes.cut(&run, k)?;
         }
-        run.x.control(read_x, run.commands[0].last());
-        run.y.control(read_y, run.commands[1].last());
+        // The last interval ends with its samples; y's controller is not served any more in it.
+        let last = k + 1 == timing.samples;
+        let mut due = run.clocks.map(|clock| clock.at(k)).map(|at| at > 0.0);
+        serve(&mut run, k, due.map(|late| !late))?;
         run.keep(axes)?;
-        if k + 1 == timing.samples {
-            break;
-        }
-        for part in &parts {
-            let [volts_x, volts_y] =
-                [0, 1].map(|axis| run.commands[axis].acting(k, part.newer[axis]));
-            axes.x.lead(&part.x, &mut run.x.run.last, volts_x, volts_x);
-            axes.y.lead(&part.y, &mut run.y.run.last, volts_y, volts_y);
-            if part.kept {
+        for Part { x, y, from, event } in &parts {
+            due[2] &= !last || run.lag.fraction == 0.0;
+            if last && due == [false; SAMPLES] {
+                break;
+            }
+            let [volts_x, volts_y] = [0, 1].map(|axis| run.commands[axis].acting(k, *from));
+            axes.x.lead(x, &mut run.x.run.last, volts_x, volts_x);
+            axes.y.lead(y, &mut run.y.run.last, volts_y, volts_y);
+            if event.kept && !last {
                 run.keep(axes)?;
             }
-            if part.samples_y && k >= run.lag.whole {
-                let measured = run.read_late(axes);
-                serve_y(&mut run, k, measured)?;
+            let mut come = event.samples;
+            for (come, due) in come.iter_mut().zip(&mut due) {
+                *come &= *due;
+                *due &= !*come;
             }
+            serve(&mut run, k, come)?;
         }
+        run.x.next_interval();
+        run.y.next_interval();
     }
     Ok(Some((run.x.run, run.y.run)))
 }
