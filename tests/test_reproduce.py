@@ -17,7 +17,7 @@ import piezotrack as pt
 from commands import refusal
 from piezotrack import _core
 from piezotrack.reproduce.apparatus import Apparatus, calibration_file
-from piezotrack.reproduce.calibration import calibrate, cost, values_of
+from piezotrack.reproduce.calibration import calibrate, cost, medians
 from piezotrack.reproduce.conclusions import conclusions
 from piezotrack.reproduce.free import FREE, Free, apparatus_at
 from piezotrack.reproduce.measured import drives
@@ -63,6 +63,8 @@ def test_the_published_numbers_are_those_of_the_paper() -> None:
 def test_what_was_to_be_left_out_is() -> None:
     for one in observables():
         left_out = one.figure[:2] in ("13", "14") or one.key.startswith("circle.40um")
+        # And what no record at 0.25 Hz tells.
+        left_out = left_out or one.key == "table_1.mass"
         assert one.calibrated != left_out, one.key
     fitted = {entry["key"] for entry in calibration_file().get("observables", [])}
     assert fitted <= {one.key for one in observables() if one.calibrated}
@@ -223,7 +225,7 @@ def test_the_file_is_what_the_calibration_gives() -> None:
     apparatus = apparatus_at(theta)
     # The file has what the report loads.
     assert Apparatus.calibrated().x.weights == pytest.approx(apparatus.x.weights, rel=1e-9)
-    values = values_of(apparatus)
+    values = medians(theta, document["provenance"]["sensor_seeds"])
     for one in document["observables"]:
         assert values[one["key"]] == pytest.approx(one["obtained"], rel=1e-6), one["key"]
     assert cost(values) == pytest.approx(document["provenance"]["cost"], rel=1e-6)
@@ -285,11 +287,16 @@ def test_a_calibration_goes_from_end_to_end() -> None:
     found = calibrate(
         particles=2, iterations=1, runs=1, progress=lambda _, least, __: seen.append(least)
     )
-    # Three swarms, each told twice; the best of all is what is described.
+    # Three swarms, each told twice. The last is judged by medians over three seeds, as the best
+    # before it then is, and the better of the two is described.
     assert len(seen) == 6
-    assert found["provenance"]["cost"] == min(found["provenance"]["costs"]) == min(seen)
+    told = found["provenance"]
+    assert told["costs"][0] == seen[1]
+    assert told["costs"][1] <= min(seen[1], seen[3])
+    assert told["cost"] == told["costs"][2] <= seen[5]
+    assert told["sensor_seeds"] == [1, 2, 3]
     obtained = {one["key"]: one["obtained"] for one in found["observables"]}
-    assert cost(obtained) == pytest.approx(min(seen), rel=1e-9)
+    assert cost(obtained) == pytest.approx(told["cost"], rel=1e-9)
     assert Apparatus.of(found["apparatus"]).document() == found["apparatus"]
 
 

@@ -196,7 +196,7 @@ fn late_samples_read_and_act_late() {
     let (samples, jitter, substeps) = (4001, 3e-3, 4);
     for delay in [0.0, 0.3 * TS, 1.95 * TS] {
         let timing = Timing { jitter, ..timing(samples, delay, substeps) };
-        let blind = |k: usize, _: f64| if k % 2 == 0 { 1.0 } else { 0.0 };
+        let blind = |k: usize, _: f64| if k.is_multiple_of(2) { 1.0 } else { 0.0 };
         let run = closed_loop(&apparatus, apparatus.rest(), &timing, blind, NEVER);
         let run = run.unwrap().unwrap();
         assert_eq!(run.measured.len(), (samples - 1) * substeps + 1);
@@ -208,7 +208,7 @@ fn late_samples_read_and_act_late() {
             // With the commands before k known, x(t) is known from their effects on.
             let effects: Vec<f64> =
                 late.iter().enumerate().map(|(j, late)| TS * j as f64 + late + delay).collect();
-            if k % 2 == 0 && k / 2 > 4 {
+            if k.is_multiple_of(2) && k > 9 {
                 let i = k / 2 - 5;
                 on += effects[2 * i + 1] - effects[2 * i];
             }

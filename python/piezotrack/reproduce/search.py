@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from .apparatus import Apparatus
 
-__all__ = ["draw", "record", "search", "thinned"]
+__all__ = ["draw", "observe", "record", "search", "thinned"]
 
 RATE, SECONDS, FREQUENCY, VOLTS = 5000.0, 12.0, 0.25, 75.0
 
@@ -52,6 +52,17 @@ def search(log: Dataset, seed: int) -> Identification:
         threads=1,
         progress=False,
     )
+
+
+def observe(fit: Identification) -> dict[str, float]:
+    """Read off the parameters of Table 1 that are searched, SI."""
+    assert isinstance(fit.model, DahlStage)
+    return {
+        "table_1.mass": fit.model.mass,
+        "table_1.damping": fit.model.damping,
+        "table_1.stiffness": fit.model.stiffness,
+        "table_1.piezo": fit.model.piezo_coefficient,
+    }
 
 
 def draw(fit: Identification) -> Figure:

@@ -51,6 +51,7 @@ class Way:
         return {
             **rest.observe(self.noise),
             **step_test.observe(self.step),
+            **search.observe(self.fit),
             **models.observe(self.judged),
             **tracked.observe(self.compensation, self.antiwindup, self.repetitive),
             **circles.observe(self.table, self.lag),

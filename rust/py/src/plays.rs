@@ -126,7 +126,6 @@ impl PyPlays {
     }
 
     /// Lets a controller lead the stage along a course, in steps of at most `step` seconds.
-    #[expect(clippy::too_many_arguments, reason = "called from one place")]
     fn track(
         &self,
         py: Python<'_>,

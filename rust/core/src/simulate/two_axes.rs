@@ -175,6 +175,37 @@ impl<X, Y> Pair<X, Y> {
         axes.y.read_beside(&mut self.y.run.last, to_y, since)
     }
 
+    /// Takes the samples of control interval `k` that come now.
+    fn serve<P, Q>(
+        &mut self,
+        axes: &TwoAxes<'_, P, Q>,
+        k: usize,
+        come: [bool; SAMPLES],
+        (x, y): (&mut impl FnMut(usize, f64) -> f64, &mut impl FnMut(usize, f64) -> f64),
+    ) -> Result<()>
+    where
+        P: Plant<State = X>,
+        Q: Plant<State = Y>,
+    {
+        let [now_x, now_y, now_late] = self.clocks.map(|clock| clock.at(k));
+        if come[0] {
+            let measured = self.read_x(axes, now_x);
+            self.commands[0].push(checked(k, measured, x(k, measured))?);
+            self.x.control(k, measured, self.commands[0].last());
+        }
+        // For the record and, where it is the same, for the controller.
+        let measured = come[1].then(|| self.read_y(axes, now_y));
+        // Before the lag has passed there is nothing to follow.
+        if let Some(sample) = k.checked_sub(self.lag.whole).filter(|_| come[2]) {
+            let seen = measured.unwrap_or_else(|| self.read_y(axes, now_late));
+            self.commands[1].push(checked(sample, seen, y(sample, seen))?);
+        }
+        if let Some(measured) = measured {
+            self.y.control(k, measured, self.commands[1].last());
+        }
+        Ok(())
+    }
+
     /// Keeps the present instant of both axes.
     fn keep<P, Q>(&mut self, axes: &TwoAxes<'_, P, Q>) -> Result<()>
     where
@@ -192,8 +223,8 @@ impl<X, Y> Pair<X, Y> {
 /// Each controller is called as in [`super::closed_loop`]; that of y at `lag` after that of x,
 /// with a reading of its own. `timing.delay` counts from each axis's own sampling. The record is of
 /// the instants of x: both `measured` are read at once there, whatever the lag, as a recorder
-/// beside the controllers would; with jitter each comes late by a time of its own. Of two axes without cross-talk, lag and jitter each has the
-/// bits of [`super::closed_loop`].
+/// beside the controllers would; with jitter each comes late by a time of its own. Of two axes
+/// without cross-talk, lag and jitter each has the bits of [`super::closed_loop`].
 ///
 /// # Errors
 /// Those of [`super::closed_loop`], for both axes.
@@ -208,26 +239,6 @@ pub fn closed_loops<X: Plant, Y: Plant>(
     axes.validate()?;
     let mut run = Pair::new(timing, axes.lag, [axes.x.sensor.seed, axes.y.sensor.seed], start)?;
     let mut parts = Vec::new();
-    let mut serve =
-        |run: &mut Pair<X::State, Y::State>, k: usize, come: [bool; SAMPLES]| -> Result<()> {
-            let [now_x, now_y, now_late] = run.clocks.map(|clock| clock.at(k));
-            if come[0] {
-                let measured = run.read_x(axes, now_x);
-                run.commands[0].push(checked(k, measured, x(k, measured))?);
-                run.x.control(k, measured, run.commands[0].last());
-            }
-            // For the record and, where it is the same, for the controller.
-            let measured = come[1].then(|| run.read_y(axes, now_y));
-            // Before the lag has passed there is nothing to follow.
-            if let Some(sample) = k.checked_sub(run.lag.whole).filter(|_| come[2]) {
-                let seen = measured.unwrap_or_else(|| run.read_y(axes, now_late));
-                run.commands[1].push(checked(sample, seen, y(sample, seen))?);
-            }
-            if let Some(measured) = measured {
-                run.y.control(k, measured, run.commands[1].last());
-            }
-            Ok(())
-        };
     for k in 0..timing.samples {
         if stop() {
             return Ok(None);
@@ -238,25 +249,25 @@ pub fn closed_loops<X: Plant, Y: Plant>(
         // The last interval ends with its samples; y's controller is not served any more in it.
         let last = k + 1 == timing.samples;
         let mut due = run.clocks.map(|clock| clock.at(k)).map(|at| at > 0.0);
-        serve(&mut run, k, due.map(|late| !late))?;
+        run.serve(axes, k, due.map(|late| !late), (&mut x, &mut y))?;
         run.keep(axes)?;
-        for Part { x, y, from, event } in &parts {
+        for part in &parts {
             due[2] &= !last || run.lag.fraction == 0.0;
             if last && due == [false; SAMPLES] {
                 break;
             }
-            let [volts_x, volts_y] = [0, 1].map(|axis| run.commands[axis].acting(k, *from));
-            axes.x.lead(x, &mut run.x.run.last, volts_x, volts_x);
-            axes.y.lead(y, &mut run.y.run.last, volts_y, volts_y);
-            if event.kept && !last {
+            let [volts_x, volts_y] = [0, 1].map(|axis| run.commands[axis].acting(k, part.from));
+            axes.x.lead(&part.x, &mut run.x.run.last, volts_x, volts_x);
+            axes.y.lead(&part.y, &mut run.y.run.last, volts_y, volts_y);
+            if part.event.kept && !last {
                 run.keep(axes)?;
             }
-            let mut come = event.samples;
+            let mut come = part.event.samples;
             for (come, due) in come.iter_mut().zip(&mut due) {
                 *come &= *due;
                 *due &= !*come;
             }
-            serve(&mut run, k, come)?;
+            run.serve(axes, k, come, (&mut x, &mut y))?;
         }
         run.x.next_interval();
         run.y.next_interval();
