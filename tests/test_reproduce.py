@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import re
@@ -16,6 +17,7 @@ import pytest
 import piezotrack as pt
 from commands import refusal
 from piezotrack import _core
+from piezotrack.reproduce import search, tracked
 from piezotrack.reproduce.apparatus import Apparatus, calibration_file
 from piezotrack.reproduce.calibration import calibrate, cost, medians
 from piezotrack.reproduce.conclusions import conclusions
@@ -139,8 +141,9 @@ def test_the_errors_are_those_of_the_samples() -> None:
 
 
 def test_the_readings_are_those_of_a_sensor() -> None:
-    # 50 Hz, whole steps, and noise between reading and truth.
-    run = quick().way.compensation["both"]
+    # 50 Hz, whole steps, and noise between reading and truth, were no reading late.
+    prompt = dataclasses.replace(quick().apparatus, jitter=0.0)
+    run = tracked.compensation(prompt, quick().way.fit.inverse())["both"]
     assert np.allclose(np.diff(run.t), 0.02)
     steps = run.measured / (2.5e-3 / 2**16)
     assert np.abs(steps - np.round(steps)).max() < 1e-6
@@ -174,11 +177,26 @@ def test_other_models_and_faster_loops_do_better() -> None:
     # Play operators are what the stage is made of.
     assert float(forward["Prandtl-Ishlinskii"][0]) < 0.7 * float(forward["Dahl"][0])
     assert all(float(row[1]) < float(row[0]) for row in forward.values())
-    rows = {row[0]: row[1:] for row in found["A filter on the sensor, and a loop at 1 kHz"].rows}
-    quicker = next(row for name, row in rows.items() if name.startswith("1 kHz, PI"))
-    assert float(quicker[3]) < 0.5 * float(rows["50 Hz, as published"][3])
-    # The derivative part of the published PID is 44 Kp at 1 kHz, and the mode is at 160 Hz.
-    assert rows["1 kHz, the published PID"][0] == "unstable"
+    rows = {
+        row[0]: row[1:] for row in found["A filter on the sensor, and loops at 1 and 5 kHz"].rows
+    }
+    for rate in ("1 kHz", "5 kHz"):
+        quicker = next(row for name, row in rows.items() if name.startswith(f"{rate}, PI"))
+        assert float(quicker[3]) < 0.5 * float(rows["50 Hz, as published"][3])
+        # The derivative part of the published PID is 44 Kp at 1 kHz, the mode near 160 Hz.
+        assert rows[f"{rate}, the published PID"][0] == "unstable"
+
+
+def test_antiwindup_helps_once_the_limits_clip() -> None:
+    rows = next(one for one in quick().sections if "Figs. 13" in one.title).rows
+    free, without, guarded = zip(
+        *([float(cell) for cell in row[1:]] for row in rows if row[0].startswith("13:")),
+        strict=True,
+    )
+    assert max(free) < 1.5
+    # The further the reference goes beyond the limits the more; little where it stays within.
+    assert list(without) == sorted(without) or without[0] < 1.5
+    assert without[-1] > 1.5 * guarded[-1] > 1.5 * free[-1]
 
 
 def test_dahl_is_better_where_the_loop_is_viscous() -> None:
@@ -229,6 +247,15 @@ def test_the_file_is_what_the_calibration_gives() -> None:
     for one in document["observables"]:
         assert values[one["key"]] == pytest.approx(one["obtained"], rel=1e-6), one["key"]
     assert cost(values) == pytest.approx(document["provenance"]["cost"], rel=1e-6)
+
+
+def test_table_1_tells_the_sign_of_the_asymmetry() -> None:
+    theta = {one["name"]: one["value"] for one in calibration_file()["free"]}
+    turned = {**theta, "bend_x": -theta["bend_x"], "top_x": -theta["top_x"]}
+    logs = [search.thinned(search.record(apparatus_at(one)), 10) for one in (theta, turned)]
+    found, other = (search.observe(search.search(log, 1))["table_1.stiffness"] for log in logs)
+    assert found == pytest.approx(26065.0, rel=0.25)
+    assert other > 1.3 * found
 
 
 def test_what_agrees_costs_nothing() -> None:

@@ -2,7 +2,7 @@
 
 ``python calibrate_virtual_stage.py [FILE [PARTICLES [ITERATIONS [RUNS]]]]`` writes what
 ``piezotrack reproduce`` loads, which is kept as ``python/piezotrack/reproduce/calibrated.json``:
-40 particles, 40 iterations and 4 runs, half an hour on two cores. Without arguments it does a
+40 particles, 40 iterations and 2 runs, half an hour on two cores. Without arguments it does a
 small search, to show the way.
 """
 

@@ -57,30 +57,30 @@ def _of_each_axis() -> list[Free]:
         Free(f"{one.name}_{axis}", one.low, one.high, f"{axis}: {one.meaning}", one.scaled)
         for axis in "xy"
         for one in (
-            Free("share", 0.05, 0.25, "widest loop of the plays, of the travel"),
-            Free("slope", -1.0, 3.0, "weights of the plays grow with the threshold to this power"),
-            Free("reach", 0.3, 1.0, "largest threshold, of half the swing"),
-            Free("bend", -0.25, 0.25, "asymmetry: above 25 V the slope grows by this"),
-            Free("top", -0.25, 0.25, "asymmetry: above 50 V the slope grows by this"),
-            Free("creep_fast", 0.0, 0.12, "share of the fastest creep"),
-            Free("creep_fast_time", 0.02, 0.5, "its time constant [s]", scaled=True),
-            Free("creep_1s", 0.0, 0.04, "share of the creep of 1 s"),
-            Free("creep_10s", 0.0, 0.03, "share of the creep of 10 s"),
-            Free("frequency", 155.0, 180.0, "mode [Hz]"),
-            Free("damping_ratio", 0.04, 0.12, "its zeta"),
+            Free("share", 0.1, 0.25, "widest loop of the plays, of the travel"),
+            Free("slope", 0.0, 3.0, "weights of the plays grow with the threshold to this power"),
+            Free("reach", 0.6, 1.0, "largest threshold, of half the swing"),
+            Free("bend", -0.25, 0.1, "asymmetry: above 25 V the slope grows by this"),
+            Free("top", -0.25, 0.1, "asymmetry: above 50 V the slope grows by this"),
+            Free("creep_fast", 0.0, 0.04, "share of the fastest creep"),
+            Free("creep_fast_time", 0.02, 0.2, "its time constant [s]", scaled=True),
+            Free("creep_1s", 0.0, 0.015, "share of the creep of 1 s"),
+            Free("creep_10s", 0.0, 0.015, "share of the creep of 10 s"),
+            Free("frequency", 158.0, 172.0, "mode [Hz]"),
+            Free("damping_ratio", 0.05, 0.08, "its zeta"),
         )
     ]
 
 
 FREE = (
     *_of_each_axis(),
-    Free("end_y", 100e-6, 125e-6, "y: where it ends under 75 V [m]"),
-    Free("bandwidth", 100.0, 2000.0, "amplifier [Hz]", scaled=True),
-    Free("slew", 1e4, 1e6, "its fastest change [V/s]", scaled=True),
-    Free("delay", 0.0, 8e-3, "from a reading to the effect of its voltage [s]"),
-    Free("jitter", 0.0, 1.5e-3, "how late a sample comes on average [s]"),
+    Free("end_y", 105e-6, 122e-6, "y: where it ends under 75 V [m]"),
+    Free("bandwidth", 200.0, 2000.0, "amplifier [Hz]", scaled=True),
+    Free("slew", 3e4, 3e5, "its fastest change [V/s]", scaled=True),
+    Free("delay", 0.0, 1.5e-3, "from a reading to the effect of its voltage [s]"),
+    Free("jitter", 0.0, 0.5e-3, "how late a sample comes on average [s]"),
     Free("lag", 0.0, 0.06, "from serving x to serving y [s]"),
-    Free("noise_bandwidth", 2.0, 500.0, "spectrum of the sensor's noise [Hz]", scaled=True),
+    Free("noise_bandwidth", 20.0, 500.0, "spectrum of the sensor's noise [Hz]", scaled=True),
     Free("cross_xy", -0.015, 0.015, "share of y in x; at most 1.5 % is published"),
     Free("cross_yx", -0.015, 0.015, "share of x in y"),
 )

@@ -15,13 +15,12 @@ __all__ = ["RULES", "SHRUNK", "fast", "shrunk", "slow"]
 SHRUNK = (6.0, 28.0)
 RANGE = 110e-6
 
-# Written down before the stage was calibrated. 8 to 39 um is older than this package: it is the
-# range of docs/tracking.md.
+# Written down before the stage was calibrated; docs/reproduction.md tells which rules there were.
 RULES = {
-    "13": "0.2 Hz as in Fig. 12, 8 to 39 um, so that 28 V clip its top.",
+    "13": "0.2 Hz as in Fig. 12; the limits times the published static gain, 9.4 to 44 um.",
     "14": "0 to 110 um as in Fig. 12, ten periods.",
 }
-LOW, HIGH = 8e-6, 39e-6
+LOW, HIGH = 9.4e-6, 44e-6
 
 
 def slow() -> Reference:
