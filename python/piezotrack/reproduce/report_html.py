@@ -126,7 +126,7 @@ def _stage(found: Reproduction) -> list[str]:
         f"{100 * xy:.3g} % and {100 * yx:.3g} %. SI units:</p>",
         table(("parameter", "x", "y"), rows),
         *_calibration(),
-        "<p>What the paper does not state, and the rule in its place, written down before the "
+        "<p>What the paper does not state, and the rule in its place, written down before any "
         f"calibration:</p><ul>{rules}</ul>",
     ]
 
