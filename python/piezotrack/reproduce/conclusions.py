@@ -113,8 +113,9 @@ CHECKS: tuple[tuple[str, Callable[[Values], bool], str], ...] = (
     (
         "Repetitive control lowers the error and settles in about three periods (Fig. 14).",
         _learns,
-        "{repetitive_without} um without it; with it {repetitive_second} um in the 2nd period, "
-        "{repetitive_fourth} um in the 4th, {repetitive_last} um in the last",
+        "largest error {repetitive_without} um without it; with it {repetitive_second} um in the "
+        "2nd period, {repetitive_fourth} um in the 4th, {repetitive_last} um in the last; rms of "
+        "the last {repetitive_rms_without} um without, {repetitive_rms_with} um with it",
     ),
     (
         "The contour error grows with the radius (Table 2).",

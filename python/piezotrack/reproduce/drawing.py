@@ -84,7 +84,7 @@ def drawn(way: Way, drives: Drives | None) -> list[Drawn]:
         Drawn(
             *("fig_15", "Fig. 15: a circle of 10 um at 0.1 Hz"),
             "The last turn: path, contour error magnified along it, errors of the axes, contour "
-            "error.",
+            "error; all at the instants of x. The table above has what each controller saw.",
             way.table.runs[0].plot(),
         ),
         Drawn(

@@ -100,4 +100,6 @@ def observe(
     for name, start in parts.items():
         part = learning.score(start, start + period, true=true)
         found[f"repetitive.{name}"] = part.max_error
+    for name, run in fourteen.items():
+        found[f"repetitive.rms_{name}"] = run.score(parts["last"], true=true).rms_error
     return found
