@@ -68,6 +68,7 @@ def number(one: Obtained, value: float) -> str:
     """Write a value of an observable in its unit, without it."""
     shown = value / SI[one.observable.unit]
     digits = 4 if one.observable.unit in ("rad", "") else 1 if abs(shown) >= 100.0 else 3
+    digits = 0 if abs(shown) >= 1000.0 else digits
     return f"{shown:.{digits}f}"
 
 

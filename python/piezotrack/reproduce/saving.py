@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["save_report"]
 
 # Lines of small type on a page.
-LINES = 54
+LINES = 58
 
 
 def save_report(found: Reproduction, folder: str | os.PathLike[str]) -> list[Path]:
@@ -55,7 +55,7 @@ def _write_pdf(found: Reproduction, figures: Sequence[Drawn], file: Path) -> Non
         for first in range(0, len(lines), LINES):
             page = plt.figure(figsize=(11.7, 8.3))
             text = "\n".join(lines[first : first + LINES])
-            page.text(0.04, 0.96, text, family="monospace", fontsize=9, va="top")
+            page.text(0.04, 0.96, text, family="monospace", fontsize=8, va="top")
             pdf.savefig(page)
             plt.close(page)
         for one in figures:
