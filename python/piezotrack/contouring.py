@@ -202,7 +202,8 @@ def contour(
     delay : float, optional
         Time from a reading to the effect of its voltage [s], besides the hold.
     jitter : float, optional
-        How late a sample comes on average [s], as for `track`: of each axis by its own time.
+        How late a sample comes on average [s], as for `track`: of each axis by its own time, but
+        the same for two models, which have no sensor with a seed.
     substeps : int, optional
         Instants kept in each sampling interval.
     beyond_reach, unstable : bool, optional

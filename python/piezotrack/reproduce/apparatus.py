@@ -40,7 +40,7 @@ class Apparatus:
 
     stage: XYStage
     delay: float
-    jitter: float = 0.0
+    jitter: float
 
     @property
     def x(self) -> VirtualStage:
@@ -80,9 +80,7 @@ class Apparatus:
         """Make the apparatus that `document` describes."""
         x, y = (VirtualStage(**document[axis], seed=0) for axis in "xy")
         stage = XYStage(x=x, y=y, cross_talk=document["cross_talk"], lag=document["lag"])
-        return cls(stage=stage, delay=document["delay"], jitter=document.get("jitter", 0.0)).seeded(
-            0
-        )
+        return cls(stage=stage, delay=document["delay"], jitter=document["jitter"]).seeded(0)
 
     @classmethod
     def calibrated(cls) -> Apparatus:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from .apparatus import Apparatus
 
-__all__ = ["calibrate", "cost", "values_of"]
+__all__ = ["calibrate", "cost", "medians", "values_of"]
 
 # The model is fitted to every tenth sample: 500 Hz is plenty for 0.25 Hz.
 THINNED = 10
@@ -184,7 +184,7 @@ def calibrate(
         f"{len(FREE)} free parameters of the virtual stage were found by {runs} swarms of "
         f"{particles} particles in {iterations} iterations each, and by two more in boxes of "
         f"{shares} of the ranges about the best, so that it agrees with {{}} published numbers; "
-        "the 40 um row of Table 2 and Figs. 13 and 14 were left out."
+        "the mass of Table 1, the 40 um row of Table 2 and Figs. 13 and 14 were left out."
     )
     provenance = {"costs": costs, "cost": least, "seed": seed, "sensor_seeds": list(seeds)}
     return _document(theta, how, provenance)

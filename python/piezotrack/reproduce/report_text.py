@@ -67,8 +67,9 @@ def tally(found: Reproduction) -> str:
 def number(one: Obtained, value: float) -> str:
     """Write a value of an observable in its unit, without it."""
     shown = value / SI[one.observable.unit]
-    digits = 4 if one.observable.unit in ("rad", "") else 1 if abs(shown) >= 100.0 else 3
-    digits = 0 if abs(shown) >= 1000.0 else digits
+    if one.observable.unit in ("rad", ""):
+        return f"{shown:.4f}"
+    digits = 0 if abs(shown) >= 1000.0 else 1 if abs(shown) >= 100.0 else 3
     return f"{shown:.{digits}f}"
 
 
