@@ -8,7 +8,7 @@
 //! [`crate::pid`] and [`crate::repetitive`].
 
 use crate::error::{Error, Result, check, usable};
-use crate::feedback::Feedback;
+use crate::feedback_law::Feedback;
 use crate::filters::{Filter, FilterState};
 use crate::limits::Limits;
 use crate::repetitive::{RepetitiveState, SampledRepetitive};

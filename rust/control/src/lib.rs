@@ -9,29 +9,28 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 #![forbid(unsafe_code)]
 
-pub mod bouc_wen_inverse;
 pub mod controller;
+mod cubic_segment;
 mod error;
-pub mod feedback;
-pub mod feedback_inverse;
+pub mod feedback_law;
 pub mod filters;
+pub mod hysteresis;
 pub mod inverse;
 pub mod limits;
 mod number;
-pub mod operator;
-mod path;
 pub mod pid;
-pub mod plain;
 pub mod repetitive;
 pub mod state_space;
+pub mod unfused;
 
-pub use bouc_wen_inverse::{BoucWenInverse, BoucWenInverseState};
 pub use controller::{Command, Controller, ControllerState};
 pub use error::{Error, Result};
-pub use feedback::Feedback;
-pub use feedback_inverse::{FeedbackInverseState, FirstOrderDahlInverse, OscillatorInverse};
+pub use feedback_law::Feedback;
 pub use filters::{Filter, FilterState};
-pub use inverse::{DahlInverse, InverseState, SampledDahlInverse};
+pub use inverse::{
+    BoucWenInverse, BoucWenInverseState, DahlInverse, FeedbackInverseState, FirstOrderDahlInverse,
+    InverseState, OscillatorInverse, PlayInverse, SampledDahlInverse,
+};
 pub use limits::Limits;
 pub use number::Number;
 pub use pid::{Pid, PidState, SampledPid};

@@ -12,7 +12,7 @@
 //! `v` that the amplifier really gave.
 
 use crate::error::{Error, Result, check, finite, not_negative};
-use crate::feedback::Feedback;
+use crate::feedback_law::Feedback;
 
 /// Gains of a PID controller, in continuous time.
 ///

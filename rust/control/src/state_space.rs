@@ -5,7 +5,7 @@
 //! ```
 
 use crate::error::{Error, Result, check, finite};
-use crate::feedback::Feedback;
+use crate::feedback_law::Feedback;
 
 /// A linear controller with up to `N` states; one error in (m), one voltage out.
 ///

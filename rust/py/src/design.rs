@@ -2,7 +2,7 @@
 
 use piezotrack_core::Result;
 use piezotrack_core::design::{GainRange, LoopPlant, SampledLoop, Verdict};
-use piezotrack_core::stage::{BoucWenStage, DahlStage, FirstOrderDahlStage};
+use piezotrack_core::models::{BoucWenStage, DahlStage, FirstOrderDahlStage};
 use pyo3::prelude::*;
 
 use crate::control::PyController;

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use piezotrack_core::Error;
 use piezotrack_core::identify::{Monitor, Progress};
-use piezotrack_core::integrate::Stop;
+use piezotrack_core::signal::Stop;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyOSError, PyStopIteration};
 use pyo3::prelude::*;
 

@@ -2,10 +2,11 @@
 
 use numpy::{PyArray1, ToPyArray};
 use piezotrack_core::identify::{
-    Boundary, Coordinate, DELAY, Delay, Identification, Model, Outcome, Plan, Record, Spec,
-    StopReason, SwarmSettings, Topology, Update, identify as identified,
+    Boundary, Coordinate, Delay, Identification, Outcome, Plan, Record, Spec, StopReason,
+    SwarmSettings, Topology, Update, identify as identified,
 };
-use piezotrack_core::march::Order;
+use piezotrack_core::integrator::Order;
+use piezotrack_core::models::{DELAY, Model};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 

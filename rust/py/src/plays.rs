@@ -3,13 +3,14 @@
 use numpy::{PyArray1, ToPyArray};
 use piezotrack_core::design::LoopPlant;
 use piezotrack_core::identify::{
-    DynamicsKind, PlaysFit, PlaysRecord, PlaysSettings, Rows, identify_plays,
+    DynamicsKind, PlaysFit, PlaysRecord, PlaysSettings, identify_plays,
 };
-use piezotrack_core::integrate::Drive;
-use piezotrack_core::stage::{
+use piezotrack_core::math::Rows;
+use piezotrack_core::models::{
     Dynamics, FeedforwardState, PlaysFeedforward, PlaysMotion, PlaysState, PrandtlIshlinskiiStage,
     Relaxation, plays,
 };
+use piezotrack_core::signal::Drive;
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 

@@ -1,15 +1,14 @@
 //! The Dahl stage and its simulation.
 
 use numpy::{PyArray1, ToPyArray};
-use piezotrack_core::identify::Model;
-use piezotrack_core::integrate::{self, Drive, Hold, Method, Trajectory};
-use piezotrack_core::march::{Order, Stepping};
-use piezotrack_core::stage::kinked::KinkedMotion;
-use piezotrack_core::stage::{
+use piezotrack_core::integrator::{KinkedMotion, Order, ParameterInfo, Stepping};
+use piezotrack_core::models::dahl_simulate::{self as model, Method, Trajectory};
+use piezotrack_core::models::{
     BOUC_WEN_OSCILLATOR_PARAMETERS, BOUC_WEN_PARAMETERS, BoucWenMotion, BoucWenOscillator,
     BoucWenStage, DAHL_PARAMETERS, DahlStage, FIRST_ORDER_DAHL_PARAMETERS, FirstOrderDahlStage,
-    ParameterInfo, StageState,
+    Model, StageState,
 };
+use piezotrack_core::signal::{self, Drive, Hold, Stop};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
@@ -152,7 +151,7 @@ fn delayed<'py>(
     delay: f64,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let (x, v) = (samples("x", x)?, samples("v", v)?);
-    Ok(integrate::delayed(&x, &v, dt, delay).to_pyarray(py))
+    Ok(signal::delayed(&x, &v, dt, delay).to_pyarray(py))
 }
 
 /// Table 1 of Xu and Li 2010.
@@ -179,7 +178,7 @@ fn dahl_simulate(
 ) -> PyResult<PyTrajectory> {
     let method = method_named(method).map_err(|error| raise(&error))?;
     run(py, theta, u, dt, hold, |stage, drive, stop| {
-        integrate::simulate(stage, drive, state(initial), method, accuracy, stop)
+        model::simulate(stage, drive, state(initial), method, accuracy, stop)
     })
 }
 
@@ -195,7 +194,7 @@ fn dahl_simulate_fixed(
 ) -> PyResult<PyTrajectory> {
     run(py, theta, u, dt, hold, |stage, drive, stop| {
         let stepping = Stepping { order: Order::Fourth, substeps };
-        integrate::simulate_fixed(stage, drive, StageState::default(), stepping, stop)
+        model::simulate_fixed(stage, drive, StageState::default(), stepping, stop)
     })
 }
 
@@ -205,7 +204,7 @@ fn run(
     u: &Bound<'_, PyAny>,
     dt: f64,
     hold_name: &str,
-    job: impl FnOnce(&DahlStage, &Drive<'_>, integrate::Stop<'_>) -> Result<Option<Trajectory>> + Send,
+    job: impl FnOnce(&DahlStage, &Drive<'_>, Stop<'_>) -> Result<Option<Trajectory>> + Send,
 ) -> PyResult<PyTrajectory> {
     driven(py, u, dt, hold_name, |drive, stop| job(&DahlStage::from_theta(&theta)?, drive, stop))
 }
@@ -215,7 +214,7 @@ fn driven<T: Send + Into<PyTrajectory>>(
     u: &Bound<'_, PyAny>,
     dt: f64,
     hold_name: &str,
-    job: impl FnOnce(&Drive<'_>, integrate::Stop<'_>) -> Result<Option<T>> + Send,
+    job: impl FnOnce(&Drive<'_>, Stop<'_>) -> Result<Option<T>> + Send,
 ) -> PyResult<PyTrajectory> {
     let u = samples("u", u)?;
     let run = enter(py, |stop| job(&Drive::new(&u, dt, hold(hold_name)?)?, stop))?;

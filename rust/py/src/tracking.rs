@@ -1,13 +1,13 @@
 //! A controller on a stage, and the figures of what came out.
 
 use numpy::{PyArray1, ToPyArray};
-use piezotrack_core::alone::Alone;
-use piezotrack_core::integrate::Stop;
-use piezotrack_core::metrics::{self, Tracking};
-use piezotrack_core::simulate::{Apparatus, ApparatusState, Course, Plant, Timing, Tracked, track};
-use piezotrack_core::stage::{
-    BoucWenKernel, BoucWenStage, DahlStage, FirstOrderDahlKernel, FirstOrderDahlStage,
+use piezotrack_core::integrator::Alone;
+use piezotrack_core::models::{
+    BoucWenKernel, BoucWenStage, DahlStage, FirstOrderDahlKernel, FirstOrderDahlStage, Plant,
 };
+use piezotrack_core::signal::Stop;
+use piezotrack_core::signal::metrics::{self, Tracking};
+use piezotrack_core::simulate::{Apparatus, ApparatusState, Course, Timing, Tracked, track};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 

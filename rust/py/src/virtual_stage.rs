@@ -1,9 +1,11 @@
 //! The virtual stage: its settings, its simulation, a controller on it.
 
 use numpy::{PyArray1, ToPyArray};
-use piezotrack_core::integrate::Drive;
-use piezotrack_core::simulate::{Amplifier, Sensor};
-use piezotrack_core::stage::{Creep, RELAXATIONS, StagePlay, VirtualSettings, VirtualStage};
+use piezotrack_core::models::Creep;
+use piezotrack_core::signal::Drive;
+use piezotrack_core::simulate::{
+    Amplifier, RELAXATIONS, Sensor, StagePlay, VirtualSettings, VirtualStage,
+};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 

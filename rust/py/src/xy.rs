@@ -1,14 +1,15 @@
 //! Two axes: an XY stage, contour errors, cross-talk; and a sensor's noise at rest.
 
 use numpy::{PyArray1, ToPyArray};
-use piezotrack_core::contour::{Polyline, radial_errors};
 use piezotrack_core::identify::{cross_talk, noise_at_rest};
-use piezotrack_core::integrate::{Drive, Stop};
-use piezotrack_core::metrics::Spread;
+use piezotrack_core::models::{DahlStage, Plant, StageState};
+use piezotrack_core::signal::contour_error::{Polyline, radial_errors};
+use piezotrack_core::signal::metrics::Spread;
+use piezotrack_core::signal::{Drive, NEVER, Stop};
 use piezotrack_core::simulate::{
-    Apparatus, ApparatusState, Plant, TwoAxes, TwoStates, open_loops, track_both,
+    Apparatus, ApparatusState, TwoAxes, TwoStates, VirtualStage, VirtualState, open_loops,
+    track_both,
 };
-use piezotrack_core::stage::{DahlStage, StageState, VirtualStage, VirtualState};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
@@ -186,7 +187,7 @@ impl PyXyStage {
         }
         let build = || -> Result<Self> {
             let stage = Self { x: x.axis()?, y: y.axis()?, cross_talk, lag };
-            stage.with(&Check, piezotrack_core::integrate::NEVER)?;
+            stage.with(&Check, NEVER)?;
             Ok(stage)
         };
         build().map_err(|error| raise(&error))

@@ -5,10 +5,10 @@ use core::ops::RangeInclusive;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::jet::Ratio;
 use crate::error::{Error, Result, finite, not_negative, positive};
-use crate::mechanics::{Mechanics, halvings};
-use crate::stage::DahlStage;
+use crate::integrator::{Mechanics, halvings};
+use crate::math::Ratio;
+use crate::models::DahlStage;
 
 /// States of a plant, at most.
 const STATES: usize = 8;

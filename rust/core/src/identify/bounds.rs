@@ -4,10 +4,10 @@
 //! stiffness, and the hysteresis force relative to the elastic one. Each ratio gets a generous
 //! range from the stroke, the drive and the sampling, and the stiffness turns it into a bound.
 
-use super::model::Model;
-use super::problem::{Coordinate, Record, range};
+use super::problem::{Coordinate, Record};
 use crate::error::{Error, Result, shown};
-use crate::integrate::index;
+use crate::models::Model;
+use crate::signal::{index, range};
 
 /// What the ranges are built from.
 struct Measures {

@@ -8,23 +8,20 @@
 //! value for each guess is the mean of the deviation, so it costs the swarm no dimension.
 //! Particles run in lockstep lanes, and no trajectory is stored.
 
-use piezotrack_control::operator::{Dahl, DahlState, Operator};
+use piezotrack_control::hysteresis::{Dahl, DahlState, Operator};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::deviation::{Delayed, Sums};
-use super::model::Model;
-use super::problem::{Problem, Record, Theta};
-use super::stepping;
-use crate::integrate::{Stop, index};
-use crate::lanes::Lanes;
-use crate::march::{FEW_TERMS, March, Order, Stepping, TERMS};
-use crate::mechanics::{Mechanics, Propagator, halvings};
-use crate::stage::feedback::{FeedbackState, Smooth};
-use crate::stage::friction::{Friction, FrictionParameters};
-use crate::stage::{
-    BoucWenKernel, BoucWenOscillatorKernel, Coupling, FirstOrderDahlKernel, Kernel, MOST_PARAMETERS,
+use super::problem::{Problem, Record};
+use super::residual_sums::{Delayed, Sums};
+use super::step_size;
+use crate::integrator::{
+    Coupling, FEW_TERMS, FeedbackState, Friction, FrictionParameters, Kernel, MOST_PARAMETERS,
+    March, Mechanics, Order, Propagator, Smooth, Stepping, TERMS, halvings,
 };
+use crate::math::Lanes;
+use crate::models::{BoucWenKernel, BoucWenOscillatorKernel, FirstOrderDahlKernel, Model, Theta};
+use crate::signal::{Stop, index};
 
 /// Vectors that go through the step together, to hide each other's latency.
 const VECTORS: usize = 3;
@@ -69,8 +66,8 @@ impl<'a> Evaluator<'a> {
     /// Fixes the stepping from the bounds, the sampling rate and the drive.
     #[must_use]
     pub fn new(record: &'a Record<'a>, problem: &'a Problem, stop: Stop<'_>) -> Self {
-        let stepping = stepping::choose(record, problem, stop);
-        let rate = stepping::corners(problem).iter().fold(0.0, |most: f64, theta| {
+        let stepping = step_size::choose(record, problem, stop);
+        let rate = step_size::corners(problem).iter().fold(0.0, |most: f64, theta| {
             let mechanics = Mechanics { mass: theta[0], damping: theta[1], stiffness: theta[2] };
             most.max(mechanics.rate())
         });

@@ -1,9 +1,8 @@
 //! Cross-talk between two axes, from logs in which one of them is driven.
 
-use super::drift::without_drift;
-use crate::contour::check;
 use crate::error::{Error, Result};
-use crate::integrate::index;
+use crate::signal::contour_error::check;
+use crate::signal::{index, without_drift};
 
 /// Slope of what one axis shows while the other moves, and its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,7 +22,7 @@ pub struct CrossTalk {
 /// independent ones: Bartlett 1935, doi 10.2307/2342284, for a drive that is slow beside them.
 ///
 /// ```
-/// use piezotrack_core::identify::cross_talk;
+/// use super::cross_talk;
 ///
 /// let driven: Vec<f64> = (0..100).map(|k| f64::from(k % 20)).collect();
 /// let other: Vec<f64> = driven.iter().map(|d| 5.0 + 0.015 * d).collect();

@@ -1,12 +1,12 @@
 //! From a record to an identified stage: the steps in their order.
 
 use super::cost::Evaluator;
-use super::local::{Local, Sensitivity};
+use super::levenberg_marquardt::{Local, Sensitivity};
 use super::problem::{Problem, Record, Spec};
 use super::search::{Monitor, Outcome, Plan, StopReason, search};
 use crate::error::Result;
-use crate::integrate::Stop;
-use crate::march::Stepping;
+use crate::integrator::Stepping;
+use crate::signal::Stop;
 
 /// An identified stage and how it was found.
 #[derive(Clone, Debug)]

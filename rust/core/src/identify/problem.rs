@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use super::bounds;
-use super::model::Model;
 use crate::error::{Error, Result, positive, shown};
-use crate::integrate::{Drive, Hold};
+use crate::models::{DELAY, Model, Theta};
+use crate::signal::{Drive, Hold, index, range};
 
 /// A drive and the displacement measured under it.
 #[derive(Clone, Debug)]
@@ -63,13 +63,6 @@ impl<'a> Record<'a> {
         let (low, high) = range(&self.y[self.window.clone()]);
         high - low
     }
-}
-
-/// Smallest and largest value.
-pub(super) fn range(values: &[f64]) -> (f64, f64) {
-    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| {
-        (f64::min(low, v), f64::max(high, v))
-    })
 }
 
 /// How a coordinate of the unit box maps to a parameter.
@@ -175,7 +168,7 @@ impl Default for Delay {
 impl Delay {
     /// The coordinate of the search.
     fn coordinate(self, record: &Record<'_>) -> Result<Coordinate> {
-        let length = record.drive.dt * crate::integrate::index(record.drive.u.len());
+        let length = record.drive.dt * index(record.drive.u.len());
         let (low, high) = match self {
             Self::Fixed(value) => (value, value),
             Self::Fitted => {
@@ -198,13 +191,6 @@ impl Delay {
         }
     }
 }
-
-/// Parameters in the order of [`Model::facts`], 0 for those that the model does not have, and
-/// after them the delay, s.
-pub type Theta = [f64; 10];
-
-/// Index of the delay in [`Theta`].
-pub const DELAY: usize = 9;
 
 /// Stiffness held where nothing in the input fixes a force, N/m.
 pub const NOMINAL_STIFFNESS: f64 = 1e6;

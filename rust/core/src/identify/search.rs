@@ -1,10 +1,11 @@
 //! The whole search: a swarm, its costs, its stop criteria.
 
 use super::cost::{Costs, Evaluator, Guess};
-use super::problem::{Problem, Theta};
+use super::problem::Problem;
 use super::swarm::{Swarm, SwarmSettings};
 use crate::error::{Error, Result};
-use crate::integrate::Stop;
+use crate::models::Theta;
+use crate::signal::Stop;
 use std::ops::ControlFlow;
 
 /// Why a search ended.

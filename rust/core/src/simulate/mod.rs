@@ -5,29 +5,32 @@
 //! ```
 
 mod amplifier;
-mod clock;
 mod closed_loop;
 mod open_loop;
-mod plant;
 mod sensor;
+mod timing;
 mod tracking;
 mod two_axes;
+mod virtual_stage;
 
 pub use amplifier::{Amplifier, AmplifierFlow};
-pub use clock::Timing;
 pub use closed_loop::{ClosedLoop, closed_loop};
 pub use open_loop::{OpenLoop, open_loop};
-pub use plant::{DahlFlow, KernelFlow, Plant};
 pub use sensor::{Sensor, SensorState};
+pub use timing::Timing;
 pub use tracking::{Course, Law, LawState, MOST_STATES, Tracked, track};
 pub use two_axes::{
     TwoAxes, TwoLogs, TwoMotions, TwoStates, TwoTracked, closed_loops, open_loops, track_both,
+};
+pub use virtual_stage::{
+    DEAD_ZONES, PLAYS, RELAXATIONS, StagePlay, VirtualSettings, VirtualStage, VirtualState,
 };
 
 use pulp::{Simd, WithSimd};
 
 use crate::error::{Error, Result, positive};
-use crate::integrate::index;
+use crate::models::Plant;
+use crate::signal::index;
 
 /// A plant between its amplifier and its sensor.
 #[derive(Clone, Copy, Debug)]

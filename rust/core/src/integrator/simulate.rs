@@ -1,0 +1,188 @@
+//! One stage of any kind under a sampled drive, all its samples kept.
+
+use pulp::{Simd, WithSimd};
+
+use super::accuracy::{MOST_SUBSTEPS, first_substeps, out_of_reach};
+use super::propagator::{Mechanics, halvings};
+use super::stepping_loop::{March, Sink};
+use super::traits::{Coupling, FeedbackState, Kernel, Parameters};
+use crate::error::{Error, Result, positive};
+use crate::signal::{Drive, Stop, all_finite, index, largest_difference};
+
+/// Share of the displacement below which no steps make it more accurate.
+const ROUNDING: f64 = 1e-16;
+
+/// Most steps of one simulation, beyond [`FEW_SUBSTEPS`] in an interval: some ten seconds.
+const MOST_STEPS: usize = 100_000_000;
+const FEW_SUBSTEPS: usize = 64;
+
+/// Memory of a kernel's step.
+pub type Memory<K> = <<K as Kernel<f64>>::Coupling as Coupling<f64>>::Memory;
+
+/// Displacement, velocity and memory at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instant<M> {
+    /// Displacement, m.
+    pub x: f64,
+    /// Velocity, m/s.
+    pub v: f64,
+    /// What the hysteresis remembers.
+    pub memory: M,
+}
+
+/// Motion of a stage at the samples of its drive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Motion<M> {
+    /// Displacement, m.
+    pub x: Vec<f64>,
+    /// Velocity, m/s.
+    pub v: Vec<f64>,
+    /// Hysteresis force, N.
+    pub hysteresis: Vec<f64>,
+    /// State at the last sample.
+    pub last: Instant<M>,
+    /// Steps in each sampling interval.
+    pub substeps: usize,
+    /// Largest difference in displacement from half the sub-steps, m; 0 where there was none.
+    pub difference: f64,
+}
+
+/// A stage: what kind, and its parameters.
+#[derive(Clone, Copy, Debug)]
+pub struct Alone<'a, K> {
+    /// The kind of stage.
+    pub kernel: &'a K,
+    /// Its parameters, SI.
+    pub parameters: &'a Parameters<f64>,
+}
+
+impl<K: Kernel<f64> + Copy> Alone<'_, K> {
+    /// The state before any motion.
+    #[must_use]
+    pub fn rest(&self) -> Instant<Memory<K>> {
+        Instant { x: 0.0, v: 0.0, memory: self.kernel.rest(self.parameters) }
+    }
+
+    /// Mass, damping and stiffness.
+    pub(crate) fn mechanics(&self) -> Mechanics {
+        let [mass, damping, stiffness, ..] = *self.parameters;
+        Mechanics { mass, damping, stiffness }
+    }
+
+    /// Simulates with given steps in each sampling interval; `None` where `stop` said so.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] where `substeps` is 0; [`Error::Numerical`] where the motion is not
+    /// finite.
+    pub fn simulate_fixed(
+        &self,
+        drive: &Drive<'_>,
+        start: Instant<Memory<K>>,
+        substeps: usize,
+        stop: Stop<'_>,
+    ) -> Result<Option<Motion<Memory<K>>>> {
+        if substeps == 0 {
+            return Err(Error::parameter("substeps", 0, "1 or more"));
+        }
+        let run = Run { of: *self, drive, start, substeps, stop };
+        let Some(motion) = pulp::Arch::new().dispatch(run) else { return Ok(None) };
+        all_finite(&motion.x, drive.dt)?;
+        Ok(Some(motion))
+    }
+
+    /// Simulates so that twice the sub-steps moved no sample by more than `accuracy`, m, and
+    /// returns the finer of the two; `None` where `stop` said so.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] where `accuracy` is not above 0; [`Error::Numerical`] where the
+    /// motion is not finite or the accuracy is out of reach.
+    pub fn simulate(
+        &self,
+        drive: &Drive<'_>,
+        start: Instant<Memory<K>>,
+        accuracy: f64,
+        stop: Stop<'_>,
+    ) -> Result<Option<Motion<Memory<K>>>> {
+        positive("accuracy", accuracy, "m")?;
+        let limit = (MOST_STEPS / drive.u.len().max(1)).clamp(FEW_SUBSTEPS, MOST_SUBSTEPS);
+        let mut substeps = first_substeps(&self.mechanics(), drive.dt).min(limit / 2);
+        let Some(mut coarse) = self.simulate_fixed(drive, start, substeps, stop)? else {
+            return Ok(None);
+        };
+        loop {
+            substeps *= 2;
+            let Some(mut fine) = self.simulate_fixed(drive, start, substeps, stop)? else {
+                return Ok(None);
+            };
+            fine.difference = largest_difference(&coarse.x, &fine.x);
+            if fine.difference <= accuracy {
+                return Ok(Some(fine));
+            }
+            let most = fine.x.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+            if substeps > limit / 2 || accuracy < ROUNDING * most {
+                return Err(out_of_reach(accuracy, substeps, fine.difference));
+            }
+            coarse = fine;
+        }
+    }
+}
+
+/// One simulation.
+struct Run<'a, K: Kernel<f64> + Copy> {
+    of: Alone<'a, K>,
+    drive: &'a Drive<'a>,
+    start: Instant<Memory<K>>,
+    substeps: usize,
+    stop: Stop<'a>,
+}
+
+impl<K: Kernel<f64> + Copy> WithSimd for Run<'_, K> {
+    type Output = Option<Motion<Memory<K>>>;
+
+    // One lane needs no vectors; the dispatch is for the fused multiply-add instruction.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        let Self { of, drive, start, substeps, stop } = self;
+        let h = drive.dt / index(substeps);
+        let halvings = halvings(of.mechanics().rate(), h);
+        let coupling = of.kernel.coupling(of.parameters, h, halvings);
+        let n = drive.u.len();
+        let mut keep = Keep {
+            of,
+            x: Vec::with_capacity(n),
+            v: Vec::with_capacity(n),
+            hysteresis: Vec::with_capacity(n),
+            step: h,
+            stop,
+        };
+        let march = March { coupling, gain: of.kernel.gain(of.parameters) };
+        let from = FeedbackState { x: start.x, w: start.v * h, memory: start.memory };
+        let end = march.run(drive, substeps, from, &mut keep)?;
+        let last = Instant { x: end.x, v: end.w / h, memory: end.memory };
+        let Keep { x, v, hysteresis, .. } = keep;
+        Some(Motion { x, v, hysteresis, last, substeps, difference: 0.0 })
+    }
+}
+
+/// Keeps the states of one stage.
+struct Keep<'a, K> {
+    of: Alone<'a, K>,
+    x: Vec<f64>,
+    v: Vec<f64>,
+    hysteresis: Vec<f64>,
+    step: f64,
+    stop: Stop<'a>,
+}
+
+impl<K: Kernel<f64> + Copy> Sink<f64, Memory<K>> for Keep<'_, K> {
+    #[inline(always)]
+    fn sample(&mut self, _k: usize, state: &FeedbackState<f64, Memory<K>>) {
+        self.x.push(state.x);
+        self.v.push(state.w / self.step);
+        self.hysteresis.push(self.of.kernel.force(self.of.parameters, &state.memory));
+    }
+
+    fn give_up(&mut self, _k: usize) -> bool {
+        (self.stop)()
+    }
+}

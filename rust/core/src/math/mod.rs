@@ -1,0 +1,14 @@
+//! Numerical methods and number types: SIMD lanes, random numbers, least squares, line search.
+
+mod golden_section;
+mod lanes;
+mod nnls;
+mod random;
+mod transfer_function;
+
+pub use lanes::Lanes;
+pub use nnls::{Rows, nnls};
+
+pub(crate) use golden_section::least;
+pub(crate) use random::Draws;
+pub(crate) use transfer_function::{C, Jet, Ratio};
