@@ -26,3 +26,5 @@ pub use plant::LoopPlant;
 pub use sampled_loop::{LinearFeedback, SampledLoop};
 pub use stability::{GainRange, Root};
 pub use verdict::{Verdict, check_loop};
+
+pub(crate) use small_signal_gain::Gains;

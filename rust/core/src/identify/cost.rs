@@ -1,59 +1,57 @@
-//! What a guess costs: the RMS deviation of the simulated from the measured displacement.
+//! What a candidate costs: the RMS deviation of the simulated from the measured displacement.
 //!
 //! ```text
 //! f = sqrt(mean((x_i - xhat_i)^2))
 //! ```
 //!
 //! Xu and Li 2010, equation (16), doi 10.1115/1.4001712. Where an offset is fitted, its best
-//! value for each guess is the mean of the deviation, so it costs the swarm no dimension.
+//! value for each candidate is the mean of the deviation, so it costs the swarm no dimension.
 //! Particles run in lockstep lanes, and no trajectory is stored.
 
-use piezotrack_control::hysteresis::{Dahl, DahlState, Operator};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
+use super::candidate::Theta;
+use super::motion::motion;
 use super::problem::{Problem, Record};
-use super::residual_sums::{Delayed, Sums};
+use super::residual_sums::{Delayed, ResidualSums};
 use super::step_size;
 use crate::integrator::{
-    Coupling, FEW_TERMS, FeedbackState, Friction, FrictionParameters, Kernel, MOST_PARAMETERS,
-    March, Mechanics, Order, Propagator, Smooth, Stepping, TERMS, halvings,
+    FeedbackState, Kernel, MOST_PARAMETERS, March, Mechanics, Stepping, halvings,
 };
 use crate::math::Lanes;
-use crate::models::{BoucWenKernel, BoucWenOscillatorKernel, FirstOrderDahlKernel, Model, Theta};
+use crate::models::{Held, KernelVisitor};
 use crate::signal::{Stop, index};
-
-/// Vectors that go through the step together, to hide each other's latency.
-const VECTORS: usize = 3;
 
 /// Parameters to simulate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Guess {
+pub struct Candidate {
     /// The parameters, SI.
     pub theta: Theta,
-    /// The cost, m, beyond which nobody asks how bad the guess is; infinite for none.
+    /// The cost, m, beyond which nobody asks how bad the candidate is; infinite for none.
     pub limit: f64,
 }
 
-/// Cost and offset of a guess.
+/// Cost and offset of a candidate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Costs {
-    /// RMS deviation, m; infinite where the simulation blew up. Where the guess was abandoned,
-    /// a lower bound that lies above its limit.
+    /// RMS deviation, m; infinite where the simulation blew up. Where the candidate was
+    /// abandoned, a lower bound that lies above its limit.
     pub rms: f64,
     /// Offset added to the simulated displacement, m.
     pub offset: f64,
 }
 
 impl Costs {
-    /// What a guess costs that could not be simulated.
+    /// What a candidate costs that could not be simulated.
     pub(super) const FAILED: Self = Self { rms: f64::INFINITY, offset: 0.0 };
 }
 
-/// Computes costs of guesses for one problem, with the stepping fixed.
+/// Computes costs of candidates for one problem, with the stepping fixed.
 pub struct Evaluator<'a> {
     pub(super) record: &'a Record<'a>,
     problem: &'a Problem,
+    held: Held,
     arch: Arch,
     /// How finely a sampling interval is stepped through.
     pub stepping: Stepping,
@@ -68,14 +66,15 @@ impl<'a> Evaluator<'a> {
     pub fn new(record: &'a Record<'a>, problem: &'a Problem, stop: Stop<'_>) -> Self {
         let stepping = step_size::choose(record, problem, stop);
         let rate = step_size::corners(problem).iter().fold(0.0, |most: f64, theta| {
-            let mechanics = Mechanics { mass: theta[0], damping: theta[1], stiffness: theta[2] };
-            most.max(mechanics.rate())
+            let [mass, damping, stiffness, ..] = theta.parameters();
+            most.max(Mechanics { mass, damping, stiffness }.rate())
         });
         let window = &record.y[record.window.clone()];
         let centre =
             if problem.offset { window.iter().sum::<f64>() / index(window.len()) } else { 0.0 };
         let halvings = halvings(rate, record.drive.dt / index(stepping.substeps));
-        Self { record, problem, arch: Arch::new(), stepping, halvings, centre }
+        let (held, arch) = (problem.held(), Arch::new());
+        Self { record, problem, held, arch, stepping, halvings, centre }
     }
 
     /// Runs on another instruction set: the costs have the same bits.
@@ -85,36 +84,20 @@ impl<'a> Evaluator<'a> {
         self
     }
 
-    /// Length of a sub-step, s.
-    fn step(&self) -> f64 {
-        self.record.drive.dt / index(self.stepping.substeps)
+    /// Displacement and velocity of a candidate, stepped as its cost is; `None` where they are
+    /// not finite.
+    pub(super) fn motion(&self, theta: &Theta, stop: Stop<'_>) -> Option<[Vec<f64>; 2]> {
+        motion(self.problem.model, theta, &self.record.drive, self.stepping, stop)
     }
 
-    /// Costs of guesses, in their order, computed on the threads of the present pool.
+    /// Costs of candidates, in their order, computed on the threads of the present pool.
     ///
     /// Those that were not finished when `stop` said so are infinite.
     #[must_use]
-    pub fn costs(&self, guesses: &[Guess], stop: Stop<'_>) -> Vec<Costs> {
-        let width = self.arch.dispatch(Width);
-        // Every thread gets vectors to fill before any gets a second one.
-        let vectors = guesses.len().div_ceil(width);
-        let each = vectors.div_ceil(rayon::current_num_threads()).clamp(1, self.most());
-        let size = guesses.len().div_ceil(vectors.div_ceil(each).max(1)).max(1);
-        guesses.par_chunks(size).flat_map_iter(|chunk| self.bundle(chunk, width, stop)).collect()
-    }
-
-    /// Most vectors in a bundle: a step with friction fills the registers with one, as do most.
-    fn most(&self) -> usize {
-        if self.problem.has_friction() || self.problem.model != Model::Dahl { 1 } else { VECTORS }
-    }
-
-    /// Costs of as many guesses as one bundle of lanes takes.
-    fn bundle(&self, guesses: &[Guess], width: usize, stop: Stop<'_>) -> Vec<Costs> {
-        if guesses.len() <= width {
-            self.arch.dispatch(Bundle::<1> { of: self, guesses, stop })
-        } else {
-            self.arch.dispatch(Bundle::<VECTORS> { of: self, guesses, stop })
-        }
+    pub fn costs(&self, candidates: &[Candidate], stop: Stop<'_>) -> Vec<Costs> {
+        let all = All { of: self, candidates, stop };
+        let costs = self.problem.model.kernel(&self.held, self.stepping.order, all);
+        costs.unwrap_or_else(|| vec![Costs::FAILED; candidates.len()])
     }
 
     /// Cost and offset from the sums of the deviation and of its square.
@@ -133,6 +116,39 @@ impl<'a> Evaluator<'a> {
     }
 }
 
+/// Candidates to be spread over threads and lanes.
+struct All<'a> {
+    of: &'a Evaluator<'a>,
+    candidates: &'a [Candidate],
+    stop: Stop<'a>,
+}
+
+impl KernelVisitor for All<'_> {
+    type Output = Vec<Costs>;
+
+    fn visit<K: Kernel>(self, kernel: K) -> Vec<Costs> {
+        let Self { of, candidates, stop } = self;
+        let width = of.arch.dispatch(Width);
+        // Every thread gets vectors to fill before any gets a second one.
+        let vectors = candidates.len().div_ceil(width);
+        let each = vectors.div_ceil(rayon::current_num_threads()).clamp(1, K::VECTORS);
+        let size = candidates.len().div_ceil(vectors.div_ceil(each).max(1)).max(1);
+        let bundle = |chunk| {
+            let bundle = Bundle { of, candidates: chunk, stop };
+            // Only a kernel that gains by several vectors is compiled for them.
+            if const { K::VECTORS > 1 } && chunk.len() > width {
+                of.arch.dispatch(Lockstep::<K, VECTORS> { kernel, bundle })
+            } else {
+                of.arch.dispatch(Lockstep::<K, 1> { kernel, bundle })
+            }
+        };
+        candidates.par_chunks(size).flat_map_iter(bundle).collect()
+    }
+}
+
+/// Vectors of a bundle of several.
+const VECTORS: usize = 3;
+
 /// Asks an instruction set for its lanes.
 struct Width;
 
@@ -144,121 +160,43 @@ impl WithSimd for Width {
     }
 }
 
-/// Guesses in one bundle of lanes.
-pub(super) struct Bundle<'a, const K: usize> {
+/// Candidates in one bundle of lanes.
+#[derive(Clone, Copy)]
+pub(super) struct Bundle<'a> {
     pub of: &'a Evaluator<'a>,
-    pub guesses: &'a [Guess],
+    pub candidates: &'a [Candidate],
     pub stop: Stop<'a>,
 }
 
-impl<const K: usize> WithSimd for Bundle<'_, K> {
+/// A bundle under a kernel, in `V` vectors.
+struct Lockstep<'a, K, const V: usize> {
+    kernel: K,
+    bundle: Bundle<'a>,
+}
+
+impl<K: Kernel, const V: usize> WithSimd for Lockstep<'_, K, V> {
     type Output = Vec<Costs>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Vec<Costs> {
-        if self.of.problem.has_friction() {
-            return self.with_friction(simd);
-        }
-        // One vector at most, so that these steps are not compiled for several as well.
-        if K == 1 {
-            let model = self.of.problem.model;
-            let exponent = self.guesses.first().map_or(1.0, |guess| model.exponent(&guess.theta));
-            match model {
-                Model::Dahl => {}
-                Model::BoucWen => return self.kernel(simd, &BoucWenKernel { exponent }),
-                Model::FirstOrderDahl => {
-                    return self.kernel(simd, &FirstOrderDahlKernel { exponent });
-                }
-                Model::BoucWenOscillator => {
-                    return self.kernel(simd, &BoucWenOscillatorKernel { exponent });
-                }
-            }
-        }
-        match self.of.stepping.order {
-            Order::Second => self.smooth::<S, FEW_TERMS, false>(simd),
-            Order::Fourth => self.smooth::<S, TERMS, true>(simd),
-        }
-    }
-}
-
-impl<const K: usize> Bundle<'_, K> {
-    /// A value for each lane; lanes without a guess of their own repeat the last.
-    #[inline(always)]
-    fn lanes<S: Simd>(&self, simd: S, value: impl Fn(&Theta) -> f64) -> Lanes<S, K> {
-        Lanes::gather(simd, |lane| {
-            let guess = self.guesses.get(lane).or(self.guesses.last());
-            guess.map_or(f64::NAN, |guess| value(&guess.theta))
-        })
-    }
-
-    #[inline(always)]
-    fn smooth<S: Simd, const T: usize, const FOURTH: bool>(self, simd: S) -> Vec<Costs> {
-        let linear = Propagator::new(
-            self.lanes(simd, |theta| 1.0 / theta[0]),
-            self.lanes(simd, |theta| theta[1] / theta[0]),
-            self.lanes(simd, |theta| theta[2] / theta[0]),
-            self.of.step(),
-            self.of.halvings,
-        );
-        let operator = Dahl::<_, T> {
-            a1: self.lanes(simd, |theta| theta[4]),
-            a2: self.lanes(simd, |theta| theta[5]),
-            gain: self.lanes(simd, |theta| theta[6] * theta[8]),
-        };
-        let zero = Lanes::splat(simd, 0.0);
-        let start = FeedbackState { x: zero, w: zero, memory: operator.rest() };
-        let gain = self.lanes(simd, |theta| theta[3]);
-        self.march(Smooth::<_, _, FOURTH> { linear, operator }, start, gain)
-    }
-
-    /// Any model that is built from plain parameters.
-    #[inline(always)]
-    fn kernel<S: Simd>(self, simd: S, kernel: &impl Kernel<Lanes<S, K>>) -> Vec<Costs> {
-        let zero = Lanes::splat(simd, 0.0);
+        let Self { kernel, bundle } = self;
+        let Bundle { of, candidates, .. } = bundle;
+        let (drive, substeps) = (&of.record.drive, of.stepping.substeps);
+        let zero = Lanes::<S, V>::splat(simd, 0.0);
         let mut parameters = [zero; MOST_PARAMETERS];
         for (i, parameter) in parameters.iter_mut().enumerate() {
-            *parameter = self.lanes(simd, |theta| theta[i]);
+            // Lanes without a candidate of their own repeat the last.
+            *parameter = Lanes::gather(simd, |lane| {
+                let candidate = candidates.get(lane).or(candidates.last());
+                candidate.map_or(f64::NAN, |candidate| candidate.theta.0[i])
+            });
         }
-        let coupling = kernel.coupling(&parameters, self.of.step(), self.of.halvings);
+        let step = drive.dt / index(substeps);
+        let (coupling, gain) = kernel.coupling(&parameters, step, of.halvings);
         let start = FeedbackState { x: zero, w: zero, memory: kernel.rest(&parameters) };
-        let gain = kernel.gain(&parameters);
-        self.march(coupling, start, gain)
-    }
-
-    #[inline(always)]
-    fn with_friction<S: Simd>(self, simd: S) -> Vec<Costs> {
-        let parameters = FrictionParameters {
-            mechanics: [0, 1, 2].map(|i| self.lanes(simd, |theta| theta[i])),
-            operator: [4, 5, 8].map(|i| self.lanes(simd, |theta| theta[i])),
-            b1: self.lanes(simd, |theta| theta[6]),
-            b0: self.lanes(simd, |theta| theta[7]),
-        };
-        let coupling = Friction::new(parameters, self.of.step(), self.of.halvings);
-        let zero = Lanes::splat(simd, 0.0);
-        let start = coupling.start(zero, zero, DahlState { force: zero, slope: zero });
-        let gain = self.lanes(simd, |theta| theta[3]);
-        self.march(coupling, start, gain)
-    }
-
-    /// Leads the lanes along the drive and concludes.
-    #[inline(always)]
-    fn march<S: Simd, C: Coupling<Lanes<S, K>>>(
-        self,
-        coupling: C,
-        start: FeedbackState<Lanes<S, K>, C::Memory>,
-        gain: Lanes<S, K>,
-    ) -> Vec<Costs> {
-        let (drive, substeps) = (&self.of.record.drive, self.of.stepping.substeps);
-        let march = March { coupling, gain };
-        let mut sums = Sums::new(&self, start.x);
-        let ended = if self.of.problem.has_delay() {
-            let mut late = Delayed::new(sums, index(substeps));
-            let end = march.run(drive, substeps, start, &mut late);
-            sums = late.sums;
-            end.is_some()
-        } else {
-            march.run(drive, substeps, start, &mut sums).is_some()
-        };
+        let delay = of.problem.has_delay().then(|| Delayed::new(&bundle, zero, index(substeps)));
+        let mut sums = ResidualSums::new(bundle, zero, delay);
+        let ended = March { coupling, gain }.run(drive, substeps, start, &mut sums).is_some();
         sums.conclude(ended)
     }
 }

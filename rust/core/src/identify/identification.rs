@@ -24,7 +24,7 @@ pub struct Identification {
     pub sensitivities: Vec<Sensitivity>,
 }
 
-/// Identifies a Dahl stage from a record: swarms, where asked a polish of each, and the spread.
+/// Identifies a stage from a record: swarms, where asked a polish of each, and the spread.
 ///
 /// # Errors
 /// [`crate::Error::Parameter`] for a specification or setting that cannot be used,

@@ -1,4 +1,4 @@
-//! What is close by: the slope of the deviation at a guess, a polish down it, and what the
+//! What is close by: the slope of the deviation at a candidate, a polish down it, and what the
 //! record tells of each parameter.
 //!
 //! The polish is the method of Levenberg and Marquardt (Marquardt 1963, doi 10.1137/0111030)
@@ -11,9 +11,8 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::cost::{Costs, Evaluator, Guess};
+use super::cost::{Candidate, Costs, Evaluator};
 use super::problem::{Coordinate, Problem, Record};
-use crate::models::DELAY;
 use crate::signal::{Stop, delayed, index};
 
 /// Most samples that enter the Jacobian: more would hardly change what it says.
@@ -25,7 +24,7 @@ const CHANGE: f64 = 1e-4;
 /// Most iterations of the polish.
 const ITERATIONS: usize = 60;
 
-/// Normal equations about a guess, in coordinates of the unit box.
+/// Normal equations about a candidate, in coordinates of the unit box.
 struct Normal {
     /// J^T J.
     square: DMatrix<f64>,
@@ -35,7 +34,7 @@ struct Normal {
     rows: usize,
 }
 
-/// A guess after the polish.
+/// A candidate after the polish.
 #[derive(Clone, Debug)]
 pub struct Polished {
     /// Its place in the unit box.
@@ -53,11 +52,11 @@ pub struct Sensitivity {
     pub parameter: usize,
     /// Standard deviation, SI; infinite where the data say nothing of it.
     pub deviation: f64,
-    /// Whether the guess lies on a bound.
+    /// Whether the candidate lies on a bound.
     pub at_bound: bool,
 }
 
-/// The neighbourhood of guesses of one problem.
+/// The neighbourhood of candidatees of one problem.
 #[derive(Clone, Copy)]
 pub struct Local<'a> {
     /// The record.
@@ -71,7 +70,7 @@ pub struct Local<'a> {
 }
 
 impl Local<'_> {
-    /// Goes down to the minimum next to a guess; never returns a worse one.
+    /// Goes down to the minimum next to a candidate; never returns a worse one.
     #[must_use]
     pub fn polish(&self, place: &[f64], costs: Costs) -> Polished {
         let mut best = Polished { place: place.to_vec(), costs, evaluations: 0 };
@@ -86,8 +85,9 @@ impl Local<'_> {
                 let Some(next) = step(&normal, &best.place, damping) else {
                     break;
                 };
-                let guess = Guess { theta: self.problem.theta(&next), limit: best.costs.rms };
-                let costs = self.evaluator.costs(&[guess], self.stop);
+                let candidate =
+                    Candidate { theta: self.problem.theta(&next), limit: best.costs.rms };
+                let costs = self.evaluator.costs(&[candidate], self.stop);
                 best.evaluations += 1;
                 if let Some(&costs) = costs.first()
                     && costs.rms < best.costs.rms
@@ -107,9 +107,9 @@ impl Local<'_> {
         best
     }
 
-    /// Standard deviations of the free parameters at a guess.
+    /// Standard deviations of the free parameters at a candidate.
     ///
-    /// Empty where the guess or its neighbours cannot be simulated.
+    /// Empty where the candidate or its neighbours cannot be simulated.
     #[must_use]
     pub fn sensitivities(&self, place: &[f64], rms: f64) -> Vec<Sensitivity> {
         let Some(normal) = self.normal(place) else {
@@ -162,9 +162,8 @@ impl Local<'_> {
     /// Every stride-th sample of the window, simulated as the search does.
     fn displacement(&self, place: &[f64], stride: usize) -> Option<Vec<f64>> {
         let theta = self.problem.theta(place);
-        let (drive, stepping) = (&self.record.drive, self.evaluator.stepping);
-        let [x, v] = self.problem.model.motion(&theta, drive, stepping, self.stop)?;
-        let x = delayed(&x, &v, drive.dt, theta[DELAY]);
+        let [x, v] = self.evaluator.motion(&theta, self.stop)?;
+        let x = delayed(&x, &v, self.record.drive.dt, theta.delay());
         Some(x[self.record.window.clone()].iter().step_by(stride).copied().collect())
     }
 

@@ -1,10 +1,12 @@
 //! Identification: parameters searched, cost of a candidate, particle swarm, local refinement.
 
 pub mod bounds;
+mod candidate;
 mod cost;
 mod cross_talk;
 mod identification;
 mod levenberg_marquardt;
+mod motion;
 mod prandtl_ishlinskii;
 mod problem;
 mod residual_sums;
@@ -15,12 +17,13 @@ mod step_ringing;
 mod step_size;
 mod swarm;
 
-pub use cost::{Costs, Evaluator, Guess};
+pub use candidate::{DELAY, PLACES, Theta};
+pub use cost::{Candidate, Costs, Evaluator};
 pub use cross_talk::{CrossTalk, cross_talk};
 pub use identification::{Identification, identify};
 pub use levenberg_marquardt::{Local, Polished, Sensitivity};
 pub use prandtl_ishlinskii::{DynamicsKind, PlaysFit, PlaysRecord, PlaysSettings, identify_plays};
-pub use problem::{Coordinate, Delay, NOMINAL_STIFFNESS, Problem, Record, Scale, Spec};
+pub use problem::{Coordinate, Delay, Problem, Record, Scale, Spec};
 pub use search::{Monitor, Outcome, Plan, Progress, StopReason, search};
 pub use sensor_noise::{Noise, noise_at_rest};
 pub use step_response::{Conventional, StepReadings, StepResponse, read_step, separate};

@@ -472,6 +472,7 @@ impl<'a> Fit<'a> {
         let linear = self.least_linear + weights[0];
         Ok(PlaysFit {
             stage: PrandtlIshlinskiiStage {
+                count: thresholds.len(),
                 plays: plays(linear, thresholds, &weights[1..], &self.corners, bends)?,
                 relaxation: Relaxation::new(shares, times, self.dynamics)?,
             },

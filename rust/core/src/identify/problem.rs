@@ -3,8 +3,10 @@
 use std::ops::Range;
 
 use super::bounds;
+use super::candidate::{DELAY, PLACES, Theta};
 use crate::error::{Error, Result, positive, shown};
-use crate::models::{DELAY, Model, Theta};
+use crate::integrator::MOST_PARAMETERS;
+use crate::models::{FoundBy, Held, Model, NOMINAL_STIFFNESS, position};
 use crate::signal::{Drive, Hold, index, range};
 
 /// A drive and the displacement measured under it.
@@ -130,7 +132,7 @@ impl Coordinate {
 }
 
 /// What the caller asked for.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Spec {
     /// The kind of stage.
     pub model: Model,
@@ -146,6 +148,22 @@ pub struct Spec {
     pub offset: bool,
     /// Time by which the displacement is late, s.
     pub delay: Delay,
+}
+
+impl Spec {
+    /// All that is not held by default is searched; no offset, no delay.
+    #[must_use]
+    pub fn of(model: Model) -> Self {
+        Self {
+            model,
+            free: None,
+            fixed: Vec::new(),
+            bounds: Vec::new(),
+            stiffness: None,
+            offset: false,
+            delay: Delay::default(),
+        }
+    }
 }
 
 /// Delay between drive and displacement.
@@ -172,7 +190,7 @@ impl Delay {
         let (low, high) = match self {
             Self::Fixed(value) => (value, value),
             Self::Fitted => {
-                return Coordinate::between("delay", 0.0, bounds::longest_delay(record));
+                return Coordinate::between("delay", 0.0, bounds::measures(record).longest_delay());
             }
             Self::Between(low, high) => (low, high),
         };
@@ -192,23 +210,24 @@ impl Delay {
     }
 }
 
-/// Stiffness held where nothing in the input fixes a force, N/m.
-pub const NOMINAL_STIFFNESS: f64 = 1e6;
-
 /// A search made definite.
 #[derive(Clone, Debug)]
 pub struct Problem {
     /// The kind of stage.
     pub model: Model,
     /// One for each place in [`Theta`].
-    pub coordinates: [Coordinate; 10],
+    pub coordinates: [Coordinate; PLACES],
     /// Whether the stiffness is nominal because nothing fixes a force.
     pub scale_assumed: bool,
     /// Whether an offset is fitted.
     pub offset: bool,
 }
 
-const STIFFNESS: usize = 2;
+/// A value for each scalar parameter, where there is one.
+type Fixed = [Option<f64>; MOST_PARAMETERS];
+
+/// Parameters that are searched.
+type Free = [bool; MOST_PARAMETERS];
 
 impl Problem {
     /// Settles which parameters are free, and between which bounds.
@@ -218,11 +237,19 @@ impl Problem {
     /// that is both fixed and free or has no value, and where all the parameters that carry
     /// force are free.
     pub fn new(record: &Record<'_>, spec: &Spec) -> Result<Self> {
+        let infos = spec.model.info().parameters;
+        if spec.model.found_by() != FoundBy::Swarm {
+            let found = format!("'{}'", spec.model.info().name);
+            return Err(Error::parameter("model", found, "one that a swarm searches"));
+        }
         let mut fixed = fixed_values(spec)?;
         let free = free_parameters(spec, &mut fixed)?;
-        let forces = spec.model.facts().forces;
-        let holds_scale =
-            forces.is_empty() || forces.iter().any(|&i| fixed[i].is_some_and(|value| value != 0.0));
+        let has_scale = infos.iter().any(|info| info.carries_force);
+        let holds_scale = !has_scale
+            || infos
+                .iter()
+                .zip(&fixed)
+                .any(|(info, value)| info.carries_force && value.is_some_and(|v| v != 0.0));
         let mut scale_assumed = false;
         if !holds_scale {
             let asked =
@@ -231,19 +258,19 @@ impl Problem {
                 return Err(Error::parameter(
                     "free",
                     "every parameter that carries force",
-                    "one of them held: voltage and displacement fix only their ratios \
+                    "one of them held: voltage and displacement determine only their ratios \
                      (give stiffness=, or name one in fixed=)",
                 ));
             }
-            fixed[STIFFNESS] = Some(NOMINAL_STIFFNESS);
+            fixed[position(infos, "stiffness", "stiffness")?] = Some(NOMINAL_STIFFNESS);
             scale_assumed = true;
         }
         check_fixed(spec.model, &fixed)?;
-        let mut coordinates = [Coordinate::Fixed(0.0); 10];
+        let mut coordinates = [Coordinate::Fixed(0.0); PLACES];
         coordinates[..DELAY].copy_from_slice(&bounds::derive(record, spec.model, &fixed)?);
         coordinates[DELAY] = spec.delay.coordinate(record)?;
         for (name, (low, high)) in &spec.bounds {
-            let i = parameter(spec.model, "bounds", name)?;
+            let i = position(infos, "bounds", name)?;
             if !free[i] {
                 return Err(Error::parameter(
                     format!("bounds of {name}"),
@@ -276,19 +303,26 @@ impl Problem {
     #[must_use]
     pub fn theta(&self, place: &[f64]) -> Theta {
         let mut places = place.iter();
-        self.coordinates.map(|coordinate| match coordinate {
+        Theta(self.coordinates.map(|coordinate| match coordinate {
             Coordinate::Fixed(value) => value,
             Coordinate::Free { .. } => coordinate.value(places.next().copied().unwrap_or(0.5)),
-        })
+        }))
     }
 
-    /// Whether any guess has dry friction.
+    /// The parameters that all candidates share.
     #[must_use]
-    pub fn has_friction(&self) -> bool {
-        self.model == Model::Dahl && self.coordinates[7] != Coordinate::Fixed(0.0)
+    pub fn held(&self) -> Held {
+        let mut held = Held::defaults(self.model.info().parameters);
+        for (slot, coordinate) in held.values.iter_mut().zip(&self.coordinates) {
+            *slot = match coordinate {
+                Coordinate::Fixed(value) => Some(*value),
+                Coordinate::Free { .. } => None,
+            };
+        }
+        held
     }
 
-    /// Whether any guess is late.
+    /// Whether any candidate has a delay.
     #[must_use]
     pub fn has_delay(&self) -> bool {
         self.coordinates[DELAY] != Coordinate::Fixed(0.0)
@@ -301,95 +335,75 @@ impl Problem {
             return Err(Error::parameter("free", "empty", "at least one parameter to search"));
         }
         for corner in [0.0, 1.0] {
-            self.model.check(&self.theta(&vec![corner; count]))?;
+            self.model.check(&self.theta(&vec![corner; count]).parameters())?;
         }
         Ok(())
     }
 }
 
 /// Values of `fixed=` and `stiffness=`, with the model's defaults.
-fn fixed_values(spec: &Spec) -> Result<[Option<f64>; 9]> {
-    let facts = spec.model.facts();
-    let mut fixed: [Option<f64>; 9] = [None; 9];
+fn fixed_values(spec: &Spec) -> Result<Fixed> {
+    let infos = spec.model.info().parameters;
+    let mut fixed: Fixed = [None; MOST_PARAMETERS];
     for (name, value) in &spec.fixed {
-        let i = parameter(spec.model, "fixed", name)?;
-        let unit = facts.parameters[i].unit;
-        fixed[i] = Some(crate::error::finite(&format!("fixed {name}"), *value, unit)?);
+        let i = position(infos, "fixed", name)?;
+        fixed[i] = Some(crate::error::finite(&format!("fixed {name}"), *value, infos[i].unit)?);
     }
     if let Some(stiffness) = spec.stiffness {
         positive("stiffness", stiffness, "N/m")?;
-        if fixed[STIFFNESS].is_some_and(|value| value.to_bits() != stiffness.to_bits()) {
+        let i = position(infos, "stiffness", "stiffness")?;
+        if fixed[i].is_some_and(|value| value.to_bits() != stiffness.to_bits()) {
             return Err(Error::parameter(
                 "stiffness",
                 format!("{stiffness} N/m"),
                 "the value given for it in fixed=, or only one of the two",
             ));
         }
-        fixed[STIFFNESS] = Some(stiffness);
+        fixed[i] = Some(stiffness);
     }
-    for &(i, value) in facts.defaults {
-        fixed[i] = fixed[i].or(Some(value));
-    }
-    for missing in &mut fixed[facts.parameters.len()..] {
-        *missing = Some(0.0);
+    let defaults = Held::defaults(infos).values;
+    for (value, default) in fixed.iter_mut().zip(defaults) {
+        *value = value.or(default);
     }
     Ok(fixed)
 }
 
 /// Refuses held values with which no stage exists, by their own names.
-fn check_fixed(model: Model, fixed: &[Option<f64>; 9]) -> Result<()> {
-    let mut theta = [1.0; 10];
-    for &(i, value) in model.facts().defaults {
-        theta[i] = value;
-    }
-    for (value, held) in theta.iter_mut().zip(fixed) {
-        *value = held.unwrap_or(*value);
-    }
-    model.check(&theta)?;
-    if model == Model::Dahl && theta[8] == 0.0 {
-        return Err(Error::parameter("up", 0, "a value other than 0: without it no hysteresis"));
-    }
-    Ok(())
+fn check_fixed(model: Model, fixed: &Fixed) -> Result<()> {
+    let defaults = Held::defaults(model.info().parameters).values;
+    let value = |i: usize| fixed[i].or(defaults[i]).unwrap_or(1.0);
+    model.check(&core::array::from_fn(value))
 }
 
 /// Which parameters are searched; each of the others must have a value.
-fn free_parameters(spec: &Spec, fixed: &mut [Option<f64>; 9]) -> Result<[bool; 9]> {
+fn free_parameters(spec: &Spec, fixed: &mut Fixed) -> Result<Free> {
     let Some(names) = &spec.free else {
         return Ok(fixed.map(|value| value.is_none()));
     };
-    let mut free = [false; 9];
+    let infos = spec.model.info().parameters;
+    let mut free: Free = [false; MOST_PARAMETERS];
     for name in names {
-        let i = parameter(spec.model, "free", name)?;
-        if spec.fixed.iter().any(|(other, _)| other == name)
-            || (i == STIFFNESS && fixed[i].is_some())
-        {
+        let i = position(infos, "free", name)?;
+        let given = spec.fixed.iter().any(|(other, _)| other == name);
+        if given || (name == "stiffness" && fixed[i].is_some()) {
             return Err(Error::parameter("free", name, "a parameter that is not fixed as well"));
         }
-        if let Some((_, reason)) = spec.model.facts().held.iter().find(|(held, _)| *held == i) {
-            return Err(Error::parameter("free", name, *reason));
+        if let Some(reason) = infos[i].held {
+            return Err(Error::parameter("free", name, reason));
         }
         free[i] = true;
         fixed[i] = None;
     }
-    for i in 0..9 {
-        let scale = i == STIFFNESS && !spec.model.facts().forces.is_empty();
+    for (i, info) in infos.iter().enumerate() {
+        // The stiffness may still be assumed.
+        let scale = info.name == "stiffness" && info.carries_force;
         if !free[i] && fixed[i].is_none() && !scale {
-            let name = spec.model.facts().parameters[i].name;
             return Err(Error::parameter(
                 "free",
                 names.join(", "),
-                format!("{name} as well, or a value for it in fixed="),
+                format!("{} as well, or a value for it in fixed=", info.name),
             ));
         }
     }
     Ok(free)
-}
-
-/// Index of a parameter by its name.
-fn parameter(model: Model, argument: &str, name: &str) -> Result<usize> {
-    let parameters = model.facts().parameters;
-    parameters.iter().position(|info| info.name == name).ok_or_else(|| {
-        let names: Vec<&str> = parameters.iter().map(|info| info.name).collect();
-        Error::parameter(argument, format!("'{name}'"), format!("one of {}", names.join(", ")))
-    })
 }

@@ -2,9 +2,11 @@
 
 use rayon::prelude::*;
 
+use super::candidate::Theta;
+use super::motion::motion;
 use super::problem::{Problem, Record};
 use crate::integrator::{Mechanics, Order, Stepping, first_substeps, steps_for};
-use crate::models::{Model, Theta};
+use crate::models::Model;
 use crate::signal::{Drive, Stop, range};
 
 /// Accuracy that a search asks of its simulations, m.
@@ -23,7 +25,7 @@ const WORTH: usize = 2;
 /// accurate to 0.2 nm, or to two millionths of the stroke.
 ///
 /// A stage that goes more than twice the measured stroke is left out, and so is one that no
-/// sub-steps make accurate: such a guess costs more than any stage worth finding, however
+/// sub-steps make accurate: such a candidate costs more than any stage worth finding, however
 /// exactly it is computed.
 pub(super) fn choose(record: &Record<'_>, problem: &Problem, stop: Stop<'_>) -> Stepping {
     let excerpts = excerpts(&record.drive);
@@ -41,7 +43,7 @@ pub(super) fn choose(record: &Record<'_>, problem: &Problem, stop: Stop<'_>) -> 
         })
         .collect();
     let fourth = trials.iter().map(|trial| trial.2).max().unwrap_or(1);
-    if problem.has_friction() || problem.model != Model::Dahl {
+    if !problem.model.has_second_order(&problem.held()) {
         return Stepping { order: Order::Fourth, substeps: fourth };
     }
     let most = WORTH * fourth;
@@ -59,7 +61,7 @@ pub(super) fn choose(record: &Record<'_>, problem: &Problem, stop: Stop<'_>) -> 
     }
 }
 
-/// A guess on a part of the drive.
+/// A candidate on a part of the drive.
 struct Trial<'a> {
     model: Model,
     theta: &'a Theta,
@@ -72,26 +74,19 @@ impl Trial<'_> {
     /// The sub-steps that make it accurate, and the displacement with them.
     fn steps(&self, order: Order, most: usize) -> Option<(usize, Vec<f64>)> {
         let &Self { model, theta, drive, accuracy, stop } = self;
-        let [mass, damping, stiffness, ..] = *theta;
+        let [mass, damping, stiffness, ..] = theta.parameters();
         let first = first_substeps(&Mechanics { mass, damping, stiffness }, drive.dt);
         steps_for(first, accuracy, most, |substeps| {
-            let [x, _] = model.motion(theta, drive, Stepping { order, substeps }, stop)?;
+            let [x, _] = motion(model, theta, drive, Stepping { order, substeps }, stop)?;
             Some(x)
         })
     }
 }
 
-/// The guesses that have to be accurate. Where the force kinks at reversals the middle of the box
-/// stands for all: its corners have kinks a nanometre wide, which would make every guess a dozen
-/// times as dear, and an oscillator's hysteresis that grows without bound, which no steps follow.
+/// The candidates that have to be accurate: where the force has kinks, the middle of the box.
 fn representatives(problem: &Problem) -> Vec<Theta> {
     let all = corners(problem);
-    match problem.model {
-        Model::FirstOrderDahl | Model::BoucWenOscillator => {
-            all.last().copied().into_iter().collect()
-        }
-        Model::Dahl | Model::BoucWen => all,
-    }
+    if problem.model.is_kinked() { all.last().copied().into_iter().collect() } else { all }
 }
 
 /// The corners of the box of free parameters, and its middle.

@@ -52,6 +52,21 @@ pub struct FrictionParameters<N> {
     pub b0: N,
 }
 
+impl<N: Number> FrictionParameters<N> {
+    /// What a stage remembers whose velocity has the sign of `w`; it rests where `w` is 0.
+    #[inline(always)]
+    pub fn memory(&self, w: N, operator: DahlState<N>) -> FrictionMemory<N> {
+        self.rubbing().memory(w, operator)
+    }
+
+    #[inline(always)]
+    fn rubbing(&self) -> Rubbing<N> {
+        let [a1, a2, up] = self.operator;
+        let dahl = Dahl { a1, a2, gain: up };
+        Rubbing { dahl, b1: self.b1, b0: self.b0, direction: self.b1.like(1.0) }
+    }
+}
+
 /// What a stage with friction remembers.
 #[derive(Clone, Copy, Debug)]
 pub struct FrictionMemory<N> {
@@ -106,6 +121,16 @@ impl<N: Number> Operator<N> for Rubbing<N> {
     }
 }
 
+impl<N: Number> Rubbing<N> {
+    #[inline(always)]
+    fn memory(self, w: N, operator: DahlState<N>) -> FrictionMemory<N> {
+        let zero = w.like(0.0);
+        let direction = w.where_negative(w.like(-1.0), (-w).where_negative(w.like(1.0), zero));
+        let force = Self { direction, ..self }.output(&operator).0;
+        FrictionMemory { operator, direction, force, doubt: zero }
+    }
+}
+
 type State<N> = FeedbackState<N, FrictionMemory<N>>;
 
 /// The way of the lanes through one step, leg by leg.
@@ -131,28 +156,19 @@ impl<N: Number> Friction<N> {
         let inverse = mass.like(1.0) / mass;
         let h = mass.like(step);
         let (damped, sprung) = (damping * inverse, stiffness * inverse);
-        let [a1, a2, up] = of.operator;
         Self {
             linear: Propagator::new(inverse, damped, sprung, step, halvings),
             rates: [inverse * h * h, damped * h, sprung * h * h],
             halvings,
             stiffness,
-            rubbing: Rubbing {
-                dahl: Dahl { a1, a2, gain: up },
-                b1: of.b1,
-                b0: of.b0,
-                direction: mass.like(1.0),
-            },
+            rubbing: of.rubbing(),
         }
     }
 
     /// The state at a displacement, at rest where `w` is 0.
     #[inline(always)]
     pub fn start(&self, x: N, w: N, operator: DahlState<N>) -> State<N> {
-        let zero = x.like(0.0);
-        let direction = w.where_negative(x.like(-1.0), (-w).where_negative(x.like(1.0), zero));
-        let force = self.moving(direction).output(&operator).0;
-        FeedbackState { x, w, memory: FrictionMemory { operator, direction, force, doubt: zero } }
+        FeedbackState { x, w, memory: self.rubbing.memory(w, operator) }
     }
 
     #[inline(always)]

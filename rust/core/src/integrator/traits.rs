@@ -29,32 +29,44 @@ pub trait Coupling<N> {
     ) -> FeedbackState<N, Self::Memory>;
 }
 
-/// Parameters of a model, SI, mass, damping and stiffness first; those it does not have are 0.
+/// Scalar parameters of a model, SI, mass, damping and stiffness first; places beyond those that
+/// the model has hold 0.
 pub type Parameters<N> = [N; MOST_PARAMETERS];
 
-/// Most parameters that a model has.
-pub const MOST_PARAMETERS: usize = 9;
+/// Most scalar parameters that a model has.
+pub const MOST_PARAMETERS: usize = 12;
 
-/// A model built from plain parameters, for one stage or for lanes of them.
-pub trait Kernel<N> {
-    /// Its step.
-    type Coupling: Coupling<N>;
+/// What the hysteresis of a kernel remembers.
+pub type Memory<K, N> = <<K as Kernel>::Coupling<N> as Coupling<N>>::Memory;
 
-    /// What 1 V enters the step as.
-    fn gain(&self, parameters: &Parameters<N>) -> N;
+/// Builds the step of a model from its parameters, for one stage or for lanes of them.
+///
+/// What is common to all lanes, as an exponent, is in `&self`.
+pub trait Kernel: Copy + Send + Sync {
+    /// Vectors that a bundle of lanes holds: more than one hides the latency of a short step.
+    const VECTORS: usize = 1;
 
-    /// The step for steps of `step` seconds.
-    fn coupling(&self, parameters: &Parameters<N>, step: f64, halvings: u32) -> Self::Coupling;
+    /// One step in time.
+    type Coupling<N: Number>: Coupling<N>;
 
-    /// The memory before any motion.
-    fn rest(&self, parameters: &Parameters<N>) -> <Self::Coupling as Coupling<N>>::Memory;
-
-    /// Hysteresis force, N.
-    fn force(
+    /// The step for steps of `step` seconds, and the force (or input) for 1 V.
+    fn coupling<N: Number>(
         &self,
         parameters: &Parameters<N>,
-        memory: &<Self::Coupling as Coupling<N>>::Memory,
-    ) -> N;
+        step: f64,
+        halvings: u32,
+    ) -> (Self::Coupling<N>, N);
+
+    /// The memory before any motion.
+    fn rest<N: Number>(&self, parameters: &Parameters<N>) -> Memory<Self, N>;
+
+    /// Hysteresis force, N.
+    fn force(&self, parameters: &Parameters<f64>, memory: &Memory<Self, f64>) -> f64;
+
+    /// Whether each rest on the way to this memory was unique.
+    fn unique(&self, _memory: &Memory<Self, f64>) -> bool {
+        true
+    }
 }
 
 /// The linear part of a stage over steps of `step` seconds.
@@ -67,15 +79,4 @@ pub(crate) fn linear<N: Number>(
     let [mass, damping, stiffness, ..] = *parameters;
     let inverse = mass.like(1.0) / mass;
     Propagator::new(inverse, damping / mass, stiffness / mass, step, halvings)
-}
-
-/// Name, symbol and unit of one parameter of a stage.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ParameterInfo {
-    /// The name that both languages use.
-    pub name: &'static str,
-    /// The symbol in the literature.
-    pub symbol: &'static str,
-    /// SI unit, empty where there is none.
-    pub unit: &'static str,
 }

@@ -1,5 +1,6 @@
 //! Numerical methods and number types: SIMD lanes, random numbers, least squares, line search.
 
+mod fused;
 mod golden_section;
 mod lanes;
 mod nnls;
@@ -9,6 +10,7 @@ mod transfer_function;
 pub use lanes::Lanes;
 pub use nnls::{Rows, nnls};
 
+pub(crate) use fused::dispatch_fused;
 pub(crate) use golden_section::least;
 pub(crate) use random::Draws;
 pub(crate) use transfer_function::{C, Jet, Ratio};

@@ -9,24 +9,40 @@
 
 use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{BoucWen, BoucWenState, Operator};
+use piezotrack_control::inverse::{BoucWenInverse, BoucWenInverseState};
 
-use crate::error::{Result, finite, not_zero, within};
-use crate::integrator::{
-    Alone, AtInput, InputMemory, Kernel, Mechanics, Motion, ParameterInfo, Parameters, linear,
+use super::plant::KernelModel;
+use super::search_ranges::{Measures, Ranges};
+use super::traits::{
+    Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel, leading,
+    parameters, simulate_kernel,
 };
-use crate::signal::{Drive, Stop};
+use super::values::{Held, ParameterInfo, Values};
+use crate::design::{Gains, LoopPlant};
+use crate::error::{Result, finite, not_zero, positive, within};
+use crate::integrator::{
+    AtInput, InputMemory, Kernel, LumpedStage, Mechanics, Order, Parameters, linear,
+};
 
-/// The stage's parameters, in the order of [`BoucWenStage::from_theta`]. The unit of beta and
-/// gamma is that for n = 1; in general it is 1/(V m^(n-1)).
-pub const BOUC_WEN_PARAMETERS: [ParameterInfo; 8] = [
-    ParameterInfo { name: "mass", symbol: "m", unit: "kg" },
-    ParameterInfo { name: "damping", symbol: "b", unit: "N s/m" },
-    ParameterInfo { name: "stiffness", symbol: "k", unit: "N/m" },
-    ParameterInfo { name: "piezo_coefficient", symbol: "d", unit: "m/V" },
-    ParameterInfo { name: "alpha", symbol: "alpha", unit: "" },
-    ParameterInfo { name: "beta", symbol: "beta", unit: "1/V" },
-    ParameterInfo { name: "gamma", symbol: "gamma", unit: "1/V" },
-    ParameterInfo { name: "exponent", symbol: "n", unit: "" },
+/// The unit of beta and gamma is that for n = 1; in general it is 1/(V m^(n-1)).
+const PARAMETERS: &[ParameterInfo] = &[
+    ParameterInfo::new("mass", "m", "kg").force(),
+    ParameterInfo::new("damping", "b", "N s/m").force(),
+    ParameterInfo::new("stiffness", "k", "N/m").force(),
+    ParameterInfo::new("piezo_coefficient", "d", "m/V"),
+    ParameterInfo::new("alpha", "alpha", ""),
+    ParameterInfo::new("beta", "beta", "1/V"),
+    ParameterInfo::new("gamma", "gamma", "1/V"),
+    ParameterInfo::new("exponent", "n", "")
+        .or(1.0)
+        .never_searched("exponent held, in fixed=: it decides the unit of beta and gamma"),
+];
+
+const STATE: &[ParameterInfo] = &[
+    ParameterInfo::new("x", "x", "m"),
+    ParameterInfo::new("v", "x'", "m/s"),
+    ParameterInfo::new("u", "u", "V"),
+    ParameterInfo::new("h", "h", "m"),
 ];
 
 /// A stage with Bouc-Wen hysteresis at its input.
@@ -57,16 +73,13 @@ pub struct BoucWenStage {
     pub exponent: f64,
 }
 
-/// Motion of a Bouc-Wen stage.
-pub type BoucWenMotion = Motion<InputMemory<f64, BoucWenState<f64>>>;
-
 impl BoucWenStage {
-    /// The stage with parameters in the order of [`BOUC_WEN_PARAMETERS`].
+    /// The stage with its eight parameters in the order of the fields.
     ///
     /// # Errors
     /// [`crate::Error::Parameter`] naming the parameter that is out of its range.
-    pub fn from_theta(theta: &[f64; 8]) -> Result<Self> {
-        let [mass, damping, stiffness, piezo_coefficient, alpha, beta, gamma, exponent] = *theta;
+    pub fn new(values: &[f64; 8]) -> Result<Self> {
+        let [mass, damping, stiffness, piezo_coefficient, alpha, beta, gamma, exponent] = *values;
         let mechanics = Mechanics::new(mass, damping, stiffness)?;
         not_zero("piezo_coefficient", piezo_coefficient, "m/V")?;
         within("exponent", exponent, 1.0, MOST_EXPONENT)?;
@@ -109,35 +122,110 @@ impl BoucWenStage {
         Self { mechanics, ..printed }
     }
 
-    /// The parameters in the order of [`BOUC_WEN_PARAMETERS`], as a kernel takes them.
+    /// The parameters in their order.
     #[must_use]
-    pub fn parameters(&self) -> Parameters<f64> {
+    pub fn values(&self) -> [f64; 8] {
         let Mechanics { mass, damping, stiffness } = self.mechanics;
         let Self { piezo_coefficient, alpha, beta, gamma, exponent, .. } = *self;
-        [mass, damping, stiffness, piezo_coefficient, alpha, beta, gamma, exponent, 0.0]
+        [mass, damping, stiffness, piezo_coefficient, alpha, beta, gamma, exponent]
     }
 
-    /// Simulates from `initial`: displacement, velocity, the drive seen last and h.
-    ///
-    /// `None` where `stop` said so meanwhile.
-    ///
-    /// # Errors
-    /// Those of [`Alone::simulate`].
-    pub fn simulate(
-        &self,
-        drive: &Drive<'_>,
-        initial: [f64; 4],
-        accuracy: f64,
-        stop: Stop<'_>,
-    ) -> Result<Option<BoucWenMotion>> {
+    /// The hysteresis operator, V to m.
+    #[must_use]
+    pub fn operator(&self) -> BoucWen<f64> {
+        let rise = self.alpha * self.piezo_coefficient;
+        BoucWen { rise, beta: self.beta, gamma: self.gamma, exponent: self.exponent }
+    }
+}
+
+impl KernelModel for BoucWenStage {
+    type Kernel = BoucWenKernel;
+
+    fn lumped(&self) -> LumpedStage<BoucWenKernel> {
         let kernel = BoucWenKernel { exponent: self.exponent };
-        let parameters = self.parameters();
-        let alone = Alone { kernel: &kernel, parameters: &parameters };
-        let [x, v, input, value] = initial;
-        let mut start = alone.rest();
-        (start.x, start.v, start.memory.input) = (x, v, input);
-        start.memory.operator.value = value;
-        alone.simulate(drive, start, accuracy, stop)
+        LumpedStage { kernel, parameters: parameters(&self.values()) }
+    }
+
+    fn memory(&self, state: &[f64]) -> InputMemory<f64, BoucWenState<f64>> {
+        let [_, _, input, value] = leading(state);
+        let operator = BoucWenState { value, ..self.operator().rest() };
+        InputMemory { operator, input, rise: 0.0 }
+    }
+
+    fn state(&self, memory: &InputMemory<f64, BoucWenState<f64>>) -> Vec<f64> {
+        vec![memory.input, memory.operator.value]
+    }
+}
+
+impl StageModel for BoucWenStage {
+    const INFO: ModelInfo = ModelInfo {
+        name: "bouc-wen",
+        title: "Bouc-Wen",
+        drive_unit: "V",
+        parameters: PARAMETERS,
+        state: STATE,
+        published: &[
+            ("xu_li_2010", || Values::scalars(PARAMETERS, &Self::xu_li_2010().values())),
+            ("xu_li_2010_corrected", || {
+                Values::scalars(PARAMETERS, &Self::xu_li_2010_corrected().values())
+            }),
+        ],
+    };
+
+    fn build(values: &Values) -> Result<Self> {
+        Self::new(&values.numbers())
+    }
+
+    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
+        simulate_kernel(self, experiment)
+    }
+
+    /// On its settled loop between the two voltages: `d - dh/du`.
+    fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
+        let piezo = self.piezo_coefficient;
+        let gains = Gains::of(&self.operator(), low, high, |slope| piezo - slope)?;
+        let Mechanics { mass, damping, stiffness } = self.mechanics;
+        let natural = libm::sqrt(stiffness / mass);
+        let ratio = 0.5 * damping / (mass * natural);
+        gains.plants(|gain| LoopPlant::mode(gain, natural / core::f64::consts::TAU, ratio))
+    }
+}
+
+impl Searchable for BoucWenStage {
+    fn ranges(of: &Measures, held: &Held) -> Result<Ranges> {
+        let [mass, damping, stiffness] = of.mechanical(of.stiffness(held, None, &[]));
+        // The memory fades over the whole drive's range, or a twentieth of it; with another
+        // exponent than 1, at a hysteresis of a tenth of the stroke.
+        let exponent = held.value("exponent").unwrap_or(1.0);
+        let fade = of.gain / of.stroke * libm::pow(0.1 * of.stroke, 1.0 - exponent);
+        Ok(vec![
+            ("mass", mass),
+            ("damping", damping),
+            ("stiffness", stiffness),
+            ("piezo_coefficient", of.piezo(of.gain, of.gain)),
+            ("alpha", (0.02, 1.5)),
+            ("beta", (0.05 * fade, 20.0 * fade)),
+            ("gamma", (-10.0 * fade, 10.0 * fade)),
+        ])
+    }
+
+    fn kernel<V: KernelVisitor>(held: &Held, _order: Order, visitor: V) -> V::Output {
+        visitor.visit(BoucWenKernel { exponent: held.value("exponent").unwrap_or(1.0) })
+    }
+}
+
+impl Invertible for BoucWenStage {
+    type Inverse = BoucWenInverse;
+
+    fn inverse(
+        &self,
+        dt: f64,
+        _initial: Option<&Values>,
+    ) -> Result<(BoucWenInverse, BoucWenInverseState)> {
+        positive("dt", dt, "s")?;
+        let [m, b, k, d, alpha, beta, gamma, n] = self.values();
+        let inverse = BoucWenInverse::new(m, b, k, d, alpha, beta, gamma, n)?;
+        Ok((inverse, inverse.rest()))
     }
 }
 
@@ -159,31 +247,36 @@ impl BoucWenKernel {
     }
 }
 
-impl<N: Number> Kernel<N> for BoucWenKernel {
-    type Coupling = AtInput<N, BoucWen<N>>;
+impl Kernel for BoucWenKernel {
+    type Coupling<N: Number> = AtInput<N, BoucWen<N>>;
 
     /// The drive enters in volts.
     #[inline(always)]
-    fn gain(&self, parameters: &Parameters<N>) -> N {
-        parameters[0].like(1.0)
-    }
-
-    #[inline(always)]
-    fn coupling(&self, parameters: &Parameters<N>, step: f64, halvings: u32) -> Self::Coupling {
+    fn coupling<N: Number>(
+        &self,
+        parameters: &Parameters<N>,
+        step: f64,
+        halvings: u32,
+    ) -> (Self::Coupling<N>, N) {
         let [_, _, stiffness, gain, ..] = *parameters;
         let linear = linear(parameters, step, halvings);
-        AtInput { linear, operator: self.operator(parameters), stiffness, gain }
+        let operator = self.operator(parameters);
+        (AtInput { linear, operator, stiffness, gain }, gain.like(1.0))
     }
 
     #[inline(always)]
-    fn rest(&self, parameters: &Parameters<N>) -> InputMemory<N, BoucWenState<N>> {
+    fn rest<N: Number>(&self, parameters: &Parameters<N>) -> InputMemory<N, BoucWenState<N>> {
         let zero = parameters[0].like(0.0);
         InputMemory { operator: self.operator(parameters).rest(), input: zero, rise: zero }
     }
 
     /// k h, what the hysteresis takes off the drive's force.
     #[inline(always)]
-    fn force(&self, parameters: &Parameters<N>, memory: &InputMemory<N, BoucWenState<N>>) -> N {
+    fn force(
+        &self,
+        parameters: &Parameters<f64>,
+        memory: &InputMemory<f64, BoucWenState<f64>>,
+    ) -> f64 {
         parameters[2] * memory.operator.value
     }
 }

@@ -10,25 +10,40 @@
 
 use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{BoucWen, BoucWenState, Operator};
+use piezotrack_control::inverse::{FeedbackInverseState, OscillatorInverse};
 
-use crate::error::{Result, finite, not_zero, within};
-use crate::integrator::nonsmooth_coupling::simulate;
-use crate::integrator::{
-    Kernel, Kinked, KinkedMotion, Mechanics, ParameterInfo, Parameters, linear,
+use super::plant::KernelModel;
+use super::search_ranges::{Measures, Ranges};
+use super::traits::{
+    Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel, leading,
+    parameters, simulate_kernel,
 };
-use crate::signal::{Drive, Stop};
+use super::values::{Held, ParameterInfo, Values};
+use crate::design::{Gains, LoopPlant};
+use crate::error::{Result, finite, not_zero, within};
+use crate::integrator::{Kernel, Kinked, LumpedStage, Mechanics, Order, Parameters, linear};
 
-/// The oscillator's parameters, in the order of [`BoucWenOscillator::from_theta`]. The unit of
-/// gamma and delta is that for nu = 1 and a beta without one; in general it is 1/(m N^(nu-1)).
-pub const BOUC_WEN_OSCILLATOR_PARAMETERS: [ParameterInfo; 8] = [
-    ParameterInfo { name: "mass", symbol: "m", unit: "kg" },
-    ParameterInfo { name: "damping", symbol: "c", unit: "N s/m" },
-    ParameterInfo { name: "stiffness", symbol: "k", unit: "N/m" },
-    ParameterInfo { name: "alpha", symbol: "alpha", unit: "N/m" },
-    ParameterInfo { name: "beta", symbol: "beta", unit: "" },
-    ParameterInfo { name: "gamma", symbol: "gamma", unit: "1/m" },
-    ParameterInfo { name: "delta", symbol: "delta", unit: "1/m" },
-    ParameterInfo { name: "exponent", symbol: "nu", unit: "" },
+/// The unit of gamma and delta is that for nu = 1 and a beta without one; in general it is
+/// 1/(m N^(nu-1)).
+const PARAMETERS: &[ParameterInfo] = &[
+    ParameterInfo::new("mass", "m", "kg"),
+    ParameterInfo::new("damping", "c", "N s/m"),
+    ParameterInfo::new("stiffness", "k", "N/m"),
+    ParameterInfo::new("alpha", "alpha", "N/m"),
+    ParameterInfo::new("beta", "beta", "")
+        .or(1.0)
+        .never_searched("beta held: only the products beta gamma and beta delta show in the data"),
+    ParameterInfo::new("gamma", "gamma", "1/m"),
+    ParameterInfo::new("delta", "delta", "1/m"),
+    ParameterInfo::new("exponent", "nu", "")
+        .or(1.0)
+        .never_searched("exponent held, in fixed=: it decides the unit of gamma and delta"),
+];
+
+const STATE: &[ParameterInfo] = &[
+    ParameterInfo::new("x", "x", "m"),
+    ParameterInfo::new("v", "x'", "m/s"),
+    ParameterInfo::new("force", "z", "N"),
 ];
 
 /// Largest exponent, as for [`super::BoucWenStage`].
@@ -63,12 +78,12 @@ pub struct BoucWenOscillator {
 }
 
 impl BoucWenOscillator {
-    /// The oscillator with parameters in the order of [`BOUC_WEN_OSCILLATOR_PARAMETERS`].
+    /// The oscillator with its eight parameters in the order of the fields.
     ///
     /// # Errors
     /// [`crate::Error::Parameter`] naming the parameter that is out of its range.
-    pub fn from_theta(theta: &[f64; 8]) -> Result<Self> {
-        let [mass, damping, stiffness, alpha, beta, gamma, delta, exponent] = *theta;
+    pub fn new(values: &[f64; 8]) -> Result<Self> {
+        let [mass, damping, stiffness, alpha, beta, gamma, delta, exponent] = *values;
         let mechanics = Mechanics::new(mass, damping, stiffness)?;
         not_zero("beta", beta, "")?;
         within("exponent", exponent, 1.0, MOST_EXPONENT)?;
@@ -95,29 +110,12 @@ impl BoucWenOscillator {
         }
     }
 
-    /// The parameters in their order, as a kernel takes them.
+    /// The parameters in their order.
     #[must_use]
-    pub fn parameters(&self) -> Parameters<f64> {
+    pub fn values(&self) -> [f64; 8] {
         let Mechanics { mass, damping, stiffness } = self.mechanics;
         let Self { alpha, beta, gamma, delta, exponent, .. } = *self;
-        [mass, damping, stiffness, alpha, beta, gamma, delta, exponent, 0.0]
-    }
-
-    /// Simulates from `initial`: displacement, velocity and the hysteresis force, N.
-    ///
-    /// `None` where `stop` said so meanwhile.
-    ///
-    /// # Errors
-    /// Those of [`crate::integrator::Alone::simulate`].
-    pub fn simulate(
-        &self,
-        drive: &Drive<'_>,
-        initial: [f64; 3],
-        accuracy: f64,
-        stop: Stop<'_>,
-    ) -> Result<Option<KinkedMotion>> {
-        let kernel = BoucWenOscillatorKernel { exponent: self.exponent };
-        simulate(&kernel, &self.parameters(), drive, initial, accuracy, stop)
+        [mass, damping, stiffness, alpha, beta, gamma, delta, exponent]
     }
 
     /// The hysteresis operator.
@@ -129,6 +127,99 @@ impl BoucWenOscillator {
             gamma: self.beta * self.delta,
             exponent: self.exponent,
         }
+    }
+}
+
+impl KernelModel for BoucWenOscillator {
+    type Kernel = BoucWenOscillatorKernel;
+
+    fn lumped(&self) -> LumpedStage<BoucWenOscillatorKernel> {
+        let kernel = BoucWenOscillatorKernel { exponent: self.exponent };
+        LumpedStage { kernel, parameters: parameters(&self.values()) }
+    }
+
+    fn memory(&self, state: &[f64]) -> BoucWenState<f64> {
+        let [_, _, value] = leading(state);
+        BoucWenState { value, ..self.operator().rest() }
+    }
+
+    fn state(&self, memory: &BoucWenState<f64>) -> Vec<f64> {
+        vec![memory.value]
+    }
+}
+
+impl StageModel for BoucWenOscillator {
+    const INFO: ModelInfo = ModelInfo {
+        name: "bouc-wen-oscillator",
+        title: "Bouc-Wen oscillator",
+        drive_unit: "N",
+        parameters: PARAMETERS,
+        state: STATE,
+        published: &[("benchmark", || Values::scalars(PARAMETERS, &Self::benchmark().values()))],
+    };
+
+    fn build(values: &Values) -> Result<Self> {
+        Self::new(&values.numbers())
+    }
+
+    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
+        simulate_kernel(self, experiment)
+    }
+
+    /// On its settled loop between the displacements that the two forces lead to without
+    /// hysteresis: `1/(k + dz/dy)`.
+    fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
+        let Mechanics { mass, damping, stiffness } = self.mechanics;
+        let ends = [low, high].map(|force| force / stiffness);
+        let gains =
+            Gains::of(&self.operator(), ends[0], ends[1], |slope| 1.0 / (stiffness + slope))?;
+        gains.plants(|gain| {
+            let mechanics = Mechanics { mass, damping, stiffness: 1.0 / gain };
+            LoopPlant::mechanical(&mechanics, 1.0)
+        })
+    }
+}
+
+impl Searchable for BoucWenOscillator {
+    const KINKED: bool = true;
+
+    /// The drive is a force, and may well shake the mass at its resonance.
+    fn ranges(of: &Measures, held: &Held) -> Result<Ranges> {
+        let stiff = of.drive_size / of.displacement_size;
+        let rate = of.displacement_rate;
+        let spring = (0.02 * stiff, 3.0 * stiff);
+        // The restoring force reaches about stiff * stroke/2.
+        let [beta, exponent] = ["beta", "exponent"].map(|name| held.value(name).unwrap_or(1.0));
+        let fade = libm::pow(0.25 * stiff * of.stroke, 1.0 - exponent) / (beta * of.stroke);
+        let gamma = if fade < 0.0 { (20.0 * fade, 0.0) } else { (0.0, 20.0 * fade) };
+        Ok(vec![
+            ("mass", (0.05 * stiff / (rate * rate), 10.0 * stiff / (rate * rate))),
+            ("damping", (1e-4 * stiff / rate, 3.0 * stiff / rate)),
+            ("stiffness", spring),
+            ("alpha", spring),
+            ("gamma", gamma),
+            ("delta", (-20.0 * fade.abs(), 20.0 * fade.abs())),
+        ])
+    }
+
+    fn kernel<V: KernelVisitor>(held: &Held, _order: Order, visitor: V) -> V::Output {
+        visitor.visit(BoucWenOscillatorKernel { exponent: held.value("exponent").unwrap_or(1.0) })
+    }
+}
+
+impl Invertible for BoucWenOscillator {
+    type Inverse = OscillatorInverse;
+
+    fn inverse(
+        &self,
+        dt: f64,
+        _initial: Option<&Values>,
+    ) -> Result<(OscillatorInverse, FeedbackInverseState)> {
+        let Mechanics { mass, damping, stiffness } = self.mechanics;
+        let Self { alpha, beta, gamma, delta, exponent, .. } = *self;
+        let hysteresis = (alpha, beta * gamma, beta * delta, exponent);
+        let inverse = OscillatorInverse::new(mass, damping, stiffness, hysteresis, dt)?;
+        Ok((inverse, inverse.rest()))
     }
 }
 
@@ -147,27 +238,29 @@ impl BoucWenOscillatorKernel {
     }
 }
 
-impl<N: Number> Kernel<N> for BoucWenOscillatorKernel {
-    type Coupling = Kinked<N, BoucWen<N>>;
+impl Kernel for BoucWenOscillatorKernel {
+    type Coupling<N: Number> = Kinked<N, BoucWen<N>>;
 
     /// The drive is a force.
     #[inline(always)]
-    fn gain(&self, parameters: &Parameters<N>) -> N {
-        parameters[0].like(1.0)
+    fn coupling<N: Number>(
+        &self,
+        parameters: &Parameters<N>,
+        step: f64,
+        halvings: u32,
+    ) -> (Self::Coupling<N>, N) {
+        let linear = linear(parameters, step, halvings);
+        let operator = self.operator(parameters);
+        (Kinked { linear, operator }, parameters[0].like(1.0))
     }
 
     #[inline(always)]
-    fn coupling(&self, parameters: &Parameters<N>, step: f64, halvings: u32) -> Self::Coupling {
-        Kinked { linear: linear(parameters, step, halvings), operator: self.operator(parameters) }
-    }
-
-    #[inline(always)]
-    fn rest(&self, parameters: &Parameters<N>) -> BoucWenState<N> {
+    fn rest<N: Number>(&self, parameters: &Parameters<N>) -> BoucWenState<N> {
         self.operator(parameters).rest()
     }
 
     #[inline(always)]
-    fn force(&self, _parameters: &Parameters<N>, memory: &BoucWenState<N>) -> N {
+    fn force(&self, _parameters: &Parameters<f64>, memory: &BoucWenState<f64>) -> f64 {
         memory.value
     }
 }

@@ -11,23 +11,35 @@
 
 use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{BoucWenState, FirstOrderDahl, Operator};
+use piezotrack_control::inverse::{FeedbackInverseState, FirstOrderDahlInverse};
 
-use crate::error::{Result, not_negative, not_zero, positive, within};
-use crate::integrator::nonsmooth_coupling::simulate;
-use crate::integrator::{
-    Kernel, Kinked, KinkedMotion, Mechanics, ParameterInfo, Parameters, linear,
+use super::plant::KernelModel;
+use super::search_ranges::{Measures, Ranges};
+use super::traits::{
+    Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel, leading,
+    parameters, simulate_kernel,
 };
-use crate::signal::{Drive, Stop};
+use super::values::{Held, ParameterInfo, Values};
+use crate::design::{Gains, LoopPlant};
+use crate::error::{Result, not_negative, not_zero, positive, within};
+use crate::integrator::{Kernel, Kinked, LumpedStage, Mechanics, Order, Parameters, linear};
 
-/// The stage's parameters, in the order of [`FirstOrderDahlStage::from_theta`].
-pub const FIRST_ORDER_DAHL_PARAMETERS: [ParameterInfo; 7] = [
-    ParameterInfo { name: "mass", symbol: "M", unit: "kg" },
-    ParameterInfo { name: "damping", symbol: "D", unit: "N s/m" },
-    ParameterInfo { name: "stiffness", symbol: "K", unit: "N/m" },
-    ParameterInfo { name: "piezo_coefficient", symbol: "T", unit: "N/V" },
-    ParameterInfo { name: "rest_stiffness", symbol: "sigma", unit: "N/m" },
-    ParameterInfo { name: "coulomb_force", symbol: "Fc", unit: "N" },
-    ParameterInfo { name: "exponent", symbol: "i", unit: "" },
+const PARAMETERS: &[ParameterInfo] = &[
+    ParameterInfo::new("mass", "M", "kg").force(),
+    ParameterInfo::new("damping", "D", "N s/m").force(),
+    ParameterInfo::new("stiffness", "K", "N/m").force(),
+    ParameterInfo::new("piezo_coefficient", "T", "N/V").force(),
+    ParameterInfo::new("rest_stiffness", "sigma", "N/m").force(),
+    ParameterInfo::new("coulomb_force", "Fc", "N").force(),
+    ParameterInfo::new("exponent", "i", "")
+        .or(1.0)
+        .never_searched("exponent held, in fixed=: all candidates of a search share it"),
+];
+
+const STATE: &[ParameterInfo] = &[
+    ParameterInfo::new("x", "x", "m"),
+    ParameterInfo::new("v", "x'", "m/s"),
+    ParameterInfo::new("force", "F", "N"),
 ];
 
 /// Largest exponent: far beyond it the force hardly leaves the rest stiffness, and then stands.
@@ -57,13 +69,13 @@ pub struct FirstOrderDahlStage {
 }
 
 impl FirstOrderDahlStage {
-    /// The stage with parameters in the order of [`FIRST_ORDER_DAHL_PARAMETERS`].
+    /// The stage with its seven parameters in the order of the fields.
     ///
     /// # Errors
     /// [`crate::Error::Parameter`] naming the parameter that is out of its range.
-    pub fn from_theta(theta: &[f64; 7]) -> Result<Self> {
+    pub fn new(values: &[f64; 7]) -> Result<Self> {
         let [mass, damping, stiffness, piezo_coefficient, rest_stiffness, coulomb, exponent] =
-            *theta;
+            *values;
         let mechanics = Mechanics::new(mass, damping, stiffness)?;
         not_zero("piezo_coefficient", piezo_coefficient, "N/V")?;
         within("exponent", exponent, 0.0, MOST_EXPONENT)?;
@@ -76,41 +88,6 @@ impl FirstOrderDahlStage {
         })
     }
 
-    /// The parameters in their order, as a kernel takes them.
-    #[must_use]
-    pub fn parameters(&self) -> Parameters<f64> {
-        let Mechanics { mass, damping, stiffness } = self.mechanics;
-        let Self { piezo_coefficient, rest_stiffness, coulomb_force, exponent, .. } = *self;
-        [
-            mass,
-            damping,
-            stiffness,
-            piezo_coefficient,
-            rest_stiffness,
-            coulomb_force,
-            exponent,
-            0.0,
-            0.0,
-        ]
-    }
-
-    /// Simulates from `initial`: displacement, velocity and the hysteresis force, N.
-    ///
-    /// `None` where `stop` said so meanwhile.
-    ///
-    /// # Errors
-    /// Those of [`crate::integrator::Alone::simulate`].
-    pub fn simulate(
-        &self,
-        drive: &Drive<'_>,
-        initial: [f64; 3],
-        accuracy: f64,
-        stop: Stop<'_>,
-    ) -> Result<Option<KinkedMotion>> {
-        let kernel = FirstOrderDahlKernel { exponent: self.exponent };
-        simulate(&kernel, &self.parameters(), drive, initial, accuracy, stop)
-    }
-
     /// The hysteresis operator.
     #[must_use]
     pub fn operator(&self) -> FirstOrderDahl<f64> {
@@ -119,6 +96,103 @@ impl FirstOrderDahlStage {
             coulomb_force: self.coulomb_force,
             exponent: self.exponent,
         }
+    }
+}
+
+impl KernelModel for FirstOrderDahlStage {
+    type Kernel = FirstOrderDahlKernel;
+
+    fn lumped(&self) -> LumpedStage<FirstOrderDahlKernel> {
+        let Mechanics { mass, damping, stiffness } = self.mechanics;
+        let Self { piezo_coefficient, rest_stiffness, coulomb_force, exponent, .. } = *self;
+        let values =
+            [mass, damping, stiffness, piezo_coefficient, rest_stiffness, coulomb_force, exponent];
+        let kernel = FirstOrderDahlKernel { exponent };
+        LumpedStage { kernel, parameters: parameters(&values) }
+    }
+
+    fn memory(&self, state: &[f64]) -> BoucWenState<f64> {
+        let [_, _, value] = leading(state);
+        BoucWenState { value, ..self.operator().rest() }
+    }
+
+    fn state(&self, memory: &BoucWenState<f64>) -> Vec<f64> {
+        vec![memory.value]
+    }
+}
+
+impl StageModel for FirstOrderDahlStage {
+    const INFO: ModelInfo = ModelInfo {
+        name: "first-order-dahl",
+        title: "Dahl, first order",
+        drive_unit: "V",
+        parameters: PARAMETERS,
+        state: STATE,
+        published: &[],
+    };
+
+    fn build(values: &Values) -> Result<Self> {
+        Self::new(&values.numbers())
+    }
+
+    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
+        simulate_kernel(self, experiment)
+    }
+
+    /// On its settled loop between the displacements that the two voltages lead to without
+    /// friction: `T/(K + dF/dx)`.
+    fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
+        let (Mechanics { mass, damping, stiffness }, piezo) =
+            (self.mechanics, self.piezo_coefficient);
+        let ends = [low, high].map(|volts| piezo * volts / stiffness);
+        let ends = if piezo < 0.0 { [ends[1], ends[0]] } else { ends };
+        let gain = |slope: f64| piezo / (stiffness + slope);
+        let gains = Gains::of(&self.operator(), ends[0], ends[1], gain)?;
+        gains.plants(|gain| {
+            let mechanics = Mechanics { mass, damping, stiffness: piezo / gain };
+            LoopPlant::mechanical(&mechanics, piezo)
+        })
+    }
+}
+
+impl Searchable for FirstOrderDahlStage {
+    const KINKED: bool = true;
+
+    fn ranges(of: &Measures, held: &Held) -> Result<Ranges> {
+        let limit = held.value("coulomb_force").map(|limit| 10.0 * limit / of.stroke);
+        let hints = [held.value("rest_stiffness"), limit];
+        let (soft, hard) = of.stiffness(held, held.value("piezo_coefficient"), &hints);
+        let [mass, damping, stiffness] = of.mechanical((soft, hard));
+        Ok(vec![
+            ("mass", mass),
+            // The loop's width is the friction's: the damping may be far too small to show.
+            ("damping", (1e-2 * damping.0, damping.1)),
+            ("stiffness", stiffness),
+            ("piezo_coefficient", of.piezo(soft * of.gain, hard * of.gain)),
+            // The way to the Coulomb force is a hundredth of the stroke or all of it.
+            ("rest_stiffness", (1e-2 * soft, 10.0 * hard)),
+            ("coulomb_force", (1e-3 * soft * of.stroke, hard * of.stroke)),
+        ])
+    }
+
+    fn kernel<V: KernelVisitor>(held: &Held, _order: Order, visitor: V) -> V::Output {
+        visitor.visit(FirstOrderDahlKernel { exponent: held.value("exponent").unwrap_or(1.0) })
+    }
+}
+
+impl Invertible for FirstOrderDahlStage {
+    type Inverse = FirstOrderDahlInverse;
+
+    fn inverse(
+        &self,
+        dt: f64,
+        _initial: Option<&Values>,
+    ) -> Result<(FirstOrderDahlInverse, FeedbackInverseState)> {
+        let Mechanics { mass, damping, stiffness } = self.mechanics;
+        let hysteresis = (self.rest_stiffness, self.coulomb_force, self.exponent);
+        let piezo = self.piezo_coefficient;
+        let inverse = FirstOrderDahlInverse::new(mass, damping, stiffness, piezo, hysteresis, dt)?;
+        Ok((inverse, inverse.rest()))
     }
 }
 
@@ -137,26 +211,27 @@ impl FirstOrderDahlKernel {
     }
 }
 
-impl<N: Number> Kernel<N> for FirstOrderDahlKernel {
-    type Coupling = Kinked<N, FirstOrderDahl<N>>;
+impl Kernel for FirstOrderDahlKernel {
+    type Coupling<N: Number> = Kinked<N, FirstOrderDahl<N>>;
 
     #[inline(always)]
-    fn gain(&self, parameters: &Parameters<N>) -> N {
-        parameters[3]
+    fn coupling<N: Number>(
+        &self,
+        parameters: &Parameters<N>,
+        step: f64,
+        halvings: u32,
+    ) -> (Self::Coupling<N>, N) {
+        let linear = linear(parameters, step, halvings);
+        (Kinked { linear, operator: self.operator(parameters) }, parameters[3])
     }
 
     #[inline(always)]
-    fn coupling(&self, parameters: &Parameters<N>, step: f64, halvings: u32) -> Self::Coupling {
-        Kinked { linear: linear(parameters, step, halvings), operator: self.operator(parameters) }
-    }
-
-    #[inline(always)]
-    fn rest(&self, parameters: &Parameters<N>) -> BoucWenState<N> {
+    fn rest<N: Number>(&self, parameters: &Parameters<N>) -> BoucWenState<N> {
         self.operator(parameters).rest()
     }
 
     #[inline(always)]
-    fn force(&self, _parameters: &Parameters<N>, memory: &BoucWenState<N>) -> N {
+    fn force(&self, _parameters: &Parameters<f64>, memory: &BoucWenState<f64>) -> f64 {
         memory.value
     }
 }

@@ -1,28 +1,30 @@
-//! Models of a stage, one file each, and the registry of those that can be identified.
+//! Models of a stage: one file each, what such a file says, and the list of them.
 
 mod bouc_wen;
 mod bouc_wen_oscillator;
 mod creep;
-mod dahl;
-mod dahl_runge_kutta;
-pub mod dahl_simulate;
+pub mod dahl;
 mod first_order_dahl;
 mod plant;
 mod prandtl_ishlinskii;
 mod registry;
+mod search_ranges;
+mod traits;
+mod values;
 
-pub use bouc_wen::{BOUC_WEN_PARAMETERS, BoucWenKernel, BoucWenMotion, BoucWenStage};
-pub use bouc_wen_oscillator::{
-    BOUC_WEN_OSCILLATOR_PARAMETERS, BoucWenOscillator, BoucWenOscillatorKernel,
-};
+pub use bouc_wen::{BoucWenKernel, BoucWenStage};
+pub use bouc_wen_oscillator::{BoucWenOscillator, BoucWenOscillatorKernel};
 pub use creep::{Creep, Dynamics, MOST_RELAXATIONS, Relaxation, RelaxationFlow, RelaxationState};
-pub use dahl::{DAHL_PARAMETERS, DahlStage, StageState};
-pub use first_order_dahl::{
-    FIRST_ORDER_DAHL_PARAMETERS, FirstOrderDahlKernel, FirstOrderDahlStage,
-};
-pub use plant::{DahlFlow, KernelFlow, Plant};
+pub use dahl::{DahlStage, DahlStageState};
+pub use first_order_dahl::{FirstOrderDahlKernel, FirstOrderDahlStage};
+pub use plant::{KernelFlow, KernelModel, Plant};
 pub use prandtl_ishlinskii::{
-    FeedforwardState, MOST_PLAYS, MOST_ZONES, Plays, PlaysFeedforward, PlaysInverse, PlaysMotion,
-    PlaysState, PrandtlIshlinskiiStage, plays,
+    FeedforwardState, MOST_PLAYS, MOST_ZONES, Plays, PlaysFeedforward, PlaysInverse, PlaysState,
+    PrandtlIshlinskiiStage, plays,
 };
-pub use registry::{DELAY, Facts, Model, Theta};
+pub use registry::{FoundBy, Model, Stage, StageFlow, StageInverse, StageInverseState, StageState};
+pub use search_ranges::{Measures, NOMINAL_STIFFNESS, Range, Ranges};
+pub use traits::{
+    Experiment, Invertible, KernelVisitor, Method, ModelInfo, Response, Searchable, StageModel,
+};
+pub use values::{Held, ParameterInfo, Values, position};

@@ -1,12 +1,6 @@
 //! What an experiment moves: a voltage goes in, a displacement comes out.
 
-use piezotrack_control::hysteresis::{Dahl, DahlState};
-
-use super::dahl::{DahlStage, StageState};
-use crate::integrator::{
-    Alone, Coupling, FeedbackState, Friction, Instant, Kernel, Memory, Propagator, Smooth, TERMS,
-    halvings,
-};
+use crate::integrator::{Coupling, FeedbackState, Instant, Kernel, LumpedStage, Memory, halvings};
 
 /// A stage from its terminals to its displacement: configuration in `&self`, memory in `State`.
 pub trait Plant {
@@ -28,94 +22,50 @@ pub trait Plant {
     fn displacement(&self, state: &Self::State) -> f64;
 }
 
-/// Steps of a [`DahlStage`].
-#[derive(Clone, Copy, Debug)]
-pub struct DahlFlow {
-    coupling: DahlCoupling,
-    step: f64,
+/// A model that one kernel describes, whatever its parameters.
+pub trait KernelModel: Copy {
+    /// The kernel.
+    type Kernel: Kernel;
+
+    /// The kernel with the stage's parameters.
+    fn lumped(&self) -> LumpedStage<Self::Kernel>;
+
+    /// What the hysteresis remembers in a state, whose numbers are in the order of the model's
+    /// state.
+    fn memory(&self, state: &[f64]) -> Memory<Self::Kernel, f64>;
+
+    /// What it remembers as numbers, in the order of the model's state after displacement and
+    /// velocity.
+    fn state(&self, memory: &Memory<Self::Kernel, f64>) -> Vec<f64>;
 }
 
-#[derive(Clone, Copy, Debug)]
-enum DahlCoupling {
-    /// b0 = 0.
-    Smooth(Smooth<f64, Dahl<f64, TERMS>, true>),
-    /// Any other: reversals, sticking and breaking away are located inside the step.
-    Friction(Friction<f64>),
-}
-
-impl Plant for DahlStage {
-    type State = StageState;
-    type Flow = DahlFlow;
-
-    fn rest(&self) -> StageState {
-        StageState::default()
-    }
-
-    fn flow(&self, step: f64) -> DahlFlow {
-        let m = &self.mechanics;
-        let halvings = halvings(m.rate(), step);
-        let coupling = if self.has_friction() {
-            DahlCoupling::Friction(Friction::new(self.friction(), step, halvings))
-        } else {
-            let (inverse, d, k) = (1.0 / m.mass, m.damping / m.mass, m.stiffness / m.mass);
-            let linear = Propagator::new(inverse, d, k, step, halvings);
-            DahlCoupling::Smooth(Smooth { linear, operator: self.operator() })
-        };
-        DahlFlow { coupling, step }
-    }
-
-    #[inline(always)]
-    fn advance(&self, flow: &DahlFlow, state: &mut StageState, from: f64, to: f64) {
-        let DahlFlow { coupling, step } = flow;
-        let gain = self.piezo_coefficient;
-        let (drive, rise) = (gain * from, gain * (to - from));
-        let (x, w) = (state.x, state.v * step);
-        *state = match coupling {
-            DahlCoupling::Smooth(smooth) => {
-                let start = FeedbackState { x, w, memory: self.memory(state) };
-                let end = smooth.step(&start, drive, rise);
-                let (q1, q2) = self.states(&end.memory);
-                StageState { x: end.x, v: end.w / step, q1, q2 }
-            }
-            DahlCoupling::Friction(friction) => {
-                let memory = DahlState { force: state.q1, slope: state.q2 };
-                let end = friction.step(&friction.start(x, w, memory), drive, rise);
-                let DahlState { force: q1, slope: q2 } = end.memory.operator;
-                StageState { x: end.x, v: end.w / step, q1, q2 }
-            }
-        };
-    }
-
-    fn displacement(&self, state: &StageState) -> f64 {
-        state.x
-    }
-}
-
-/// Steps of a stage of any kind that a kernel describes.
+/// Steps of a stage that a kernel describes.
 #[derive(Clone, Copy, Debug)]
 pub struct KernelFlow<C> {
     coupling: C,
+    gain: f64,
     step: f64,
 }
 
 /// With the operator at the input, steps under a held voltage are exact, however long they are.
-impl<K: Kernel<f64> + Copy> Plant for Alone<'_, K> {
-    type State = Instant<Memory<K>>;
-    type Flow = KernelFlow<K::Coupling>;
+impl<M: KernelModel> Plant for M {
+    type State = Instant<Memory<M::Kernel, f64>>;
+    type Flow = KernelFlow<<M::Kernel as Kernel>::Coupling<f64>>;
 
     fn rest(&self) -> Self::State {
-        Alone::rest(self)
+        self.lumped().rest()
     }
 
     fn flow(&self, step: f64) -> Self::Flow {
-        let halvings = halvings(self.mechanics().rate(), step);
-        KernelFlow { coupling: self.kernel.coupling(self.parameters, step, halvings), step }
+        let stage = self.lumped();
+        let halvings = halvings(stage.mechanics().rate(), step);
+        let (coupling, gain) = stage.kernel.coupling(&stage.parameters, step, halvings);
+        KernelFlow { coupling, gain, step }
     }
 
     #[inline(always)]
     fn advance(&self, flow: &Self::Flow, state: &mut Self::State, from: f64, to: f64) {
-        let KernelFlow { coupling, step } = flow;
-        let gain = self.kernel.gain(self.parameters);
+        let KernelFlow { coupling, gain, step } = flow;
         let start = FeedbackState { x: state.x, w: state.v * step, memory: state.memory };
         let end = coupling.step(&start, gain * from, gain * (to - from));
         *state = Instant { x: end.x, v: end.w / step, memory: end.memory };

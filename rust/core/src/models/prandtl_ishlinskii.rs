@@ -13,11 +13,15 @@
 
 use piezotrack_control::PlayInverse;
 use piezotrack_control::hysteresis::{Operator, Play, PlayState};
+use piezotrack_control::inverse::Inverse;
 
-use super::creep::{Relaxation, RelaxationFlow, RelaxationState};
+use super::creep::{Dynamics, Relaxation, RelaxationFlow, RelaxationState};
 use super::plant::Plant;
+use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
+use super::values::{ParameterInfo, Values};
+use crate::design::{Gains, LoopPlant};
 use crate::error::{Error, Result, finite, not_negative, positive};
-use crate::signal::{Drive, Hold, Stop};
+use crate::signal::Hold;
 
 /// Most plays of a stage.
 pub const MOST_PLAYS: usize = 32;
@@ -31,6 +35,26 @@ pub type Plays = Play<f64, MOST_PLAYS, MOST_ZONES>;
 /// Its inverse, m to V.
 pub type PlaysInverse = PlayInverse<MOST_PLAYS, MOST_ZONES>;
 
+const PARAMETERS: &[ParameterInfo] = &[
+    ParameterInfo::new("linear", "w0", "m/V"),
+    ParameterInfo::list("thresholds", "r", "V"),
+    ParameterInfo::list("weights", "w", "m/V"),
+    ParameterInfo::list("dead_zone_thresholds", "d", "m"),
+    ParameterInfo::list("dead_zone_weights", "s", ""),
+    ParameterInfo::list("creep_weights", "c", ""),
+    ParameterInfo::list("creep_times", "tau", "s"),
+    ParameterInfo::list("time_constant", "T", "s"),
+    ParameterInfo::list("mode", "wn/2pi, zeta", "Hz, 1"),
+];
+
+const STATE: &[ParameterInfo] = &[
+    ParameterInfo::new("x", "x", "m"),
+    ParameterInfo::new("v", "x'", "m/s"),
+    ParameterInfo::new("u", "u", "V"),
+    ParameterInfo::list("plays", "z", "V"),
+    ParameterInfo::list("creep", "q", "m"),
+];
+
 /// Samples between two questions whether to stop.
 const POLL: usize = 4096;
 
@@ -43,10 +67,14 @@ const POLL: usize = 4096;
 /// # fn main() -> piezotrack_core::Result<()> {
 /// let stage = PrandtlIshlinskiiStage {
 ///     plays: plays(1e-6, &[10.0, 20.0], &[0.2e-6, 0.1e-6], &[], &[])?,
+///     count: 2,
 ///     relaxation: Relaxation::new(&[], &[], Dynamics::None)?,
 /// };
 /// let drive = Drive::new(&[0.0, 50.0, 0.0], 0.01, Hold::First)?;
-/// let run = stage.simulate(&drive, stage.at_rest(), NEVER)?.unwrap();
+/// let method = Method::Exponential;
+/// let experiment =
+///     Experiment { drive: &drive, initial: None, method, accuracy: 1e-10, stop: NEVER };
+/// let run = stage.simulate(&experiment)?.unwrap();
 /// assert!((run.x[1] - 61e-6).abs() < 1e-15);
 /// assert!((run.x[2] - 4e-6).abs() < 1e-15); // the plays stay behind
 /// # Ok(())
@@ -56,6 +84,8 @@ const POLL: usize = 4096;
 pub struct PrandtlIshlinskiiStage {
     /// Hysteresis, V to m.
     pub plays: Plays,
+    /// Number of plays.
+    pub count: usize,
     /// Creep and linear dynamics.
     pub relaxation: Relaxation,
 }
@@ -67,17 +97,6 @@ pub struct PlaysState {
     pub plays: PlayState<f64, MOST_PLAYS>,
     /// Creep and dynamics.
     pub rest: RelaxationState,
-}
-
-/// Motion of a stage at the samples of its drive.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PlaysMotion {
-    /// Displacement, m.
-    pub x: Vec<f64>,
-    /// What comes out of the hysteresis, h, m.
-    pub hysteresis: Vec<f64>,
-    /// State at the last sample.
-    pub last: PlaysState,
 }
 
 /// A hysteresis from its parameters.
@@ -93,7 +112,13 @@ pub fn plays(
     bends: &[f64],
 ) -> Result<Plays> {
     same_length("weights", weights.len(), "thresholds", thresholds.len(), MOST_PLAYS)?;
-    same_length("bends", bends.len(), "corners", corners.len(), MOST_ZONES)?;
+    same_length(
+        "dead_zone_weights",
+        bends.len(),
+        "dead_zone_thresholds",
+        corners.len(),
+        MOST_ZONES,
+    )?;
     positive("linear", linear, "m/V")?;
     let mut plays = Plays {
         linear,
@@ -112,12 +137,12 @@ pub fn plays(
     }
     let (mut before, mut slope) = (f64::NEG_INFINITY, 1.0);
     for j in 0..corners.len() {
-        let name = format!("corners[{j}]");
+        let name = format!("dead_zone_thresholds[{j}]");
         before = ascending(&name, finite(&name, corners[j], "m")?, before, "m")?;
-        slope += finite(&format!("bends[{j}]"), bends[j], "")?;
+        slope += finite(&format!("dead_zone_weights[{j}]"), bends[j], "")?;
         if slope <= 0.0 {
-            let expected = "bends whose sums stay above -1, or the curve turns back";
-            return Err(Error::parameter(format!("bends[{j}]"), bends[j], expected));
+            let expected = "dead-zone weights whose sums stay above -1, or the curve turns back";
+            return Err(Error::parameter(format!("dead_zone_weights[{j}]"), bends[j], expected));
         }
         (plays.corners[j], plays.bends[j]) = (before, bends[j]);
     }
@@ -150,20 +175,39 @@ impl PrandtlIshlinskiiStage {
         PlaysState { plays: self.plays.rest(), rest: RelaxationState::default() }
     }
 
-    /// The state with the drive at `volts`, V, the first plays and relaxations as given, and
-    /// displacement and velocity; a play that the drive would have pushed on stands where it does.
-    #[must_use]
-    pub fn state(&self, volts: f64, plays: &[f64], creep: &[f64], x: f64, v: f64) -> PlaysState {
+    /// A state from its values, or that at rest; a play that the drive would have pushed on
+    /// stands where it does.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] where the state is of another stage; [`Error::Parameter`] where it is not
+    /// finite.
+    pub fn state(&self, values: Option<&Values>) -> Result<PlaysState> {
         let mut state = self.at_rest();
-        for (slot, play) in state.plays.plays.iter_mut().zip(plays) {
-            *slot = *play;
+        let Some(values) = values else { return Ok(state) };
+        let (plays, creep) = (values.list("plays"), values.list("creep"));
+        let (count, relaxations) = (self.count, self.relaxation.count);
+        if plays.len() != count || creep.len() != relaxations {
+            return Err(Error::Shape {
+                name: "initial".into(),
+                found: format!("{} plays and {} relaxations", plays.len(), creep.len()),
+                expected: format!("{count} plays and {relaxations} relaxations, as the stage"),
+            });
         }
-        for (slot, reached) in state.rest.creep.iter_mut().zip(creep) {
-            *slot = *reached;
+        if !values.iter().flat_map(|(_, numbers)| numbers).all(|value| value.is_finite()) {
+            return Err(Error::parameter("initial", "not finite", "finite numbers"));
         }
-        state.rest.input = self.plays.follow(&mut state.plays, volts) - self.zero();
-        (state.rest.x, state.rest.v) = (x, v);
-        state
+        state.plays.plays[..count].copy_from_slice(plays);
+        state.rest.creep[..relaxations].copy_from_slice(creep);
+        state.rest.input = self.plays.follow(&mut state.plays, values.number("u")) - self.zero();
+        (state.rest.x, state.rest.v) = (values.number("x"), values.number("v"));
+        Ok(state)
+    }
+
+    /// The values of a state.
+    fn values_of(&self, PlaysState { plays, rest }: &PlaysState) -> Values {
+        let creep = rest.creep[..self.relaxation.count].to_vec();
+        let stand = plays.plays[..self.count].to_vec();
+        Values::of(STATE, [vec![rest.x], vec![rest.v], vec![plays.input], stand, creep])
     }
 
     /// What the dead zones make of 0.
@@ -177,24 +221,72 @@ impl PrandtlIshlinskiiStage {
         self.relaxation.jump(&mut state.rest, output);
     }
 
-    /// Displacement under a sampled drive; `None` where `stop` said so meanwhile.
-    ///
-    /// The drive jumps from where `start` has it to its first sample. With a zero-order hold a
-    /// sample shows the stage before the drive's step at that instant has any effect.
+    /// The inverse for references sampled every `dt` seconds.
     ///
     /// # Errors
-    /// [`Error::Numerical`] where the displacement is not finite.
-    pub fn simulate(
-        &self,
-        drive: &Drive<'_>,
-        start: PlaysState,
-        stop: Stop<'_>,
-    ) -> Result<Option<PlaysMotion>> {
+    /// [`Error::Parameter`] where `dt` is not above 0.
+    pub fn feedforward(&self, dt: f64) -> Result<PlaysFeedforward> {
+        positive("dt", dt, "s")?;
+        Ok(PlaysFeedforward {
+            plays: self.plays,
+            inverse: PlayInverse::new(&self.plays)?,
+            relaxation: self.relaxation,
+            flow: self.relaxation.flow(dt),
+            zero: self.zero(),
+        })
+    }
+}
+
+impl StageModel for PrandtlIshlinskiiStage {
+    const INFO: ModelInfo = ModelInfo {
+        name: "prandtl-ishlinskii",
+        title: "Prandtl-Ishlinskii",
+        drive_unit: "V",
+        parameters: PARAMETERS,
+        state: STATE,
+        published: &[],
+    };
+
+    fn build(values: &Values) -> Result<Self> {
+        let list = |name| values.list(name);
+        let dynamics = match (list("time_constant"), list("mode")) {
+            ([], []) => Dynamics::None,
+            ([time], []) => Dynamics::First { time: *time },
+            ([], [frequency, damping_ratio]) => {
+                Dynamics::Second { frequency: *frequency, damping_ratio: *damping_ratio }
+            }
+            (time, mode) => {
+                let found = format!("{} and {} numbers", time.len(), mode.len());
+                let expected = "one time constant, or frequency and damping ratio of a mode";
+                return Err(Error::parameter("time_constant and mode", found, expected));
+            }
+        };
+        let (corners, bends) = (list("dead_zone_thresholds"), list("dead_zone_weights"));
+        Ok(Self {
+            plays: plays(
+                values.number("linear"),
+                list("thresholds"),
+                list("weights"),
+                corners,
+                bends,
+            )?,
+            count: list("thresholds").len(),
+            relaxation: Relaxation::new(list("creep_weights"), list("creep_times"), dynamics)?,
+        })
+    }
+
+    /// Exact from sample to sample, so its error estimate is 0.
+    ///
+    /// The drive jumps from where the initial state has it to its first sample. With a zero-order
+    /// hold a sample shows the stage before the drive's step at that instant has any effect.
+    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
+        let Experiment { drive, initial, method, stop, .. } = *experiment;
+        method.exponential_only()?;
         let count = drive.u.len();
         let flow = self.relaxation.flow(drive.dt);
         let zero = self.zero();
-        let mut state = start;
-        let (mut x, mut hysteresis) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        let mut state = self.state(initial)?;
+        let [mut x, mut v, mut hysteresis] = [0, 1, 2].map(|_| Vec::with_capacity(count));
         for (k, &volts) in drive.u.iter().enumerate() {
             if k % POLL == 0 && stop() {
                 return Ok(None);
@@ -218,24 +310,60 @@ impl PrandtlIshlinskiiStage {
                 )));
             }
             x.push(state.rest.x);
+            v.push(state.rest.v);
             hysteresis.push(state.rest.input);
         }
-        Ok(Some(PlaysMotion { x, hysteresis, last: state }))
+        let last = self.values_of(&state);
+        Ok(Some(Response {
+            x,
+            v,
+            hysteresis,
+            last,
+            substeps: 1,
+            error_estimate: 0.0,
+            unique: true,
+        }))
     }
 
-    /// The inverse for references sampled every `dt` seconds.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] where `dt` is not above 0.
-    pub fn inverse(&self, dt: f64) -> Result<PlaysFeedforward> {
-        positive("dt", dt, "s")?;
-        Ok(PlaysFeedforward {
-            plays: self.plays,
-            inverse: PlayInverse::new(&self.plays)?,
-            relaxation: self.relaxation,
-            flow: self.relaxation.flow(dt),
-            zero: self.zero(),
+    /// On its settled loop between the two voltages; its creep is slower than a loop and left
+    /// out.
+    fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
+        let gains = Gains::of(&self.plays, low, high, |slope| slope)?;
+        gains.plants(|gain| match self.relaxation.dynamics {
+            Dynamics::None => LoopPlant::fixed_gain(gain),
+            Dynamics::First { time } => {
+                LoopPlant::fixed_gain(gain)?.with_amplifier(1.0 / (core::f64::consts::TAU * time))
+            }
+            Dynamics::Second { frequency, damping_ratio } => {
+                LoopPlant::mode(gain, frequency, damping_ratio)
+            }
         })
+    }
+}
+
+impl Inverse for PlaysFeedforward {
+    type State = FeedforwardState;
+
+    fn rest(&self) -> FeedforwardState {
+        self.rest()
+    }
+
+    fn step(&self, state: &mut FeedforwardState, x: f64, v: f64, a: f64) -> f64 {
+        self.step(state, x, v, a)
+    }
+}
+
+impl Invertible for PrandtlIshlinskiiStage {
+    type Inverse = PlaysFeedforward;
+
+    fn inverse(
+        &self,
+        dt: f64,
+        initial: Option<&Values>,
+    ) -> Result<(PlaysFeedforward, FeedforwardState)> {
+        let inverse = self.feedforward(dt)?;
+        let start = inverse.start(&self.state(initial)?);
+        Ok((inverse, start))
     }
 }
 

@@ -1,181 +1,297 @@
-//! The models that can be identified: what a search has to know of each.
+//! The list of models, and what is done with a model or a stage whichever it is.
 
-use super::bouc_wen::{BOUC_WEN_PARAMETERS, BoucWenKernel, BoucWenStage};
-use super::bouc_wen_oscillator::{
-    BOUC_WEN_OSCILLATOR_PARAMETERS, BoucWenOscillator, BoucWenOscillatorKernel,
+use piezotrack_control::inverse::Inverse;
+
+use super::bouc_wen::BoucWenStage;
+use super::bouc_wen_oscillator::BoucWenOscillator;
+use super::dahl::DahlStage;
+use super::first_order_dahl::FirstOrderDahlStage;
+use super::plant::Plant;
+use super::prandtl_ishlinskii::PrandtlIshlinskiiStage;
+use super::search_ranges::{Measures, Ranges};
+use super::traits::{
+    Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
 };
-use super::dahl::{DAHL_PARAMETERS, DahlStage, StageState};
-use super::dahl_simulate::simulate_fixed;
-use super::first_order_dahl::{
-    FIRST_ORDER_DAHL_PARAMETERS, FirstOrderDahlKernel, FirstOrderDahlStage,
-};
+use super::values::{Held, Values};
+use crate::design::LoopPlant;
 use crate::error::{Error, Result};
-use crate::integrator::{Alone, Kernel, ParameterInfo, Stepping};
-use crate::signal::{Drive, Stop};
+use crate::integrator::{Order, Parameters};
 
-/// Parameters in the order of [`Model::facts`], 0 for those that the model does not have, and
-/// after them the delay, s.
-pub type Theta = [f64; 10];
-
-/// Index of the delay in [`Theta`].
-pub const DELAY: usize = 9;
-
-/// A kind of stage. The first three parameters of each are mass, damping and stiffness.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Model {
-    /// Second-order Dahl hysteresis in feedback: [`DahlStage`].
-    #[default]
-    Dahl,
-    /// Bouc-Wen hysteresis at the input: [`BoucWenStage`].
-    BoucWen,
-    /// First-order Dahl friction in feedback: [`FirstOrderDahlStage`].
-    FirstOrderDahl,
-    /// Bouc-Wen hysteresis in feedback, under a force: [`BoucWenOscillator`].
-    BoucWenOscillator,
+/// How the parameters of a model are found from a record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FoundBy {
+    /// A swarm searches the scalar parameters.
+    Swarm,
+    /// Least squares find the weights.
+    LeastSquares,
 }
 
-/// What distinguishes one model's search from another's.
-#[derive(Clone, Copy, Debug)]
-pub struct Facts {
-    /// The name that both languages use.
-    pub name: &'static str,
-    /// Its parameters, in their order.
-    pub parameters: &'static [ParameterInfo],
-    /// Indices of those that carry force: all of them can be multiplied by one number. None
-    /// where the drive is a force itself.
-    pub forces: &'static [usize],
-    /// Values of those that are held where the caller says nothing.
-    pub defaults: &'static [(usize, f64)],
-    /// Those that are never searched, and why.
-    pub held: &'static [(usize, &'static str)],
+/// `$then` for a model that a swarm searches, `$other` for another one.
+macro_rules! by_swarm {
+    (swarm, $then:expr, $other:expr) => {
+        $then
+    };
+    (least_squares, $then:expr, $other:expr) => {
+        $other
+    };
+}
+
+/// Makes the types that hold any model from one list: name of the variant, type of the stage, and
+/// how it is found.
+macro_rules! models {
+    ($($variant:ident: $stage:ty, $found:ident;)*) => {
+        /// A model of the list.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Model {
+            $(#[doc = concat!("[`", stringify!($stage), "`].")] $variant,)*
+        }
+
+        impl Model {
+            /// All of them, in the order of the list.
+            pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
+
+            /// Its name and parts.
+            #[must_use]
+            pub fn info(self) -> ModelInfo {
+                match self { $(Self::$variant => <$stage>::INFO,)* }
+            }
+
+            /// How its parameters are found.
+            #[must_use]
+            pub fn found_by(self) -> FoundBy {
+                match self {
+                    $(Self::$variant => {
+                        by_swarm!($found, FoundBy::Swarm, FoundBy::LeastSquares)
+                    })*
+                }
+            }
+
+            /// The stage with these parameters.
+            ///
+            /// # Errors
+            /// Names the parameter that is out of its range.
+            pub fn build(self, values: &Values) -> Result<Stage> {
+                Ok(match self {
+                    $(Self::$variant => Stage::$variant(<$stage>::build(values)?),)*
+                })
+            }
+
+            /// Ranges of the parameters that are not held; none where no swarm searches them.
+            ///
+            /// # Errors
+            /// Those of [`Searchable::ranges`].
+            pub fn ranges(self, measures: &Measures, held: &Held) -> Result<Ranges> {
+                match self {
+                    $(Self::$variant => by_swarm!(
+                        $found,
+                        <$stage as Searchable>::ranges(measures, held),
+                        Ok(Ranges::new())
+                    ),)*
+                }
+            }
+
+            /// Whether the force has kinks: see [`Searchable::KINKED`].
+            #[must_use]
+            pub fn is_kinked(self) -> bool {
+                match self {
+                    $(Self::$variant => {
+                        by_swarm!($found, <$stage as Searchable>::KINKED, false)
+                    })*
+                }
+            }
+
+            /// Whether there is a kernel of second order.
+            #[must_use]
+            pub fn has_second_order(self, held: &Held) -> bool {
+                match self {
+                    $(Self::$variant => by_swarm!(
+                        $found,
+                        <$stage as Searchable>::has_second_order(held),
+                        false
+                    ),)*
+                }
+            }
+
+            /// Hands the kernel of an order to a visitor; `None` where no swarm searches it.
+            pub fn kernel<V: KernelVisitor>(
+                self,
+                held: &Held,
+                order: Order,
+                visitor: V,
+            ) -> Option<V::Output> {
+                match self {
+                    $(Self::$variant => by_swarm!(
+                        $found,
+                        Some(<$stage as Searchable>::kernel(held, order, visitor)),
+                        None
+                    ),)*
+                }
+            }
+        }
+
+        /// A stage of any model.
+        #[derive(Clone, Copy, Debug)]
+        #[expect(clippy::large_enum_variant, reason = "one in an experiment")]
+        pub enum Stage {
+            $(#[doc = concat!("[`", stringify!($stage), "`].")] $variant($stage),)*
+        }
+
+        /// State of a [`Stage`].
+        #[derive(Clone, Debug)]
+        #[expect(missing_docs, reason = "one for each model")]
+        pub enum StageState {
+            $($variant(<$stage as Plant>::State),)*
+        }
+
+        /// Steps of a [`Stage`].
+        #[expect(missing_docs, missing_debug_implementations, reason = "one for each model")]
+        pub enum StageFlow {
+            $($variant(<$stage as Plant>::Flow),)*
+        }
+
+        impl Plant for Stage {
+            type State = StageState;
+            type Flow = StageFlow;
+
+            fn rest(&self) -> StageState {
+                match self { $(Self::$variant(stage) => StageState::$variant(Plant::rest(stage)),)* }
+            }
+
+            fn flow(&self, step: f64) -> StageFlow {
+                match self { $(Self::$variant(stage) => StageFlow::$variant(stage.flow(step)),)* }
+            }
+
+            #[inline(always)]
+            fn advance(&self, flow: &StageFlow, state: &mut StageState, from: f64, to: f64) {
+                match (self, flow, state) {
+                    $((
+                        Self::$variant(stage),
+                        StageFlow::$variant(flow),
+                        StageState::$variant(state),
+                    ) => stage.advance(flow, state, from, to),)*
+                    // Flow and state are always those of the stage itself.
+                    _ => {}
+                }
+            }
+
+            #[inline(always)]
+            fn displacement(&self, state: &StageState) -> f64 {
+                match (self, state) {
+                    $((Self::$variant(stage), StageState::$variant(state)) => {
+                        stage.displacement(state)
+                    })*
+                    _ => f64::NAN,
+                }
+            }
+        }
+
+        impl Stage {
+            /// Which model it is of.
+            #[must_use]
+            pub fn model(&self) -> Model {
+                match self { $(Self::$variant(_) => Model::$variant,)* }
+            }
+
+            /// Motion under a drive; `None` where it was told to stop.
+            ///
+            /// # Errors
+            /// Those of [`StageModel::simulate`].
+            pub fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
+                match self {
+                    $(Self::$variant(stage) => StageModel::simulate(stage, experiment),)*
+                }
+            }
+
+            /// The stage for small motions between two voltages.
+            ///
+            /// # Errors
+            /// Those of [`StageModel::loop_plants`].
+            pub fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
+                match self { $(Self::$variant(stage) => stage.loop_plants(low, high),)* }
+            }
+
+            /// The inverse for samples every `dt` seconds.
+            ///
+            /// # Errors
+            /// Those of [`Invertible::inverse`].
+            pub fn inverse(
+                &self,
+                dt: f64,
+                initial: Option<&Values>,
+            ) -> Result<(StageInverse, StageInverseState)> {
+                match self {
+                    $(Self::$variant(stage) => {
+                        let (inverse, state) = Invertible::inverse(stage, dt, initial)?;
+                        Ok((StageInverse::$variant(inverse), StageInverseState::$variant(state)))
+                    })*
+                }
+            }
+        }
+
+        /// Inverse of a [`Stage`].
+        #[derive(Clone)]
+        #[expect(missing_docs, missing_debug_implementations, reason = "one for each model")]
+        #[expect(clippy::large_enum_variant, reason = "one in a controller")]
+        pub enum StageInverse {
+            $($variant(<$stage as Invertible>::Inverse),)*
+        }
+
+        /// What a [`StageInverse`] remembers.
+        #[derive(Clone)]
+        #[expect(missing_docs, missing_debug_implementations, reason = "one for each model")]
+        pub enum StageInverseState {
+            $($variant(<<$stage as Invertible>::Inverse as Inverse>::State),)*
+        }
+
+        impl Inverse for StageInverse {
+            type State = StageInverseState;
+
+            fn rest(&self) -> StageInverseState {
+                match self {
+                    $(Self::$variant(inverse) => {
+                        StageInverseState::$variant(Inverse::rest(inverse))
+                    })*
+                }
+            }
+
+            fn step(&self, state: &mut StageInverseState, x: f64, v: f64, a: f64) -> f64 {
+                match (self, state) {
+                    $((Self::$variant(inverse), StageInverseState::$variant(state)) => {
+                        Inverse::step(inverse, state, x, v, a)
+                    })*
+                    _ => f64::NAN,
+                }
+            }
+        }
+    };
+}
+
+models! {
+    Dahl: DahlStage, swarm;
+    BoucWen: BoucWenStage, swarm;
+    FirstOrderDahl: FirstOrderDahlStage, swarm;
+    BoucWenOscillator: BoucWenOscillator, swarm;
+    PrandtlIshlinskii: PrandtlIshlinskiiStage, least_squares;
 }
 
 impl Model {
-    /// All of them.
-    pub const ALL: [Self; 4] =
-        [Self::Dahl, Self::BoucWen, Self::FirstOrderDahl, Self::BoucWenOscillator];
-
     /// The model of a name.
     ///
     /// # Errors
     /// [`Error::Parameter`] where there is none.
     pub fn named(name: &str) -> Result<Self> {
-        Self::ALL.into_iter().find(|model| model.facts().name == name).ok_or_else(|| {
-            let names = Self::ALL.map(|model| format!("'{}'", model.facts().name));
+        Self::ALL.iter().copied().find(|model| model.info().name == name).ok_or_else(|| {
+            let names: Vec<String> =
+                Self::ALL.iter().map(|model| format!("'{}'", model.info().name)).collect();
             Error::parameter("model", format!("'{name}'"), names.join(" or "))
         })
     }
 
-    /// What a search has to know of it.
-    #[must_use]
-    pub fn facts(self) -> Facts {
-        match self {
-            Self::Dahl => Facts {
-                name: "dahl",
-                parameters: &DAHL_PARAMETERS,
-                forces: &[0, 1, 2, 3, 6, 7],
-                defaults: &[(7, 0.0), (8, 30.0)],
-                held: &[(8, "up held: only the products b1 up and b0 up show in the data")],
-            },
-            Self::BoucWen => Facts {
-                name: "bouc-wen",
-                parameters: &BOUC_WEN_PARAMETERS,
-                forces: &[0, 1, 2],
-                defaults: &[(7, 1.0)],
-                held: &[(7, "exponent held, in fixed=: it decides the unit of beta and gamma")],
-            },
-            Self::FirstOrderDahl => Facts {
-                name: "first-order-dahl",
-                parameters: &FIRST_ORDER_DAHL_PARAMETERS,
-                forces: &[0, 1, 2, 3, 4, 5],
-                defaults: &[(6, 1.0)],
-                held: &[(6, "exponent held, in fixed=: all guesses of a search share it")],
-            },
-            Self::BoucWenOscillator => Facts {
-                name: "bouc-wen-oscillator",
-                parameters: &BOUC_WEN_OSCILLATOR_PARAMETERS,
-                forces: &[],
-                defaults: &[(4, 1.0), (7, 1.0)],
-                held: &[
-                    (4, "beta held: only the products beta gamma and beta delta show in the data"),
-                    (7, "exponent held, in fixed=: it decides the unit of gamma and delta"),
-                ],
-            },
-        }
-    }
-
-    /// Refuses parameters with which no stage exists.
+    /// Refuses scalar parameters with which no stage exists.
     ///
     /// # Errors
     /// [`Error::Parameter`] naming the parameter that is out of its range.
-    pub fn check(self, theta: &Theta) -> Result<()> {
-        match self {
-            Self::Dahl => dahl(theta).map(|_| ()),
-            Self::BoucWen => BoucWenStage::from_theta(&first(theta)).map(|_| ()),
-            Self::FirstOrderDahl => FirstOrderDahlStage::from_theta(&first(theta)).map(|_| ()),
-            Self::BoucWenOscillator => BoucWenOscillator::from_theta(&first(theta)).map(|_| ()),
-        }
+    pub fn check(self, parameters: &Parameters<f64>) -> Result<()> {
+        self.build(&Values::scalars(self.info().parameters, parameters)).map(drop)
     }
-
-    /// The exponent, which all guesses of a search share; 1 for a model without one.
-    pub(crate) fn exponent(self, theta: &Theta) -> f64 {
-        match self {
-            Self::Dahl => 1.0,
-            Self::FirstOrderDahl => theta[6],
-            Self::BoucWen | Self::BoucWenOscillator => theta[7],
-        }
-    }
-
-    /// Displacement and velocity as a search computes them; `None` where they are not finite or
-    /// `stop` said so.
-    pub(crate) fn motion(
-        self,
-        theta: &Theta,
-        drive: &Drive<'_>,
-        stepping: Stepping,
-        stop: Stop<'_>,
-    ) -> Option<[Vec<f64>; 2]> {
-        match self {
-            Self::Dahl => {
-                let stage = dahl(theta).ok()?;
-                let run = simulate_fixed(&stage, drive, StageState::default(), stepping, stop);
-                run.ok().flatten().map(|run| [run.x, run.v])
-            }
-            Self::BoucWen => {
-                let kernel = BoucWenKernel { exponent: self.exponent(theta) };
-                alone(&kernel, theta, drive, stepping, stop)
-            }
-            Self::FirstOrderDahl => {
-                let kernel = FirstOrderDahlKernel { exponent: self.exponent(theta) };
-                alone(&kernel, theta, drive, stepping, stop)
-            }
-            Self::BoucWenOscillator => {
-                let kernel = BoucWenOscillatorKernel { exponent: self.exponent(theta) };
-                alone(&kernel, theta, drive, stepping, stop)
-            }
-        }
-    }
-}
-
-fn dahl(theta: &Theta) -> Result<DahlStage> {
-    DahlStage::from_theta(&first(theta))
-}
-
-/// The parameters that a model has.
-fn first<const N: usize>(theta: &Theta) -> [f64; N] {
-    core::array::from_fn(|i| theta[i])
-}
-
-fn alone<K: Kernel<f64> + Copy>(
-    kernel: &K,
-    theta: &Theta,
-    drive: &Drive<'_>,
-    stepping: Stepping,
-    stop: Stop<'_>,
-) -> Option<[Vec<f64>; 2]> {
-    let mut parameters = [0.0; DELAY];
-    parameters.copy_from_slice(&theta[..DELAY]);
-    let stage = Alone { kernel, parameters: &parameters };
-    let run = stage.simulate_fixed(drive, stage.rest(), stepping.substeps, stop);
-    run.ok().flatten().map(|run| [run.x, run.v])
 }

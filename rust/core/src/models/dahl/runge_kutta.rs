@@ -7,9 +7,12 @@
 
 use piezotrack_control::hysteresis::DahlState;
 
-use super::dahl::{DahlStage, StageState};
-use super::dahl_simulate::Trajectory;
-use crate::signal::{Drive, index};
+use super::{DahlStage, DahlStageState, STATE};
+use crate::error::{Error, Result};
+use crate::integrator::{MOST_SUBSTEPS, first_substeps, out_of_reach};
+use crate::models::traits::{Experiment, Method, Response};
+use crate::models::values::Values;
+use crate::signal::{Drive, Stop, index, largest_difference};
 
 /// x, x', Fh, dFh/dx.
 type State = [f64; 4];
@@ -37,7 +40,7 @@ fn moved(state: &State, h: f64, weights: &[f64], slopes: &[State]) -> State {
 }
 
 /// How an interval of the drive is crossed.
-pub(crate) trait Crossing {
+trait Crossing {
     /// The state at the end of an interval of length `dt` with the drive from `u` to
     /// `u + change`; `None` where it does not stay finite.
     fn cross(&mut self, state: State, u: f64, change: f64, dt: f64) -> Option<State>;
@@ -47,9 +50,9 @@ pub(crate) trait Crossing {
 }
 
 /// RK4 with a fixed number of steps in each interval.
-pub(crate) struct Rk4<'a> {
-    pub stage: &'a DahlStage,
-    pub substeps: usize,
+struct Rk4<'a> {
+    stage: &'a DahlStage,
+    substeps: usize,
 }
 
 impl Crossing for Rk4<'_> {
@@ -96,7 +99,7 @@ const DIFFERENCE: [f64; 7] = [
 ];
 
 /// Dormand-Prince with steps chosen for a relative tolerance.
-pub(crate) struct Rk45<'a> {
+struct Rk45<'a> {
     stage: &'a DahlStage,
     tolerance: f64,
     /// What errors of small values are measured against.
@@ -107,7 +110,7 @@ pub(crate) struct Rk45<'a> {
 }
 
 impl<'a> Rk45<'a> {
-    pub(crate) fn new(stage: &'a DahlStage, drive: &Drive<'_>, tolerance: f64) -> Self {
+    fn new(stage: &'a DahlStage, drive: &Drive<'_>, tolerance: f64) -> Self {
         let m = &stage.mechanics;
         let most = drive.u.iter().fold(0.0, |most: f64, u| most.max(u.abs()));
         let x = (stage.piezo_coefficient * most / m.stiffness).abs().max(1e-12);
@@ -163,26 +166,74 @@ impl Crossing for Rk45<'_> {
     }
 }
 
-/// Leads a stage along its drive; `None` where it does not stay finite or `stop` says so.
-pub(crate) fn march(
+/// Digits of the relative tolerance that the adaptive method begins and ends with.
+const DIGITS: (usize, usize) = (6, 14);
+
+/// Simulates so that half the step, or a tenth of the tolerance, moves no sample by more than the
+/// accuracy; `None` where it was told to stop.
+pub(super) fn simulate(
+    stage: &DahlStage,
+    experiment: &Experiment<'_>,
+    from: DahlStageState,
+) -> Result<Option<Response>> {
+    let Experiment { drive, method, accuracy, stop, .. } = *experiment;
+    if stage.has_friction() {
+        let expected = "0 with a Runge-Kutta method, which steps over sticking (or \
+                        method='exponential')";
+        return Err(Error::parameter("b0", format!("{} N/m", stage.b0), expected));
+    }
+    let adaptive = method == Method::Rk45;
+    let (mut level, last) =
+        if adaptive { DIGITS } else { (first_substeps(&stage.mechanics, drive.dt), MOST_SUBSTEPS) };
+    let mut coarse: Option<Response> = None;
+    loop {
+        let fine = if adaptive {
+            let mut crossing = Rk45::new(stage, drive, libm::pow(10.0, -index(level)));
+            along(stage, &mut crossing, drive, from, stop)
+        } else {
+            along(stage, &mut Rk4 { stage, substeps: level }, drive, from, stop)
+        };
+        if stop() {
+            return Ok(None);
+        }
+        coarse = match (fine, coarse.take()) {
+            (Some(mut fine), Some(before)) => {
+                fine.error_estimate = largest_difference(&before.x, &fine.x);
+                if fine.error_estimate <= accuracy {
+                    return Ok(Some(fine));
+                }
+                if level >= last {
+                    return Err(out_of_reach(accuracy, fine.substeps, fine.error_estimate));
+                }
+                Some(fine)
+            }
+            (Some(fine), None) => Some(fine),
+            (None, _) if level >= last => {
+                return Err(Error::Numerical(
+                    "the simulated displacement does not stay finite: check that parameters and \
+                     drive are in SI units"
+                        .into(),
+                ));
+            }
+            // A Runge-Kutta method that is not stable may be so in shorter steps.
+            (None, _) => None,
+        };
+        level = if adaptive { level + 1 } else { 2 * level };
+    }
+}
+
+/// Motion under a drive; `None` where it does not stay finite or `stop` says so.
+fn along(
     stage: &DahlStage,
     crossing: &mut impl Crossing,
     drive: &Drive<'_>,
-    initial: StageState,
-    stop: &dyn Fn() -> bool,
-) -> Option<Trajectory> {
+    initial: DahlStageState,
+    stop: Stop<'_>,
+) -> Option<Response> {
     let n = drive.u.len();
     let memory = stage.memory(&initial);
     let mut state = [initial.x, initial.v, memory.force, memory.slope];
-    let mut out = Trajectory {
-        x: Vec::with_capacity(n),
-        v: Vec::with_capacity(n),
-        hysteresis: Vec::with_capacity(n),
-        last: initial,
-        substeps: 0,
-        difference: 0.0,
-        well_posed: true,
-    };
+    let mut columns = [0, 1, 2].map(|_| Vec::with_capacity(n));
     for k in 0..n {
         if k > 0 {
             let (u, change) = drive.interval(k - 1);
@@ -191,13 +242,20 @@ pub(crate) fn march(
                 return None;
             }
         }
-        out.x.push(state[0]);
-        out.v.push(state[1]);
-        out.hysteresis.push(state[2]);
+        for (column, value) in columns.iter_mut().zip(state) {
+            column.push(value);
+        }
     }
-    let [x, v, force, slope] = state;
+    let [end, velocity, force, slope] = state;
     let (q1, q2) = stage.states(&DahlState { force, slope });
-    out.last = StageState { x, v, q1, q2 };
-    out.substeps = crossing.steps();
-    Some(out)
+    let [x, v, hysteresis] = columns;
+    Some(Response {
+        x,
+        v,
+        hysteresis,
+        last: Values::scalars(STATE, &[end, velocity, q1, q2]),
+        substeps: crossing.steps(),
+        error_estimate: 0.0,
+        unique: true,
+    })
 }
