@@ -2,7 +2,7 @@
 
 use piezotrack_control::hysteresis::{BoucWen, Operator};
 
-use super::LoopPlant;
+use super::plant::LoopPlant;
 use crate::error::{Error, Result, finite};
 use crate::integrator::Mechanics;
 use crate::models::{BoucWenStage, Dynamics, FirstOrderDahlStage, PrandtlIshlinskiiStage};

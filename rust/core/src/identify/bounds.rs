@@ -4,10 +4,14 @@
 //! stiffness, and the hysteresis force relative to the elastic one. Each ratio gets a generous
 //! range from the stroke, the drive and the sampling, and the stiffness turns it into a bound.
 
-use super::problem::{Coordinate, Record};
+use super::coordinate::Coordinate;
+use super::record::Record;
 use crate::error::{Error, Result, shown};
 use crate::models::Model;
 use crate::signal::{index, range};
+
+/// Stiffness held where nothing in the input fixes a force, N/m.
+pub const NOMINAL_STIFFNESS: f64 = 1e6;
 
 /// What the ranges are built from.
 struct Measures {
@@ -221,6 +225,6 @@ fn stiffness_range(of: &Measures, fixed: &[Option<f64>; 9], hints: &[Option<f64>
         let slowest = 3.0 * of.frequency;
         (value * slowest * slowest, value * slowest * slowest * 1e4)
     } else {
-        (super::problem::NOMINAL_STIFFNESS, super::problem::NOMINAL_STIFFNESS)
+        (NOMINAL_STIFFNESS, NOMINAL_STIFFNESS)
     }
 }

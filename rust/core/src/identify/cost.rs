@@ -12,8 +12,9 @@ use piezotrack_control::hysteresis::{Dahl, DahlState, Operator};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::problem::{Problem, Record};
-use super::residual_sums::{Delayed, Sums};
+use super::problem::Problem;
+use super::record::Record;
+use super::residual_sums::{Costs, Delayed, Guess, Residuals, Sums};
 use super::step_size;
 use crate::integrator::{
     Coupling, FEW_TERMS, FeedbackState, Friction, FrictionParameters, Kernel, MOST_PARAMETERS,
@@ -26,40 +27,14 @@ use crate::signal::{Stop, index};
 /// Vectors that go through the step together, to hide each other's latency.
 const VECTORS: usize = 3;
 
-/// Parameters to simulate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Guess {
-    /// The parameters, SI.
-    pub theta: Theta,
-    /// The cost, m, beyond which nobody asks how bad the guess is; infinite for none.
-    pub limit: f64,
-}
-
-/// Cost and offset of a guess.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Costs {
-    /// RMS deviation, m; infinite where the simulation blew up. Where the guess was abandoned,
-    /// a lower bound that lies above its limit.
-    pub rms: f64,
-    /// Offset added to the simulated displacement, m.
-    pub offset: f64,
-}
-
-impl Costs {
-    /// What a guess costs that could not be simulated.
-    pub(super) const FAILED: Self = Self { rms: f64::INFINITY, offset: 0.0 };
-}
-
 /// Computes costs of guesses for one problem, with the stepping fixed.
 pub struct Evaluator<'a> {
-    pub(super) record: &'a Record<'a>,
+    residuals: Residuals<'a>,
     problem: &'a Problem,
     arch: Arch,
     /// How finely a sampling interval is stepped through.
     pub stepping: Stepping,
     halvings: u32,
-    /// Subtracted from the measured displacement, m, to keep the sums small.
-    pub(super) centre: f64,
 }
 
 impl<'a> Evaluator<'a> {
@@ -75,7 +50,8 @@ impl<'a> Evaluator<'a> {
         let centre =
             if problem.offset { window.iter().sum::<f64>() / index(window.len()) } else { 0.0 };
         let halvings = halvings(rate, record.drive.dt / index(stepping.substeps));
-        Self { record, problem, arch: Arch::new(), stepping, halvings, centre }
+        let residuals = Residuals { record, offset: problem.offset, centre };
+        Self { residuals, problem, arch: Arch::new(), stepping, halvings }
     }
 
     /// Runs on another instruction set: the costs have the same bits.
@@ -87,7 +63,7 @@ impl<'a> Evaluator<'a> {
 
     /// Length of a sub-step, s.
     fn step(&self) -> f64 {
-        self.record.drive.dt / index(self.stepping.substeps)
+        self.residuals.record.drive.dt / index(self.stepping.substeps)
     }
 
     /// Costs of guesses, in their order, computed on the threads of the present pool.
@@ -116,21 +92,6 @@ impl<'a> Evaluator<'a> {
             self.arch.dispatch(Bundle::<VECTORS> { of: self, guesses, stop })
         }
     }
-
-    /// Cost and offset from the sums of the deviation and of its square.
-    pub(super) fn conclude(&self, sum: f64, squares: f64, samples: usize) -> Costs {
-        let (mean, mean_square) = (sum / index(samples), squares / index(samples));
-        let (variance, offset) = if self.problem.offset {
-            (mean_square - mean * mean, mean + self.centre)
-        } else {
-            (mean_square, 0.0)
-        };
-        if variance.is_finite() && mean.is_finite() {
-            Costs { rms: libm::sqrt(variance.max(0.0)), offset }
-        } else {
-            Costs::FAILED
-        }
-    }
 }
 
 /// Asks an instruction set for its lanes.
@@ -145,10 +106,10 @@ impl WithSimd for Width {
 }
 
 /// Guesses in one bundle of lanes.
-pub(super) struct Bundle<'a, const K: usize> {
-    pub of: &'a Evaluator<'a>,
-    pub guesses: &'a [Guess],
-    pub stop: Stop<'a>,
+struct Bundle<'a, const K: usize> {
+    of: &'a Evaluator<'a>,
+    guesses: &'a [Guess],
+    stop: Stop<'a>,
 }
 
 impl<const K: usize> WithSimd for Bundle<'_, K> {
@@ -248,10 +209,11 @@ impl<const K: usize> Bundle<'_, K> {
         start: FeedbackState<Lanes<S, K>, C::Memory>,
         gain: Lanes<S, K>,
     ) -> Vec<Costs> {
-        let (drive, substeps) = (&self.of.record.drive, self.of.stepping.substeps);
+        let Self { of, guesses, stop } = self;
+        let (drive, substeps) = (&of.residuals.record.drive, of.stepping.substeps);
         let march = March { coupling, gain };
-        let mut sums = Sums::new(&self, start.x);
-        let ended = if self.of.problem.has_delay() {
+        let mut sums = Sums::new(&of.residuals, guesses, stop, start.x);
+        let ended = if of.problem.has_delay() {
             let mut late = Delayed::new(sums, index(substeps));
             let end = march.run(drive, substeps, start, &mut late);
             sums = late.sums;

@@ -11,8 +11,11 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::cost::{Costs, Evaluator, Guess};
-use super::problem::{Coordinate, Problem, Record};
+use super::coordinate::Coordinate;
+use super::cost::Evaluator;
+use super::problem::Problem;
+use super::record::Record;
+use super::residual_sums::{Costs, Guess};
 use crate::models::DELAY;
 use crate::signal::{Stop, delayed, index};
 

@@ -1,12 +1,14 @@
 //! Identification: parameters searched, cost of a candidate, particle swarm, local refinement.
 
-pub mod bounds;
+mod bounds;
+mod coordinate;
 mod cost;
 mod cross_talk;
 mod identification;
 mod levenberg_marquardt;
 mod prandtl_ishlinskii;
 mod problem;
+mod record;
 mod residual_sums;
 mod search;
 mod sensor_noise;
@@ -15,12 +17,16 @@ mod step_ringing;
 mod step_size;
 mod swarm;
 
-pub use cost::{Costs, Evaluator, Guess};
+pub use bounds::NOMINAL_STIFFNESS;
+pub use coordinate::{Coordinate, Scale};
+pub use cost::Evaluator;
 pub use cross_talk::{CrossTalk, cross_talk};
 pub use identification::{Identification, identify};
 pub use levenberg_marquardt::{Local, Polished, Sensitivity};
 pub use prandtl_ishlinskii::{DynamicsKind, PlaysFit, PlaysRecord, PlaysSettings, identify_plays};
-pub use problem::{Coordinate, Delay, NOMINAL_STIFFNESS, Problem, Record, Scale, Spec};
+pub use problem::{Delay, Problem, Spec};
+pub use record::Record;
+pub use residual_sums::{Costs, Guess};
 pub use search::{Monitor, Outcome, Plan, Progress, StopReason, search};
 pub use sensor_noise::{Noise, noise_at_rest};
 pub use step_response::{Conventional, StepReadings, StepResponse, read_step, separate};

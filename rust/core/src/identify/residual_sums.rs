@@ -3,30 +3,88 @@
 use piezotrack_control::Number;
 use pulp::Simd;
 
-use super::cost::{Bundle, Costs};
+use super::record::Record;
 use crate::integrator::{FeedbackState, Sink};
 use crate::math::Lanes;
-use crate::models::DELAY;
-use crate::signal::{Late, between, index};
+use crate::models::{DELAY, Theta};
+use crate::signal::{Late, Stop, between, index};
+
+/// Parameters to simulate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Guess {
+    /// The parameters, SI.
+    pub theta: Theta,
+    /// The cost, m, beyond which nobody asks how bad the guess is; infinite for none.
+    pub limit: f64,
+}
+
+/// Cost and offset of a guess.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Costs {
+    /// RMS deviation, m; infinite where the simulation blew up. Where the guess was abandoned,
+    /// a lower bound that lies above its limit.
+    pub rms: f64,
+    /// Offset added to the simulated displacement, m.
+    pub offset: f64,
+}
+
+impl Costs {
+    /// What a guess costs that could not be simulated.
+    pub(super) const FAILED: Self = Self { rms: f64::INFINITY, offset: 0.0 };
+}
+
+/// The residual that is summed: measured less simulated displacement.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Residuals<'a> {
+    pub record: &'a Record<'a>,
+    /// Whether an offset is fitted.
+    pub offset: bool,
+    /// Subtracted from the measured displacement, m, to keep the sums small.
+    pub centre: f64,
+}
+
+impl Residuals<'_> {
+    /// Cost and offset from the sums of the deviation and of its square.
+    fn conclude(&self, sum: f64, squares: f64, samples: usize) -> Costs {
+        let (mean, mean_square) = (sum / index(samples), squares / index(samples));
+        let (variance, offset) = if self.offset {
+            (mean_square - mean * mean, mean + self.centre)
+        } else {
+            (mean_square, 0.0)
+        };
+        if variance.is_finite() && mean.is_finite() {
+            Costs { rms: libm::sqrt(variance.max(0.0)), offset }
+        } else {
+            Costs::FAILED
+        }
+    }
+}
 
 /// Sums of the deviation and of its square, in lanes.
-pub(super) struct Sums<'a, const K: usize, N> {
-    of: &'a Bundle<'a, K>,
+pub(super) struct Sums<'a, N> {
+    of: &'a Residuals<'a>,
+    guesses: &'a [Guess],
+    stop: Stop<'a>,
     sum: N,
     squares: N,
     /// Costs of the guesses that are settled before the end.
     verdicts: Vec<Option<Costs>>,
 }
 
-impl<'a, const K: usize, S: Simd> Sums<'a, K, Lanes<S, K>> {
+impl<'a, const K: usize, S: Simd> Sums<'a, Lanes<S, K>> {
     #[inline(always)]
-    pub fn new(of: &'a Bundle<'a, K>, zero: Lanes<S, K>) -> Self {
-        Self { of, sum: zero, squares: zero, verdicts: vec![None; of.guesses.len()] }
+    pub fn new(
+        of: &'a Residuals<'a>,
+        guesses: &'a [Guess],
+        stop: Stop<'a>,
+        zero: Lanes<S, K>,
+    ) -> Self {
+        Self { of, guesses, stop, sum: zero, squares: zero, verdicts: vec![None; guesses.len()] }
     }
 
     #[inline(always)]
     fn add(&mut self, k: usize, x: Lanes<S, K>) {
-        let of = self.of.of;
+        let of = self.of;
         if k >= of.record.window.start {
             let deviation = x.like(of.record.y[k] - of.centre) - x;
             self.sum = self.sum + deviation;
@@ -41,13 +99,13 @@ impl<'a, const K: usize, S: Simd> Sums<'a, K, Lanes<S, K>> {
     /// how guesses are bundled.
     #[inline(always)]
     fn hopeless(&mut self, k: usize) -> bool {
-        let Bundle { of, guesses, stop } = self.of;
+        let Self { of, guesses, stop, .. } = *self;
         let (seen, samples) =
             ((k + 1).saturating_sub(of.record.window.start), of.record.window.len());
         if seen > 0 && seen < samples {
             let share = libm::sqrt(index(seen) / index(samples));
             let sums = self.sum.as_slice().iter().zip(self.squares.as_slice());
-            for (((&sum, &squares), guess), verdict) in sums.zip(*guesses).zip(&mut self.verdicts) {
+            for (((&sum, &squares), guess), verdict) in sums.zip(guesses).zip(&mut self.verdicts) {
                 let part = of.conclude(sum, squares, seen);
                 let bound = Costs { rms: share * part.rms, ..part };
                 // A hair above, so that rounding cannot abandon a guess that ends at its limit.
@@ -62,7 +120,7 @@ impl<'a, const K: usize, S: Simd> Sums<'a, K, Lanes<S, K>> {
     /// The costs, where the lanes `ended` or were given up before.
     #[inline(always)]
     pub fn conclude(self, ended: bool) -> Vec<Costs> {
-        let of = self.of.of;
+        let of = self.of;
         let samples = of.record.window.len();
         let lanes = self.sum.as_slice().iter().zip(self.squares.as_slice()).zip(self.verdicts);
         let costs = lanes.map(|((&sum, &squares), verdict)| match verdict {
@@ -74,7 +132,7 @@ impl<'a, const K: usize, S: Simd> Sums<'a, K, Lanes<S, K>> {
     }
 }
 
-impl<const K: usize, S: Simd, M> Sink<Lanes<S, K>, M> for Sums<'_, K, Lanes<S, K>> {
+impl<const K: usize, S: Simd, M> Sink<Lanes<S, K>, M> for Sums<'_, Lanes<S, K>> {
     #[inline(always)]
     fn sample(&mut self, k: usize, state: &FeedbackState<Lanes<S, K>, M>) {
         self.add(k, state.x);
@@ -88,7 +146,7 @@ impl<const K: usize, S: Simd, M> Sink<Lanes<S, K>, M> for Sums<'_, K, Lanes<S, K
 
 /// Sums of a displacement that is late, each lane by its own delay.
 pub(super) struct Delayed<'a, const K: usize, S: Simd> {
-    pub sums: Sums<'a, K, Lanes<S, K>>,
+    pub sums: Sums<'a, Lanes<S, K>>,
     /// Displacement and scaled velocity at the last samples, in a ring.
     past: Vec<[Lanes<S, K>; 2]>,
     /// Delay of each lane in whole samples.
@@ -101,8 +159,8 @@ pub(super) struct Delayed<'a, const K: usize, S: Simd> {
 
 impl<'a, const K: usize, S: Simd> Delayed<'a, K, S> {
     #[inline(always)]
-    pub fn new(sums: Sums<'a, K, Lanes<S, K>>, substeps: f64) -> Self {
-        let Bundle { of, guesses, .. } = sums.of;
+    pub fn new(sums: Sums<'a, Lanes<S, K>>, substeps: f64) -> Self {
+        let (of, guesses) = (sums.of, sums.guesses);
         let late = |lane: usize| {
             let delay = guesses.get(lane).map_or(0.0, |guess| guess.theta[DELAY]);
             Late::new(delay, of.record.drive.dt)

@@ -1,7 +1,8 @@
 //! The whole search: a swarm, its costs, its stop criteria.
 
-use super::cost::{Costs, Evaluator, Guess};
+use super::cost::Evaluator;
 use super::problem::Problem;
+use super::residual_sums::{Costs, Guess};
 use super::swarm::{Swarm, SwarmSettings};
 use crate::error::{Error, Result};
 use crate::models::Theta;

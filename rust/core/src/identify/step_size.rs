@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::problem::{Problem, Record};
+use super::problem::Problem;
+use super::record::Record;
 use crate::integrator::{Mechanics, Order, Stepping, first_substeps, steps_for};
 use crate::models::{Model, Theta};
 use crate::signal::{Drive, Stop, range};

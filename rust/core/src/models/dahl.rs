@@ -66,6 +66,26 @@ pub struct StageState {
     pub q2: f64,
 }
 
+/// Motion of a stage at the samples of its drive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trajectory {
+    /// Displacement, m.
+    pub x: Vec<f64>,
+    /// Velocity, m/s.
+    pub v: Vec<f64>,
+    /// Hysteresis force Fh, N.
+    pub hysteresis: Vec<f64>,
+    /// State at the last sample.
+    pub last: StageState,
+    /// Steps of the integrator in each sampling interval.
+    pub substeps: usize,
+    /// Largest difference in displacement from a coarser simulation, m; 0 where there was none.
+    pub difference: f64,
+    /// Whether each rest was unique: false once a stage with b0 other than 0 could have gone
+    /// either way.
+    pub well_posed: bool,
+}
+
 impl DahlStage {
     /// The stage with parameters in the order of [`DAHL_PARAMETERS`].
     ///

@@ -7,8 +7,7 @@
 
 use piezotrack_control::hysteresis::DahlState;
 
-use super::dahl::{DahlStage, StageState};
-use super::dahl_simulate::Trajectory;
+use super::dahl::{DahlStage, StageState, Trajectory};
 use crate::signal::{Drive, index};
 
 /// x, x', Fh, dFh/dx.

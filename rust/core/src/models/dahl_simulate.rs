@@ -3,7 +3,7 @@
 use piezotrack_control::hysteresis::DahlState;
 use pulp::{Simd, WithSimd};
 
-use super::dahl::{DahlStage, StageState};
+use super::dahl::{DahlStage, StageState, Trajectory};
 use super::dahl_runge_kutta::{self, Rk4, Rk45};
 use crate::error::{Error, Result, positive};
 use crate::integrator::{
@@ -11,26 +11,6 @@ use crate::integrator::{
     Propagator, Sink, Smooth, Stepping, TERMS, first_substeps, halvings, out_of_reach,
 };
 use crate::signal::{Drive, Stop, all_finite, index, largest_difference};
-
-/// Motion of a stage at the samples of its drive.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Trajectory {
-    /// Displacement, m.
-    pub x: Vec<f64>,
-    /// Velocity, m/s.
-    pub v: Vec<f64>,
-    /// Hysteresis force Fh, N.
-    pub hysteresis: Vec<f64>,
-    /// State at the last sample.
-    pub last: StageState,
-    /// Steps of the integrator in each sampling interval.
-    pub substeps: usize,
-    /// Largest difference in displacement from a coarser simulation, m; 0 where there was none.
-    pub difference: f64,
-    /// Whether each rest was unique: false once a stage with b0 other than 0 could have gone
-    /// either way.
-    pub well_posed: bool,
-}
 
 /// How a stage is integrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

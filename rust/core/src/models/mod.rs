@@ -16,7 +16,7 @@ pub use bouc_wen_oscillator::{
     BOUC_WEN_OSCILLATOR_PARAMETERS, BoucWenOscillator, BoucWenOscillatorKernel,
 };
 pub use creep::{Creep, Dynamics, MOST_RELAXATIONS, Relaxation, RelaxationFlow, RelaxationState};
-pub use dahl::{DAHL_PARAMETERS, DahlStage, StageState};
+pub use dahl::{DAHL_PARAMETERS, DahlStage, StageState, Trajectory};
 pub use first_order_dahl::{
     FIRST_ORDER_DAHL_PARAMETERS, FirstOrderDahlKernel, FirstOrderDahlStage,
 };
