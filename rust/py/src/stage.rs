@@ -2,11 +2,11 @@
 
 use numpy::{PyArray1, ToPyArray};
 use piezotrack_core::integrator::{KinkedMotion, Order, ParameterInfo, Stepping};
-use piezotrack_core::models::dahl_simulate::{self as model, Method, Trajectory};
+use piezotrack_core::models::dahl_simulate::{self as model, Method};
 use piezotrack_core::models::{
     BOUC_WEN_OSCILLATOR_PARAMETERS, BOUC_WEN_PARAMETERS, BoucWenMotion, BoucWenOscillator,
     BoucWenStage, DAHL_PARAMETERS, DahlStage, FIRST_ORDER_DAHL_PARAMETERS, FirstOrderDahlStage,
-    Model, StageState,
+    Model, StageState, Trajectory,
 };
 use piezotrack_core::signal::{self, Drive, Hold, Stop};
 use piezotrack_core::{Error, Result};

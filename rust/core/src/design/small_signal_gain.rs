@@ -2,7 +2,7 @@
 
 use piezotrack_control::hysteresis::Operator;
 
-use super::LoopPlant;
+use super::plant::LoopPlant;
 use crate::error::{Error, Result, finite};
 
 /// Cycles after which the loop counts as settled.

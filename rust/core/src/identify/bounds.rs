@@ -1,6 +1,7 @@
 //! Bounds of a search, from the record, where the caller gave none.
 
-use super::problem::{Coordinate, Record};
+use super::coordinate::Coordinate;
+use super::record::Record;
 use crate::error::{Error, Result, shown};
 use crate::integrator::MOST_PARAMETERS;
 use crate::models::{Held, Measures, Model};

@@ -26,3 +26,12 @@ impl Theta {
         self.0[DELAY]
     }
 }
+
+/// Parameters to simulate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// The parameters, SI.
+    pub theta: Theta,
+    /// The cost, m, beyond which nobody asks how bad the candidate is; infinite for none.
+    pub limit: f64,
+}

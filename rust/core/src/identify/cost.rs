@@ -11,10 +11,11 @@
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::candidate::Theta;
+use super::candidate::{Candidate, Theta};
 use super::motion::motion;
-use super::problem::{Problem, Record};
-use super::residual_sums::{Delayed, ResidualSums};
+use super::problem::Problem;
+use super::record::Record;
+use super::residual_sums::{Costs, ResidualSums, Residuals};
 use super::step_size;
 use crate::integrator::{
     FeedbackState, Kernel, MOST_PARAMETERS, March, Mechanics, Stepping, halvings,
@@ -23,41 +24,15 @@ use crate::math::Lanes;
 use crate::models::{Held, KernelVisitor};
 use crate::signal::{Stop, index};
 
-/// Parameters to simulate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Candidate {
-    /// The parameters, SI.
-    pub theta: Theta,
-    /// The cost, m, beyond which nobody asks how bad the candidate is; infinite for none.
-    pub limit: f64,
-}
-
-/// Cost and offset of a candidate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Costs {
-    /// RMS deviation, m; infinite where the simulation blew up. Where the candidate was
-    /// abandoned, a lower bound that lies above its limit.
-    pub rms: f64,
-    /// Offset added to the simulated displacement, m.
-    pub offset: f64,
-}
-
-impl Costs {
-    /// What a candidate costs that could not be simulated.
-    pub(super) const FAILED: Self = Self { rms: f64::INFINITY, offset: 0.0 };
-}
-
 /// Computes costs of candidates for one problem, with the stepping fixed.
 pub struct Evaluator<'a> {
-    pub(super) record: &'a Record<'a>,
+    residuals: Residuals<'a>,
     problem: &'a Problem,
     held: Held,
     arch: Arch,
     /// How finely a sampling interval is stepped through.
     pub stepping: Stepping,
     halvings: u32,
-    /// Subtracted from the measured displacement, m, to keep the sums small.
-    pub(super) centre: f64,
 }
 
 impl<'a> Evaluator<'a> {
@@ -74,7 +49,8 @@ impl<'a> Evaluator<'a> {
             if problem.offset { window.iter().sum::<f64>() / index(window.len()) } else { 0.0 };
         let halvings = halvings(rate, record.drive.dt / index(stepping.substeps));
         let (held, arch) = (problem.held(), Arch::new());
-        Self { record, problem, held, arch, stepping, halvings, centre }
+        let residuals = Residuals { record, offset: problem.offset, centre };
+        Self { residuals, problem, held, arch, stepping, halvings }
     }
 
     /// Runs on another instruction set: the costs have the same bits.
@@ -87,7 +63,7 @@ impl<'a> Evaluator<'a> {
     /// Displacement and velocity of a candidate, stepped as its cost is; `None` where they are
     /// not finite.
     pub(super) fn motion(&self, theta: &Theta, stop: Stop<'_>) -> Option<[Vec<f64>; 2]> {
-        motion(self.problem.model, theta, &self.record.drive, self.stepping, stop)
+        motion(self.problem.model, theta, &self.residuals.record.drive, self.stepping, stop)
     }
 
     /// Costs of candidates, in their order, computed on the threads of the present pool.
@@ -99,21 +75,6 @@ impl<'a> Evaluator<'a> {
         let costs = self.problem.model.kernel(&self.held, self.stepping.order, all);
         costs.unwrap_or_else(|| vec![Costs::FAILED; candidates.len()])
     }
-
-    /// Cost and offset from the sums of the deviation and of its square.
-    pub(super) fn conclude(&self, sum: f64, squares: f64, samples: usize) -> Costs {
-        let (mean, mean_square) = (sum / index(samples), squares / index(samples));
-        let (variance, offset) = if self.problem.offset {
-            (mean_square - mean * mean, mean + self.centre)
-        } else {
-            (mean_square, 0.0)
-        };
-        if variance.is_finite() && mean.is_finite() {
-            Costs { rms: libm::sqrt(variance.max(0.0)), offset }
-        } else {
-            Costs::FAILED
-        }
-    }
 }
 
 /// Candidates to be spread over threads and lanes.
@@ -123,7 +84,7 @@ struct All<'a> {
     stop: Stop<'a>,
 }
 
-impl KernelVisitor for All<'_> {
+impl<'a> KernelVisitor for All<'a> {
     type Output = Vec<Costs>;
 
     fn visit<K: Kernel>(self, kernel: K) -> Vec<Costs> {
@@ -133,13 +94,12 @@ impl KernelVisitor for All<'_> {
         let vectors = candidates.len().div_ceil(width);
         let each = vectors.div_ceil(rayon::current_num_threads()).clamp(1, K::VECTORS);
         let size = candidates.len().div_ceil(vectors.div_ceil(each).max(1)).max(1);
-        let bundle = |chunk| {
-            let bundle = Bundle { of, candidates: chunk, stop };
+        let bundle = |chunk: &'a [Candidate]| {
             // Only a kernel that gains by several vectors is compiled for them.
             if const { K::VECTORS > 1 } && chunk.len() > width {
-                of.arch.dispatch(Lockstep::<K, VECTORS> { kernel, bundle })
+                of.arch.dispatch(Bundle::<K, VECTORS> { kernel, of, candidates: chunk, stop })
             } else {
-                of.arch.dispatch(Lockstep::<K, 1> { kernel, bundle })
+                of.arch.dispatch(Bundle::<K, 1> { kernel, of, candidates: chunk, stop })
             }
         };
         candidates.par_chunks(size).flat_map_iter(bundle).collect()
@@ -160,28 +120,21 @@ impl WithSimd for Width {
     }
 }
 
-/// Candidates in one bundle of lanes.
-#[derive(Clone, Copy)]
-pub(super) struct Bundle<'a> {
-    pub of: &'a Evaluator<'a>,
-    pub candidates: &'a [Candidate],
-    pub stop: Stop<'a>,
-}
-
-/// A bundle under a kernel, in `V` vectors.
-struct Lockstep<'a, K, const V: usize> {
+/// Candidates in one bundle of `V` vectors of lanes.
+struct Bundle<'a, K, const V: usize> {
     kernel: K,
-    bundle: Bundle<'a>,
+    of: &'a Evaluator<'a>,
+    candidates: &'a [Candidate],
+    stop: Stop<'a>,
 }
 
-impl<K: Kernel, const V: usize> WithSimd for Lockstep<'_, K, V> {
+impl<K: Kernel, const V: usize> WithSimd for Bundle<'_, K, V> {
     type Output = Vec<Costs>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Vec<Costs> {
-        let Self { kernel, bundle } = self;
-        let Bundle { of, candidates, .. } = bundle;
-        let (drive, substeps) = (&of.record.drive, of.stepping.substeps);
+        let Self { kernel, of, candidates, stop } = self;
+        let (drive, substeps) = (&of.residuals.record.drive, of.stepping.substeps);
         let zero = Lanes::<S, V>::splat(simd, 0.0);
         let mut parameters = [zero; MOST_PARAMETERS];
         for (i, parameter) in parameters.iter_mut().enumerate() {
@@ -194,8 +147,8 @@ impl<K: Kernel, const V: usize> WithSimd for Lockstep<'_, K, V> {
         let step = drive.dt / index(substeps);
         let (coupling, gain) = kernel.coupling(&parameters, step, of.halvings);
         let start = FeedbackState { x: zero, w: zero, memory: kernel.rest(&parameters) };
-        let delay = of.problem.has_delay().then(|| Delayed::new(&bundle, zero, index(substeps)));
-        let mut sums = ResidualSums::new(bundle, zero, delay);
+        let delays = of.problem.has_delay().then(|| index(substeps));
+        let mut sums = ResidualSums::new(&of.residuals, candidates, stop, zero, delays);
         let ended = March { coupling, gain }.run(drive, substeps, start, &mut sums).is_some();
         sums.conclude(ended)
     }

@@ -2,7 +2,8 @@
 
 use super::cost::Evaluator;
 use super::levenberg_marquardt::{Local, Sensitivity};
-use super::problem::{Problem, Record, Spec};
+use super::problem::{Problem, Spec};
+use super::record::Record;
 use super::search::{Monitor, Outcome, Plan, StopReason, search};
 use crate::error::Result;
 use crate::integrator::Stepping;

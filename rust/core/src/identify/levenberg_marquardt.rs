@@ -11,8 +11,12 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::cost::{Candidate, Costs, Evaluator};
-use super::problem::{Coordinate, Problem, Record};
+use super::candidate::Candidate;
+use super::coordinate::Coordinate;
+use super::cost::Evaluator;
+use super::problem::Problem;
+use super::record::Record;
+use super::residual_sums::Costs;
 use crate::signal::{Stop, delayed, index};
 
 /// Most samples that enter the Jacobian: more would hardly change what it says.

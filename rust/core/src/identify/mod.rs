@@ -2,6 +2,7 @@
 
 pub mod bounds;
 mod candidate;
+mod coordinate;
 mod cost;
 mod cross_talk;
 mod identification;
@@ -9,6 +10,7 @@ mod levenberg_marquardt;
 mod motion;
 mod prandtl_ishlinskii;
 mod problem;
+mod record;
 mod residual_sums;
 mod search;
 mod sensor_noise;
@@ -17,13 +19,16 @@ mod step_ringing;
 mod step_size;
 mod swarm;
 
-pub use candidate::{DELAY, PLACES, Theta};
-pub use cost::{Candidate, Costs, Evaluator};
+pub use candidate::{Candidate, DELAY, PLACES, Theta};
+pub use coordinate::{Coordinate, Scale};
+pub use cost::Evaluator;
 pub use cross_talk::{CrossTalk, cross_talk};
 pub use identification::{Identification, identify};
 pub use levenberg_marquardt::{Local, Polished, Sensitivity};
 pub use prandtl_ishlinskii::{DynamicsKind, PlaysFit, PlaysRecord, PlaysSettings, identify_plays};
-pub use problem::{Coordinate, Delay, Problem, Record, Scale, Spec};
+pub use problem::{Delay, Problem, Spec};
+pub use record::Record;
+pub use residual_sums::Costs;
 pub use search::{Monitor, Outcome, Plan, Progress, StopReason, search};
 pub use sensor_noise::{Noise, noise_at_rest};
 pub use step_response::{Conventional, StepReadings, StepResponse, read_step, separate};

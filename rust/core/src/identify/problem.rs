@@ -1,135 +1,13 @@
-//! What is searched: a record, the parameters held and the parameters free.
-
-use std::ops::Range;
+//! What is searched: the parameters held and the parameters free.
 
 use super::bounds;
 use super::candidate::{DELAY, PLACES, Theta};
+use super::coordinate::Coordinate;
+use super::record::Record;
 use crate::error::{Error, Result, positive, shown};
 use crate::integrator::MOST_PARAMETERS;
 use crate::models::{FoundBy, Held, Model, NOMINAL_STIFFNESS, position};
-use crate::signal::{Drive, Hold, index, range};
-
-/// A drive and the displacement measured under it.
-#[derive(Clone, Debug)]
-pub struct Record<'a> {
-    /// The drive from the first sample kept, warm-up included.
-    pub drive: Drive<'a>,
-    /// Displacement at the same samples, m.
-    pub y: &'a [f64],
-    /// The samples that count.
-    pub window: Range<usize>,
-}
-
-impl<'a> Record<'a> {
-    /// Checks that the record can tell anything.
-    ///
-    /// # Errors
-    /// [`Error::Shape`] for unequal lengths, [`Error::Parameter`] for a bad `dt`,
-    /// [`Error::Data`] for a constant drive, a dead sensor or too short a window.
-    pub fn new(u: &'a [f64], y: &'a [f64], dt: f64, hold: Hold, start: usize) -> Result<Self> {
-        let drive = Drive::new(u, dt, hold)?;
-        if u.len() != y.len() {
-            return Err(Error::Shape {
-                name: "y".into(),
-                found: format!("{} samples", y.len()),
-                expected: format!("{}, as many as u", u.len()),
-            });
-        }
-        let window = start.min(u.len())..u.len();
-        if window.len() < 10 {
-            return Err(Error::Data(format!(
-                "the window has {} samples: expected at least 10",
-                window.len()
-            )));
-        }
-        let (low, high) = range(&u[window.clone()]);
-        if low >= high {
-            return Err(Error::Data(format!(
-                "the drive is constant at {low} V in the window: expected a drive that moves \
-                 the stage, up and down at least once"
-            )));
-        }
-        let (low, high) = range(&y[window.clone()]);
-        if low >= high {
-            return Err(Error::Data(format!(
-                "the displacement is constant at {low} m in the window while the drive moves: \
-                 the sensor seems dead or not connected"
-            )));
-        }
-        Ok(Self { drive, y, window })
-    }
-
-    /// Range of the displacement in the window, m.
-    #[must_use]
-    pub fn stroke(&self) -> f64 {
-        let (low, high) = range(&self.y[self.window.clone()]);
-        high - low
-    }
-}
-
-/// How a coordinate of the unit box maps to a parameter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scale {
-    /// Evenly.
-    Linear,
-    /// Evenly in the logarithm.
-    Log,
-}
-
-/// One parameter of the stage in a search.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Coordinate {
-    /// Held at a value.
-    Fixed(f64),
-    /// Searched between two bounds.
-    Free {
-        /// Lower bound, SI.
-        low: f64,
-        /// Upper bound, SI.
-        high: f64,
-        /// Scale of the search.
-        scale: Scale,
-    },
-}
-
-impl Coordinate {
-    /// Free between two bounds; on a logarithmic scale where they are positive and two decades
-    /// or more apart.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] where the bounds are not finite or not in order.
-    pub fn between(name: &str, low: f64, high: f64) -> Result<Self> {
-        if low.is_finite() && high.is_finite() && low < high {
-            let wide = low > 0.0 && high >= 100.0 * low;
-            return Ok(Self::Free {
-                low,
-                high,
-                scale: if wide { Scale::Log } else { Scale::Linear },
-            });
-        }
-        Err(Error::parameter(
-            format!("bounds of {name}"),
-            format!("({}, {})", shown(low), shown(high)),
-            "two finite numbers, the lower one first",
-        ))
-    }
-
-    /// The parameter at a place `z` in [0, 1].
-    #[must_use]
-    pub fn value(&self, z: f64) -> f64 {
-        match *self {
-            Self::Fixed(value) => value,
-            Self::Free { low, high, scale: Scale::Linear } => {
-                (low + (high - low) * z).clamp(low, high)
-            }
-            Self::Free { low, high, scale: Scale::Log } => {
-                // Not log(high / low), which can overflow where the bounds do not.
-                let (from, to) = (libm::log(low), libm::log(high));
-                libm::exp(from + z * (to - from)).clamp(low, high)
-            }
-        }
-    }
-}
+use crate::signal::index;
 
 /// What the caller asked for.
 #[derive(Clone, Debug)]

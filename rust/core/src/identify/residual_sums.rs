@@ -3,14 +3,60 @@
 use piezotrack_control::Number;
 use pulp::Simd;
 
-use super::cost::{Bundle, Costs};
+use super::candidate::Candidate;
+use super::record::Record;
 use crate::integrator::{FeedbackState, Sink};
 use crate::math::Lanes;
-use crate::signal::{Late, between, index};
+use crate::signal::{Late, Stop, between, index};
+
+/// Cost and offset of a candidate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Costs {
+    /// RMS deviation, m; infinite where the simulation blew up. Where the candidate was
+    /// abandoned, a lower bound that lies above its limit.
+    pub rms: f64,
+    /// Offset added to the simulated displacement, m.
+    pub offset: f64,
+}
+
+impl Costs {
+    /// What a candidate costs that could not be simulated.
+    pub(super) const FAILED: Self = Self { rms: f64::INFINITY, offset: 0.0 };
+}
+
+/// A record whose deviations are summed.
+#[derive(Clone, Copy)]
+pub(super) struct Residuals<'a> {
+    /// The record.
+    pub record: &'a Record<'a>,
+    /// Whether an offset is fitted.
+    pub offset: bool,
+    /// Subtracted from the measured displacement, m, to keep the sums small.
+    pub centre: f64,
+}
+
+impl Residuals<'_> {
+    /// Cost and offset from the sums of the deviation and of its square.
+    fn conclude(&self, sum: f64, squares: f64, samples: usize) -> Costs {
+        let (mean, mean_square) = (sum / index(samples), squares / index(samples));
+        let (variance, offset) = if self.offset {
+            (mean_square - mean * mean, mean + self.centre)
+        } else {
+            (mean_square, 0.0)
+        };
+        if variance.is_finite() && mean.is_finite() {
+            Costs { rms: libm::sqrt(variance.max(0.0)), offset }
+        } else {
+            Costs::FAILED
+        }
+    }
+}
 
 /// Sums of the deviation and of its square, in lanes.
 pub(super) struct ResidualSums<'a, const V: usize, S: Simd> {
-    of: Bundle<'a>,
+    of: &'a Residuals<'a>,
+    candidates: &'a [Candidate],
+    stop: Stop<'a>,
     sum: Lanes<S, V>,
     squares: Lanes<S, V>,
     /// Where any candidate has a delay.
@@ -20,9 +66,19 @@ pub(super) struct ResidualSums<'a, const V: usize, S: Simd> {
 }
 
 impl<'a, const V: usize, S: Simd> ResidualSums<'a, V, S> {
+    /// Sums that are 0; `substeps` in a sampling interval where a candidate has a delay.
     #[inline(always)]
-    pub fn new(of: Bundle<'a>, zero: Lanes<S, V>, delay: Option<Delayed<V, S>>) -> Self {
-        Self { of, sum: zero, squares: zero, delay, verdicts: vec![None; of.candidates.len()] }
+    pub fn new(
+        of: &'a Residuals<'a>,
+        candidates: &'a [Candidate],
+        stop: Stop<'a>,
+        zero: Lanes<S, V>,
+        substeps: Option<f64>,
+    ) -> Self {
+        let dt = of.record.drive.dt;
+        let delay = substeps.map(|substeps| Delayed::new(candidates, dt, zero, substeps));
+        let verdicts = vec![None; candidates.len()];
+        Self { of, candidates, stop, sum: zero, squares: zero, delay, verdicts }
     }
 
     /// Gives up where every candidate is already beyond its limit: squares only add up, also
@@ -31,7 +87,7 @@ impl<'a, const V: usize, S: Simd> ResidualSums<'a, V, S> {
     /// A candidate's verdict is its own, whatever the other lanes hold, so it does not depend on
     /// how candidates are bundled.
     fn hopeless(&mut self, k: usize) -> bool {
-        let Bundle { of, candidates, stop } = self.of;
+        let Self { of, candidates, stop, .. } = *self;
         let (seen, samples) =
             ((k + 1).saturating_sub(of.record.window.start), of.record.window.len());
         if seen > 0 && seen < samples {
@@ -52,7 +108,7 @@ impl<'a, const V: usize, S: Simd> ResidualSums<'a, V, S> {
 
     /// The costs, where the lanes `ended` or were given up before.
     pub fn conclude(self, ended: bool) -> Vec<Costs> {
-        let of = self.of.of;
+        let of = self.of;
         let samples = of.record.window.len();
         let lanes = self.sum.as_slice().iter().zip(self.squares.as_slice()).zip(self.verdicts);
         let costs = lanes.map(|((&sum, &squares), verdict)| match verdict {
@@ -71,9 +127,9 @@ impl<const V: usize, S: Simd, M> Sink<Lanes<S, V>, M> for ResidualSums<'_, V, S>
             None => state.x,
             Some(delay) => delay.read(k, state.x, state.w),
         };
-        let record = self.of.of.record;
+        let record = self.of.record;
         if k >= record.window.start {
-            let deviation = x.like(record.y[k] - self.of.of.centre) - x;
+            let deviation = x.like(record.y[k] - self.of.centre) - x;
             self.sum = self.sum + deviation;
             self.squares = deviation.mul_add(deviation, self.squares);
         }
@@ -85,7 +141,7 @@ impl<const V: usize, S: Simd, M> Sink<Lanes<S, V>, M> for ResidualSums<'_, V, S>
 }
 
 /// The last samples of a displacement that is read with a delay, each lane with its own.
-pub(super) struct Delayed<const V: usize, S: Simd> {
+struct Delayed<const V: usize, S: Simd> {
     /// Displacement and scaled velocity at the last samples, in a ring.
     past: Vec<[Lanes<S, V>; 2]>,
     /// Delay of each lane in whole samples.
@@ -97,10 +153,10 @@ pub(super) struct Delayed<const V: usize, S: Simd> {
 }
 
 impl<const V: usize, S: Simd> Delayed<V, S> {
-    pub fn new(of: &Bundle<'_>, zero: Lanes<S, V>, substeps: f64) -> Self {
+    fn new(candidates: &[Candidate], dt: f64, zero: Lanes<S, V>, substeps: f64) -> Self {
         let late = |lane: usize| {
-            let delay = of.candidates.get(lane).map_or(0.0, |candidate| candidate.theta.delay());
-            Late::new(delay, of.of.record.drive.dt)
+            let delay = candidates.get(lane).map_or(0.0, |candidate| candidate.theta.delay());
+            Late::new(delay, dt)
         };
         let whole: Vec<usize> = (0..Lanes::<S, V>::COUNT).map(|lane| late(lane).whole).collect();
         let part = zero.each(|lane| late(lane).part);

@@ -1,8 +1,10 @@
 //! The whole search: a swarm, its costs, its stop criteria.
 
+use super::candidate::Candidate;
 use super::candidate::Theta;
-use super::cost::{Candidate, Costs, Evaluator};
+use super::cost::Evaluator;
 use super::problem::Problem;
+use super::residual_sums::Costs;
 use super::swarm::{Swarm, SwarmSettings};
 use crate::error::{Error, Result};
 use crate::signal::Stop;

@@ -3,7 +3,7 @@
 
 use core::f64::consts::TAU;
 
-use super::step_ringing::{Ringing, mean};
+use super::step_ringing::{Ringing, decrement, mean};
 use crate::error::{Error, Result, finite, positive, shown};
 use crate::signal::{Hold, Spectrum, index, range};
 
@@ -147,22 +147,6 @@ impl StepReadings {
         }
         Ok(over)
     }
-}
-
-/// Logarithmic decrement of successive overshoots: their own for two, else the straight line
-/// through the logarithms, weighted as equal errors of the overshoots ask.
-pub(super) fn decrement(over: &[f64]) -> f64 {
-    -slope(over, |k| libm::log(over[k]))
-}
-
-/// Slope of a value over the number of the peak, weighted with the overshoot squared.
-pub(super) fn slope(over: &[f64], value: impl Fn(usize) -> f64) -> f64 {
-    let weight = |k: usize| over[k] * over[k] / (over[0] * over[0]);
-    let sum = |of: &dyn Fn(usize) -> f64| (0..over.len()).map(|k| weight(k) * of(k)).sum::<f64>();
-    let total = sum(&|_| 1.0);
-    let (middle, level) = (sum(&index) / total, sum(&value) / total);
-    let spread = sum(&|k| (index(k) - middle) * (index(k) - middle));
-    sum(&|k| (index(k) - middle) * (value(k) - level)) / spread
 }
 
 /// Stiffness and piezo coefficient from two static levels, with the hysteresis as the scale.

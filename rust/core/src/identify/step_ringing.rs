@@ -1,6 +1,5 @@
 //! The ringing after a step: peaks, period, decay and the level it ends at.
 
-use super::step_response::{decrement, slope};
 use crate::error::{Error, Result};
 use crate::signal::index;
 
@@ -37,6 +36,22 @@ pub struct Ringing {
     pub used: usize,
     /// Samples at their end that gave the level.
     pub settled: usize,
+}
+
+/// Logarithmic decrement of successive overshoots: their own for two, else the straight line
+/// through the logarithms, weighted as equal errors of the overshoots ask.
+pub(super) fn decrement(over: &[f64]) -> f64 {
+    -slope(over, |k| libm::log(over[k]))
+}
+
+/// Slope of a value over the number of the peak, weighted with the overshoot squared.
+fn slope(over: &[f64], value: impl Fn(usize) -> f64) -> f64 {
+    let weight = |k: usize| over[k] * over[k] / (over[0] * over[0]);
+    let sum = |of: &dyn Fn(usize) -> f64| (0..over.len()).map(|k| weight(k) * of(k)).sum::<f64>();
+    let total = sum(&|_| 1.0);
+    let (middle, level) = (sum(&index) / total, sum(&value) / total);
+    let spread = sum(&|k| (index(k) - middle) * (index(k) - middle));
+    sum(&|k| (index(k) - middle) * (value(k) - level)) / spread
 }
 
 /// Mean, 0 of nothing.

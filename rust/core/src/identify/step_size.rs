@@ -4,7 +4,8 @@ use rayon::prelude::*;
 
 use super::candidate::Theta;
 use super::motion::motion;
-use super::problem::{Problem, Record};
+use super::problem::Problem;
+use super::record::Record;
 use crate::integrator::{Mechanics, Order, Stepping, first_substeps, steps_for};
 use crate::models::Model;
 use crate::signal::{Drive, Stop, range};

@@ -1,7 +1,7 @@
 //! A continuous plant under a sampled controller.
 
+use super::apparatus::{Apparatus, ApparatusState, Stretch, instants, still_finite};
 use super::timing::{Clock, Commands, Delay, Event, Timing, events};
-use super::{Apparatus, ApparatusState, Stretch, instants, still_finite};
 use crate::error::{Error, Result};
 use crate::models::Plant;
 use crate::signal::{Stop, index};

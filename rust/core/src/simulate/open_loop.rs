@@ -1,6 +1,6 @@
 //! A drive without feedback: what a log is made of.
 
-use super::{Apparatus, ApparatusState, Stretch, instants, still_finite};
+use super::apparatus::{Apparatus, ApparatusState, Stretch, instants, still_finite};
 use crate::error::{Result, finite};
 use crate::models::Plant;
 use crate::signal::{Drive, Stop, index};

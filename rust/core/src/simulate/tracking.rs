@@ -5,7 +5,9 @@ use piezotrack_control::{
     StateSpaceState,
 };
 
-use super::{Apparatus, ApparatusState, ClosedLoop, Timing, closed_loop};
+use super::apparatus::{Apparatus, ApparatusState};
+use super::closed_loop::{ClosedLoop, closed_loop};
+use super::timing::Timing;
 use crate::design::LinearFeedback;
 use crate::error::{Error, Result};
 use crate::models::Plant;

@@ -9,11 +9,11 @@
 
 use piezotrack_control::{Command, Controller, Feedback};
 
-use super::closed_loop::{Record, checked};
-use super::open_loop::{BLOCK, checked as checked_drive, since};
+use super::apparatus::{Apparatus, ApparatusState, Stretch};
+use super::closed_loop::{ClosedLoop, Record, checked};
+use super::open_loop::{BLOCK, OpenLoop, checked as checked_drive, since};
 use super::timing::{Clock, Commands, Delay, Event, SAMPLES, Timing, events};
-use super::tracking::{Leader, Tracked};
-use super::{Apparatus, ApparatusState, ClosedLoop, Course, OpenLoop, Stretch};
+use super::tracking::{Course, Leader, Tracked};
 use crate::error::{Error, Result, finite, not_negative};
 use crate::models::Plant;
 use crate::signal::{Drive, Stop, index};

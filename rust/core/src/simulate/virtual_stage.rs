@@ -13,7 +13,10 @@
 
 use piezotrack_control::hysteresis::{Operator, Play, PlayState};
 
-use super::{Amplifier, Apparatus, ApparatusState, OpenLoop, Sensor, open_loop};
+use super::amplifier::Amplifier;
+use super::apparatus::{Apparatus, ApparatusState};
+use super::open_loop::{OpenLoop, open_loop};
+use super::sensor::Sensor;
 use crate::error::{Error, Result, finite, not_negative, positive};
 use crate::models::{
     Creep, Dynamics, MOST_RELAXATIONS, Plant, Relaxation, RelaxationFlow, RelaxationState,
