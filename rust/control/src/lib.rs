@@ -10,7 +10,9 @@
 #![forbid(unsafe_code)]
 
 pub mod controller;
+pub mod creep;
 mod cubic_segment;
+pub mod dynamics;
 mod error;
 pub mod feedback_law;
 pub mod filters;
@@ -18,21 +20,27 @@ pub mod hysteresis;
 pub mod inverse;
 pub mod limits;
 mod number;
+pub mod online_feedforward;
 pub mod pid;
 pub mod repetitive;
 pub mod state_space;
 pub mod unfused;
 
 pub use controller::{Command, Controller, ControllerState};
+pub use creep::{Creep, CreepState};
+pub use dynamics::Dynamics;
 pub use error::{Error, Result};
 pub use feedback_law::Feedback;
 pub use filters::{Filter, FilterState};
 pub use inverse::{
-    BoucWenInverse, BoucWenInverseState, DahlInverse, FeedbackInverseState, FirstOrderDahlInverse,
-    InverseState, OscillatorInverse, PlayInverse, SampledDahlInverse,
+    BoucWenInverse, BoucWenInverseState, DahlInverse, FeedbackInverse, FeedbackInverseState,
+    FirstOrderDahlInverse, Inverse, InverseState, OscillatorInverse, PlayInverse,
+    PrandtlIshlinskiiInverse, PrandtlIshlinskiiInverseState, PrandtlIshlinskiiState,
+    SampledDahlInverse,
 };
 pub use limits::Limits;
 pub use number::Number;
+pub use online_feedforward::{OnlineFeedforward, OnlineFeedforwardState, ReferenceSample};
 pub use pid::{Pid, PidState, SampledPid};
 pub use repetitive::{Recursion, Repetitive, RepetitiveState, SampledRepetitive, Smoothing};
 pub use state_space::{StateSpace, StateSpaceState};

@@ -9,6 +9,7 @@
 //! increasing function of the way of u, and a few steps of Newton's method solve it. Between two
 //! samples y is taken to be monotone.
 
+use super::Inverse;
 use crate::error::{Result, check, finite, not_negative, positive, usable};
 use crate::hysteresis::{BoucWen, BoucWenState, Operator};
 
@@ -129,4 +130,17 @@ const MOST_TRIES: usize = 100;
 pub struct BoucWenInverseState {
     u: f64,
     memory: BoucWenState<f64>,
+}
+
+impl Inverse for BoucWenInverse {
+    type State = BoucWenInverseState;
+
+    fn rest(&self) -> Self::State {
+        self.rest()
+    }
+
+    #[inline]
+    fn step(&self, state: &mut Self::State, x: f64, v: f64, a: f64) -> f64 {
+        self.step(state, x, v, a)
+    }
 }

@@ -10,6 +10,7 @@
 //! A reference may turn between two samples: there it is taken as the cubic through displacement
 //! and velocity at both ends, and the operator is led to its turning points.
 
+use super::Inverse;
 use crate::cubic_segment::{is_straight, legs};
 use crate::error::{Result, check, finite, not_negative, positive, usable};
 use crate::hysteresis::{Dahl, DahlState, Operator};
@@ -224,5 +225,18 @@ impl SampledDahlInverse {
             memory = self.travel(memory, leg)?;
         }
         Some(memory)
+    }
+}
+
+impl Inverse for SampledDahlInverse {
+    type State = InverseState;
+
+    fn rest(&self) -> Self::State {
+        self.rest()
+    }
+
+    #[inline]
+    fn step(&self, state: &mut Self::State, x: f64, v: f64, a: f64) -> f64 {
+        self.step(state, x, v, a)
     }
 }

@@ -9,6 +9,7 @@
 //! explicit, and the operator is led to the reference's turning points as in
 //! [`crate::DahlInverse`].
 
+use super::Inverse;
 use crate::cubic_segment::{is_straight, legs};
 use crate::error::{Result, check, finite, not_negative, positive, usable};
 use crate::hysteresis::{BoucWen, BoucWenState, FirstOrderDahl, Operator};
@@ -148,5 +149,18 @@ impl<O: Operator<Plain, State = BoucWenState<Plain>>> FeedbackInverse<O> {
         }
         *state = FeedbackInverseState { x, w: Some(w), memory };
         drive
+    }
+}
+
+impl<O: Operator<Plain, State = BoucWenState<Plain>>> Inverse for FeedbackInverse<O> {
+    type State = FeedbackInverseState;
+
+    fn rest(&self) -> Self::State {
+        self.rest()
+    }
+
+    #[inline]
+    fn step(&self, state: &mut Self::State, x: f64, v: f64, a: f64) -> f64 {
+        self.step(state, x, v, a)
     }
 }

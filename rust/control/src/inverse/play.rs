@@ -13,6 +13,7 @@
 //! Kuhnen 2003, European Journal of Control 9(4), 407-418, doi 10.3166/ejc.9.407-418. Each step
 //! costs what a step of the operator costs.
 
+use super::Inverse;
 use crate::error::{Result, check, finite, not_negative, positive, usable};
 use crate::hysteresis::{Operator, Play, PlayState};
 
@@ -104,6 +105,20 @@ impl<const PLAYS: usize, const ZONES: usize> PlayInverse<PLAYS, ZONES> {
             }
         }
         self.plays.follow(state, value)
+    }
+}
+
+/// The operator's output is the displacement; velocity and acceleration have no effect.
+impl<const PLAYS: usize, const ZONES: usize> Inverse for PlayInverse<PLAYS, ZONES> {
+    type State = PlayState<f64, PLAYS>;
+
+    fn rest(&self) -> Self::State {
+        self.rest()
+    }
+
+    #[inline]
+    fn step(&self, state: &mut Self::State, x: f64, _v: f64, _a: f64) -> f64 {
+        self.follow(state, x)
     }
 }
 

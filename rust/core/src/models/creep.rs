@@ -11,39 +11,15 @@
 //! that grows nearly with the logarithm of time, as that of piezoceramics does. Every step is
 //! exact for an `h` that goes straight from its start to its end.
 
+pub use piezotrack_control::{Creep, Dynamics};
+
+use piezotrack_control::creep::{Lag, advance, output};
+
 use crate::error::{Error, Result, not_negative, positive};
 use crate::integrator::{Mechanics, Propagator, halvings};
 
 /// Most relaxations of the creep.
 pub const MOST_RELAXATIONS: usize = 8;
-
-/// One relaxation of the creep.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Creep {
-    /// Displacement that it adds in the end, as a share of the immediate one.
-    pub share: f64,
-    /// Time constant, s.
-    pub time: f64,
-}
-
-/// Linear dynamics between the hysteresis and the displacement, with a static gain of 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Dynamics {
-    /// None: the displacement follows at once.
-    None,
-    /// A first-order lag.
-    First {
-        /// Time constant T, s.
-        time: f64,
-    },
-    /// A mode.
-    Second {
-        /// Undamped frequency wn / (2 pi), Hz.
-        frequency: f64,
-        /// Damping ratio zeta.
-        damping_ratio: f64,
-    },
-}
 
 /// Creep and dynamics.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,8 +48,7 @@ pub struct RelaxationState {
 /// Steps of one length.
 #[derive(Clone, Copy, Debug)]
 pub struct RelaxationFlow {
-    /// exp(-step / tau), and tau / step.
-    creep: [(f64, f64); MOST_RELAXATIONS],
+    creep: [Lag; MOST_RELAXATIONS],
     dynamics: DynamicsFlow,
     step: f64,
 }
@@ -81,66 +56,22 @@ pub struct RelaxationFlow {
 #[derive(Clone, Copy, Debug)]
 enum DynamicsFlow {
     None,
-    First(f64, f64),
+    First(Lag),
     Second(Propagator<f64>),
 }
 
-/// exp(-step / time), and time / step.
-fn lag(time: f64, step: f64) -> (f64, f64) {
-    (libm::exp(-step / time), time / step)
-}
-
-/// A first-order lag at the end of a step in which its input rises by `rise` to `end`.
-fn lagged(reached: f64, end: f64, rise: f64, (decay, lag): (f64, f64)) -> f64 {
-    // Behind a ramp it settles to trail; the rest of the gap decays.
-    let trail = rise * lag;
-    end - ((end - rise - reached - trail) * decay + trail)
-}
-
-impl Dynamics {
-    /// Checks the numbers.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] naming the number that is out of its range.
-    pub fn validate(&self) -> Result<()> {
-        match *self {
-            Self::None => Ok(()),
-            Self::First { time } => positive("time_constant", time, "s").map(|_| ()),
-            Self::Second { frequency, damping_ratio } => {
-                positive("frequency", frequency, "Hz")?;
-                not_negative("damping_ratio", damping_ratio, "").map(|_| ())
-            }
-        }
-    }
-
-    /// The input that leads to displacement `x`, m, with velocity `v` and acceleration `a`.
-    #[must_use]
-    pub fn inverse(&self, x: f64, v: f64, a: f64) -> f64 {
-        match *self {
-            Self::None => x,
-            Self::First { time } => x + time * v,
-            Self::Second { frequency, damping_ratio } => {
-                let natural = core::f64::consts::TAU * frequency;
-                x + (2.0 * damping_ratio * v + a / natural) / natural
-            }
-        }
-    }
-
-    fn flow(&self, step: f64) -> DynamicsFlow {
-        match *self {
-            Self::None => DynamicsFlow::None,
-            Self::First { time } => {
-                let (decay, lag) = lag(time, step);
-                DynamicsFlow::First(decay, lag)
-            }
-            Self::Second { frequency, damping_ratio } => {
-                // Mass 1: only ratios matter, and the force is wn^2 d.
-                let natural = core::f64::consts::TAU * frequency;
-                let damping = 2.0 * damping_ratio * natural;
-                let modes = Mechanics { mass: 1.0, damping, stiffness: natural * natural };
-                let halvings = halvings(modes.rate().max(damping), step);
-                DynamicsFlow::Second(Propagator::new(1.0, damping, modes.stiffness, step, halvings))
-            }
+/// Steps of the dynamics of one length, s.
+fn dynamics_flow(dynamics: Dynamics, step: f64) -> DynamicsFlow {
+    match dynamics {
+        Dynamics::None => DynamicsFlow::None,
+        Dynamics::First { time } => DynamicsFlow::First(Lag::new(time, step)),
+        Dynamics::Second { frequency, damping_ratio } => {
+            // Mass 1: only ratios matter, and the force is wn^2 d.
+            let natural = core::f64::consts::TAU * frequency;
+            let damping = 2.0 * damping_ratio * natural;
+            let modes = Mechanics { mass: 1.0, damping, stiffness: natural * natural };
+            let halvings = halvings(modes.rate().max(damping), step);
+            DynamicsFlow::Second(Propagator::new(1.0, damping, modes.stiffness, step, halvings))
         }
     }
 }
@@ -173,15 +104,21 @@ impl Relaxation {
     /// Works out steps of `step` seconds.
     #[must_use]
     pub fn flow(&self, step: f64) -> RelaxationFlow {
-        let creep = self.creep.map(|creep| lag(creep.time, step));
-        RelaxationFlow { creep, dynamics: self.dynamics.flow(step), step }
+        let creep = self.creep.map(|creep| Lag::new(creep.time, step));
+        RelaxationFlow { creep, dynamics: dynamics_flow(self.dynamics, step), step }
+    }
+
+    /// The relaxations in use.
+    #[must_use]
+    #[inline(always)]
+    pub fn used(&self) -> &[Creep] {
+        self.creep.get(..self.count).unwrap_or(&self.creep)
     }
 
     /// Displacement that the dynamics are drawn to, d, m.
     #[must_use]
     pub fn target(&self, state: &RelaxationState) -> f64 {
-        let crept = self.creep.iter().zip(&state.creep).take(self.count);
-        crept.fold(state.input, |sum, (creep, reached)| sum + creep.share * reached)
+        output(self.used(), state.input, &state.creep)
     }
 
     /// What comes in jumps to `input`, m.
@@ -196,17 +133,13 @@ impl Relaxation {
     #[inline(always)]
     pub fn step(&self, flow: &RelaxationFlow, state: &mut RelaxationState, input: f64) {
         let before = self.target(state);
-        let rise = input - state.input;
-        for (reached, lag) in state.creep.iter_mut().zip(&flow.creep).take(self.count) {
-            *reached = lagged(*reached, input, rise, *lag);
-        }
+        let used = self.used().len();
+        advance(&flow.creep[..used], &mut state.creep, state.input, input);
         state.input = input;
         let target = self.target(state);
         match &flow.dynamics {
             DynamicsFlow::None => state.x = target,
-            DynamicsFlow::First(decay, lag) => {
-                state.x = lagged(state.x, target, target - before, (*decay, *lag));
-            }
+            DynamicsFlow::First(lag) => state.x = lag.step(state.x, target, target - before),
             DynamicsFlow::Second(p) => {
                 let stiffness = match self.dynamics {
                     Dynamics::Second { frequency, .. } => {
@@ -224,39 +157,5 @@ impl Relaxation {
                 state.v = end(p.position.w, p.velocity.w, p.constant.w, p.ramp.w) / flow.step;
             }
         }
-    }
-
-    /// What has to come in at the end of the next step for the creep to reach `target`, m.
-    ///
-    /// The exact inverse of [`Relaxation::step`] without dynamics.
-    #[inline]
-    pub fn inverse_step(
-        &self,
-        flow: &RelaxationFlow,
-        state: &mut RelaxationState,
-        target: f64,
-    ) -> f64 {
-        let (mut fixed, mut gain) = (0.0, 1.0);
-        for j in 0..self.count {
-            let (share, lag, reached) = (self.creep[j].share, flow.creep[j], state.creep[j]);
-            // The end of the step is linear in what comes in: at 0, and its slope.
-            fixed += share * lagged(reached, 0.0, -state.input, lag);
-            gain += share * lagged(0.0, 1.0, 1.0, lag);
-        }
-        let input = (target - fixed) / gain;
-        let rise = input - state.input;
-        for (reached, lag) in state.creep.iter_mut().zip(&flow.creep).take(self.count) {
-            *reached = lagged(*reached, input, rise, *lag);
-        }
-        state.input = input;
-        input
-    }
-
-    /// What has to come in at once, without time for the creep, for `target`, m.
-    pub fn inverse_jump(&self, state: &mut RelaxationState, target: f64) -> f64 {
-        state.input = 0.0;
-        let input = target - self.target(state);
-        state.input = input;
-        input
     }
 }

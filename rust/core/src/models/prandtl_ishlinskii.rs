@@ -11,11 +11,13 @@
 //! weights in m/V. The hysteresis is exact from sample to sample; between two samples its output
 //! is taken to go straight.
 
-use piezotrack_control::PlayInverse;
 use piezotrack_control::hysteresis::{Operator, Play, PlayState};
-use piezotrack_control::inverse::Inverse;
+use piezotrack_control::{
+    CreepState, PlayInverse, PrandtlIshlinskiiInverse, PrandtlIshlinskiiInverseState,
+    PrandtlIshlinskiiState,
+};
 
-use super::creep::{Dynamics, Relaxation, RelaxationFlow, RelaxationState};
+use super::creep::{Dynamics, MOST_RELAXATIONS, Relaxation, RelaxationFlow, RelaxationState};
 use super::plant::Plant;
 use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
 use super::values::{ParameterInfo, Values};
@@ -54,6 +56,12 @@ const STATE: &[ParameterInfo] = &[
     ParameterInfo::list("plays", "z", "V"),
     ParameterInfo::list("creep", "q", "m"),
 ];
+
+/// The voltage that leads a stage along a reference: the inverse of each part in turn.
+pub type PlaysFeedforward = PrandtlIshlinskiiInverse<MOST_PLAYS, MOST_ZONES, MOST_RELAXATIONS>;
+
+/// Memory of a [`PlaysFeedforward`].
+pub type FeedforwardState = PrandtlIshlinskiiInverseState<MOST_PLAYS, MOST_RELAXATIONS>;
 
 /// Samples between two questions whether to stop.
 const POLL: usize = 4096;
@@ -226,14 +234,8 @@ impl PrandtlIshlinskiiStage {
     /// # Errors
     /// [`Error::Parameter`] where `dt` is not above 0.
     pub fn feedforward(&self, dt: f64) -> Result<PlaysFeedforward> {
-        positive("dt", dt, "s")?;
-        Ok(PlaysFeedforward {
-            plays: self.plays,
-            inverse: PlayInverse::new(&self.plays)?,
-            relaxation: self.relaxation,
-            flow: self.relaxation.flow(dt),
-            zero: self.zero(),
-        })
+        let Relaxation { dynamics, .. } = self.relaxation;
+        Ok(PlaysFeedforward::new(&self.plays, self.relaxation.used(), dynamics, dt)?)
     }
 }
 
@@ -340,19 +342,6 @@ impl StageModel for PrandtlIshlinskiiStage {
         })
     }
 }
-
-impl Inverse for PlaysFeedforward {
-    type State = FeedforwardState;
-
-    fn rest(&self) -> FeedforwardState {
-        self.rest()
-    }
-
-    fn step(&self, state: &mut FeedforwardState, x: f64, v: f64, a: f64) -> f64 {
-        self.step(state, x, v, a)
-    }
-}
-
 impl Invertible for PrandtlIshlinskiiStage {
     type Inverse = PlaysFeedforward;
 
@@ -400,58 +389,9 @@ impl Plant for PrandtlIshlinskiiStage {
     }
 }
 
-/// The voltage that leads a stage along a reference: the inverse of each part in turn.
-///
-/// Dynamics are undone with the derivatives of the reference, creep by its exact inverse from
-/// sample to sample, dead zones and plays in closed form.
-#[derive(Clone, Copy, Debug)]
-pub struct PlaysFeedforward {
-    plays: Plays,
-    inverse: PlaysInverse,
-    relaxation: Relaxation,
-    flow: RelaxationFlow,
-    zero: f64,
-}
-
-/// Memory of a [`PlaysFeedforward`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FeedforwardState {
-    plays: PlayState<f64, MOST_PLAYS>,
-    rest: RelaxationState,
-    begun: bool,
-}
-
-impl PlaysFeedforward {
-    /// The inverse of a stage at rest that never moved.
-    #[must_use]
-    pub fn rest(&self) -> FeedforwardState {
-        let rest = RelaxationState::default();
-        FeedforwardState { plays: self.inverse.rest(), rest, begun: false }
-    }
-
-    /// The inverse of a stage that has been somewhere: what its plays and its creep remember.
-    #[must_use]
-    pub fn start(&self, state: &PlaysState) -> FeedforwardState {
-        let plays = self.inverse.memory(&self.plays, &state.plays);
-        FeedforwardState { plays, rest: state.rest, begun: false }
-    }
-
-    /// The voltage for displacement `x` (m), velocity `v` (m/s) and acceleration `a` (m/s^2) of
-    /// the reference. At the first sample the stage is taken to come straight from where it was.
-    ///
-    /// NaN, with the state left as it was, where an input is not finite (or beyond 1e100).
-    #[inline]
-    pub fn step(&self, state: &mut FeedforwardState, x: f64, v: f64, a: f64) -> f64 {
-        let target = self.relaxation.dynamics.inverse(x, v, a);
-        if target.is_nan() || target.abs() >= 1e100 {
-            return f64::NAN;
-        }
-        let output = if state.begun {
-            self.relaxation.inverse_step(&self.flow, &mut state.rest, target)
-        } else {
-            self.relaxation.inverse_jump(&mut state.rest, target)
-        };
-        state.begun = true;
-        self.inverse.follow(&mut state.plays, output + self.zero)
+impl From<&PlaysState> for PrandtlIshlinskiiState<MOST_PLAYS, MOST_RELAXATIONS> {
+    fn from(state: &PlaysState) -> Self {
+        let creep = CreepState { input: state.rest.input, reached: state.rest.creep };
+        Self { plays: state.plays, creep }
     }
 }

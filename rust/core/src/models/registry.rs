@@ -237,7 +237,8 @@ macro_rules! models {
         }
 
         /// What a [`StageInverse`] remembers.
-        #[derive(Clone)]
+        #[derive(Clone, Copy)]
+        #[expect(clippy::large_enum_variant, reason = "one in a controller")]
         #[expect(missing_docs, missing_debug_implementations, reason = "one for each model")]
         pub enum StageInverseState {
             $($variant(<<$stage as Invertible>::Inverse as Inverse>::State),)*

@@ -134,7 +134,7 @@ pub trait StageModel: Plant + Copy {
 /// A model with an inverse that runs at the sample rate.
 pub trait Invertible: StageModel {
     /// The inverse.
-    type Inverse: Inverse<State: Clone> + Clone;
+    type Inverse: Inverse + Clone;
 
     /// The inverse for samples every `dt` seconds, and what it remembers of a stage in the state
     /// `initial`, or of one that never moved.
