@@ -34,9 +34,8 @@ pub use feedback_law::Feedback;
 pub use filters::{Filter, FilterState};
 pub use inverse::{
     BoucWenInverse, BoucWenInverseState, DahlInverse, FeedbackInverse, FeedbackInverseState,
-    FirstOrderDahlInverse, Inverse, InverseState, OscillatorInverse, PlayInverse,
-    PrandtlIshlinskiiInverse, PrandtlIshlinskiiInverseState, PrandtlIshlinskiiState,
-    SampledDahlInverse,
+    FirstOrderDahlInverse, InputInverse, InputInverseState, Inverse, InverseState, OperatorInverse,
+    OscillatorInverse, PlayInverse, PrandtlIshlinskiiInverse, SampledDahlInverse,
 };
 pub use limits::Limits;
 pub use number::Number;

@@ -163,7 +163,7 @@ fn tell(watchers: &Watchers, halt: &Halt, progress: &Progress, answers: &Sender<
         progress.iterations,
         progress.evaluations,
         progress.cost,
-        progress.theta.to_vec(),
+        progress.theta.0.to_vec(),
     );
     Python::attach(|py| {
         if let Some(bar) = &watchers.progress

@@ -4,7 +4,7 @@ use numpy::{PyArray1, ToPyArray};
 use piezotrack_core::models::Creep;
 use piezotrack_core::signal::Drive;
 use piezotrack_core::simulate::{
-    Amplifier, RELAXATIONS, Sensor, StagePlay, VirtualSettings, VirtualStage,
+    Amplifier, Axis, RELAXATIONS, Sensor, StagePlay, VirtualSettings, VirtualStage,
 };
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
@@ -218,9 +218,6 @@ impl PyVirtualStage {
         pace: Pace,
     ) -> PyResult<PyTracked> {
         let course = Arrays::new(reference, feedforward)?;
-        enter(py, |stop| {
-            let apparatus = self.0.apparatus();
-            course.run(&apparatus, self.0.start(), controller, pace, stop)
-        })
+        enter(py, |stop| course.run(&Axis::Virtual(self.0), controller, pace, stop))
     }
 }

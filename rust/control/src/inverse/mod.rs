@@ -7,18 +7,16 @@
 mod bouc_wen;
 mod dahl;
 mod feedback;
+mod input;
 mod play;
-mod prandtl_ishlinskii;
 
 pub use bouc_wen::{BoucWenInverse, BoucWenInverseState};
 pub use dahl::{DahlInverse, InverseState, SampledDahlInverse};
 pub use feedback::{
     FeedbackInverse, FeedbackInverseState, FirstOrderDahlInverse, OscillatorInverse,
 };
+pub use input::{InputInverse, InputInverseState, OperatorInverse, PrandtlIshlinskiiInverse};
 pub use play::PlayInverse;
-pub use prandtl_ishlinskii::{
-    PrandtlIshlinskiiInverse, PrandtlIshlinskiiInverseState, PrandtlIshlinskiiState,
-};
 
 /// Inverse of a stage model: configuration in `&self`, memory in `State`.
 ///

@@ -6,9 +6,9 @@ mod coordinate;
 mod cost;
 mod cross_talk;
 mod identification;
+mod least_squares;
 mod levenberg_marquardt;
 mod motion;
-mod prandtl_ishlinskii;
 mod problem;
 mod record;
 mod residual_sums;
@@ -24,8 +24,10 @@ pub use coordinate::{Coordinate, Scale};
 pub use cost::Evaluator;
 pub use cross_talk::{CrossTalk, cross_talk};
 pub use identification::{Identification, identify};
+pub use least_squares::{
+    DynamicsKind, LeastSquaresFit, Settings as WeightsSettings, WeightsRecord, identify_weights,
+};
 pub use levenberg_marquardt::{Local, Polished, Sensitivity};
-pub use prandtl_ishlinskii::{DynamicsKind, PlaysFit, PlaysRecord, PlaysSettings, identify_plays};
 pub use problem::{Delay, Problem, Spec};
 pub use record::Record;
 pub use residual_sums::Costs;

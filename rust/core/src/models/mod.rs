@@ -5,22 +5,24 @@ mod bouc_wen_oscillator;
 mod creep;
 pub mod dahl;
 mod first_order_dahl;
+mod input_stage;
 mod plant;
 mod prandtl_ishlinskii;
 mod registry;
 mod search_ranges;
 mod traits;
 mod values;
+mod weighted_plays;
 
 pub use bouc_wen::{BoucWenKernel, BoucWenStage};
 pub use bouc_wen_oscillator::{BoucWenOscillator, BoucWenOscillatorKernel};
 pub use creep::{Creep, Dynamics, MOST_RELAXATIONS, Relaxation, RelaxationFlow, RelaxationState};
 pub use dahl::{DahlStage, DahlStageState};
 pub use first_order_dahl::{FirstOrderDahlKernel, FirstOrderDahlStage};
+pub use input_stage::{InputOperator, InputStage, InputStageFlow, InputStageState};
 pub use plant::{KernelFlow, KernelModel, Plant};
 pub use prandtl_ishlinskii::{
-    FeedforwardState, MOST_PLAYS, MOST_ZONES, Plays, PlaysFeedforward, PlaysInverse, PlaysState,
-    PrandtlIshlinskiiStage, plays,
+    MOST_PLAYS, MOST_ZONES, PlayHysteresis, Plays, PrandtlIshlinskiiStage,
 };
 pub use registry::{FoundBy, Model, Stage, StageFlow, StageInverse, StageInverseState, StageState};
 pub use search_ranges::{Measures, NOMINAL_STIFFNESS, Range, Ranges};
@@ -28,3 +30,4 @@ pub use traits::{
     Experiment, Invertible, KernelVisitor, Method, ModelInfo, Response, Searchable, StageModel,
 };
 pub use values::{Held, ParameterInfo, Values, position};
+pub use weighted_plays::{FittedPlays, WeightedPlays, WeightedVisitor};

@@ -13,6 +13,7 @@ use super::traits::{
     Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
 };
 use super::values::{Held, Values};
+use super::weighted_plays::WeightedVisitor;
 use crate::design::LoopPlant;
 use crate::error::{Error, Result};
 use crate::integrator::{Order, Parameters};
@@ -125,6 +126,17 @@ macro_rules! models {
                         Some(<$stage as Searchable>::kernel(held, order, visitor)),
                         None
                     ),)*
+                }
+            }
+        }
+
+        impl Model {
+            /// Hands the model to a visitor; `None` where least squares do not find its weights.
+            pub fn weighted<V: WeightedVisitor>(self, visitor: V) -> Option<V::Output> {
+                match self {
+                    $(Self::$variant => {
+                        by_swarm!($found, None, Some(visitor.visit::<$stage>()))
+                    })*
                 }
             }
         }

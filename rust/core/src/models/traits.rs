@@ -76,6 +76,14 @@ pub struct Experiment<'a> {
     pub stop: Stop<'a>,
 }
 
+impl<'a> Experiment<'a> {
+    /// From rest, exponential, to 0.1 nm.
+    #[must_use]
+    pub fn of(drive: &'a Drive<'a>, stop: Stop<'a>) -> Self {
+        Self { drive, initial: None, method: Method::Exponential, accuracy: 1e-10, stop }
+    }
+}
+
 /// Motion of a stage at the samples of its drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Response {

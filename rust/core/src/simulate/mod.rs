@@ -6,6 +6,7 @@
 
 mod amplifier;
 mod apparatus;
+mod axis;
 mod closed_loop;
 mod open_loop;
 mod sensor;
@@ -16,6 +17,7 @@ mod virtual_stage;
 
 pub use amplifier::{Amplifier, AmplifierFlow};
 pub use apparatus::{Apparatus, ApparatusState};
+pub use axis::{Axis, AxisFlow, AxisState};
 pub use closed_loop::{ClosedLoop, closed_loop};
 pub use open_loop::{OpenLoop, open_loop};
 pub use sensor::{Sensor, SensorState};
