@@ -65,12 +65,22 @@ struct Parameter {
     default: Option<f64>,
     held: Option<&'static str>,
     is_list: bool,
+    is_optional: bool,
 }
 
 impl Parameter {
     fn of(info: &ParameterInfo) -> Self {
-        let ParameterInfo { name, symbol, unit, carries_force, default, held, is_list } = *info;
-        Self { name, symbol, unit, carries_force, default, held, is_list }
+        let ParameterInfo {
+            name,
+            symbol,
+            unit,
+            carries_force,
+            default,
+            held,
+            is_list,
+            is_optional,
+        } = *info;
+        Self { name, symbol, unit, carries_force, default, held, is_list, is_optional }
     }
 }
 

@@ -25,11 +25,12 @@ use crate::signal::Hold;
 const POLL: usize = 4096;
 
 /// Parameters of creep and dynamics, which follow those of the operator.
-pub(super) const DYNAMICS: [ParameterInfo; 4] = [
+pub(super) const DYNAMICS: [ParameterInfo; 5] = [
     ParameterInfo::list("creep_weights", "c", ""),
     ParameterInfo::list("creep_times", "tau", "s"),
-    ParameterInfo::list("time_constant", "T", "s"),
-    ParameterInfo::list("mode", "wn/2pi, zeta", "Hz, 1"),
+    ParameterInfo::optional("time_constant", "T", "s"),
+    ParameterInfo::optional("frequency", "fn", "Hz"),
+    ParameterInfo::optional("damping_ratio", "zeta", ""),
 ];
 
 /// State of a stage whose operator has plays.
@@ -88,33 +89,38 @@ impl Relaxation {
     /// Creep and dynamics from the values of a stage.
     pub(super) fn build(values: &Values) -> Result<Self> {
         let list = |name| values.list(name);
-        let dynamics = match (list("time_constant"), list("mode")) {
-            ([], []) => Dynamics::None,
-            ([time], []) => Dynamics::First { time: *time },
-            ([], [frequency, damping_ratio]) => {
+        let modal = (list("time_constant"), list("frequency"), list("damping_ratio"));
+        let dynamics = match modal {
+            ([], [], []) => Dynamics::None,
+            ([time], [], []) => Dynamics::First { time: *time },
+            ([], [frequency], [damping_ratio]) => {
                 Dynamics::Second { frequency: *frequency, damping_ratio: *damping_ratio }
             }
-            (time, mode) => {
-                let found = format!("{} and {} numbers", time.len(), mode.len());
-                let expected = "one time constant, or frequency and damping ratio of a mode";
-                return Err(Error::parameter("time_constant and mode", found, expected));
+            ([time, ..], _, _) => {
+                let expected = "None beside a frequency or a damping ratio";
+                return Err(Error::parameter("time_constant", format!("{time} s"), expected));
+            }
+            _ => {
+                let expected = "both or neither";
+                return Err(Error::parameter("frequency and damping_ratio", "one", expected));
             }
         };
         Self::new(list("creep_weights"), list("creep_times"), dynamics)
     }
 
     /// The values of creep and dynamics, in the order of [`DYNAMICS`].
-    pub(super) fn values(&self) -> [Vec<f64>; 4] {
+    pub(super) fn values(&self) -> [Vec<f64>; 5] {
         let creep = self.used();
-        let (time, mode) = match self.dynamics {
-            Dynamics::None => (vec![], vec![]),
-            Dynamics::First { time } => (vec![time], vec![]),
+        let [time, frequency, damping_ratio] = match self.dynamics {
+            Dynamics::None => [vec![], vec![], vec![]],
+            Dynamics::First { time } => [vec![time], vec![], vec![]],
             Dynamics::Second { frequency, damping_ratio } => {
-                (vec![], vec![frequency, damping_ratio])
+                [vec![], vec![frequency], vec![damping_ratio]]
             }
         };
         let weights = creep.iter().map(|creep| creep.share).collect();
-        [weights, creep.iter().map(|creep| creep.time).collect(), time, mode]
+        let times = creep.iter().map(|creep| creep.time).collect();
+        [weights, times, time, frequency, damping_ratio]
     }
 
     /// A stage of some static gain (m/V) with these dynamics; its creep is slower than a loop and

@@ -38,6 +38,7 @@ const PARAMETERS: &[ParameterInfo] = &[
     DYNAMICS[1],
     DYNAMICS[2],
     DYNAMICS[3],
+    DYNAMICS[4],
 ];
 
 /// Plays with dead zones, and how many of the plays are used.
@@ -242,22 +243,19 @@ impl WeightedPlays for PrandtlIshlinskiiStage {
 
     fn values(fitted: &FittedPlays) -> Values {
         let of = fitted.clone();
-        let [creep_weights, creep_times, time, mode] = of.relaxation.values();
-        let operator = [vec![of.linear], of.thresholds, of.weights];
-        let [linear, thresholds, weights] = operator;
-        Values::of(
-            PARAMETERS,
-            [
-                linear,
-                thresholds,
-                weights,
-                of.dead_zone_thresholds,
-                of.dead_zone_weights,
-                creep_weights,
-                creep_times,
-                time,
-                mode,
-            ],
-        )
+        let [creep_weights, creep_times, time, frequency, damping_ratio] = of.relaxation.values();
+        let entries = [
+            vec![of.linear],
+            of.thresholds,
+            of.weights,
+            of.dead_zone_thresholds,
+            of.dead_zone_weights,
+            creep_weights,
+            creep_times,
+            time,
+            frequency,
+            damping_ratio,
+        ];
+        Values::of(PARAMETERS, entries)
     }
 }

@@ -20,19 +20,36 @@ pub struct ParameterInfo {
     pub held: Option<&'static str>,
     /// Whether it is a list of numbers, as weights are.
     pub is_list: bool,
+    /// Whether it may be left out: a list of none or one.
+    pub is_optional: bool,
 }
 
 impl ParameterInfo {
     /// One number.
     #[must_use]
     pub const fn new(name: &'static str, symbol: &'static str, unit: &'static str) -> Self {
-        Self { name, symbol, unit, carries_force: false, default: None, held: None, is_list: false }
+        Self {
+            name,
+            symbol,
+            unit,
+            carries_force: false,
+            default: None,
+            held: None,
+            is_list: false,
+            is_optional: false,
+        }
     }
 
     /// A list of any length.
     #[must_use]
     pub const fn list(name: &'static str, symbol: &'static str, unit: &'static str) -> Self {
         Self { is_list: true, ..Self::new(name, symbol, unit) }
+    }
+
+    /// One number, or none.
+    #[must_use]
+    pub const fn optional(name: &'static str, symbol: &'static str, unit: &'static str) -> Self {
+        Self { is_optional: true, ..Self::new(name, symbol, unit) }
     }
 
     /// It carries force.
@@ -74,12 +91,11 @@ impl Values {
         let mut entries: Vec<Option<Vec<f64>>> = vec![None; infos.len()];
         for (name, numbers) in given {
             let i = position(infos, "parameters", &name)?;
-            if !infos[i].is_list && numbers.len() != 1 {
-                return Err(Error::Shape {
-                    name,
-                    found: format!("{} numbers", numbers.len()),
-                    expected: "one number".into(),
-                });
+            let (found, info) = (numbers.len(), &infos[i]);
+            if !(info.is_list || found == 1 || info.is_optional && found == 0) {
+                let expected = if info.is_optional { "one number or none" } else { "one number" };
+                let found = format!("{found} numbers");
+                return Err(Error::Shape { name, found, expected: expected.into() });
             }
             if entries[i].replace(numbers).is_some() {
                 return Err(Error::parameter(name, "given twice", "one value"));
