@@ -37,8 +37,8 @@ const POLL: usize = 4096;
 /// A stage with play operators at its input.
 ///
 /// ```
-/// use piezotrack_core::signal::{Drive, Hold, NEVER};
 /// use piezotrack_core::models::{Dynamics, PrandtlIshlinskiiStage, Relaxation, plays};
+/// use piezotrack_core::signal::{Drive, Hold, NEVER};
 ///
 /// # fn main() -> piezotrack_core::Result<()> {
 /// let stage = PrandtlIshlinskiiStage {
