@@ -20,8 +20,8 @@ use crate::hysteresis::{Operator, Play, PlayState};
 /// Inverse of a [`Play`] with `PLAYS` plays and `ZONES` dead zones: output in, input out.
 ///
 /// ```
-/// use piezotrack_control::hysteresis::{Operator, Play};
 /// use piezotrack_control::PlayInverse;
+/// use piezotrack_control::hysteresis::{Operator, Play};
 ///
 /// # fn main() -> piezotrack_control::Result<()> {
 /// let play = Play {

@@ -66,8 +66,7 @@ pub struct Response {
 ///
 /// ```
 /// use piezotrack_control::Pid;
-/// use piezotrack_core::design::LoopPlant;
-/// use super::margins;
+/// use piezotrack_core::design::{LoopPlant, margins};
 ///
 /// let pid = Pid::xu_li_2010().at(0.02).expect("published");
 /// let margins = margins(&LoopPlant::fixed_gain(1.0e-6)?, &pid, &[], 0.02)?;

@@ -22,7 +22,7 @@ pub struct CrossTalk {
 /// independent ones: Bartlett 1935, doi 10.2307/2342284, for a drive that is slow beside them.
 ///
 /// ```
-/// use super::cross_talk;
+/// use piezotrack_core::identify::cross_talk;
 ///
 /// let driven: Vec<f64> = (0..100).map(|k| f64::from(k % 20)).collect();
 /// let other: Vec<f64> = driven.iter().map(|d| 5.0 + 0.015 * d).collect();

@@ -1,4 +1,4 @@
-//! Numerical methods and number types: SIMD lanes, random numbers, least squares, line search.
+//! Numerical methods: SIMD lanes, random numbers, least squares, line search, transfer functions.
 
 mod fused;
 mod golden_section;

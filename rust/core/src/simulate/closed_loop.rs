@@ -43,9 +43,7 @@ struct Part<F> {
 ///
 /// ```
 /// use piezotrack_core::signal::NEVER;
-/// use piezotrack_core::simulate::Timing;
-/// use super::closed_loop;
-/// use piezotrack_core::simulate::VirtualStage;
+/// use piezotrack_core::simulate::{Timing, VirtualStage, closed_loop};
 ///
 /// # fn main() -> piezotrack_core::Result<()> {
 /// let stage = VirtualStage::xu_li_2010(1);
