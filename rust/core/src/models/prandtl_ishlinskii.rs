@@ -34,10 +34,10 @@ pub type Plays = Play<f64, MOST_PLAYS, MOST_ZONES>;
 /// Its inverse, m to V.
 pub type PlaysInverse = PlayInverse<MOST_PLAYS, MOST_ZONES>;
 
-/// The voltage that leads a stage along a reference: the inverse of each part in turn.
+/// The inverse of a stage for feedforward, with room for as many parts as a stage can have.
 pub type PlaysFeedforward = PrandtlIshlinskiiInverse<MOST_PLAYS, MOST_ZONES, MOST_RELAXATIONS>;
 
-/// Memory of a [`PlaysFeedforward`].
+/// State of a [`PlaysFeedforward`].
 pub type FeedforwardState = PrandtlIshlinskiiInverseState<MOST_PLAYS, MOST_RELAXATIONS>;
 
 /// Samples between two questions whether to stop.
