@@ -1,8 +1,8 @@
 //! A controller as firmware runs it: feedforward, feedback and repetitive part, one call a sample.
 //!
-//! `Axis` and its `new` and `step` use `core` only: no allocation, no std, no panic. In firmware
-//! they stand in the interrupt of the sampling timer. `main` is the test bench: it connects the
-//! axis to a linear stage and prints the tracking error.
+//! `Axis` and its `new` and `step` use `core` only and do not allocate. In firmware they belong to
+//! the interrupt of the sampling timer. `main` is the test bench: it connects the axis to a linear
+//! stage and prints the tracking error.
 //!
 //! ```sh
 //! cargo run -p piezotrack-control --example firmware_step
