@@ -1,22 +1,21 @@
-//! The slot for a feedback law.
+//! The interface of a feedback law.
 
-/// A law that turns the tracking error into a voltage: configuration in `&self`, memory in
+/// A law that computes a voltage from the tracking error: configuration in `&self`, state in
 /// `State`.
 ///
-/// `excess` is the voltage that the actuator got in the sample before, less the voltage that all
-/// parts of the controller together asked for; 0 where nothing saturated. An antiwindup scheme
-/// needs nothing else.
+/// `excess` (V) is for antiwindup: the voltage applied in the sample before, less the unclipped
+/// sum of all parts of the controller; 0 where nothing saturated.
 pub trait Feedback {
-    /// What the law remembers from sample to sample.
+    /// The state of the law.
     type State: Clone;
 
-    /// The memory of a law whose output begins at 0 V.
+    /// The initial state for an output of 0 V.
     fn rest(&self) -> Self::State;
 
-    /// The memory of a law whose output goes on from `volts`: a start without a bump.
+    /// The initial state for an output that continues from `volts` (V): a bumpless start.
     fn start(&self, volts: f64) -> Self::State;
 
-    /// The voltage for the tracking error `error` (reference less displacement), m.
+    /// The voltage (V) for the tracking error `error` (reference less displacement, m).
     fn step(&self, state: &mut Self::State, error: f64, excess: f64) -> f64;
 }
 

@@ -1,12 +1,12 @@
-//! A plain number for firmware.
+//! A number type without fused multiply-add, for firmware.
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::Number;
 
-/// A number whose `mul_add` rounds twice. A processor built for without a fused instruction
-/// calls a function for each one that rounds once, which takes longer than the whole step of an
-/// inverse.
+/// A number whose `mul_add` is a multiplication and an addition, each rounded. On a target
+/// without a fused instruction `f64::mul_add` is a call of a slow library function, and those of
+/// one step would take longer than the rest of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plain(pub f64);
 

@@ -5,16 +5,16 @@
 //! ```
 //!
 //! Xu and Li 2010, equation (20), doi 10.1115/1.4001712, with A = alpha d; after Bouc 1967 and
-//! Wen 1976. Along a monotone stretch time drops out. With p the length of the path and z the
-//! output counted along the direction of motion,
+//! Wen 1976. Along a monotone section of the path time drops out. With p the length of the path
+//! and z the output counted positive in the direction of motion,
 //!
 //! ```text
 //! dz/dp = A - kappa z |z|^(n-1),   kappa = beta + sgn(z) gamma
 //! ```
 //!
-//! an exponential in p for n = 1, another one beyond the place where z changes sign, which the
-//! same formula tells in closed form. With any other exponent there is no closed form, and short
-//! steps of fourth order take its place.
+//! For n = 1 the solution is an exponential in p up to the point where z changes sign, which has
+//! a closed form too, and another exponential beyond it. For any other exponent the equation is
+//! integrated in short Runge-Kutta steps of fourth order.
 
 use core::cmp::Ordering;
 
@@ -23,8 +23,8 @@ use crate::Number;
 
 /// Bouc-Wen operator.
 ///
-/// It is passive only for |gamma| <= beta, and is bounded, by (A/(beta + gamma))^(1/n), only
-/// for beta + gamma > 0.
+/// It is passive only for |gamma| <= beta. It is bounded only for beta + gamma > 0, by
+/// (A/(beta + gamma))^(1/n).
 ///
 /// | field | symbol | unit | range |
 /// | --- | --- | --- | --- |
@@ -45,20 +45,20 @@ use crate::Number;
 pub struct BoucWen<N> {
     /// Slope where the output is 0, A.
     pub rise: N,
-    /// Share of the decay that dissipates, beta.
+    /// Coefficient of the dissipative term, beta.
     pub beta: N,
-    /// Share of the decay that stores, gamma.
+    /// Coefficient of the non-dissipative term, gamma.
     pub gamma: N,
-    /// Sharpness of the bend, n, the same for all lanes.
+    /// Exponent n, the sharpness of the transition to saturation; the same for all lanes.
     pub exponent: f64,
 }
 
-/// Memory of the operator: its output, and the slope that it came with.
+/// State of the operator: its output and the slope.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoucWenState<N> {
     /// Output, h.
     pub value: N,
-    /// Slope of the output along the way that led here.
+    /// Slope of the output along the path that led here.
     pub slope: N,
 }
 
@@ -78,13 +78,13 @@ const TERMS: usize = 14;
 const LOG_TERMS: usize = 13;
 /// Longest piece with another exponent, times the rate: an error of 1e-8 of the change.
 const SHORT_PIECE: f64 = 0.02;
-/// Most pieces with n = 1: e^-40 of the way to the limit is then left.
+/// Most pieces with n = 1: e^-40 of the distance to the limit is left after them.
 const MOST_PIECES: usize = 80;
 /// Most pieces with another exponent.
 const MOST_SHORT_PIECES: usize = 2000;
 
 impl<N: Number> BoucWen<N> {
-    /// Leads the output, counted along the direction of motion, over a path of length `length`.
+    /// The output, counted along the direction of motion, after a path of length `length`.
     #[inline(always)]
     fn lead(&self, z: N, length: N) -> N {
         if self.is_exact() {
@@ -102,7 +102,7 @@ impl<N: Number> BoucWen<N> {
         (self.exponent - 1.0).abs() <= 0.0
     }
 
-    /// n = 1, in pieces for which the series converge: mostly one.
+    /// n = 1, in pieces short enough for the series to converge: mostly one piece.
     #[inline(always)]
     fn lead_exact(&self, mut z: N, length: N) -> N {
         let rate = magnitude(self.beta) + magnitude(self.gamma);
@@ -116,14 +116,14 @@ impl<N: Number> BoucWen<N> {
                 return z;
             }
         }
-        // What decays has reached its limit, and what still moves grows without one.
+        // A bounded output has reached its limit by now; any other grows without bound.
         let kappa = self.side(z, longest).mul_add(self.gamma, self.beta);
         let moving = magnitude(kappa.mul_add(-z, self.rise) * longest);
         let still = magnitude(z).mul_add(z.like(-1e-9), moving - z.like(f64::MIN_POSITIVE));
         (-left).where_negative(still.where_negative(z, z.like(f64::INFINITY)), z)
     }
 
-    /// n = 1 over one piece: an exponential to where z changes sign, another one beyond.
+    /// n = 1 over one piece: an exponential up to the sign change of z, another one beyond it.
     #[inline(always)]
     fn piece(&self, z: N, length: N) -> N {
         let side = self.side(z, length);
@@ -156,7 +156,7 @@ impl<N: Number> BoucWen<N> {
         })
     }
 
-    /// +1 or -1: the side of 0 on which a move begins; from 0, the one that it leads to.
+    /// Sign of z at the beginning of a move; where z = 0, its sign right after the beginning.
     #[inline(always)]
     fn side(&self, z: N, length: N) -> N {
         let ahead = (self.rise * length).mul_add(z.like(1e-12), z);
@@ -199,7 +199,7 @@ impl<N: Number> Facing<N> for BoucWen<N> {
     }
 }
 
-/// The operator with an exponent other than 1, in plain numbers.
+/// The operator with an exponent other than 1, for scalars.
 #[derive(Clone, Copy)]
 struct Bend {
     rise: f64,
@@ -209,8 +209,8 @@ struct Bend {
 }
 
 impl Bend {
-    /// Runge-Kutta steps of fourth order along the path, as short as they have to be. Where z
-    /// changes sign, the path to there is an integral over z.
+    /// Runge-Kutta steps of fourth order along the path, their length limited by the decay rate.
+    /// The distance to a sign change of z is found by quadrature over z.
     #[inline(never)]
     fn lead(self, mut z: f64, length: f64) -> f64 {
         let mut left = length;
@@ -225,12 +225,12 @@ impl Bend {
             let more = if left < longest { left } else { longest };
             z = self.piece(z, more, side, kappa);
             left -= more;
-            // Also where NaN has come in.
+            // Written so that NaN ends the loop too.
             if left.partial_cmp(&0.0) != Some(Ordering::Greater) {
                 return z;
             }
         }
-        // What decays has reached its limit, and what still moves grows without one.
+        // A bounded output has reached its limit by now; any other grows without bound.
         let kappa = self.beta + if z < 0.0 { -self.gamma } else { self.gamma };
         if (self.slope(z, kappa) * left).abs() <= 1e-4 * z.abs() { z } else { f64::INFINITY }
     }

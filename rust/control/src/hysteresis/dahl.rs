@@ -7,17 +7,17 @@
 //!
 //! Xu and Li 2010, equations (7) and (8), doi 10.1115/1.4001712, with b0 = 0. It is linear
 //! with constant coefficients *in x*, one matrix for each direction of motion, so the force
-//! along a monotone stretch is a power series in the distance, whatever the speed.
+//! along a monotone section is a power series in the distance, at any speed.
 
 use super::Operator;
 use crate::Number;
 
 /// Second-order Dahl operator with its output scaled to force, for b0 = 0.
 ///
-/// `TERMS` of the power series in the distance are summed. The first one left out is
-/// `(sqrt(a2) d)^TERMS / (TERMS + 1)!` of the change: with six, below 1e-15 for moves of
-/// 0.01 / sqrt(a2), which is 10 um with the published a2. The integrator, which halves its
-/// steps until they agree, checks longer moves.
+/// `TERMS` terms of the power series in the distance d are summed. The first one omitted is
+/// `(sqrt(a2) d)^TERMS / (TERMS + 1)!` of the change: with six terms it is below 1e-15 for
+/// d = 0.01/sqrt(a2), which is 10 um with the published a2. For longer moves the integrator
+/// controls the error by halving its steps until two results agree.
 ///
 /// | field | symbol | unit | range |
 /// | --- | --- | --- | --- |
@@ -34,7 +34,7 @@ pub struct Dahl<N, const TERMS: usize = 6> {
     pub gain: N,
 }
 
-/// Memory of the operator: the force and its slope, b1 q1 and b1 q2.
+/// State of the operator: the force b1 q1 and its slope b1 q2.
 #[derive(Clone, Copy, Debug)]
 pub struct DahlState<N> {
     /// Hysteresis force b1 q1, N.
@@ -43,11 +43,11 @@ pub struct DahlState<N> {
     pub slope: N,
 }
 
-/// Taylor coefficients of the force about the state that a branch leaves.
+/// Taylor coefficients of the force about the state where the branch begins.
 #[derive(Clone, Copy, Debug)]
 pub struct DahlBranch<N, const TERMS: usize> {
     force: N,
-    /// Derivatives of the force with respect to x, the first one first.
+    /// Derivatives of the force with respect to x, in ascending order from the first.
     derivatives: [N; TERMS],
 }
 

@@ -5,15 +5,16 @@
 //! ```
 //!
 //! Dahl 1968, "A solid friction model", Aerospace Corporation TOR-0158(3107-18)-1, and Dahl 1976,
-//! equation (1), doi 10.2514/3.61511. With w = 1 - F sgn(x')/Fc, what is left to the Coulomb force
-//! along the direction of motion, and p the length of the path,
+//! equation (1), doi 10.2514/3.61511. With w = 1 - F sgn(x')/Fc, the normalised distance to the
+//! Coulomb force in the direction of motion, and p the length of the path,
 //!
 //! ```text
 //! dw/dp = -(sigma/Fc) |w|^i sgn(w)
 //! ```
 //!
-//! which has a closed form for every i: an exponential for i = 1, a power for any other. The
-//! force stays within Fc, forgets along the path, and its loops close.
+//! This has a closed form for every i: an exponential for i = 1, a power for any other i. The
+//! force stays within +-Fc, the influence of the initial state decays along the path, and loops
+//! close.
 
 use super::{BoucWen, BoucWenBranch, BoucWenState, Facing, Operator};
 use crate::Number;
@@ -38,9 +39,9 @@ use crate::Number;
 pub struct FirstOrderDahl<N> {
     /// Slope where the force is 0, sigma.
     pub rest_stiffness: N,
-    /// Force that a long way in one direction leads to, Fc.
+    /// Coulomb force Fc, reached after a long path in one direction.
     pub coulomb_force: N,
-    /// Shape of the way there, i, the same for all lanes.
+    /// Exponent i, the shape of the transition; the same for all lanes.
     pub exponent: f64,
 }
 
@@ -97,7 +98,7 @@ impl<N: Number> Operator<N> for FirstOrderDahl<N> {
         let arguments = [along, direction * distance, self.rest_stiffness, self.coulomb_force];
         let force = N::lanewise(arguments, move |[f, length, sigma, limit]| {
             let left = 1.0 - f / limit;
-            // A way of no length changes nothing, to the bit.
+            // In this form a path of length 0 leaves the force unchanged to the last bit.
             f + limit * (left - remainder(left, sigma * length / limit, i))
         });
         BoucWenState { value: direction * force, slope: self.slope(force) }
@@ -120,7 +121,7 @@ fn power(w: f64, i: f64) -> f64 {
     libm::copysign(share, w)
 }
 
-/// What is left of `left` after a path of `length` Fc/sigma, for an exponent i other than 1.
+/// w after a path of `length` times Fc/sigma that begins at w = `left`, for i other than 1.
 fn remainder(left: f64, length: f64, i: f64) -> f64 {
     let size = left.abs();
     if size <= 0.0 {

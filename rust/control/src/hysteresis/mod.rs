@@ -1,8 +1,9 @@
 //! Rate-independent hysteresis operators: a path goes in, a value comes out.
 //!
-//! Time does not enter. Along a monotone stretch of the input the step is exact, so an
-//! operator is asked for the *branch* that leaves a state in one direction, and the branch
-//! for the state a displacement further on.
+//! The output depends on the path of the input, not on its speed. Along a monotone section of
+//! the path the output has a closed form (or a fast converging one). An operator therefore gives
+//! the *branch* that leaves a state in one direction, and the branch gives the state at a
+//! distance along it.
 
 mod bouc_wen;
 mod dahl;
@@ -20,10 +21,10 @@ use crate::Number;
 pub trait Operator<N: Number> {
     /// What the operator remembers of the path.
     type State: Copy;
-    /// A monotone stretch that leaves a state in one direction.
+    /// A monotone section of the path that leaves a state in one direction.
     type Branch: Copy;
 
-    /// The state before any motion.
+    /// The initial state, before any motion.
     fn rest(&self) -> Self::State;
 
     /// Output of a state, and the slope of the output along the path.
@@ -32,12 +33,12 @@ pub trait Operator<N: Number> {
     /// The branch that leaves `state` in `direction`, which is +1 or -1.
     fn branch(&self, state: &Self::State, direction: N) -> Self::Branch;
 
-    /// The state where the input has moved on by `distance`, signed as the direction is.
+    /// The state after the input has moved by `distance`, which has the sign of the direction.
     fn along(&self, branch: &Self::Branch, distance: N) -> Self::State;
 }
 
-/// An operator that leaves a reversal with another slope than it came with.
+/// An operator whose slope jumps at a reversal.
 pub trait Facing<N: Number>: Operator<N> {
-    /// The state about to be left by `distance` in `direction`, with the slope there.
+    /// The same state with the slope of the branch that leaves it by `distance` in `direction`.
     fn facing(&self, state: &Self::State, distance: N, direction: N) -> Self::State;
 }

@@ -1,4 +1,4 @@
-//! Weighted play operators behind which dead zones bend the curve: voltage in, voltage out.
+//! Modified Prandtl-Ishlinskii operator: weighted play operators followed by dead-zone operators.
 //!
 //! ```text
 //! z_i = max(u - r_i, min(u + r_i, z_i))           play (backlash) of threshold r_i
@@ -6,15 +6,15 @@
 //! y   = v + sum_j s_j max(v - d_j, 0)              one-sided dead zones
 //! ```
 //!
-//! The modified Prandtl-Ishlinskii operator of Kuhnen 2003, European Journal of Control 9(4),
-//! 407-418, doi 10.3166/ejc.9.407-418, with the dead zones above zero only: a piezo that is
-//! driven from 0 V up needs no others. Plays alone give loops that look the same when turned
-//! by half a turn; the dead zones, which have no memory, make them asymmetric.
+//! Kuhnen 2003, European Journal of Control 9(4), 407-418, doi 10.3166/ejc.9.407-418, with
+//! one-sided dead zones of the form max(v - d, 0) only: a piezo driven from 0 V up needs no
+//! others. Play operators alone give loops with point symmetry; the dead zones, which have no
+//! memory, make the loops asymmetric.
 
 use super::Operator;
 use crate::Number;
 
-/// Modified Prandtl-Ishlinskii operator with `PLAYS` plays and `ZONES` dead zones.
+/// Modified Prandtl-Ishlinskii operator with `PLAYS` play operators and `ZONES` dead zones.
 ///
 /// ```
 /// use piezotrack_control::hysteresis::{Operator, Play};
@@ -26,38 +26,40 @@ use crate::Number;
 /// assert_eq!(play.follow(&mut state, 0.0), 3.0);
 /// ```
 ///
-/// It is increasing, and so has an inverse, where `linear`, all `weights` and all partial sums
-/// of 1 + `bends` are positive.
+/// It is strictly increasing, and so has an inverse, where `linear` and all partial sums of
+/// 1 + `bends` are positive and no weight is negative.
+///
+/// The unit of the output is free; it is written Y here: V, or m for a stage.
 ///
 /// | field | symbol | unit | range |
 /// | --- | --- | --- | --- |
-/// | `linear` | w0 | 1 | > 0 |
-/// | `thresholds` | r | V | >= 0 |
-/// | `weights` | w | 1 | >= 0 |
-/// | `corners` | d | V | >= 0, ascending |
-/// | `bends` | s | 1 | sums above -1 |
+/// | `linear` | w0 | Y/V | > 0 |
+/// | `thresholds` | r | V | >= 0, ascending |
+/// | `weights` | w | Y/V | >= 0 |
+/// | `corners` | d | Y | ascending |
+/// | `bends` | s | 1 | partial sums above -1 |
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Play<N, const PLAYS: usize, const ZONES: usize> {
-    /// Share of the input that passes without memory, w0: the slope after a reversal.
+    /// Gain of the path without memory, w0: the slope right after a reversal.
     pub linear: N,
-    /// Half the width of each play's backlash, r, V.
+    /// Threshold of each play operator, half the width of its backlash, r, V.
     pub thresholds: [N; PLAYS],
-    /// Weight of each play, w.
+    /// Weight of each play operator, w.
     pub weights: [N; PLAYS],
-    /// Where each dead zone ends, d, V.
+    /// Threshold of each dead zone, d, in the unit of the output.
     pub corners: [N; ZONES],
-    /// By how much the slope changes there, s.
+    /// Weight of each dead zone: the change of the slope at its threshold, s.
     pub bends: [N; ZONES],
 }
 
-/// Memory of the operator: its input, where each play stands, and the slope it came with.
+/// State of the operator: its input, the output of each play operator, and the slope.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlayState<N, const PLAYS: usize> {
     /// Input, V.
     pub input: N,
-    /// Output of each play, V.
+    /// Output of each play operator, V.
     pub plays: [N; PLAYS],
-    /// Slope of the weighted plays along the way that led here.
+    /// Slope of the weighted sum along the path that led here.
     pub slope: N,
 }
 
@@ -69,9 +71,9 @@ pub struct PlayBranch<N, const PLAYS: usize> {
 }
 
 impl<N: Number, const PLAYS: usize, const ZONES: usize> Play<N, PLAYS, ZONES> {
-    /// Takes the input to `input`, V, and returns the output, V.
+    /// Moves the input to `input` (V) and returns the output.
     ///
-    /// The way there is taken to be monotone, and then the step is exact however long it is.
+    /// Exact for a step of any length, provided that the input is monotone within it.
     #[inline(always)]
     pub fn follow(&self, state: &mut PlayState<N, PLAYS>, input: N) -> N {
         let distance = input - state.input;

@@ -4,10 +4,10 @@
 //! d u - h(u) = y,   y = (m xd'' + b xd' + k xd)/k
 //! ```
 //!
-//! from Xu and Li 2010, equations (19) and (20), doi 10.1115/1.4001712. The hysteresis depends on
-//! the drive, so this is an equation for u; along a monotone stretch its left side is an
-//! increasing function of the way of u, and a few steps of Newton's method solve it. Between two
-//! samples y is taken to be monotone.
+//! from Xu and Li 2010, equations (19) and (20), doi 10.1115/1.4001712. The hysteresis h depends
+//! on the drive u, so this is an implicit equation for u. Along a monotone section its left side
+//! is a monotone function of u, and a few Newton steps solve it. Between two samples y is taken
+//! to be monotone.
 
 use super::Inverse;
 use crate::error::{Result, check, finite, not_negative, positive, usable};
@@ -35,9 +35,10 @@ impl BoucWenInverse {
     /// The inverse of the stage with these parameters, in SI units.
     ///
     /// # Errors
-    /// Names the parameter that is out of its range. `alpha` is where the drive would not always
-    /// move the stage forward: the steepest hysteresis is alpha at first, and
-    /// 2 alpha beta/(beta + gamma) after a reversal at the limit; both must stay below 1.
+    /// Names the parameter that is out of its range. `alpha` is refused where the left side of
+    /// the equation is not increasing: the slope of the hysteresis, relative to d, is alpha at
+    /// h = 0 and 2 alpha beta/(beta + gamma) after a reversal in saturation; both must stay
+    /// below 1.
     #[expect(clippy::too_many_arguments, reason = "the stage's eight numbers, in their order")]
     pub fn new(
         mass: f64,
@@ -72,7 +73,7 @@ impl BoucWenInverse {
         })
     }
 
-    /// The state of a stage that never moved.
+    /// The state for a stage at rest that never moved.
     #[must_use]
     pub fn rest(&self) -> BoucWenInverseState {
         BoucWenInverseState { u: 0.0, memory: self.operator.rest() }
@@ -81,8 +82,8 @@ impl BoucWenInverse {
     /// The voltage for displacement `x` (m), velocity `v` (m/s) and acceleration `a` (m/s^2) of
     /// the reference.
     ///
-    /// NaN, with the state left as it was, where an input is not finite (or beyond 1e100) or the
-    /// equation was not solved; a controller holds its feedforward then.
+    /// NaN, with the state unchanged, where an input is not finite (or beyond 1e100) or the
+    /// iteration did not converge; a controller holds its feedforward then.
     #[inline]
     pub fn step(&self, state: &mut BoucWenInverseState, x: f64, v: f64, a: f64) -> f64 {
         if !(usable(x) && usable(v) && usable(a)) {
@@ -91,7 +92,7 @@ impl BoucWenInverse {
         let d = self.piezo_coefficient;
         let wanted = (self.mass * a + self.damping * v) / self.stiffness + x;
         let rise = wanted - (d * state.u - state.memory.value);
-        // Volts, as if there were no hysteresis: a lower bound of the way, for alpha >= 0.
+        // The change of u without hysteresis: a lower bound of its size, for alpha >= 0.
         let plain = rise / d;
         let direction = if plain < 0.0 { -1.0 } else { 1.0 };
         let branch = self.operator.branch(&state.memory, direction);
@@ -122,10 +123,10 @@ impl BoucWenInverse {
     }
 }
 
-/// Most steps of Newton's method, or of bisection where that leads out of bounds.
+/// Most iterations: Newton steps, or bisection where a Newton step leaves the bracket.
 const MOST_TRIES: usize = 100;
 
-/// The drive so far, and what the operator remembers of it.
+/// State of a [`BoucWenInverse`]: the last drive (V) and the state of the operator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoucWenInverseState {
     u: f64,

@@ -6,9 +6,9 @@
 //! ```
 //!
 //! Xu and Li 2010, equations (21), (7) and (8), doi 10.1115/1.4001712. The force depends on the
-//! path of the reference alone, so the inverse is explicit and the operator exact along the path.
-//! A reference may turn between two samples: there it is taken as the cubic through displacement
-//! and velocity at both ends, and the operator is led to its turning points.
+//! path of the reference only, so the inverse is explicit. Where the reference reverses between
+//! two samples, its path is taken to be the cubic through displacement and velocity at both
+//! samples, and the operator follows it from turning point to turning point.
 
 use super::Inverse;
 use crate::cubic_segment::{is_straight, legs};
@@ -117,12 +117,12 @@ impl DahlInverse {
     }
 }
 
-/// Terms of the operator's power series. Four keep a step short: they leave 3e-11 of the slope
-/// out in each [`PIECE`], with the published stage a picometre by the time it is forgotten.
+/// Terms of the operator's power series. Four terms keep a step short. They omit 3e-11 of the
+/// slope in each [`PIECE`], which adds up to about a picometre with the published stage.
 const TERMS: usize = 4;
-/// Longest move in one piece, times sqrt(a2) or a1: 4.6 um with the published a2.
+/// Longest move in one piece, times the larger of sqrt(a2) and a1: 4.6 um with the published a2.
 const PIECE: f64 = 0.005;
-/// Most pieces that a move between two samples is split into: a bound on the time of a step.
+/// Most pieces that a move between two samples is split into; it bounds the time of a step.
 const MOST_PIECES: f64 = 2000.0;
 
 /// The inverse for one sampling interval; see [`DahlInverse::at`].
@@ -138,14 +138,14 @@ pub struct SampledDahlInverse {
     level: f64,
     /// b0/T, V for one unit of q2.
     friction: f64,
-    /// Driven by up alone, so that its output is q1 and q2 and not b1 times them.
+    /// Its gain is up without b1, so that its output is q1 and q2.
     operator: Dahl<Plain, TERMS>,
     /// Longest move in one piece, m; infinite where the operator is a parabola.
     piece: f64,
     dt: f64,
 }
 
-/// Where the reference was, and what the operator remembers of its path.
+/// State of a [`SampledDahlInverse`]: the last sample of the reference and the operator's state.
 #[derive(Clone, Copy, Debug)]
 pub struct InverseState {
     x: f64,
@@ -155,18 +155,18 @@ pub struct InverseState {
 }
 
 impl SampledDahlInverse {
-    /// The inverse of a stage at rest at 0 that never moved.
+    /// The state for a stage at rest at 0 that never moved.
     #[must_use]
     pub fn rest(&self) -> InverseState {
         InverseState { x: 0.0, w: None, memory: self.operator.rest() }
     }
 
     /// The voltage for displacement `x` (m), velocity `v` (m/s) and acceleration `a` (m/s^2) of
-    /// the reference. At the first sample the stage is taken to come straight from 0 to `x`.
+    /// the reference. The first sample is taken to be reached in a monotone move from 0.
     ///
-    /// NaN, with the state left as it was, where an input is not finite (or beyond 1e100), or
-    /// `x` more than 2000 pieces (9 mm with the published a2) away; a controller holds its
-    /// feedforward then.
+    /// NaN, with the state unchanged, where an input is not finite (or beyond 1e100), or `x` is
+    /// more than 2000 pieces (9 mm with the published a2) away from the last one; a controller
+    /// holds its feedforward then.
     #[inline]
     pub fn step(&self, state: &mut InverseState, x: f64, v: f64, a: f64) -> f64 {
         if !(usable(x) && usable(v) && usable(a)) {
@@ -190,7 +190,7 @@ impl SampledDahlInverse {
         volts
     }
 
-    /// The operator after a monotone move; `None` where that is too long.
+    /// The operator's state after a monotone move; `None` where the move is too long.
     #[inline]
     fn travel(&self, mut memory: DahlState<Plain>, distance: f64) -> Option<DahlState<Plain>> {
         let length = distance.abs();
@@ -212,7 +212,7 @@ impl SampledDahlInverse {
         Some(self.operator.along(&branch, Plain(distance)))
     }
 
-    /// The operator along the cubic with velocities `w0` and `w1` that rises by `rise`.
+    /// The operator's state after the cubic with velocities `w0` and `w1` that rises by `rise`.
     #[cold]
     fn travel_turning(
         &self,

@@ -1,13 +1,12 @@
-//! Feedforward: the inverse of a stage with an exact operator in feedback, sample by sample.
+//! Feedforward: the inverse of a stage whose hysteresis acts on the displacement, sample by sample.
 //!
 //! ```text
 //! uFF = (M xd'' + D xd' + K xd + F(xd))/T
 //! ```
 //!
 //! Xu and Li 2010, equation (21), doi 10.1115/1.4001712, for first-order Dahl friction and the
-//! Bouc-Wen oscillator: the force depends on the path of the reference alone, so the inverse is
-//! explicit, and the operator is led to the reference's turning points as in
-//! [`crate::DahlInverse`].
+//! Bouc-Wen oscillator: the force F depends on the path of the reference only, so the inverse is
+//! explicit. Reversals between two samples are treated as in [`crate::DahlInverse`].
 
 use super::Inverse;
 use crate::cubic_segment::{is_straight, legs};
@@ -18,10 +17,10 @@ use crate::unfused::Plain;
 /// Inverse of a stage with first-order Dahl friction.
 pub type FirstOrderDahlInverse = FeedbackInverse<FirstOrderDahl<Plain>>;
 
-/// Inverse of a Bouc-Wen oscillator: it gives a force.
+/// Inverse of a Bouc-Wen oscillator; its drive is a force, N.
 pub type OscillatorInverse = FeedbackInverse<BoucWen<Plain>>;
 
-/// An inverse for one sampling interval.
+/// Inverse of a stage with the operator `O` in feedback, for one sampling interval.
 ///
 /// ```
 /// use piezotrack_control::FirstOrderDahlInverse;
@@ -44,7 +43,7 @@ pub struct FeedbackInverse<O> {
     dt: f64,
 }
 
-/// Where the reference was, and what the operator remembers of its path.
+/// State of a [`FeedbackInverse`]: the last sample of the reference and the operator's state.
 #[derive(Clone, Copy, Debug)]
 pub struct FeedbackInverseState {
     x: f64,
@@ -54,8 +53,9 @@ pub struct FeedbackInverseState {
 }
 
 impl FirstOrderDahlInverse {
-    /// The inverse of the stage with these mass, damping, stiffness and piezo coefficient, and of
-    /// its rest stiffness, Coulomb force and exponent, for samples every `dt` seconds.
+    /// The inverse of the stage with this mass (kg), damping (N s/m), stiffness (N/m) and piezo
+    /// coefficient (N/V), and with rest stiffness (N/m), Coulomb force (N) and exponent of the
+    /// friction, for samples every `dt` seconds.
     ///
     /// # Errors
     /// Names the parameter that is out of its range.
@@ -80,8 +80,9 @@ impl FirstOrderDahlInverse {
 }
 
 impl OscillatorInverse {
-    /// The inverse of the oscillator with these mass, damping and stiffness, and of its alpha,
-    /// beta gamma, beta delta and exponent, for samples every `dt` seconds.
+    /// The inverse of the oscillator with this mass (kg), damping (N s/m) and stiffness (N/m), and
+    /// with alpha (N/m), beta gamma (1/m), beta delta (1/m) and exponent of the hysteresis, for
+    /// samples every `dt` seconds.
     ///
     /// # Errors
     /// Names the parameter that is out of its range.
@@ -115,16 +116,16 @@ impl<O: Operator<Plain, State = BoucWenState<Plain>>> FeedbackInverse<O> {
         })
     }
 
-    /// The inverse of a stage at rest at 0 that never moved.
+    /// The state for a stage at rest at 0 that never moved.
     #[must_use]
     pub fn rest(&self) -> FeedbackInverseState {
         FeedbackInverseState { x: 0.0, w: None, memory: self.operator.rest() }
     }
 
     /// The drive for displacement `x` (m), velocity `v` (m/s) and acceleration `a` (m/s^2) of the
-    /// reference. At the first sample the stage is taken to come straight from 0 to `x`.
+    /// reference. The first sample is taken to be reached in a monotone move from 0.
     ///
-    /// NaN, with the state left as it was, where an input is not finite (or beyond 1e100), or the
+    /// NaN, with the state unchanged, where an input is not finite (or beyond 1e100), or the
     /// hysteresis force grows without bound; a controller holds its feedforward then.
     pub fn step(&self, state: &mut FeedbackInverseState, x: f64, v: f64, a: f64) -> f64 {
         if !(usable(x) && usable(v) && usable(a)) {

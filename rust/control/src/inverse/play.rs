@@ -1,4 +1,4 @@
-//! The inverse of weighted plays and dead zones: an operator of the same kind, in closed form.
+//! The inverse of the modified Prandtl-Ishlinskii operator: one of the same kind, in closed form.
 //!
 //! ```text
 //! v = S^-1(y) = y + sum_j s'_j max(y - d'_j, 0)          inverse of the dead zones
@@ -10,14 +10,14 @@
 //! d'_j = S(d_j),   s'_j = 1 / m_j - 1 / m_(j-1),          m_j = 1 + s_1 + ... + s_j
 //! ```
 //!
-//! Kuhnen 2003, European Journal of Control 9(4), 407-418, doi 10.3166/ejc.9.407-418. Each step
-//! costs what a step of the operator costs.
+//! Kuhnen 2003, European Journal of Control 9(4), 407-418, doi 10.3166/ejc.9.407-418. A step
+//! takes as long as one of the operator.
 
 use super::Inverse;
 use crate::error::{Result, check, finite, not_negative, positive, usable};
 use crate::hysteresis::{Operator, Play, PlayState};
 
-/// Inverse of a [`Play`] with `PLAYS` plays and `ZONES` dead zones: output in, input out.
+/// Inverse of a [`Play`] with `PLAYS` play operators and `ZONES` dead zones: output in, input out.
 ///
 /// ```
 /// use piezotrack_control::PlayInverse;
@@ -42,11 +42,11 @@ use crate::hysteresis::{Operator, Play, PlayState};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlayInverse<const PLAYS: usize, const ZONES: usize> {
-    /// Where each dead zone ended, in terms of the output, d'.
+    /// Thresholds of the dead zones at the output, d'.
     corners: [f64; ZONES],
-    /// By how much the slope of the inverse changes there, s'.
+    /// Changes of the slope of the inverse there, s'.
     bends: [f64; ZONES],
-    /// Plays of transformed thresholds and weights, without dead zones.
+    /// Play operators with transformed thresholds and weights, without dead zones.
     plays: Play<f64, PLAYS, 0>,
 }
 
@@ -55,20 +55,20 @@ impl<const PLAYS: usize, const ZONES: usize> PlayInverse<PLAYS, ZONES> {
     ///
     /// # Errors
     /// Where the operator has no inverse of this form: `linear` is not above 0, a weight is
-    /// below 0, thresholds or corners do not ascend, or the slope of the dead zones does not
-    /// stay above 0.
+    /// negative, thresholds or corners do not ascend, or a slope of the dead zones is not
+    /// above 0.
     pub fn new(play: &Play<f64, PLAYS, ZONES>) -> Result<Self> {
         let (corners, bends) = zones(play)?;
         Ok(Self { corners, bends, plays: plays(play)? })
     }
 
-    /// The memory of the inverse of an operator at rest.
+    /// The state of the inverse of an operator at rest.
     #[must_use]
     pub fn rest(&self) -> PlayState<f64, PLAYS> {
         self.plays.rest()
     }
 
-    /// The memory of the inverse of an operator that has the memory `state`.
+    /// The state of the inverse of the operator `play` in the state `state`.
     #[must_use]
     pub fn memory<const ANY: usize>(
         &self,
@@ -88,10 +88,10 @@ impl<const PLAYS: usize, const ZONES: usize> PlayInverse<PLAYS, ZONES> {
         inverse
     }
 
-    /// Takes the output of the operator to `output` and returns its input.
+    /// Moves the output of the operator to `output` and returns its input (V).
     ///
-    /// The way there is taken to be monotone, and then the step is exact however long it is.
-    /// NaN, with the state left as it was, where `output` is not finite (or beyond 1e100).
+    /// Exact for a step of any length, provided that the output is monotone within it. NaN, with
+    /// the state unchanged, where `output` is not finite (or beyond 1e100).
     #[inline]
     pub fn follow(&self, state: &mut PlayState<f64, PLAYS>, output: f64) -> f64 {
         if !usable(output) {
@@ -122,7 +122,7 @@ impl<const PLAYS: usize, const ZONES: usize> Inverse for PlayInverse<PLAYS, ZONE
     }
 }
 
-/// Corners and bends of the inverse of the dead zones.
+/// Thresholds and slope changes of the inverse of the dead zones.
 fn zones<const PLAYS: usize, const ZONES: usize>(
     play: &Play<f64, PLAYS, ZONES>,
 ) -> Result<([f64; ZONES], [f64; ZONES])> {
@@ -144,7 +144,7 @@ fn zones<const PLAYS: usize, const ZONES: usize>(
     Ok((corners, bends))
 }
 
-/// Plays of transformed thresholds and weights.
+/// Play operators with transformed thresholds and weights.
 fn plays<const PLAYS: usize, const ZONES: usize>(
     play: &Play<f64, PLAYS, ZONES>,
 ) -> Result<Play<f64, PLAYS, 0>> {
