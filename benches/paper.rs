@@ -1,7 +1,8 @@
 //! What the benches share: the paper's search, and what the core can do at most.
 #![allow(missing_docs)]
 
-use piezotrack_core::identify::{Guess, Problem, Spec};
+use piezotrack_core::identify::{Candidate, Problem, Spec};
+use piezotrack_core::models::Model;
 use pulp::{Simd, WithSimd};
 
 pub const RATE: f64 = 5000.0;
@@ -22,14 +23,14 @@ pub fn paper_spec() -> Spec {
             ("stiffness".into(), (1e4, 5e4)),
             ("piezo_coefficient".into(), (0.01, 0.1)),
         ],
-        ..Spec::default()
+        ..Spec::of(Model::Dahl)
     }
 }
 
-pub fn guesses(problem: &Problem, particles: u32) -> Vec<Guess> {
+pub fn candidates(problem: &Problem, particles: u32) -> Vec<Candidate> {
     (0..particles)
         .map(|i| problem.theta(&[f64::from(i) / f64::from(particles); 4]))
-        .map(|theta| Guess { theta, limit: f64::INFINITY })
+        .map(|theta| Candidate { theta, limit: f64::INFINITY })
         .collect()
 }
 

@@ -9,10 +9,9 @@ mod paper;
 use std::hint::black_box;
 use std::time::Instant;
 
-use paper::{Peak, RATE, SAMPLES, Width, drive, guesses, paper_spec};
+use paper::{Peak, RATE, SAMPLES, Width, candidates, drive, paper_spec};
 use piezotrack_core::identify::{Evaluator, Problem, Record};
-use piezotrack_core::models::dahl_simulate::{Method, simulate};
-use piezotrack_core::models::{DahlStage, StageState};
+use piezotrack_core::models::{DahlStage, Experiment, StageModel};
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 use pulp::Arch;
 
@@ -39,12 +38,12 @@ fn whole(count: u64) -> f64 {
 fn main() {
     let u = drive();
     let held = Drive::new(&u, 1.0 / RATE, Hold::First).unwrap();
-    let (stage, rest) = (DahlStage::xu_li_2010(), StageState::default());
-    let run = simulate(&stage, &held, rest, Method::Exponential, 1e-10, NEVER).unwrap().unwrap();
+    let stage = DahlStage::xu_li_2010();
+    let run = stage.simulate(&Experiment::of(&held, NEVER)).unwrap().unwrap();
     let record = Record::new(&u, &run.x, 1.0 / RATE, Hold::First, 0).unwrap();
     let problem = Problem::new(&record, &paper_spec()).unwrap();
     let evaluator = Evaluator::new(&record, &problem, NEVER);
-    let guesses = guesses(&problem, PARTICLES);
+    let candidates = candidates(&problem, PARTICLES);
 
     let arch = Arch::new();
     let lanes = arch.dispatch(Width);
@@ -58,7 +57,7 @@ fn main() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let time = pool.install(|| {
             best(|| {
-                black_box(evaluator.costs(black_box(&guesses), NEVER));
+                black_box(evaluator.costs(black_box(&candidates), NEVER));
             })
         });
         let each = time / f64::from(PARTICLES) / f64::from(SAMPLES);

@@ -10,13 +10,12 @@ use std::hint::black_box;
 
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
-use paper::{Peak, RATE, SAMPLES, Width, drive, guesses, paper_spec};
+use paper::{Peak, RATE, SAMPLES, Width, candidates, drive, paper_spec};
 use piezotrack_core::identify::{
-    Evaluator, Guess, Plan, Problem, Progress, Record, SwarmSettings, search,
+    Candidate, Evaluator, Plan, Problem, Progress, Record, SwarmSettings, search,
 };
 use piezotrack_core::integrator::{Order, Stepping};
-use piezotrack_core::models::dahl_simulate::{Method, simulate};
-use piezotrack_core::models::{DahlStage, StageState};
+use piezotrack_core::models::{DahlStage, Experiment, StageModel};
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 use pulp::Arch;
 
@@ -34,14 +33,14 @@ fn costs(
     group: &mut BenchmarkGroup<'_, WallTime>,
     name: &str,
     evaluator: &Evaluator<'_>,
-    guesses: &[Guess],
+    candidates: &[Candidate],
     threads: usize,
 ) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    let samples = guesses.len() as u64 * u64::from(SAMPLES);
+    let samples = candidates.len() as u64 * u64::from(SAMPLES);
     group.throughput(Throughput::Elements(samples));
     group.bench_function(name, |bencher| {
-        bencher.iter(|| pool.install(|| evaluator.costs(black_box(guesses), NEVER)));
+        bencher.iter(|| pool.install(|| evaluator.costs(black_box(candidates), NEVER)));
     });
 }
 
@@ -49,8 +48,7 @@ fn throughput(criterion: &mut Criterion) {
     let u = drive();
     let held = Drive::new(&u, 1.0 / RATE, Hold::First).unwrap();
     let stage = DahlStage::xu_li_2010();
-    let rest = StageState::default();
-    let y = simulate(&stage, &held, rest, Method::Exponential, 1e-10, NEVER).unwrap().unwrap().x;
+    let y = stage.simulate(&Experiment::of(&held, NEVER)).unwrap().unwrap().x;
     let record = Record::new(&u, &y, 1.0 / RATE, Hold::First, 0).unwrap();
     let problem = Problem::new(&record, &paper_spec()).unwrap();
     let evaluator = || Evaluator::new(&record, &problem, NEVER);
@@ -60,7 +58,7 @@ fn throughput(criterion: &mut Criterion) {
     for particles in [1, 8, 10, 64, 96] {
         for threads in [1, 2] {
             let name = format!("{particles} particles, {threads} threads");
-            costs(&mut group, &name, &evaluator(), &guesses(&problem, particles), threads);
+            costs(&mut group, &name, &evaluator(), &candidates(&problem, particles), threads);
         }
     }
     group.finish();
@@ -70,7 +68,7 @@ fn throughput(criterion: &mut Criterion) {
         let second = evaluator().on(arch);
         let mut fourth = evaluator().on(arch);
         fourth.stepping.order = Order::Fourth;
-        let full = guesses(&problem, 96);
+        let full = candidates(&problem, 96);
         costs(&mut group, &format!("{name}, second order"), &second, &full, 1);
         costs(&mut group, &format!("{name}, fourth order"), &fourth, &full, 1);
         group.throughput(Throughput::Elements(Peak::COUNT * arch.dispatch(Width)));

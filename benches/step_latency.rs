@@ -6,9 +6,9 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use piezotrack_control::{Controller, DahlInverse, Limits, Pid, Repetitive, Smoothing};
-use piezotrack_core::integrator::{Order, Stepping};
-use piezotrack_core::models::dahl_simulate::simulate_fixed;
-use piezotrack_core::models::{DahlStage, StageState};
+use piezotrack_core::integrator::{FEW_TERMS, TERMS};
+use piezotrack_core::models::DahlStage;
+use piezotrack_core::models::dahl::SmoothKernel;
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 
 fn latency(criterion: &mut Criterion) {
@@ -18,14 +18,14 @@ fn latency(criterion: &mut Criterion) {
     let stage = DahlStage::xu_li_2010();
     let mut group = criterion.benchmark_group("step_latency");
     group.throughput(Throughput::Elements(5000));
-    for order in [Order::Second, Order::Fourth] {
-        let stepping = Stepping { order, substeps: 1 };
-        group.bench_function(format!("one lane, {order:?} order"), |bencher| {
-            bencher.iter(|| {
-                simulate_fixed(black_box(&stage), &drive, StageState::default(), stepping, NEVER)
-            });
-        });
-    }
+    let second = stage.lumped(SmoothKernel::<FEW_TERMS, false>);
+    group.bench_function("one lane, Second order", |bencher| {
+        bencher.iter(|| black_box(&second).simulate_fixed(&drive, second.rest(), 1, NEVER));
+    });
+    let fourth = stage.lumped(SmoothKernel::<TERMS, true>);
+    group.bench_function("one lane, Fourth order", |bencher| {
+        bencher.iter(|| black_box(&fourth).simulate_fixed(&drive, fourth.rest(), 1, NEVER));
+    });
     group.finish();
 }
 

@@ -3,9 +3,7 @@
 
 use core::f64::consts::TAU;
 
-use piezotrack_core::integrator::Alone;
-use piezotrack_core::models::dahl_simulate::{Method, simulate};
-use piezotrack_core::models::{BoucWenKernel, BoucWenStage, Creep, DahlStage, Plant, StageState};
+use piezotrack_core::models::{BoucWenStage, Creep, DahlStage, Experiment, Plant, StageModel};
 use piezotrack_core::signal::metrics::{each_period, tracking};
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 use piezotrack_core::simulate::{
@@ -275,8 +273,10 @@ fn a_dahl_plant_moves_as_its_own_simulation() {
     let stage = DahlStage::xu_li_2010();
     let u: Vec<f64> = (0..60).map(|k| 30.0 + 25.0 * (0.3 * f64::from(k)).sin()).collect();
     let drive = Drive::new(&u, TS, Hold::Zero).unwrap();
-    let rest = StageState::default();
-    let exact = simulate(&stage, &drive, rest, Method::Exponential, 1e-13, NEVER).unwrap().unwrap();
+    let exact = stage
+        .simulate(&Experiment { accuracy: 1e-13, ..Experiment::of(&drive, NEVER) })
+        .unwrap()
+        .unwrap();
     let apparatus = Apparatus::bare(&stage, 5e-5);
     let run = closed_loop(&apparatus, apparatus.rest(), &timing(60, 0.0, 3), |k, _| u[k], NEVER);
     for (k, x) in run.unwrap().unwrap().displacement.iter().step_by(3).enumerate() {
@@ -336,14 +336,13 @@ fn a_run_stops_when_asked() {
 #[test]
 fn a_kernel_led_step_by_step_moves_as_it_does_alone() {
     let stage = BoucWenStage::xu_li_2010_corrected();
-    let kernel = BoucWenKernel { exponent: stage.exponent };
-    let plant = Alone { kernel: &kernel, parameters: &stage.parameters() };
     let u: Vec<f64> = sine(75.0, 0.5, 400);
     for hold in [Hold::First, Hold::Zero] {
         let drive = Drive::new(&u, TS, hold).unwrap();
-        let alone = stage.simulate(&drive, [0.0; 4], 1e-12, NEVER).unwrap().unwrap();
+        let experiment = Experiment { accuracy: 1e-12, ..Experiment::of(&drive, NEVER) };
+        let alone = stage.simulate(&experiment).unwrap().unwrap();
         let largest = |step: f64| {
-            let apparatus = Apparatus::bare(&plant, step);
+            let apparatus = Apparatus::bare(&stage, step);
             let run = open_loop(&apparatus, apparatus.rest(), &drive, NEVER).unwrap().unwrap();
             let gaps = run.displacement.iter().zip(&alone.x).map(|(a, b)| (a - b).abs());
             gaps.fold(0.0, f64::max)

@@ -13,6 +13,7 @@ use piezotrack_core::Error;
 use piezotrack_core::design::{LinearFeedback, LoopPlant, SampledLoop, check_loop, margins};
 use piezotrack_core::integrator::Mechanics;
 use piezotrack_core::models::DahlStage;
+use piezotrack_core::models::dahl::{extremes, linearised};
 
 const DT: f64 = 0.02;
 
@@ -167,16 +168,15 @@ fn response_is_that_of_the_parts() {
 fn dahl_stage_is_linearised_along_its_virgin_branch() {
     let stage = DahlStage::xu_li_2010();
     // From 1.80 to 1.44 um/V over the stroke, and softer the other way
-    close(LoopPlant::dahl(&stage, 0.0).unwrap().static_gain(), 1.80e-6, 5e-9);
-    close(LoopPlant::dahl(&stage, 117e-6).unwrap().static_gain(), 1.44e-6, 5e-9);
-    let [softest, stiffest] = LoopPlant::dahl_extremes(&stage, 0.0..=117e-6).unwrap();
+    close(linearised(&stage, 0.0).unwrap().static_gain(), 1.80e-6, 5e-9);
+    close(linearised(&stage, 117e-6).unwrap().static_gain(), 1.44e-6, 5e-9);
+    let [softest, stiffest] = extremes(&stage, 0.0..=117e-6).unwrap();
     close(softest.static_gain(), 1.80e-6, 5e-9);
     close(stiffest.static_gain(), 1.44e-6, 5e-9);
     // The extreme inside a long range: q2' = 0
-    let [_, stiffest] = LoopPlant::dahl_extremes(&stage, 0.0..=2.5e-3).unwrap();
+    let [_, stiffest] = extremes(&stage, 0.0..=2.5e-3).unwrap();
     let lowest = (1..2500).map(|i| {
-        LoopPlant::dahl(&stage, 1e-6 * f64::from(i))
-            .map_or(f64::INFINITY, |plant| plant.static_gain())
+        linearised(&stage, 1e-6 * f64::from(i)).map_or(f64::INFINITY, |plant| plant.static_gain())
     });
     close(stiffest.static_gain(), lowest.fold(f64::INFINITY, f64::min), 1e-13);
     // dFh/dx of the operator itself, by a difference of closed forms of the force
@@ -191,7 +191,7 @@ fn dahl_stage_is_linearised_along_its_virgin_branch() {
             q2 += h * (stage.up - a2 * m1 - a1 * m2);
         }
         let exact = stage.piezo_coefficient / (stage.mechanics.stiffness + stage.b1 * q2);
-        close(LoopPlant::dahl(&stage, x).unwrap().static_gain(), exact, 1e-9 * exact);
+        close(linearised(&stage, x).unwrap().static_gain(), exact, 1e-9 * exact);
     }
 }
 
@@ -480,9 +480,9 @@ fn bad_input_is_named() {
     named(LoopPlant::state_space(&[1.0], &[1.0, 2.0], &[1.0], 0.0).unwrap_err(), "a has");
     named(LoopPlant::state_space(&[0.0; 81], &[0.0; 9], &[0.0; 9], 0.0).unwrap_err(), "b has");
     let stage = DahlStage::xu_li_2010();
-    named(LoopPlant::dahl(&stage, f64::NAN).unwrap_err(), "at");
-    named(LoopPlant::dahl(&stage, -2e-3).unwrap_err(), "K + dFh/dx");
-    let empty = LoopPlant::dahl_extremes(&stage, 1.0..=0.0);
+    named(linearised(&stage, f64::NAN).unwrap_err(), "at");
+    named(linearised(&stage, -2e-3).unwrap_err(), "K + dFh/dx");
+    let empty = extremes(&stage, 1.0..=0.0);
     named(empty.unwrap_err(), "range");
     close(LoopPlant::fixed_gain(2.0).unwrap().static_gain(), 2.0, 0.0);
     let law = published();

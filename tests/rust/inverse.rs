@@ -4,8 +4,7 @@
 use core::f64::consts::TAU;
 
 use piezotrack_control::{DahlInverse, SampledDahlInverse};
-use piezotrack_core::models::dahl_simulate::{Method, simulate};
-use piezotrack_core::models::{DahlStage, StageState};
+use piezotrack_core::models::{DahlStage, Experiment, StageModel};
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 
 /// Displacement, velocity and acceleration of two sines, 0 at rest at t = 0.
@@ -36,8 +35,10 @@ fn stage_driven_by_its_inverse_tracks_within_a_tenth_of_a_nanometre() {
     let u = voltages(&inverse, dt, 40_000);
     let drive = Drive::new(&u, dt, Hold::First).unwrap();
     let stage = DahlStage::xu_li_2010();
-    let rest = StageState::default();
-    let run = simulate(&stage, &drive, rest, Method::Exponential, 1e-13, NEVER).unwrap().unwrap();
+    let run = stage
+        .simulate(&Experiment { accuracy: 1e-13, ..Experiment::of(&drive, NEVER) })
+        .unwrap()
+        .unwrap();
     // M/D is 70 us: after 5 ms the jump of the reference's acceleration is over.
     for (k, x) in (0_u32..).zip(&run.x).skip(25) {
         let error = x - reference(dt * f64::from(k))[0];

@@ -10,7 +10,7 @@ use std::slice::from_ref;
 
 /// From the bottom up.
 const CORE: [&str; 8] =
-    ["error", "math", "signal", "integrator", "models", "design", "simulate", "identify"];
+    ["error", "math", "signal", "integrator", "design", "models", "simulate", "identify"];
 
 /// From the bottom up.
 const CONTROL: [&str; 13] = [

@@ -6,10 +6,11 @@ use core::f64::consts::{PI, TAU};
 use piezotrack_control::hysteresis::{Operator, Play};
 use piezotrack_control::{
     BoucWenInverse, Creep, DahlInverse, Dynamics, FirstOrderDahlInverse, Inverse,
-    OnlineFeedforward, OscillatorInverse, PlayInverse, PrandtlIshlinskiiInverse,
-    PrandtlIshlinskiiState, ReferenceSample,
+    OnlineFeedforward, OscillatorInverse, PlayInverse, PrandtlIshlinskiiInverse, ReferenceSample,
 };
-use piezotrack_core::models::{PrandtlIshlinskiiStage, Relaxation, plays};
+use piezotrack_core::models::{
+    Experiment, Invertible, PlayHysteresis, PrandtlIshlinskiiStage, Relaxation, StageModel,
+};
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 
 /// Passes on the displacement, the velocity or the acceleration that reach an inverse.
@@ -257,7 +258,7 @@ fn stage() -> PrandtlIshlinskiiStage {
     let Play { linear, thresholds, weights, corners, bends } = PLAY;
     let (shares, times) = (CREEP.map(|one| one.share), CREEP.map(|one| one.time));
     PrandtlIshlinskiiStage {
-        plays: plays(linear, &thresholds, &weights, &corners, &bends).unwrap(),
+        operator: PlayHysteresis::new(linear, &thresholds, &weights, &corners, &bends).unwrap(),
         relaxation: Relaxation::new(&shares, &times, Dynamics::None).unwrap(),
     }
 }
@@ -267,12 +268,12 @@ fn hysteresis_and_creep_are_undone_to_rounding() {
     let (stage, dt) = (stage(), 0.01);
     let u = path(5000);
     let drive = Drive::new(&u, dt, Hold::First).unwrap();
-    let run = stage.simulate(&drive, stage.at_rest(), NEVER).unwrap().unwrap();
+    let run = stage.simulate(&Experiment::of(&drive, NEVER)).unwrap().unwrap();
     // The simulation's inverse with room for more, and one of just the size that is needed.
-    let roomy = stage.inverse(dt).unwrap();
+    let (roomy, mut first) = stage.inverse(dt, None).unwrap();
     let exact =
         PrandtlIshlinskiiInverse::<3, 1, 2>::new(&PLAY, &CREEP, Dynamics::None, dt).unwrap();
-    let (mut first, mut second) = (roomy.rest(), exact.rest());
+    let mut second = exact.rest();
     let largest = u.iter().fold(0.0, |most, volts| f64::max(most, volts.abs()));
     for (&x, &volts) in run.x.iter().zip(&u) {
         for found in [roomy.step(&mut first, x, 0.0, 0.0), exact.step(&mut second, x, 0.0, 0.0)] {
@@ -287,14 +288,15 @@ fn an_inverse_goes_on_from_where_a_stage_is() {
     let u = path(3000);
     let (before, after) = u.split_at(1111);
     let drive = Drive::new(before, dt, Hold::First).unwrap();
-    let middle = stage.simulate(&drive, stage.at_rest(), NEVER).unwrap().unwrap().last;
+    let middle = stage.simulate(&Experiment::of(&drive, NEVER)).unwrap().unwrap().last;
     let drive = Drive::new(after, dt, Hold::First).unwrap();
-    let run = stage.simulate(&drive, middle, NEVER).unwrap().unwrap();
-    let inverse = stage.inverse(dt).unwrap();
-    let memory = PrandtlIshlinskiiState::from(&middle);
-    assert_eq!(inverse.start(&middle), inverse.start(memory));
+    let run = stage
+        .simulate(&Experiment { initial: Some(&middle), ..Experiment::of(&drive, NEVER) })
+        .unwrap()
+        .unwrap();
+    let (inverse, memory) = stage.inverse(dt, Some(&middle)).unwrap();
     let feedforward = OnlineFeedforward::new(inverse, dt, 0.0, 0.0).unwrap();
-    let mut state = feedforward.start(inverse.start(&middle));
+    let mut state = feedforward.start(memory);
     for (&x, &volts) in run.x.iter().zip(after) {
         let found = feedforward.step(&mut state, &ReferenceSample::new(x));
         assert!((found - volts).abs() < 1e-12 * 40.0, "{found} for {volts}");

@@ -4,9 +4,12 @@
 use nalgebra::{DMatrix, DVector};
 use piezotrack_control::PlayInverse;
 use piezotrack_control::hysteresis::{Operator, Play};
-use piezotrack_core::identify::{DynamicsKind, PlaysRecord, PlaysSettings, identify_plays};
+use piezotrack_core::identify::{DynamicsKind, WeightsRecord, WeightsSettings, identify_weights};
 use piezotrack_core::math::{Rows, nnls};
-use piezotrack_core::models::{Dynamics, Plant, PrandtlIshlinskiiStage, Relaxation, plays};
+use piezotrack_core::models::{
+    Dynamics, Experiment, Model, Plant, PlayHysteresis, PrandtlIshlinskiiStage, Relaxation,
+    StageModel,
+};
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 
 const PLAY: Play<f64, 4, 2> = Play {
@@ -20,7 +23,8 @@ const PLAY: Play<f64, 4, 2> = Play {
 fn stage(dynamics: Dynamics) -> PrandtlIshlinskiiStage {
     let weights = [0.2e-6, 0.1e-6, 0.15e-6];
     PrandtlIshlinskiiStage {
-        plays: plays(1e-6, &[4.0, 10.0, 20.0], &weights, &[30e-6], &[0.1]).unwrap(),
+        operator: PlayHysteresis::new(1e-6, &[4.0, 10.0, 20.0], &weights, &[30e-6], &[0.1])
+            .unwrap(),
         relaxation: Relaxation::new(&[0.01], &[0.3], dynamics).unwrap(),
     }
 }
@@ -87,7 +91,7 @@ fn a_plant_moves_as_the_simulation_does() {
         let stage = stage(dynamics);
         let u = path(2000);
         let drive = Drive::new(&u, 0.01, Hold::First).unwrap();
-        let run = stage.simulate(&drive, stage.at_rest(), NEVER).unwrap().unwrap();
+        let run = stage.simulate(&Experiment::of(&drive, NEVER)).unwrap().unwrap();
         let flow = stage.flow(0.01);
         let mut state = Plant::rest(&stage);
         for k in 1..u.len() {
@@ -101,28 +105,34 @@ fn a_plant_moves_as_the_simulation_does() {
 fn a_fit_finds_what_the_record_was_made_with() {
     let stage = PrandtlIshlinskiiStage {
         relaxation: Relaxation::new(&[], &[], Dynamics::First { time: 0.015 }).unwrap(),
-        plays: plays(1e-6, &[4.0, 10.0, 20.0], &[0.2e-6, 0.0, 0.15e-6], &[], &[]).unwrap(),
+        operator: PlayHysteresis::new(1e-6, &[4.0, 10.0, 20.0], &[0.2e-6, 0.0, 0.15e-6], &[], &[])
+            .unwrap(),
     };
     let u = path(6000);
     for hold in [Hold::First, Hold::Zero] {
         let drive = Drive::new(&u, 0.01, hold).unwrap();
-        let y = stage.simulate(&drive, stage.at_rest(), NEVER).unwrap().unwrap().x;
-        let settings = PlaysSettings {
+        let y = stage.simulate(&Experiment::of(&drive, NEVER)).unwrap().unwrap().x;
+        let settings = WeightsSettings {
             thresholds: vec![4.0, 10.0, 20.0],
             zones: 0,
             times: vec![],
             dynamics: DynamicsKind::First,
             offset: true,
         };
-        let record = PlaysRecord { drive, y: &y, start: 500 };
-        let fit = identify_plays(&record, &settings, NEVER).unwrap().unwrap();
-        let Dynamics::First { time } = fit.stage.relaxation.dynamics else { panic!("no lag") };
+        let record = WeightsRecord { drive, y: &y, start: 500 };
+        let fit =
+            identify_weights(Model::PrandtlIshlinskii, &record, &settings, NEVER).unwrap().unwrap();
+        let time = fit.values.number("time_constant");
         assert!((time - 0.015).abs() < 1e-6, "{time}");
-        for (found, made) in fit.stage.plays.weights.iter().zip(&stage.plays.weights) {
+        let made = [0.2e-6, 0.0, 0.15e-6];
+        for (found, made) in fit.values.list("weights").iter().zip(made) {
             assert!((found - made).abs() < 1e-10, "{found} {made}");
         }
         assert!(fit.rms < 1e-9);
-        assert_eq!(identify_plays(&record, &settings, &|| true).unwrap(), None);
+        assert_eq!(
+            identify_weights(Model::PrandtlIshlinskii, &record, &settings, &|| true).unwrap(),
+            None
+        );
     }
 }
 

@@ -2,12 +2,11 @@
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use piezotrack_core::identify::{
-    Delay, Evaluator, Guess, Monitor, Outcome, Plan, Problem, Progress, Record, Spec,
+    Candidate, Delay, Evaluator, Monitor, Outcome, Plan, Problem, Progress, Record, Spec,
     SwarmSettings, search,
 };
 use piezotrack_core::integrator::{Order, Stepping};
-use piezotrack_core::models::dahl_simulate::{Method, simulate};
-use piezotrack_core::models::{DahlStage, Model, StageState};
+use piezotrack_core::models::{DahlStage, Experiment, Model, StageModel};
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 use pulp::Arch;
 
@@ -17,9 +16,7 @@ fn log() -> (Vec<f64>, Vec<f64>) {
     let u: Vec<f64> = (0..4000).map(|k| 30.0 * (1.0 - (0.02 * f64::from(k)).cos())).collect();
     let drive = Drive::new(&u, DT, Hold::First).unwrap();
     let stage = DahlStage::xu_li_2010();
-    let run = simulate(&stage, &drive, StageState::default(), Method::Exponential, 1e-10, NEVER)
-        .unwrap()
-        .unwrap();
+    let run = stage.simulate(&Experiment::of(&drive, NEVER)).unwrap().unwrap();
     (u, run.x)
 }
 
@@ -28,24 +25,24 @@ fn spec() -> Spec {
         bounds: vec![("damping".into(), (1e3, 5e3)), ("a1".into(), (10.0, 1e3))],
         stiffness: Some(26065.0),
         offset: true,
-        ..Spec::default()
+        ..Spec::of(Model::Dahl)
     }
 }
 
-fn guesses(problem: &Problem) -> Vec<Guess> {
+fn candidates(problem: &Problem) -> Vec<Candidate> {
     let count = problem.free().count();
     (0..23_u32)
         .map(|i| {
             let place: Vec<f64> = (0..count)
                 .map(|d| f64::from((7 * i + 5 * u32::try_from(d).unwrap()) % 23) / 23.0)
                 .collect();
-            Guess { theta: problem.theta(&place), limit: f64::INFINITY }
+            Candidate { theta: problem.theta(&place), limit: f64::INFINITY }
         })
         .collect()
 }
 
-fn bits(evaluator: &Evaluator<'_>, guesses: &[Guess]) -> Vec<(u64, u64)> {
-    let costs = evaluator.costs(guesses, NEVER);
+fn bits(evaluator: &Evaluator<'_>, candidates: &[Candidate]) -> Vec<(u64, u64)> {
+    let costs = evaluator.costs(candidates, NEVER);
     costs.iter().map(|c| (c.rms.to_bits(), c.offset.to_bits())).collect()
 }
 
@@ -64,7 +61,7 @@ fn one_lane_and_many_on_every_instruction_set() {
     let (u, y) = log();
     let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
     let problem = Problem::new(&record, &spec()).unwrap();
-    let asked = guesses(&problem);
+    let asked = candidates(&problem);
     for order in [Order::Second, Order::Fourth] {
         let evaluator = |arch| {
             let mut evaluator = Evaluator::new(&record, &problem, NEVER).on(arch);
@@ -94,7 +91,7 @@ fn one_lane_and_many_with_friction_and_delay() {
     spec.bounds.push(("b0".into(), (-100.0, 400.0)));
     spec.delay = Delay::Between(0.0, 0.02);
     let problem = Problem::new(&record, &spec).unwrap();
-    let asked = guesses(&problem);
+    let asked = candidates(&problem);
     let expected = bits(&Evaluator::new(&record, &problem, NEVER), &asked);
     assert!(expected.iter().filter(|c| f64::from_bits(c.0).is_finite()).count() > 10);
     for arch in instruction_sets() {
@@ -119,10 +116,10 @@ fn one_lane_and_many_of_models_with_an_exponent() {
             stiffness: Some(19567.0),
             offset: true,
             delay: Delay::Between(0.0, 0.02),
-            ..Spec::default()
+            ..Spec::of(Model::Dahl)
         };
         let problem = Problem::new(&record, &spec).unwrap();
-        let asked = guesses(&problem);
+        let asked = candidates(&problem);
         let expected = bits(&Evaluator::new(&record, &problem, NEVER), &asked);
         assert!(expected.iter().filter(|c| f64::from_bits(c.0).is_finite()).count() > 10);
         for arch in instruction_sets() {
@@ -140,10 +137,11 @@ fn abandoning_a_guess_changes_no_result() {
     let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
     let problem = Problem::new(&record, &spec()).unwrap();
     let evaluator = Evaluator::new(&record, &problem, NEVER);
-    let asked = guesses(&problem);
+    let asked = candidates(&problem);
     let whole = evaluator.costs(&asked, NEVER);
     let limit = 2e-6;
-    let limited: Vec<Guess> = asked.iter().map(|guess| Guess { limit, ..*guess }).collect();
+    let limited: Vec<Candidate> =
+        asked.iter().map(|candidate| Candidate { limit, ..*candidate }).collect();
     let (mut kept, mut abandoned) = (0, 0);
     for (cut, whole) in evaluator.costs(&limited, NEVER).iter().zip(&whole) {
         if whole.rms <= limit {
@@ -177,7 +175,7 @@ fn searched(settings: &SwarmSettings, threads: usize, seed: u64, runs: usize) ->
 }
 
 fn assert_same(one: &Outcome, other: &Outcome) {
-    assert_eq!(one.theta.map(f64::to_bits), other.theta.map(f64::to_bits));
+    assert_eq!(one.theta.0.map(f64::to_bits), other.theta.0.map(f64::to_bits));
     assert_eq!(one.history, other.history);
     assert_eq!(one.failures, other.failures);
     assert_eq!(one.evaluations, other.evaluations);

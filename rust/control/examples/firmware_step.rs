@@ -8,12 +8,12 @@
 //! cargo run -p piezotrack-control --example firmware_step
 //! ```
 
-use piezotrack_control::hysteresis::Play;
+use piezotrack_control::hysteresis::{Play, PlayState};
 use piezotrack_control::pid::{PidState, SampledPid};
 use piezotrack_control::{
-    Command, Controller, ControllerState, Creep, Dynamics, Limits, OnlineFeedforward,
-    OnlineFeedforwardState, Pid, PrandtlIshlinskiiInverse, PrandtlIshlinskiiInverseState,
-    ReferenceSample, Repetitive, Result, Smoothing,
+    Command, Controller, ControllerState, Creep, Dynamics, InputInverseState, Limits,
+    OnlineFeedforward, OnlineFeedforwardState, Pid, PrandtlIshlinskiiInverse, ReferenceSample,
+    Repetitive, Result, Smoothing,
 };
 
 /// Sampling interval, s.
@@ -26,7 +26,7 @@ const ROOM: usize = Repetitive::room(SAMPLES as usize);
 
 /// Two play operators, no dead zone, one relaxation.
 type Inverse = PrandtlIshlinskiiInverse<2, 0, 1>;
-type InverseState = PrandtlIshlinskiiInverseState<2, 1>;
+type InverseState = InputInverseState<PlayState<f64, 2>, 1>;
 
 /// One axis: configuration and state, of a size known to the compiler.
 struct Axis {

@@ -5,8 +5,7 @@ use std::ops::ControlFlow;
 
 use piezotrack_core::Result;
 use piezotrack_core::identify::{Plan, Progress, Record, Spec, SwarmSettings, identify};
-use piezotrack_core::models::dahl_simulate::{Method, simulate};
-use piezotrack_core::models::{DAHL_PARAMETERS, DahlStage, StageState};
+use piezotrack_core::models::{DahlStage, Experiment, Model, StageModel};
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 
 const DT: f64 = 1e-3;
@@ -16,7 +15,7 @@ fn main() -> Result<()> {
     let u: Vec<f64> = (0..4001).map(|k| 37.5 * (1.0 - (turn * f64::from(k)).cos())).collect();
     let drive = Drive::new(&u, DT, Hold::First)?;
     let stage = DahlStage::xu_li_2010();
-    let run = simulate(&stage, &drive, StageState::default(), Method::Exponential, 1e-10, NEVER)?;
+    let run = stage.simulate(&Experiment::of(&drive, NEVER))?;
     let y = run.map(|run| run.x).unwrap_or_default();
 
     let record = Record::new(&u, &y, DT, Hold::First, 0)?;
@@ -27,7 +26,7 @@ fn main() -> Result<()> {
             ("b1".into(), stage.b1),
             ("mass".into(), stage.mechanics.mass),
         ],
-        ..Spec::default()
+        ..Spec::of(Model::Dahl)
     };
     let plan = Plan { settings: SwarmSettings::xu_li_2010(), seed: 1, runs: 4 };
     let mut quiet = |_: &Progress| ControlFlow::Continue(());
@@ -36,7 +35,7 @@ fn main() -> Result<()> {
         println!("cost {:.3e} m after {} iterations", run.costs.rms, run.iterations);
     }
     if let Some(best) = found.best {
-        for (info, value) in DAHL_PARAMETERS.iter().zip(found.runs[best].theta) {
+        for (info, value) in DahlStage::INFO.parameters.iter().zip(found.runs[best].theta.0) {
             println!("{:<18} {value:>14.6e} {}", info.name, info.unit);
         }
     }

@@ -4,7 +4,7 @@
 //! of Python, prints nothing, and returns an [`Error`] where an argument cannot be used.
 //!
 //! The modules are layers. Each uses those before it in this list, and none after it: [`error`],
-//! [`math`], [`signal`], [`integrator`], [`models`], [`design`], [`simulate`], [`identify`].
+//! [`math`], [`signal`], [`integrator`], [`design`], [`models`], [`simulate`], [`identify`].
 #![forbid(unsafe_code)]
 
 pub mod design;

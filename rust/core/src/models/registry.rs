@@ -150,6 +150,7 @@ macro_rules! models {
 
         /// State of a [`Stage`].
         #[derive(Clone, Debug)]
+        #[expect(clippy::large_enum_variant, reason = "one in an experiment")]
         #[expect(missing_docs, reason = "one for each model")]
         pub enum StageState {
             $($variant(<$stage as Plant>::State),)*

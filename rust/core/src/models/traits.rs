@@ -12,6 +12,9 @@ use crate::error::{Error, Result};
 use crate::integrator::{Instant, Kernel, Motion, Order, Parameters};
 use crate::signal::{Drive, Stop};
 
+/// Published parameters: their name, and what makes them.
+pub type Published = (&'static str, fn() -> Values);
+
 /// Name and parts of a model.
 #[derive(Clone, Copy)]
 pub struct ModelInfo {
@@ -26,7 +29,7 @@ pub struct ModelInfo {
     /// Its state: displacement and velocity, and what the hysteresis remembers.
     pub state: &'static [ParameterInfo],
     /// Published parameters by a name.
-    pub published: &'static [(&'static str, fn() -> Values)],
+    pub published: &'static [Published],
 }
 
 impl fmt::Debug for ModelInfo {
@@ -174,6 +177,7 @@ pub trait Searchable: StageModel {
     fn kernel<V: KernelVisitor>(held: &Held, order: Order, visitor: V) -> V::Output;
 
     /// Whether there is a kernel of second order too.
+    #[must_use]
     fn has_second_order(_held: &Held) -> bool {
         false
     }

@@ -35,6 +35,7 @@ pub trait WeightedPlays: StageModel {
     type Envelope: Clone;
 
     /// Ranges of the envelope's numbers, which are searched around the least squares.
+    #[must_use]
     fn shapes() -> Vec<(f64, f64)> {
         Vec::new()
     }

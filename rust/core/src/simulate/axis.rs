@@ -21,7 +21,6 @@ pub enum Axis {
 
 /// State of an [`Axis`].
 #[derive(Clone, Debug)]
-#[expect(clippy::large_enum_variant, reason = "two in an experiment")]
 pub enum AxisState {
     /// Of a model.
     Model(StageState),
@@ -31,7 +30,6 @@ pub enum AxisState {
 
 /// Steps of an [`Axis`].
 #[expect(missing_debug_implementations, reason = "numbers of a step")]
-#[expect(clippy::large_enum_variant, reason = "two in an experiment")]
 pub enum AxisFlow {
     /// Of a model.
     Model(StageFlow),
