@@ -86,7 +86,7 @@ fn ringing(gain: f64, frequency: f64, lag: f64) -> f64 {
     settings.frequency = frequency;
     settings.play.linear = 1.0;
     settings.play.weights = [0.0; PLAYS];
-    settings.play.bends = [0.0; DEAD_ZONES];
+    settings.play.dead_zone_weights = [0.0; DEAD_ZONES];
     settings.creep = [Creep { share: 0.0, time: 1.0 }; RELAXATIONS];
     settings.amplifier = Amplifier { bandwidth: 1.0 / (TAU * lag), ..Amplifier::IDEAL };
     settings.sensor = Sensor::IDEAL;
@@ -103,8 +103,8 @@ fn ringing(gain: f64, frequency: f64, lag: f64) -> f64 {
 
 #[test]
 fn the_sampled_loop_is_stable_up_to_the_gains_known_without_hysteresis() {
-    // Limits computed apart: overall gain in um/V by frequency and amplifier lag. Its sample of delay is
-    // that of the hold: a command acts at once, and shows in the next reading.
+    // Limits computed apart: overall gain in um/V by frequency and amplifier lag. Its sample of
+    // delay is that of the hold: a command acts at once, and shows in the next reading.
     for (limit, frequency, lag) in [
         (2.34, 150.0, 0.0),
         (2.21, 155.0, 0.0),

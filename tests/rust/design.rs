@@ -88,7 +88,9 @@ fn slowest_roots_with_repetitive_control() {
         println!("static plant: {gain}");
         close(gain, 1.21, 0.01);
         // What runs by default forgets, and has no hidden root
-        let part = Repetitive { leak: 0.99, ..Repetitive::xu_li_2010(period) }.at(DT).unwrap();
+        let part = Repetitive { forgetting_factor: 0.99, ..Repetitive::xu_li_2010(period) }
+            .at(DT)
+            .unwrap();
         let one = SampledLoop::new(&table_1(), &published(), &[], Some(&part), DT).unwrap();
         let verdict = one.check().unwrap();
         assert!(verdict.stable && verdict.hidden == 0 && verdict.small_gain.unwrap() < 0.999);
@@ -360,9 +362,9 @@ fn hidden_root_is_at_exactly_one() {
         let within = roots.iter().filter(|root| root.norm() > 0.9).count();
         assert_eq!(one.roots_outside(0.9), Some(within));
     }
-    // A leak moves it inside, where it is found again and set apart
+    // A forgetting factor moves it inside, where it is found again and set apart
     for (period, gain) in [(12.0, 0.9e-6), (24.5, 1.0e-6)] {
-        let part = Repetitive { leak: 0.95, ..Repetitive::xu_li_2010(period * DT) };
+        let part = Repetitive { forgetting_factor: 0.95, ..Repetitive::xu_li_2010(period * DT) };
         let part = part.at(DT).unwrap();
         let plant = LoopPlant::fixed_gain(gain).unwrap();
         let one = SampledLoop::new(&plant, &published(), &[], Some(&part), DT).unwrap();

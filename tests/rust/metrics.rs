@@ -123,7 +123,8 @@ fn bad_records_are_refused() {
 
 #[test]
 fn information_criteria_prefer_what_pays_for_its_parameters() {
-    // A sine of amplitude a has the mean square a^2/2 and, at w dt apart, the correlation cos(w dt).
+    // A sine of amplitude a has the mean square a^2/2 and, at w dt apart, the correlation cos(w
+    // dt).
     let errors: Vec<f64> = (0..1000).map(|k| (TAU * f64::from(k) / 50.0).sin()).collect();
     let seven = residual(&errors, 7).unwrap();
     assert!((seven.rms - 0.5_f64.sqrt()).abs() < 1e-12 && (seven.max - 1.0).abs() < 2e-3);

@@ -241,8 +241,8 @@ const PLAY: Play<f64, 3, 1> = Play {
     linear: 1e-6,
     thresholds: [4.0, 10.0, 20.0],
     weights: [0.2e-6, 0.1e-6, 0.15e-6],
-    corners: [30e-6],
-    bends: [0.1],
+    dead_zone_thresholds: [30e-6],
+    dead_zone_weights: [0.1],
 };
 const MODE: Dynamics = Dynamics::Second { frequency: 300.0, damping_ratio: 0.05 };
 
@@ -255,10 +255,17 @@ fn path(count: u32) -> Vec<f64> {
 const CREEP: [Creep; 2] = [Creep { share: 0.02, time: 0.03 }, Creep { share: 0.01, time: 2.0 }];
 
 fn stage() -> PrandtlIshlinskiiStage {
-    let Play { linear, thresholds, weights, corners, bends } = PLAY;
+    let Play { linear, thresholds, weights, dead_zone_thresholds, dead_zone_weights } = PLAY;
     let (shares, times) = (CREEP.map(|one| one.share), CREEP.map(|one| one.time));
     PrandtlIshlinskiiStage {
-        operator: PlayHysteresis::new(linear, &thresholds, &weights, &corners, &bends).unwrap(),
+        operator: PlayHysteresis::new(
+            linear,
+            &thresholds,
+            &weights,
+            &dead_zone_thresholds,
+            &dead_zone_weights,
+        )
+        .unwrap(),
         relaxation: Relaxation::new(&shares, &times, Dynamics::None).unwrap(),
     }
 }
@@ -337,7 +344,7 @@ fn stages_without_an_inverse_are_refused() {
     let none = Dynamics::None;
     assert_eq!(refused(PLAY, &[], none, 0.0), "dt");
     assert_eq!(refused(PLAY, &CREEP, none, 1e-3), "creep");
-    assert_eq!(refused(PLAY, &[Creep { share: -0.1, time: 1.0 }], none, 1e-3), "creep_shares");
+    assert_eq!(refused(PLAY, &[Creep { share: -0.1, time: 1.0 }], none, 1e-3), "creep_weights");
     assert_eq!(refused(PLAY, &[Creep { share: 0.1, time: 0.0 }], none, 1e-3), "creep_times");
     assert_eq!(refused(PLAY, &[], Dynamics::First { time: -PI }, 1e-3), "time_constant");
     assert_eq!(refused(Play { linear: 0.0, ..PLAY }, &[], none, 1e-3), "linear");

@@ -6,8 +6,13 @@ use piezotrack_core::simulate::{StagePlay, VirtualSettings};
 
 type Single = Play<f64, 1, 0>;
 
-const ONE: Single =
-    Single { linear: 0.0, thresholds: [3.0], weights: [1.0], corners: [], bends: [] };
+const ONE: Single = Single {
+    linear: 0.0,
+    thresholds: [3.0],
+    weights: [1.0],
+    dead_zone_thresholds: [],
+    dead_zone_weights: [],
+};
 
 fn stage_play() -> StagePlay {
     VirtualSettings::xu_li_2010(1).play
@@ -96,7 +101,7 @@ fn dead_zones_alone_break_the_symmetry() {
     let mut play = stage_play();
     let (rising, falling) = ends(&play, 25.0);
     assert!((rising - falling).abs() > 0.5, "{rising} {falling}");
-    play.bends = [0.0, 0.0];
+    play.dead_zone_weights = [0.0, 0.0];
     let (rising, falling) = ends(&play, 25.0);
     assert!((rising - falling).abs() < 1e-12);
 }

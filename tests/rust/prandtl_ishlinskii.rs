@@ -16,8 +16,8 @@ const PLAY: Play<f64, 4, 2> = Play {
     linear: 0.6,
     thresholds: [1.0, 2.5, 6.0, 12.0],
     weights: [0.2, 0.1, 0.0, 0.25],
-    corners: [-5.0, 8.0],
-    bends: [0.15, -0.2],
+    dead_zone_thresholds: [-5.0, 8.0],
+    dead_zone_weights: [0.15, -0.2],
 };
 
 fn stage(dynamics: Dynamics) -> PrandtlIshlinskiiStage {
@@ -79,9 +79,9 @@ fn operators_without_an_inverse_are_refused() {
     assert_eq!(refused(Play { linear: 0.0, ..PLAY }), "linear");
     assert_eq!(refused(Play { weights: [0.1, -0.1, 0.0, 0.0], ..PLAY }), "weights");
     assert_eq!(refused(Play { thresholds: [2.0, 1.0, 3.0, 4.0], ..PLAY }), "thresholds");
-    assert_eq!(refused(Play { corners: [1.0, 0.0], ..PLAY }), "corners");
-    assert_eq!(refused(Play { bends: [-0.6, -0.6], ..PLAY }), "bends");
-    assert_eq!(refused(Play { bends: [f64::NAN, 0.0], ..PLAY }), "bends");
+    assert_eq!(refused(Play { dead_zone_thresholds: [1.0, 0.0], ..PLAY }), "dead_zone_thresholds");
+    assert_eq!(refused(Play { dead_zone_weights: [-0.6, -0.6], ..PLAY }), "dead_zone_weights");
+    assert_eq!(refused(Play { dead_zone_weights: [f64::NAN, 0.0], ..PLAY }), "dead_zone_weights");
 }
 
 #[test]

@@ -6,7 +6,8 @@ use piezotrack_control::hysteresis::{Dahl, DahlState, Operator};
 use piezotrack_core::integrator::{Mechanics, Propagator, halvings};
 
 fn exponential(m: &Mechanics, h: f64) -> Matrix6<f64> {
-    // [x, w = h v] under the force f0 + f1 s + c2 s^2 + c3 s^3 as the states of a longer system in s.
+    // [x, w = h v] under the force f0 + f1 s + c2 s^2 + c3 s^3 as the states of a longer system in
+    // s.
     let mut a = Matrix6::zeros();
     a[(0, 1)] = 1.0;
     a[(1, 0)] = -h * h * m.stiffness / m.mass;

@@ -121,7 +121,7 @@ fn hidden_root_drifts_under_saturation_in_the_papers_form_only() {
         let paper = Repetitive::xu_li_2010(period);
         let ours = Repetitive::new(period, lag(0.2, false), 1.0).unwrap();
         let run = |learner, periods| track(Some(learner), (6.0, 28.0), 1.0e-6, n, periods);
-        // The leak forgets within some 100 periods.
+        // The forgetting factor forgets within some 100 periods.
         let (paper, ours) = (run(paper, 98.0), run(ours, 1000.0));
         let late = |commands: &[Command], share: usize| {
             let end = commands.len() / share;
@@ -158,7 +158,7 @@ fn fractional_periods_learn() {
             let learner = samples.map(|samples| {
                 let kq = 0.3;
                 let new = Repetitive::new(samples * DT, smoothing, kq).unwrap();
-                Repetitive { leak: 1.0, lead: 1, ..new }
+                Repetitive { forgetting_factor: 1.0, lead: 1, ..new }
             });
             let run = track(learner, WIDE, 0.6e-6, period, 200.0);
             largest(&run[run.len() - 400..], |command| command.error)
@@ -205,7 +205,10 @@ fn settings_are_refused_by_name() {
     assert_eq!(new(5.0, lag(0.0, false), 1.0).unwrap_err().name, "tq");
     assert_eq!(new(5.0, Smoothing::ZeroPhase { order: 5 }, 1.0).unwrap_err().name, "order");
     let good = new(5.0, smoothing, 1.0).unwrap();
-    assert_eq!(Repetitive { leak: 1.01, ..good }.at(DT).unwrap_err().name, "leak");
+    assert_eq!(
+        Repetitive { forgetting_factor: 1.01, ..good }.at(DT).unwrap_err().name,
+        "forgetting_factor"
+    );
     assert_eq!(Repetitive { lead: 251, ..good }.at(DT).unwrap_err().name, "lead");
     assert!(Repetitive { lead: 250, ..good }.at(DT).is_ok());
     assert_eq!(good.at(0.0).unwrap_err().name, "dt");

@@ -10,8 +10,8 @@ use piezotrack_core::signal::contour_error::radial_errors;
 use piezotrack_core::signal::metrics::Spread;
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 use piezotrack_core::simulate::{
-    Apparatus, ApparatusState, Course, Law, Timing, TwoAxes, VirtualSettings, VirtualStage,
-    open_loops, track, track_both,
+    Apparatus, ApparatusState, Law, ReferenceSamples, Timing, TwoAxes, VirtualSettings,
+    VirtualStage, open_loops, track, track_both,
 };
 
 const UM: f64 = 1e-6;
@@ -91,7 +91,8 @@ fn without_cross_talk_and_lag_each_axis_is_alone() {
     let (to_x, to_y) =
         (wave(150, 50.0 * UM, 10.0 * UM, 0.5, 0.0), wave(150, 40.0 * UM, 20.0 * UM, 0.5, 1.0));
     let none = vec![0.0; 150];
-    let courses = [&to_x, &to_y].map(|reference| Course { reference, feedforward: &none });
+    let courses =
+        [&to_x, &to_y].map(|reference| ReferenceSamples { reference, feedforward: &none });
     for (delay, substeps) in [(0.0, 1), (0.7e-3, 10), (0.027, 3)] {
         let timing = timing(delay, substeps);
         let axes = TwoAxes { x, y, cross_talk: [0.0, 0.0], lag: 0.0 };
@@ -120,7 +121,8 @@ fn a_lag_makes_the_ellipse_of_its_angle() {
         (wave(1001, 0.0, radius, frequency, 0.0), wave(1001, 0.0, radius, frequency, TAU / 4.0));
     for (whole, intervals) in [(1, 1.0), (2, 2.0), (5, 5.0)] {
         let axes = TwoAxes { x: axis, y: axis, cross_talk: [0.0, 0.0], lag: intervals * TS };
-        let courses = [&cosine, &sine].map(|volts| Course { reference: volts, feedforward: volts });
+        let courses =
+            [&cosine, &sine].map(|volts| ReferenceSamples { reference: volts, feedforward: volts });
         let start = (axis.rest(), axis.rest());
         let run = track_both(&axes, start, &timing(0.0, 1), (&open(), &open()), courses, NEVER);
         let (x, y) = run.unwrap().unwrap();
@@ -151,7 +153,7 @@ fn late_axes_without_cross_talk_and_lag_move_as_each_alone() {
     let (stage, other) = (VirtualStage::xu_li_2010(3), VirtualStage::xu_li_2010_y(4));
     let (x, y) = (stage.apparatus(), other.apparatus());
     let reference = wave(150, 50.0 * UM, 10.0 * UM, 0.5, 0.0);
-    let course = Course { reference: &reference, feedforward: &vec![0.0; 150] };
+    let course = ReferenceSamples { reference: &reference, feedforward: &vec![0.0; 150] };
     for (delay, jitter, substeps) in [(0.0, 2e-3, 1), (0.027, 4e-3, 3)] {
         let timing = Timing { jitter, ..timing(delay, substeps) };
         let axes = TwoAxes { x, y, cross_talk: [0.0, 0.0], lag: 0.0 };
@@ -182,7 +184,7 @@ fn each_axis_is_late_by_its_own_time() {
     let axes = TwoAxes { x: seeded(&x), y: seeded(&y), cross_talk: [0.0; 2], lag: 0.0 };
     let ones = vec![1.0; 3000];
     let zeros = vec![0.0; 3000];
-    let course = Course { reference: &zeros, feedforward: &ones };
+    let course = ReferenceSamples { reference: &zeros, feedforward: &ones };
     let lateness = |lag: f64| {
         let timing = Timing { jitter: 2e-3, ..timing(0.0, 1) };
         let axes = TwoAxes { lag, ..axes };
@@ -225,7 +227,7 @@ fn a_lag_of_a_part_of_an_interval_is_kept_to_the_instant() {
     let plant = Rigid;
     let axis = Apparatus::bare(&plant, 1.0);
     let steps: Vec<f64> = (0..20).map(|k| f64::from(k % 2)).collect();
-    let course = Course { reference: &steps, feedforward: &steps };
+    let course = ReferenceSamples { reference: &steps, feedforward: &steps };
     for (lag, delay) in [(3, 0), (0, 3), (2, 1), (3, 4), (13, 0), (9, 22)] {
         // In tenths of an interval.
         let seconds = |tenths: usize| 0.1 * TS * tenths as f64;
@@ -265,8 +267,8 @@ fn cross_talk_mixes_what_the_sensors_see() {
     // Under integrating feedback both readings settle where they should in spite of it.
     let level = [vec![20.0 * UM; 400], vec![60.0 * UM; 400]];
     let none = vec![0.0; 400];
-    let courses =
-        [0, 1].map(|i| Course { reference: level[i].as_slice(), feedforward: none.as_slice() });
+    let courses = [0, 1]
+        .map(|i| ReferenceSamples { reference: level[i].as_slice(), feedforward: none.as_slice() });
     let integral = Law::Pid(Pid::new(0.3e6, 0.02, 0.0, None).unwrap().at(TS).unwrap());
     let loops = Controller::new(Limits::new(-100.0, 100.0).unwrap(), integral);
     let run = track_both(
@@ -358,7 +360,7 @@ fn a_run_stops_when_told() {
     let axis = Apparatus::bare(&plant, 1.0);
     let axes = TwoAxes { x: axis, y: axis, cross_talk: [0.0, 0.0], lag: 0.01 };
     let volts = [1.0; 9];
-    let course = Course { reference: &volts, feedforward: &volts };
+    let course = ReferenceSamples { reference: &volts, feedforward: &volts };
     let start = (axis.rest(), axis.rest());
     let stop = &|| true;
     let run = track_both(&axes, start, &timing(0.0, 1), (&open(), &open()), [course; 2], stop);

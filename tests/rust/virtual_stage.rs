@@ -248,8 +248,14 @@ fn settings_out_of_range_are_named() {
     };
     assert!(refused(|s| s.gain = 0.0).starts_with("gain is 0 m/V"));
     assert!(refused(|s| s.play.weights[3] = -1.0).starts_with("weights[3] is -1"));
-    assert!(refused(|s| s.play.bends[1] = -1.06).starts_with("bends[1] is -1.06"));
-    assert!(refused(|s| s.play.corners[1] = 1.0).starts_with("corners[1] is 1 V"));
+    assert!(
+        refused(|s| s.play.dead_zone_weights[1] = -1.06)
+            .starts_with("dead_zone_weights[1] is -1.06")
+    );
+    assert!(
+        refused(|s| s.play.dead_zone_thresholds[1] = 1.0)
+            .starts_with("dead_zone_thresholds[1] is 1 V")
+    );
     assert!(refused(|s| s.creep[2].time = f64::NAN).starts_with("creep_time[2] is NaN s"));
     assert!(refused(|s| s.amplifier.slew = 0.0).starts_with("slew is 0 V/s"));
     assert!(refused(|s| s.amplifier.low = 80.0).starts_with("limits is 80 V to 75 V"));

@@ -43,8 +43,8 @@ impl Axis {
             linear: 1.2e-6,            // m/V
             thresholds: [5.0, 15.0],   // V
             weights: [0.2e-6, 0.1e-6], // m/V
-            corners: [],
-            bends: [],
+            dead_zone_thresholds: [],
+            dead_zone_weights: [],
         };
         let creep = [Creep { share: 0.01, time: 0.5 }];
         let dynamics = Dynamics::First { time: 2e-3 };

@@ -121,7 +121,7 @@ impl<const N: usize> CreepInverse<N> {
     /// The inverse of these relaxations for samples every `dt` seconds.
     ///
     /// # Errors
-    /// Names `creep` where there are more than `N`; `creep_shares`, `creep_times` or `dt` where
+    /// Names `creep` where there are more than `N`; `creep_weights`, `creep_times` or `dt` where
     /// one is out of its range.
     pub fn new(creep: &[Creep], dt: f64) -> Result<Self> {
         positive("dt", dt, "s")?;
@@ -132,7 +132,7 @@ impl<const N: usize> CreepInverse<N> {
         }
         let mut used = [Creep { share: 0.0, time: 1.0 }; N];
         for (slot, one) in used.iter_mut().zip(creep) {
-            slot.share = not_negative("creep_shares", one.share, "")?;
+            slot.share = not_negative("creep_weights", one.share, "")?;
             slot.time = positive("creep_times", one.time, "s")?;
         }
         let lags = used.map(|one| Lag::new(one.time, dt));

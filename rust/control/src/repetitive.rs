@@ -7,7 +7,7 @@
 //! Xu and Li 2010, equations (26) to (28), doi 10.1115/1.4001712. The printed recursion, (29) and
 //! (30), has a common factor that is not cancelled and coefficients of four digits: its pole at
 //! 1.000172 grows by 4.4 % in a period. Here the delay line stores the sum `uRC + Kq e`, so that
-//! one line is enough; the filter Q, the leak and a fractional delay are taps on it.
+//! one line is enough; the filter Q, the forgetting factor and a fractional delay are taps on it.
 
 use crate::error::{Error, Result, check, positive};
 
@@ -40,7 +40,8 @@ pub enum Smoothing {
         /// Order, 1 to 4.
         order: u32,
     },
-    /// Q = leak: all frequencies are learnt, which is stable only for a plant without delay.
+    /// Q = the forgetting factor: all frequencies are learnt, which is stable only for a plant
+    /// without delay.
     None,
 }
 
@@ -51,7 +52,7 @@ pub enum Smoothing {
 /// | `period` | L | s | two samples or more | |
 /// | `smoothing` | Q, Tq | s | | |
 /// | `kq` | Kq | V/um | 0 < Kq < 2 | |
-/// | `leak` | Q(1) | 1 | 0 < Q(1) <= 1 | 0.99 |
+/// | `forgetting_factor` | Q(1) | 1 | 0 < Q(1) <= 1 | 0.99 |
 /// | `lead` | m | samples | shorter than the period | 0 |
 /// | `pause` | | | | true |
 ///
@@ -59,8 +60,8 @@ pub enum Smoothing {
 /// 0 < Kq < 2, holds for errors in um. The bound is necessary, not sufficient.
 ///
 /// With an integrator in the feedback the loop has a root at exactly 1: constant parts of uRC and
-/// uFB that cancel each other are not observable, and they drift under saturation. `leak` below 1
-/// and `pause` (no learning from saturated samples) prevent this.
+/// uFB that cancel each other are not observable, and they drift under saturation.
+/// `forgetting_factor` below 1 and `pause` (no learning from saturated samples) prevent this.
 ///
 /// ```
 /// use piezotrack_control::{Repetitive, Smoothing};
@@ -81,7 +82,7 @@ pub struct Repetitive {
     /// Learning gain Kq, V/um.
     pub kq: f64,
     /// Q(1), the share of a constant that is kept from period to period.
-    pub leak: f64,
+    pub forgetting_factor: f64,
     /// Number of samples by which an error is stored earlier, to compensate the delay of the
     /// plant. The voltage stored beside it is not shifted: that would change the period.
     pub lead: u32,
@@ -95,18 +96,20 @@ impl Repetitive {
     /// # Errors
     /// Names the parameter that is out of its range.
     pub fn new(period: f64, smoothing: Smoothing, kq: f64) -> Result<Self> {
-        let settings = Self { period, smoothing, kq, leak: 0.99, lead: 0, pause: true };
+        let settings =
+            Self { period, smoothing, kq, forgetting_factor: 0.99, lead: 0, pause: true };
         settings.check()?;
         Ok(settings)
     }
 
-    /// The paper's form: Tq = 0.2 s, Kq = 1.0 V/um, no leak, no pause under saturation.
+    /// The paper's form: Tq = 0.2 s, Kq = 1.0 V/um, no forgetting factor, no pause under
+    /// saturation.
     ///
     /// Xu and Li 2010, section 4.3, with L = 5 s for 0.2 Hz and 2 s for 0.5 Hz.
     #[must_use]
     pub fn xu_li_2010(period: f64) -> Self {
         let smoothing = Smoothing::Lag { tq: 0.2, compensated: false };
-        Self { period, smoothing, kq: 1.0, leak: 1.0, lead: 0, pause: false }
+        Self { period, smoothing, kq: 1.0, forgetting_factor: 1.0, lead: 0, pause: false }
     }
 
     /// Entries that suffice for a period of `period` samples (rounded up), for a fixed-size array.
@@ -119,8 +122,8 @@ impl Repetitive {
         positive("period", self.period, "s")?;
         let right = self.kq > 0.0 && self.kq < 2.0;
         check("kq", self.kq, "V/um", right, "a gain above 0 and below 2, not included")?;
-        let right = self.leak > 0.0 && self.leak <= 1.0;
-        check("leak", self.leak, "", right, "a gain above 0, at most 1")?;
+        let right = self.forgetting_factor > 0.0 && self.forgetting_factor <= 1.0;
+        check("forgetting_factor", self.forgetting_factor, "", right, "a gain above 0, at most 1")?;
         match self.smoothing {
             Smoothing::Lag { tq, .. } => positive("tq", tq, "s").map(drop),
             Smoothing::ZeroPhase { order } => {
@@ -188,7 +191,7 @@ impl Repetitive {
         };
         let cubic = if reads == 1 { [1.0, 0.0, 0.0, 0.0] } else { lagrange(part) };
         let mut taps = [0.0; TAPS];
-        let gain = self.leak * (1.0 - pole);
+        let gain = self.forgetting_factor * (1.0 - pole);
         for (i, read) in cubic.iter().take(reads).enumerate() {
             for j in 0..=2 * half {
                 taps[i + j] += gain * read * q[j.abs_diff(half)];

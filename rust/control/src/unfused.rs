@@ -8,9 +8,9 @@ use crate::Number;
 /// without a fused instruction `f64::mul_add` is a call of a slow library function, and those of
 /// one step would take longer than the rest of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plain(pub f64);
+pub struct Unfused(pub f64);
 
-impl Add for Plain {
+impl Add for Unfused {
     type Output = Self;
 
     #[inline(always)]
@@ -19,7 +19,7 @@ impl Add for Plain {
     }
 }
 
-impl Sub for Plain {
+impl Sub for Unfused {
     type Output = Self;
 
     #[inline(always)]
@@ -28,7 +28,7 @@ impl Sub for Plain {
     }
 }
 
-impl Mul for Plain {
+impl Mul for Unfused {
     type Output = Self;
 
     #[inline(always)]
@@ -37,7 +37,7 @@ impl Mul for Plain {
     }
 }
 
-impl Div for Plain {
+impl Div for Unfused {
     type Output = Self;
 
     #[inline(always)]
@@ -46,7 +46,7 @@ impl Div for Plain {
     }
 }
 
-impl Neg for Plain {
+impl Neg for Unfused {
     type Output = Self;
 
     #[inline(always)]
@@ -55,7 +55,7 @@ impl Neg for Plain {
     }
 }
 
-impl Number for Plain {
+impl Number for Unfused {
     #[inline(always)]
     fn like(self, value: f64) -> Self {
         Self(value)

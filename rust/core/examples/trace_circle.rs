@@ -6,7 +6,7 @@ use piezotrack_control::{Controller, DahlInverse, Limits, Pid};
 use piezotrack_core::signal::NEVER;
 use piezotrack_core::signal::contour_error::radial_errors;
 use piezotrack_core::signal::metrics::Spread;
-use piezotrack_core::simulate::{Course, Law, Timing, TwoAxes, VirtualStage, track_both};
+use piezotrack_core::simulate::{Law, ReferenceSamples, Timing, TwoAxes, VirtualStage, track_both};
 
 const INTERVAL: f64 = 0.02;
 const FREQUENCY: f64 = 0.1;
@@ -49,8 +49,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for (radius, published) in [(10e-6, 0.184), (20e-6, 0.300), (40e-6, 0.472)] {
         let coordinates =
             [coordinate(radius, 0.0)?, coordinate(radius, -0.25 * core::f64::consts::TAU)?];
-        let courses = [0, 1]
-            .map(|i| Course { reference: &coordinates[i][0], feedforward: &coordinates[i][1] });
+        let courses = [0, 1].map(|i| ReferenceSamples {
+            reference: &coordinates[i][0],
+            feedforward: &coordinates[i][1],
+        });
         let timing = Timing {
             interval: INTERVAL,
             samples: courses[0].reference.len(),

@@ -5,7 +5,7 @@
 use piezotrack_control::{Controller, DahlInverse, Limits, Pid};
 use piezotrack_core::signal::NEVER;
 use piezotrack_core::signal::metrics::tracking;
-use piezotrack_core::simulate::{Course, Law, Timing, VirtualStage, track};
+use piezotrack_core::simulate::{Law, ReferenceSamples, Timing, VirtualStage, track};
 
 const INTERVAL: f64 = 0.02;
 const FREQUENCY: f64 = 0.2;
@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             jitter: 0.0,
             substeps: 1,
         };
-        let course = Course { reference: &reference, feedforward };
+        let course = ReferenceSamples { reference: &reference, feedforward };
         let run = track(&stage.apparatus(), stage.start(), &timing, &controller, course, NEVER)?;
         let Some(run) = run else { continue };
         let measured = &run.motion.measured;

@@ -20,7 +20,7 @@ type PidGains = (f64, f64, f64, Option<f64>);
 /// A row by row, B, C, D, and the vector of back-calculation where it is given.
 type Matrices = (Vec<f64>, Vec<f64>, Vec<f64>, f64, Option<Vec<f64>>);
 
-/// period, kq, smoothing by its name, its number, leak, lead, pause.
+/// period, kq, smoothing by its name, its number, forgetting factor, lead, pause.
 type RepetitiveSettings = (f64, f64, String, f64, f64, u32, bool);
 
 /// A controller for one sampling interval.
@@ -92,7 +92,7 @@ fn law(dt: f64, pid: Option<PidGains>, state_space: Option<Matrices>) -> Result<
 
 /// A repetitive part from plain numbers.
 pub fn repetitive_from(settings: RepetitiveSettings) -> Result<Repetitive> {
-    let (period, kq, smoothing, number, leak, lead, pause) = settings;
+    let (period, kq, smoothing, number, forgetting_factor, lead, pause) = settings;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked there")]
     let smoothing = match smoothing.as_str() {
         "lag" => Smoothing::Lag { tq: number, compensated: false },
@@ -104,7 +104,7 @@ pub fn repetitive_from(settings: RepetitiveSettings) -> Result<Repetitive> {
             return Err(Error::parameter("smoothing", format!("'{other}'"), expected));
         }
     };
-    Ok(Repetitive { leak, lead, pause, ..Repetitive::new(period, smoothing, kq)? })
+    Ok(Repetitive { forgetting_factor, lead, pause, ..Repetitive::new(period, smoothing, kq)? })
 }
 
 /// A filter from its name and three numbers.

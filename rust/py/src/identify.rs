@@ -225,7 +225,8 @@ impl PySearch {
 }
 
 /// Identifies a stage, its `delay` between two bounds, known where they are equal, or
-/// between bounds of its own choice where there are none; None where the search was stopped before its first cost.
+/// between bounds of its own choice where there are none; None where the search was stopped before
+/// its first cost.
 #[pyfunction]
 #[pyo3(signature = (*, model, u, y, dt, hold_name, start, free, fixed, bounds, stiffness, offset,
     delay, settings, seed, runs, threads, callback, progress))]

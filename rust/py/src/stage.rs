@@ -17,7 +17,7 @@ use crate::control::PyController;
 use crate::design::PyLoopPlant;
 use crate::enter::enter;
 use crate::errors::raise;
-use crate::tracking::{Arrays, Pace, PyTracked, stopped};
+use crate::tracking::{Arrays, PyTrackingRun, Sampling, stopped};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyStage>()?;
@@ -187,10 +187,10 @@ impl PyStage {
         controller: &PyController,
         reference: &Bound<'_, PyAny>,
         feedforward: &Bound<'_, PyAny>,
-        pace: Pace,
-    ) -> PyResult<PyTracked> {
+        sampling: Sampling,
+    ) -> PyResult<PyTrackingRun> {
         let course = Arrays::new(reference, feedforward)?;
-        enter(py, |stop| course.run(&self.axis(step), controller, pace, stop))
+        enter(py, |stop| course.run(&self.axis(step), controller, sampling, stop))
     }
 
     /// The stage for small motions between two voltages: least, middle and largest gain.

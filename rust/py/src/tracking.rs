@@ -3,7 +3,7 @@
 use numpy::{PyArray1, ToPyArray};
 use piezotrack_core::signal::Stop;
 use piezotrack_core::signal::metrics::{self, Tracking};
-use piezotrack_core::simulate::{Axis, Course, Timing, Tracked, track};
+use piezotrack_core::simulate::{Axis, ReferenceSamples, Timing, TrackingRun, track};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
@@ -12,7 +12,7 @@ use crate::control::PyController;
 use crate::errors::{raise, shape};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<PyTracked>()?;
+    module.add_class::<PyTrackingRun>()?;
     module.add_function(wrap_pyfunction!(tracking_metrics, module)?)?;
     module.add_function(wrap_pyfunction!(period_metrics, module)?)?;
     module.add_function(wrap_pyfunction!(residual, module)?)
@@ -24,11 +24,11 @@ pub fn stopped<T>(run: Option<T>) -> Result<T> {
 }
 
 /// Delay and jitter, s, and instants kept in each control interval.
-pub type Pace = (f64, f64, usize);
+pub type Sampling = (f64, f64, usize);
 
 /// When a controller looks and acts.
-pub fn timing(controller: &PyController, samples: usize, pace: Pace) -> Timing {
-    let (delay, jitter, substeps) = pace;
+pub fn timing(controller: &PyController, samples: usize, sampling: Sampling) -> Timing {
+    let (delay, jitter, substeps) = sampling;
     Timing { interval: controller.dt, samples, delay, jitter, substeps }
 }
 
@@ -49,8 +49,8 @@ impl Arrays {
         Ok(Self { reference, feedforward })
     }
 
-    pub fn course(&self) -> Course<'_> {
-        Course { reference: &self.reference, feedforward: &self.feedforward }
+    pub fn course(&self) -> ReferenceSamples<'_> {
+        ReferenceSamples { reference: &self.reference, feedforward: &self.feedforward }
     }
 
     /// Simulates the closed loop of an axis from its start.
@@ -58,19 +58,19 @@ impl Arrays {
         &self,
         axis: &Axis,
         controller: &PyController,
-        pace: Pace,
+        sampling: Sampling,
         stop: Stop<'_>,
-    ) -> Result<PyTracked> {
-        let timing = timing(controller, self.reference.len(), pace);
+    ) -> Result<PyTrackingRun> {
+        let timing = timing(controller, self.reference.len(), sampling);
         let (apparatus, course) = (axis.apparatus(), self.course());
         let run = track(&apparatus, axis.start(), &timing, &controller.controller, course, stop)?;
-        Ok(PyTracked::new(stopped(run)?))
+        Ok(PyTrackingRun::new(stopped(run)?))
     }
 }
 
 /// A controlled motion.
-#[pyclass(name = "Tracked", frozen, module = "piezotrack._core")]
-pub struct PyTracked {
+#[pyclass(name = "TrackingRun", frozen, module = "piezotrack._core")]
+pub struct PyTrackingRun {
     /// At the instants kept: time, true displacement, applied voltage.
     motion: [Vec<f64>; 3],
     /// At the control samples.
@@ -78,9 +78,9 @@ pub struct PyTracked {
     measured: Vec<f64>,
 }
 
-impl PyTracked {
-    pub fn new<S>(run: Tracked<S>) -> Self {
-        let Tracked { motion, commands } = run;
+impl PyTrackingRun {
+    pub fn new<S>(run: TrackingRun<S>) -> Self {
+        let TrackingRun { motion, commands } = run;
         let substeps = (motion.time.len() - 1) / (commands.len() - 1).max(1);
         let measured = motion.measured.iter().step_by(substeps.max(1)).copied().collect();
         Self { motion: [motion.time, motion.displacement, motion.applied], commands, measured }
@@ -88,7 +88,7 @@ impl PyTracked {
 }
 
 #[pymethods]
-impl PyTracked {
+impl PyTrackingRun {
     /// Time, true displacement, applied voltage at the instants kept.
     fn motion<'py>(&self, py: Python<'py>) -> [Bound<'py, PyArray1<f64>>; 3] {
         [0, 1, 2].map(|i| self.motion[i].to_pyarray(py))

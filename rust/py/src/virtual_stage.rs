@@ -14,13 +14,13 @@ use crate::control::PyController;
 use crate::enter::enter;
 use crate::errors::raise;
 use crate::stage::hold;
-use crate::tracking::{Arrays, Pace, PyTracked, stopped};
+use crate::tracking::{Arrays, PyTrackingRun, Sampling, stopped};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyVirtualStage>()
 }
 
-/// Plain numbers of a virtual stage, as a dict in Python.
+/// Unfused numbers of a virtual stage, as a dict in Python.
 #[derive(FromPyObject, IntoPyObject)]
 struct Settings {
     #[pyo3(item)]
@@ -36,13 +36,13 @@ struct Settings {
     #[pyo3(item)]
     weights: Vec<f64>,
     #[pyo3(item)]
-    corners: Vec<f64>,
+    dead_zone_thresholds: Vec<f64>,
     #[pyo3(item)]
-    bends: Vec<f64>,
+    dead_zone_weights: Vec<f64>,
     #[pyo3(item)]
     gain: f64,
     #[pyo3(item)]
-    creep_shares: Vec<f64>,
+    creep_weights: Vec<f64>,
     #[pyo3(item)]
     creep_times: Vec<f64>,
     #[pyo3(item)]
@@ -89,18 +89,23 @@ fn equally_many(name: &str, values: &[f64], other: &str, others: &[f64]) -> Resu
 impl Settings {
     fn core(&self) -> Result<VirtualSettings> {
         equally_many("weights", &self.weights, "thresholds", &self.thresholds)?;
-        equally_many("bends", &self.bends, "corners", &self.corners)?;
-        equally_many("creep_shares", &self.creep_shares, "creep_times", &self.creep_times)?;
-        let last = self.corners.last().copied().unwrap_or(0.0);
-        let shares: [f64; RELAXATIONS] = padded("creep_shares", &self.creep_shares, 0.0)?;
+        equally_many(
+            "dead_zone_weights",
+            &self.dead_zone_weights,
+            "dead_zone_thresholds",
+            &self.dead_zone_thresholds,
+        )?;
+        equally_many("creep_weights", &self.creep_weights, "creep_times", &self.creep_times)?;
+        let last = self.dead_zone_thresholds.last().copied().unwrap_or(0.0);
+        let shares: [f64; RELAXATIONS] = padded("creep_weights", &self.creep_weights, 0.0)?;
         let times: [f64; RELAXATIONS] = padded("creep_times", &self.creep_times, 1.0)?;
         let creep = core::array::from_fn(|j| Creep { share: shares[j], time: times[j] });
         let play = StagePlay {
             linear: self.linear,
             thresholds: padded("thresholds", &self.thresholds, 0.0)?,
             weights: padded("weights", &self.weights, 0.0)?,
-            corners: padded("corners", &self.corners, last)?,
-            bends: padded("bends", &self.bends, 0.0)?,
+            dead_zone_thresholds: padded("dead_zone_thresholds", &self.dead_zone_thresholds, last)?,
+            dead_zone_weights: padded("dead_zone_weights", &self.dead_zone_weights, 0.0)?,
         };
         Ok(VirtualSettings {
             amplifier: Amplifier {
@@ -137,10 +142,10 @@ impl Settings {
             linear: play.linear,
             thresholds: play.thresholds.to_vec(),
             weights: play.weights.to_vec(),
-            corners: play.corners.to_vec(),
-            bends: play.bends.to_vec(),
+            dead_zone_thresholds: play.dead_zone_thresholds.to_vec(),
+            dead_zone_weights: play.dead_zone_weights.to_vec(),
             gain: settings.gain,
-            creep_shares: settings.creep.map(|creep| creep.share).to_vec(),
+            creep_weights: settings.creep.map(|creep| creep.share).to_vec(),
             creep_times: settings.creep.map(|creep| creep.time).to_vec(),
             frequency: settings.frequency,
             damping_ratio: settings.damping_ratio,
@@ -215,9 +220,9 @@ impl PyVirtualStage {
         controller: &PyController,
         reference: &Bound<'_, PyAny>,
         feedforward: &Bound<'_, PyAny>,
-        pace: Pace,
-    ) -> PyResult<PyTracked> {
+        sampling: Sampling,
+    ) -> PyResult<PyTrackingRun> {
         let course = Arrays::new(reference, feedforward)?;
-        enter(py, |stop| course.run(&Axis::Virtual(self.0), controller, pace, stop))
+        enter(py, |stop| course.run(&Axis::Virtual(self.0), controller, sampling, stop))
     }
 }

@@ -16,7 +16,7 @@ use crate::control::PyController;
 use crate::enter::enter;
 use crate::errors::raise;
 use crate::stage::{PyStage, hold};
-use crate::tracking::{Arrays, Pace, PyTracked, stopped, timing};
+use crate::tracking::{Arrays, PyTrackingRun, Sampling, stopped, timing};
 use crate::virtual_stage::{OpenLoopArrays, PyVirtualStage};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -106,8 +106,8 @@ impl PyXyStage {
         controllers: [PyRef<'_, PyController>; 2],
         references: [Bound<'_, PyAny>; 2],
         feedforwards: [Bound<'_, PyAny>; 2],
-        pace: Pace,
-    ) -> PyResult<(PyTracked, PyTracked)> {
+        sampling: Sampling,
+    ) -> PyResult<(PyTrackingRun, PyTrackingRun)> {
         let courses = [
             Arrays::new(&references[0], &feedforwards[0])?,
             Arrays::new(&references[1], &feedforwards[1])?,
@@ -115,11 +115,11 @@ impl PyXyStage {
         let [x, y] = [&*controllers[0], &*controllers[1]];
         enter(py, |stop| {
             let (axes, start) = self.both();
-            let timing = timing(x, 0, pace);
+            let timing = timing(x, 0, sampling);
             let courses = [courses[0].course(), courses[1].course()];
             let controllers = (&x.controller, &y.controller);
             let (x, y) = stopped(track_both(&axes, start, &timing, controllers, courses, stop)?)?;
-            Ok((PyTracked::new(x), PyTracked::new(y)))
+            Ok((PyTrackingRun::new(x), PyTrackingRun::new(y)))
         })
     }
 }

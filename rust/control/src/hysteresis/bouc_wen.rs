@@ -18,7 +18,7 @@
 
 use core::cmp::Ordering;
 
-use super::{Facing, Operator};
+use super::{NonsmoothOperator, Operator};
 use crate::Number;
 
 /// Bouc-Wen operator.
@@ -86,14 +86,14 @@ const MOST_SHORT_PIECES: usize = 2000;
 impl<N: Number> BoucWen<N> {
     /// The output, counted along the direction of motion, after a path of length `length`.
     #[inline(always)]
-    fn lead(&self, z: N, length: N) -> N {
+    fn advance(&self, z: N, length: N) -> N {
         if self.is_exact() {
             return self.lead_exact(z, length);
         }
         let n = self.exponent;
         let arguments = [z, length, self.rise, self.beta, self.gamma];
         N::lanewise(arguments, move |[z, length, rise, beta, gamma]| {
-            Bend { rise, beta, gamma, n }.lead(z, length)
+            Bend { rise, beta, gamma, n }.advance(z, length)
         })
     }
 
@@ -187,14 +187,14 @@ impl<N: Number> Operator<N> for BoucWen<N> {
     fn along(&self, branch: &BoucWenBranch<N>, distance: N) -> BoucWenState<N> {
         let BoucWenBranch { along, direction } = *branch;
         let length = direction * distance;
-        let z = self.lead(along, length);
+        let z = self.advance(along, length);
         BoucWenState { value: direction * z, slope: self.slope(z, length) }
     }
 }
 
-impl<N: Number> Facing<N> for BoucWen<N> {
+impl<N: Number> NonsmoothOperator<N> for BoucWen<N> {
     #[inline(always)]
-    fn facing(&self, state: &BoucWenState<N>, distance: N, direction: N) -> BoucWenState<N> {
+    fn leaving(&self, state: &BoucWenState<N>, distance: N, direction: N) -> BoucWenState<N> {
         BoucWenState { slope: self.slope(direction * state.value, direction * distance), ..*state }
     }
 }
@@ -212,7 +212,7 @@ impl Bend {
     /// Runge-Kutta steps of fourth order along the path, their length limited by the decay rate.
     /// The distance to a sign change of z is found by quadrature over z.
     #[inline(never)]
-    fn lead(self, mut z: f64, length: f64) -> f64 {
+    fn advance(self, mut z: f64, length: f64) -> f64 {
         let mut left = length;
         for _ in 0..MOST_SHORT_PIECES {
             let side = if z + 1e-12 * self.rise * left < 0.0 { -1.0 } else { 1.0 };

@@ -16,7 +16,7 @@
 //! force stays within +-Fc, the influence of the initial state decays along the path, and loops
 //! close.
 
-use super::{BoucWen, BoucWenBranch, BoucWenState, Facing, Operator};
+use super::{BoucWen, BoucWenBranch, BoucWenState, NonsmoothOperator, Operator};
 use crate::Number;
 
 /// First-order Dahl operator.
@@ -105,11 +105,11 @@ impl<N: Number> Operator<N> for FirstOrderDahl<N> {
     }
 }
 
-impl<N: Number> Facing<N> for FirstOrderDahl<N> {
+impl<N: Number> NonsmoothOperator<N> for FirstOrderDahl<N> {
     #[inline(always)]
-    fn facing(&self, state: &BoucWenState<N>, distance: N, direction: N) -> BoucWenState<N> {
+    fn leaving(&self, state: &BoucWenState<N>, distance: N, direction: N) -> BoucWenState<N> {
         if self.is_exponential() {
-            return self.exponential().facing(state, distance, direction);
+            return self.exponential().leaving(state, distance, direction);
         }
         BoucWenState { slope: self.slope(direction * state.value), ..*state }
     }

@@ -38,7 +38,7 @@ pub trait Operator<N: Number> {
 }
 
 /// An operator whose slope jumps at a reversal.
-pub trait Facing<N: Number>: Operator<N> {
+pub trait NonsmoothOperator<N: Number>: Operator<N> {
     /// The same state with the slope of the branch that leaves it by `distance` in `direction`.
-    fn facing(&self, state: &Self::State, distance: N, direction: N) -> Self::State;
+    fn leaving(&self, state: &Self::State, distance: N, direction: N) -> Self::State;
 }

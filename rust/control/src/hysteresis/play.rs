@@ -19,7 +19,14 @@ use crate::Number;
 /// ```
 /// use piezotrack_control::hysteresis::{Operator, Play};
 ///
-/// let play = Play { linear: 0.0, thresholds: [3.0], weights: [1.0], corners: [], bends: [] };
+/// let (dead_zone_thresholds, dead_zone_weights) = ([], []);
+/// let play = Play {
+///     linear: 0.0,
+///     thresholds: [3.0],
+///     weights: [1.0],
+///     dead_zone_thresholds,
+///     dead_zone_weights,
+/// };
 /// let mut state = play.rest();
 /// assert_eq!(play.follow(&mut state, 10.0), 7.0);
 /// assert_eq!(play.follow(&mut state, 5.0), 7.0); // the backlash is 6 wide
@@ -27,7 +34,7 @@ use crate::Number;
 /// ```
 ///
 /// It is strictly increasing, and so has an inverse, where `linear` and all partial sums of
-/// 1 + `bends` are positive and no weight is negative.
+/// 1 + `dead_zone_weights` are positive and no weight is negative.
 ///
 /// The unit of the output is free; it is written Y here: V, or m for a stage.
 ///
@@ -36,8 +43,8 @@ use crate::Number;
 /// | `linear` | w0 | Y/V | > 0 |
 /// | `thresholds` | r | V | >= 0, ascending |
 /// | `weights` | w | Y/V | >= 0 |
-/// | `corners` | d | Y | ascending |
-/// | `bends` | s | 1 | partial sums above -1 |
+/// | `dead_zone_thresholds` | d | Y | ascending |
+/// | `dead_zone_weights` | s | 1 | partial sums above -1 |
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Play<N, const PLAYS: usize, const ZONES: usize> {
     /// Gain of the path without memory, w0: the slope right after a reversal.
@@ -47,9 +54,9 @@ pub struct Play<N, const PLAYS: usize, const ZONES: usize> {
     /// Weight of each play operator, w.
     pub weights: [N; PLAYS],
     /// Threshold of each dead zone, d, in the unit of the output.
-    pub corners: [N; ZONES],
+    pub dead_zone_thresholds: [N; ZONES],
     /// Weight of each dead zone: the change of the slope at its threshold, s.
-    pub bends: [N; ZONES],
+    pub dead_zone_weights: [N; ZONES],
 }
 
 /// State of the operator: its input, the output of each play operator, and the slope.
@@ -118,7 +125,7 @@ impl<N: Number, const PLAYS: usize, const ZONES: usize> Operator<N> for Play<N, 
         }
         let zero = value.like(0.0);
         let (mut bent, mut factor) = (value, one(value));
-        for (corner, bend) in self.corners.iter().zip(&self.bends) {
+        for (corner, bend) in self.dead_zone_thresholds.iter().zip(&self.dead_zone_weights) {
             let beyond = value - *corner;
             bent = bent + beyond.where_negative(zero, *bend * beyond);
             factor = factor + beyond.where_negative(zero, *bend);

@@ -14,7 +14,7 @@ use super::Inverse;
 use crate::cubic_segment::{is_straight, legs};
 use crate::error::{Result, check, finite, not_negative, positive, usable};
 use crate::hysteresis::{Dahl, DahlState, Operator};
-use crate::unfused::Plain;
+use crate::unfused::Unfused;
 
 /// Parameters of the inverse of a Dahl stage.
 ///
@@ -110,7 +110,7 @@ impl DahlInverse {
             stiffness: self.stiffness / t,
             level: self.b1 / t,
             friction: self.b0 / t,
-            operator: Dahl { a1: Plain(self.a1), a2: Plain(self.a2), gain: Plain(self.up) },
+            operator: Dahl { a1: Unfused(self.a1), a2: Unfused(self.a2), gain: Unfused(self.up) },
             piece: PIECE / if root > self.a1 { root } else { self.a1 },
             dt,
         })
@@ -139,7 +139,7 @@ pub struct SampledDahlInverse {
     /// b0/T, V for one unit of q2.
     friction: f64,
     /// Its gain is up without b1, so that its output is q1 and q2.
-    operator: Dahl<Plain, TERMS>,
+    operator: Dahl<Unfused, TERMS>,
     /// Longest move in one piece, m; infinite where the operator is a parabola.
     piece: f64,
     dt: f64,
@@ -151,7 +151,7 @@ pub struct InverseState {
     x: f64,
     /// x' times the sampling interval, m; `None` before the first sample.
     w: Option<f64>,
-    memory: DahlState<Plain>,
+    memory: DahlState<Unfused>,
 }
 
 impl SampledDahlInverse {
@@ -192,9 +192,9 @@ impl SampledDahlInverse {
 
     /// The operator's state after a monotone move; `None` where the move is too long.
     #[inline]
-    fn travel(&self, mut memory: DahlState<Plain>, distance: f64) -> Option<DahlState<Plain>> {
+    fn travel(&self, mut memory: DahlState<Unfused>, distance: f64) -> Option<DahlState<Unfused>> {
         let length = distance.abs();
-        let direction = Plain(if distance < 0.0 { -1.0 } else { 1.0 });
+        let direction = Unfused(if distance < 0.0 { -1.0 } else { 1.0 });
         if length > self.piece {
             if length > MOST_PIECES * self.piece {
                 return None;
@@ -202,25 +202,25 @@ impl SampledDahlInverse {
             let mut left = length;
             while left > self.piece {
                 let branch = self.operator.branch(&memory, direction);
-                memory = self.operator.along(&branch, direction * Plain(self.piece));
+                memory = self.operator.along(&branch, direction * Unfused(self.piece));
                 left -= self.piece;
             }
             let branch = self.operator.branch(&memory, direction);
-            return Some(self.operator.along(&branch, direction * Plain(left)));
+            return Some(self.operator.along(&branch, direction * Unfused(left)));
         }
         let branch = self.operator.branch(&memory, direction);
-        Some(self.operator.along(&branch, Plain(distance)))
+        Some(self.operator.along(&branch, Unfused(distance)))
     }
 
     /// The operator's state after the cubic with velocities `w0` and `w1` that rises by `rise`.
     #[cold]
     fn travel_turning(
         &self,
-        mut memory: DahlState<Plain>,
+        mut memory: DahlState<Unfused>,
         w0: f64,
         rise: f64,
         w1: f64,
-    ) -> Option<DahlState<Plain>> {
+    ) -> Option<DahlState<Unfused>> {
         for leg in legs(w0, rise, w1) {
             memory = self.travel(memory, leg)?;
         }

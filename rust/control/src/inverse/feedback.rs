@@ -12,13 +12,13 @@ use super::Inverse;
 use crate::cubic_segment::{is_straight, legs};
 use crate::error::{Result, check, finite, not_negative, positive, usable};
 use crate::hysteresis::{BoucWen, BoucWenState, FirstOrderDahl, Operator};
-use crate::unfused::Plain;
+use crate::unfused::Unfused;
 
 /// Inverse of a stage with first-order Dahl friction.
-pub type FirstOrderDahlInverse = FeedbackInverse<FirstOrderDahl<Plain>>;
+pub type FirstOrderDahlInverse = FeedbackInverse<FirstOrderDahl<Unfused>>;
 
 /// Inverse of a Bouc-Wen oscillator; its drive is a force, N.
-pub type OscillatorInverse = FeedbackInverse<BoucWen<Plain>>;
+pub type OscillatorInverse = FeedbackInverse<BoucWen<Unfused>>;
 
 /// Inverse of a stage with the operator `O` in feedback, for one sampling interval.
 ///
@@ -49,7 +49,7 @@ pub struct FeedbackInverseState {
     x: f64,
     /// x' times the sampling interval, m; `None` before the first sample.
     w: Option<f64>,
-    memory: BoucWenState<Plain>,
+    memory: BoucWenState<Unfused>,
 }
 
 impl FirstOrderDahlInverse {
@@ -71,8 +71,8 @@ impl FirstOrderDahlInverse {
         let right = piezo_coefficient.abs() > 0.0;
         check("piezo_coefficient", piezo_coefficient, "N/V", right, "a value other than 0")?;
         let operator = FirstOrderDahl {
-            rest_stiffness: Plain(not_negative("rest_stiffness", rest_stiffness, "N/m")?),
-            coulomb_force: Plain(positive("coulomb_force", coulomb_force, "N")?),
+            rest_stiffness: Unfused(not_negative("rest_stiffness", rest_stiffness, "N/m")?),
+            coulomb_force: Unfused(positive("coulomb_force", coulomb_force, "N")?),
             exponent: not_negative("exponent", exponent, "")?,
         };
         Self::with([mass, damping, stiffness], piezo_coefficient, operator, dt)
@@ -95,16 +95,16 @@ impl OscillatorInverse {
     ) -> Result<Self> {
         let right = exponent >= 1.0 && exponent.is_finite();
         let operator = BoucWen {
-            rise: Plain(finite("alpha", alpha, "N/m")?),
-            beta: Plain(finite("beta gamma", dissipating, "1/m")?),
-            gamma: Plain(finite("beta delta", storing, "1/m")?),
+            rise: Unfused(finite("alpha", alpha, "N/m")?),
+            beta: Unfused(finite("beta gamma", dissipating, "1/m")?),
+            gamma: Unfused(finite("beta delta", storing, "1/m")?),
             exponent: check("exponent", exponent, "", right, "1 or more")?,
         };
         Self::with([mass, damping, stiffness], 1.0, operator, dt)
     }
 }
 
-impl<O: Operator<Plain, State = BoucWenState<Plain>>> FeedbackInverse<O> {
+impl<O: Operator<Unfused, State = BoucWenState<Unfused>>> FeedbackInverse<O> {
     fn with([mass, damping, stiffness]: [f64; 3], gain: f64, operator: O, dt: f64) -> Result<Self> {
         Ok(Self {
             inertia: not_negative("mass", mass, "kg")? / gain,
@@ -140,8 +140,8 @@ impl<O: Operator<Plain, State = BoucWenState<Plain>>> FeedbackInverse<O> {
             if leg == 0.0 {
                 return memory;
             }
-            let branch = self.operator.branch(&memory, Plain(leg.signum()));
-            self.operator.along(&branch, Plain(leg))
+            let branch = self.operator.branch(&memory, Unfused(leg.signum()));
+            self.operator.along(&branch, Unfused(leg))
         });
         let linear = self.inertia * a + self.damping * v + self.stiffness * x;
         let drive = linear + memory.value.0 / self.gain;
@@ -153,7 +153,7 @@ impl<O: Operator<Plain, State = BoucWenState<Plain>>> FeedbackInverse<O> {
     }
 }
 
-impl<O: Operator<Plain, State = BoucWenState<Plain>>> Inverse for FeedbackInverse<O> {
+impl<O: Operator<Unfused, State = BoucWenState<Unfused>>> Inverse for FeedbackInverse<O> {
     type State = FeedbackInverseState;
 
     fn rest(&self) -> Self::State {

@@ -40,8 +40,8 @@ pub trait OperatorInverse: Copy {
 ///     linear: 1e-6,
 ///     thresholds: [10.0, 20.0],
 ///     weights: [0.2e-6, 0.1e-6],
-///     corners: [],
-///     bends: [],
+///     dead_zone_thresholds: [],
+///     dead_zone_weights: [],
 /// };
 /// let creep = [Creep { share: 0.01, time: 0.3 }];
 /// let dynamics = Dynamics::First { time: 1e-3 };

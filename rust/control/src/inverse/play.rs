@@ -28,8 +28,8 @@ use crate::hysteresis::{Operator, Play, PlayState};
 ///     linear: 0.5,
 ///     thresholds: [1.0, 2.0],
 ///     weights: [0.3, 0.2],
-///     corners: [4.0],
-///     bends: [0.1],
+///     dead_zone_thresholds: [4.0],
+///     dead_zone_weights: [0.1],
 /// };
 /// let inverse = PlayInverse::new(&play)?;
 /// let (mut there, mut back) = (play.rest(), inverse.rest());
@@ -43,9 +43,9 @@ use crate::hysteresis::{Operator, Play, PlayState};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlayInverse<const PLAYS: usize, const ZONES: usize> {
     /// Thresholds of the dead zones at the output, d'.
-    corners: [f64; ZONES],
+    dead_zone_thresholds: [f64; ZONES],
     /// Changes of the slope of the inverse there, s'.
-    bends: [f64; ZONES],
+    dead_zone_weights: [f64; ZONES],
     /// Play operators with transformed thresholds and weights, without dead zones.
     plays: Play<f64, PLAYS, 0>,
 }
@@ -55,11 +55,11 @@ impl<const PLAYS: usize, const ZONES: usize> PlayInverse<PLAYS, ZONES> {
     ///
     /// # Errors
     /// Where the operator has no inverse of this form: `linear` is not above 0, a weight is
-    /// negative, thresholds or corners do not ascend, or a slope of the dead zones is not
-    /// above 0.
+    /// negative, thresholds or dead-zone thresholds do not ascend, or a slope of the dead zones is
+    /// not above 0.
     pub fn new(play: &Play<f64, PLAYS, ZONES>) -> Result<Self> {
-        let (corners, bends) = zones(play)?;
-        Ok(Self { corners, bends, plays: plays(play)? })
+        let (dead_zone_thresholds, dead_zone_weights) = zones(play)?;
+        Ok(Self { dead_zone_thresholds, dead_zone_weights, plays: plays(play)? })
     }
 
     /// The state of the inverse of an operator at rest.
@@ -98,7 +98,7 @@ impl<const PLAYS: usize, const ZONES: usize> PlayInverse<PLAYS, ZONES> {
             return f64::NAN;
         }
         let mut value = output;
-        for (corner, bend) in self.corners.iter().zip(&self.bends) {
+        for (corner, bend) in self.dead_zone_thresholds.iter().zip(&self.dead_zone_weights) {
             let beyond = output - corner;
             if beyond > 0.0 {
                 value += bend * beyond;
@@ -126,22 +126,34 @@ impl<const PLAYS: usize, const ZONES: usize> Inverse for PlayInverse<PLAYS, ZONE
 fn zones<const PLAYS: usize, const ZONES: usize>(
     play: &Play<f64, PLAYS, ZONES>,
 ) -> Result<([f64; ZONES], [f64; ZONES])> {
-    let (mut corners, mut bends) = ([0.0; ZONES], [0.0; ZONES]);
+    let (mut dead_zone_thresholds, mut dead_zone_weights) = ([0.0; ZONES], [0.0; ZONES]);
     let (mut slope, mut height, mut before) = (1.0, 0.0, 0.0);
     for j in 0..ZONES {
-        let corner = finite("corners", play.corners[j], "")?;
+        let corner = finite("dead_zone_thresholds", play.dead_zone_thresholds[j], "")?;
         if j == 0 {
             height = corner;
         } else {
-            check("corners", corner, "", corner >= before, "corners that ascend")?;
+            check(
+                "dead_zone_thresholds",
+                corner,
+                "",
+                corner >= before,
+                "dead_zone_thresholds that ascend",
+            )?;
             height += slope * (corner - before);
         }
-        let next = slope + finite("bends", play.bends[j], "")?;
-        check("bends", play.bends[j], "", next > 0.0, "bends whose sums stay above -1")?;
-        (corners[j], bends[j]) = (height, (slope - next) / (next * slope));
+        let next = slope + finite("dead_zone_weights", play.dead_zone_weights[j], "")?;
+        check(
+            "dead_zone_weights",
+            play.dead_zone_weights[j],
+            "",
+            next > 0.0,
+            "dead_zone_weights whose sums stay above -1",
+        )?;
+        (dead_zone_thresholds[j], dead_zone_weights[j]) = (height, (slope - next) / (next * slope));
         (slope, before) = (next, corner);
     }
-    Ok((corners, bends))
+    Ok((dead_zone_thresholds, dead_zone_weights))
 }
 
 /// Play operators with transformed thresholds and weights.
@@ -153,8 +165,8 @@ fn plays<const PLAYS: usize, const ZONES: usize>(
         linear: 1.0 / sum,
         thresholds: [0.0; PLAYS],
         weights: [0.0; PLAYS],
-        corners: [],
-        bends: [],
+        dead_zone_thresholds: [],
+        dead_zone_weights: [],
     };
     // r'_i = r'_(i-1) + W_(i-1) (r_i - r_(i-1)): sums of what is not negative.
     let (mut threshold, mut before) = (0.0, 0.0);

@@ -167,8 +167,8 @@ impl SampledLoop {
         Self { learning: None, hidden, left_out: None, ..self.clone() }
     }
 
-    /// The root that a leak has moved from exactly 1 to a little below, `z - 1`: still almost
-    /// hidden, as it almost cancels with a pole of the repetitive part.
+    /// The root that a forgetting factor has moved from exactly 1 to a little below, `z - 1`:
+    /// still almost hidden, as it almost cancels with a pole of the repetitive part.
     pub(crate) fn almost_hidden(&self) -> Option<f64> {
         let part = self.learning.as_ref().filter(|_| self.feedback.integrates())?;
         if part.forgets == 0.0 {
@@ -217,9 +217,9 @@ impl SampledLoop {
 
     /// Roots at exactly 1 that move neither displacement nor error.
     ///
-    /// Beside a feedback that integrates, a repetitive part without leak has one: uRC and uFB
-    /// move against each other. An incremental PID without an integral part has one too, its
-    /// start value.
+    /// Beside a feedback that integrates, a repetitive part without forgetting factor has one: uRC
+    /// and uFB move against each other. An incremental PID without an integral part has one too,
+    /// its start value.
     #[must_use]
     pub fn hidden_roots(&self) -> usize {
         self.hidden

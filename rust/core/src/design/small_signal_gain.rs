@@ -29,13 +29,13 @@ impl Gains {
             let found = format!("{low} V to {high} V");
             return Err(Error::parameter("limits", found, "the lower one below the upper one"));
         }
-        let lead = |state: &O::State, way: f64| {
+        let advance = |state: &O::State, way: f64| {
             let direction = if way < 0.0 { -1.0 } else { 1.0 };
             operator.along(&operator.branch(state, direction), way)
         };
-        let mut state = lead(&operator.rest(), low);
+        let mut state = advance(&operator.rest(), low);
         for _ in 0..CYCLES {
-            state = lead(&lead(&state, span), -span);
+            state = advance(&advance(&state, span), -span);
         }
         let bottom = operator.output(&state).0;
         let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -47,9 +47,9 @@ impl Gains {
         for direction in [1.0, -1.0] {
             let part = direction * span / f64::from(PLACES);
             // Just after the reversal, where most of the hysteresis stands still.
-            read(&lead(&state, 1e-9 * part));
+            read(&advance(&state, 1e-9 * part));
             for _ in 0..PLACES {
-                state = lead(&state, part);
+                state = advance(&state, part);
                 read(&state);
             }
             if direction > 0.0 {

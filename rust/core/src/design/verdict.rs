@@ -40,8 +40,8 @@ pub struct Verdict {
     pub gains: Option<GainRange>,
     /// The same for the feedback without the repetitive part.
     pub feedback_gains: Option<GainRange>,
-    /// The root that a leak has moved from exactly 1 to a little below. uRC and uFB return by
-    /// it from where they have drifted; the error hardly shows it.
+    /// The root that a forgetting factor has moved from exactly 1 to a little below. uRC and uFB
+    /// return by it from where they have drifted; the error hardly shows it.
     pub almost_hidden: Option<Root>,
     /// Periods until 1/e of an error is left, by the slowest root beside the almost hidden one;
     /// `None` without a repetitive part or for an unstable loop.
@@ -122,8 +122,8 @@ impl SampledLoop {
     ///
     /// Below 1, and with a feedback that is stable by itself, the repetitive loop is stable
     /// whatever its period (small-gain theorem; Inoue et al. 1981, Hara et al. 1988, doi
-    /// 10.1109/9.1274). Sufficient, not necessary. At frequency 0 without leak it is 1, the
-    /// hidden root. `None` without a repetitive part.
+    /// 10.1109/9.1274). Sufficient, not necessary. At frequency 0 without forgetting factor it is
+    /// 1, the hidden root. `None` without a repetitive part.
     #[must_use]
     pub fn small_gain(&self) -> Option<f64> {
         if !self.repeats() {

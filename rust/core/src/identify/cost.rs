@@ -18,7 +18,7 @@ use super::record::Record;
 use super::residual_sums::{Costs, ResidualSums, Residuals};
 use super::step_size;
 use crate::integrator::{
-    FeedbackState, Kernel, MOST_PARAMETERS, March, Mechanics, Stepping, halvings,
+    FeedbackState, Kernel, MOST_PARAMETERS, Mechanics, Stepping, SteppingLoop, halvings,
 };
 use crate::math::Lanes;
 use crate::models::{Held, KernelVisitor};
@@ -149,7 +149,8 @@ impl<K: Kernel, const V: usize> WithSimd for Bundle<'_, K, V> {
         let start = FeedbackState { x: zero, w: zero, memory: kernel.rest(&parameters) };
         let delays = of.problem.has_delay().then(|| index(substeps));
         let mut sums = ResidualSums::new(&of.residuals, candidates, stop, zero, delays);
-        let ended = March { coupling, gain }.run(drive, substeps, start, &mut sums).is_some();
+        let ended =
+            SteppingLoop { coupling, gain }.run(drive, substeps, start, &mut sums).is_some();
         sums.conclude(ended)
     }
 }

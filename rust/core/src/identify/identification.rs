@@ -1,7 +1,7 @@
 //! From a record to an identified stage: the steps in their order.
 
 use super::cost::Evaluator;
-use super::levenberg_marquardt::{Local, Sensitivity};
+use super::levenberg_marquardt::{LocalRefinement, Sensitivity};
 use super::problem::{Problem, Spec};
 use super::record::Record;
 use super::search::{Monitor, Outcome, Plan, StopReason, search};
@@ -42,7 +42,7 @@ pub fn identify(
     let evaluator = Evaluator::new(record, &problem, stop);
     let mut runs = search(&evaluator, &problem, plan, monitor, stop)?;
     let ended = runs.iter().all(|run| run.reason != StopReason::Interrupted);
-    let local = Local { record, problem: &problem, evaluator: &evaluator, stop };
+    let local = LocalRefinement { record, problem: &problem, evaluator: &evaluator, stop };
     if ended && plan.settings.polish {
         for run in runs.iter_mut().filter(|run| run.costs.rms.is_finite()) {
             let polished = local.polish(&run.place, run.costs);

@@ -62,7 +62,7 @@ pub struct Sensitivity {
 
 /// The neighbourhood of candidatees of one problem.
 #[derive(Clone, Copy)]
-pub struct Local<'a> {
+pub struct LocalRefinement<'a> {
     /// The record.
     pub record: &'a Record<'a>,
     /// What is free, and where.
@@ -73,7 +73,7 @@ pub struct Local<'a> {
     pub stop: Stop<'a>,
 }
 
-impl Local<'_> {
+impl LocalRefinement<'_> {
     /// Goes down to the minimum next to a candidate; never returns a worse one.
     #[must_use]
     pub fn polish(&self, place: &[f64], costs: Costs) -> Polished {

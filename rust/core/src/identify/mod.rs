@@ -27,7 +27,7 @@ pub use identification::{Identification, identify};
 pub use least_squares::{
     DynamicsKind, LeastSquaresFit, Settings as WeightsSettings, WeightsRecord, identify_weights,
 };
-pub use levenberg_marquardt::{Local, Polished, Sensitivity};
+pub use levenberg_marquardt::{LocalRefinement, Polished, Sensitivity};
 pub use problem::{Delay, Problem, Spec};
 pub use record::Record;
 pub use residual_sums::Costs;

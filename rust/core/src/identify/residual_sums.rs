@@ -5,9 +5,9 @@ use pulp::Simd;
 
 use super::candidate::Candidate;
 use super::record::Record;
-use crate::integrator::{FeedbackState, Sink};
+use crate::integrator::{FeedbackState, Observer};
 use crate::math::Lanes;
-use crate::signal::{Late, Stop, between, index};
+use crate::signal::{FractionalDelay, Stop, between, index};
 
 /// Cost and offset of a candidate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,7 +120,7 @@ impl<'a, const V: usize, S: Simd> ResidualSums<'a, V, S> {
     }
 }
 
-impl<const V: usize, S: Simd, M> Sink<Lanes<S, V>, M> for ResidualSums<'_, V, S> {
+impl<const V: usize, S: Simd, M> Observer<Lanes<S, V>, M> for ResidualSums<'_, V, S> {
     #[inline(always)]
     fn sample(&mut self, k: usize, state: &FeedbackState<Lanes<S, V>, M>) {
         let x = match &mut self.delay {
@@ -146,7 +146,7 @@ struct Delayed<const V: usize, S: Simd> {
     past: Vec<[Lanes<S, V>; 2]>,
     /// Delay of each lane in whole samples.
     whole: Vec<usize>,
-    /// What [`Late::part`] says.
+    /// What [`FractionalDelay::part`] says.
     part: Lanes<S, V>,
     /// Sub-steps in a sampling interval.
     substeps: f64,
@@ -156,7 +156,7 @@ impl<const V: usize, S: Simd> Delayed<V, S> {
     fn new(candidates: &[Candidate], dt: f64, zero: Lanes<S, V>, substeps: f64) -> Self {
         let late = |lane: usize| {
             let delay = candidates.get(lane).map_or(0.0, |candidate| candidate.theta.delay());
-            Late::new(delay, dt)
+            FractionalDelay::new(delay, dt)
         };
         let whole: Vec<usize> = (0..Lanes::<S, V>::COUNT).map(|lane| late(lane).whole).collect();
         let part = zero.each(|lane| late(lane).part);

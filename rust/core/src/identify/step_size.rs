@@ -87,7 +87,7 @@ impl Trial<'_> {
 /// The candidates that have to be accurate: where the force has kinks, the middle of the box.
 fn representatives(problem: &Problem) -> Vec<Theta> {
     let all = corners(problem);
-    if problem.model.is_kinked() { all.last().copied().into_iter().collect() } else { all }
+    if problem.model.is_nonsmooth() { all.last().copied().into_iter().collect() } else { all }
 }
 
 /// The corners of the box of free parameters, and its middle.

@@ -15,14 +15,14 @@ use crate::signal::between;
 
 /// An operator without dry friction in feedback, coupled to second or fourth order.
 #[derive(Clone, Copy, Debug)]
-pub struct Smooth<N, O, const FOURTH: bool> {
+pub struct FeedbackCoupling<N, O, const FOURTH: bool> {
     /// The linear part over one step.
     pub linear: Propagator<N>,
     /// The hysteresis.
     pub operator: O,
 }
 
-impl<N: Number, O: Operator<N>, const FOURTH: bool> Coupling<N> for Smooth<N, O, FOURTH> {
+impl<N: Number, O: Operator<N>, const FOURTH: bool> Coupling<N> for FeedbackCoupling<N, O, FOURTH> {
     type Memory = O::State;
 
     #[inline(always)]
@@ -125,7 +125,7 @@ fn fourth_order<N: Number, O: Operator<N>>(
     let direction = sign(heading(state, &ahead));
     let branch = operator.branch(&state.memory, direction);
     let (x, w) = correct(linear, operator, &branch, &ahead, state.x);
-    let memory = lead(operator, state, &branch, x, w);
+    let memory = advance_operator(operator, state, &branch, x, w);
     FeedbackState { x, w, memory }
 }
 
@@ -138,7 +138,7 @@ pub(super) fn heading<N: Number, M>(from: &FeedbackState<N, M>, ahead: &Predicti
 
 /// The operator's memory where a step ends: along the branch, or to the turning point and back.
 #[inline(always)]
-pub(super) fn lead<N: Number, O: Operator<N>>(
+pub(super) fn advance_operator<N: Number, O: Operator<N>>(
     operator: &O,
     from: &FeedbackState<N, O::State>,
     branch: &O::Branch,

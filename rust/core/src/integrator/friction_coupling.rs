@@ -29,14 +29,14 @@ const SLACK: f64 = 1e-12;
 
 /// A Dahl stage with dry friction over one step.
 #[derive(Clone, Copy, Debug)]
-pub struct Friction<N> {
+pub struct FrictionCoupling<N> {
     /// The linear part over the whole step.
     linear: Propagator<N>,
     /// 1/M, D/M, K/M in units of the step.
     rates: [N; 3],
     halvings: u32,
     stiffness: N,
-    rubbing: Rubbing<N>,
+    sliding: SlidingOperator<N>,
 }
 
 /// The parameters of a stage with friction, SI.
@@ -56,14 +56,14 @@ impl<N: Number> FrictionParameters<N> {
     /// What a stage remembers whose velocity has the sign of `w`; it rests where `w` is 0.
     #[inline(always)]
     pub fn memory(&self, w: N, operator: DahlState<N>) -> FrictionMemory<N> {
-        self.rubbing().memory(w, operator)
+        self.sliding().memory(w, operator)
     }
 
     #[inline(always)]
-    fn rubbing(&self) -> Rubbing<N> {
+    fn sliding(&self) -> SlidingOperator<N> {
         let [a1, a2, up] = self.operator;
         let dahl = Dahl { a1, a2, gain: up };
-        Rubbing { dahl, b1: self.b1, b0: self.b0, direction: self.b1.like(1.0) }
+        SlidingOperator { dahl, b1: self.b1, b0: self.b0, direction: self.b1.like(1.0) }
     }
 }
 
@@ -82,7 +82,7 @@ pub struct FrictionMemory<N> {
 
 /// The operator in motion in one direction.
 #[derive(Clone, Copy, Debug)]
-struct Rubbing<N> {
+struct SlidingOperator<N> {
     /// The operator with q1 for a force.
     dahl: Dahl<N, TERMS>,
     b1: N,
@@ -91,7 +91,7 @@ struct Rubbing<N> {
     direction: N,
 }
 
-impl<N: Number> Operator<N> for Rubbing<N> {
+impl<N: Number> Operator<N> for SlidingOperator<N> {
     type State = DahlState<N>;
     type Branch = DahlBranch<N, TERMS>;
 
@@ -121,7 +121,7 @@ impl<N: Number> Operator<N> for Rubbing<N> {
     }
 }
 
-impl<N: Number> Rubbing<N> {
+impl<N: Number> SlidingOperator<N> {
     #[inline(always)]
     fn memory(self, w: N, operator: DahlState<N>) -> FrictionMemory<N> {
         let zero = w.like(0.0);
@@ -134,21 +134,21 @@ impl<N: Number> Rubbing<N> {
 type State<N> = FeedbackState<N, FrictionMemory<N>>;
 
 /// The way of the lanes through one step, leg by leg.
-struct Way<N> {
+struct StepProgress<N> {
     state: State<N>,
     /// Part of the step that is behind.
     passed: N,
 }
 
 /// A leg in motion: where it ends, and the branch that it went along.
-struct Glide<N> {
+struct Slide<N> {
     x: N,
     /// Velocity times the length of the leg, m.
     w: N,
     branch: DahlBranch<N, TERMS>,
 }
 
-impl<N: Number> Friction<N> {
+impl<N: Number> FrictionCoupling<N> {
     /// Works out what the parameters alone decide, for steps of `step` seconds.
     #[inline(always)]
     pub fn new(of: FrictionParameters<N>, step: f64, halvings: u32) -> Self {
@@ -161,50 +161,50 @@ impl<N: Number> Friction<N> {
             rates: [inverse * h * h, damped * h, sprung * h * h],
             halvings,
             stiffness,
-            rubbing: of.rubbing(),
+            sliding: of.sliding(),
         }
     }
 
     /// The state at a displacement, at rest where `w` is 0.
     #[inline(always)]
     pub fn start(&self, x: N, w: N, operator: DahlState<N>) -> State<N> {
-        FeedbackState { x, w, memory: self.rubbing.memory(w, operator) }
+        FeedbackState { x, w, memory: self.sliding.memory(w, operator) }
     }
 
     #[inline(always)]
-    fn moving(&self, direction: N) -> Rubbing<N> {
-        Rubbing { direction, ..self.rubbing }
+    fn moving(&self, direction: N) -> SlidingOperator<N> {
+        SlidingOperator { direction, ..self.sliding }
     }
 
     /// b1 q1 + K x, the forces that do not depend on the direction.
     #[inline(always)]
     fn spring(&self, x: N, operator: &DahlState<N>) -> N {
-        self.rubbing.b1.mul_add(operator.force, self.stiffness * x)
+        self.sliding.b1.mul_add(operator.force, self.stiffness * x)
     }
 
     /// What sticking bears, N: b0 q2, below 0 where the operator pushes.
     #[inline(always)]
     fn grip(&self, operator: &DahlState<N>, force: N) -> N {
-        let grip = self.rubbing.b0 * operator.slope;
+        let grip = self.sliding.b0 * operator.slope;
         grip.where_negative(grip, magnitude(force).mul_add(force.like(SLACK), grip))
     }
 
     /// A leg without a reversal, under a force that goes from `drive` to `drive + rise`.
     #[inline(always)]
-    fn glide(
+    fn slide(
         &self,
         linear: &Propagator<N>,
         state: &State<N>,
         direction: N,
         drive: N,
         rise: N,
-    ) -> Glide<N> {
+    ) -> Slide<N> {
         let operator = self.moving(direction);
         let from = FeedbackState { x: state.x, w: state.w, memory: state.memory.operator };
         let branch = operator.branch(&from.memory, direction);
         let ahead: Prediction<N> = predict(linear, &operator, &from, drive, rise);
         let (x, w) = correct(linear, &operator, &branch, &ahead, from.x);
-        Glide { x, w, branch }
+        Slide { x, w, branch }
     }
 
     /// The linear part over a part of the step, each lane its own.
@@ -217,7 +217,7 @@ impl<N: Number> Friction<N> {
 
     /// The next leg of every lane: to its reversal, to where it breaks away, or to the end.
     #[inline(always)]
-    fn leg(&self, way: &Way<N>, drive: N, rise: N, last: bool) -> Way<N> {
+    fn leg(&self, way: &StepProgress<N>, drive: N, rise: N, last: bool) -> StepProgress<N> {
         let at = &way.state;
         let memory = &at.memory;
         let (zero, one) = (drive.like(0.0), drive.like(1.0));
@@ -238,29 +238,29 @@ impl<N: Number> Friction<N> {
 
         // Lanes in motion: the whole rest of the step first, then up to the reversal.
         let direction = sign(memory.direction);
-        let glide = |length: N| {
+        let slide = |length: N| {
             let scaled = FeedbackState { w: at.w * length, ..*at };
-            (scaled, self.glide(&self.part(length), &scaled, direction, now, rise * length))
+            (scaled, self.slide(&self.part(length), &scaled, direction, now, rise * length))
         };
-        let (from, whole) = glide(left);
+        let (from, whole) = slide(left);
         let turns = if last { one } else { held.where_negative(direction * whole.w, one) };
         let fraction = turning_fraction(direction, &from, whole.x, whole.w);
         let length = turns.where_negative(fraction * left, left);
-        let (_, part) = glide(length);
+        let (_, part) = slide(length);
         let w = (drive.like(1e-12) - length).where_negative(part.w / length, at.w);
 
         // What velocity the reversal is off by is made up for in its time.
         let reached = rise.mul_add(length, now);
-        let rubbing = self.moving(direction);
-        let there = rubbing.along(&part.branch, part.x - at.x);
-        let net = reached - rubbing.output(&there).0 - self.stiffness * part.x;
+        let sliding = self.moving(direction);
+        let there = sliding.along(&part.branch, part.x - at.x);
+        let net = reached - sliding.output(&there).0 - self.stiffness * part.x;
         let late = -(w / (net * self.rates[0]));
         let late = (magnitude(late) - length * drive.like(0.1)).where_negative(late, zero);
         let late = turns.where_negative(late, zero);
         let x = (w * late).mul_add(drive.like(0.5), part.x);
         let stop = way.passed + length + late;
         let stop = turns.where_negative((stop - one).where_negative(stop, one), one);
-        let there = rubbing.along(&part.branch, x - at.x);
+        let there = sliding.along(&part.branch, x - at.x);
 
         // After a reversal: sticking, the way back or, where both could be, on as before.
         let turned_pull = rise.mul_add(stop, drive) - self.spring(x, &there);
@@ -286,11 +286,14 @@ impl<N: Number> Friction<N> {
         let moving = FeedbackState { x, w: turns.where_negative(zero, end_w), memory: moved };
         let resting = FeedbackState { x: at.x, w: zero, memory: rested };
         let waited = leaves.where_negative(way.passed + wait, one);
-        Way { state: choose(held, &moving, &resting), passed: held.where_negative(stop, waited) }
+        StepProgress {
+            state: choose(held, &moving, &resting),
+            passed: held.where_negative(stop, waited),
+        }
     }
 }
 
-impl<N: Number> Coupling<N> for Friction<N> {
+impl<N: Number> Coupling<N> for FrictionCoupling<N> {
     type Memory = FrictionMemory<N>;
 
     #[inline(always)]
@@ -299,27 +302,27 @@ impl<N: Number> Coupling<N> for Friction<N> {
         // Below 0 for lanes in motion.
         let held = drive.like(0.5) - memory.direction * memory.direction;
         let direction = sign(memory.direction);
-        let glide = self.glide(&self.linear, state, direction, drive, rise);
+        let slide = self.slide(&self.linear, state, direction, drive, rise);
         let pull = drive - self.spring(state.x, &memory.operator);
         let grip = self.grip(&memory.operator, drive);
         let (first, second) = (grip - magnitude(pull), grip - magnitude(pull + rise));
         let sticks = (second - first).where_negative(second, first);
-        let calm = held.where_negative(direction * glide.w, sticks);
+        let calm = held.where_negative(direction * slide.w, sticks);
 
-        let rubbing = self.moving(direction);
-        let operator = rubbing.along(&glide.branch, glide.x - state.x);
+        let sliding = self.moving(direction);
+        let operator = sliding.along(&slide.branch, slide.x - state.x);
         let moved = FrictionMemory { operator, ..*memory };
-        let moving = FeedbackState { x: glide.x, w: glide.w, memory: moved };
+        let moving = FeedbackState { x: slide.x, w: slide.w, memory: moved };
         let mut end = choose(held, &moving, state);
         if calm.any_negative() {
-            let mut way = Way { state: *state, passed: drive.like(0.0) };
+            let mut way = StepProgress { state: *state, passed: drive.like(0.0) };
             for leg in 1..=LEGS {
                 let left = way.passed - drive.like(1.0);
                 if !left.any_negative() {
                     break;
                 }
                 let next = self.leg(&way, drive, rise, leg == LEGS);
-                way = Way {
+                way = StepProgress {
                     state: choose(left, &next.state, &way.state),
                     passed: left.where_negative(next.passed, way.passed),
                 };

@@ -6,7 +6,7 @@
 //! the linear part is exact: fourth order, and no limit on the step, however stiff the stage is.
 
 use piezotrack_control::Number;
-use piezotrack_control::hysteresis::Facing;
+use piezotrack_control::hysteresis::NonsmoothOperator;
 
 use super::feedback_coupling::sign;
 use super::propagator::Propagator;
@@ -14,7 +14,7 @@ use super::traits::{Coupling, FeedbackState};
 
 /// An operator between the drive and linear mechanics.
 #[derive(Clone, Copy, Debug)]
-pub struct AtInput<N, O> {
+pub struct InputCoupling<N, O> {
     /// The linear part over one step.
     pub linear: Propagator<N>,
     /// The hysteresis, from volts to metres.
@@ -39,7 +39,7 @@ pub struct InputMemory<N, S> {
 /// Share of the drive below which a difference is taken for rounding.
 const ROUNDING: f64 = 1e-13;
 
-impl<N: Number, O: Facing<N>> Coupling<N> for AtInput<N, O> {
+impl<N: Number, O: NonsmoothOperator<N>> Coupling<N> for InputCoupling<N, O> {
     type Memory = InputMemory<N, O::State>;
 
     /// Here the drive is in volts.
@@ -64,7 +64,7 @@ impl<N: Number, O: Facing<N>> Coupling<N> for AtInput<N, O> {
         }
         let branch = self.operator.branch(&operator, direction);
         if !onward.any_negative() {
-            operator = self.operator.facing(&operator, rise, direction);
+            operator = self.operator.leaving(&operator, rise, direction);
         }
         let (h0, slope0) = self.operator.output(&operator);
         let operator = self.operator.along(&branch, rise);

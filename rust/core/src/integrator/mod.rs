@@ -11,13 +11,13 @@ mod stepping_loop;
 mod traits;
 
 pub use accuracy::steps_for;
-pub use feedback_coupling::Smooth;
-pub use friction_coupling::{Friction, FrictionMemory, FrictionParameters};
-pub use input_coupling::{AtInput, InputMemory};
-pub use nonsmooth_coupling::Kinked;
+pub use feedback_coupling::FeedbackCoupling;
+pub use friction_coupling::{FrictionCoupling, FrictionMemory, FrictionParameters};
+pub use input_coupling::{InputCoupling, InputMemory};
+pub use nonsmooth_coupling::NonsmoothCoupling;
 pub use propagator::{Column, Mechanics, Propagator, halvings};
 pub use simulate::{Instant, LumpedStage, Motion};
-pub use stepping_loop::{FEW_TERMS, March, Order, Sink, Stepping, TERMS};
+pub use stepping_loop::{FEW_TERMS, Observer, Order, Stepping, SteppingLoop, TERMS};
 pub use traits::{Coupling, FeedbackState, Kernel, MOST_PARAMETERS, Memory, Parameters};
 
 pub(crate) use accuracy::{MOST_SUBSTEPS, first_substeps, out_of_reach};

@@ -1,28 +1,28 @@
 //! An operator whose slope jumps at a reversal, in feedback on the displacement.
 //!
-//! The scheme of [`super::Smooth`] takes the force over a step for a cubic in time. First-order
-//! Dahl and Bouc-Wen hysteresis leave a reversal with another slope than they came with, so a
-//! step begins with the slope of the direction in which it goes, and a reversal inside it is led
-//! through in both predictor and corrector: the cubic is right at both ends, and only the kink
-//! between them is smoothed. Fourth order between reversals, third across them.
+//! The scheme of [`super::FeedbackCoupling`] takes the force over a step for a cubic in time.
+//! First-order Dahl and Bouc-Wen hysteresis leave a reversal with another slope than they came
+//! with, so a step begins with the slope of the direction in which it goes, and a reversal inside
+//! it is led through in both predictor and corrector: the cubic is right at both ends, and only
+//! the kink between them is smoothed. Fourth order between reversals, third across them.
 
 use piezotrack_control::Number;
-use piezotrack_control::hysteresis::Facing;
+use piezotrack_control::hysteresis::NonsmoothOperator;
 
-use super::feedback_coupling::{conclude, heading, lead, predict, sign};
+use super::feedback_coupling::{advance_operator, conclude, heading, predict, sign};
 use super::propagator::Propagator;
 use super::traits::{Coupling, FeedbackState};
 
 /// An operator with kinks at reversals in feedback.
 #[derive(Clone, Copy, Debug)]
-pub struct Kinked<N, O> {
+pub struct NonsmoothCoupling<N, O> {
     /// The linear part over one step.
     pub linear: Propagator<N>,
     /// The hysteresis.
     pub operator: O,
 }
 
-impl<N: Number, O: Facing<N>> Coupling<N> for Kinked<N, O> {
+impl<N: Number, O: NonsmoothOperator<N>> Coupling<N> for NonsmoothCoupling<N, O> {
     type Memory = O::State;
 
     #[inline(always)]
@@ -34,12 +34,12 @@ impl<N: Number, O: Facing<N>> Coupling<N> for Kinked<N, O> {
     ) -> FeedbackState<N, O::State> {
         let Self { linear, operator } = self;
         // At rest the slope does not matter, as the force does not change.
-        let memory = operator.facing(&state.memory, state.w, sign(state.w));
+        let memory = operator.leaving(&state.memory, state.w, sign(state.w));
         let from = FeedbackState { memory, ..*state };
         let ahead = predict(linear, operator, &from, drive, rise);
         let branch = operator.branch(&from.memory, sign(heading(&from, &ahead)));
-        let arrived = lead(operator, &from, &branch, ahead.x, ahead.w);
+        let arrived = advance_operator(operator, &from, &branch, ahead.x, ahead.w);
         let (x, w) = conclude(linear, &ahead, operator.output(&arrived));
-        FeedbackState { x, w, memory: lead(operator, &from, &branch, x, w) }
+        FeedbackState { x, w, memory: advance_operator(operator, &from, &branch, x, w) }
     }
 }

@@ -4,7 +4,7 @@ use pulp::{Simd, WithSimd};
 
 use super::accuracy::{MOST_SUBSTEPS, first_substeps, out_of_reach};
 use super::propagator::{Mechanics, halvings};
-use super::stepping_loop::{March, Sink};
+use super::stepping_loop::{Observer, SteppingLoop};
 use super::traits::{FeedbackState, Kernel, Memory, Parameters};
 use crate::error::{Error, Result, positive};
 use crate::math::dispatch_fused;
@@ -176,7 +176,7 @@ impl<K: Kernel> WithSimd for Run<'_, K> {
             step: h,
             stop,
         };
-        let march = March { coupling, gain };
+        let march = SteppingLoop { coupling, gain };
         let from = FeedbackState { x: start.x, w: start.v * h, memory: start.memory };
         let end = march.run(drive, substeps, from, &mut samples)?;
         let last = Instant { x: end.x, v: end.w / h, memory: end.memory };
@@ -195,7 +195,7 @@ struct Samples<'a, K> {
     stop: Stop<'a>,
 }
 
-impl<K: Kernel> Sink<f64, Memory<K, f64>> for Samples<'_, K> {
+impl<K: Kernel> Observer<f64, Memory<K, f64>> for Samples<'_, K> {
     #[inline(always)]
     fn sample(&mut self, _k: usize, state: &FeedbackState<f64, Memory<K, f64>>) {
         self.x.push(state.x);

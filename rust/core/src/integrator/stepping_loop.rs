@@ -26,7 +26,7 @@ pub struct Stepping {
 }
 
 /// What is done with the states of a stage on its way.
-pub trait Sink<N, M> {
+pub trait Observer<N, M> {
     /// Takes the state at sample `k`.
     fn sample(&mut self, k: usize, state: &FeedbackState<N, M>);
 
@@ -36,7 +36,7 @@ pub trait Sink<N, M> {
 
 /// A stage with everything that its parameters alone decide worked out.
 #[derive(Clone, Copy, Debug)]
-pub struct March<N, C> {
+pub struct SteppingLoop<N, C> {
     /// One sub-step.
     pub coupling: C,
     /// Force for 1 V, N.
@@ -52,7 +52,7 @@ pub const FEW_TERMS: usize = 3;
 /// Sub-steps between two questions whether to give up: tens of microseconds.
 const BLOCK: usize = 1024;
 
-impl<N: Number, C: Coupling<N>> March<N, C> {
+impl<N: Number, C: Coupling<N>> SteppingLoop<N, C> {
     /// Leads the stage along the drive; `None` where the sink gave up.
     #[inline(always)]
     pub fn run(
@@ -60,7 +60,7 @@ impl<N: Number, C: Coupling<N>> March<N, C> {
         drive: &Drive<'_>,
         substeps: usize,
         start: FeedbackState<N, C::Memory>,
-        sink: &mut impl Sink<N, C::Memory>,
+        sink: &mut impl Observer<N, C::Memory>,
     ) -> Option<FeedbackState<N, C::Memory>> {
         let mut state = start;
         sink.sample(0, &state);
@@ -89,7 +89,7 @@ impl<N: Number, C: Coupling<N>> March<N, C> {
         drive: &Drive<'_>,
         samples: Range<usize>,
         mut state: FeedbackState<N, C::Memory>,
-        sink: &mut impl Sink<N, C::Memory>,
+        sink: &mut impl Observer<N, C::Memory>,
     ) -> FeedbackState<N, C::Memory> {
         for k in samples {
             let (u, change) = drive.interval(k - 1);
@@ -107,7 +107,7 @@ impl<N: Number, C: Coupling<N>> March<N, C> {
         substeps: usize,
         samples: Range<usize>,
         mut state: FeedbackState<N, C::Memory>,
-        sink: &mut impl Sink<N, C::Memory>,
+        sink: &mut impl Observer<N, C::Memory>,
     ) -> FeedbackState<N, C::Memory> {
         let part = 1.0 / index(substeps);
         for k in samples {

@@ -21,7 +21,7 @@ use super::values::{Held, ParameterInfo, Values};
 use crate::design::{Gains, LoopPlant};
 use crate::error::{Result, finite, not_zero, positive, within};
 use crate::integrator::{
-    AtInput, InputMemory, Kernel, LumpedStage, Mechanics, Order, Parameters, linear,
+    InputCoupling, InputMemory, Kernel, LumpedStage, Mechanics, Order, Parameters, linear,
 };
 
 /// The unit of beta and gamma is that for n = 1; in general it is 1/(V m^(n-1)).
@@ -248,7 +248,7 @@ impl BoucWenKernel {
 }
 
 impl Kernel for BoucWenKernel {
-    type Coupling<N: Number> = AtInput<N, BoucWen<N>>;
+    type Coupling<N: Number> = InputCoupling<N, BoucWen<N>>;
 
     /// The drive enters in volts.
     #[inline(always)]
@@ -261,7 +261,7 @@ impl Kernel for BoucWenKernel {
         let [_, _, stiffness, gain, ..] = *parameters;
         let linear = linear(parameters, step, halvings);
         let operator = self.operator(parameters);
-        (AtInput { linear, operator, stiffness, gain }, gain.like(1.0))
+        (InputCoupling { linear, operator, stiffness, gain }, gain.like(1.0))
     }
 
     #[inline(always)]

@@ -21,7 +21,9 @@ use super::traits::{
 use super::values::{Held, ParameterInfo, Values};
 use crate::design::{Gains, LoopPlant};
 use crate::error::{Result, finite, not_zero, within};
-use crate::integrator::{Kernel, Kinked, LumpedStage, Mechanics, Order, Parameters, linear};
+use crate::integrator::{
+    Kernel, LumpedStage, Mechanics, NonsmoothCoupling, Order, Parameters, linear,
+};
 
 /// The unit of gamma and delta is that for nu = 1 and a beta without one; in general it is
 /// 1/(m N^(nu-1)).
@@ -181,7 +183,7 @@ impl StageModel for BoucWenOscillator {
 }
 
 impl Searchable for BoucWenOscillator {
-    const KINKED: bool = true;
+    const NONSMOOTH: bool = true;
 
     /// The drive is a force, and may well shake the mass at its resonance.
     fn ranges(of: &Measures, held: &Held) -> Result<Ranges> {
@@ -239,7 +241,7 @@ impl BoucWenOscillatorKernel {
 }
 
 impl Kernel for BoucWenOscillatorKernel {
-    type Coupling<N: Number> = Kinked<N, BoucWen<N>>;
+    type Coupling<N: Number> = NonsmoothCoupling<N, BoucWen<N>>;
 
     /// The drive is a force.
     #[inline(always)]
@@ -251,7 +253,7 @@ impl Kernel for BoucWenOscillatorKernel {
     ) -> (Self::Coupling<N>, N) {
         let linear = linear(parameters, step, halvings);
         let operator = self.operator(parameters);
-        (Kinked { linear, operator }, parameters[0].like(1.0))
+        (NonsmoothCoupling { linear, operator }, parameters[0].like(1.0))
     }
 
     #[inline(always)]

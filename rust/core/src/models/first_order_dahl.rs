@@ -22,7 +22,9 @@ use super::traits::{
 use super::values::{Held, ParameterInfo, Values};
 use crate::design::{Gains, LoopPlant};
 use crate::error::{Result, not_negative, not_zero, positive, within};
-use crate::integrator::{Kernel, Kinked, LumpedStage, Mechanics, Order, Parameters, linear};
+use crate::integrator::{
+    Kernel, LumpedStage, Mechanics, NonsmoothCoupling, Order, Parameters, linear,
+};
 
 const PARAMETERS: &[ParameterInfo] = &[
     ParameterInfo::new("mass", "M", "kg").force(),
@@ -156,7 +158,7 @@ impl StageModel for FirstOrderDahlStage {
 }
 
 impl Searchable for FirstOrderDahlStage {
-    const KINKED: bool = true;
+    const NONSMOOTH: bool = true;
 
     fn ranges(of: &Measures, held: &Held) -> Result<Ranges> {
         let limit = held.value("coulomb_force").map(|limit| 10.0 * limit / of.stroke);
@@ -212,7 +214,7 @@ impl FirstOrderDahlKernel {
 }
 
 impl Kernel for FirstOrderDahlKernel {
-    type Coupling<N: Number> = Kinked<N, FirstOrderDahl<N>>;
+    type Coupling<N: Number> = NonsmoothCoupling<N, FirstOrderDahl<N>>;
 
     #[inline(always)]
     fn coupling<N: Number>(
@@ -222,7 +224,7 @@ impl Kernel for FirstOrderDahlKernel {
         halvings: u32,
     ) -> (Self::Coupling<N>, N) {
         let linear = linear(parameters, step, halvings);
-        (Kinked { linear, operator: self.operator(parameters) }, parameters[3])
+        (NonsmoothCoupling { linear, operator: self.operator(parameters) }, parameters[3])
     }
 
     #[inline(always)]

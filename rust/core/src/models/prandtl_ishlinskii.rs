@@ -89,33 +89,39 @@ impl PlayHysteresis {
         positive("linear", linear, "m/V")?;
         let count = thresholds.len();
         same_length("weights", weights.len(), "thresholds", count, MOST_PLAYS)?;
-        let (corners, bends) = (dead_zone_thresholds, dead_zone_weights);
         let names = ("dead_zone_weights", "dead_zone_thresholds");
-        same_length(names.0, bends.len(), names.1, corners.len(), MOST_ZONES)?;
+        same_length(
+            names.0,
+            dead_zone_weights.len(),
+            names.1,
+            dead_zone_thresholds.len(),
+            MOST_ZONES,
+        )?;
         let mut plays = Plays {
             linear,
             // What is not used weighs 0; it stands at the end so that all ascend.
             thresholds: [thresholds.last().copied().unwrap_or(0.0); MOST_PLAYS],
             weights: [0.0; MOST_PLAYS],
-            corners: [corners.last().copied().unwrap_or(0.0); MOST_ZONES],
-            bends: [0.0; MOST_ZONES],
+            dead_zone_thresholds: [dead_zone_thresholds.last().copied().unwrap_or(0.0); MOST_ZONES],
+            dead_zone_weights: [0.0; MOST_ZONES],
         };
         plays.thresholds[..count].copy_from_slice(&checked_thresholds(thresholds, "V")?);
         for (i, weight) in weights.iter().enumerate() {
             plays.weights[i] = not_negative(&format!("weights[{i}]"), *weight, "m/V")?;
         }
         let (mut before, mut slope) = (f64::NEG_INFINITY, 1.0);
-        for j in 0..corners.len() {
+        for j in 0..dead_zone_thresholds.len() {
             let name = format!("dead_zone_thresholds[{j}]");
-            before = ascending(&name, finite(&name, corners[j], "m")?, before, "m")?;
+            before = ascending(&name, finite(&name, dead_zone_thresholds[j], "m")?, before, "m")?;
             let name = format!("dead_zone_weights[{j}]");
-            slope += finite(&name, bends[j], "")?;
+            slope += finite(&name, dead_zone_weights[j], "")?;
             if slope <= 0.0 {
                 let expected =
                     "dead-zone weights whose sums stay above -1, or the curve turns back";
-                return Err(Error::parameter(name, bends[j], expected));
+                return Err(Error::parameter(name, dead_zone_weights[j], expected));
             }
-            (plays.corners[j], plays.bends[j]) = (before, bends[j]);
+            (plays.dead_zone_thresholds[j], plays.dead_zone_weights[j]) =
+                (before, dead_zone_weights[j]);
         }
         Ok(Self { plays, count })
     }

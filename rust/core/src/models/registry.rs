@@ -91,12 +91,12 @@ macro_rules! models {
                 }
             }
 
-            /// Whether the force has kinks: see [`Searchable::KINKED`].
+            /// Whether the force has kinks: see [`Searchable::NONSMOOTH`].
             #[must_use]
-            pub fn is_kinked(self) -> bool {
+            pub fn is_nonsmooth(self) -> bool {
                 match self {
                     $(Self::$variant => {
-                        by_swarm!($found, <$stage as Searchable>::KINKED, false)
+                        by_swarm!($found, <$stage as Searchable>::NONSMOOTH, false)
                     })*
                 }
             }

@@ -165,7 +165,7 @@ pub trait Searchable: StageModel {
     /// for all in the choice of the step. At its corners the kinks are a nanometre wide, which
     /// would make every candidate a dozen times as dear, and an oscillator's hysteresis grows
     /// without bound, which no steps follow.
-    const KINKED: bool = false;
+    const NONSMOOTH: bool = false;
 
     /// Ranges of the parameters that are not held.
     ///

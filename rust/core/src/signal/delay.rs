@@ -9,7 +9,7 @@ pub fn delayed(x: &[f64], v: &[f64], dt: f64, delay: f64) -> Vec<f64> {
     if delay == 0.0 {
         return x.to_vec();
     }
-    let Late { whole, part } = Late::new(delay, dt);
+    let FractionalDelay { whole, part } = FractionalDelay::new(delay, dt);
     let at =
         |k: Option<usize>| k.map_or((x.first().copied().unwrap_or(0.0), 0.0), |k| (x[k], v[k]));
     let values = (0..x.len().min(v.len())).map(|k| {
@@ -21,14 +21,14 @@ pub fn delayed(x: &[f64], v: &[f64], dt: f64, delay: f64) -> Vec<f64> {
 
 /// A delay in samples.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Late {
+pub(crate) struct FractionalDelay {
     /// Whole samples.
     pub whole: usize,
     /// Where between the sample before and that one the displacement is read off, 0 to 1.
     pub part: f64,
 }
 
-impl Late {
+impl FractionalDelay {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 or above")]
     pub(crate) fn new(delay: f64, dt: f64) -> Self {
         let samples = (delay / dt).max(0.0);

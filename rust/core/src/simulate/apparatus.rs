@@ -104,14 +104,14 @@ impl<'a, P: Plant> Apparatus<'a, P> {
     }
 
     /// Leads the apparatus along a stretch whose command goes straight from `from` to `to`, V.
-    pub(super) fn lead(
+    pub(super) fn drive(
         &self,
         stretch: &Stretch<P::Flow>,
         state: &mut ApparatusState<P::State>,
         from: f64,
         to: f64,
     ) {
-        pulp::Arch::new().dispatch(Lead { apparatus: self, stretch, state, from, to });
+        pulp::Arch::new().dispatch(DriveStretch { apparatus: self, stretch, state, from, to });
     }
 }
 
@@ -124,7 +124,7 @@ pub(super) struct Stretch<F> {
 }
 
 /// One way along a stretch; dispatched for the fused multiply-add instruction.
-struct Lead<'a, P: Plant> {
+struct DriveStretch<'a, P: Plant> {
     apparatus: &'a Apparatus<'a, P>,
     stretch: &'a Stretch<P::Flow>,
     state: &'a mut ApparatusState<P::State>,
@@ -132,7 +132,7 @@ struct Lead<'a, P: Plant> {
     to: f64,
 }
 
-impl<P: Plant> WithSimd for Lead<'_, P> {
+impl<P: Plant> WithSimd for DriveStretch<'_, P> {
     type Output = ();
 
     #[inline(always)]

@@ -104,7 +104,7 @@ pub fn closed_loop<P: Plant>(
         }
         for Part { stretch, from, event } in &parts {
             let volts = commands.acting(k, *from);
-            apparatus.lead(stretch, &mut record.run.last, volts, volts);
+            apparatus.drive(stretch, &mut record.run.last, volts, volts);
             if event.kept && !last {
                 record.keep(apparatus.displacement(&record.run.last))?;
             }

@@ -79,7 +79,7 @@ impl<S> OpenLoop<S> {
     ) {
         if let Some(before) = k.checked_sub(1) {
             let (from, change) = drive.interval(before);
-            apparatus.lead(stretch, &mut self.last, from, from + change);
+            apparatus.drive(stretch, &mut self.last, from, from + change);
         }
     }
 

@@ -86,7 +86,7 @@ impl LinearFeedback for Law {
 
 /// What a controller is to follow, sample by sample.
 #[derive(Clone, Copy, Debug)]
-pub struct Course<'a> {
+pub struct ReferenceSamples<'a> {
     /// Reference, m.
     pub reference: &'a [f64],
     /// Feedforward, V.
@@ -95,7 +95,7 @@ pub struct Course<'a> {
 
 /// A controlled motion and the commands behind it.
 #[derive(Clone, Debug)]
-pub struct Tracked<S> {
+pub struct TrackingRun<S> {
     /// The motion, with the instants between the control samples.
     pub motion: ClosedLoop<S>,
     /// The command at each control sample.
@@ -111,27 +111,27 @@ pub fn track<P: Plant, F: Feedback>(
     start: ApparatusState<P::State>,
     timing: &Timing,
     controller: &Controller<F>,
-    course: Course<'_>,
+    course: ReferenceSamples<'_>,
     stop: Stop<'_>,
-) -> Result<Option<Tracked<P::State>>> {
-    let mut leader = Leader::new(controller, course)?;
+) -> Result<Option<TrackingRun<P::State>>> {
+    let mut run = ControllerRun::new(controller, course)?;
     let timing = Timing { samples: course.reference.len(), ..*timing };
-    let lead = |k, measured| leader.lead(k, measured);
-    let motion = closed_loop(apparatus, start, &timing, lead, stop)?;
-    Ok(motion.map(|motion| Tracked { motion, commands: leader.commands }))
+    let command = |k, measured| run.command(k, measured);
+    let motion = closed_loop(apparatus, start, &timing, command, stop)?;
+    Ok(motion.map(|motion| TrackingRun { motion, commands: run.commands }))
 }
 
 /// A controller on its course.
-pub(super) struct Leader<'a, F: Feedback> {
+pub(super) struct ControllerRun<'a, F: Feedback> {
     controller: &'a Controller<F>,
-    course: Course<'a>,
+    course: ReferenceSamples<'a>,
     state: ControllerState<F::State, Vec<f64>>,
     /// The commands so far.
     pub(super) commands: Vec<Command>,
 }
 
-impl<'a, F: Feedback> Leader<'a, F> {
-    pub(super) fn new(controller: &'a Controller<F>, course: Course<'a>) -> Result<Self> {
+impl<'a, F: Feedback> ControllerRun<'a, F> {
+    pub(super) fn new(controller: &'a Controller<F>, course: ReferenceSamples<'a>) -> Result<Self> {
         let samples = course.reference.len();
         if course.feedforward.len() != samples {
             return Err(Error::Shape {
@@ -146,7 +146,7 @@ impl<'a, F: Feedback> Leader<'a, F> {
     }
 
     /// The command at sample `k`, V.
-    pub(super) fn lead(&mut self, k: usize, measured: f64) -> f64 {
+    pub(super) fn command(&mut self, k: usize, measured: f64) -> f64 {
         let (reference, feedforward) = (self.course.reference[k], self.course.feedforward[k]);
         let command = self.controller.step(&mut self.state, reference, measured, feedforward);
         self.commands.push(command);

@@ -13,7 +13,7 @@ use super::apparatus::{Apparatus, ApparatusState, Stretch};
 use super::closed_loop::{ClosedLoop, Record, checked};
 use super::open_loop::{BLOCK, OpenLoop, checked as checked_drive, since};
 use super::timing::{Clock, Commands, Delay, Event, SAMPLES, Timing, events};
-use super::tracking::{Course, Leader, Tracked};
+use super::tracking::{ControllerRun, ReferenceSamples, TrackingRun};
 use crate::error::{Error, Result, finite, not_negative};
 use crate::models::Plant;
 use crate::signal::{Drive, Stop, index};
@@ -46,7 +46,7 @@ pub type TwoStates<X, Y> = (ApparatusState<X>, ApparatusState<Y>);
 pub type TwoMotions<X, Y> = (ClosedLoop<<X as Plant>::State>, ClosedLoop<<Y as Plant>::State>);
 
 /// Controlled motion of both axes, with the commands behind it.
-pub type TwoTracked<X, Y> = (Tracked<<X as Plant>::State>, Tracked<<Y as Plant>::State>);
+pub type TwoTracked<X, Y> = (TrackingRun<<X as Plant>::State>, TrackingRun<<Y as Plant>::State>);
 
 /// Driven motion of both axes.
 pub type TwoLogs<X, Y> = (OpenLoop<<X as Plant>::State>, OpenLoop<<Y as Plant>::State>);
@@ -258,8 +258,8 @@ pub fn closed_loops<X: Plant, Y: Plant>(
                 break;
             }
             let [volts_x, volts_y] = [0, 1].map(|axis| run.commands[axis].acting(k, part.from));
-            axes.x.lead(&part.x, &mut run.x.run.last, volts_x, volts_x);
-            axes.y.lead(&part.y, &mut run.y.run.last, volts_y, volts_y);
+            axes.x.drive(&part.x, &mut run.x.run.last, volts_x, volts_x);
+            axes.y.drive(&part.y, &mut run.y.run.last, volts_y, volts_y);
             if part.event.kept && !last {
                 run.keep(axes)?;
             }
@@ -288,7 +288,7 @@ pub fn track_both<X: Plant, Y: Plant, F: Feedback, G: Feedback>(
     start: TwoStates<X::State, Y::State>,
     timing: &Timing,
     controllers: (&Controller<F>, &Controller<G>),
-    courses: [Course<'_>; 2],
+    courses: [ReferenceSamples<'_>; 2],
     stop: Stop<'_>,
 ) -> Result<Option<TwoTracked<X, Y>>> {
     let samples = courses[0].reference.len();
@@ -299,18 +299,20 @@ pub fn track_both<X: Plant, Y: Plant, F: Feedback, G: Feedback>(
             expected: format!("{samples}, as many as that of x"),
         });
     }
-    let (mut x, mut y) =
-        (Leader::new(controllers.0, courses[0])?, Leader::new(controllers.1, courses[1])?);
+    let (mut x, mut y) = (
+        ControllerRun::new(controllers.0, courses[0])?,
+        ControllerRun::new(controllers.1, courses[1])?,
+    );
     let timing = Timing { samples, ..*timing };
     let waiting = Command { volts: start.1.command, ..Command::default() };
-    let (lead_x, lead_y) = (|k, read| x.lead(k, read), |k, read| y.lead(k, read));
-    let run = closed_loops(axes, start, &timing, lead_x, lead_y, stop)?;
+    let (command_x, command_y) = (|k, read| x.command(k, read), |k, read| y.command(k, read));
+    let run = closed_loops(axes, start, &timing, command_x, command_y, stop)?;
     let late = samples - y.commands.len();
     y.commands.splice(..0, core::iter::repeat_n(waiting, late));
     Ok(run.map(|(motion_x, motion_y)| {
         (
-            Tracked { motion: motion_x, commands: x.commands },
-            Tracked { motion: motion_y, commands: y.commands },
+            TrackingRun { motion: motion_x, commands: x.commands },
+            TrackingRun { motion: motion_y, commands: y.commands },
         )
     }))
 }

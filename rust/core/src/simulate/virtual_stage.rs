@@ -213,20 +213,29 @@ impl VirtualSettings {
         let mut slope = 1.0;
         let mut before = 0.0;
         for j in 0..DEAD_ZONES {
-            let corner = not_negative(&format!("corners[{j}]"), play.corners[j], "V")?;
+            let corner = not_negative(
+                &format!("dead_zone_thresholds[{j}]"),
+                play.dead_zone_thresholds[j],
+                "V",
+            )?;
             if corner < before {
-                let expected = format!("{before} V or above: corners ascend");
+                let expected = format!("{before} V or above: dead_zone_thresholds ascend");
                 return Err(Error::parameter(
-                    format!("corners[{j}]"),
+                    format!("dead_zone_thresholds[{j}]"),
                     format!("{corner} V"),
                     expected,
                 ));
             }
             before = corner;
-            slope += finite(&format!("bends[{j}]"), play.bends[j], "")?;
+            slope += finite(&format!("dead_zone_weights[{j}]"), play.dead_zone_weights[j], "")?;
             if slope <= 0.0 {
-                let expected = "bends whose sums stay above -1, or the curve turns back";
-                return Err(Error::parameter(format!("bends[{j}]"), play.bends[j], expected));
+                let expected =
+                    "dead_zone_weights whose sums stay above -1, or the curve turns back";
+                return Err(Error::parameter(
+                    format!("dead_zone_weights[{j}]"),
+                    play.dead_zone_weights[j],
+                    expected,
+                ));
             }
         }
         Ok(())
@@ -260,8 +269,8 @@ fn spread_plays(share: f64, swing: f64) -> StagePlay {
         linear: 1.0 - 0.5 * sum,
         thresholds,
         weights: [sum / count; PLAYS],
-        corners: [swing / 3.0, 2.0 * swing / 3.0],
-        bends: [0.05, 0.05],
+        dead_zone_thresholds: [swing / 3.0, 2.0 * swing / 3.0],
+        dead_zone_weights: [0.05, 0.05],
     }
 }
 
@@ -315,9 +324,10 @@ impl VirtualStage {
     pub fn gains(&self) -> [f64; 3] {
         let VirtualSettings { play, gain, swing, .. } = &self.settings;
         let moving: f64 = play.weights.iter().sum();
-        let bends: f64 = play.bends.iter().sum();
+        let dead_zone_weights: f64 = play.dead_zone_weights.iter().sum();
         let mean = travel(play, *swing) / swing;
-        [play.linear, mean, (play.linear + moving) * (1.0 + bends)].map(|slope| slope * gain)
+        [play.linear, mean, (play.linear + moving) * (1.0 + dead_zone_weights)]
+            .map(|slope| slope * gain)
     }
 
     /// Where an experiment starts: preconditioned and zeroed as the settings say.

@@ -21,7 +21,7 @@ const LEAST_SLOPE: f64 = 0.05;
 struct Unknowns {
     /// w0 above its least value, then the weights, m/V.
     weights: Vec<f64>,
-    bends: Vec<f64>,
+    dead_zone_weights: Vec<f64>,
     shares: Vec<f64>,
     offset: f64,
 }
@@ -34,7 +34,7 @@ impl Unknowns {
         };
         Self {
             weights: mix(&self.weights, &goal.weights),
-            bends: mix(&self.bends, &goal.bends),
+            dead_zone_weights: mix(&self.dead_zone_weights, &goal.dead_zone_weights),
             shares: mix(&self.shares, &goal.shares),
             offset: self.offset + part * (goal.offset - self.offset),
         }
@@ -42,7 +42,7 @@ impl Unknowns {
 
     fn rises(&self) -> bool {
         let mut slope = 1.0;
-        self.bends.iter().all(|bend| {
+        self.dead_zone_weights.iter().all(|bend| {
             slope += bend;
             slope >= LEAST_SLOPE
         })
@@ -55,7 +55,7 @@ pub(super) struct Fit<'a, M: WeightedPlays> {
     settings: &'a Settings,
     stop: Stop<'a>,
     least_linear: f64,
-    corners: Vec<f64>,
+    dead_zone_thresholds: Vec<f64>,
     unknowns: Unknowns,
     dynamics: Dynamics,
     /// Numbers of the envelope, and what they make.
@@ -74,7 +74,7 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         let (least, most) = range(&record.y[record.start..]);
         let unknowns = Unknowns {
             weights: vec![0.0; 1 + settings.thresholds.len()],
-            bends: Vec::new(),
+            dead_zone_weights: Vec::new(),
             shares: vec![0.0; settings.times.len()],
             offset: 0.0,
         };
@@ -87,7 +87,7 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
             settings,
             stop,
             least_linear: LEAST_LINEAR * (most - least) / (high - low),
-            corners: Vec::new(),
+            dead_zone_thresholds: Vec::new(),
             unknowns,
             dynamics: Dynamics::None,
             rms: f64::INFINITY,
@@ -198,14 +198,14 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         let count = self.settings.zones;
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for (k, &volts) in self.record.drive.u.iter().enumerate() {
-            let value = self.lead(&mut plays, volts);
+            let value = self.follow(&mut plays, volts);
             if k >= self.record.start {
                 (low, high) = (low.min(value), high.max(value));
             }
         }
-        self.corners =
+        self.dead_zone_thresholds =
             (1..=count).map(|j| low + (high - low) * index(j) / index(count + 1)).collect();
-        self.unknowns.bends = vec![0.0; count];
+        self.unknowns.dead_zone_weights = vec![0.0; count];
     }
 
     /// The drive, then what the plays would stand at: all at rest.
@@ -214,7 +214,7 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
     }
 
     /// Moves the plays to `volts` and returns p, m.
-    fn lead(&self, plays: &mut [f64], volts: f64) -> f64 {
+    fn follow(&self, plays: &mut [f64], volts: f64) -> f64 {
         let (up, down) = M::edges(&self.envelope, volts);
         plays[0] = up.max(down.min(plays[0]));
         let mut value = (self.least_linear + self.unknowns.weights[0]) * plays[0];
@@ -228,7 +228,7 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
 
     /// What the dead zones make of p.
     fn bent(&self, value: f64) -> f64 {
-        let zones = self.corners.iter().zip(&self.unknowns.bends);
+        let zones = self.dead_zone_thresholds.iter().zip(&self.unknowns.dead_zone_weights);
         value + zones.map(|(corner, bend)| bend * beyond(value, *corner)).sum::<f64>()
     }
 
@@ -275,7 +275,7 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         let (mut plays, mut follower) = (self.plays(), Follower::new());
         let mut sum = 0.0;
         for (k, &volts) in drive.u.iter().enumerate() {
-            let output = self.bent(self.lead(&mut plays, volts));
+            let output = self.bent(self.follow(&mut plays, volts));
             let x = follower.next(&relaxation, &flow, drive.hold, output);
             if k >= start {
                 let error = y[k] - x - self.unknowns.offset;
@@ -296,7 +296,8 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
             .map(|_| Relaxation::new(&[], &[], self.dynamics))
             .collect::<Result<_>>()
             .ok()?;
-        let (n, zones, times) = (self.unknowns.weights.len(), self.corners.len(), parts.len());
+        let (n, zones, times) =
+            (self.unknowns.weights.len(), self.dead_zone_thresholds.len(), parts.len());
         let unknowns = n + zones + times + usize::from(self.settings.offset);
         let mut free = vec![false; unknowns];
         free[n..n + zones].fill(true);
@@ -307,15 +308,15 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         let mut row = vec![1.0; unknowns];
         let now = self.flat();
         for (k, &volts) in drive.u.iter().enumerate() {
-            let value = self.lead(&mut plays, volts);
-            let zone = self.corners.iter().zip(&self.unknowns.bends);
+            let value = self.follow(&mut plays, volts);
+            let zone = self.dead_zone_thresholds.iter().zip(&self.unknowns.dead_zone_weights);
             let slope: f64 =
                 zone.map(|(d, s)| if value > *d { *s } else { 0.0 }).sum::<f64>() + 1.0;
             let x = whole.next(&relaxation, &flow, drive.hold, self.bent(value));
             for j in 0..n {
                 row[j] = columns[j].next(&relaxation, &flow, drive.hold, slope * plays[j]);
             }
-            for (j, corner) in self.corners.iter().enumerate() {
+            for (j, corner) in self.dead_zone_thresholds.iter().enumerate() {
                 let input = beyond(value, *corner);
                 row[n + j] = columns[n + j].next(&relaxation, &flow, drive.hold, input);
             }
@@ -330,11 +331,11 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         }
         let found = rows.solve(&free);
         let (weights, rest) = found.split_at(n);
-        let (bends, rest) = rest.split_at(zones);
+        let (dead_zone_weights, rest) = rest.split_at(zones);
         let (shares, rest) = rest.split_at(times);
         Some(Unknowns {
             weights: weights.to_vec(),
-            bends: bends.to_vec(),
+            dead_zone_weights: dead_zone_weights.to_vec(),
             shares: shares.to_vec(),
             offset: rest.first().copied().unwrap_or(0.0),
         })
@@ -342,8 +343,8 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
 
     /// The unknowns in the order of the columns.
     fn flat(&self) -> Vec<f64> {
-        let Unknowns { weights, bends, shares, offset } = &self.unknowns;
-        let mut all = [&weights[..], bends, shares].concat();
+        let Unknowns { weights, dead_zone_weights, shares, offset } = &self.unknowns;
+        let mut all = [&weights[..], dead_zone_weights, shares].concat();
         if self.settings.offset {
             all.push(*offset);
         }
@@ -352,13 +353,13 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
 
     pub fn result(&self) -> Result<LeastSquaresFit> {
         let Settings { thresholds, times, .. } = self.settings;
-        let Unknowns { weights, bends, shares, offset } = &self.unknowns;
+        let Unknowns { weights, dead_zone_weights, shares, offset } = &self.unknowns;
         let fitted = FittedPlays {
             linear: self.least_linear + weights[0],
             thresholds: thresholds.clone(),
             weights: weights[1..].to_vec(),
-            dead_zone_thresholds: self.corners.clone(),
-            dead_zone_weights: bends.clone(),
+            dead_zone_thresholds: self.dead_zone_thresholds.clone(),
+            dead_zone_weights: dead_zone_weights.clone(),
             shape: self.shape.clone(),
             drive: self.drive,
             relaxation: Relaxation::new(shares, times, self.dynamics)?,

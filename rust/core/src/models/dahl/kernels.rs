@@ -5,8 +5,8 @@ use piezotrack_control::hysteresis::{Dahl, DahlState, Operator};
 
 use super::{DahlStage, DahlStageState};
 use crate::integrator::{
-    Coupling, FeedbackState, Friction, FrictionMemory, FrictionParameters, Kernel, Parameters,
-    Smooth, TERMS, halvings, linear,
+    Coupling, FeedbackCoupling, FeedbackState, FrictionCoupling, FrictionMemory,
+    FrictionParameters, Kernel, Parameters, TERMS, halvings, linear,
 };
 use crate::models::Plant;
 
@@ -23,7 +23,7 @@ fn operator<N: Number, const T: usize>(parameters: &Parameters<N>) -> Dahl<N, T>
 impl<const T: usize, const FOURTH: bool> Kernel for SmoothKernel<T, FOURTH> {
     const VECTORS: usize = 3;
 
-    type Coupling<N: Number> = Smooth<N, Dahl<N, T>, FOURTH>;
+    type Coupling<N: Number> = FeedbackCoupling<N, Dahl<N, T>, FOURTH>;
 
     #[inline(always)]
     fn coupling<N: Number>(
@@ -33,7 +33,7 @@ impl<const T: usize, const FOURTH: bool> Kernel for SmoothKernel<T, FOURTH> {
         halvings: u32,
     ) -> (Self::Coupling<N>, N) {
         let linear = linear(parameters, step, halvings);
-        (Smooth { linear, operator: operator(parameters) }, parameters[3])
+        (FeedbackCoupling { linear, operator: operator(parameters) }, parameters[3])
     }
 
     #[inline(always)]
@@ -59,7 +59,7 @@ fn friction<N: Number>(parameters: &Parameters<N>) -> FrictionParameters<N> {
 }
 
 impl Kernel for FrictionKernel {
-    type Coupling<N: Number> = Friction<N>;
+    type Coupling<N: Number> = FrictionCoupling<N>;
 
     #[inline(always)]
     fn coupling<N: Number>(
@@ -67,8 +67,8 @@ impl Kernel for FrictionKernel {
         parameters: &Parameters<N>,
         step: f64,
         halvings: u32,
-    ) -> (Friction<N>, N) {
-        (Friction::new(friction(parameters), step, halvings), parameters[3])
+    ) -> (FrictionCoupling<N>, N) {
+        (FrictionCoupling::new(friction(parameters), step, halvings), parameters[3])
     }
 
     #[inline(always)]
@@ -97,9 +97,9 @@ pub struct DahlFlow {
 #[derive(Clone, Copy, Debug)]
 enum DahlCoupling {
     /// b0 = 0.
-    Smooth(Smooth<f64, Dahl<f64, TERMS>, true>),
+    Smooth(FeedbackCoupling<f64, Dahl<f64, TERMS>, true>),
     /// Any other.
-    Friction(Friction<f64>),
+    FrictionCoupling(FrictionCoupling<f64>),
 }
 
 impl Plant for DahlStage {
@@ -114,7 +114,7 @@ impl Plant for DahlStage {
         let halvings = halvings(self.mechanics.rate(), step);
         let parameters = self.lumped(FrictionKernel).parameters;
         let coupling = if self.has_friction() {
-            DahlCoupling::Friction(FrictionKernel.coupling(&parameters, step, halvings).0)
+            DahlCoupling::FrictionCoupling(FrictionKernel.coupling(&parameters, step, halvings).0)
         } else {
             let kernel = SmoothKernel::<TERMS, true>;
             DahlCoupling::Smooth(kernel.coupling(&parameters, step, halvings).0)
@@ -135,7 +135,7 @@ impl Plant for DahlStage {
                 let (q1, q2) = self.states(&end.memory);
                 DahlStageState { x: end.x, v: end.w / step, q1, q2 }
             }
-            DahlCoupling::Friction(friction) => {
+            DahlCoupling::FrictionCoupling(friction) => {
                 let memory = DahlState { force: state.q1, slope: state.q2 };
                 let end = friction.step(&friction.start(x, w, memory), drive, rise);
                 let DahlState { force: q1, slope: q2 } = end.memory.operator;

@@ -196,7 +196,7 @@ impl DahlStage {
     }
 
     /// Motion with sticking and breaking away.
-    fn rubbing(
+    fn sliding(
         &self,
         experiment: &Experiment<'_>,
         from: &DahlStageState,
@@ -239,7 +239,7 @@ impl StageModel for DahlStage {
         let [x, v, q1, q2] = experiment.initial.map_or([0.0; 4], Values::numbers);
         let from = DahlStageState { x, v, q1, q2 };
         match experiment.method {
-            Method::Exponential if self.has_friction() => self.rubbing(experiment, &from),
+            Method::Exponential if self.has_friction() => self.sliding(experiment, &from),
             Method::Exponential => self.smooth(experiment, &from),
             Method::Rk4 | Method::Rk45 => runge_kutta::simulate(self, experiment, from),
         }

@@ -40,7 +40,7 @@ fn moved(state: &State, h: f64, weights: &[f64], slopes: &[State]) -> State {
 }
 
 /// How an interval of the drive is crossed.
-trait Crossing {
+trait IntervalSolver {
     /// The state at the end of an interval of length `dt` with the drive from `u` to
     /// `u + change`; `None` where it does not stay finite.
     fn cross(&mut self, state: State, u: f64, change: f64, dt: f64) -> Option<State>;
@@ -55,7 +55,7 @@ struct Rk4<'a> {
     substeps: usize,
 }
 
-impl Crossing for Rk4<'_> {
+impl IntervalSolver for Rk4<'_> {
     fn cross(&mut self, mut state: State, u: f64, change: f64, dt: f64) -> Option<State> {
         let part = 1.0 / index(self.substeps);
         let h = dt * part;
@@ -120,7 +120,7 @@ impl<'a> Rk45<'a> {
     }
 }
 
-impl Crossing for Rk45<'_> {
+impl IntervalSolver for Rk45<'_> {
     fn cross(&mut self, mut state: State, u: f64, change: f64, dt: f64) -> Option<State> {
         let mut at = 0.0;
         let mut steps = 0;
@@ -225,7 +225,7 @@ pub(super) fn simulate(
 /// Motion under a drive; `None` where it does not stay finite or `stop` says so.
 fn along(
     stage: &DahlStage,
-    crossing: &mut impl Crossing,
+    crossing: &mut impl IntervalSolver,
     drive: &Drive<'_>,
     initial: DahlStageState,
     stop: Stop<'_>,
