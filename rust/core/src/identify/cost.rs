@@ -15,7 +15,7 @@ use super::candidate::{Candidate, Theta};
 use super::motion::motion;
 use super::problem::Problem;
 use super::record::Record;
-use super::residual_sums::{Costs, ResidualSums, Residuals};
+use super::residual_sums::{Costs, Delayed, Direct, ResidualSums, Residuals};
 use super::step_size;
 use crate::integrator::{
     FeedbackState, Kernel, MOST_PARAMETERS, Mechanics, Stepping, SteppingLoop, halvings,
@@ -92,14 +92,20 @@ impl<'a> KernelVisitor for All<'a> {
         let width = of.arch.dispatch(Width);
         // Every thread gets vectors to fill before any gets a second one.
         let vectors = candidates.len().div_ceil(width);
-        let each = vectors.div_ceil(rayon::current_num_threads()).clamp(1, K::VECTORS);
+        // A delay reads a ring in memory, which several vectors do not make faster.
+        let delayed = of.problem.has_delay();
+        let most = if delayed { 1 } else { K::VECTORS };
+        let each = vectors.div_ceil(rayon::current_num_threads()).clamp(1, most);
         let size = candidates.len().div_ceil(vectors.div_ceil(each).max(1)).max(1);
         let bundle = |chunk: &'a [Candidate]| {
             // Only a kernel that gains by several vectors is compiled for them.
             if const { K::VECTORS > 1 } && chunk.len() > width {
-                of.arch.dispatch(Bundle::<K, VECTORS> { kernel, of, candidates: chunk, stop })
+                let bundle = Bundle::<K, VECTORS, false> { kernel, of, candidates: chunk, stop };
+                of.arch.dispatch(bundle)
+            } else if delayed {
+                of.arch.dispatch(Bundle::<K, 1, true> { kernel, of, candidates: chunk, stop })
             } else {
-                of.arch.dispatch(Bundle::<K, 1> { kernel, of, candidates: chunk, stop })
+                of.arch.dispatch(Bundle::<K, 1, false> { kernel, of, candidates: chunk, stop })
             }
         };
         candidates.par_chunks(size).flat_map_iter(bundle).collect()
@@ -120,15 +126,15 @@ impl WithSimd for Width {
     }
 }
 
-/// Candidates in one bundle of `V` vectors of lanes.
-struct Bundle<'a, K, const V: usize> {
+/// Candidates in one bundle of `V` vectors of lanes, read with a delay where `DELAYED`.
+struct Bundle<'a, K, const V: usize, const DELAYED: bool> {
     kernel: K,
     of: &'a Evaluator<'a>,
     candidates: &'a [Candidate],
     stop: Stop<'a>,
 }
 
-impl<K: Kernel, const V: usize> WithSimd for Bundle<'_, K, V> {
+impl<K: Kernel, const V: usize, const DELAYED: bool> WithSimd for Bundle<'_, K, V, DELAYED> {
     type Output = Vec<Costs>;
 
     #[inline(always)]
@@ -147,10 +153,17 @@ impl<K: Kernel, const V: usize> WithSimd for Bundle<'_, K, V> {
         let step = drive.dt / index(substeps);
         let (coupling, gain) = kernel.coupling(&parameters, step, of.halvings);
         let start = FeedbackState { x: zero, w: zero, memory: kernel.rest(&parameters) };
-        let delays = of.problem.has_delay().then(|| index(substeps));
-        let mut sums = ResidualSums::new(&of.residuals, candidates, stop, zero, delays);
-        let ended =
-            SteppingLoop { coupling, gain }.run(drive, substeps, start, &mut sums).is_some();
-        sums.conclude(ended)
+        let stepping = SteppingLoop { coupling, gain };
+        let residuals = &of.residuals;
+        if const { DELAYED } {
+            let reading = Delayed::new(candidates, drive.dt, zero, index(substeps));
+            let mut sums = ResidualSums::new(residuals, candidates, stop, zero, reading);
+            let ended = stepping.run(drive, substeps, start, &mut sums).is_some();
+            sums.conclude(ended)
+        } else {
+            let mut sums = ResidualSums::new(residuals, candidates, stop, zero, Direct);
+            let ended = stepping.run(drive, substeps, start, &mut sums).is_some();
+            sums.conclude(ended)
+        }
     }
 }

@@ -52,33 +52,46 @@ impl Residuals<'_> {
     }
 }
 
+/// How the displacement of a bundle is read at a sample.
+pub(super) trait Reading<N> {
+    /// Takes the state at sample `k` and gives the displacement that is read there.
+    fn read(&mut self, k: usize, x: N, w: N) -> N;
+}
+
+/// Without delay.
+pub(super) struct Direct;
+
+impl<N> Reading<N> for Direct {
+    #[inline(always)]
+    fn read(&mut self, _k: usize, x: N, _w: N) -> N {
+        x
+    }
+}
+
 /// Sums of the deviation and of its square, in lanes.
-pub(super) struct ResidualSums<'a, const V: usize, S: Simd> {
+pub(super) struct ResidualSums<'a, const V: usize, S: Simd, R> {
     of: &'a Residuals<'a>,
     candidates: &'a [Candidate],
     stop: Stop<'a>,
     sum: Lanes<S, V>,
     squares: Lanes<S, V>,
-    /// Where any candidate has a delay.
-    delay: Option<Delayed<V, S>>,
+    reading: R,
     /// Costs of the candidates that are settled before the end.
     verdicts: Vec<Option<Costs>>,
 }
 
-impl<'a, const V: usize, S: Simd> ResidualSums<'a, V, S> {
-    /// Sums that are 0; `substeps` in a sampling interval where a candidate has a delay.
+impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
+    /// Sums that are 0.
     #[inline(always)]
     pub fn new(
         of: &'a Residuals<'a>,
         candidates: &'a [Candidate],
         stop: Stop<'a>,
         zero: Lanes<S, V>,
-        substeps: Option<f64>,
+        reading: R,
     ) -> Self {
-        let dt = of.record.drive.dt;
-        let delay = substeps.map(|substeps| Delayed::new(candidates, dt, zero, substeps));
         let verdicts = vec![None; candidates.len()];
-        Self { of, candidates, stop, sum: zero, squares: zero, delay, verdicts }
+        Self { of, candidates, stop, sum: zero, squares: zero, reading, verdicts }
     }
 
     /// Gives up where every candidate is already beyond its limit: squares only add up, also
@@ -120,13 +133,12 @@ impl<'a, const V: usize, S: Simd> ResidualSums<'a, V, S> {
     }
 }
 
-impl<const V: usize, S: Simd, M> Observer<Lanes<S, V>, M> for ResidualSums<'_, V, S> {
+impl<const V: usize, S: Simd, M, R: Reading<Lanes<S, V>>> Observer<Lanes<S, V>, M>
+    for ResidualSums<'_, V, S, R>
+{
     #[inline(always)]
     fn sample(&mut self, k: usize, state: &FeedbackState<Lanes<S, V>, M>) {
-        let x = match &mut self.delay {
-            None => state.x,
-            Some(delay) => delay.read(k, state.x, state.w),
-        };
+        let x = self.reading.read(k, state.x, state.w);
         let record = self.of.record;
         if k >= record.window.start {
             let deviation = x.like(record.y[k] - self.of.centre) - x;
@@ -141,7 +153,7 @@ impl<const V: usize, S: Simd, M> Observer<Lanes<S, V>, M> for ResidualSums<'_, V
 }
 
 /// The last samples of a displacement that is read with a delay, each lane with its own.
-struct Delayed<const V: usize, S: Simd> {
+pub(super) struct Delayed<const V: usize, S: Simd> {
     /// Displacement and scaled velocity at the last samples, in a ring.
     past: Vec<[Lanes<S, V>; 2]>,
     /// Delay of each lane in whole samples.
@@ -153,7 +165,7 @@ struct Delayed<const V: usize, S: Simd> {
 }
 
 impl<const V: usize, S: Simd> Delayed<V, S> {
-    fn new(candidates: &[Candidate], dt: f64, zero: Lanes<S, V>, substeps: f64) -> Self {
+    pub fn new(candidates: &[Candidate], dt: f64, zero: Lanes<S, V>, substeps: f64) -> Self {
         let late = |lane: usize| {
             let delay = candidates.get(lane).map_or(0.0, |candidate| candidate.theta.delay());
             FractionalDelay::new(delay, dt)
@@ -164,9 +176,10 @@ impl<const V: usize, S: Simd> Delayed<V, S> {
         // At rest before the first sample.
         Self { past: vec![[zero; 2]; length], whole, part, substeps }
     }
+}
 
-    /// Takes the state at sample `k` and gives the displacement that is read there.
-    #[inline(never)]
+impl<const V: usize, S: Simd> Reading<Lanes<S, V>> for Delayed<V, S> {
+    #[inline(always)]
     fn read(&mut self, k: usize, x: Lanes<S, V>, w: Lanes<S, V>) -> Lanes<S, V> {
         let length = self.past.len();
         self.past[k % length] = [x, w * w.like(self.substeps)];
