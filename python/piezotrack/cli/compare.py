@@ -7,22 +7,8 @@ from typing import Annotated
 
 import typer
 
-from .options import (
-    Columns,
-    DisplacementColumn,
-    DriveColumn,
-    HoldOption,
-    Interval,
-    Out,
-    TimeColumn,
-    Units,
-    can_be_folder,
-    list_files,
-    of_file,
-    seconds,
-    windowed,
-)
-from .words import in_words
+from .options import Columns, DisplacementColumn, DriveColumn, HoldOption, Interval, Out, TimeColumn, Units, can_be_folder, list_files, of_file, seconds, windowed
+from .error_messages import in_words
 
 __all__ = ["compare_command"]
 
@@ -59,7 +45,7 @@ def compare_command(
     threads: Annotated[int | None, typer.Option(help="Up to 256; else all cores.")] = None,
 ) -> None:
     """Fit several models on a part of a log and judge them on the rest: a table, a picture."""
-    from ..comparison import compare
+    from ..identification.comparison import compare
 
     columns = Columns(time, drive, displacement, unit, dt)
     log = columns.read(file, hold)
