@@ -8,8 +8,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-import piezotrack as pt
 from piezotrack.demo import demo_log
+
+import piezotrack as pt
 
 
 def main() -> None:

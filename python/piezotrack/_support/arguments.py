@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "as_numbers",
     "bounds",
     "check_length",
     "check_reach",
@@ -22,6 +23,7 @@ __all__ = [
     "in_range",
     "not_negative",
     "numbers",
+    "one_or_more_numbers",
     "plain",
     "positive",
 ]
@@ -166,3 +168,28 @@ def numbers(
                 f"{name} has {number:g}: expected finite numbers{limit}, in {unit}"
             )
     return array
+
+
+def as_numbers(name: str, values: object) -> tuple[float, ...]:
+    """Return a sequence of numbers as a tuple of floats.
+
+    Examples
+    --------
+    >>> as_numbers("thresholds", [1, 2.5])
+    (1.0, 2.5)
+    """
+    if not isinstance(values, Iterable) or isinstance(values, (str, bytes)):
+        raise ParameterError(f"{name} is {values!r}: expected numbers in a list")
+    return tuple(_core.as_number(f"{name}[{i}]", value) for i, value in enumerate(values))
+
+
+def one_or_more_numbers(name: str, values: object) -> tuple[float, ...]:
+    """Return a number, or a sequence of numbers, as a tuple of floats.
+
+    Examples
+    --------
+    >>> one_or_more_numbers("weights", 1)
+    (1.0,)
+    """
+    entries = np.atleast_1d(np.asarray(values, dtype=object)).tolist()
+    return tuple(_core.as_number(f"{name}[{i}]", value) for i, value in enumerate(entries))

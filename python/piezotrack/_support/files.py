@@ -1,20 +1,24 @@
-"""Writing files: whole or not at all."""
+"""Writing files whole or not at all: CSV, JSON, pictures, and the folder for them."""
 
 from __future__ import annotations
 
+import math
 import os
+from collections.abc import Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import DataError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
-__all__ = ["replacing", "write_columns"]
+    from matplotlib.figure import Figure
+
+__all__ = ["make_folder", "replacing", "save_figures", "write_columns", "write_document"]
 
 
 @contextmanager
@@ -82,3 +86,85 @@ def write_columns(path: Path, columns: Mapping[str, np.ndarray]) -> Path:
             comments="",
         )
     return path
+
+
+def write_document(path: str | os.PathLike[str], document: Mapping[str, Any]) -> Path:
+    """Write a JSON file, whole or not at all; arguments and errors as of `save`."""
+    import json
+
+    text = json.dumps(_finite(document), indent=2, allow_nan=False)
+    with replacing(path) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
+    return Path(path)
+
+
+def make_folder(folder: str | os.PathLike[str]) -> Path:
+    """Make the folder for results.
+
+    Parameters
+    ----------
+    folder : path-like
+        It may exist.
+
+    Returns
+    -------
+    pathlib.Path
+        The folder.
+
+    Raises
+    ------
+    DataError
+        It cannot be made.
+    """
+    path = Path(folder)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise DataError(f"{path} cannot be made a folder: {reason}") from None
+    return path
+
+
+def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
+    """Save figures as PNG and SVG, and close them.
+
+    Parameters
+    ----------
+    figures : mapping of str to matplotlib.figure.Figure
+        By the name of the file, without its ending.
+    folder : pathlib.Path
+        Where to.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The files written.
+    """
+    import matplotlib as mpl
+    import matplotlib.pyplot as plt
+
+    written = []
+    try:
+        for name, figure in figures.items():
+            for ending in ("png", "svg"):
+                path = folder / f"{name}.{ending}"
+                # Without a date and with fixed ids, the same result gives the same file.
+                stamp = {"Date": None} if ending == "svg" else {}
+                with replacing(path) as temporary, mpl.rc_context({"svg.hashsalt": name}):
+                    figure.savefig(temporary, dpi=150, metadata=stamp)
+                written.append(path)
+    finally:
+        for figure in figures.values():
+            plt.close(figure)
+    return written
+
+
+def _finite(value: Any) -> Any:
+    """Replace what JSON cannot say, NaN and infinity, by null."""
+    if isinstance(value, Mapping):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -7,8 +7,22 @@ from typing import Annotated
 
 import typer
 
-from .options import Columns, DisplacementColumn, DriveColumn, HoldOption, Interval, Out, TimeColumn, Units, can_be_folder, list_files, of_file, seconds, windowed
 from .error_messages import in_words
+from .options import (
+    Columns,
+    DisplacementColumn,
+    DriveColumn,
+    HoldOption,
+    Interval,
+    Out,
+    TimeColumn,
+    Units,
+    can_be_folder,
+    list_files,
+    of_file,
+    seconds,
+    windowed,
+)
 
 __all__ = ["compare_command"]
 

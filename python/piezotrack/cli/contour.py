@@ -9,16 +9,25 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import DataError, ParameterError
-from .options import ControlInterval, Duration, Jitter, Out, Period, can_be_folder, list_files, number_range
 from .error_messages import in_words
+from .options import (
+    ControlInterval,
+    Duration,
+    Jitter,
+    Out,
+    Period,
+    can_be_folder,
+    list_files,
+    number_range,
+)
 
 if TYPE_CHECKING:
     from ..control.contouring import Contour
     from ..identification.cross_talk import CrossTalk
-    from ..stages.inverse import Inverse
-    from ..xu_li_2010.table_2 import Table2
     from ..references.xy_reference import XYReference
+    from ..stages.inverse import Inverse
     from ..stages.xy import XYStage
+    from ..xu_li_2010.table_2 import Table2
 
 __all__ = ["contour_command"]
 
@@ -78,9 +87,9 @@ def contour_command(
     ] = False,
 ) -> None:
     """Let two controllers lead the virtual XY stage along a path: figures, a table, pictures."""
+    from ..control.components import Pid
     from ..control.contouring import contour
     from ..control.controller import Controller
-    from ..control.components import Pid
     from ..xu_li_2010.table_2 import run_table_2
 
     if table_2 == (path is not None):
@@ -152,8 +161,8 @@ def _stage(seed: int, lag: float | None, cross_talk: str | None) -> XYStage:
 
 def _inverse(model: Path | None, seed: int) -> tuple[Inverse, str]:
     """Invert the model, or identify one as the paper does."""
-    from ..xu_li_2010.demo import demo_log, identify_demo
     from ..identification.model_file import load
+    from ..xu_li_2010.demo import demo_log, identify_demo
 
     if model is not None:
         return load(model).inverse(), f"feedforward by {model.name} on both axes"
@@ -176,9 +185,7 @@ def _cross_talk(stage: XYStage) -> CrossTalk:
 def _write(run: Contour, out: Path) -> list[Path]:
     """Write the samples, the figures as JSON, and the picture."""
     from .. import __version__
-    from .._support.files import write_document
-    from .._support.files import write_columns
-    from .._support.files import make_folder, save_figures
+    from .._support.files import make_folder, save_figures, write_columns, write_document
 
     folder = make_folder(out)
     table = {"time_s": run.t}
@@ -211,8 +218,7 @@ def _write_table(table: Table2, out: Path) -> list[Path]:
     """Write the table, published beside obtained, and pictures of it and of each circle."""
     import numpy as np
 
-    from .._support.files import write_columns
-    from .._support.files import make_folder, save_figures
+    from .._support.files import make_folder, save_figures, write_columns
     from ..xu_li_2010.table_2 import PUBLISHED
 
     folder = make_folder(out)

@@ -9,8 +9,25 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import Interrupted, ParameterError
-from .options import Columns, DisplacementColumn, DriveColumn, HoldOption, Interval, Out, Seconds, TimeColumn, Units, can_be_folder, list_files, number, number_range, of_file, pairs, windowed
 from .error_messages import in_words
+from .options import (
+    Columns,
+    DisplacementColumn,
+    DriveColumn,
+    HoldOption,
+    Interval,
+    Out,
+    Seconds,
+    TimeColumn,
+    Units,
+    can_be_folder,
+    list_files,
+    number,
+    number_range,
+    of_file,
+    pairs,
+    windowed,
+)
 
 if TYPE_CHECKING:
     from ..data.dataset import Dataset
@@ -120,8 +137,8 @@ def _partial(model: str) -> str:
 
 def _search(log: Dataset, out: Path, kind: str, **arguments: Any) -> Fitted[Any]:
     """Identify; on Ctrl-C keep the best so far as a file."""
-    from ..identification.search import identify
     from .._support.files import make_folder
+    from ..identification.search import identify
 
     try:
         return identify(log, kind, **arguments)
@@ -134,10 +151,10 @@ def _search(log: Dataset, out: Path, kind: str, **arguments: Any) -> Fitted[Any]
 
 def _write(fit: Fitted[Any], out: Path, second: Dataset | None, score: Score | None) -> list[Path]:
     """Write the model, with what it is worth on a second log, and the pictures."""
-    from ..stages.registry import kind_of
-    from ..identification.plot import plot_loop, plot_time
     from .._support.files import save_figures
+    from ..identification.plot import plot_loop, plot_time
     from ..identification.report import save_identification
+    from ..stages.registry import kind_of
 
     kind = kind_of(fit.model)
     if second is None or score is None:

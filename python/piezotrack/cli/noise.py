@@ -8,8 +8,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import Columns, DisplacementColumn, Interval, Out, TimeColumn, Units, can_be_folder, list_files, of_file, windowed
 from .error_messages import in_words
+from .options import (
+    Columns,
+    DisplacementColumn,
+    Interval,
+    Out,
+    TimeColumn,
+    Units,
+    can_be_folder,
+    list_files,
+    of_file,
+    windowed,
+)
 
 if TYPE_CHECKING:
     from ..identification.sensor_noise import Noise
@@ -30,9 +41,9 @@ def noise_command(
     dt: Interval = None,
 ) -> None:
     """Read a record at rest: rms, steps, spectrum and a model of the noise."""
+    from .._support.files import make_folder, save_figures
     from ..data.reader import read_displacement
     from ..identification.sensor_noise import identify_noise
-    from .._support.files import make_folder, save_figures
 
     columns = Columns(time, None, displacement, unit, dt)
     log = read_displacement(

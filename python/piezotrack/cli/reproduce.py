@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from .options import Out, can_be_folder, list_files
 from .error_messages import in_words
+from .options import Out, can_be_folder, list_files
 
 __all__ = ["reproduce_command"]
 

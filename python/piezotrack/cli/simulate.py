@@ -7,8 +7,19 @@ from typing import Annotated
 
 import typer
 
-from .options import Columns, DriveColumn, HoldOption, Interval, Out, TimeColumn, Units, can_be_folder, list_files, of_file
 from .error_messages import in_words
+from .options import (
+    Columns,
+    DriveColumn,
+    HoldOption,
+    Interval,
+    Out,
+    TimeColumn,
+    Units,
+    can_be_folder,
+    list_files,
+    of_file,
+)
 
 __all__ = ["simulate_command"]
 
@@ -27,11 +38,10 @@ def simulate_command(
     hold: HoldOption = "foh",
 ) -> None:
     """Simulate a model under a drive: a CSV with the displacement, and a picture."""
-    from .._support.files import write_columns
+    from .._support.files import make_folder, save_figures, write_columns
     from ..data.reader import read_drive
     from ..identification.model_file import load
     from ..identification.plot import plot_response
-    from .._support.files import make_folder, save_figures
 
     known = load(model)
     columns = Columns(time, drive, None, unit, dt)

@@ -9,8 +9,22 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import ParameterError
-from .options import Columns, DisplacementColumn, DriveColumn, HoldOption, Interval, Out, TimeColumn, Units, can_be_folder, list_files, number, of_file, windowed
 from .error_messages import in_words
+from .options import (
+    Columns,
+    DisplacementColumn,
+    DriveColumn,
+    HoldOption,
+    Interval,
+    Out,
+    TimeColumn,
+    Units,
+    can_be_folder,
+    list_files,
+    number,
+    of_file,
+    windowed,
+)
 
 if TYPE_CHECKING:
     from ..identification.step_response import StepResult

@@ -9,17 +9,26 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ..errors import ParameterError
-from .options import ControlInterval, Duration, Jitter, Out, Period, can_be_folder, list_files, number_range
 from .error_messages import in_words
+from .options import (
+    ControlInterval,
+    Duration,
+    Jitter,
+    Out,
+    Period,
+    can_be_folder,
+    list_files,
+    number_range,
+)
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
     from ..control.controller import Controller
+    from ..control.tracking import Tracking
     from ..identification.identified import Identified
     from ..references.reference import Reference
-    from ..control.tracking import Tracking
 
 __all__ = ["feedforward_command", "track_command"]
 
@@ -69,10 +78,10 @@ def track_command(
     ] = False,
 ) -> None:
     """Let a controller lead the virtual stage along a reference: figures, a table, pictures."""
-    from ..control.controller import Controller
     from ..control.components import Pid, Repetitive
-    from ..identification.model_file import load
+    from ..control.controller import Controller
     from ..control.tracking import track
+    from ..identification.model_file import load
     from ..stages.virtual import VirtualStage
 
     known = load(model)
@@ -116,10 +125,9 @@ def feedforward_command(
     period: Period = None,
 ) -> None:
     """Write the voltage table that leads a stage along a reference."""
-    from .._support.files import write_columns
-    from ..identification.model_file import load
+    from .._support.files import make_folder, save_figures, write_columns
     from ..control.tracking_plot import plot_feedforward
-    from .._support.files import make_folder, save_figures
+    from ..identification.model_file import load
 
     known = load(model)
     course = _reference(reference, duration, period)
@@ -160,9 +168,7 @@ def _reference(text: str, duration: float | None, period: float | None) -> Refer
 def _write(run: Tracking, known: Identified[Any], loop: Controller, out: Path) -> list[Path]:
     """Write the samples, the figures as JSON, and the pictures."""
     from .. import __version__
-    from .._support.files import write_document
-    from .._support.files import write_columns
-    from .._support.files import make_folder, save_figures
+    from .._support.files import make_folder, save_figures, write_columns, write_document
 
     folder = make_folder(out)
     table = {

@@ -10,12 +10,19 @@ import numpy as np
 
 from .. import _core
 from .._support.arguments import not_negative
-from .controller import Controller
+from .._support.statistics import ErrorStatistics
 from ..errors import ParameterError
-from .._support.statistics import Spread
-from .tracking import Tracking, check_period, check_stable, check_within_reach, feedforward_of, followed
 from ..references.xy_reference import XYReference, square_matrix
 from ..stages.xy import XYStage
+from .controller import Controller
+from .tracking import (
+    Tracking,
+    check_period,
+    check_stable,
+    check_within_reach,
+    feedforward_of,
+    followed,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,7 +33,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 __all__ = ["Contour", "contour"]
-
 
 # A start so far from the stage, as a part of the path's size, is worth a note.
 JUMP = 0.05
@@ -79,13 +85,13 @@ class Contour:
         return self.path.errors(self.x.fine_displacement, self.y.fine_displacement)
 
     @cached_property
-    def metrics(self) -> Spread:
+    def metrics(self) -> ErrorStatistics:
         """Figures of the measured contour error, from `settled` on."""
         return self.score()
 
     def score(
         self, start: float | None = None, stop: float | None = None, *, true: bool = False
-    ) -> Spread:
+    ) -> ErrorStatistics:
         """Figures of the contour error in a part of the run.
 
         Parameters
@@ -98,7 +104,7 @@ class Contour:
 
         Returns
         -------
-        Spread
+        ErrorStatistics
             Table 2 of Xu and Li 2010 has `peak_to_peak`, `mean_error` and `sd_error`.
 
         Raises
@@ -108,7 +114,7 @@ class Contour:
         """
         t, errors = (self.x.fine_t, self.fine_error) if true else (self.t, self.error)
         first = self.settled if start is None else start
-        return Spread.of(_core.spread(errors[self.x.part(t, first, stop)]))
+        return ErrorStatistics.of(_core.spread(errors[self.x.part(t, first, stop)]))
 
     def plot(self) -> Figure:
         """Path and positions, the error magnified along the path, and the errors over time.
@@ -156,7 +162,7 @@ class Contour:
         )
 
 
-def _words(spread: Spread) -> str:
+def _words(spread: ErrorStatistics) -> str:
     return (
         f"peak to peak {1e6 * spread.peak_to_peak:.3f} um, mean {1e6 * spread.mean_error:.3f} um, "
         f"SD {1e6 * spread.sd_error:.3f} um"

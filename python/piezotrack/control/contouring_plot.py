@@ -1,4 +1,4 @@
-"""Pictures of a path that was run, and of a sensor at rest."""
+"""Pictures of a path that was run."""
 
 from __future__ import annotations
 
@@ -7,30 +7,23 @@ from typing import TYPE_CHECKING
 import matplotlib.pyplot as plt
 import numpy as np
 
-from .._support.plot_style import axes_or_new, plain_log_ticks
-from .._support.plot_style import ACTUAL, DESIRED, above
-from .._support.units import best_length_unit
+from .._support.plot_style import ACTUAL, DESIRED, above, axes_or_new
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from .contouring import Contour
-    from ..identification.sensor_noise import Noise
-    from ..xu_li_2010.table_2 import Table2
 
     Array = NDArray[np.float64]
 
 __all__ = [
+    "last_turn",
     "plot_contour",
     "plot_contour_error",
     "plot_magnified",
-    "plot_noise",
     "plot_path",
-    "plot_table_2",
 ]
 
 # How large the largest error is drawn, as a part of the path's smaller side.
@@ -55,7 +48,7 @@ def plot_path(run: Contour, ax: Axes | None = None) -> Axes:
     (ax,) = axes_or_new(ax, 1)
     x, y = run.path.outline
     ax.plot(1e6 * x, 1e6 * y, **{**DESIRED, "linewidth": 2.6, "color": "0.72"})
-    way, part = run.t < run.settled, _last(run)
+    way, part = run.t < run.settled, last_turn(run)
     ax.plot(
         1e6 * run.x.measured[way], 1e6 * run.y.measured[way], color="0.5", linewidth=0.6, ls=":"
     )
@@ -83,7 +76,7 @@ def plot_magnified(run: Contour, ax: Axes | None = None, factor: float | None = 
         With the picture.
     """
     (ax,) = axes_or_new(ax, 1)
-    part = _last(run)
+    part = last_turn(run)
     if factor is None:
         side = min(float(np.ptp(axis)) for axis in run.path.outline)
         factor = _round_down(SHOWN * side / run.metrics.max_error)
@@ -121,7 +114,7 @@ def plot_contour_error(run: Contour, ax: Axes | None = None) -> Axes:
         With the picture.
     """
     (ax,) = axes_or_new(ax, 1)
-    part = _last(run)
+    part = last_turn(run)
     found = run.metrics
     mean, sd = 1e6 * found.mean_error, 1e6 * found.sd_error
     ax.axhspan(mean - sd, mean + sd, color="0.9", label="mean +- SD")
@@ -150,7 +143,7 @@ def plot_contour(run: Contour) -> Figure:
     grid = figure.add_gridspec(2, 2, height_ratios=[1.6, 1.0])
     plot_path(run, figure.add_subplot(grid[0, 0]))
     plot_magnified(run, figure.add_subplot(grid[0, 1]))
-    part, shared = _last(run), None
+    part, shared = last_turn(run), None
     inner = grid[1, 0].subgridspec(2, 1, hspace=0.1)
     for row, (name, axis) in enumerate((("x", run.x), ("y", run.y))):
         ax = figure.add_subplot(inner[row], sharex=shared, sharey=shared)
@@ -171,111 +164,7 @@ def plot_contour(run: Contour) -> Figure:
     return figure
 
 
-def plot_table_2(table: Table2) -> Figure:
-    """Plot the circles at 0.1 Hz, their errors over an angle, and published beside obtained.
-
-    Parameters
-    ----------
-    table : Table2
-        The nine circles, run.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Not yet shown or saved.
-    """
-    from ..xu_li_2010.table_2 import PUBLISHED
-
-    figure = plt.figure(figsize=(11.0, 8.4), layout="constrained")
-    grid = figure.add_gridspec(2, 6, height_ratios=[1.5, 1.0])
-    circles = figure.add_subplot(grid[0, :3])
-    slow = [run for case, run in zip(PUBLISHED, table.runs, strict=True) if case.frequency == 0.1]
-    for run in slow:
-        plot_magnified(run, circles, factor=5.0)
-    circles.set_title("0.1 Hz, contour error x 5")
-    if legend := circles.get_legend():
-        legend.remove()
-    _over_angle(slow, figure.add_subplot(grid[0, 3:]))
-    for column, name in enumerate(("max", "mean", "SD")):
-        _bars(table, name, figure.add_subplot(grid[1, 2 * column : 2 * column + 2]))
-    return figure
-
-
-def _over_angle(runs: Sequence[Contour], ax: Axes) -> None:
-    """Plot the last turn of circles, one above the other, each about a line of its own."""
-    apart = 1.15 * max(1e6 * run.metrics.peak_to_peak for run in runs)
-    for row, run in enumerate(runs):
-        part = _last(run)
-        angle = 360.0 * np.arange(part.sum()) / part.sum()
-        ax.axhline(row * apart, color="0.75", linewidth=0.8)
-        ax.plot(angle, row * apart + 1e6 * run.error[part], color="C3", linewidth=0.8)
-        label = f"{1e6 * (run.path.radius or 0.0):g} um"
-        ax.annotate(label, (362.0, row * apart), va="center", annotation_clip=False)
-    ax.set(xlabel="angle [deg]", ylabel="contour error [um], one radius above the other")
-    ax.set(xticks=range(0, 361, 90), xlim=(0, 360), title="0.1 Hz, last turn")
-
-
-def _bars(table: Table2, name: str, ax: Axes) -> None:
-    """Plot one figure of the nine cases, published beside obtained."""
-    from ..xu_li_2010.table_2 import PUBLISHED
-
-    column, attribute = {
-        "max": (2, "peak_to_peak"),
-        "mean": (3, "mean_error"),
-        "SD": (4, "sd_error"),
-    }[name]
-    places = np.arange(len(PUBLISHED))
-    published = [1e6 * case[column] for case in PUBLISHED]
-    found = [1e6 * getattr(run.metrics, attribute) for run in table.runs]
-    ax.bar(places - 0.2, published, 0.4, color="0.75", edgecolor="0.3", label="published")
-    ax.bar(places + 0.2, found, 0.4, color="C0", edgecolor="0.1", label="obtained")
-    what = "peak to peak" if name == "max" else name
-    ax.set(ylabel=f"{what} [um]", xlabel="radius [um], and frequency [Hz]")
-    labels = [f"{1e6 * case.radius:g}\n{case.frequency:g}" for case in PUBLISHED]
-    ax.set_xticks(places, labels, fontsize="small")
-    ax.axhline(0.0, color="0.4", linewidth=0.6)
-    above(ax)
-
-
-def plot_noise(noise: Noise) -> Figure:
-    """Plot a record at rest: the beginning of it with its steps, and its spectrum.
-
-    Parameters
-    ----------
-    noise : Noise
-        What was found.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Not yet shown or saved.
-    """
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.4), layout="constrained")
-    data = noise.data
-    unit, scale = best_length_unit(noise.spread.peak_to_peak)
-    # Enough to see the course, few enough to tell the steps.
-    shown = slice(0, min(len(data), 400))
-    time = data.t[shown] - data.t[0]
-    left.step(1e3 * time, scale * (data.y[shown] - data.y[shown].mean()), where="post", color="C0",
-              linewidth=0.9)  # fmt: skip
-    left.set(xlabel="time [ms]", ylabel=f"displacement from the mean [{unit}]")
-    steps = f", steps of {1e6 * noise.resolution:.4g} um" if noise.resolution else ""
-    left.set_title(f"At rest: {1e6 * noise.rms:.4g} um rms{steps}", fontsize="medium")
-    left.margins(x=0)
-    f, density = noise.spectrum()
-    right.loglog(f, 1e9 * density, color="0.6", linewidth=0.9, label="record")
-    colour = "white" if np.isinf(noise.bandwidth) else f"low-pass {noise.bandwidth:.4g} Hz"
-    right.loglog(
-        f, 1e9 * noise.density(f), color="C3", linewidth=1.6, linestyle="--",
-        label=f"model: {1e6 * noise.noise:.4g} um rms, {colour}",
-    )  # fmt: skip
-    plain_log_ticks(right)
-    right.set(xlabel="frequency [Hz]", ylabel="amplitude spectral density [nm/sqrt(Hz)]")
-    above(right)
-    return figure
-
-
-def _last(run: Contour) -> NDArray[np.bool_]:
+def last_turn(run: Contour) -> NDArray[np.bool_]:
     """Tell the samples of the last turn; all that count where the path is run once."""
     turn = run.path.period
     start = run.settled

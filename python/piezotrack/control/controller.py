@@ -15,7 +15,7 @@ from .components import LowPass, Notch, Pid, Repetitive, StateSpace
 
 if TYPE_CHECKING:
     from ..identification.identified import Identified
-    from .plant import Led
+    from .plant import Plant
     from .stability import LoopReport
 
 __all__ = ["Command", "Controller", "Session"]
@@ -128,7 +128,7 @@ class Controller:
         )
         object.__setattr__(self, "core", core)
 
-    def check(self, stage: Led | Identified[Any], *, delay: float = 0.0) -> LoopReport:
+    def check(self, stage: Plant | Identified[Any], *, delay: float = 0.0) -> LoopReport:
         """Gain and phase margins on a stage, and whether the loop is stable: see `check_loop`.
 
         Parameters

@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from .. import _core
-from ..stages.bouc_wen import BoucWenStage
 from ..errors import ParameterError
-from ..stages.first_order_dahl import FirstOrderDahlStage
 from ..identification.identified import Identified
-from ..stages.registry import kind_of
+from ..stages.base import MODEL_STEP
+from ..stages.bouc_wen import BoucWenStage
 from ..stages.dahl import DahlStage
+from ..stages.first_order_dahl import FirstOrderDahlStage
 from ..stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
+from ..stages.registry import kind_of
 from ..stages.virtual import VirtualStage
 
 if TYPE_CHECKING:
@@ -22,16 +23,13 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Led", "bare", "lead", "loop_plants"]
+__all__ = ["Plant", "linearised_plants", "run_closed_loop", "unwrap"]
 
-Led = VirtualStage | DahlStage | BoucWenStage | PrandtlIshlinskiiStage | FirstOrderDahlStage
-LED = (VirtualStage, DahlStage, BoucWenStage, PrandtlIshlinskiiStage, FirstOrderDahlStage)
-
-# Longest step in which a model's mechanics are followed under a jumping voltage [s].
-MODEL_STEP = 5e-5
+Plant = VirtualStage | DahlStage | BoucWenStage | PrandtlIshlinskiiStage | FirstOrderDahlStage
+PLANTS = (VirtualStage, DahlStage, BoucWenStage, PrandtlIshlinskiiStage, FirstOrderDahlStage)
 
 
-def bare(stage: Led | Identified[Any]) -> tuple[Led, float, float]:
+def unwrap(stage: Plant | Identified[Any]) -> tuple[Plant, float, float]:
     """Return the stage itself, and the offset [m] and delay [s] that its sensor shows.
 
     Raises
@@ -42,16 +40,16 @@ def bare(stage: Led | Identified[Any]) -> tuple[Led, float, float]:
     offset = late = 0.0
     if isinstance(stage, Identified):
         offset, late, stage = stage.offset, stage.delay, stage.model
-    if not isinstance(stage, LED):
-        expected = ", ".join(f"pt.{one.__name__}" for one in LED)
+    if not isinstance(stage, PLANTS):
+        expected = ", ".join(f"pt.{one.__name__}" for one in PLANTS)
         raise ParameterError(
             f"stage is {type(stage).__name__}: expected {expected} or an identified one"
         )
     return stage, offset, late
 
 
-def lead(
-    stage: Led,
+def run_closed_loop(
+    stage: Plant,
     controller: Controller,
     reference: Array,
     volts: Array,
@@ -70,7 +68,9 @@ def lead(
     return _core.track_model(kind_of(stage).name, stage.theta, step, *course)
 
 
-def loop_plants(stage: Led, limits: tuple[float, float], delay: float) -> list[_core.LoopPlant]:
+def linearised_plants(
+    stage: Plant, limits: tuple[float, float], delay: float
+) -> list[_core.LoopPlant]:
     """Take a stage for small motions: at its lowest, a middle and its highest gain."""
     low, high = (float(volts) for volts in limits)
     if isinstance(stage, VirtualStage):

@@ -11,15 +11,15 @@ import numpy as np
 from .. import _core
 from .._support.arguments import not_negative
 from ..errors import ParameterError
-from .plant import bare, loop_plants
+from .plant import linearised_plants, unwrap
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from .controller import Controller
     from ..identification.identified import Identified
-    from .plant import Led
+    from .controller import Controller
+    from .plant import Plant
 
     Array = NDArray[np.float64]
 
@@ -201,7 +201,7 @@ class LoopReport:
 
 def check_loop(
     controller: Controller,
-    stage: Led | Identified[Any],
+    stage: Plant | Identified[Any],
     *,
     delay: float = 0.0,
 ) -> LoopReport:
@@ -235,8 +235,8 @@ def check_loop(
     >>> report.stable
     True
     """
-    led, _, late = bare(stage)
-    plants = loop_plants(led, controller.limits, not_negative("delay", delay, "s") + late)
+    led, _, late = unwrap(stage)
+    plants = linearised_plants(led, controller.limits, not_negative("delay", delay, "s") + late)
     cases = [_check(controller, plant) for plant in plants]
     return LoopReport(
         controller=controller, low=cases[0], middle=cases[1], high=cases[2], plant=plants[1]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -11,68 +11,27 @@ import numpy as np
 
 from .. import _core
 from .._support.arguments import not_negative
-from .controller import Controller
+from .._support.statistics import FIGURES, ErrorStatistics
 from ..errors import ParameterError
-from .plant import bare, lead
-from .stability import check_loop
 from ..references.reference import Reference, SampledReference
+from .controller import Controller
+from .plant import run_closed_loop, unwrap
+from .stability import check_loop
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from ..identification.identified import Identified
-    from .plant import Led
+    from .plant import Plant
 
     Array = NDArray[np.float64]
 
-__all__ = ["Metrics", "Spread", "Tracking", "track"]
+__all__ = ["Metrics", "Tracking", "track"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Spread:
-    """How a signed error is spread.
-
-    Attributes
-    ----------
-    max_error, rms_error : float
-        Largest absolute error and root mean square [m].
-    mean_error, sd_error : float
-        Mean of the signed error and standard deviation about it [m].
-    peak_to_peak : float
-        Largest less smallest error [m].
-    """
-
-    max_error: float
-    rms_error: float
-    mean_error: float
-    sd_error: float
-    peak_to_peak: float
-
-    @classmethod
-    def of(cls, figures: Sequence[float]) -> Spread:
-        """Name the core's figures.
-
-        Parameters
-        ----------
-        figures : sequence of 5 float
-            In the order of the attributes [m].
-
-        Returns
-        -------
-        Spread
-            The same with names.
-        """
-        return cls(**dict(zip(SPREAD, figures, strict=True)))
-
-
-SPREAD = tuple(field.name for field in fields(Spread))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Metrics(Spread):
+class Metrics(ErrorStatistics):
     """How well a motion follows its reference; errors are desired less actual.
 
     Attributes
@@ -277,11 +236,11 @@ def _metrics(
     figures: tuple[float, float, float, float, float, float | None, float | None],
 ) -> Metrics:
     *errors, lag, loop = figures
-    return Metrics(**dict(zip(SPREAD, errors, strict=True)), phase_lag=lag, widest_loop=loop)
+    return Metrics(**dict(zip(FIGURES, errors, strict=True)), phase_lag=lag, widest_loop=loop)
 
 
 def track(
-    stage: Led | Identified[Any],
+    stage: Plant | Identified[Any],
     controller: Controller,
     reference: Reference,
     *,
@@ -341,7 +300,7 @@ def track(
     >>> print(f"{run.metrics.phase_lag:.2f} rad")
     0.06 rad
     """
-    led, offset, late = bare(stage)
+    led, offset, late = unwrap(stage)
     for name, value, kind in (
         ("controller", controller, Controller),
         ("reference", reference, Reference),
@@ -359,7 +318,7 @@ def track(
         check_within_reach(led, controller, samples, offset)
     volts, note = feedforward_of(controller, reference)
     pace = (delay, not_negative("jitter", jitter, "s"), substeps)
-    run = lead(led, controller, samples.x - offset, volts, pace)
+    run = run_closed_loop(led, controller, samples.x - offset, volts, pace)
     return followed(run, controller, reference, note, substeps, offset)
 
 
@@ -419,7 +378,7 @@ def check_period(controller: Controller, reference: Reference) -> None:
         )
 
 
-def check_stable(stage: Led, controller: Controller, delay: float) -> None:
+def check_stable(stage: Plant, controller: Controller, delay: float) -> None:
     """Refuse a loop that is unstable at the middle gain of the stage."""
     if controller.feedback is None and controller.addon is None:
         return
@@ -439,7 +398,7 @@ def check_stable(stage: Led, controller: Controller, delay: float) -> None:
 
 
 def check_within_reach(
-    stage: Led,
+    stage: Plant,
     controller: Controller,
     samples: SampledReference,
     offset: float,

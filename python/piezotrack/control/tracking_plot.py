@@ -2,45 +2,29 @@
 
 from __future__ import annotations
 
-import textwrap
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
 import numpy as np
 
-from .._support.plot_style import axes_or_new
+from .._support.plot_style import ACTUAL, DESIRED, above, axes_or_new
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from .stability import LoopReport
     from .tracking import Tracking
 
     Array = NDArray[np.float64]
 
 __all__ = [
-    "ACTUAL",
-    "DESIRED",
-    "above",
     "plot_effort",
     "plot_error",
     "plot_following",
-    "plot_loop_report",
     "plot_motion",
     "plot_tracking",
 ]
-
-DESIRED: dict[str, Any] = {"color": "0.35", "linewidth": 1.6, "label": "desired"}
-ACTUAL: dict[str, Any] = {"color": "C0", "linewidth": 1.1, "label": "actual"}
-
-
-def above(ax: Axes) -> None:
-    """Put the legend above the axes, where it hides nothing."""
-    ax.legend(
-        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, frameon=False, borderaxespad=0.2
-    )
 
 
 def plot_motion(run: Tracking, ax: Axes | None = None) -> Axes:
@@ -176,40 +160,6 @@ def plot_feedforward(t: Array, volts: Array, x: Array) -> Figure:
     left.margins(x=0)
     right.plot(1e6 * x, volts, color="C0", linewidth=1.0)
     right.set(xlabel="reference [um]", ylabel="feedforward [V]", title="Voltage over reference")
-    return figure
-
-
-def plot_loop_report(report: LoopReport) -> Figure:
-    """Plot open loop, sensitivity and, with a repetitive part, what a period leaves of an error.
-
-    Parameters
-    ----------
-    report : LoopReport
-        What is known of a loop.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Not yet shown or saved.
-    """
-    curves = report.response()
-    f = curves.frequency
-    figure = plt.figure(figsize=(7.0, 7.0), layout="constrained")
-    size, phase, parts = figure.subplots(3, 1, sharex=True)
-    size.loglog(f, np.abs(curves.open_loop), color="C0")
-    size.axhline(1.0, color="0.7", linewidth=0.8)
-    size.set(ylabel="open loop |L|")
-    phase.semilogx(f, np.degrees(np.angle(curves.open_loop)), color="C0")
-    phase.set(ylabel="phase of L [deg]", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
-    parts.loglog(f, np.abs(curves.sensitivity), color="C3", label="sensitivity |S|")
-    parts.loglog(f, np.abs(curves.complementary), color="C0", label="complementary |T|")
-    if np.any(curves.learning):
-        parts.loglog(f, curves.learning, color="C2", label="left by a period")
-    parts.axhline(1.0, color="0.7", linewidth=0.8)
-    parts.set(xlabel="frequency [Hz]", ylabel="closed loop")
-    parts.set_ylim(bottom=max(1e-3, parts.get_ylim()[0]))
-    above(parts)
-    figure.suptitle("\n".join(textwrap.wrap(str(report.middle), 75)), fontsize="medium")
     return figure
 
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from numbers import Integral
 from typing import TYPE_CHECKING
 
-from ..errors import DataError, ParameterError
 from .._support.units import known_units, lookup, require, split_unit
+from ..errors import DataError, ParameterError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

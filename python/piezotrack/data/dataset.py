@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ..errors import DataError, ParameterError
 from .._support.arrays import real, signal_of, time_axis
 from .._support.units import best_length_unit
+from ..errors import DataError, ParameterError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

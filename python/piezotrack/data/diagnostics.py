@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from ..errors import DataError
 from .._support.units import best_length_unit
+from ..errors import DataError
 
 if TYPE_CHECKING:
     from collections.abc import Collection

@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .columns import Column, Columns
-from .dataset import Dataset
-from ..errors import DataError, ParameterError, ShapeError
 from .._support.arrays import check_dt, time_fault
 from .._support.units import lookup, require
+from ..errors import DataError, ParameterError, ShapeError
+from .columns import Column, Columns
+from .dataset import Dataset
 
 if TYPE_CHECKING:
     import os

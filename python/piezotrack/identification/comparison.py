@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from .. import _core
-from ..data.dataset import Dataset
-from .model_file import provenance
 from .._support.files import write_document
+from ..data.dataset import Dataset
 from ..errors import ParameterError
-from .search import identify
-from .identified import Identified, Score
 from ..stages.registry import KINDS, Kind, kind_of
-from .model_file import load
+from .identified import Identified, Score
+from .model_file import load, provenance
+from .search import identify
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

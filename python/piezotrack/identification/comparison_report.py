@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .comparison import Compared, Comparison
     from ..data.dataset import Dataset
+    from .comparison import Compared, Comparison
 
 __all__ = ["comparison_text"]
 

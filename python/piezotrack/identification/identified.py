@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 import numpy as np
 
 from .. import _core
+from .._support.files import write_document
 from ..data import diagnostics
 from ..data.dataset import Dataset
-from .._support.files import write_document
 from ..errors import ParameterError
-from ..stages.registry import kind_of
 from ..stages.base import Response
 from ..stages.prandtl_ishlinskii import PlaysResponse
+from ..stages.registry import kind_of
 
 if TYPE_CHECKING:
     import os

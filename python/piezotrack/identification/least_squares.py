@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from .. import _core
-from ..data.dataset import Dataset
-from .model_file import provenance
-from ..errors import DataError, ParameterError
-from .identified import Fitted
-from ..stages.prandtl_ishlinskii import PlaysResponse, PrandtlIshlinskiiStage
 from .._support.arguments import as_numbers
-from .model_file import IdentifiedPlays
+from ..data.dataset import Dataset
+from ..errors import DataError, ParameterError
+from ..stages.prandtl_ishlinskii import PlaysResponse, PrandtlIshlinskiiStage
+from .identified import Fitted
+from .model_file import IdentifiedPlays, provenance
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..stages.registry import kind_of
+from .._support.plot_style import MEASURED, axes_or_new, plain_log_ticks, thinned
 from .._support.units import best_length_unit
+from ..stages.registry import kind_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,30 +22,24 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..data.dataset import Dataset
-    from .search import Identification
-    from .identified import Fitted
     from ..stages.base import Response
     from ..stages.prandtl_ishlinskii import PlaysResponse
+    from .identified import Fitted
+    from .search import Identification
 
     Array = NDArray[np.float64]
 
 __all__ = [
-    "axes_or_new",
-    "plain_log_ticks",
     "plot_convergence",
     "plot_identification",
     "plot_loop",
     "plot_response",
     "plot_time",
-    "thinned",
 ]
 
 # Told apart in black and white as well, also where many cycles lie on each other.
-MEASURED: dict[str, Any] = {"color": "0.68", "linewidth": 3.2, "label": "measured"}
 SIMULATED: dict[str, Any] = {"color": "#b3400a", "linewidth": 1.0, "label": "simulated"}
 ERROR: dict[str, Any] = {"color": "#1b6ca8", "linewidth": 0.8}
-# More points than a picture has columns of pixels, yet few enough for a light SVG.
-MOST_POINTS = 6000
 
 
 def plot_loop(data: Dataset, run: Response | PlaysResponse, ax: Axes | None = None) -> Axes:
@@ -237,47 +232,3 @@ def plot_identification(fit: Fitted[Any], data: Dataset | None = None) -> Figure
     below = figure.add_subplot(grid[1, 1], sharex=above)
     plot_time(record, run, (above, below), stroke=fit.stroke)
     return figure
-
-
-def axes_or_new(given: Axes | Sequence[Axes] | None, count: int) -> list[Axes]:
-    """Take the axes given, or make a figure with some."""
-    if given is None:
-        import matplotlib.pyplot as plt
-
-        size = (6.4, 4.2) if count == 1 else (7.6, 5.4)
-        _, made = plt.subplots(
-            count, 1, figsize=size, sharex=True, squeeze=False, layout="constrained"
-        )
-        return [ax for row in made for ax in row]
-    return list(given) if isinstance(given, (list, tuple, np.ndarray)) else [given]  # type: ignore[list-item]
-
-
-def thinned(values: Array) -> NDArray[np.intp]:
-    """Choose the samples to draw: of a long signal, the extremes of each stretch.
-
-    A glitch of one sample is just what one looks for.
-    """
-    stretch = max(1, values.size // (MOST_POINTS // 2))
-    if stretch < 3:
-        return np.arange(values.size)
-    whole = values.size // stretch * stretch
-    rows = values[:whole].reshape(-1, stretch)
-    first = np.arange(0, whole, stretch)
-    extremes = np.stack([first + rows.argmin(axis=1), first + rows.argmax(axis=1)])
-    ends = [0, values.size - 1]
-    tail = np.arange(whole, values.size)
-    return np.unique(np.concatenate([extremes.ravel(), tail, ends]))
-
-
-def plain_log_ticks(ax: Axes) -> None:
-    """Label a short logarithmic axis with plain numbers."""
-    from matplotlib.ticker import FuncFormatter, LogFormatter, LogLocator
-
-    low, high = ax.get_ylim()
-    plain = FuncFormatter(lambda value, _: f"{value:g}")
-    ax.yaxis.set_major_formatter(plain)
-    if np.log10(high / low) < 2.0:
-        ax.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
-        ax.yaxis.set_minor_formatter(plain)
-    else:
-        ax.yaxis.set_minor_formatter(LogFormatter(labelOnlyBase=True))

@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import DataError
-from .._support.files import replacing
+from .._support.files import make_folder, save_figures
 from ..stages.registry import kind_of
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Mapping
-
-    from matplotlib.figure import Figure
+    from pathlib import Path
 
     from ..data.dataset import Dataset
     from .estimates import Estimate
-    from .search import Identification
     from .identified import Fitted
     from .least_squares import PlaysIdentification
+    from .search import Identification
 
-__all__ = ["make_folder", "plays_text", "save_figures", "save_identification", "summary_text"]
+__all__ = ["plays_text", "save_identification", "summary_text"]
 
 
 def summary_text(fit: Identification) -> str:
@@ -153,7 +149,7 @@ def _known(fit: Identification) -> list[str]:
 
 def _ratios(fit: Identification) -> list[tuple[str, str, float, str]]:
     """Parameter, symbol, value and unit of what does not depend on the scale of the forces."""
-    ratios = kind_of(fit.model).ratios(fit.model)
+    ratios = fit.model.force_ratios()
     # Friction that was neither searched nor there is not worth a line.
     return [r for r in ratios if r[0] != "b0" or fit.parameters["b0"].free or r[2]]
 
@@ -174,67 +170,6 @@ def _row(name: str, estimate: Estimate, width: int) -> str:
     return (
         f"  {name:<18}{estimate.symbol:<{width}}{estimate.value:>13.6g}  {estimate.unit:<9}{note}"
     ).rstrip()
-
-
-def make_folder(folder: str | os.PathLike[str]) -> Path:
-    """Make the folder for results.
-
-    Parameters
-    ----------
-    folder : path-like
-        It may exist.
-
-    Returns
-    -------
-    pathlib.Path
-        The folder.
-
-    Raises
-    ------
-    DataError
-        It cannot be made.
-    """
-    path = Path(folder)
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise DataError(f"{path} cannot be made a folder: {reason}") from None
-    return path
-
-
-def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
-    """Save figures as PNG and SVG, and close them.
-
-    Parameters
-    ----------
-    figures : mapping of str to matplotlib.figure.Figure
-        By the name of the file, without its ending.
-    folder : pathlib.Path
-        Where to.
-
-    Returns
-    -------
-    list of pathlib.Path
-        The files written.
-    """
-    import matplotlib as mpl
-    import matplotlib.pyplot as plt
-
-    written = []
-    try:
-        for name, figure in figures.items():
-            for ending in ("png", "svg"):
-                path = folder / f"{name}.{ending}"
-                # Without a date and with fixed ids, the same result gives the same file.
-                stamp = {"Date": None} if ending == "svg" else {}
-                with replacing(path) as temporary, mpl.rc_context({"svg.hashsalt": name}):
-                    figure.savefig(temporary, dpi=150, metadata=stamp)
-                written.append(path)
-    finally:
-        for figure in figures.values():
-            plt.close(figure)
-    return written
 
 
 def save_identification(

@@ -7,18 +7,17 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 from .. import _core
-from ..data import diagnostics
 from .._support.progress_bar import ProgressBar
+from ..data import diagnostics
 from ..data.dataset import Dataset
-from .model_file import provenance
 from ..errors import Interrupted, ParameterError
+from ..stages.base import Response
+from ..stages.dahl import DahlStage
+from ..stages.registry import Kind, Searched, kind_named, kind_of
 from .estimates import Estimate, Progress, Run, StopReason
 from .identified import Fitted
-from ..stages.registry import Kind, Searched, kind_named, kind_of
-from .model_file import IdentifiedModel
-from ..stages.dahl import DahlStage
-from ..stages.base import Response
 from .least_squares import PlaysIdentification, identify_plays
+from .model_file import IdentifiedModel, provenance
 from .step_response import StepResult
 from .swarm import ParticleSwarm
 

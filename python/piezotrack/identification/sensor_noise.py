@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
+from .._support.statistics import ErrorStatistics
 from ..data.dataset import Dataset
 from ..errors import DataError, ParameterError
-from .._support.statistics import Spread
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,7 +43,7 @@ class Noise:
     ----------
     data : Dataset
         The record.
-    spread : Spread
+    spread : ErrorStatistics
         Of the record about its drift [m]; its `sd_error` is what Xu and Li 2010 call the
         rms of the noise.
     drift : float
@@ -60,7 +60,7 @@ class Noise:
     """
 
     data: Dataset
-    spread: Spread
+    spread: ErrorStatistics
     drift: float
     resolution: float
     levels: int
@@ -226,7 +226,7 @@ def identify_noise(log: Dataset) -> Noise:
     figures, drift, resolution, levels, noise, bandwidth, sd = _core.sensor_noise(log.y, log.dt)
     return Noise(
         data=log,
-        spread=Spread.of(figures),
+        spread=ErrorStatistics.of(figures),
         drift=drift,
         resolution=resolution,
         levels=levels,

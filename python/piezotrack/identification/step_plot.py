@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import ParameterError
 from .._support.plot_style import axes_or_new
 from .._support.units import best_length_unit
+from ..errors import ParameterError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

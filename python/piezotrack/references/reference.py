@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._support.arguments import check_reach, finite, in_range, not_negative, plain, positive
-from ..errors import DataError, ParameterError
-from .motions import Spline, blended, extremes
 from .._support.arrays import check_dt, signal_of
 from .._support.units import best_length_unit
+from ..errors import DataError, ParameterError
+from .motions import Spline, blended, extremes
 
 if TYPE_CHECKING:
     import os

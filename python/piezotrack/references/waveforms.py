@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from .._support.arguments import bounds, check_reach, finite, in_range, not_negative, numbers, positive
+from .._support.arguments import (
+    bounds,
+    check_reach,
+    finite,
+    in_range,
+    not_negative,
+    numbers,
+    positive,
+)
 from ..errors import ParameterError, ShapeError
 from .motions import Chirp, Cosines, Steps, Triangle, common_period, extremes, schroeder_phases
 from .reference import Reference

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
+from .._support.units import best_length_unit
 from ..errors import ParameterError
 from .reference import Reference, read_reference
-from .._support.units import best_length_unit
 
 if TYPE_CHECKING:
     import os

@@ -1,25 +1,145 @@
-"""What stages have in common that the core simulates from their kind and a state."""
+"""Base classes of the stage models with scalar parameters, and what they return."""
 
 from __future__ import annotations
 
+import math
+from abc import abstractmethod
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypeVar
 
 import numpy as np
 
 from .. import _core
 from ..errors import ParameterError
-from .base import LumpedStage
-from .base import Response
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
     from ..data.dataset import Hold
+    from .inverse import Inverse
 
-__all__ = ["DrivenStage", "FeedbackState"]
+    Array = NDArray[np.float64]
+
+__all__ = [
+    "MODEL_STEP",
+    "DrivenStage",
+    "FeedbackState",
+    "LumpedStage",
+    "Ratio",
+    "Response",
+    "mechanical_ratios",
+]
+
+# Longest step in which a model's mechanics are followed under a jumping voltage [s].
+MODEL_STEP = 5e-5
+# Parameter, symbol, value and unit.
+Ratio = tuple[str, str, float, str]
 
 State = TypeVar("State")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Response:
+    """Motion of a stage at the samples of its drive.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n,)
+        Time [s], from 0 on.
+    u : ndarray, shape (n,)
+        Drive [V].
+    x : ndarray, shape (n,)
+        Displacement [m].
+    v : ndarray, shape (n,)
+        Velocity [m/s].
+    hysteresis : ndarray, shape (n,)
+        Hysteresis force [N].
+    final : StageState or BoucWenState
+        State at the last sample; ``initial=final`` carries on from there.
+    substeps : int
+        Steps of the integrator in each sampling interval.
+    difference : float
+        Largest change of `x` from a coarser simulation [m]; the error of `x` is a third of it,
+        and a fifteenth where the drive asked for the scheme's fourth order.
+    well_posed : bool
+        Whether each rest was unique. False where a stage with `b0` other than 0 came to rest
+        with the friction term along the motion and too little force to decide: the same drive
+        then has another motion too.
+    """
+
+    t: Array
+    u: Array
+    x: Array
+    v: Array
+    hysteresis: Array
+    final: Any
+    substeps: int
+    difference: float
+    well_posed: bool = True
+
+
+class LumpedStage:
+    """Base of the stages that a swarm can search: a dataclass of floats.
+
+    A subclass says its name in the core and which parameters the core has for it.
+    """
+
+    _kind: ClassVar[str]
+    _parameters: ClassVar[list[tuple[str, str, str]]]
+
+    def __post_init__(self) -> None:
+        for name in self.parameter_names():
+            object.__setattr__(self, name, _core.as_number(name, getattr(self, name)))
+        _core.stage_check(self._kind, self.theta)
+
+    @property
+    def theta(self) -> tuple[float, ...]:
+        """The parameters in their order."""
+        # Not dataclasses.astuple, which copies deeply and takes longer than a short simulation.
+        return tuple(getattr(self, name) for name, _, _ in self._parameters)
+
+    @classmethod
+    def parameter_names(cls) -> tuple[str, ...]:
+        """Names of the parameters, in their order.
+
+        Returns
+        -------
+        tuple of str
+            As the constructor takes them.
+        """
+        return tuple(name for name, _, _ in cls._parameters)
+
+    @abstractmethod
+    def force_ratios(self) -> list[Ratio]:
+        """Return what a record fixes without a force known, as ratios to the stiffness.
+
+        Returns
+        -------
+        list of (str, str, float, str)
+            Parameter, symbol, value and unit.
+        """
+
+    def inverse(
+        self, *, playback: Literal["table", "online"] = "table", settle: int = 1
+    ) -> Inverse:
+        """Feedforward of the bare stage, as `Inverse` describes.
+
+        Parameters
+        ----------
+        playback : {"table", "online"}, optional
+            Whether one settled period is played again and again, or all is computed.
+        settle : int, optional
+            Periods before the one of the table.
+
+        Returns
+        -------
+        Inverse
+            For `Controller` or on its own.
+        """
+        from .inverse import Inverse
+
+        # Which stages have an inverse is known there.
+        return Inverse(stage=self, playback=playback, settle=settle)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,3 +245,13 @@ class DrivenStage(LumpedStage, Generic[State]):
             substeps=run.substeps,
             difference=run.difference,
         )
+
+
+def mechanical_ratios(stage: Any, damping: str, mass: str) -> list[Ratio]:
+    """Viscous time and mass over stiffness, with the natural frequency that they mean."""
+    frequency = math.sqrt(stage.stiffness / stage.mass) / (2 * math.pi)
+    hertz = f"s^2, a natural frequency of {frequency:.4g} Hz"
+    return [
+        ("damping", damping, 1e3 * stage.damping / stage.stiffness, "ms"),
+        ("mass", mass, stage.mass / stage.stiffness, hertz),
+    ]

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from .. import _core
-from .base import DrivenStage
+from .base import DrivenStage, mechanical_ratios
+
+if TYPE_CHECKING:
+    from .base import Ratio
 
 __all__ = ["BoucWenStage", "BoucWenState"]
 
@@ -138,3 +142,13 @@ class BoucWenStage(DrivenStage[BoucWenState]):
     def _published(cls, *, corrected: bool) -> BoucWenStage:
         values = _core.bouc_wen_xu_li_2010(corrected)
         return cls(**dict(zip(cls.parameter_names(), values, strict=True)))
+
+    def force_ratios(self) -> list[Ratio]:
+        """Return all but the exponent, which is held, forces over the stiffness."""
+        return [
+            ("piezo_coefficient", "d", 1e6 * self.piezo_coefficient, "um/V"),
+            *mechanical_ratios(self, "b/k", "m/k"),
+            ("alpha", "alpha", self.alpha, ""),
+            ("beta", "beta", self.beta, "1/V"),
+            ("gamma", "gamma", self.gamma, "1/V"),
+        ]

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from .. import _core
 from .base import DrivenStage, FeedbackState
+
+if TYPE_CHECKING:
+    from .base import Ratio
 
 __all__ = ["BoucWenOscillator"]
 
@@ -85,3 +89,8 @@ class BoucWenOscillator(DrivenStage[FeedbackState]):
         """
         values = _core.bouc_wen_benchmark()
         return cls(**dict(zip(cls.parameter_names(), values, strict=True)))
+
+    def force_ratios(self) -> list[Ratio]:
+        """Return every parameter as it is: the drive is a force."""
+        values = zip(self._parameters, self.theta, strict=True)
+        return [(name, symbol, value, unit) for (name, symbol, unit), value in values]

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from .. import _core
-from .base import LumpedStage
+from .base import LumpedStage, Response, mechanical_ratios
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from ..data.dataset import Hold
+    from .base import Ratio
 
     Array = NDArray[np.float64]
 
-__all__ = ["DahlStage", "Response", "StageState"]
+__all__ = ["DahlStage", "StageState"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,46 +46,6 @@ class StageState:
     def values(self) -> tuple[float, float, float, float]:
         """The four values in their order."""
         return self.x, self.v, self.q1, self.q2
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Response:
-    """Motion of a stage at the samples of its drive.
-
-    Attributes
-    ----------
-    t : ndarray, shape (n,)
-        Time [s], from 0 on.
-    u : ndarray, shape (n,)
-        Drive [V].
-    x : ndarray, shape (n,)
-        Displacement [m].
-    v : ndarray, shape (n,)
-        Velocity [m/s].
-    hysteresis : ndarray, shape (n,)
-        Hysteresis force [N].
-    final : StageState or BoucWenState
-        State at the last sample; ``initial=final`` carries on from there.
-    substeps : int
-        Steps of the integrator in each sampling interval.
-    difference : float
-        Largest change of `x` from a coarser simulation [m]; the error of `x` is a third of it,
-        and a fifteenth where the drive asked for the scheme's fourth order.
-    well_posed : bool
-        Whether each rest was unique. False where a stage with `b0` other than 0 came to rest
-        with the friction term along the motion and too little force to decide: the same drive
-        then has another motion too.
-    """
-
-    t: Array
-    u: Array
-    x: Array
-    v: Array
-    hysteresis: Array
-    final: Any
-    substeps: int
-    difference: float
-    well_posed: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -250,3 +211,15 @@ class DahlStage(LumpedStage):
             difference=run.difference,
             well_posed=run.well_posed,
         )
+
+    def force_ratios(self) -> list[Ratio]:
+        """Return all but up, which the data do not tell from b1 and b0, over the stiffness."""
+        gain = 1e6 * self.piezo_coefficient / self.stiffness
+        return [
+            ("piezo_coefficient", "T/K", gain, "um/V"),
+            *mechanical_ratios(self, "D/K", "M/K"),
+            ("b1", "b1 up/K", self.b1 * self.up / self.stiffness, "1/m"),
+            ("a1", "a1", self.a1, "1/m"),
+            ("a2", "a2", self.a2, "1/m^2"),
+            ("b0", "b0 up/K", self.b0 * self.up / self.stiffness, ""),
+        ]

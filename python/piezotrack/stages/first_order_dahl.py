@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from .. import _core
-from .base import DrivenStage, FeedbackState
+from .base import DrivenStage, FeedbackState, mechanical_ratios
+
+if TYPE_CHECKING:
+    from .base import Ratio
 
 __all__ = ["FirstOrderDahlStage"]
 
@@ -76,3 +80,14 @@ class FirstOrderDahlStage(DrivenStage[FeedbackState]):
     rest_stiffness: float
     coulomb_force: float
     exponent: float = 1.0
+
+    def force_ratios(self) -> list[Ratio]:
+        """Return all but the exponent, which is held, forces over the stiffness."""
+        gain = 1e6 * self.piezo_coefficient / self.stiffness
+        reach = 1e6 * self.coulomb_force / self.stiffness
+        return [
+            ("piezo_coefficient", "T/K", gain, "um/V"),
+            *mechanical_ratios(self, "D/K", "M/K"),
+            ("rest_stiffness", "sigma/K", self.rest_stiffness / self.stiffness, ""),
+            ("coulomb_force", "Fc/K", reach, "um"),
+        ]

@@ -11,10 +11,10 @@ import numpy as np
 from .. import _core
 from .._support.arguments import finite, not_negative, positive
 from ..errors import ParameterError
-from .registry import Stage, kind_of
 from ..references.motions import Spline
-from .prandtl_ishlinskii import PlaysState, PrandtlIshlinskiiStage
 from ..references.reference import Reference
+from .prandtl_ishlinskii import PlaysState, PrandtlIshlinskiiStage
+from .registry import Stage, kind_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from .. import _core
+from .._support.arguments import as_numbers
 from ..errors import ParameterError
 
 if TYPE_CHECKING:
@@ -315,16 +315,3 @@ class PrandtlIshlinskiiStage:
             hysteresis=run.hysteresis,
             final=PlaysState(u=drive, plays=tuple(plays), creep=tuple(creep), x=x, v=v),
         )
-
-
-def as_numbers(name: str, values: object) -> tuple[float, ...]:
-    """Return a sequence of numbers as a tuple of floats.
-
-    Examples
-    --------
-    >>> as_numbers("thresholds", [1, 2.5])
-    (1.0, 2.5)
-    """
-    if not isinstance(values, Iterable) or isinstance(values, (str, bytes)):
-        raise ParameterError(f"{name} is {values!r}: expected numbers in a list")
-    return tuple(_core.as_number(f"{name}[{i}]", value) for i, value in enumerate(values))

@@ -5,19 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from .. import _core
-from . import base
-from .bouc_wen import BoucWenStage
 from ..errors import ParameterError
-from .first_order_dahl import FirstOrderDahlStage
-from .dahl import DahlStage
+from .bouc_wen import BoucWenStage
 from .bouc_wen_oscillator import BoucWenOscillator
+from .dahl import DahlStage
+from .first_order_dahl import FirstOrderDahlStage
 from .prandtl_ishlinskii import PARAMETERS as PLAYS_PARAMETERS
 from .prandtl_ishlinskii import PrandtlIshlinskiiStage
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
-    from .base import Ratio
 
 __all__ = ["KINDS", "Kind", "Searched", "Stage", "kind_named", "kind_of"]
 
@@ -43,8 +41,6 @@ class Kind(NamedTuple):
         Symbols of what scales along with the stiffness.
     searched : bool
         Whether a swarm searches its parameters; else they follow by least squares.
-    ratios : callable
-        What of a stage does not depend on the scale of the forces, for those searched.
     drive_unit : str
         Unit of the drive.
     """
@@ -55,7 +51,6 @@ class Kind(NamedTuple):
     parameters: Sequence[tuple[str, str, str]]
     forces: str = ""
     searched: bool = True
-    ratios: Callable[[Any], list[Ratio]] = lambda _: []
     drive_unit: str = "V"
 
     def built(self, values: list[float]) -> Stage:
@@ -72,7 +67,6 @@ KINDS = (
         DahlStage,
         _core.DAHL_PARAMETERS,
         "M, D, T, b1 and b0",
-        ratios=base.dahl,
     ),
     Kind(
         "bouc-wen",
@@ -80,7 +74,6 @@ KINDS = (
         BoucWenStage,
         _core.BOUC_WEN_PARAMETERS,
         "m and b",
-        ratios=base.bouc_wen,
     ),
     Kind(
         "prandtl-ishlinskii",
@@ -95,14 +88,12 @@ KINDS = (
         FirstOrderDahlStage,
         _core.FIRST_ORDER_DAHL_PARAMETERS,
         "M, D, T, sigma and Fc",
-        ratios=base.first_order_dahl,
     ),
     Kind(
         "bouc-wen-oscillator",
         "Bouc-Wen oscillator",
         BoucWenOscillator,
         _core.BOUC_WEN_OSCILLATOR_PARAMETERS,
-        ratios=base.bouc_wen_oscillator,
         drive_unit="N",
     ),
 )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
+from .._support.arguments import one_or_more_numbers
 from ..data.dataset import Dataset
 from ..errors import ParameterError
 
@@ -133,9 +134,9 @@ class VirtualStage:
 
     def __post_init__(self) -> None:
         for name in ("limits", "thresholds", "weights", "corners", "bends"):
-            object.__setattr__(self, name, _numbers(name, getattr(self, name)))
+            object.__setattr__(self, name, one_or_more_numbers(name, getattr(self, name)))
         for name in ("creep_shares", "creep_times"):
-            object.__setattr__(self, name, _numbers(name, getattr(self, name)))
+            object.__setattr__(self, name, one_or_more_numbers(name, getattr(self, name)))
         if len(self.limits) != 2:
             raise ParameterError(f"limits are {self.limits}: expected (low, high) in V")
         for one in fields(self):
@@ -218,8 +219,3 @@ class VirtualStage:
         """
         run = self.simulate(u, dt, hold=hold)
         return Dataset(u=run.u, y=run.y, dt=dt, hold=hold, source="virtual stage")
-
-
-def _numbers(name: str, values: object) -> tuple[float, ...]:
-    entries = np.atleast_1d(np.asarray(values, dtype=object)).tolist()
-    return tuple(_core.as_number(f"{name}[{i}]", value) for i, value in enumerate(entries))

@@ -10,10 +10,10 @@ import numpy as np
 from .. import _core
 from ..data.dataset import Dataset
 from ..errors import ParameterError
+from ..references.xy_reference import square_matrix
 from .base import MODEL_STEP
 from .dahl import DahlStage
 from .virtual import VirtualResponse, VirtualStage
-from ..references.xy_reference import square_matrix
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
-from .procedure import FITTED_SECONDS, SEARCH_BOX
+from ..control.tracking import check_stable
 from ..errors import PiezotrackError
 from ..identification.search import identify
-from ..stages.dahl import DahlStage
 from ..identification.swarm import ParticleSwarm
-from ..control.tracking import check_stable
-from . import fig_15_circles, fig_06_identification, fig_04_step_test, fig_12_14_tracking
+from ..stages.dahl import DahlStage
+from . import fig_04_step_test, fig_06_identification, fig_12_14_tracking, fig_15_circles
 from .apparatus import loop
 from .free_parameters import FREE, SEED, Free, apparatus_at, theta_at
+from .procedure import FITTED_SECONDS, SEARCH_BOX
 from .published import observables
 
 if TYPE_CHECKING:
@@ -65,7 +65,9 @@ def values_of(apparatus: Apparatus) -> dict[str, float]:
         **fig_04_step_test.observe(fig_04_step_test.step_test(apparatus)),
         **fig_06_identification.observe(fit),
         "models.dahl": float(np.abs(error).max()),
-        **fig_12_14_tracking.observe_compensation(fig_12_14_tracking.compensation(apparatus, inverse)),
+        **fig_12_14_tracking.observe_compensation(
+            fig_12_14_tracking.compensation(apparatus, inverse)
+        ),
         **fig_15_circles.observe(table, apparatus.stage.lag),
     }
 

@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..control.controller import Controller
 from .._support.files import write_columns
-from ..identification.search import Identification, identify
 from ..control.components import Pid, Repetitive
-from ..stages.dahl import DahlStage
+from ..control.controller import Controller
 from ..control.tracking import Tracking, track
-from ..stages.virtual import VirtualStage
+from ..identification.search import Identification, identify
 from ..references.waveforms import sine
+from ..stages.dahl import DahlStage
+from ..stages.virtual import VirtualStage
+from .procedure import FITTED_SECONDS, SEARCH_BOX
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,16 +23,7 @@ if TYPE_CHECKING:
     from ..data.dataset import Dataset
     from ..identification.estimates import Progress
 
-__all__ = ["SEARCH_BOX", "demo_log", "identify_demo", "track_demo", "write_log"]
-
-# The box of Xu and Li 2010, section 3.3, SI.
-SEARCH_BOX = {
-    "mass": (0.1, 0.2),
-    "damping": (1000.0, 5000.0),
-    "stiffness": (1e4, 5e4),
-    "piezo_coefficient": (0.01, 0.1),
-}
-FITTED_SECONDS = 4.0
+__all__ = ["demo_log", "identify_demo", "track_demo", "write_log"]
 
 
 def demo_log(seed: int = 1) -> Dataset:

@@ -2,58 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from ..control.components import LowPass, Notch, Pid, Repetitive
+from ..control.tracking import Tracking, track
 from ..data.dataset import Dataset
 from ..errors import NumericalError, ParameterError
 from ..identification.search import identify
-from ..control.components import LowPass, Notch, Pid, Repetitive
 from ..stages.dahl import DahlStage
-from ..control.tracking import Tracking, track
-from . import fig_07_model_comparison, fig_06_identification, fig_12_14_tracking
+from . import fig_06_identification, fig_07_model_comparison, fig_12_14_tracking
 from .apparatus import DT, loop
 from .references import HIGH, LOW, RANGE, fast, slow
+from .section import Section
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from ..control.controller import Controller
-    from ..stages.inverse import Inverse
     from ..references.reference import Reference
+    from ..stages.inverse import Inverse
     from .apparatus import Apparatus
     from .run import Way
 
-__all__ = ["Section", "rivals", "sections"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Section:
-    """A table with a heading and a few words.
-
-    Attributes
-    ----------
-    title, text : str
-        Heading, and what to read from the table.
-    heads : tuple of str
-        Titles of the columns, with units.
-    rows : tuple of tuple of str
-        Cells.
-    """
-
-    title: str
-    text: str
-    heads: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-
-    def document(self) -> dict[str, Any]:
-        """Content of the JSON file."""
-        return {
-            "title": self.title,
-            "text": self.text,
-            "columns": list(self.heads),
-            "rows": [list(row) for row in self.rows],
-        }
+__all__ = ["rivals", "sections"]
 
 
 def sections(apparatus: Apparatus, way: Way) -> list[Section]:
@@ -135,14 +107,17 @@ def _which_model(apparatus: Apparatus, way: Way) -> Section:
         judged = way.judged
         if log is not None:
             thin = fig_06_identification.thinned(log, THINNED)
-            judged = fig_07_model_comparison.judge(thin, fig_06_identification.search(thin, 1), 1, every=1)
+            judged = fig_07_model_comparison.judge(
+                thin, fig_06_identification.search(thin, 1), 1, every=1
+            )
         found = fig_07_model_comparison.largest(judged)
         better = "Dahl" if found["dahl"] < found["bouc-wen"] else "Bouc-Wen"
         rows.append((name, _um(found["dahl"]), _um(found["bouc-wen"]), better))
+    printed = fig_07_model_comparison.published_bouc_wen(log_of_12_s)
     text = (
         "Largest error over the 12 s of Fig. 7, in um; both fitted to the first 4 s, of Dahl the "
         "paper's four parameters, of Bouc-Wen all. The Bouc-Wen model that the paper prints, its "
-        f"stiffness corrected, is {_um(fig_07_model_comparison.published_bouc_wen(log_of_12_s))} um off."
+        f"stiffness corrected, is {_um(printed)} um off."
     )
     return Section(
         title="On what kind of stage Dahl beats Bouc-Wen",
@@ -193,7 +168,10 @@ def _learning(apparatus: Apparatus, inverse: Inverse) -> Section:
             period=period, smoothing="zero phase", kq=0.6, lead=1
         ),
     }
-    loops = {name: loop(inverse, feedback=fig_12_14_tracking.PID, addon=one) for name, one in forms.items()}
+    loops = {
+        name: loop(inverse, feedback=fig_12_14_tracking.PID, addon=one)
+        for name, one in forms.items()
+    }
 
     def figures(run: Tracking) -> list[str]:
         last = run.score(run.reference.duration - period)

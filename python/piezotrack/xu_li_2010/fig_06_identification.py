@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..data.dataset import Dataset
-from .procedure import FITTED_SECONDS, SEARCH_BOX
 from ..identification.search import Identification, identify
-from ..stages.dahl import DahlStage
 from ..identification.swarm import ParticleSwarm
+from ..stages.dahl import DahlStage
+from .procedure import FITTED_SECONDS, SEARCH_BOX
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..stages.bouc_wen import BoucWenStage
 from ..identification.comparison import Comparison, compare
-from .procedure import FITTED_SECONDS
 from ..identification.search import identify
+from ..stages.bouc_wen import BoucWenStage
 from .fig_06_identification import thinned
+from .procedure import FITTED_SECONDS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .table_2 import Table2, run_table_2
 from .apparatus import loop
 from .fig_12_14_tracking import PID
+from .table_2 import Table2, run_table_2
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..stages.inverse import Inverse
     from ..control.tracking import Tracking
+    from ..stages.inverse import Inverse
     from .apparatus import Apparatus
 
 __all__ = ["circles", "draw", "observe"]

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from . import fig_15_circles, block_diagrams, fig_07_model_comparison, fig_03_sensor_at_rest, fig_06_identification, fig_04_step_test
+from . import (
+    block_diagrams,
+    fig_03_sensor_at_rest,
+    fig_04_step_test,
+    fig_06_identification,
+    fig_07_model_comparison,
+    fig_15_circles,
+)
 from .references import RULES
 
 if TYPE_CHECKING:
@@ -14,8 +21,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..control.tracking import Tracking
-    from .measured_log import Drives
     from .fig_12_14_tracking import Runs
+    from .measured_log import Drives
     from .run import Way
 
 __all__ = ["Drawn", "drawn"]

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..data.reader import read
 from ..errors import DataError
 from ..identification.search import identify
-from ..data.reader import read
 from ..references.reference import Reference, read_reference
-from .section import Section
 from .extensions import rivals
+from .section import Section
 
 if TYPE_CHECKING:
     import os

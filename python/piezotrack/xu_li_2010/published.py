@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ..stages.dahl import DahlStage
 from ..identification.step_readings import StepReadings
+from ..stages.dahl import DahlStage
 from .table_2 import PUBLISHED
 
 if TYPE_CHECKING:

@@ -5,9 +5,7 @@ from __future__ import annotations
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from .._support.files import write_document
-from .._support.files import replacing
-from .._support.files import make_folder
+from .._support.files import make_folder, replacing, write_document
 from .figures import Drawn, drawn
 from .report_html import html_text
 from .report_text import summary_text

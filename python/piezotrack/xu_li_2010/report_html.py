@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from .apparatus import calibration_file
 from .published import observables
-from .report_text import number, reading, seen, tally
 from .references import RULES
+from .report_text import number, reading, seen, tally
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

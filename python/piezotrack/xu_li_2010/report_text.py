@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from .published import SI
 
 if TYPE_CHECKING:
-    from .section import Section
     from .published import Obtained
     from .reproduction import Reproduction
+    from .section import Section
 
 __all__ = ["number", "reading", "seen", "summary_text", "tally"]
 

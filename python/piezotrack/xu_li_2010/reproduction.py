@@ -11,9 +11,8 @@ import numpy as np
 from .. import _core
 from ..errors import ParameterError
 from .apparatus import Apparatus, calibration_file
-from .section import Section
-from .extensions import sections
 from .conclusions import Conclusion, conclusions
+from .extensions import sections
 from .measured_log import Drives, drives
 from .published import SI, Obtained, gathered
 from .references import RULES
@@ -23,6 +22,8 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Sequence
     from pathlib import Path
+
+    from .section import Section
 
 __all__ = ["Reproduction", "reproduce_xu_li_2010"]
 

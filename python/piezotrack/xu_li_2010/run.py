@@ -5,16 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from . import fig_15_circles, fig_07_model_comparison, fig_03_sensor_at_rest, fig_06_identification, fig_04_step_test, fig_12_14_tracking
+from . import (
+    fig_03_sensor_at_rest,
+    fig_04_step_test,
+    fig_06_identification,
+    fig_07_model_comparison,
+    fig_12_14_tracking,
+    fig_15_circles,
+)
 
 if TYPE_CHECKING:
     from ..identification.comparison import Comparison
     from ..identification.search import Identification
     from ..identification.sensor_noise import Noise
     from ..identification.step_response import StepResult
-    from .table_2 import Table2
     from .apparatus import Apparatus
     from .fig_12_14_tracking import Runs
+    from .table_2 import Table2
 
 __all__ = ["Way", "go"]
 
@@ -61,7 +68,9 @@ class Way:
     def true_values(self) -> dict[str, float]:
         """The same of the true displacement, for what is followed under control."""
         return {
-            **fig_12_14_tracking.observe(self.compensation, self.antiwindup, self.repetitive, true=True),
+            **fig_12_14_tracking.observe(
+                self.compensation, self.antiwindup, self.repetitive, true=True
+            ),
             **fig_15_circles.observe(self.table, self.lag, true=True),
         }
 
