@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import doctest
 import importlib
 import inspect
@@ -17,8 +18,8 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
+from folders import ROOT
 
-ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted(
     {"piezotrack"}
     | {
@@ -198,10 +199,20 @@ def test_the_examples_run(example: Path, tmp_path: Path) -> None:
 
 
 def test_every_public_name_is_there_and_listed() -> None:
-    lazy = {name for names in pt._HOMES.values() for name in names}
-    assert lazy <= set(pt.__all__)
-    for name in pt.__all__:
+    stub = Path(pt.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+    listed = [
+        (imported.name, imported.asname)
+        for line in ast.parse(stub).body
+        if isinstance(line, ast.ImportFrom)
+        for imported in line.names
+    ]
+    names = [name for name, _ in listed]
+    # A name is exported to type checkers only where it is repeated behind "as".
+    assert [shown for _, shown in listed] == names
+    assert pt.__all__ == sorted(set(names))
+    assert len(set(names)) == len(names)
+    for name in names:
         assert getattr(pt, name) is not None
-    assert set(pt.__all__) <= set(dir(pt))
+    assert set(names) <= set(dir(pt))
     with pytest.raises(AttributeError, match="'Bogus'"):
-        pt.Bogus  # noqa: B018
+        pt.Bogus  # type: ignore[attr-defined]  # noqa: B018

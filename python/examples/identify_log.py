@@ -8,9 +8,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from piezotrack.demo import demo_log
-
 import piezotrack as pt
+from piezotrack.xu_li_2010.demo import demo_log
 
 
 def main() -> None:

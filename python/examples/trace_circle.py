@@ -9,9 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from piezotrack.demo import demo_log, identify_demo
 
 import piezotrack as pt
+from piezotrack.xu_li_2010.demo import demo_log, identify_demo
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "contouring")
 folder.mkdir(parents=True, exist_ok=True)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from piezotrack.led import Led
+    from piezotrack.control.plant import Plant
 
 BOUC_WEN = pt.BoucWenStage.xu_li_2010_corrected()
 PLAYS = pt.PrandtlIshlinskiiStage(
@@ -35,7 +35,7 @@ FRICTION = pt.FirstOrderDahlStage(
     rest_stiffness=9e3,
     coulomb_force=0.15,
 )
-STAGES: dict[str, Led] = {
+STAGES: dict[str, Plant] = {
     "bouc-wen": BOUC_WEN,
     "first-order dahl": FRICTION,
     "plays": PLAYS,
@@ -47,7 +47,7 @@ STAGES: dict[str, Led] = {
 WIDE = (-20.0, 95.0)
 
 
-def loop(stage: Led | None = None, dt: float = 0.02, **parts: Any) -> pt.Controller:
+def loop(stage: Plant | None = None, dt: float = 0.02, **parts: Any) -> pt.Controller:
     if stage is not None:
         assert not isinstance(stage, pt.VirtualStage)
         parts["feedforward"] = stage.inverse(playback="online")
@@ -63,7 +63,7 @@ def travel(x: NDArray[np.float64]) -> float:
     return float(np.ptp(x))
 
 
-# Led.
+# Plant.
 
 
 @pytest.mark.parametrize("name", STAGES)
@@ -148,13 +148,13 @@ def test_a_reference_out_of_reach_is_refused() -> None:
 # Checked.
 
 
-def gains(stage: Led, limits: tuple[float, float] = (0.0, 75.0)) -> list[float]:
+def gains(stage: Plant, limits: tuple[float, float] = (0.0, 75.0)) -> list[float]:
     report = pt.check_loop(loop(limits=limits, feedback=pt.Pid.xu_li_2010()), stage)
     return [one.gain for one in (report.low, report.middle, report.high)]
 
 
 @pytest.mark.parametrize("stage", [BOUC_WEN, PLAYS])
-def test_the_gains_are_those_of_the_settled_loop(stage: Led) -> None:
+def test_the_gains_are_those_of_the_settled_loop(stage: Plant) -> None:
     """Slopes of a quasi-static loop, by differences of the simulated displacement."""
     assert not isinstance(stage, pt.VirtualStage)
     up = np.linspace(0.0, 75.0, 20001)

@@ -13,8 +13,9 @@ import pytest
 from typer.testing import CliRunner
 
 import piezotrack as pt
+from folders import SHARED
+from piezotrack._support.files import write_columns
 from piezotrack.cli import app
-from piezotrack.files import write_columns
 from records import BOX, TABLE_1, quick
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def step_log(
 
 
 def test_the_published_readings_give_the_published_values() -> None:
-    path = Path(__file__).resolve().parents[2] / "shared" / "published.json"
+    path = SHARED / "published.json"
     step = pt.identify_step(pt.StepReadings.from_um(**TYPED))
     for name, value in PUBLISHED.items():
         assert step.hysteresis[name] == pytest.approx(value, rel=1e-4, abs=1e-4), name

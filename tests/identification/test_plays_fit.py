@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.optimize import nnls
 
 import piezotrack as pt
+from folders import MEASURED
 from piezotrack import _core
-from test_plays import PLAIN, STAGE, drive, record
+from play_records import PLAIN, STAGE, drive, record
 
-MEASURED = Path(__file__).resolve().parents[2] / "shared" / "data" / "dbo_piezo"
 measured = pytest.mark.skipif(
     not MEASURED.is_dir(), reason=f"the measured logs are not in {MEASURED}"
 )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -11,29 +10,17 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from commands import ran, refusal
-from loops import PID, STAGE, fitted, loop, sine
+from commands import ran, refusal, table
+from loops import PID, STAGE, fitted, loop, model_text, sine
 
 COURSE = "sine:0.5Hz,0..110um,6s"
 ROWS = "time_s,desired_um,measured_um,voltage_V,feedforward_V,feedback_V,repetitive_V"
-
-
-@cache
-def model_text() -> str:
-    path = Path(fitted().save("made.json"))
-    text = path.read_text(encoding="utf-8")
-    path.unlink()
-    return text
 
 
 @pytest.fixture(autouse=True)
 def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("dahl.json").write_text(model_text(), encoding="utf-8")
-
-
-def table(path: str) -> Any:
-    return np.genfromtxt(path, delimiter=",", names=True)
 
 
 def report(folder: str = "results") -> dict[str, Any]:

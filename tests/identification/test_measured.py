@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from functools import cache
-from pathlib import Path
 
 import pytest
 
 import piezotrack as pt
+from folders import MEASURED
 
-MEASURED = Path(__file__).resolve().parents[2] / "shared" / "data" / "dbo_piezo"
 pytestmark = pytest.mark.skipif(
     not MEASURED.is_dir(), reason=f"the measured logs are not in {MEASURED}"
 )

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
+from folders import MEASURED
 
-MEASURED = Path(__file__).resolve().parents[2] / "shared" / "data" / "dbo_piezo"
 needs_measured = pytest.mark.skipif(
     not MEASURED.is_dir(), reason=f"the measured logs are not in {MEASURED}"
 )
@@ -391,7 +391,7 @@ def test_a_clean_log_is_not_read_line_by_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: str
 ) -> None:
     # Ten times slower, and a million samples are nothing unusual.
-    monkeypatch.delattr("piezotrack.io._TextLog._table_by_line")
+    monkeypatch.delattr("piezotrack.data.reader._TextLog._table_by_line")
     assert is_the_log(pt.read(write(tmp_path, content)))
 
 

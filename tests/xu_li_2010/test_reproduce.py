@@ -9,23 +9,25 @@ import re
 import shutil
 import subprocess
 from functools import cache
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 import piezotrack as pt
 from commands import refusal
+from folders import MEASURED
 from piezotrack import _core
-from piezotrack.reproduce import search, tracked
-from piezotrack.reproduce.apparatus import Apparatus, calibration_file
-from piezotrack.reproduce.calibration import calibrate, cost, medians
-from piezotrack.reproduce.conclusions import conclusions
-from piezotrack.reproduce.free import FREE, Free, apparatus_at
-from piezotrack.reproduce.measured import drives
-from piezotrack.reproduce.observables import Observable, Obtained, observables
+from piezotrack.xu_li_2010 import fig_06_identification, fig_12_14_tracking
+from piezotrack.xu_li_2010.apparatus import Apparatus, calibration_file
+from piezotrack.xu_li_2010.calibration import calibrate, cost, medians
+from piezotrack.xu_li_2010.conclusions import conclusions
+from piezotrack.xu_li_2010.free_parameters import FREE, Free, apparatus_at
+from piezotrack.xu_li_2010.measured_log import drives
+from piezotrack.xu_li_2010.published import Observable, Obtained, observables
 
-MEASURED = Path(__file__).resolve().parents[2] / "shared" / "data" / "dbo_piezo"
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 @cache
@@ -143,7 +145,7 @@ def test_the_errors_are_those_of_the_samples() -> None:
 def test_the_readings_are_those_of_a_sensor() -> None:
     # 50 Hz, whole steps, and noise between reading and truth, were no reading late.
     prompt = dataclasses.replace(quick().apparatus, jitter=0.0)
-    run = tracked.compensation(prompt, quick().way.fit.inverse())["both"]
+    run = fig_12_14_tracking.compensation(prompt, quick().way.fit.inverse())["both"]
     assert np.allclose(np.diff(run.t), 0.02)
     steps = run.measured / (2.5e-3 / 2**16)
     assert np.abs(steps - np.round(steps)).max() < 1e-6
@@ -252,8 +254,14 @@ def test_the_file_is_what_the_calibration_gives() -> None:
 def test_table_1_tells_the_sign_of_the_asymmetry() -> None:
     theta = {one["name"]: one["value"] for one in calibration_file()["free"]}
     turned = {**theta, "bend_x": -theta["bend_x"], "top_x": -theta["top_x"]}
-    logs = [search.thinned(search.record(apparatus_at(one)), 10) for one in (theta, turned)]
-    found, other = (search.observe(search.search(log, 1))["table_1.stiffness"] for log in logs)
+    logs = [
+        fig_06_identification.thinned(fig_06_identification.record(apparatus_at(one)), 10)
+        for one in (theta, turned)
+    ]
+    found, other = (
+        fig_06_identification.observe(fig_06_identification.search(log, 1))["table_1.stiffness"]
+        for log in logs
+    )
     assert found == pytest.approx(26065.0, rel=0.25)
     assert other > 1.3 * found
 

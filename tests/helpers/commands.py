@@ -8,11 +8,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from typer.testing import CliRunner
 
 import piezotrack as pt
 from piezotrack.cli import app
-from piezotrack.demo import write_log
+from piezotrack.xu_li_2010.demo import write_log
 from records import BOX, HELD, quick
 
 HEADER = "time_s,voltage_V,displacement_um"
@@ -87,3 +88,8 @@ def column(index: int, value: str) -> str:
     for row in rows:
         row[index] = value
     return "\n".join([HEADER, *(",".join(row) for row in rows)])
+
+
+def table(path: str) -> Any:
+    """The columns of a file that the command wrote, by their titles."""
+    return np.genfromtxt(path, delimiter=",", names=True)

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from commands import ran, refusal
-from loops import PID, fitted, loop
-from test_cli_track import model_text, table
+from commands import ran, refusal, table
+from loops import PID, fitted, loop, model_text
 
 STAGE = pt.XYStage.xu_li_2010(seed=1)
 
@@ -88,7 +87,7 @@ def _no_pictures_at_all(monkeypatch: pytest.MonkeyPatch) -> None:
         plt.close("all")
         return []
 
-    monkeypatch.setattr("piezotrack.report.save_figures", none)
+    monkeypatch.setattr("piezotrack._support.files.save_figures", none)
 
 
 def rest_log(name: str = "rest.csv") -> None:

@@ -27,7 +27,7 @@ from commands import (
     write,
     write_model,
 )
-from piezotrack.demo import write_log
+from piezotrack.xu_li_2010.demo import write_log
 from records import BOX, HELD, quick
 
 

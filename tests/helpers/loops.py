@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -39,3 +40,12 @@ def loop(**parts: Any) -> pt.Controller:
 
 def sine(frequency: float, duration: float, low: float = 0.0, high: float = 110e-6) -> pt.Reference:
     return pt.sine(frequency=frequency, low=low, high=high, duration=duration)
+
+
+@cache
+def model_text() -> str:
+    """The fitted model as a file has it."""
+    path = Path(fitted().save("made.json"))
+    text = path.read_text(encoding="utf-8")
+    path.unlink()
+    return text

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import piezotrack as pt
-from piezotrack.units import best_length_unit, known_units, lookup, require, split_unit
+from piezotrack._support.units import best_length_unit, known_units, lookup, require, split_unit
 
 
 def record(n: int = 5000, dt: float = 0.005, **more: Any) -> pt.Dataset:

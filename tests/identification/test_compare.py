@@ -14,10 +14,10 @@ from matplotlib.patches import Rectangle
 
 import piezotrack as pt
 from commands import names, ran, refusal
-from piezotrack.demo import write_log
-from piezotrack.kinds import KINDS
+from folders import MEASURED
+from piezotrack.stages.registry import KINDS
+from piezotrack.xu_li_2010.demo import write_log
 
-MEASURED = Path(__file__).resolve().parents[2] / "shared" / "data" / "dbo_piezo"
 TIMES = np.arange(1600) / 200.0
 DRIVE = 37.5 - 25.0 * np.cos(np.pi * TIMES) - 12.0 * np.cos(1.5 * np.pi * TIMES)
 # Some of the thresholds that a fit takes: elevenths of half the drive's range.

@@ -12,14 +12,15 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from piezotrack.plotting import (
+from piezotrack._support.files import save_figures
+from piezotrack.identification.plot import (
     plot_convergence,
     plot_identification,
     plot_loop,
     plot_response,
     plot_time,
 )
-from piezotrack.report import save_figures, save_identification
+from piezotrack.identification.report import save_identification
 from records import quick, quick_fit
 
 if TYPE_CHECKING:
