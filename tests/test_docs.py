@@ -100,7 +100,15 @@ def test_the_pages_link_to_what_is_there(page: Path) -> None:
 
 # Docstrings.
 
-PUBLIC = {name: getattr(pt, name) for name in pt.__all__ if name != "__version__"}
+STUB = Path(pt.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+LISTED = [
+    (imported.name, imported.asname)
+    for line in ast.parse(STUB).body
+    if isinstance(line, ast.ImportFrom)
+    for imported in line.names
+]
+NAMES = [name for name, _ in LISTED]
+PUBLIC = {name: getattr(pt, name) for name in NAMES if name != "__version__"}
 CLASSES = {name: value for name, value in PUBLIC.items() if inspect.isclass(value)}
 
 
@@ -199,20 +207,13 @@ def test_the_examples_run(example: Path, tmp_path: Path) -> None:
 
 
 def test_every_public_name_is_there_and_listed() -> None:
-    stub = Path(pt.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
-    listed = [
-        (imported.name, imported.asname)
-        for line in ast.parse(stub).body
-        if isinstance(line, ast.ImportFrom)
-        for imported in line.names
-    ]
-    names = [name for name, _ in listed]
     # A name is exported to type checkers only where it is repeated behind "as".
-    assert [shown for _, shown in listed] == names
-    assert pt.__all__ == sorted(set(names))
-    assert len(set(names)) == len(names)
-    for name in names:
+    assert [shown for _, shown in LISTED] == NAMES
+    # What runs and what type checkers see.
+    assert vars(pt)["__all__"] == sorted(NAMES)
+    assert len(set(NAMES)) == len(NAMES)
+    for name in NAMES:
         assert getattr(pt, name) is not None
-    assert set(names) <= set(dir(pt))
+    assert set(NAMES) <= set(dir(pt))
     with pytest.raises(AttributeError, match="'Bogus'"):
         pt.Bogus  # type: ignore[attr-defined]  # noqa: B018

@@ -87,5 +87,3 @@ from .xu_li_2010.reproduction import Reproduction as Reproduction
 from .xu_li_2010.reproduction import reproduce_xu_li_2010 as reproduce_xu_li_2010
 from .xu_li_2010.table_2 import Table2 as Table2
 from .xu_li_2010.table_2 import run_table_2 as run_table_2
-
-__all__: list[str]

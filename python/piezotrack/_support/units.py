@@ -58,7 +58,7 @@ class Unit:
         Examples
         --------
         >>> import numpy as np
-        >>> from piezotrack.units import require
+        >>> from piezotrack._support.units import require
         >>> require("um").to_si(np.array([45.1]))
         array([4.51e-05])
         """
@@ -100,7 +100,7 @@ def lookup(text: str) -> Unit | None:
 
     Examples
     --------
-    >>> from piezotrack.units import lookup
+    >>> from piezotrack._support.units import lookup
     >>> lookup("UM").name, lookup("MV"), lookup("furlong")
     ('um', None, None)
     """
@@ -131,7 +131,7 @@ def require(text: str, quantity: str | None = None) -> Unit:
 
     Examples
     --------
-    >>> from piezotrack.units import require
+    >>> from piezotrack._support.units import require
     >>> require("mV", "voltage").si
     'V'
     """
@@ -151,7 +151,7 @@ def known_units(quantity: str | None = None) -> str:
 
     Examples
     --------
-    >>> from piezotrack.units import known_units
+    >>> from piezotrack._support.units import known_units
     >>> known_units("voltage")
     'V, mV, uV, kV'
     """
@@ -170,7 +170,7 @@ def split_unit(header: str) -> tuple[str, str]:
 
     Examples
     --------
-    >>> from piezotrack.units import split_unit
+    >>> from piezotrack._support.units import split_unit
     >>> split_unit("voltage_V"), split_unit("Time (s)"), split_unit("x/um")
     (('voltage', 'V'), ('Time', 's'), ('x', 'um'))
     >>> split_unit("sensor_left")
@@ -206,7 +206,7 @@ def best_length_unit(stroke_m: float) -> tuple[str, float]:
 
     Examples
     --------
-    >>> from piezotrack.units import best_length_unit
+    >>> from piezotrack._support.units import best_length_unit
     >>> best_length_unit(45e-6)
     ('um', 1000000.0)
     """

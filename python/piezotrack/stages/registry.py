@@ -16,7 +16,6 @@ from .prandtl_ishlinskii import PrandtlIshlinskiiStage
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-
 __all__ = ["KINDS", "Kind", "Searched", "Stage", "kind_named", "kind_of"]
 
 Stage = DahlStage | BoucWenStage | PrandtlIshlinskiiStage | FirstOrderDahlStage | BoucWenOscillator

@@ -215,7 +215,9 @@ def reproduce_xu_li_2010(
     apparatus = Apparatus.calibrated() if apparatus is None else apparatus
     if not isinstance(apparatus, Apparatus):
         kind = type(apparatus).__name__
-        raise ParameterError(f"apparatus is {kind}: expected a piezotrack.reproduce.Apparatus")
+        raise ParameterError(
+            f"apparatus is {kind}: expected a piezotrack.xu_li_2010.apparatus.Apparatus"
+        )
     chosen = tuple(range(FIRST_SEED, FIRST_SEED + count))
     # What may be missing is looked at first.
     log = None if dbo is None else drives(dbo)
