@@ -1,7 +1,7 @@
 """Calibrate the virtual stage to what Xu and Li 2010 publish.
 
 ``python calibrate_virtual_stage.py [FILE [PARTICLES [ITERATIONS [RUNS]]]]`` writes what
-``piezotrack reproduce`` loads, which is kept as ``python/piezotrack/reproduce/calibrated.json``:
+``piezotrack reproduce`` loads, which is kept as ``python/piezotrack/xu_li_2010/calibrated.json``:
 40 particles, 40 iterations and 2 runs, half an hour on two cores. Without arguments it does a
 small search, to show the way.
 """
