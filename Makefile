@@ -25,6 +25,7 @@ lint: $(VENV)/installed $(VENV)/tools ## Formatting, clippy, ruff, types, stubs
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
 	$(BIN)/mypy
+	$(BIN)/lint-imports
 	$(BIN)/python -m mypy.stubtest piezotrack._core
 
 rust-test: ## Tests of the crates, the control crate also without std

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from .error_messages import in_words
 from .options import (
     Columns,
     DisplacementColumn,
@@ -22,7 +23,6 @@ from .options import (
     seconds,
     windowed,
 )
-from .words import in_words
 
 __all__ = ["compare_command"]
 
@@ -59,7 +59,7 @@ def compare_command(
     threads: Annotated[int | None, typer.Option(help="Up to 256; else all cores.")] = None,
 ) -> None:
     """Fit several models on a part of a log and judge them on the rest: a table, a picture."""
-    from ..comparison import compare
+    from ..identification.comparison import compare
 
     columns = Columns(time, drive, displacement, unit, dt)
     log = columns.read(file, hold)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import Interrupted, ParameterError
+from .error_messages import in_words
 from .options import (
     Columns,
     DisplacementColumn,
@@ -27,12 +28,11 @@ from .options import (
     pairs,
     windowed,
 )
-from .words import in_words
 
 if TYPE_CHECKING:
-    from ..dataset import Dataset
-    from ..identified import Fitted, Score
-    from ..swarm import ParticleSwarm
+    from ..data.dataset import Dataset
+    from ..identification.identified import Fitted, Score
+    from ..identification.swarm import ParticleSwarm
 
 __all__ = ["identify_command"]
 
@@ -120,7 +120,7 @@ def identify_command(
 
 def _kinds(given: list[str] | None) -> list[str]:
     """Check the kinds named before anything is searched."""
-    from ..kinds import kind_named
+    from ..stages.registry import kind_named
 
     kinds = given or ["dahl"]
     for i, name in enumerate(kinds):
@@ -137,8 +137,8 @@ def _partial(model: str) -> str:
 
 def _search(log: Dataset, out: Path, kind: str, **arguments: Any) -> Fitted[Any]:
     """Identify; on Ctrl-C keep the best so far as a file."""
-    from ..identification import identify
-    from ..report import make_folder
+    from .._support.files import make_folder
+    from ..identification.search import identify
 
     try:
         return identify(log, kind, **arguments)
@@ -151,9 +151,10 @@ def _search(log: Dataset, out: Path, kind: str, **arguments: Any) -> Fitted[Any]
 
 def _write(fit: Fitted[Any], out: Path, second: Dataset | None, score: Score | None) -> list[Path]:
     """Write the model, with what it is worth on a second log, and the pictures."""
-    from ..kinds import kind_of
-    from ..plotting import plot_loop, plot_time
-    from ..report import save_figures, save_identification
+    from .._support.files import save_figures
+    from ..identification.plot import plot_loop, plot_time
+    from ..identification.report import save_identification
+    from ..stages.registry import kind_of
 
     kind = kind_of(fit.model)
     if second is None or score is None:
@@ -181,7 +182,7 @@ def _write(fit: Fitted[Any], out: Path, second: Dataset | None, score: Score | N
 
 
 def _swarm(name: str) -> ParticleSwarm | None:
-    from ..swarm import ParticleSwarm
+    from ..identification.swarm import ParticleSwarm
 
     known = {
         "default": None,
