@@ -12,14 +12,13 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
+from folders import MEASURED
 from piezotrack.data import datasets
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
 FOLDER = Path(datasets.__file__).parent
-# The files they were made of, where they lie beside the repository.
-SOURCE = Path(__file__).resolve().parents[2] / ".." / "shared" / "data" / "dbo_piezo"
 LOGS = {"dbo_training": datasets.dbo_training, "dbo_tracking": datasets.dbo_tracking}
 # Of the text inside, as in the README beside the files.
 SHA256 = {
@@ -50,9 +49,9 @@ def test_the_files_hold_no_name_and_no_time(name: str) -> None:
 
 @each_log
 def test_the_text_is_that_of_the_source(name: str) -> None:
-    path = SOURCE / f"{name.removeprefix('dbo_')}.csv"
+    path = MEASURED / f"{name.removeprefix('dbo_')}.csv"
     if not path.is_file():
-        pytest.skip(f"the files they were made of are not in {SOURCE}")
+        pytest.skip(f"the files they were made of are not in {MEASURED}")
     assert text(name) == path.read_bytes()
 
 
