@@ -35,12 +35,10 @@ def plot_table_2(table: Table2) -> Figure:
     matplotlib.figure.Figure
         Not yet shown or saved.
     """
-    from ..xu_li_2010.table_2 import PUBLISHED
-
     figure = plt.figure(figsize=(11.0, 8.4), layout="constrained")
     grid = figure.add_gridspec(2, 6, height_ratios=[1.5, 1.0])
     circles = figure.add_subplot(grid[0, :3])
-    slow = [run for case, run in zip(PUBLISHED, table.runs, strict=True) if case.frequency == 0.1]
+    slow = [run for case, run in table.cases if case.frequency == 0.1]
     for run in slow:
         plot_magnified(run, circles, factor=5.0)
     circles.set_title("0.1 Hz, contour error x 5")
@@ -68,21 +66,20 @@ def _over_angle(runs: Sequence[Contour], ax: Axes) -> None:
 
 def _bars(table: Table2, name: str, ax: Axes) -> None:
     """Plot one figure of the nine cases, published beside obtained."""
-    from ..xu_li_2010.table_2 import PUBLISHED
-
     column, attribute = {
         "max": (2, "peak_to_peak"),
         "mean": (3, "mean_error"),
         "SD": (4, "sd_error"),
     }[name]
-    places = np.arange(len(PUBLISHED))
-    published = [1e6 * case[column] for case in PUBLISHED]
+    cases = [case for case, _ in table.cases]
+    places = np.arange(len(cases))
+    published = [1e6 * case[column] for case in cases]
     found = [1e6 * getattr(run.metrics, attribute) for run in table.runs]
     ax.bar(places - 0.2, published, 0.4, color="0.75", edgecolor="0.3", label="published")
     ax.bar(places + 0.2, found, 0.4, color="C0", edgecolor="0.1", label="obtained")
     what = "peak to peak" if name == "max" else name
     ax.set(ylabel=f"{what} [um]", xlabel="radius [um], and frequency [Hz]")
-    labels = [f"{1e6 * case.radius:g}\n{case.frequency:g}" for case in PUBLISHED]
+    labels = [f"{1e6 * case.radius:g}\n{case.frequency:g}" for case in cases]
     ax.set_xticks(places, labels, fontsize="small")
     ax.axhline(0.0, color="0.4", linewidth=0.6)
     above(ax)
