@@ -11,8 +11,9 @@ use std::time::Instant;
 
 use paper::{Peak, RATE, SAMPLES, Width, drive, guesses, paper_spec};
 use piezotrack_core::identify::{Evaluator, Problem, Record};
-use piezotrack_core::integrate::{Drive, Hold, Method, NEVER, simulate};
-use piezotrack_core::stage::{DahlStage, StageState};
+use piezotrack_core::models::dahl_simulate::{Method, simulate};
+use piezotrack_core::models::{DahlStage, StageState};
+use piezotrack_core::signal::{Drive, Hold, NEVER};
 use pulp::Arch;
 
 const RUNS: usize = 100;

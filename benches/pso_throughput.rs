@@ -11,11 +11,13 @@ use std::hint::black_box;
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
 use paper::{Peak, RATE, SAMPLES, Width, drive, guesses, paper_spec};
-use piezotrack_core::identify::{Evaluator, Guess, Plan, Problem, Progress, Record};
-use piezotrack_core::identify::{SwarmSettings, search};
-use piezotrack_core::integrate::{Drive, Hold, Method, NEVER, simulate};
-use piezotrack_core::march::{Order, Stepping};
-use piezotrack_core::stage::{DahlStage, StageState};
+use piezotrack_core::identify::{
+    Evaluator, Guess, Plan, Problem, Progress, Record, SwarmSettings, search,
+};
+use piezotrack_core::integrator::{Order, Stepping};
+use piezotrack_core::models::dahl_simulate::{Method, simulate};
+use piezotrack_core::models::{DahlStage, StageState};
+use piezotrack_core::signal::{Drive, Hold, NEVER};
 use pulp::Arch;
 
 fn instruction_sets() -> Vec<(&'static str, Arch)> {

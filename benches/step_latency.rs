@@ -6,9 +6,10 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use piezotrack_control::{Controller, DahlInverse, Limits, Pid, Repetitive, Smoothing};
-use piezotrack_core::integrate::{Drive, Hold, NEVER, simulate_fixed};
-use piezotrack_core::march::{Order, Stepping};
-use piezotrack_core::stage::{DahlStage, StageState};
+use piezotrack_core::integrator::{Order, Stepping};
+use piezotrack_core::models::dahl_simulate::simulate_fixed;
+use piezotrack_core::models::{DahlStage, StageState};
+use piezotrack_core::signal::{Drive, Hold, NEVER};
 
 fn latency(criterion: &mut Criterion) {
     let turn = core::f64::consts::TAU * 0.25 / 5000.0;

@@ -3,15 +3,14 @@
 
 use core::f64::consts::TAU;
 
-use piezotrack_core::alone::Alone;
-use piezotrack_core::integrate::{Drive, Hold, Method, NEVER, simulate};
-use piezotrack_core::metrics::{each_period, tracking};
+use piezotrack_core::integrator::Alone;
+use piezotrack_core::models::dahl_simulate::{Method, simulate};
+use piezotrack_core::models::{BoucWenKernel, BoucWenStage, Creep, DahlStage, Plant, StageState};
+use piezotrack_core::signal::metrics::{each_period, tracking};
+use piezotrack_core::signal::{Drive, Hold, NEVER};
 use piezotrack_core::simulate::{
-    Amplifier, Apparatus, ClosedLoop, Plant, Sensor, Timing, closed_loop, open_loop,
-};
-use piezotrack_core::stage::{
-    BoucWenKernel, BoucWenStage, Creep, DEAD_ZONES, DahlStage, PLAYS, RELAXATIONS, StageState,
-    VirtualSettings, VirtualStage, VirtualState,
+    Amplifier, Apparatus, ClosedLoop, DEAD_ZONES, PLAYS, RELAXATIONS, Sensor, Timing,
+    VirtualSettings, VirtualStage, VirtualState, closed_loop, open_loop,
 };
 
 const UM: f64 = 1e-6;

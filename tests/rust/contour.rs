@@ -3,7 +3,7 @@
 
 use core::f64::consts::TAU;
 
-use piezotrack_core::contour::{Polyline, radial_errors};
+use piezotrack_core::signal::contour_error::{Polyline, radial_errors};
 
 fn circle(points: u32, radius: f64) -> (Vec<f64>, Vec<f64>) {
     let angle = |k: u32| TAU * f64::from(k) / f64::from(points);

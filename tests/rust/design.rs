@@ -11,8 +11,8 @@ use piezotrack_control::{
 };
 use piezotrack_core::Error;
 use piezotrack_core::design::{LinearFeedback, LoopPlant, SampledLoop, check_loop, margins};
-use piezotrack_core::mechanics::Mechanics;
-use piezotrack_core::stage::DahlStage;
+use piezotrack_core::integrator::Mechanics;
+use piezotrack_core::models::DahlStage;
 
 const DT: f64 = 0.02;
 

@@ -4,8 +4,9 @@
 use core::f64::consts::TAU;
 
 use piezotrack_control::{DahlInverse, SampledDahlInverse};
-use piezotrack_core::integrate::{Drive, Hold, Method, NEVER, simulate};
-use piezotrack_core::stage::{DahlStage, StageState};
+use piezotrack_core::models::dahl_simulate::{Method, simulate};
+use piezotrack_core::models::{DahlStage, StageState};
+use piezotrack_core::signal::{Drive, Hold, NEVER};
 
 /// Displacement, velocity and acceleration of two sines, 0 at rest at t = 0.
 fn reference(t: f64) -> [f64; 3] {

@@ -3,7 +3,7 @@
 
 use core::f64::consts::{PI, TAU};
 
-use piezotrack_core::metrics::{
+use piezotrack_core::signal::metrics::{
     each_period, fundamental, phase_lag, residual, tracking, widest_loop,
 };
 

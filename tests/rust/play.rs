@@ -1,8 +1,8 @@
 //! Play operators: what every rate-independent hysteresis of this kind must do.
 #![allow(missing_docs, clippy::unwrap_used, clippy::float_cmp)]
 
-use piezotrack_control::operator::{Operator, Play};
-use piezotrack_core::stage::{StagePlay, VirtualSettings};
+use piezotrack_control::hysteresis::{Operator, Play};
+use piezotrack_core::simulate::{StagePlay, VirtualSettings};
 
 type Single = Play<f64, 1, 0>;
 

@@ -2,13 +2,12 @@
 #![allow(missing_docs, clippy::unwrap_used, clippy::panic, clippy::float_cmp)]
 
 use nalgebra::{DMatrix, DVector};
-use piezotrack_control::operator::{Operator, Play, PlayInverse};
-use piezotrack_core::identify::{
-    DynamicsKind, PlaysRecord, PlaysSettings, Rows, identify_plays, nnls,
-};
-use piezotrack_core::integrate::{Drive, Hold, NEVER};
-use piezotrack_core::simulate::Plant;
-use piezotrack_core::stage::{Dynamics, PrandtlIshlinskiiStage, Relaxation, plays};
+use piezotrack_control::PlayInverse;
+use piezotrack_control::hysteresis::{Operator, Play};
+use piezotrack_core::identify::{DynamicsKind, PlaysRecord, PlaysSettings, identify_plays};
+use piezotrack_core::math::{Rows, nnls};
+use piezotrack_core::models::{Dynamics, Plant, PrandtlIshlinskiiStage, Relaxation, plays};
+use piezotrack_core::signal::{Drive, Hold, NEVER};
 
 const PLAY: Play<f64, 4, 2> = Play {
     linear: 0.6,

@@ -2,8 +2,8 @@
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use nalgebra::{Matrix3, Matrix6};
-use piezotrack_control::operator::{Dahl, DahlState, Operator};
-use piezotrack_core::mechanics::{Mechanics, Propagator, halvings};
+use piezotrack_control::hysteresis::{Dahl, DahlState, Operator};
+use piezotrack_core::integrator::{Mechanics, Propagator, halvings};
 
 fn exponential(m: &Mechanics, h: f64) -> Matrix6<f64> {
     // [x, w = h v] under the force f0 + f1 s + c2 s^2 + c3 s^3 as the states of a longer system in s.

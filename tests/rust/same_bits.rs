@@ -2,12 +2,13 @@
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use piezotrack_core::identify::{
-    Delay, Evaluator, Guess, Model, Monitor, Outcome, Plan, Problem, Progress, Record, Spec,
+    Delay, Evaluator, Guess, Monitor, Outcome, Plan, Problem, Progress, Record, Spec,
     SwarmSettings, search,
 };
-use piezotrack_core::integrate::{Drive, Hold, Method, NEVER, simulate};
-use piezotrack_core::march::{Order, Stepping};
-use piezotrack_core::stage::{DahlStage, StageState};
+use piezotrack_core::integrator::{Order, Stepping};
+use piezotrack_core::models::dahl_simulate::{Method, simulate};
+use piezotrack_core::models::{DahlStage, Model, StageState};
+use piezotrack_core::signal::{Drive, Hold, NEVER};
 use pulp::Arch;
 
 const DT: f64 = 1e-3;

@@ -4,8 +4,8 @@
 use std::f64::consts::TAU;
 
 use piezotrack_core::Error;
-use piezotrack_core::identify::{StepReadings, read_step, separate, turns};
-use piezotrack_core::integrate::Hold;
+use piezotrack_core::identify::{StepReadings, read_step, separate};
+use piezotrack_core::signal::{Hold, turns};
 
 const RATE: f64 = 5000.0;
 const STEADY: f64 = 117.7622e-6;

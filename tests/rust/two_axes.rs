@@ -4,14 +4,15 @@
 use core::f64::consts::TAU;
 
 use piezotrack_control::{Controller, Limits, Pid};
-use piezotrack_core::contour::radial_errors;
 use piezotrack_core::identify::{cross_talk, noise_at_rest};
-use piezotrack_core::integrate::{Drive, Hold, NEVER};
-use piezotrack_core::metrics::Spread;
+use piezotrack_core::models::{DahlStage, Plant};
+use piezotrack_core::signal::contour_error::radial_errors;
+use piezotrack_core::signal::metrics::Spread;
+use piezotrack_core::signal::{Drive, Hold, NEVER};
 use piezotrack_core::simulate::{
-    Apparatus, ApparatusState, Course, Law, Plant, Timing, TwoAxes, open_loops, track, track_both,
+    Apparatus, ApparatusState, Course, Law, Timing, TwoAxes, VirtualSettings, VirtualStage,
+    open_loops, track, track_both,
 };
-use piezotrack_core::stage::{DahlStage, VirtualSettings, VirtualStage};
 
 const UM: f64 = 1e-6;
 const TS: f64 = 0.02;

@@ -3,10 +3,12 @@
 
 use core::f64::consts::TAU;
 
-use piezotrack_core::integrate::{Drive, Hold, NEVER};
-use piezotrack_core::metrics::widest_loop;
-use piezotrack_core::simulate::{Amplifier, OpenLoop, Sensor, open_loop};
-use piezotrack_core::stage::{Creep, VirtualSettings, VirtualStage, VirtualState};
+use piezotrack_core::models::Creep;
+use piezotrack_core::signal::metrics::widest_loop;
+use piezotrack_core::signal::{Drive, Hold, NEVER};
+use piezotrack_core::simulate::{
+    Amplifier, OpenLoop, Sensor, VirtualSettings, VirtualStage, VirtualState, open_loop,
+};
 
 const UM: f64 = 1e-6;
 

@@ -4,19 +4,18 @@
 //! u = uFB + uFF + uRC,   v = clip(u),   eu = v - u
 //! ```
 //!
-//! Xu and Li 2010, section 4, doi 10.1115/1.4001712; how the parts were corrected is told in
+//! Xu and Li 2010, section 4, doi 10.1115/1.4001712, with the corrections described in
 //! [`crate::pid`] and [`crate::repetitive`].
 
 use crate::error::{Error, Result, check, usable};
-use crate::feedback::Feedback;
+use crate::feedback_law::Feedback;
 use crate::filters::{Filter, FilterState};
 use crate::limits::Limits;
 use crate::repetitive::{RepetitiveState, SampledRepetitive};
 
-/// Composes the parts that run at the sample rate.
+/// A controller for one sampling interval: limits, feedback, repetitive part and filters.
 ///
-/// Parts may be exchanged between two steps, with the state kept: other gains come without a
-/// bump.
+/// Gains may be changed between two steps with the state kept; the transfer is bumpless.
 ///
 /// ```
 /// use piezotrack_control::{Controller, Limits, Pid};
@@ -40,24 +39,24 @@ pub struct Controller<F> {
     pub filters: [Option<Filter>; 2],
 }
 
-/// What a controller remembers; `L` is the delay line of the repetitive part, `[f64; 0]` for a
+/// State of a [`Controller`]; `L` is the delay line of the repetitive part, `[f64; 0]` for a
 /// controller without one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ControllerState<S, L> {
     feedback: S,
     repetitive: Option<RepetitiveState<L>>,
     filters: [FilterState; 2],
-    /// Voltage to go on from at the first step.
+    /// Voltage to continue from at the first step, V.
     present: Option<f64>,
     /// The last command.
     last: Command,
-    /// What the actuator got less what was asked for, V.
+    /// Applied voltage less the unclipped command, eu, V.
     excess: f64,
-    /// The error that the repetitive part has yet to store, m.
+    /// Tracking error of the last sample, which the repetitive part has yet to store, m.
     unlearnt: f64,
 }
 
-/// What a controller asks for at one sample, and how it is made up.
+/// The command of a controller at one sample, with its parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Command {
     /// The voltage for the actuator, within the limits, V.
@@ -70,29 +69,29 @@ pub struct Command {
     pub feedback: f64,
     /// Its repetitive part uRC, V.
     pub repetitive: f64,
-    /// The tracking error that was used, reference less filtered measurement, m.
+    /// The tracking error used: reference less filtered measurement, m.
     pub error: f64,
     /// Whether the voltage was clipped.
     pub saturated: bool,
-    /// Whether the measurement could be used.
+    /// False where the measurement was not finite (or beyond 1e100).
     pub measurement_ok: bool,
-    /// Whether reference and feedforward could be used.
+    /// False where the reference or the feedforward was not finite (or beyond 1e100).
     pub reference_ok: bool,
 }
 
 impl<F: Feedback> Controller<F> {
-    /// Limits and feedback alone; set the public fields for more.
+    /// A controller of limits and feedback only; set the public fields for more.
     #[must_use]
     pub fn new(limits: Limits, feedback: F) -> Self {
         Self { limits, feedback, repetitive: None, filters: [None; 2] }
     }
 
-    /// The memory of a controller whose feedback part begins at 0 V.
+    /// The initial state, with the feedback part at 0 V.
     ///
     /// `line` is the delay line of the repetitive part; `[]` where there is none.
     ///
     /// # Errors
-    /// Names `line` where the repetitive part needs more room.
+    /// Names `line` where it is too short for the repetitive part.
     pub fn rest<L: AsMut<[f64]>>(&self, line: L) -> Result<ControllerState<F::State, L>> {
         let repetitive = match &self.repetitive {
             Some(part) => Some(part.rest(line)?),
@@ -109,8 +108,8 @@ impl<F: Feedback> Controller<F> {
         })
     }
 
-    /// The memory of a controller that goes on, without a bump, from the voltage `present` (V)
-    /// that the actuator has: the feedback part begins at what the others leave of it.
+    /// The initial state for a bumpless start from the voltage `present` (V) at the actuator: the
+    /// feedback part starts at `present` less the other parts.
     ///
     /// # Errors
     /// Names `present` where it is outside the limits, `line` as in [`Self::rest`].
@@ -127,7 +126,7 @@ impl<F: Feedback> Controller<F> {
         Ok(state)
     }
 
-    /// Back to [`Self::rest`], with what was learnt forgotten and the delay line kept.
+    /// Resets the state to that of [`Self::rest`]; the delay line is cleared and kept.
     pub fn reset<L: AsMut<[f64]>>(&self, state: &mut ControllerState<F::State, L>) {
         if let (Some(part), Some(memory)) = (&self.repetitive, &mut state.repetitive) {
             part.reset(memory);
@@ -142,10 +141,10 @@ impl<F: Feedback> Controller<F> {
 
     /// One sample: `reference` and `measured` displacement in m, `feedforward` in V.
     ///
-    /// What is not a finite number (or beyond 1e100) reaches neither the actuator nor any
-    /// memory. Without a measurement or a reference the feedback part holds, the next error
-    /// follows on the last good one, and the repetitive part plays on what it has learnt and
-    /// learns nothing; without a feedforward that holds. The command's flags tell.
+    /// Inputs that are not finite (or beyond 1e100) affect neither the actuator nor any state, and
+    /// are reported by the flags of the command. Without a valid measurement or reference the
+    /// feedback part holds its output, and the repetitive part continues its output without
+    /// learning. Without a valid feedforward the last one is held.
     #[inline]
     pub fn step<L: AsMut<[f64]>>(
         &self,
@@ -178,7 +177,7 @@ impl<F: Feedback> Controller<F> {
             state.unlearnt = error;
         }
         let unclipped = feedback + feedforward + repetitive;
-        // Parts that are too large to be added up: stay.
+        // The sum overflowed: hold the last voltage.
         let unclipped = if unclipped.is_finite() { unclipped } else { last.volts };
         let volts = self.limits.clip(unclipped);
         state.excess = volts - unclipped;
@@ -209,10 +208,10 @@ impl<F: Feedback> Controller<F> {
 }
 
 impl<S, L> ControllerState<S, L> {
-    /// Tells the voltage that the actuator really got for the last command, V, where something
-    /// beyond the limits (a slew rate, an amplifier's own limit) came between.
+    /// Reports the voltage (V) applied for the last command, where it differs from the clipped
+    /// command because of a slew rate or of the amplifier's own limits.
     ///
-    /// Antiwindup works on it; without this call, on the clipped command.
+    /// Antiwindup uses it; without this call, it uses the clipped command.
     ///
     /// # Errors
     /// Names `volts` where it is not finite; nothing is changed then.

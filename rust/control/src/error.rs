@@ -1,21 +1,21 @@
-//! What can be wrong with a parameter: its name, its value and what was expected.
+//! The error of a parameter out of its range: its name, its value and what was expected.
 
 use core::fmt;
 
-/// A parameter that cannot be used. Holds no text of its own, so that it needs no allocation.
+/// A parameter that is out of its range. It holds static text only and needs no allocation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Error {
-    /// The argument as the caller wrote it.
+    /// Name of the argument.
     pub name: &'static str,
     /// Its value.
     pub value: f64,
     /// Unit of the value, empty where it has none.
     pub unit: &'static str,
-    /// What would have been right.
+    /// The values that are accepted.
     pub expected: &'static str,
 }
 
-/// Result of anything that checks its parameters.
+/// Result of a function that checks its parameters.
 pub type Result<T> = core::result::Result<T, Error>;
 
 impl fmt::Display for Error {
@@ -43,19 +43,19 @@ pub(crate) fn finite(name: &'static str, value: f64, unit: &'static str) -> Resu
     check(name, value, unit, value.is_finite(), "a finite number")
 }
 
-/// Refuses what is not a finite number above zero.
+/// Refuses values other than finite numbers above zero.
 pub(crate) fn positive(name: &'static str, value: f64, unit: &'static str) -> Result<f64> {
     let right = value.is_finite() && value > 0.0;
     check(name, value, unit, right, "a finite number above 0")
 }
 
-/// Refuses what is not a finite number, zero or above.
+/// Refuses values other than finite numbers, zero or above.
 pub(crate) fn not_negative(name: &'static str, value: f64, unit: &'static str) -> Result<f64> {
     let right = value.is_finite() && value >= 0.0;
     check(name, value, unit, right, "a finite number, 0 or above")
 }
 
-/// Whether a number can enter a memory: NaN, infinity and what would soon be one cannot.
+/// Whether a number may enter a state: NaN, infinity and numbers that soon overflow may not.
 #[inline]
 pub(crate) fn usable(value: f64) -> bool {
     value.abs() < 1e100

@@ -1,7 +1,7 @@
 //! Filters for the measurement: first-order low-pass and notch.
 //!
-//! Both pass a constant unchanged and start in the steady state of their first sample. In the
-//! loop their lag comes off the phase margin: a low-pass delays by 1/(2 pi cutoff).
+//! Both have a static gain of 1 and start in the steady state of their first sample. In the loop
+//! their lag reduces the phase margin: a low-pass delays by 1/(2 pi cutoff).
 
 use core::f64::consts::{PI, TAU};
 
@@ -27,14 +27,14 @@ pub struct Filter {
     a: [f64; 2],
 }
 
-/// Memory of a [`Filter`]; `None` before the first sample.
+/// State of a [`Filter`]; `None` before the first sample.
 pub type FilterState = Option<[f64; 2]>;
 
 impl Filter {
     /// `1/(1 + s/wc)`, wc = 2 pi `cutoff` (Hz), sampled every `dt` seconds.
     ///
-    /// Exact for an input that goes in straight lines from sample to sample, and so without the
-    /// half sample of delay that a held input would add.
+    /// Exact for an input that is linear between samples (first-order hold), and therefore
+    /// without the delay of half a sample that a zero-order hold adds.
     ///
     /// # Errors
     /// Names `dt` or `cutoff` where it is not above 0.
@@ -54,9 +54,9 @@ impl Filter {
 
     /// `(s^2 + 2 depth width w0 s + w0^2)/(s^2 + 2 width w0 s + w0^2)`, w0 = 2 pi `frequency`.
     ///
-    /// `frequency` (Hz) is passed with the gain `depth`, 0 for none of it; `width` is the damping
-    /// ratio of the poles: the notch is 2 `width` `frequency` wide. Bilinear transform, prewarped
-    /// so that the notch sits at its frequency.
+    /// `depth` is the gain at `frequency` (Hz), 0 for a complete notch. `width` is the damping
+    /// ratio of the poles; the notch is 2 `width` `frequency` wide. Bilinear transform, prewarped
+    /// to keep the frequency of the notch.
     ///
     /// # Errors
     /// Names `dt`, `frequency` (above 0, below half the sampling rate), `width` (above 0) or

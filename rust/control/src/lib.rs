@@ -1,39 +1,72 @@
-//! What runs at the sample rate: hysteresis operators, generic over their number type, and the
-//! parts of a controller.
+//! Everything that runs at the sample rate: hysteresis operators, inverses and online feedforward,
+//! and the parts of a controller.
 //!
-//! Nothing here allocates, and nothing needs `std`: the same lines are compiled into a
-//! laboratory's firmware, into the simulator and into the lockstep lanes of a swarm.
-//! Configuration lives in `&self`, memory in a state that the caller holds. A part is described
-//! in continuous time and SI units (`Pid`, `Repetitive`, `DahlInverse`); `at(dt)` gives its
-//! coefficients for a sampling interval.
+//! Nothing here allocates or needs `std`, so that firmware, the simulation and the vectorised
+//! particle swarm run the same code. Configuration is in `&self`; the state of each part is a
+//! value that the caller keeps and passes to `step`. Parts are described in continuous time and
+//! in SI units (`Pid`, `Repetitive`, `DahlInverse`); `at(dt)` computes their coefficients for a
+//! sampling interval.
+//!
+//! One sample of a controller with feedforward:
+//!
+//! ```
+//! use piezotrack_control::{
+//!     Controller, DahlInverse, Limits, OnlineFeedforward, Pid, ReferenceSample,
+//! };
+//!
+//! // Once, at the start: parameters are checked and coefficients computed.
+//! let dt = 0.02;
+//! let inverse = DahlInverse::xu_li_2010().at(dt)?;
+//! let feedforward = OnlineFeedforward::new(inverse, dt, 0.0, 0.0)?;
+//! let controller = Controller::new(Limits::new(0.0, 75.0)?, Pid::xu_li_2010().at(dt)?);
+//! let mut feedforward_state = feedforward.rest();
+//! let mut controller_state = controller.rest([])?; // no repetitive part, no delay line
+//!
+//! // In every sampling interval: the reference now and one sample ahead, and the measurement.
+//! let (reference, next, measured) = (1.0e-6, 1.2e-6, 0.9e-6);
+//! let sample = ReferenceSample { preview: Some(next), ..ReferenceSample::new(reference) };
+//! let volts = feedforward.step(&mut feedforward_state, &sample);
+//! let command = controller.step(&mut controller_state, reference, measured, volts);
+//! assert!(command.reference_ok && command.measurement_ok && !command.saturated);
+//! assert!(command.volts > 0.0 && command.volts < 75.0);
+//! # Ok::<(), piezotrack_control::Error>(())
+//! ```
+//!
+//! `examples/firmware_step.rs` has a whole axis with a repetitive part.
 #![cfg_attr(not(feature = "std"), no_std)]
 #![forbid(unsafe_code)]
 
-pub mod bouc_wen_inverse;
 pub mod controller;
+pub mod creep;
+mod cubic_segment;
+pub mod dynamics;
 mod error;
-pub mod feedback;
-pub mod feedback_inverse;
+pub mod feedback_law;
 pub mod filters;
+pub mod hysteresis;
 pub mod inverse;
 pub mod limits;
 mod number;
-pub mod operator;
-mod path;
+pub mod online_feedforward;
 pub mod pid;
-pub mod plain;
 pub mod repetitive;
 pub mod state_space;
+pub mod unfused;
 
-pub use bouc_wen_inverse::{BoucWenInverse, BoucWenInverseState};
 pub use controller::{Command, Controller, ControllerState};
+pub use creep::{Creep, CreepState};
+pub use dynamics::Dynamics;
 pub use error::{Error, Result};
-pub use feedback::Feedback;
-pub use feedback_inverse::{FeedbackInverseState, FirstOrderDahlInverse, OscillatorInverse};
+pub use feedback_law::Feedback;
 pub use filters::{Filter, FilterState};
-pub use inverse::{DahlInverse, InverseState, SampledDahlInverse};
+pub use inverse::{
+    BoucWenInverse, BoucWenInverseState, DahlInverse, FeedbackInverse, FeedbackInverseState,
+    FirstOrderDahlInverse, InputInverse, InputInverseState, Inverse, InverseState, OperatorInverse,
+    OscillatorInverse, PlayInverse, PrandtlIshlinskiiInverse, SampledDahlInverse,
+};
 pub use limits::Limits;
 pub use number::Number;
+pub use online_feedforward::{OnlineFeedforward, OnlineFeedforwardState, ReferenceSample};
 pub use pid::{Pid, PidState, SampledPid};
 pub use repetitive::{Recursion, Repetitive, RepetitiveState, SampledRepetitive, Smoothing};
 pub use state_space::{StateSpace, StateSpaceState};

@@ -1,8 +1,8 @@
-//! The voltages that the amplifier can give.
+//! Saturation limits of the amplifier.
 
 use crate::error::{Result, check, finite};
 
-/// Range of the actuator's voltage, 0 to 75 V for the stage of Xu and Li 2010.
+/// Voltage range of the actuator, for example 0 to 75 V for the stage of Xu and Li 2010.
 ///
 /// ```
 /// use piezotrack_control::Limits;
@@ -23,7 +23,7 @@ impl Limits {
     /// Limits in V.
     ///
     /// # Errors
-    /// Names `low` or `high` where one is not finite or they are crossed or equal.
+    /// Names `low` or `high` where it is not finite, and `high` where it is not above `low`.
     pub fn new(low: f64, high: f64) -> Result<Self> {
         finite("low", low, "V")?;
         finite("high", high, "V")?;
@@ -43,7 +43,7 @@ impl Limits {
         self.high
     }
 
-    /// The voltage in the range that is nearest to `volts`; nearest to 0 V where that is NaN.
+    /// The voltage within the limits nearest to `volts` (V); nearest to 0 V where that is NaN.
     ///
     /// `v = clip(u)` before equation (24) of Xu and Li 2010, doi 10.1115/1.4001712.
     #[inline]

@@ -1,11 +1,12 @@
-//! The number type of a kernel: one `f64`, or a bundle of lanes in lockstep.
+//! The number type of a kernel: one `f64`, or a vector of lanes.
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A real number, or several of them that go through the same operations.
+/// A real number, or a vector of them (lanes) on which every operation acts lane by lane.
 ///
-/// A kernel written over this trait gives the same bits for one lane and for many, on every
-/// instruction set: it has only correctly rounded operations, and a choice is made per lane.
+/// A kernel that is generic over this trait gives the same bits for one lane and for many, on
+/// every instruction set: its operations are correctly rounded, its choices are made per lane,
+/// and [`Number::lanewise`] calls the same scalar function for each lane.
 pub trait Number:
     Copy
     + Add<Output = Self>
@@ -26,7 +27,7 @@ pub trait Number:
     #[must_use]
     fn sqrt(self) -> Self;
 
-    /// A function of plain numbers in every lane by itself: for what has no closed form.
+    /// Calls a scalar function for every lane, for functions other than those above.
     #[must_use]
     fn lanewise<const A: usize>(arguments: [Self; A], function: impl Fn([f64; A]) -> f64) -> Self;
 

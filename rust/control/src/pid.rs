@@ -5,14 +5,14 @@
 //!          + (Kp Td/Ts) (e[k] - 2 e[k-1] + e[k-2]) + (Ts/Tt) eu[k-1],   eu = v - u
 //! ```
 //!
-//! Xu and Li 2010, equations (22) to (25), doi 10.1115/1.4001712, with one correction. Printed,
-//! the recursion starts from the previous *total* command and adds the feedforward again, which
-//! integrates the feedforward: some 100 um of error. It belongs to the feedback part alone. The
-//! excess `eu` however is that of the total command `u = uFB + uFF + uRC` against the voltage
-//! `v` that the amplifier really gave.
+//! Xu and Li 2010, equations (22) to (25), doi 10.1115/1.4001712, with one correction. As
+//! printed, the recursion starts from the previous *total* command and adds the feedforward
+//! again, which integrates the feedforward and leads to an error of about 100 um. Here the
+//! recursion is that of the feedback part only. The excess `eu` is the applied voltage `v` less
+//! the total command `u = uFB + uFF + uRC`.
 
 use crate::error::{Error, Result, check, finite, not_negative};
-use crate::feedback::Feedback;
+use crate::feedback_law::Feedback;
 
 /// Gains of a PID controller, in continuous time.
 ///
@@ -43,10 +43,10 @@ pub struct Pid {
 impl Pid {
     /// Gains `kp` in V/m and times in s.
     ///
-    /// `tt`, the time in which back-calculation works off an excess, is sqrt(Ti Td) by default,
-    /// and Ti where Td is 0. Without an integral part (`ti` infinite) nothing winds up, and an
-    /// incremental controller would keep for ever what back-calculation took off it: there is
-    /// no antiwindup then, and a finite `tt` is refused.
+    /// `tt`, the time constant of back-calculation, is sqrt(Ti Td) by default, and Ti where Td
+    /// is 0. Without an integral part (`ti` infinite) nothing winds up, and in an incremental
+    /// controller a correction by back-calculation would stay for ever; there is no antiwindup
+    /// then, and a finite `tt` is refused.
     ///
     /// # Errors
     /// Names the gain or time that is out of its range.
@@ -68,7 +68,7 @@ impl Pid {
 
     /// The published gains: Kp 0.120 V/um, Ti 0.009 s, Td 0.044 s, Tt = sqrt(Ti Td).
     ///
-    /// Xu and Li 2010, section 5, doi 10.1115/1.4001712; for a loop at 50 Hz.
+    /// Xu and Li 2010, section 5, doi 10.1115/1.4001712; for a sampling rate of 50 Hz.
     #[must_use]
     pub fn xu_li_2010() -> Self {
         Self { kp: 0.120e6, ti: 0.009, td: 0.044, tt: libm::sqrt(0.009 * 0.044) }
@@ -101,9 +101,8 @@ impl Pid {
     /// The controller for a sampling interval `dt`, s.
     ///
     /// # Errors
-    /// Names `dt` where it is not above 0; `tt` where it is not above dt/2, from where on
-    /// back-calculation is unstable by itself (its pole is 1 - dt/Tt); `kp` where a coefficient
-    /// is too large to be a number.
+    /// Names `dt` where it is not above 0; `tt` where it is not above dt/2, since the pole of
+    /// back-calculation, 1 - dt/Tt, is then unstable; `kp` where a coefficient overflows.
     pub fn at(&self, dt: f64) -> Result<SampledPid> {
         crate::error::positive("dt", dt, "s")?;
         let right = self.tt > 0.5 * dt;
@@ -126,8 +125,8 @@ impl Pid {
 
 /// Coefficients of a PID controller for one sampling interval; see [`Pid::at`].
 ///
-/// Gains change without a bump: take other coefficients and go on with the same state. All that
-/// is remembered is the output and two errors, and no coefficient acts on the output.
+/// Gains change without a bump: continue with the same state and other coefficients. The state
+/// is the output and two errors, and no coefficient multiplies the output.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampledPid {
     /// Kp, V/m.
@@ -140,13 +139,13 @@ pub struct SampledPid {
     tracking: f64,
 }
 
-/// Memory of a PID controller.
+/// State of a PID controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PidState {
     /// The output, V.
     volts: f64,
-    /// The last two errors, m. `None` before the first: it counts as having always been there,
-    /// so that the controller starts without a kick.
+    /// The last two errors, m. `None` before the first error, which then stands for the earlier
+    /// ones too, so that the controller starts without a derivative kick.
     errors: Option<[f64; 2]>,
 }
 
@@ -183,7 +182,7 @@ impl Feedback for SampledPid {
         if volts.is_finite() {
             *state = PidState { volts, errors: Some([error, e1]) };
         } else {
-            // Too large to be a number: hold the output, and start anew from the next error.
+            // Overflow: hold the output, and start again from the next error.
             state.errors = None;
         }
         state.volts

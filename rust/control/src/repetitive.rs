@@ -1,17 +1,17 @@
-//! Repetitive controller, plugged in beside the feedback: it learns what every period needs.
+//! Plug-in repetitive controller: it learns the voltage that removes a periodic error.
 //!
 //! ```text
 //! uRC[k] = p uRC[k-1] + (1-p) (uRC[k-N-1] + Kq e[k-N-1]),   p = exp(-Ts/Tq),  N = L/Ts
 //! ```
 //!
-//! Xu and Li 2010, equations (26) to (28), doi 10.1115/1.4001712. The recursion that is printed
-//! there, (29) and (30), has a common factor left in and four digits: its pole at 1.000172 grows
-//! by 4.4 % a period. What is written to the delay line here is the sum `uRC + Kq e`, so one line
-//! does, and all of Q, leak and fractional delay are a few taps on it.
+//! Xu and Li 2010, equations (26) to (28), doi 10.1115/1.4001712. The printed recursion, (29) and
+//! (30), has a common factor that is not cancelled and coefficients of four digits: its pole at
+//! 1.000172 grows by 4.4 % in a period. Here the delay line stores the sum `uRC + Kq e`, so that
+//! one line is enough; the filter Q, the leak and a fractional delay are taps on it.
 
 use crate::error::{Error, Result, check, positive};
 
-/// Taps of the cubic that reads between two samples.
+/// Taps of the cubic interpolation between two samples.
 const CUBIC: usize = 4;
 /// Taps on each side of the middle one in a zero-phase filter, at most.
 const HALF: usize = 4;
@@ -20,27 +20,27 @@ const TAPS: usize = 2 * HALF + CUBIC;
 /// Longest period, in samples.
 const LONGEST: f64 = 1e9;
 
-/// The filter Q: what it passes is learnt, and what it stops cannot make the loop unstable.
+/// The filter Q: what it passes is learnt; what it stops cannot make the learning unstable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Smoothing {
     /// First-order lag of time constant `tq`, s, as in the paper.
     ///
-    /// It delays by `tq` too, so that what was learnt comes that much late; with
-    /// `compensated` the delay line is that much shorter.
+    /// It delays the learnt voltage by `tq`; with `compensated` the delay line is shorter by the
+    /// same time.
     Lag {
         /// Time constant Tq, s.
         tq: f64,
         /// Whether the delay line makes up for the filter's lag.
         compensated: bool,
     },
-    /// `((1 + cos(w Ts))/2)^order`, order 1 to 4: no lag at all, since a period ago the
-    /// samples that follow are known. Half is passed at 1/4 of the sampling rate for order 1, at
-    /// 0.18 of it for order 2, 0.13 for order 4.
+    /// `((1 + cos(w Ts))/2)^order`, order 1 to 4, without phase lag: of the period before, the
+    /// later samples are known too. The gain is 1/2 at 0.25 of the sampling rate for order 1, at
+    /// 0.18 of it for order 2, at 0.13 for order 4.
     ZeroPhase {
         /// Order, 1 to 4.
         order: u32,
     },
-    /// Q = leak: everything is learnt, which only a loop without delay survives.
+    /// Q = leak: all frequencies are learnt, which is stable only for a plant without delay.
     None,
 }
 
@@ -55,12 +55,12 @@ pub enum Smoothing {
 /// | `lead` | m | samples | shorter than the period | 0 |
 /// | `pause` | | | | true |
 ///
-/// `kq` is in V/um, unlike all else here: (28) states its bound, 0 < Kq < 2, for the number
-/// that goes with errors in um. The bound is necessary, not sufficient.
+/// `kq` is in V/um, unlike all other parameters, because the bound of equation (28),
+/// 0 < Kq < 2, holds for errors in um. The bound is necessary, not sufficient.
 ///
-/// Beside an integrator in the feedback the loop has a root at exactly 1, in which uRC and uFB
-/// move against each other unseen; under saturation they drift without end. `leak` and `pause`
-/// (no error is learnt from a saturated sample) put an end to it.
+/// With an integrator in the feedback the loop has a root at exactly 1: constant parts of uRC and
+/// uFB that cancel each other are not observable, and they drift under saturation. `leak` below 1
+/// and `pause` (no learning from saturated samples) prevent this.
 ///
 /// ```
 /// use piezotrack_control::{Repetitive, Smoothing};
@@ -80,11 +80,10 @@ pub struct Repetitive {
     pub smoothing: Smoothing,
     /// Learning gain Kq, V/um.
     pub kq: f64,
-    /// Q(1), what is kept of a constant from period to period.
+    /// Q(1), the share of a constant that is kept from period to period.
     pub leak: f64,
-    /// By how many samples an error comes earlier in what is learnt from it, to make up for the
-    /// plant's own delay. What was learnt before stays where it is: moving that too would learn
-    /// another period.
+    /// Number of samples by which an error is stored earlier, to compensate the delay of the
+    /// plant. The voltage stored beside it is not shifted: that would change the period.
     pub lead: u32,
     /// Whether the error of a saturated sample is stored as 0.
     pub pause: bool,
@@ -110,7 +109,7 @@ impl Repetitive {
         Self { period, smoothing, kq: 1.0, leak: 1.0, lead: 0, pause: false }
     }
 
-    /// Room in samples for a period of so many samples (rounded up), for an array of fixed size.
+    /// Entries that suffice for a period of `period` samples (rounded up), for a fixed-size array.
     #[must_use]
     pub const fn room(period: usize) -> usize {
         period.saturating_add(HALF + CUBIC)
@@ -152,7 +151,7 @@ impl Repetitive {
         match self.smoothing {
             Smoothing::Lag { tq, compensated } => {
                 pole = libm::exp(-dt / tq);
-                // Its zero-order hold delays by one sample; the rest of the lag is Tq.
+                // The zero-order hold of the lag delays by one sample; the rest is Tq.
                 delay += if compensated { 1.0 - tq / dt } else { 1.0 };
             }
             Smoothing::ZeroPhase { order } => (q, half) = binomial(order),
@@ -170,13 +169,13 @@ impl Repetitive {
 
     /// Convolves the filter with the cubic that reads the line at a fractional delay.
     fn taps(&self, delay: f64, pole: f64, q: &[f64; HALF + 1], half: usize) -> SampledRepetitive {
-        // A period given in decimals is a whole number of samples up to rounding.
+        // A period given in decimals is a whole number of samples only up to rounding.
         let nearest = libm::round(delay);
         let whole = if (delay - nearest).abs() < 1e-9 * delay { nearest } else { delay };
         let mut floor = libm::floor(whole);
         let mut part = whole - floor;
-        // The cubic reads one sample before and one after its interval; before the newest there
-        // is none yet, so close to it the outermost interval has to do.
+        // The cubic needs one sample on each side of its interval. Beyond the newest sample
+        // there is none, so that close to it the outermost interval of the cubic is used.
         let newest = count(half) + 1.0;
         let (before, reads) = if part > 0.0 {
             if floor - 1.0 < newest {
@@ -212,7 +211,7 @@ impl Repetitive {
     }
 }
 
-/// Taps of `((1 + cos w)/2)^order` from the middle one outwards, and how many on each side.
+/// Taps of `((1 + cos w)/2)^order` from the middle outwards, and their number on each side.
 fn binomial(order: u32) -> ([f64; HALF + 1], usize) {
     let half = if order > 4 { HALF } else { order as usize };
     let mut q = [0.0; HALF + 1];
@@ -228,7 +227,7 @@ fn binomial(order: u32) -> ([f64; HALF + 1], usize) {
     (q, half)
 }
 
-/// Weights of the samples at -1, 0, 1 and 2 for the cubic through them, read at `part`.
+/// Weights of the samples at -1, 0, 1 and 2 for the cubic through them, evaluated at `part`.
 fn lagrange(part: f64) -> [f64; CUBIC] {
     let (up, down, far) = (part + 1.0, part - 1.0, part - 2.0);
     [
@@ -244,7 +243,7 @@ fn count(n: usize) -> f64 {
     u32::try_from(n).map_or(f64::NAN, f64::from)
 }
 
-/// A whole number of samples, already checked to lie between 0 and [`LONGEST`].
+/// A whole number of samples; the caller has checked that it is from 0 to [`LONGEST`].
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
 fn samples(value: f64) -> usize {
     value as usize
@@ -260,13 +259,13 @@ pub struct SampledRepetitive {
     /// Kq, V/m.
     gain: f64,
     pause: bool,
-    /// How many entries back an error goes.
+    /// Number of entries by which an error is stored earlier.
     lead: usize,
     /// Delay of the first tap, in samples, 1 or more.
     nearest: usize,
-    /// The oldest sample's first; 0 where not in use.
+    /// Weights of the samples, the oldest first; 0 where not in use.
     taps: [f64; TAPS],
-    /// How many taps are in use.
+    /// Number of taps in use.
     reads: usize,
 }
 
@@ -279,15 +278,15 @@ pub struct Recursion<'a> {
     pub pole: f64,
     /// Learning gain Kq, V/m.
     pub gain: f64,
-    /// By how many samples the errors come earlier than the voltages beside them.
+    /// Number of samples by which errors are stored earlier than voltages.
     pub lead: usize,
     /// Delay of the first tap, in samples, more than `lead`.
     pub nearest: usize,
-    /// Weights of the samples, the oldest first; the last is that at the delay `nearest`.
+    /// Weights of the samples, the oldest first; the last one has the delay `nearest`.
     pub taps: &'a [f64],
 }
 
-/// Sum of products, in two chains that do not wait for each other.
+/// Sum of products in two independent sums, which the processor can compute in parallel.
 #[inline]
 fn weighted(entries: &[f64], taps: &[f64]) -> f64 {
     let (mut even, mut odd) = (0.0, 0.0);
@@ -301,26 +300,26 @@ fn weighted(entries: &[f64], taps: &[f64]) -> f64 {
     even + odd
 }
 
-/// Memory of a repetitive controller: a delay line lent by the caller, `&mut [f64]`, `[f64; N]`
-/// or `Vec<f64>`.
+/// State of a repetitive controller, with a delay line provided by the caller: `&mut [f64]`,
+/// `[f64; N]` or `Vec<f64>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RepetitiveState<L> {
     line: L,
-    /// Where the next entry goes.
+    /// Index of the next entry to be written.
     next: usize,
     /// The last output, V.
     volts: f64,
 }
 
 impl SampledRepetitive {
-    /// Entries that the delay line must have, at least.
+    /// Least number of entries of the delay line.
     #[must_use]
     pub fn length(&self) -> usize {
         self.nearest + self.reads - 1
     }
 
-    /// Coefficients of the recursion, for the design of the loop:
-    /// `uRC[k] = pole uRC[k-1] + sum of tap (uRC[k-n] + gain e[k-n+lead])`, n the tap's delay.
+    /// Coefficients of the recursion, for a stability analysis:
+    /// `uRC[k] = pole uRC[k-1] + sum of tap (uRC[k-n] + gain e[k-n+lead])`, n the delay of a tap.
     #[must_use]
     pub fn recursion(&self) -> Recursion<'_> {
         Recursion {
@@ -333,7 +332,7 @@ impl SampledRepetitive {
         }
     }
 
-    /// The memory before any learning. `line` is filled with zeros.
+    /// The state before any learning. `line` is filled with zeros.
     ///
     /// # Errors
     /// Names `line` where it is shorter than [`Self::length`].
@@ -350,9 +349,9 @@ impl SampledRepetitive {
 
     /// The voltage for this sample, from the tracking error (m) of the sample *before*.
     ///
-    /// The error of a sample can show in the voltage of the next one at the earliest, so that it
-    /// need not be known sooner; by then it is also known whether the command was clipped
-    /// (`saturated`). At the first sample there is no error yet: 0.
+    /// An error affects the voltage of the next sample at the earliest, so it is passed one sample
+    /// later, when it is also known whether that command was clipped (`saturated`). At the first
+    /// sample there is no error yet: pass 0.
     #[inline]
     pub fn step<L: AsMut<[f64]>>(
         &self,
@@ -372,7 +371,7 @@ impl SampledRepetitive {
             *entry += self.gain * error;
         }
         state.next = if state.next + 1 < length { state.next + 1 } else { 0 };
-        // The oldest entry, which is the last tap's, is the one to be written next.
+        // The oldest entry is the one to be written next.
         let (newer, older) = line.split_at(state.next);
         let (first, rest) = self.taps.split_at(self.reads.min(older.len()).min(TAPS));
         let mut learnt = weighted(older, first);
@@ -380,12 +379,12 @@ impl SampledRepetitive {
             learnt += weighted(newer, rest);
         }
         let volts = self.pole * state.volts + learnt;
-        // An output too large to be a number is forgotten.
+        // Overflow: start again from 0 V.
         state.volts = if volts.is_finite() { volts } else { 0.0 };
         state.volts
     }
 
-    /// Forgets all that was learnt.
+    /// Clears everything learnt.
     pub fn reset<L: AsMut<[f64]>>(&self, state: &mut RepetitiveState<L>) {
         state.line.as_mut().fill(0.0);
         state.next = 0;

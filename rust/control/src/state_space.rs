@@ -1,18 +1,18 @@
-//! A feedback law in discrete state space.
+//! Feedback law in discrete-time state space.
 //!
 //! ```text
 //! x[k+1] = A x[k] + B e[k],   u[k] = C x[k] + D e[k]
 //! ```
 
 use crate::error::{Error, Result, check, finite};
-use crate::feedback::Feedback;
+use crate::feedback_law::Feedback;
 
-/// A linear controller with up to `N` states; one error in (m), one voltage out.
+/// A linear controller with up to `N` states: tracking error (m) in, voltage (V) out.
 ///
-/// **Antiwindup.** With a gain vector `l`, back-calculation: what the amplifier gave less what
-/// was asked for, `eu[k]` in V, enters as `x[k+1] = A x[k] + B e[k] + l eu[k]`; `A - l C` should
-/// be stable. Without one, conditional freezing: while the command is clipped, the state stays
-/// where it is as long as its next step would take the command further out.
+/// **Antiwindup.** With a gain vector `l`, back-calculation: the applied voltage less the
+/// unclipped command, `eu[k]` in V, enters as `x[k+1] = A x[k] + B e[k] + l eu[k]`; `A - l C`
+/// should be stable. Without one, conditional integration: while the command is clipped, a step
+/// of the state that would move the command further beyond the limit is omitted.
 ///
 /// ```
 /// use piezotrack_control::{Feedback, StateSpace};
@@ -34,9 +34,9 @@ pub struct StateSpace<const N: usize> {
 }
 
 impl<const N: usize> StateSpace<N> {
-    /// Matrices of `b.len()` states, `a` row by row; fewer than `N` are padded with zeros.
+    /// Matrices for `b.len()` states, `a` row by row; they are padded with zeros to `N` states.
     ///
-    /// `d` is in V/m, `b` times `c` too; `back` is the optional vector of back-calculation.
+    /// `d` and the product of `b` and `c` are in V/m; `back` is the vector `l`, if any.
     ///
     /// # Errors
     /// Names the matrix that has the wrong number of entries or one that is not finite.
@@ -91,15 +91,15 @@ fn fill(to: &mut [f64], from: &[f64]) {
     }
 }
 
-/// Memory of a [`StateSpace`].
+/// State of a [`StateSpace`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StateSpaceState<const N: usize> {
     x: [f64; N],
-    /// The error of the sample before, which has not yet moved `x`; `None` before the first.
+    /// The error of the last sample, not yet applied to `x`; `None` before the first sample.
     error: Option<f64>,
-    /// Voltage at the first sample where a start without a bump was asked for.
+    /// Voltage at the first sample for a bumpless start, V.
     first: Option<f64>,
-    /// Constant part of the output that this takes, V. It stays; an integrator works it off.
+    /// Constant output for the bumpless start, V. It stays; an integrator compensates it.
     offset: f64,
 }
 
@@ -126,14 +126,14 @@ impl<const N: usize> Feedback for StateSpace<N> {
         if volts.is_finite() {
             return volts;
         }
-        // Too large to be a number: start anew.
+        // Overflow: start again.
         *state = self.rest();
         0.0
     }
 }
 
 impl<const N: usize> StateSpace<N> {
-    /// Moves the state on by the sample whose error and excess are now known.
+    /// Advances the state by the last sample, whose error and excess are known now.
     #[inline]
     fn advance(&self, x: &mut [f64; N], error: f64, excess: f64) {
         let mut next = [0.0; N];

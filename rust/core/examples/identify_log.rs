@@ -5,8 +5,9 @@ use std::ops::ControlFlow;
 
 use piezotrack_core::Result;
 use piezotrack_core::identify::{Plan, Progress, Record, Spec, SwarmSettings, identify};
-use piezotrack_core::integrate::{Drive, Hold, Method, NEVER, simulate};
-use piezotrack_core::stage::{DAHL_PARAMETERS, DahlStage, StageState};
+use piezotrack_core::models::dahl_simulate::{Method, simulate};
+use piezotrack_core::models::{DAHL_PARAMETERS, DahlStage, StageState};
+use piezotrack_core::signal::{Drive, Hold, NEVER};
 
 const DT: f64 = 1e-3;
 

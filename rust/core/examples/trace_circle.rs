@@ -3,11 +3,10 @@
 //! `cargo run --release -p piezotrack-core --example trace_circle`
 
 use piezotrack_control::{Controller, DahlInverse, Limits, Pid};
-use piezotrack_core::contour::radial_errors;
-use piezotrack_core::integrate::NEVER;
-use piezotrack_core::metrics::Spread;
-use piezotrack_core::simulate::{Course, Law, Timing, TwoAxes, track_both};
-use piezotrack_core::stage::VirtualStage;
+use piezotrack_core::signal::NEVER;
+use piezotrack_core::signal::contour_error::radial_errors;
+use piezotrack_core::signal::metrics::Spread;
+use piezotrack_core::simulate::{Course, Law, Timing, TwoAxes, VirtualStage, track_both};
 
 const INTERVAL: f64 = 0.02;
 const FREQUENCY: f64 = 0.1;

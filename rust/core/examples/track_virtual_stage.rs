@@ -3,10 +3,9 @@
 //! `cargo run --release -p piezotrack-core --example track_virtual_stage`
 
 use piezotrack_control::{Controller, DahlInverse, Limits, Pid};
-use piezotrack_core::integrate::NEVER;
-use piezotrack_core::metrics::tracking;
-use piezotrack_core::simulate::{Course, Law, Timing, track};
-use piezotrack_core::stage::VirtualStage;
+use piezotrack_core::signal::NEVER;
+use piezotrack_core::signal::metrics::tracking;
+use piezotrack_core::simulate::{Course, Law, Timing, VirtualStage, track};
 
 const INTERVAL: f64 = 0.02;
 const FREQUENCY: f64 = 0.2;

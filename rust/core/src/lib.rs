@@ -2,22 +2,18 @@
 //!
 //! All quantities are SI: metres, volts, seconds, newtons, kilograms. The crate knows nothing
 //! of Python, prints nothing, and returns an [`Error`] where an argument cannot be used.
+//!
+//! The modules are layers. Each uses those before it in this list, and none after it: [`error`],
+//! [`math`], [`signal`], [`integrator`], [`models`], [`design`], [`simulate`], [`identify`].
 #![forbid(unsafe_code)]
 
-pub mod alone;
-mod classical;
-pub mod contour;
-mod delay;
 pub mod design;
 pub mod error;
 pub mod identify;
-pub mod integrate;
-pub mod lanes;
-pub mod march;
-pub mod mechanics;
-pub mod metrics;
-mod random;
+pub mod integrator;
+pub mod math;
+pub mod models;
+pub mod signal;
 pub mod simulate;
-pub mod stage;
 
 pub use error::{Error, Result};

@@ -1,23 +1,17 @@
-//! Controllers and inverses, as configuration and as sessions.
+//! Controllers, as configuration and as sessions.
 
-use numpy::{PyArray1, ToPyArray};
 use piezotrack_control::{
-    BoucWenInverse, BoucWenInverseState, Command, Controller, ControllerState, DahlInverse,
-    FeedbackInverseState, Filter, FirstOrderDahlInverse, InverseState, Limits, OscillatorInverse,
-    Pid, Repetitive, SampledDahlInverse, Smoothing, StateSpace,
+    Command, Controller, ControllerState, Filter, Limits, Pid, Repetitive, Smoothing, StateSpace,
 };
 use piezotrack_core::simulate::{Law, LawState};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
-use crate::arrays::samples;
 use crate::errors::raise;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyController>()?;
-    module.add_class::<PySession>()?;
-    module.add_class::<PyInverseSession>()?;
-    module.add_function(wrap_pyfunction!(feedforward, module)?)
+    module.add_class::<PySession>()
 }
 
 /// kp, ti, td, and tt where it is given.
@@ -104,7 +98,11 @@ pub fn repetitive_from(settings: RepetitiveSettings) -> Result<Repetitive> {
         "lag" => Smoothing::Lag { tq: number, compensated: false },
         "compensated lag" => Smoothing::Lag { tq: number, compensated: true },
         "zero phase" => Smoothing::ZeroPhase { order: number as u32 },
-        _ => Smoothing::None,
+        "none" => Smoothing::None,
+        other => {
+            let expected = "'lag', 'compensated lag', 'zero phase' or 'none'";
+            return Err(Error::parameter("smoothing", format!("'{other}'"), expected));
+        }
     };
     Ok(Repetitive { leak, lead, pause, ..Repetitive::new(period, smoothing, kq)? })
 }
@@ -113,7 +111,11 @@ pub fn repetitive_from(settings: RepetitiveSettings) -> Result<Repetitive> {
 fn filter_from((kind, first, second, third): &(String, f64, f64, f64), dt: f64) -> Result<Filter> {
     Ok(match kind.as_str() {
         "notch" => Filter::notch(*first, *second, *third, dt)?,
-        _ => Filter::low_pass(*first, dt)?,
+        "low pass" => Filter::low_pass(*first, dt)?,
+        other => {
+            let expected = "'notch' or 'low pass'";
+            return Err(Error::parameter("filters", format!("'{other}'"), expected));
+        }
     })
 }
 
@@ -170,112 +172,5 @@ impl PySession {
         }
         self.controller = other.controller;
         Ok(())
-    }
-}
-
-/// The inverse of a stage for one sampling interval.
-enum AnyInverse {
-    Dahl(SampledDahlInverse, InverseState),
-    BoucWen(BoucWenInverse, BoucWenInverseState),
-    FirstOrderDahl(FirstOrderDahlInverse, FeedbackInverseState),
-    Oscillator(OscillatorInverse, FeedbackInverseState),
-}
-
-impl AnyInverse {
-    /// By the name of the model.
-    fn new(model: &str, theta: &[f64], dt: f64) -> Result<Self> {
-        match (model, theta) {
-            ("dahl", &[m, d, k, t, a1, a2, b1, b0, up]) => {
-                let inverse = DahlInverse::new(m, d, k, t, a1, a2, b1, b0, up)?.at(dt)?;
-                Ok(Self::Dahl(inverse, inverse.rest()))
-            }
-            ("bouc-wen", &[m, b, k, d, alpha, beta, gamma, n]) => {
-                piezotrack_core::error::positive("dt", dt, "s")?;
-                let inverse = BoucWenInverse::new(m, b, k, d, alpha, beta, gamma, n)?;
-                Ok(Self::BoucWen(inverse, inverse.rest()))
-            }
-            ("first-order-dahl", &[m, d, k, t, sigma, limit, i]) => {
-                let inverse = FirstOrderDahlInverse::new(m, d, k, t, (sigma, limit, i), dt)?;
-                Ok(Self::FirstOrderDahl(inverse, inverse.rest()))
-            }
-            ("bouc-wen-oscillator", &[m, c, k, alpha, beta, gamma, delta, nu]) => {
-                let hysteresis = (alpha, beta * gamma, beta * delta, nu);
-                let inverse = OscillatorInverse::new(m, c, k, hysteresis, dt)?;
-                Ok(Self::Oscillator(inverse, inverse.rest()))
-            }
-            _ => Err(Error::parameter("model", format!("'{model}'"), "one that has an inverse")),
-        }
-    }
-
-    fn step(&mut self, x: f64, v: f64, a: f64) -> f64 {
-        match self {
-            Self::Dahl(inverse, state) => inverse.step(state, x, v, a),
-            Self::BoucWen(inverse, state) => inverse.step(state, x, v, a),
-            Self::FirstOrderDahl(inverse, state) => inverse.step(state, x, v, a),
-            Self::Oscillator(inverse, state) => inverse.step(state, x, v, a),
-        }
-    }
-
-    fn reset(&mut self) {
-        match self {
-            Self::Dahl(inverse, state) => *state = inverse.rest(),
-            Self::BoucWen(inverse, state) => *state = inverse.rest(),
-            Self::FirstOrderDahl(inverse, state) => *state = inverse.rest(),
-            Self::Oscillator(inverse, state) => *state = inverse.rest(),
-        }
-    }
-}
-
-/// The voltage along a whole reference, from a stage that never moved.
-#[pyfunction]
-#[pyo3(signature = (model, theta, dt, x, v, a))]
-#[expect(clippy::needless_pass_by_value, reason = "a tuple becomes a vector, not a slice")]
-fn feedforward<'py>(
-    py: Python<'py>,
-    model: &str,
-    theta: Vec<f64>,
-    dt: f64,
-    x: &Bound<'py, PyAny>,
-    v: &Bound<'py, PyAny>,
-    a: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let (x, v, a) = (samples("x", x)?, samples("v", v)?, samples("a", a)?);
-    let volts = || -> Result<Vec<f64>> {
-        let mut inverse = AnyInverse::new(model, &theta, dt)?;
-        let mut volts = Vec::with_capacity(x.len());
-        for (k, ((&x, &v), &a)) in x.iter().zip(v.iter()).zip(a.iter()).enumerate() {
-            let value = inverse.step(x, v, a);
-            if !value.is_finite() {
-                return Err(Error::Numerical(format!(
-                    "the inverse has no voltage for sample {k} of the reference ({x:e} m, \
-                     {v:e} m/s, {a:e} m/s^2): check its units and its sampling"
-                )));
-            }
-            volts.push(value);
-        }
-        Ok(volts)
-    };
-    volts().map(|volts| volts.to_pyarray(py)).map_err(|error| raise(&error))
-}
-
-/// The inverse at work, sample by sample.
-#[pyclass(name = "InverseSession", module = "piezotrack._core")]
-struct PyInverseSession(AnyInverse);
-
-#[pymethods]
-impl PyInverseSession {
-    #[new]
-    #[expect(clippy::needless_pass_by_value, reason = "a tuple becomes a vector, not a slice")]
-    fn new(model: &str, theta: Vec<f64>, dt: f64) -> PyResult<Self> {
-        AnyInverse::new(model, &theta, dt).map(Self).map_err(|error| raise(&error))
-    }
-
-    /// NaN where there is no voltage.
-    fn step(&mut self, x: f64, v: f64, a: f64) -> f64 {
-        self.0.step(x, v, a)
-    }
-
-    fn reset(&mut self) {
-        self.0.reset();
     }
 }

@@ -2,13 +2,11 @@
 
 use piezotrack_core::Result;
 use piezotrack_core::design::{GainRange, LoopPlant, SampledLoop, Verdict};
-use piezotrack_core::stage::{BoucWenStage, DahlStage, FirstOrderDahlStage};
 use pyo3::prelude::*;
 
 use crate::control::PyController;
 use crate::enter::enter;
 use crate::errors::raise;
-use crate::stage::Theta;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyLoopPlant>()?;
@@ -39,31 +37,6 @@ impl PyLoopPlant {
         build().map(Self).map_err(|error| raise(&error))
     }
 
-    /// The softest and the stiffest of a Dahl stage between two displacements (m), with a delay.
-    #[staticmethod]
-    fn dahl(theta: Theta, low: f64, high: f64, delay: f64) -> PyResult<[Self; 2]> {
-        let build = || -> Result<[LoopPlant; 2]> {
-            let stage = DahlStage::from_theta(&theta)?;
-            let [soft, stiff] = LoopPlant::dahl_extremes(&stage, low..=high)?;
-            Ok([soft.with_delay(delay)?, stiff.with_delay(delay)?])
-        };
-        build().map(|both| both.map(Self)).map_err(|error| raise(&error))
-    }
-
-    /// A Bouc-Wen stage between two voltages, with a delay: least, mean and largest gain.
-    #[staticmethod]
-    fn bouc_wen(theta: [f64; 8], low: f64, high: f64, delay: f64) -> PyResult<[Self; 3]> {
-        let stage = BoucWenStage::from_theta(&theta);
-        Self::late(stage.and_then(|stage| LoopPlant::bouc_wen(&stage, low, high)), delay)
-    }
-
-    /// A stage with first-order Dahl friction in the same way.
-    #[staticmethod]
-    fn first_order_dahl(theta: [f64; 7], low: f64, high: f64, delay: f64) -> PyResult<[Self; 3]> {
-        let stage = FirstOrderDahlStage::from_theta(&theta);
-        Self::late(stage.and_then(|stage| LoopPlant::first_order_dahl(&stage, low, high)), delay)
-    }
-
     #[getter]
     fn static_gain(&self) -> f64 {
         self.0.static_gain()
@@ -72,11 +45,11 @@ impl PyLoopPlant {
 
 impl PyLoopPlant {
     /// Three plants, with a delay more.
-    pub fn late(plants: Result<[LoopPlant; 3]>, delay: f64) -> PyResult<[Self; 3]> {
+    pub fn delayed(plants: Result<[LoopPlant; 3]>, delay: f64) -> PyResult<[Self; 3]> {
         let build = || -> Result<[Self; 3]> {
             let [low, middle, high] = plants?;
-            let late = |plant: LoopPlant| plant.with_delay(delay).map(Self);
-            Ok([late(low)?, late(middle)?, late(high)?])
+            let delayed = |plant: LoopPlant| plant.with_delay(delay).map(Self);
+            Ok([delayed(low)?, delayed(middle)?, delayed(high)?])
         };
         build().map_err(|error| raise(&error))
     }

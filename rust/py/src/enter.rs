@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use piezotrack_core::Error;
 use piezotrack_core::identify::{Monitor, Progress};
-use piezotrack_core::integrate::Stop;
+use piezotrack_core::signal::Stop;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyOSError, PyStopIteration};
 use pyo3::prelude::*;
 
@@ -163,7 +163,7 @@ fn tell(watchers: &Watchers, halt: &Halt, progress: &Progress, answers: &Sender<
         progress.iterations,
         progress.evaluations,
         progress.cost,
-        progress.theta.to_vec(),
+        progress.theta.0.to_vec(),
     );
     Python::attach(|py| {
         if let Some(bar) = &watchers.progress

@@ -2,10 +2,11 @@
 
 use numpy::{PyArray1, ToPyArray};
 use piezotrack_core::identify::{
-    Boundary, Coordinate, DELAY, Delay, Identification, Model, Outcome, Plan, Record, Spec,
-    StopReason, SwarmSettings, Topology, Update, identify as identified,
+    Boundary, Coordinate, DELAY, Delay, Identification, Outcome, Plan, Record, Spec, StopReason,
+    SwarmSettings, Topology, Update, identify as identified,
 };
-use piezotrack_core::march::Order;
+use piezotrack_core::integrator::Order;
+use piezotrack_core::models::Model;
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
@@ -128,7 +129,7 @@ impl PySearch {
     /// The parameters of the stage, then the delay.
     #[getter]
     fn theta(&self) -> Vec<f64> {
-        self.places().map(|i| self.outcome.theta[i]).collect()
+        self.places().map(|i| self.outcome.theta.0[i]).collect()
     }
 
     #[getter]
@@ -211,7 +212,7 @@ impl PySearch {
     #[getter]
     fn sensitivities(&self) -> Vec<(usize, f64, bool)> {
         let found = self.found.sensitivities.iter();
-        let place = |i: usize| i.min(self.found.problem.model.facts().parameters.len());
+        let place = |i: usize| i.min(self.found.problem.model.info().parameters.len());
         found.map(|s| (place(s.parameter), s.deviation, s.at_bound)).collect()
     }
 }
@@ -219,7 +220,7 @@ impl PySearch {
 impl PySearch {
     /// Indices of the model's parameters, and of the delay.
     fn places(&self) -> impl Iterator<Item = usize> {
-        (0..self.found.problem.model.facts().parameters.len()).chain([DELAY])
+        (0..self.found.problem.model.info().parameters.len()).chain([DELAY])
     }
 }
 

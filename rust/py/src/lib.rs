@@ -6,8 +6,8 @@ mod design;
 mod enter;
 mod errors;
 mod identify;
+mod least_squares;
 mod numbers;
-mod plays;
 mod stage;
 mod step;
 mod swarm;
@@ -28,7 +28,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     swarm::register(module)?;
     control::register(module)?;
     design::register(module)?;
-    plays::register(module)?;
+    least_squares::register(module)?;
     virtual_stage::register(module)?;
     tracking::register(module)?;
     xy::register(module)

@@ -1,47 +1,38 @@
-//! The Dahl stage and its simulation.
+//! Stages of every model: their parameters, their simulation, their inverse and their loop.
 
 use numpy::{PyArray1, ToPyArray};
-use piezotrack_core::identify::Model;
-use piezotrack_core::integrate::{self, Drive, Hold, Method, Trajectory};
-use piezotrack_core::march::{Order, Stepping};
-use piezotrack_core::stage::kinked::KinkedMotion;
-use piezotrack_core::stage::{
-    BOUC_WEN_OSCILLATOR_PARAMETERS, BOUC_WEN_PARAMETERS, BoucWenMotion, BoucWenOscillator,
-    BoucWenStage, DAHL_PARAMETERS, DahlStage, FIRST_ORDER_DAHL_PARAMETERS, FirstOrderDahlStage,
-    ParameterInfo, StageState,
+use piezotrack_control::inverse::Inverse;
+use piezotrack_control::{OnlineFeedforward, OnlineFeedforwardState, ReferenceSample};
+use piezotrack_core::models::{
+    Experiment, FoundBy, Method, Model, ParameterInfo, Response, Stage, StageInverse,
+    StageInverseState, Values,
 };
+use piezotrack_core::signal::{self, Drive, Hold};
+use piezotrack_core::simulate::Axis;
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
 use crate::arrays::samples;
+use crate::control::PyController;
+use crate::design::PyLoopPlant;
 use crate::enter::enter;
 use crate::errors::raise;
-
-/// Values of the nine parameters, in the order of `DAHL_PARAMETERS`.
-pub type Theta = [f64; 9];
-
-/// Displacement, velocity, and two numbers that the hysteresis remembers.
-type State = (f64, f64, f64, f64);
+use crate::tracking::{Arrays, Pace, PyTracked, stopped};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("DAHL_PARAMETERS", plain(&DAHL_PARAMETERS))?;
-    module.add("BOUC_WEN_PARAMETERS", plain(&BOUC_WEN_PARAMETERS))?;
-    module.add("FIRST_ORDER_DAHL_PARAMETERS", plain(&FIRST_ORDER_DAHL_PARAMETERS))?;
-    module.add("BOUC_WEN_OSCILLATOR_PARAMETERS", plain(&BOUC_WEN_OSCILLATOR_PARAMETERS))?;
-    module.add_class::<PyTrajectory>()?;
-    module.add_function(wrap_pyfunction!(delayed, module)?)?;
-    module.add_function(wrap_pyfunction!(dahl_xu_li_2010, module)?)?;
-    module.add_function(wrap_pyfunction!(dahl_simulate, module)?)?;
-    module.add_function(wrap_pyfunction!(dahl_simulate_fixed, module)?)?;
-    module.add_function(wrap_pyfunction!(bouc_wen_xu_li_2010, module)?)?;
-    module.add_function(wrap_pyfunction!(stage_check, module)?)?;
-    module.add_function(wrap_pyfunction!(bouc_wen_benchmark, module)?)?;
-    module.add_function(wrap_pyfunction!(stage_simulate, module)?)
+    module.add_class::<PyStage>()?;
+    module.add_class::<PyResponse>()?;
+    module.add_class::<PyInverse>()?;
+    module.add_function(wrap_pyfunction!(models, module)?)?;
+    module.add_function(wrap_pyfunction!(published, module)?)?;
+    module.add_function(wrap_pyfunction!(delayed, module)?)
 }
 
-/// Name, symbol and unit of each.
-fn plain(parameters: &[ParameterInfo]) -> Vec<(&str, &str, &str)> {
-    parameters.iter().map(|info| (info.name, info.symbol, info.unit)).collect()
+/// Names and numbers, in the order of a model's parameters or of its state.
+pub type Named = Vec<(String, Vec<f64>)>;
+
+pub fn named(values: &Values) -> Named {
+    values.iter().map(|(name, numbers)| (name.into(), numbers.to_vec())).collect()
 }
 
 /// The hold by its name.
@@ -64,85 +55,272 @@ fn method_named(name: &str) -> Result<Method> {
     }
 }
 
-/// A simulated motion.
-#[pyclass(name = "Trajectory", frozen, module = "piezotrack._core")]
-struct PyTrajectory {
-    x: Vec<f64>,
-    v: Vec<f64>,
-    hysteresis: Vec<f64>,
-    #[pyo3(get)]
-    last: State,
-    #[pyo3(get)]
-    substeps: usize,
-    #[pyo3(get)]
-    well_posed: bool,
-    #[pyo3(get)]
-    difference: f64,
+/// One parameter of a model, as a dict in Python.
+#[derive(IntoPyObject)]
+struct Parameter {
+    name: &'static str,
+    symbol: &'static str,
+    unit: &'static str,
+    carries_force: bool,
+    default: Option<f64>,
+    held: Option<&'static str>,
+    is_list: bool,
+    is_optional: bool,
+}
+
+impl Parameter {
+    fn of(info: &ParameterInfo) -> Self {
+        let ParameterInfo {
+            name,
+            symbol,
+            unit,
+            carries_force,
+            default,
+            held,
+            is_list,
+            is_optional,
+        } = *info;
+        Self { name, symbol, unit, carries_force, default, held, is_list, is_optional }
+    }
+}
+
+/// A model of the list, as a dict in Python.
+#[derive(IntoPyObject)]
+struct Listed {
+    name: &'static str,
+    title: &'static str,
+    drive_unit: &'static str,
+    searched: bool,
+    parameters: Vec<Parameter>,
+    state: Vec<Parameter>,
+    published: Vec<&'static str>,
+}
+
+/// The list of models, in its order.
+#[pyfunction]
+fn models() -> Vec<Listed> {
+    let listed = |model: &Model| {
+        let info = model.info();
+        Listed {
+            name: info.name,
+            title: info.title,
+            drive_unit: info.drive_unit,
+            searched: model.found_by() == FoundBy::Swarm,
+            parameters: info.parameters.iter().map(Parameter::of).collect(),
+            state: info.state.iter().map(Parameter::of).collect(),
+            published: info.published.iter().map(|(name, _)| *name).collect(),
+        }
+    };
+    Model::ALL.iter().map(listed).collect()
+}
+
+/// Published parameters of a model, by their name.
+#[pyfunction]
+fn published(model: &str, name: &str) -> PyResult<Named> {
+    let find = || -> Result<Named> {
+        let info = Model::named(model)?.info();
+        let found = info.published.iter().find(|(known, _)| *known == name);
+        let (_, values) = found.ok_or_else(|| {
+            let known: Vec<&str> = info.published.iter().map(|(known, _)| *known).collect();
+            Error::parameter("name", format!("'{name}'"), format!("one of {}", known.join(", ")))
+        })?;
+        Ok(named(&values()))
+    };
+    find().map_err(|error| raise(&error))
+}
+
+/// A stage of a model, by the model's name and the parameters' names.
+#[pyclass(name = "Stage", frozen, module = "piezotrack._core")]
+pub struct PyStage(pub Stage);
+
+impl PyStage {
+    fn state(&self, given: Option<Named>) -> Result<Option<Values>> {
+        given.map(|given| Values::named(self.0.model().info().state, given)).transpose()
+    }
+
+    /// The stage as a plant, in steps of at most `step` seconds.
+    pub fn axis(&self, step: f64) -> Axis {
+        Axis::Model { stage: self.0, step }
+    }
 }
 
 #[pymethods]
-impl PyTrajectory {
+impl PyStage {
+    #[new]
+    fn new(model: &str, parameters: Named) -> PyResult<Self> {
+        let build = || {
+            let model = Model::named(model)?;
+            model.build(&Values::named(model.info().parameters, parameters)?)
+        };
+        build().map(Self).map_err(|error| raise(&error))
+    }
+
+    /// Motion under a drive, from a state or from rest.
+    #[pyo3(signature = (u, dt, hold_name, *, initial, method, accuracy))]
+    #[expect(clippy::too_many_arguments, reason = "called from one place")]
+    fn simulate(
+        &self,
+        py: Python<'_>,
+        u: &Bound<'_, PyAny>,
+        dt: f64,
+        hold_name: &str,
+        initial: Option<Named>,
+        method: &str,
+        accuracy: f64,
+    ) -> PyResult<PyResponse> {
+        let u = samples("u", u)?;
+        let run = enter(py, |stop| {
+            let drive = Drive::new(&u, dt, hold(hold_name)?)?;
+            let (initial, method) = (self.state(initial)?, method_named(method)?);
+            let initial = initial.as_ref();
+            let experiment = Experiment { drive: &drive, initial, method, accuracy, stop };
+            stopped(self.0.simulate(&experiment)?)
+        })?;
+        Ok(PyResponse(run))
+    }
+
+    /// Simulates the closed loop along a reference from rest, in steps of at most `step` seconds.
+    fn track(
+        &self,
+        py: Python<'_>,
+        step: f64,
+        controller: &PyController,
+        reference: &Bound<'_, PyAny>,
+        feedforward: &Bound<'_, PyAny>,
+        pace: Pace,
+    ) -> PyResult<PyTracked> {
+        let course = Arrays::new(reference, feedforward)?;
+        enter(py, |stop| course.run(&self.axis(step), controller, pace, stop))
+    }
+
+    /// The stage for small motions between two voltages: least, middle and largest gain.
+    fn loop_plants(&self, low: f64, high: f64, delay: f64) -> PyResult<[PyLoopPlant; 3]> {
+        PyLoopPlant::delayed(self.0.loop_plants(low, high), delay)
+    }
+
+    /// The inverse for samples every `dt` seconds, from a state or from a stage that never moved.
+    #[pyo3(signature = (dt, *, offset, delay, initial))]
+    fn inverse(
+        &self,
+        dt: f64,
+        offset: f64,
+        delay: f64,
+        initial: Option<Named>,
+    ) -> PyResult<PyInverse> {
+        let build = || -> Result<PyInverse> {
+            let (inverse, start) = self.0.inverse(dt, self.state(initial)?.as_ref())?;
+            let online = OnlineFeedforward::new(inverse, dt, offset, delay)?;
+            Ok(PyInverse { state: online.start(start), online, start })
+        };
+        build().map_err(|error| raise(&error))
+    }
+}
+
+/// A simulated motion.
+#[pyclass(name = "Response", frozen, module = "piezotrack._core")]
+struct PyResponse(Response);
+
+#[pymethods]
+impl PyResponse {
     #[getter]
     fn x<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.x.to_pyarray(py)
+        self.0.x.to_pyarray(py)
     }
 
     #[getter]
     fn v<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.v.to_pyarray(py)
+        self.0.v.to_pyarray(py)
     }
 
     #[getter]
     fn hysteresis<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.hysteresis.to_pyarray(py)
+        self.0.hysteresis.to_pyarray(py)
+    }
+
+    /// State at the last sample.
+    #[getter]
+    fn last(&self) -> Named {
+        named(&self.0.last)
+    }
+
+    #[getter]
+    fn substeps(&self) -> usize {
+        self.0.substeps
+    }
+
+    #[getter]
+    fn error_estimate(&self) -> f64 {
+        self.0.error_estimate
+    }
+
+    #[getter]
+    fn unique(&self) -> bool {
+        self.0.unique
     }
 }
 
-impl From<Trajectory> for PyTrajectory {
-    fn from(run: Trajectory) -> Self {
-        let StageState { x, v, q1, q2 } = run.last;
-        Self {
-            x: run.x,
-            v: run.v,
-            hysteresis: run.hysteresis,
-            last: (x, v, q1, q2),
-            substeps: run.substeps,
-            well_posed: run.well_posed,
-            difference: run.difference,
+/// The inverse of a stage, sample by sample or along a whole reference.
+#[pyclass(name = "Inverse", module = "piezotrack._core")]
+struct PyInverse {
+    online: OnlineFeedforward<StageInverse>,
+    start: StageInverseState,
+    state: OnlineFeedforwardState<StageInverseState>,
+}
+
+#[pymethods]
+impl PyInverse {
+    /// The drive for the next sample of a reference; NaN where there is none.
+    fn step(
+        &mut self,
+        reference: f64,
+        velocity: Option<f64>,
+        acceleration: Option<f64>,
+        preview: Option<f64>,
+    ) -> f64 {
+        let sample = ReferenceSample { position: reference, velocity, acceleration, preview };
+        self.online.step(&mut self.state, &sample)
+    }
+
+    /// The drive along a whole path, whose derivatives are known, from the start.
+    fn along<'py>(
+        &self,
+        py: Python<'py>,
+        x: &Bound<'py, PyAny>,
+        v: &Bound<'py, PyAny>,
+        a: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (x, v, a) = (samples("x", x)?, samples("v", v)?, samples("a", a)?);
+        let drive = along(self.online.inverse(), self.start, &x, &v, &a);
+        drive.map(|drive| drive.to_pyarray(py)).map_err(|error| raise(&error))
+    }
+
+    fn reset(&mut self) {
+        self.state = self.online.start(self.start);
+    }
+}
+
+fn along(
+    inverse: &StageInverse,
+    mut state: StageInverseState,
+    x: &[f64],
+    v: &[f64],
+    a: &[f64],
+) -> Result<Vec<f64>> {
+    let mut drive = Vec::with_capacity(x.len());
+    for (k, ((&x, &v), &a)) in x.iter().zip(v).zip(a).enumerate() {
+        let value = inverse.step(&mut state, x, v, a);
+        if !value.is_finite() {
+            return Err(Error::Numerical(format!(
+                "the inverse has no voltage for sample {k} of the reference ({x:e} m, \
+                 {v:e} m/s, {a:e} m/s^2): check its units and its sampling"
+            )));
         }
+        drive.push(value);
     }
+    Ok(drive)
 }
 
-impl From<BoucWenMotion> for PyTrajectory {
-    fn from(run: BoucWenMotion) -> Self {
-        let memory = &run.last.memory;
-        Self {
-            x: run.x,
-            v: run.v,
-            hysteresis: run.hysteresis,
-            last: (run.last.x, run.last.v, memory.input, memory.operator.value),
-            substeps: run.substeps,
-            well_posed: true,
-            difference: run.difference,
-        }
-    }
-}
-
-impl From<KinkedMotion> for PyTrajectory {
-    fn from(run: KinkedMotion) -> Self {
-        Self {
-            x: run.x,
-            v: run.v,
-            hysteresis: run.hysteresis,
-            last: (run.last.x, run.last.v, run.last.memory.value, 0.0),
-            substeps: run.substeps,
-            well_posed: true,
-            difference: run.difference,
-        }
-    }
-}
-
-/// The displacement `delay` seconds late.
+/// The displacement with a delay.
 #[pyfunction]
 fn delayed<'py>(
     py: Python<'py>,
@@ -152,142 +330,5 @@ fn delayed<'py>(
     delay: f64,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let (x, v) = (samples("x", x)?, samples("v", v)?);
-    Ok(integrate::delayed(&x, &v, dt, delay).to_pyarray(py))
-}
-
-/// Table 1 of Xu and Li 2010.
-#[pyfunction]
-fn dahl_xu_li_2010() -> Theta {
-    let DahlStage { mechanics, piezo_coefficient, a1, a2, b1, b0, up } = DahlStage::xu_li_2010();
-    let (mass, damping, stiffness) = (mechanics.mass, mechanics.damping, mechanics.stiffness);
-    [mass, damping, stiffness, piezo_coefficient, a1, a2, b1, b0, up]
-}
-
-/// Simulates to an accuracy, choosing the sub-steps.
-#[pyfunction]
-#[pyo3(signature = (theta, u, dt, hold, initial, method, accuracy))]
-#[expect(clippy::too_many_arguments, reason = "called from one place")]
-fn dahl_simulate(
-    py: Python<'_>,
-    theta: Theta,
-    u: &Bound<'_, PyAny>,
-    dt: f64,
-    hold: &str,
-    initial: State,
-    method: &str,
-    accuracy: f64,
-) -> PyResult<PyTrajectory> {
-    let method = method_named(method).map_err(|error| raise(&error))?;
-    run(py, theta, u, dt, hold, |stage, drive, stop| {
-        integrate::simulate(stage, drive, state(initial), method, accuracy, stop)
-    })
-}
-
-/// Simulates from rest with given sub-steps: for studies of convergence.
-#[pyfunction]
-fn dahl_simulate_fixed(
-    py: Python<'_>,
-    theta: Theta,
-    u: &Bound<'_, PyAny>,
-    dt: f64,
-    hold: &str,
-    substeps: usize,
-) -> PyResult<PyTrajectory> {
-    run(py, theta, u, dt, hold, |stage, drive, stop| {
-        let stepping = Stepping { order: Order::Fourth, substeps };
-        integrate::simulate_fixed(stage, drive, StageState::default(), stepping, stop)
-    })
-}
-
-fn run(
-    py: Python<'_>,
-    theta: Theta,
-    u: &Bound<'_, PyAny>,
-    dt: f64,
-    hold_name: &str,
-    job: impl FnOnce(&DahlStage, &Drive<'_>, integrate::Stop<'_>) -> Result<Option<Trajectory>> + Send,
-) -> PyResult<PyTrajectory> {
-    driven(py, u, dt, hold_name, |drive, stop| job(&DahlStage::from_theta(&theta)?, drive, stop))
-}
-
-fn driven<T: Send + Into<PyTrajectory>>(
-    py: Python<'_>,
-    u: &Bound<'_, PyAny>,
-    dt: f64,
-    hold_name: &str,
-    job: impl FnOnce(&Drive<'_>, integrate::Stop<'_>) -> Result<Option<T>> + Send,
-) -> PyResult<PyTrajectory> {
-    let u = samples("u", u)?;
-    let run = enter(py, |stop| job(&Drive::new(&u, dt, hold(hold_name)?)?, stop))?;
-    // None means stopped, for which `enter` has raised.
-    run.map(Into::into).ok_or_else(|| raise(&Error::Numerical("the simulation was stopped".into())))
-}
-
-fn state((x, v, q1, q2): State) -> StageState {
-    StageState { x, v, q1, q2 }
-}
-
-/// The parameters of Xu and Li 2010, as printed or with the stiffness corrected.
-#[pyfunction]
-fn bouc_wen_xu_li_2010(corrected: bool) -> [f64; 8] {
-    let printed = BoucWenStage::xu_li_2010();
-    let stage = if corrected { BoucWenStage::xu_li_2010_corrected() } else { printed };
-    let [mass, damping, stiffness, piezo, alpha, beta, gamma, exponent, _] = stage.parameters();
-    [mass, damping, stiffness, piezo, alpha, beta, gamma, exponent]
-}
-
-/// Raises where the values make no stage of the model.
-#[pyfunction]
-#[expect(clippy::needless_pass_by_value, reason = "extracted from a tuple")]
-fn stage_check(model: &str, theta: Vec<f64>) -> PyResult<()> {
-    let check = || Model::named(model)?.check(&leading(&theta));
-    check().map_err(|error| raise(&error))
-}
-
-/// As many values as asked for, zeros after the last.
-fn leading<const N: usize>(theta: &[f64]) -> [f64; N] {
-    core::array::from_fn(|i| theta.get(i).copied().unwrap_or(0.0))
-}
-
-/// Parameters of the Bouc-Wen benchmark.
-#[pyfunction]
-fn bouc_wen_benchmark() -> [f64; 8] {
-    leading(&BoucWenOscillator::benchmark().parameters())
-}
-
-/// Simulates a stage of a model, by its name, from a state: displacement, velocity and what the
-/// hysteresis remembers.
-#[pyfunction]
-#[pyo3(signature = (model, theta, u, dt, hold, initial, accuracy))]
-#[expect(clippy::too_many_arguments, reason = "called from one place")]
-#[expect(clippy::needless_pass_by_value, reason = "extracted from a tuple")]
-fn stage_simulate(
-    py: Python<'_>,
-    model: &str,
-    theta: Vec<f64>,
-    u: &Bound<'_, PyAny>,
-    dt: f64,
-    hold: &str,
-    initial: Vec<f64>,
-    accuracy: f64,
-) -> PyResult<PyTrajectory> {
-    driven(py, u, dt, hold, |drive, stop| match Model::named(model)? {
-        Model::BoucWen => {
-            let stage = BoucWenStage::from_theta(&leading(&theta))?;
-            let run = stage.simulate(drive, leading(&initial), accuracy, stop)?;
-            Ok(run.map(PyTrajectory::from))
-        }
-        Model::FirstOrderDahl => {
-            let stage = FirstOrderDahlStage::from_theta(&leading(&theta))?;
-            let run = stage.simulate(drive, leading(&initial), accuracy, stop)?;
-            Ok(run.map(PyTrajectory::from))
-        }
-        Model::BoucWenOscillator => {
-            let oscillator = BoucWenOscillator::from_theta(&leading(&theta))?;
-            let run = oscillator.simulate(drive, leading(&initial), accuracy, stop)?;
-            Ok(run.map(PyTrajectory::from))
-        }
-        // Other methods than one are offered for it.
-        Model::Dahl => Err(Error::parameter("model", "'dahl'", "dahl_simulate for it")),
-    })
+    Ok(signal::delayed(&x, &v, dt, delay).to_pyarray(py))
 }

@@ -2,6 +2,7 @@
 
 use numpy::{PyArray1, ToPyArray};
 use piezotrack_core::identify::{self, Conventional, StepReadings, StepResponse};
+use piezotrack_core::signal;
 use pyo3::prelude::*;
 
 use crate::arrays::samples;
@@ -148,5 +149,5 @@ fn read_step(
 /// Samples at which a signal turns by more than `least`.
 #[pyfunction]
 fn turns(signal: &Bound<'_, PyAny>, least: f64) -> PyResult<Vec<usize>> {
-    Ok(identify::turns(&samples("signal", signal)?, least))
+    Ok(signal::turns(&samples("signal", signal)?, least))
 }

@@ -1,72 +1,21 @@
 //! A controller on a stage, and the figures of what came out.
 
 use numpy::{PyArray1, ToPyArray};
-use piezotrack_core::alone::Alone;
-use piezotrack_core::integrate::Stop;
-use piezotrack_core::metrics::{self, Tracking};
-use piezotrack_core::simulate::{Apparatus, ApparatusState, Course, Plant, Timing, Tracked, track};
-use piezotrack_core::stage::{
-    BoucWenKernel, BoucWenStage, DahlStage, FirstOrderDahlKernel, FirstOrderDahlStage,
-};
+use piezotrack_core::signal::Stop;
+use piezotrack_core::signal::metrics::{self, Tracking};
+use piezotrack_core::simulate::{Axis, Course, Timing, Tracked, track};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
 use crate::arrays::samples;
 use crate::control::PyController;
-use crate::enter::enter;
 use crate::errors::{raise, shape};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyTracked>()?;
-    module.add_function(wrap_pyfunction!(track_model, module)?)?;
     module.add_function(wrap_pyfunction!(tracking_metrics, module)?)?;
     module.add_function(wrap_pyfunction!(period_metrics, module)?)?;
     module.add_function(wrap_pyfunction!(residual, module)?)
-}
-
-/// Lets a controller lead a model, by its name, along a course, in steps of at most `step` s.
-#[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "called from one place")]
-#[expect(clippy::needless_pass_by_value, reason = "a tuple becomes a vector, not a slice")]
-fn track_model(
-    py: Python<'_>,
-    model: &str,
-    theta: Vec<f64>,
-    step: f64,
-    controller: &PyController,
-    reference: &Bound<'_, PyAny>,
-    feedforward: &Bound<'_, PyAny>,
-    pace: Pace,
-) -> PyResult<PyTracked> {
-    let course = Arrays::new(reference, feedforward)?;
-    enter(py, |stop| match model {
-        "dahl" => {
-            let stage = DahlStage::from_theta(exactly(&theta)?)?;
-            course.bare(&stage, step, controller, pace, stop)
-        }
-        "first-order-dahl" => {
-            let stage = FirstOrderDahlStage::from_theta(exactly(&theta)?)?;
-            let kernel = FirstOrderDahlKernel { exponent: stage.exponent };
-            let plant = Alone { kernel: &kernel, parameters: &stage.parameters() };
-            course.bare(&plant, step, controller, pace, stop)
-        }
-        "bouc-wen" => {
-            let stage = BoucWenStage::from_theta(exactly(&theta)?)?;
-            let kernel = BoucWenKernel { exponent: stage.exponent };
-            let plant = Alone { kernel: &kernel, parameters: &stage.parameters() };
-            course.bare(&plant, step, controller, pace, stop)
-        }
-        other => Err(Error::parameter("model", format!("'{other}'"), "one that can be led")),
-    })
-}
-
-/// As many parameters as the model has.
-fn exactly<const N: usize>(theta: &[f64]) -> Result<&[f64; N]> {
-    theta.try_into().map_err(|_| Error::Shape {
-        name: "theta".into(),
-        found: format!("{} entries", theta.len()),
-        expected: format!("{N}"),
-    })
 }
 
 /// A stopped simulation, for which `enter` raises.
@@ -104,29 +53,17 @@ impl Arrays {
         Course { reference: &self.reference, feedforward: &self.feedforward }
     }
 
-    /// Leads a plant with nothing around it, from rest.
-    pub fn bare<P: Plant>(
+    /// Simulates the closed loop of an axis from its start.
+    pub fn run(
         &self,
-        plant: &P,
-        step: f64,
-        controller: &PyController,
-        pace: Pace,
-        stop: Stop<'_>,
-    ) -> Result<PyTracked> {
-        let apparatus = Apparatus::bare(plant, step);
-        self.run(&apparatus, apparatus.rest(), controller, pace, stop)
-    }
-
-    pub fn run<P: Plant>(
-        &self,
-        apparatus: &Apparatus<'_, P>,
-        start: ApparatusState<P::State>,
+        axis: &Axis,
         controller: &PyController,
         pace: Pace,
         stop: Stop<'_>,
     ) -> Result<PyTracked> {
         let timing = timing(controller, self.reference.len(), pace);
-        let run = track(apparatus, start, &timing, &controller.controller, self.course(), stop)?;
+        let (apparatus, course) = (axis.apparatus(), self.course());
+        let run = track(&apparatus, axis.start(), &timing, &controller.controller, course, stop)?;
         Ok(PyTracked::new(stopped(run)?))
     }
 }

@@ -1,9 +1,11 @@
 //! The virtual stage: its settings, its simulation, a controller on it.
 
 use numpy::{PyArray1, ToPyArray};
-use piezotrack_core::integrate::Drive;
-use piezotrack_core::simulate::{Amplifier, Sensor};
-use piezotrack_core::stage::{Creep, RELAXATIONS, StagePlay, VirtualSettings, VirtualStage};
+use piezotrack_core::models::Creep;
+use piezotrack_core::signal::Drive;
+use piezotrack_core::simulate::{
+    Amplifier, Axis, RELAXATIONS, Sensor, StagePlay, VirtualSettings, VirtualStage,
+};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
@@ -216,9 +218,6 @@ impl PyVirtualStage {
         pace: Pace,
     ) -> PyResult<PyTracked> {
         let course = Arrays::new(reference, feedforward)?;
-        enter(py, |stop| {
-            let apparatus = self.0.apparatus();
-            course.run(&apparatus, self.0.start(), controller, pace, stop)
-        })
+        enter(py, |stop| course.run(&Axis::Virtual(self.0), controller, pace, stop))
     }
 }

@@ -1,22 +1,21 @@
 //! Two axes: an XY stage, contour errors, cross-talk; and a sensor's noise at rest.
 
 use numpy::{PyArray1, ToPyArray};
-use piezotrack_core::contour::{Polyline, radial_errors};
+use piezotrack_core::Error;
 use piezotrack_core::identify::{cross_talk, noise_at_rest};
-use piezotrack_core::integrate::{Drive, Stop};
-use piezotrack_core::metrics::Spread;
+use piezotrack_core::signal::Drive;
+use piezotrack_core::signal::contour_error::{Polyline, radial_errors};
+use piezotrack_core::signal::metrics::Spread;
 use piezotrack_core::simulate::{
-    Apparatus, ApparatusState, Plant, TwoAxes, TwoStates, open_loops, track_both,
+    Axis, AxisState, OpenLoop, TwoAxes, TwoStates, open_loops, track_both,
 };
-use piezotrack_core::stage::{DahlStage, StageState, VirtualStage, VirtualState};
-use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
 use crate::arrays::samples;
 use crate::control::PyController;
 use crate::enter::enter;
 use crate::errors::raise;
-use crate::stage::{Theta, hold};
+use crate::stage::{PyStage, hold};
 use crate::tracking::{Arrays, Pace, PyTracked, stopped, timing};
 use crate::virtual_stage::{OpenLoopArrays, PyVirtualStage};
 
@@ -29,140 +28,37 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(sensor_noise, module)?)
 }
 
-/// An axis as Python gives it: a virtual stage, or a model's parameters and its longest step, s.
+/// An axis as Python gives it: a virtual stage, or a model's stage and its longest step, s.
 #[derive(FromPyObject)]
 enum Given<'py> {
     Virtual(PyRef<'py, PyVirtualStage>),
-    Dahl(Theta, f64),
-}
-
-/// One axis.
-#[derive(Clone, Copy)]
-#[expect(clippy::large_enum_variant, reason = "two in a stage")]
-enum Axis {
-    Virtual(VirtualStage),
-    Dahl(DahlStage, f64),
+    Model(PyRef<'py, PyStage>, f64),
 }
 
 impl Given<'_> {
-    fn axis(&self) -> Result<Axis> {
-        Ok(match self {
+    fn axis(&self) -> Axis {
+        match self {
             Self::Virtual(stage) => Axis::Virtual(stage.0),
-            Self::Dahl(theta, step) => Axis::Dahl(DahlStage::from_theta(theta)?, *step),
-        })
+            Self::Model(stage, step) => stage.axis(*step),
+        }
     }
-}
-
-/// What is done with two axes, whatever they are.
-trait Job {
-    type Done;
-
-    fn run<X: Plant, Y: Plant>(
-        &self,
-        axes: &TwoAxes<'_, X, Y>,
-        start: TwoStates<X::State, Y::State>,
-        stop: Stop<'_>,
-    ) -> Result<Self::Done>;
-}
-
-/// A virtual stage as it begins.
-fn virtual_axis(
-    stage: &VirtualStage,
-) -> (Apparatus<'_, VirtualStage>, ApparatusState<VirtualState>) {
-    (stage.apparatus(), stage.start())
-}
-
-/// A model as it begins.
-fn dahl_axis(
-    stage: &DahlStage,
-    step: f64,
-) -> (Apparatus<'_, DahlStage>, ApparatusState<StageState>) {
-    let apparatus = Apparatus::bare(stage, step);
-    (apparatus, apparatus.rest())
 }
 
 /// Two axes on one platform.
 #[pyclass(name = "XYStage", frozen, module = "piezotrack._core")]
 struct PyXyStage {
-    x: Axis,
-    y: Axis,
+    axes: [Axis; 2],
     cross_talk: [f64; 2],
     lag: f64,
 }
 
 impl PyXyStage {
-    /// Does a job with axes of either kind.
-    fn with<J: Job>(&self, job: &J, stop: Stop<'_>) -> Result<J::Done> {
-        match (&self.x, &self.y) {
-            (Axis::Virtual(x), Axis::Virtual(y)) => {
-                self.go(job, virtual_axis(x), virtual_axis(y), stop)
-            }
-            (Axis::Virtual(x), Axis::Dahl(y, step)) => {
-                self.go(job, virtual_axis(x), dahl_axis(y, *step), stop)
-            }
-            (Axis::Dahl(x, step), Axis::Virtual(y)) => {
-                self.go(job, dahl_axis(x, *step), virtual_axis(y), stop)
-            }
-            (Axis::Dahl(x, step), Axis::Dahl(y, other)) => {
-                self.go(job, dahl_axis(x, *step), dahl_axis(y, *other), stop)
-            }
-        }
-    }
-
-    fn go<J: Job, X: Plant, Y: Plant>(
-        &self,
-        job: &J,
-        (x, start_x): (Apparatus<'_, X>, ApparatusState<X::State>),
-        (y, start_y): (Apparatus<'_, Y>, ApparatusState<Y::State>),
-        stop: Stop<'_>,
-    ) -> Result<J::Done> {
-        let axes = TwoAxes { x, y, cross_talk: self.cross_talk, lag: self.lag };
-        job.run(&axes, (start_x, start_y), stop)
-    }
-}
-
-/// Two controllers on their courses.
-struct Following<'a> {
-    controllers: [&'a PyController; 2],
-    courses: [Arrays; 2],
-    pace: Pace,
-}
-
-impl Job for Following<'_> {
-    type Done = (PyTracked, PyTracked);
-
-    fn run<X: Plant, Y: Plant>(
-        &self,
-        axes: &TwoAxes<'_, X, Y>,
-        start: TwoStates<X::State, Y::State>,
-        stop: Stop<'_>,
-    ) -> Result<Self::Done> {
-        let Self { controllers: [x, y], courses, pace } = self;
-        let timing = timing(x, 0, *pace);
-        let courses = [courses[0].course(), courses[1].course()];
-        let controllers = (&x.controller, &y.controller);
-        let (x, y) = stopped(track_both(axes, start, &timing, controllers, courses, stop)?)?;
-        Ok((PyTracked::new(x), PyTracked::new(y)))
-    }
-}
-
-/// Two drives.
-struct Driven<'a>([Drive<'a>; 2]);
-
-/// Displacement, reading and applied voltage.
-type Motion = [Vec<f64>; 3];
-
-impl Job for Driven<'_> {
-    type Done = [Motion; 2];
-
-    fn run<X: Plant, Y: Plant>(
-        &self,
-        axes: &TwoAxes<'_, X, Y>,
-        start: TwoStates<X::State, Y::State>,
-        stop: Stop<'_>,
-    ) -> Result<Self::Done> {
-        let (x, y) = stopped(open_loops(axes, start, [&self.0[0], &self.0[1]], stop)?)?;
-        Ok([[x.displacement, x.measured, x.applied], [y.displacement, y.measured, y.applied]])
+    /// The axes between their amplifiers and sensors, and where an experiment starts.
+    fn both(&self) -> (TwoAxes<'_, Axis, Axis>, TwoStates<AxisState, AxisState>) {
+        let [x, y] = &self.axes;
+        let start = (x.start(), y.start());
+        let (x, y) = (x.apparatus(), y.apparatus());
+        (TwoAxes { x, y, cross_talk: self.cross_talk, lag: self.lag }, start)
     }
 }
 
@@ -171,25 +67,9 @@ impl PyXyStage {
     #[new]
     #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn new(x: Given<'_>, y: Given<'_>, cross_talk: [f64; 2], lag: f64) -> PyResult<Self> {
-        struct Check;
-        impl Job for Check {
-            type Done = ();
-
-            fn run<X: Plant, Y: Plant>(
-                &self,
-                axes: &TwoAxes<'_, X, Y>,
-                _: TwoStates<X::State, Y::State>,
-                _: Stop<'_>,
-            ) -> Result<()> {
-                axes.validate()
-            }
-        }
-        let build = || -> Result<Self> {
-            let stage = Self { x: x.axis()?, y: y.axis()?, cross_talk, lag };
-            stage.with(&Check, piezotrack_core::integrate::NEVER)?;
-            Ok(stage)
-        };
-        build().map_err(|error| raise(&error))
+        let stage = Self { axes: [x.axis(), y.axis()], cross_talk, lag };
+        stage.both().0.validate().map_err(|error| raise(&error))?;
+        Ok(stage)
     }
 
     /// Displacement, reading and applied voltage of each axis.
@@ -202,15 +82,23 @@ impl PyXyStage {
         hold_name: &str,
     ) -> PyResult<[OpenLoopArrays<'py>; 2]> {
         let (ux, uy) = (samples("ux", ux)?, samples("uy", uy)?);
-        let run = enter(py, |stop| {
+        let (x, y) = enter(py, |stop| {
             let hold = hold(hold_name)?;
-            let drives = [Drive::new(&ux, dt, hold)?, Drive::new(&uy, dt, hold)?];
-            self.with(&Driven(drives), stop)
+            let drives = [&Drive::new(&ux, dt, hold)?, &Drive::new(&uy, dt, hold)?];
+            let (axes, start) = self.both();
+            stopped(open_loops(&axes, start, drives, stop)?)
         })?;
-        Ok(run.map(|[x, y, u]| (x.to_pyarray(py), y.to_pyarray(py), u.to_pyarray(py))))
+        let arrays = |run: OpenLoop<AxisState>| {
+            (
+                run.displacement.to_pyarray(py),
+                run.measured.to_pyarray(py),
+                run.applied.to_pyarray(py),
+            )
+        };
+        Ok([arrays(x), arrays(y)])
     }
 
-    /// Lets two controllers of one interval lead the axes along their courses.
+    /// Simulates the closed loops of two controllers of one interval along their references.
     #[expect(clippy::needless_pass_by_value, reason = "extracted from tuples")]
     fn track(
         &self,
@@ -224,9 +112,15 @@ impl PyXyStage {
             Arrays::new(&references[0], &feedforwards[0])?,
             Arrays::new(&references[1], &feedforwards[1])?,
         ];
-        let controllers = [&*controllers[0], &*controllers[1]];
-        let job = Following { controllers, courses, pace };
-        enter(py, |stop| self.with(&job, stop))
+        let [x, y] = [&*controllers[0], &*controllers[1]];
+        enter(py, |stop| {
+            let (axes, start) = self.both();
+            let timing = timing(x, 0, pace);
+            let courses = [courses[0].course(), courses[1].course()];
+            let controllers = (&x.controller, &y.controller);
+            let (x, y) = stopped(track_both(&axes, start, &timing, controllers, courses, stop)?)?;
+            Ok((PyTracked::new(x), PyTracked::new(y)))
+        })
     }
 }
 

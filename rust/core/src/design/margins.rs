@@ -4,11 +4,11 @@ use core::f64::consts::{PI, TAU};
 
 use piezotrack_control::Filter;
 
-use super::jet::C;
+use super::argument_principle::{Peak, Place};
 use super::plant::LoopPlant;
 use super::sampled_loop::{LinearFeedback, SampledLoop};
-use super::walk::{Peak, Place};
 use crate::error::{Error, Result};
+use crate::math::C;
 
 /// Where the walk for margins begins, rad: slower than that nothing is looked at.
 const SLOWEST: f64 = 1e-9;

@@ -13,17 +13,18 @@
 //! The displacement at a sampling instant counts as read before the new voltage acts, so that
 //! even a static plant answers one sample later.
 
-mod check;
-mod input_gain;
-mod jet;
+mod argument_principle;
 mod margins;
 mod plant;
 mod sampled_loop;
+mod small_signal_gain;
 mod stability;
-mod walk;
+mod verdict;
 
-pub use check::{Verdict, check_loop};
 pub use margins::{Margins, Response, margins};
 pub use plant::LoopPlant;
 pub use sampled_loop::{LinearFeedback, SampledLoop};
 pub use stability::{GainRange, Root};
+pub use verdict::{Verdict, check_loop};
+
+pub(crate) use small_signal_gain::Gains;

@@ -1,14 +1,12 @@
 //! The stage as the loop sees it around one point: volts to metres, linear.
 
 use core::f64::consts::TAU;
-use core::ops::RangeInclusive;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::jet::Ratio;
 use crate::error::{Error, Result, finite, not_negative, positive};
-use crate::mechanics::{Mechanics, halvings};
-use crate::stage::DahlStage;
+use crate::integrator::{Mechanics, halvings};
+use crate::math::Ratio;
 
 /// States of a plant, at most.
 const STATES: usize = 8;
@@ -73,50 +71,9 @@ impl LoopPlant {
     pub fn mechanical(mechanics: &Mechanics, piezo_coefficient: f64) -> Result<Self> {
         let Mechanics { mass, damping, stiffness } = *mechanics;
         Mechanics::new(mass, damping, stiffness)?;
-        second_order(mass, damping, stiffness, piezo_coefficient)
-    }
-
-    /// A Dahl stage for small motions about the displacement `at` (m) on its virgin branch.
-    ///
-    /// The hysteresis adds a spring of stiffness `dFh/dx = b1 q2`, with
-    /// `q2 = up exp(-a1 x/2) sin(b x)/b`, `b^2 = a2 - a1^2/4`, from (7) and (8) of Xu and Li
-    /// 2010; odd in x. With Table 1 it takes the gain from 1.80 to 1.44 um/V over the stroke.
-    ///
-    /// # Errors
-    /// Names `at` where it is not finite or the stage has no positive stiffness there.
-    pub fn dahl(stage: &DahlStage, at: f64) -> Result<Self> {
-        finite("at", at, "m")?;
-        let Mechanics { mass, damping, stiffness } = stage.mechanics;
-        let total = stiffness + virgin_slope(stage, at);
-        if total > 0.0 {
-            return second_order(mass, damping, total, stage.piezo_coefficient);
-        }
-        let expected = "a displacement at which K + dFh/dx is above 0";
-        Err(Error::parameter("at", format!("{at} m"), expected))
-    }
-
-    /// The softest and the stiffest of [`Self::dahl`] over a range of displacement, m.
-    ///
-    /// The loop must be stable with both: the softest has the highest static gain.
-    ///
-    /// # Errors
-    /// Names `range` where it is empty or not finite; as [`Self::dahl`].
-    pub fn dahl_extremes(stage: &DahlStage, range: RangeInclusive<f64>) -> Result<[Self; 2]> {
-        let (low, high) = (*range.start(), *range.end());
-        if !(low.is_finite() && high.is_finite() && low <= high) {
-            let shown = format!("{low} to {high} m");
-            return Err(Error::parameter("range", shown, "two displacements in rising order"));
-        }
-        let mut softest = (f64::INFINITY, low);
-        let mut stiffest = (f64::NEG_INFINITY, low);
-        let turns = turning_points(stage);
-        let inside = turns.iter().flat_map(|x| [*x, -x]).filter(|x| range.contains(x));
-        for x in [low, high].into_iter().chain(inside) {
-            let slope = virgin_slope(stage, x);
-            softest = if slope < softest.0 { (slope, x) } else { softest };
-            stiffest = if slope > stiffest.0 { (slope, x) } else { stiffest };
-        }
-        Ok([Self::dahl(stage, softest.1)?, Self::dahl(stage, stiffest.1)?])
+        finite("piezo_coefficient", piezo_coefficient, "N/V")?;
+        let rows = [0.0, 1.0, -stiffness / mass, -damping / mass];
+        Self::state_space(&rows, &[0.0, piezo_coefficient / mass], &[1.0, 0.0], 0.0)
     }
 
     /// Matrices of `b.len()` states (8 at most), `a` row by row, in SI: 1/s, 1/(V s), m, m/V
@@ -276,45 +233,6 @@ fn balance(a: &mut DMatrix<f64>) -> DVector<f64> {
         }
     }
     scales
-}
-
-fn second_order(mass: f64, damping: f64, stiffness: f64, force: f64) -> Result<LoopPlant> {
-    finite("piezo_coefficient", force, "N/V")?;
-    let rows = [0.0, 1.0, -stiffness / mass, -damping / mass];
-    LoopPlant::state_space(&rows, &[0.0, force / mass], &[1.0, 0.0], 0.0)
-}
-
-/// dFh/dx on the virgin branch at `x`, N/m.
-fn virgin_slope(stage: &DahlStage, x: f64) -> f64 {
-    let (distance, half) = (x.abs(), 0.5 * stage.a1);
-    let square = stage.a2 - half * half;
-    let root = libm::sqrt(square.abs());
-    let wave = if root * distance < 1e-8 {
-        distance * libm::exp(-half * distance)
-    } else if square > 0.0 {
-        libm::exp(-half * distance) * libm::sin(root * distance) / root
-    } else {
-        // e^(-a1 x/2) sinh(b x)/b, without the overflow of sinh
-        let (slow, fast) = (root - half, -root - half);
-        0.5 * (libm::exp(slow * distance) - libm::exp(fast * distance)) / root
-    };
-    let slope = stage.b1 * stage.up * wave;
-    if x < 0.0 { -slope } else { slope }
-}
-
-/// Distances at which the slope of the virgin branch turns: the first two, the highest there is.
-fn turning_points(stage: &DahlStage) -> Vec<f64> {
-    let half = 0.5 * stage.a1;
-    let square = stage.a2 - half * half;
-    let root = libm::sqrt(square.abs());
-    if square > 0.0 {
-        let first = libm::atan2(root, half) / root;
-        return vec![first, first + core::f64::consts::PI / root];
-    }
-    if root > 0.0 && half > root {
-        return vec![libm::atanh(root / half) / root];
-    }
-    if half > 0.0 && root == 0.0 { vec![1.0 / half] } else { Vec::new() }
 }
 
 /// Refuses a wrong number of entries, and entries that are not finite.

@@ -4,9 +4,9 @@ use piezotrack_control::{Controller, Feedback, Filter, SampledPid, SampledRepeti
 
 use nalgebra::{DMatrix, DVector};
 
-use super::jet::{C, Jet, Ratio};
 use super::plant::LoopPlant;
 use crate::error::{Error, Result, positive};
+use crate::math::{C, Jet, Ratio};
 
 /// Longest chain of delays that is counted exactly, in samples.
 const LONGEST: usize = 1_000_000;

@@ -3,10 +3,10 @@
 
 use core::f64::consts::{PI, TAU};
 
-use super::jet::C;
+use super::argument_principle::Place;
 use super::sampled_loop::{SampledLoop, small};
-use super::walk::Place;
 use crate::error::{Error, Result};
+use crate::math::C;
 
 /// Places on the circle that a search for a stable range of gains may cost, about.
 const EFFORT: usize = 300_000;

@@ -1,84 +1,56 @@
-//! What a guess costs: the RMS deviation of the simulated from the measured displacement.
+//! What a candidate costs: the RMS deviation of the simulated from the measured displacement.
 //!
 //! ```text
 //! f = sqrt(mean((x_i - xhat_i)^2))
 //! ```
 //!
 //! Xu and Li 2010, equation (16), doi 10.1115/1.4001712. Where an offset is fitted, its best
-//! value for each guess is the mean of the deviation, so it costs the swarm no dimension.
+//! value for each candidate is the mean of the deviation, so it costs the swarm no dimension.
 //! Particles run in lockstep lanes, and no trajectory is stored.
 
-use piezotrack_control::operator::{Dahl, DahlState, Operator};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::deviation::{Delayed, Sums};
-use super::model::Model;
-use super::problem::{Problem, Record, Theta};
-use super::stepping;
-use crate::integrate::{Stop, index};
-use crate::lanes::Lanes;
-use crate::march::{FEW_TERMS, March, Order, Stepping, TERMS};
-use crate::mechanics::{Mechanics, Propagator, halvings};
-use crate::stage::feedback::{FeedbackState, Smooth};
-use crate::stage::friction::{Friction, FrictionParameters};
-use crate::stage::{
-    BoucWenKernel, BoucWenOscillatorKernel, Coupling, FirstOrderDahlKernel, Kernel, MOST_PARAMETERS,
+use super::candidate::{Candidate, Theta};
+use super::motion::motion;
+use super::problem::Problem;
+use super::record::Record;
+use super::residual_sums::{Costs, ResidualSums, Residuals};
+use super::step_size;
+use crate::integrator::{
+    FeedbackState, Kernel, MOST_PARAMETERS, March, Mechanics, Stepping, halvings,
 };
+use crate::math::Lanes;
+use crate::models::{Held, KernelVisitor};
+use crate::signal::{Stop, index};
 
-/// Vectors that go through the step together, to hide each other's latency.
-const VECTORS: usize = 3;
-
-/// Parameters to simulate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Guess {
-    /// The parameters, SI.
-    pub theta: Theta,
-    /// The cost, m, beyond which nobody asks how bad the guess is; infinite for none.
-    pub limit: f64,
-}
-
-/// Cost and offset of a guess.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Costs {
-    /// RMS deviation, m; infinite where the simulation blew up. Where the guess was abandoned,
-    /// a lower bound that lies above its limit.
-    pub rms: f64,
-    /// Offset added to the simulated displacement, m.
-    pub offset: f64,
-}
-
-impl Costs {
-    /// What a guess costs that could not be simulated.
-    pub(super) const FAILED: Self = Self { rms: f64::INFINITY, offset: 0.0 };
-}
-
-/// Computes costs of guesses for one problem, with the stepping fixed.
+/// Computes costs of candidates for one problem, with the stepping fixed.
 pub struct Evaluator<'a> {
-    pub(super) record: &'a Record<'a>,
+    residuals: Residuals<'a>,
     problem: &'a Problem,
+    held: Held,
     arch: Arch,
     /// How finely a sampling interval is stepped through.
     pub stepping: Stepping,
     halvings: u32,
-    /// Subtracted from the measured displacement, m, to keep the sums small.
-    pub(super) centre: f64,
 }
 
 impl<'a> Evaluator<'a> {
     /// Fixes the stepping from the bounds, the sampling rate and the drive.
     #[must_use]
     pub fn new(record: &'a Record<'a>, problem: &'a Problem, stop: Stop<'_>) -> Self {
-        let stepping = stepping::choose(record, problem, stop);
-        let rate = stepping::corners(problem).iter().fold(0.0, |most: f64, theta| {
-            let mechanics = Mechanics { mass: theta[0], damping: theta[1], stiffness: theta[2] };
-            most.max(mechanics.rate())
+        let stepping = step_size::choose(record, problem, stop);
+        let rate = step_size::corners(problem).iter().fold(0.0, |most: f64, theta| {
+            let [mass, damping, stiffness, ..] = theta.parameters();
+            most.max(Mechanics { mass, damping, stiffness }.rate())
         });
         let window = &record.y[record.window.clone()];
         let centre =
             if problem.offset { window.iter().sum::<f64>() / index(window.len()) } else { 0.0 };
         let halvings = halvings(rate, record.drive.dt / index(stepping.substeps));
-        Self { record, problem, arch: Arch::new(), stepping, halvings, centre }
+        let (held, arch) = (problem.held(), Arch::new());
+        let residuals = Residuals { record, offset: problem.offset, centre };
+        Self { residuals, problem, held, arch, stepping, halvings }
     }
 
     /// Runs on another instruction set: the costs have the same bits.
@@ -88,53 +60,54 @@ impl<'a> Evaluator<'a> {
         self
     }
 
-    /// Length of a sub-step, s.
-    fn step(&self) -> f64 {
-        self.record.drive.dt / index(self.stepping.substeps)
+    /// Displacement and velocity of a candidate, stepped as its cost is; `None` where they are
+    /// not finite.
+    pub(super) fn motion(&self, theta: &Theta, stop: Stop<'_>) -> Option<[Vec<f64>; 2]> {
+        motion(self.problem.model, theta, &self.residuals.record.drive, self.stepping, stop)
     }
 
-    /// Costs of guesses, in their order, computed on the threads of the present pool.
+    /// Costs of candidates, in their order, computed on the threads of the present pool.
     ///
     /// Those that were not finished when `stop` said so are infinite.
     #[must_use]
-    pub fn costs(&self, guesses: &[Guess], stop: Stop<'_>) -> Vec<Costs> {
-        let width = self.arch.dispatch(Width);
-        // Every thread gets vectors to fill before any gets a second one.
-        let vectors = guesses.len().div_ceil(width);
-        let each = vectors.div_ceil(rayon::current_num_threads()).clamp(1, self.most());
-        let size = guesses.len().div_ceil(vectors.div_ceil(each).max(1)).max(1);
-        guesses.par_chunks(size).flat_map_iter(|chunk| self.bundle(chunk, width, stop)).collect()
-    }
-
-    /// Most vectors in a bundle: a step with friction fills the registers with one, as do most.
-    fn most(&self) -> usize {
-        if self.problem.has_friction() || self.problem.model != Model::Dahl { 1 } else { VECTORS }
-    }
-
-    /// Costs of as many guesses as one bundle of lanes takes.
-    fn bundle(&self, guesses: &[Guess], width: usize, stop: Stop<'_>) -> Vec<Costs> {
-        if guesses.len() <= width {
-            self.arch.dispatch(Bundle::<1> { of: self, guesses, stop })
-        } else {
-            self.arch.dispatch(Bundle::<VECTORS> { of: self, guesses, stop })
-        }
-    }
-
-    /// Cost and offset from the sums of the deviation and of its square.
-    pub(super) fn conclude(&self, sum: f64, squares: f64, samples: usize) -> Costs {
-        let (mean, mean_square) = (sum / index(samples), squares / index(samples));
-        let (variance, offset) = if self.problem.offset {
-            (mean_square - mean * mean, mean + self.centre)
-        } else {
-            (mean_square, 0.0)
-        };
-        if variance.is_finite() && mean.is_finite() {
-            Costs { rms: libm::sqrt(variance.max(0.0)), offset }
-        } else {
-            Costs::FAILED
-        }
+    pub fn costs(&self, candidates: &[Candidate], stop: Stop<'_>) -> Vec<Costs> {
+        let all = All { of: self, candidates, stop };
+        let costs = self.problem.model.kernel(&self.held, self.stepping.order, all);
+        costs.unwrap_or_else(|| vec![Costs::FAILED; candidates.len()])
     }
 }
+
+/// Candidates to be spread over threads and lanes.
+struct All<'a> {
+    of: &'a Evaluator<'a>,
+    candidates: &'a [Candidate],
+    stop: Stop<'a>,
+}
+
+impl<'a> KernelVisitor for All<'a> {
+    type Output = Vec<Costs>;
+
+    fn visit<K: Kernel>(self, kernel: K) -> Vec<Costs> {
+        let Self { of, candidates, stop } = self;
+        let width = of.arch.dispatch(Width);
+        // Every thread gets vectors to fill before any gets a second one.
+        let vectors = candidates.len().div_ceil(width);
+        let each = vectors.div_ceil(rayon::current_num_threads()).clamp(1, K::VECTORS);
+        let size = candidates.len().div_ceil(vectors.div_ceil(each).max(1)).max(1);
+        let bundle = |chunk: &'a [Candidate]| {
+            // Only a kernel that gains by several vectors is compiled for them.
+            if const { K::VECTORS > 1 } && chunk.len() > width {
+                of.arch.dispatch(Bundle::<K, VECTORS> { kernel, of, candidates: chunk, stop })
+            } else {
+                of.arch.dispatch(Bundle::<K, 1> { kernel, of, candidates: chunk, stop })
+            }
+        };
+        candidates.par_chunks(size).flat_map_iter(bundle).collect()
+    }
+}
+
+/// Vectors of a bundle of several.
+const VECTORS: usize = 3;
 
 /// Asks an instruction set for its lanes.
 struct Width;
@@ -147,121 +120,36 @@ impl WithSimd for Width {
     }
 }
 
-/// Guesses in one bundle of lanes.
-pub(super) struct Bundle<'a, const K: usize> {
-    pub of: &'a Evaluator<'a>,
-    pub guesses: &'a [Guess],
-    pub stop: Stop<'a>,
+/// Candidates in one bundle of `V` vectors of lanes.
+struct Bundle<'a, K, const V: usize> {
+    kernel: K,
+    of: &'a Evaluator<'a>,
+    candidates: &'a [Candidate],
+    stop: Stop<'a>,
 }
 
-impl<const K: usize> WithSimd for Bundle<'_, K> {
+impl<K: Kernel, const V: usize> WithSimd for Bundle<'_, K, V> {
     type Output = Vec<Costs>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Vec<Costs> {
-        if self.of.problem.has_friction() {
-            return self.with_friction(simd);
-        }
-        // One vector at most, so that these steps are not compiled for several as well.
-        if K == 1 {
-            let model = self.of.problem.model;
-            let exponent = self.guesses.first().map_or(1.0, |guess| model.exponent(&guess.theta));
-            match model {
-                Model::Dahl => {}
-                Model::BoucWen => return self.kernel(simd, &BoucWenKernel { exponent }),
-                Model::FirstOrderDahl => {
-                    return self.kernel(simd, &FirstOrderDahlKernel { exponent });
-                }
-                Model::BoucWenOscillator => {
-                    return self.kernel(simd, &BoucWenOscillatorKernel { exponent });
-                }
-            }
-        }
-        match self.of.stepping.order {
-            Order::Second => self.smooth::<S, FEW_TERMS, false>(simd),
-            Order::Fourth => self.smooth::<S, TERMS, true>(simd),
-        }
-    }
-}
-
-impl<const K: usize> Bundle<'_, K> {
-    /// A value for each lane; lanes without a guess of their own repeat the last.
-    #[inline(always)]
-    fn lanes<S: Simd>(&self, simd: S, value: impl Fn(&Theta) -> f64) -> Lanes<S, K> {
-        Lanes::gather(simd, |lane| {
-            let guess = self.guesses.get(lane).or(self.guesses.last());
-            guess.map_or(f64::NAN, |guess| value(&guess.theta))
-        })
-    }
-
-    #[inline(always)]
-    fn smooth<S: Simd, const T: usize, const FOURTH: bool>(self, simd: S) -> Vec<Costs> {
-        let linear = Propagator::new(
-            self.lanes(simd, |theta| 1.0 / theta[0]),
-            self.lanes(simd, |theta| theta[1] / theta[0]),
-            self.lanes(simd, |theta| theta[2] / theta[0]),
-            self.of.step(),
-            self.of.halvings,
-        );
-        let operator = Dahl::<_, T> {
-            a1: self.lanes(simd, |theta| theta[4]),
-            a2: self.lanes(simd, |theta| theta[5]),
-            gain: self.lanes(simd, |theta| theta[6] * theta[8]),
-        };
-        let zero = Lanes::splat(simd, 0.0);
-        let start = FeedbackState { x: zero, w: zero, memory: operator.rest() };
-        let gain = self.lanes(simd, |theta| theta[3]);
-        self.march(Smooth::<_, _, FOURTH> { linear, operator }, start, gain)
-    }
-
-    /// Any model that is built from plain parameters.
-    #[inline(always)]
-    fn kernel<S: Simd>(self, simd: S, kernel: &impl Kernel<Lanes<S, K>>) -> Vec<Costs> {
-        let zero = Lanes::splat(simd, 0.0);
+        let Self { kernel, of, candidates, stop } = self;
+        let (drive, substeps) = (&of.residuals.record.drive, of.stepping.substeps);
+        let zero = Lanes::<S, V>::splat(simd, 0.0);
         let mut parameters = [zero; MOST_PARAMETERS];
         for (i, parameter) in parameters.iter_mut().enumerate() {
-            *parameter = self.lanes(simd, |theta| theta[i]);
+            // Lanes without a candidate of their own repeat the last.
+            *parameter = Lanes::gather(simd, |lane| {
+                let candidate = candidates.get(lane).or(candidates.last());
+                candidate.map_or(f64::NAN, |candidate| candidate.theta.0[i])
+            });
         }
-        let coupling = kernel.coupling(&parameters, self.of.step(), self.of.halvings);
+        let step = drive.dt / index(substeps);
+        let (coupling, gain) = kernel.coupling(&parameters, step, of.halvings);
         let start = FeedbackState { x: zero, w: zero, memory: kernel.rest(&parameters) };
-        let gain = kernel.gain(&parameters);
-        self.march(coupling, start, gain)
-    }
-
-    #[inline(always)]
-    fn with_friction<S: Simd>(self, simd: S) -> Vec<Costs> {
-        let parameters = FrictionParameters {
-            mechanics: [0, 1, 2].map(|i| self.lanes(simd, |theta| theta[i])),
-            operator: [4, 5, 8].map(|i| self.lanes(simd, |theta| theta[i])),
-            b1: self.lanes(simd, |theta| theta[6]),
-            b0: self.lanes(simd, |theta| theta[7]),
-        };
-        let coupling = Friction::new(parameters, self.of.step(), self.of.halvings);
-        let zero = Lanes::splat(simd, 0.0);
-        let start = coupling.start(zero, zero, DahlState { force: zero, slope: zero });
-        let gain = self.lanes(simd, |theta| theta[3]);
-        self.march(coupling, start, gain)
-    }
-
-    /// Leads the lanes along the drive and concludes.
-    #[inline(always)]
-    fn march<S: Simd, C: Coupling<Lanes<S, K>>>(
-        self,
-        coupling: C,
-        start: FeedbackState<Lanes<S, K>, C::Memory>,
-        gain: Lanes<S, K>,
-    ) -> Vec<Costs> {
-        let (drive, substeps) = (&self.of.record.drive, self.of.stepping.substeps);
-        let march = March { coupling, gain };
-        let mut sums = Sums::new(&self, start.x);
-        let ended = if self.of.problem.has_delay() {
-            let mut late = Delayed::new(sums, index(substeps));
-            let end = march.run(drive, substeps, start, &mut late);
-            sums = late.sums;
-            end.is_some()
-        } else {
-            march.run(drive, substeps, start, &mut sums).is_some()
-        };
+        let delays = of.problem.has_delay().then(|| index(substeps));
+        let mut sums = ResidualSums::new(&of.residuals, candidates, stop, zero, delays);
+        let ended = March { coupling, gain }.run(drive, substeps, start, &mut sums).is_some();
         sums.conclude(ended)
     }
 }

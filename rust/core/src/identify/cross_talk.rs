@@ -1,9 +1,8 @@
 //! Cross-talk between two axes, from logs in which one of them is driven.
 
-use super::drift::without_drift;
-use crate::contour::check;
 use crate::error::{Error, Result};
-use crate::integrate::index;
+use crate::signal::contour_error::check;
+use crate::signal::{index, without_drift};
 
 /// Slope of what one axis shows while the other moves, and its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,12 +1,13 @@
 //! From a record to an identified stage: the steps in their order.
 
 use super::cost::Evaluator;
-use super::local::{Local, Sensitivity};
-use super::problem::{Problem, Record, Spec};
+use super::levenberg_marquardt::{Local, Sensitivity};
+use super::problem::{Problem, Spec};
+use super::record::Record;
 use super::search::{Monitor, Outcome, Plan, StopReason, search};
 use crate::error::Result;
-use crate::integrate::Stop;
-use crate::march::Stepping;
+use crate::integrator::Stepping;
+use crate::signal::Stop;
 
 /// An identified stage and how it was found.
 #[derive(Clone, Debug)]
@@ -24,7 +25,7 @@ pub struct Identification {
     pub sensitivities: Vec<Sensitivity>,
 }
 
-/// Identifies a Dahl stage from a record: swarms, where asked a polish of each, and the spread.
+/// Identifies a stage from a record: swarms, where asked a polish of each, and the spread.
 ///
 /// # Errors
 /// [`crate::Error::Parameter`] for a specification or setting that cannot be used,

@@ -1,38 +1,37 @@
-//! Identification: which parameters are searched, what a guess costs, and the swarm.
+//! Identification: parameters searched, cost of a candidate, particle swarm, local refinement.
 
 pub mod bounds;
+mod candidate;
+mod coordinate;
 mod cost;
 mod cross_talk;
-mod deviation;
-mod drift;
 mod identification;
-mod line;
-mod local;
-mod model;
-mod nnls;
-mod noise;
-mod plays;
+mod least_squares;
+mod levenberg_marquardt;
+mod motion;
 mod problem;
-mod ringing;
+mod record;
+mod residual_sums;
 mod search;
-mod spectrum;
-mod step;
-mod stepping;
+mod sensor_noise;
+mod step_response;
+mod step_ringing;
+mod step_size;
 mod swarm;
-mod turns;
 
-pub use cost::{Costs, Evaluator, Guess};
+pub use candidate::{Candidate, DELAY, PLACES, Theta};
+pub use coordinate::{Coordinate, Scale};
+pub use cost::Evaluator;
 pub use cross_talk::{CrossTalk, cross_talk};
 pub use identification::{Identification, identify};
-pub use local::{Local, Polished, Sensitivity};
-pub use model::{Facts, Model};
-pub use nnls::{Rows, nnls};
-pub use noise::{Noise, noise_at_rest};
-pub use plays::{DynamicsKind, PlaysFit, PlaysRecord, PlaysSettings, identify_plays};
-pub use problem::{
-    Coordinate, DELAY, Delay, NOMINAL_STIFFNESS, Problem, Record, Scale, Spec, Theta,
+pub use least_squares::{
+    DynamicsKind, LeastSquaresFit, Settings as WeightsSettings, WeightsRecord, identify_weights,
 };
+pub use levenberg_marquardt::{Local, Polished, Sensitivity};
+pub use problem::{Delay, Problem, Spec};
+pub use record::Record;
+pub use residual_sums::Costs;
 pub use search::{Monitor, Outcome, Plan, Progress, StopReason, search};
-pub use step::{Conventional, StepReadings, StepResponse, read_step, separate};
+pub use sensor_noise::{Noise, noise_at_rest};
+pub use step_response::{Conventional, StepReadings, StepResponse, read_step, separate};
 pub use swarm::{Boundary, Swarm, SwarmSettings, Topology, Update};
-pub use turns::turns;

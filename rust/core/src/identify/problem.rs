@@ -1,143 +1,16 @@
-//! What is searched: a record, the parameters held and the parameters free.
-
-use std::ops::Range;
+//! What is searched: the parameters held and the parameters free.
 
 use super::bounds;
-use super::model::Model;
+use super::candidate::{DELAY, PLACES, Theta};
+use super::coordinate::Coordinate;
+use super::record::Record;
 use crate::error::{Error, Result, positive, shown};
-use crate::integrate::{Drive, Hold};
-
-/// A drive and the displacement measured under it.
-#[derive(Clone, Debug)]
-pub struct Record<'a> {
-    /// The drive from the first sample kept, warm-up included.
-    pub drive: Drive<'a>,
-    /// Displacement at the same samples, m.
-    pub y: &'a [f64],
-    /// The samples that count.
-    pub window: Range<usize>,
-}
-
-impl<'a> Record<'a> {
-    /// Checks that the record can tell anything.
-    ///
-    /// # Errors
-    /// [`Error::Shape`] for unequal lengths, [`Error::Parameter`] for a bad `dt`,
-    /// [`Error::Data`] for a constant drive, a dead sensor or too short a window.
-    pub fn new(u: &'a [f64], y: &'a [f64], dt: f64, hold: Hold, start: usize) -> Result<Self> {
-        let drive = Drive::new(u, dt, hold)?;
-        if u.len() != y.len() {
-            return Err(Error::Shape {
-                name: "y".into(),
-                found: format!("{} samples", y.len()),
-                expected: format!("{}, as many as u", u.len()),
-            });
-        }
-        let window = start.min(u.len())..u.len();
-        if window.len() < 10 {
-            return Err(Error::Data(format!(
-                "the window has {} samples: expected at least 10",
-                window.len()
-            )));
-        }
-        let (low, high) = range(&u[window.clone()]);
-        if low >= high {
-            return Err(Error::Data(format!(
-                "the drive is constant at {low} V in the window: expected a drive that moves \
-                 the stage, up and down at least once"
-            )));
-        }
-        let (low, high) = range(&y[window.clone()]);
-        if low >= high {
-            return Err(Error::Data(format!(
-                "the displacement is constant at {low} m in the window while the drive moves: \
-                 the sensor seems dead or not connected"
-            )));
-        }
-        Ok(Self { drive, y, window })
-    }
-
-    /// Range of the displacement in the window, m.
-    #[must_use]
-    pub fn stroke(&self) -> f64 {
-        let (low, high) = range(&self.y[self.window.clone()]);
-        high - low
-    }
-}
-
-/// Smallest and largest value.
-pub(super) fn range(values: &[f64]) -> (f64, f64) {
-    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| {
-        (f64::min(low, v), f64::max(high, v))
-    })
-}
-
-/// How a coordinate of the unit box maps to a parameter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scale {
-    /// Evenly.
-    Linear,
-    /// Evenly in the logarithm.
-    Log,
-}
-
-/// One parameter of the stage in a search.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Coordinate {
-    /// Held at a value.
-    Fixed(f64),
-    /// Searched between two bounds.
-    Free {
-        /// Lower bound, SI.
-        low: f64,
-        /// Upper bound, SI.
-        high: f64,
-        /// Scale of the search.
-        scale: Scale,
-    },
-}
-
-impl Coordinate {
-    /// Free between two bounds; on a logarithmic scale where they are positive and two decades
-    /// or more apart.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] where the bounds are not finite or not in order.
-    pub fn between(name: &str, low: f64, high: f64) -> Result<Self> {
-        if low.is_finite() && high.is_finite() && low < high {
-            let wide = low > 0.0 && high >= 100.0 * low;
-            return Ok(Self::Free {
-                low,
-                high,
-                scale: if wide { Scale::Log } else { Scale::Linear },
-            });
-        }
-        Err(Error::parameter(
-            format!("bounds of {name}"),
-            format!("({}, {})", shown(low), shown(high)),
-            "two finite numbers, the lower one first",
-        ))
-    }
-
-    /// The parameter at a place `z` in [0, 1].
-    #[must_use]
-    pub fn value(&self, z: f64) -> f64 {
-        match *self {
-            Self::Fixed(value) => value,
-            Self::Free { low, high, scale: Scale::Linear } => {
-                (low + (high - low) * z).clamp(low, high)
-            }
-            Self::Free { low, high, scale: Scale::Log } => {
-                // Not log(high / low), which can overflow where the bounds do not.
-                let (from, to) = (libm::log(low), libm::log(high));
-                libm::exp(from + z * (to - from)).clamp(low, high)
-            }
-        }
-    }
-}
+use crate::integrator::MOST_PARAMETERS;
+use crate::models::{FoundBy, Held, Model, NOMINAL_STIFFNESS, position};
+use crate::signal::index;
 
 /// What the caller asked for.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Spec {
     /// The kind of stage.
     pub model: Model,
@@ -153,6 +26,22 @@ pub struct Spec {
     pub offset: bool,
     /// Time by which the displacement is late, s.
     pub delay: Delay,
+}
+
+impl Spec {
+    /// All that is not held by default is searched; no offset, no delay.
+    #[must_use]
+    pub fn of(model: Model) -> Self {
+        Self {
+            model,
+            free: None,
+            fixed: Vec::new(),
+            bounds: Vec::new(),
+            stiffness: None,
+            offset: false,
+            delay: Delay::default(),
+        }
+    }
 }
 
 /// Delay between drive and displacement.
@@ -175,11 +64,11 @@ impl Default for Delay {
 impl Delay {
     /// The coordinate of the search.
     fn coordinate(self, record: &Record<'_>) -> Result<Coordinate> {
-        let length = record.drive.dt * crate::integrate::index(record.drive.u.len());
+        let length = record.drive.dt * index(record.drive.u.len());
         let (low, high) = match self {
             Self::Fixed(value) => (value, value),
             Self::Fitted => {
-                return Coordinate::between("delay", 0.0, bounds::longest_delay(record));
+                return Coordinate::between("delay", 0.0, bounds::measures(record).longest_delay());
             }
             Self::Between(low, high) => (low, high),
         };
@@ -199,30 +88,24 @@ impl Delay {
     }
 }
 
-/// Parameters in the order of [`Model::facts`], 0 for those that the model does not have, and
-/// after them the delay, s.
-pub type Theta = [f64; 10];
-
-/// Index of the delay in [`Theta`].
-pub const DELAY: usize = 9;
-
-/// Stiffness held where nothing in the input fixes a force, N/m.
-pub const NOMINAL_STIFFNESS: f64 = 1e6;
-
 /// A search made definite.
 #[derive(Clone, Debug)]
 pub struct Problem {
     /// The kind of stage.
     pub model: Model,
     /// One for each place in [`Theta`].
-    pub coordinates: [Coordinate; 10],
+    pub coordinates: [Coordinate; PLACES],
     /// Whether the stiffness is nominal because nothing fixes a force.
     pub scale_assumed: bool,
     /// Whether an offset is fitted.
     pub offset: bool,
 }
 
-const STIFFNESS: usize = 2;
+/// A value for each scalar parameter, where there is one.
+type Fixed = [Option<f64>; MOST_PARAMETERS];
+
+/// Parameters that are searched.
+type Free = [bool; MOST_PARAMETERS];
 
 impl Problem {
     /// Settles which parameters are free, and between which bounds.
@@ -232,11 +115,19 @@ impl Problem {
     /// that is both fixed and free or has no value, and where all the parameters that carry
     /// force are free.
     pub fn new(record: &Record<'_>, spec: &Spec) -> Result<Self> {
+        let infos = spec.model.info().parameters;
+        if spec.model.found_by() != FoundBy::Swarm {
+            let found = format!("'{}'", spec.model.info().name);
+            return Err(Error::parameter("model", found, "one that a swarm searches"));
+        }
         let mut fixed = fixed_values(spec)?;
         let free = free_parameters(spec, &mut fixed)?;
-        let forces = spec.model.facts().forces;
-        let holds_scale =
-            forces.is_empty() || forces.iter().any(|&i| fixed[i].is_some_and(|value| value != 0.0));
+        let has_scale = infos.iter().any(|info| info.carries_force);
+        let holds_scale = !has_scale
+            || infos
+                .iter()
+                .zip(&fixed)
+                .any(|(info, value)| info.carries_force && value.is_some_and(|v| v != 0.0));
         let mut scale_assumed = false;
         if !holds_scale {
             let asked =
@@ -245,19 +136,19 @@ impl Problem {
                 return Err(Error::parameter(
                     "free",
                     "every parameter that carries force",
-                    "one of them held: voltage and displacement fix only their ratios \
+                    "one of them held: voltage and displacement determine only their ratios \
                      (give stiffness=, or name one in fixed=)",
                 ));
             }
-            fixed[STIFFNESS] = Some(NOMINAL_STIFFNESS);
+            fixed[position(infos, "stiffness", "stiffness")?] = Some(NOMINAL_STIFFNESS);
             scale_assumed = true;
         }
         check_fixed(spec.model, &fixed)?;
-        let mut coordinates = [Coordinate::Fixed(0.0); 10];
+        let mut coordinates = [Coordinate::Fixed(0.0); PLACES];
         coordinates[..DELAY].copy_from_slice(&bounds::derive(record, spec.model, &fixed)?);
         coordinates[DELAY] = spec.delay.coordinate(record)?;
         for (name, (low, high)) in &spec.bounds {
-            let i = parameter(spec.model, "bounds", name)?;
+            let i = position(infos, "bounds", name)?;
             if !free[i] {
                 return Err(Error::parameter(
                     format!("bounds of {name}"),
@@ -290,19 +181,26 @@ impl Problem {
     #[must_use]
     pub fn theta(&self, place: &[f64]) -> Theta {
         let mut places = place.iter();
-        self.coordinates.map(|coordinate| match coordinate {
+        Theta(self.coordinates.map(|coordinate| match coordinate {
             Coordinate::Fixed(value) => value,
             Coordinate::Free { .. } => coordinate.value(places.next().copied().unwrap_or(0.5)),
-        })
+        }))
     }
 
-    /// Whether any guess has dry friction.
+    /// The parameters that all candidates share.
     #[must_use]
-    pub fn has_friction(&self) -> bool {
-        self.model == Model::Dahl && self.coordinates[7] != Coordinate::Fixed(0.0)
+    pub fn held(&self) -> Held {
+        let mut held = Held::defaults(self.model.info().parameters);
+        for (slot, coordinate) in held.values.iter_mut().zip(&self.coordinates) {
+            *slot = match coordinate {
+                Coordinate::Fixed(value) => Some(*value),
+                Coordinate::Free { .. } => None,
+            };
+        }
+        held
     }
 
-    /// Whether any guess is late.
+    /// Whether any candidate has a delay.
     #[must_use]
     pub fn has_delay(&self) -> bool {
         self.coordinates[DELAY] != Coordinate::Fixed(0.0)
@@ -315,95 +213,75 @@ impl Problem {
             return Err(Error::parameter("free", "empty", "at least one parameter to search"));
         }
         for corner in [0.0, 1.0] {
-            self.model.check(&self.theta(&vec![corner; count]))?;
+            self.model.check(&self.theta(&vec![corner; count]).parameters())?;
         }
         Ok(())
     }
 }
 
 /// Values of `fixed=` and `stiffness=`, with the model's defaults.
-fn fixed_values(spec: &Spec) -> Result<[Option<f64>; 9]> {
-    let facts = spec.model.facts();
-    let mut fixed: [Option<f64>; 9] = [None; 9];
+fn fixed_values(spec: &Spec) -> Result<Fixed> {
+    let infos = spec.model.info().parameters;
+    let mut fixed: Fixed = [None; MOST_PARAMETERS];
     for (name, value) in &spec.fixed {
-        let i = parameter(spec.model, "fixed", name)?;
-        let unit = facts.parameters[i].unit;
-        fixed[i] = Some(crate::error::finite(&format!("fixed {name}"), *value, unit)?);
+        let i = position(infos, "fixed", name)?;
+        fixed[i] = Some(crate::error::finite(&format!("fixed {name}"), *value, infos[i].unit)?);
     }
     if let Some(stiffness) = spec.stiffness {
         positive("stiffness", stiffness, "N/m")?;
-        if fixed[STIFFNESS].is_some_and(|value| value.to_bits() != stiffness.to_bits()) {
+        let i = position(infos, "stiffness", "stiffness")?;
+        if fixed[i].is_some_and(|value| value.to_bits() != stiffness.to_bits()) {
             return Err(Error::parameter(
                 "stiffness",
                 format!("{stiffness} N/m"),
                 "the value given for it in fixed=, or only one of the two",
             ));
         }
-        fixed[STIFFNESS] = Some(stiffness);
+        fixed[i] = Some(stiffness);
     }
-    for &(i, value) in facts.defaults {
-        fixed[i] = fixed[i].or(Some(value));
-    }
-    for missing in &mut fixed[facts.parameters.len()..] {
-        *missing = Some(0.0);
+    let defaults = Held::defaults(infos).values;
+    for (value, default) in fixed.iter_mut().zip(defaults) {
+        *value = value.or(default);
     }
     Ok(fixed)
 }
 
 /// Refuses held values with which no stage exists, by their own names.
-fn check_fixed(model: Model, fixed: &[Option<f64>; 9]) -> Result<()> {
-    let mut theta = [1.0; 10];
-    for &(i, value) in model.facts().defaults {
-        theta[i] = value;
-    }
-    for (value, held) in theta.iter_mut().zip(fixed) {
-        *value = held.unwrap_or(*value);
-    }
-    model.check(&theta)?;
-    if model == Model::Dahl && theta[8] == 0.0 {
-        return Err(Error::parameter("up", 0, "a value other than 0: without it no hysteresis"));
-    }
-    Ok(())
+fn check_fixed(model: Model, fixed: &Fixed) -> Result<()> {
+    let defaults = Held::defaults(model.info().parameters).values;
+    let value = |i: usize| fixed[i].or(defaults[i]).unwrap_or(1.0);
+    model.check(&core::array::from_fn(value))
 }
 
 /// Which parameters are searched; each of the others must have a value.
-fn free_parameters(spec: &Spec, fixed: &mut [Option<f64>; 9]) -> Result<[bool; 9]> {
+fn free_parameters(spec: &Spec, fixed: &mut Fixed) -> Result<Free> {
     let Some(names) = &spec.free else {
         return Ok(fixed.map(|value| value.is_none()));
     };
-    let mut free = [false; 9];
+    let infos = spec.model.info().parameters;
+    let mut free: Free = [false; MOST_PARAMETERS];
     for name in names {
-        let i = parameter(spec.model, "free", name)?;
-        if spec.fixed.iter().any(|(other, _)| other == name)
-            || (i == STIFFNESS && fixed[i].is_some())
-        {
+        let i = position(infos, "free", name)?;
+        let given = spec.fixed.iter().any(|(other, _)| other == name);
+        if given || (name == "stiffness" && fixed[i].is_some()) {
             return Err(Error::parameter("free", name, "a parameter that is not fixed as well"));
         }
-        if let Some((_, reason)) = spec.model.facts().held.iter().find(|(held, _)| *held == i) {
-            return Err(Error::parameter("free", name, *reason));
+        if let Some(reason) = infos[i].held {
+            return Err(Error::parameter("free", name, reason));
         }
         free[i] = true;
         fixed[i] = None;
     }
-    for i in 0..9 {
-        let scale = i == STIFFNESS && !spec.model.facts().forces.is_empty();
+    for (i, info) in infos.iter().enumerate() {
+        // The stiffness may still be assumed.
+        let scale = info.name == "stiffness" && info.carries_force;
         if !free[i] && fixed[i].is_none() && !scale {
-            let name = spec.model.facts().parameters[i].name;
             return Err(Error::parameter(
                 "free",
                 names.join(", "),
-                format!("{name} as well, or a value for it in fixed="),
+                format!("{} as well, or a value for it in fixed=", info.name),
             ));
         }
     }
     Ok(free)
-}
-
-/// Index of a parameter by its name.
-fn parameter(model: Model, argument: &str, name: &str) -> Result<usize> {
-    let parameters = model.facts().parameters;
-    parameters.iter().position(|info| info.name == name).ok_or_else(|| {
-        let names: Vec<&str> = parameters.iter().map(|info| info.name).collect();
-        Error::parameter(argument, format!("'{name}'"), format!("one of {}", names.join(", ")))
-    })
 }

@@ -1,10 +1,13 @@
 //! The whole search: a swarm, its costs, its stop criteria.
 
-use super::cost::{Costs, Evaluator, Guess};
-use super::problem::{Problem, Theta};
+use super::candidate::Candidate;
+use super::candidate::Theta;
+use super::cost::Evaluator;
+use super::problem::Problem;
+use super::residual_sums::Costs;
 use super::swarm::{Swarm, SwarmSettings};
 use crate::error::{Error, Result};
-use crate::integrate::Stop;
+use crate::signal::Stop;
 use std::ops::ControlFlow;
 
 /// Why a search ended.
@@ -48,7 +51,7 @@ impl<F: FnMut(&Progress) -> ControlFlow<()>> Monitor for F {
 /// What one run of a search found.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// Parameters of the best guess, SI.
+    /// Parameters of the best candidate, SI.
     pub theta: Theta,
     /// Its place in the unit box.
     pub place: Vec<f64>,
@@ -120,17 +123,17 @@ impl Run {
     }
 
     /// What the swarm wants to know now; nothing once it has ended.
-    fn guesses(&self, problem: &Problem) -> Vec<Guess> {
+    fn candidates(&self, problem: &Problem) -> Vec<Candidate> {
         if self.reason.is_some() {
             return Vec::new();
         }
         let asked = self.swarm.ask().zip(self.swarm.limits());
         asked
-            .filter_map(|(place, limit)| Some(Guess { theta: problem.theta(place?), limit }))
+            .filter_map(|(place, limit)| Some(Candidate { theta: problem.theta(place?), limit }))
             .collect()
     }
 
-    /// Takes the costs of its guesses, in their order.
+    /// Takes the costs of its candidates, in their order.
     fn tell(&mut self, costs: &[Costs]) {
         self.evaluations += costs.len();
         self.failures += costs.iter().filter(|costs| costs.rms.is_infinite()).count();
@@ -174,7 +177,7 @@ impl Run {
 /// A run gives the same bits whatever the other runs, the threads and the instruction set.
 ///
 /// # Errors
-/// [`Error::Parameter`] for settings that cannot be used, [`Error::Numerical`] where no guess
+/// [`Error::Parameter`] for settings that cannot be used, [`Error::Numerical`] where no candidate
 /// could be simulated.
 pub fn search(
     evaluator: &Evaluator<'_>,
@@ -190,7 +193,7 @@ pub fn search(
         runs.map(|run| Run::new(&plan.settings, coordinates, plan.seed, run)).collect();
     let mut runs = runs?;
     while runs.iter().any(|run| run.reason.is_none()) {
-        let asked: Vec<Vec<Guess>> = runs.iter().map(|run| run.guesses(problem)).collect();
+        let asked: Vec<Vec<Candidate>> = runs.iter().map(|run| run.candidates(problem)).collect();
         let costs = evaluator.costs(&asked.concat(), stop);
         if stop() {
             break;

@@ -1,9 +1,10 @@
 //! A continuous plant under a sampled controller.
 
-use super::clock::{Clock, Commands, Delay, Event, Timing, events};
-use super::{Apparatus, ApparatusState, Plant, Stretch, instants, still_finite};
+use super::apparatus::{Apparatus, ApparatusState, Stretch, instants, still_finite};
+use super::timing::{Clock, Commands, Delay, Event, Timing, events};
 use crate::error::{Error, Result};
-use crate::integrate::{Stop, index};
+use crate::models::Plant;
+use crate::signal::{Stop, index};
 
 /// A controlled apparatus, `(samples - 1) substeps + 1` instants of it.
 ///
@@ -41,9 +42,8 @@ struct Part<F> {
 /// had at the start. With a delay of 0 a command acts at once, and shows in the next reading.
 ///
 /// ```
-/// use piezotrack_core::integrate::NEVER;
-/// use piezotrack_core::simulate::{Timing, closed_loop};
-/// use piezotrack_core::stage::VirtualStage;
+/// use piezotrack_core::signal::NEVER;
+/// use piezotrack_core::simulate::{Timing, VirtualStage, closed_loop};
 ///
 /// # fn main() -> piezotrack_core::Result<()> {
 /// let stage = VirtualStage::xu_li_2010(1);

@@ -5,183 +5,27 @@
 //! ```
 
 mod amplifier;
-mod clock;
+mod apparatus;
+mod axis;
 mod closed_loop;
 mod open_loop;
-mod plant;
 mod sensor;
+mod timing;
 mod tracking;
 mod two_axes;
+mod virtual_stage;
 
 pub use amplifier::{Amplifier, AmplifierFlow};
-pub use clock::Timing;
+pub use apparatus::{Apparatus, ApparatusState};
+pub use axis::{Axis, AxisFlow, AxisState};
 pub use closed_loop::{ClosedLoop, closed_loop};
 pub use open_loop::{OpenLoop, open_loop};
-pub use plant::{DahlFlow, KernelFlow, Plant};
 pub use sensor::{Sensor, SensorState};
+pub use timing::Timing;
 pub use tracking::{Course, Law, LawState, MOST_STATES, Tracked, track};
 pub use two_axes::{
     TwoAxes, TwoLogs, TwoMotions, TwoStates, TwoTracked, closed_loops, open_loops, track_both,
 };
-
-use pulp::{Simd, WithSimd};
-
-use crate::error::{Error, Result, positive};
-use crate::integrate::index;
-
-/// A plant between its amplifier and its sensor.
-#[derive(Clone, Copy, Debug)]
-pub struct Apparatus<'a, P> {
-    /// What is moved.
-    pub plant: &'a P,
-    /// What turns the command into the applied voltage.
-    pub amplifier: Amplifier,
-    /// What reads the displacement.
-    pub sensor: Sensor,
-    /// Longest step of the simulation, s.
-    pub step: f64,
-}
-
-/// All that an apparatus remembers: an experiment can go on from it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ApparatusState<S> {
-    /// State of the plant.
-    pub plant: S,
-    /// Command that the amplifier follows, V.
-    pub command: f64,
-    /// Voltage that it gives, V.
-    pub applied: f64,
-    /// State of the sensor.
-    pub sensor: SensorState,
-}
-
-/// Most steps of the simulation in one interval: beyond any use, and answered within a second.
-const MOST_STEPS: f64 = 1e7;
-
-/// Most instants of an experiment that are kept.
-const MOST_INSTANTS: usize = 100_000_000;
-
-impl<'a, P: Plant> Apparatus<'a, P> {
-    /// A plant with nothing around it: the command is applied, the displacement read as it is.
-    ///
-    /// `step` is the longest step of the simulation, s.
-    #[must_use]
-    pub fn bare(plant: &'a P, step: f64) -> Self {
-        Self { plant, amplifier: Amplifier::IDEAL, sensor: Sensor::IDEAL, step }
-    }
-
-    /// The state before any command, with the sensor at 0.
-    #[must_use]
-    pub fn rest(&self) -> ApparatusState<P::State> {
-        let applied = self.amplifier.within_limits(0.0);
-        let sensor = SensorState::default();
-        ApparatusState { plant: self.plant.rest(), command: 0.0, applied, sensor }
-    }
-
-    /// True displacement from the sensor's zero, m.
-    #[must_use]
-    pub fn displacement(&self, state: &ApparatusState<P::State>) -> f64 {
-        self.plant.displacement(&state.plant) - state.sensor.zero
-    }
-
-    /// Reads the sensor `interval` seconds after the last reading, m.
-    pub fn read(&self, state: &mut ApparatusState<P::State>, interval: f64) -> f64 {
-        self.read_beside(state, 0.0, interval)
-    }
-
-    /// As [`Self::read`], with `other` m of another axis in what the sensor sees.
-    fn read_beside(&self, state: &mut ApparatusState<P::State>, other: f64, interval: f64) -> f64 {
-        let seen = self.plant.displacement(&state.plant) + other;
-        self.sensor.read(&mut state.sensor, seen, interval)
-    }
-
-    /// Checks amplifier, sensor and step.
-    fn validate(&self) -> Result<()> {
-        positive("step", self.step, "s")?;
-        self.amplifier.validate()?;
-        self.sensor.validate()
-    }
-
-    /// All that a stretch of `duration` seconds decides, cut into equal steps.
-    fn stretch(&self, duration: f64) -> Result<Stretch<P::Flow>> {
-        let wanted = (duration / self.step * (1.0 - 1e-12)).ceil().max(1.0);
-        if wanted > MOST_STEPS {
-            return Err(Error::parameter(
-                "step",
-                format!("{:e} s", self.step),
-                format!("{:e} s or more: at most {MOST_STEPS} steps fit", duration / MOST_STEPS),
-            ));
-        }
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 1e7")]
-        let steps = wanted as usize;
-        let step = duration / wanted;
-        let (plant, amplifier) = (self.plant.flow(step), self.amplifier.flow(step));
-        Ok(Stretch { steps, plant, amplifier })
-    }
-
-    /// Leads the apparatus along a stretch whose command goes straight from `from` to `to`, V.
-    fn lead(
-        &self,
-        stretch: &Stretch<P::Flow>,
-        state: &mut ApparatusState<P::State>,
-        from: f64,
-        to: f64,
-    ) {
-        pulp::Arch::new().dispatch(Lead { apparatus: self, stretch, state, from, to });
-    }
-}
-
-/// A stretch of time, in equal steps.
-#[derive(Clone, Copy, Debug)]
-struct Stretch<F> {
-    steps: usize,
-    plant: F,
-    amplifier: AmplifierFlow,
-}
-
-/// One way along a stretch; dispatched for the fused multiply-add instruction.
-struct Lead<'a, P: Plant> {
-    apparatus: &'a Apparatus<'a, P>,
-    stretch: &'a Stretch<P::Flow>,
-    state: &'a mut ApparatusState<P::State>,
-    from: f64,
-    to: f64,
-}
-
-impl<P: Plant> WithSimd for Lead<'_, P> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) {
-        let Self { apparatus, stretch, state, from, to } = self;
-        let part = (to - from) / index(stretch.steps);
-        let mut before = from;
-        for j in 1..=stretch.steps {
-            let after = if j == stretch.steps { to } else { part.mul_add(index(j), from) };
-            let (low, high) =
-                apparatus.amplifier.advance(&stretch.amplifier, state.applied, before, after);
-            apparatus.plant.advance(&stretch.plant, &mut state.plant, low, high);
-            state.applied = high;
-            before = after;
-        }
-        state.command = to;
-    }
-}
-
-/// Refuses more instants than memory should hold.
-fn instants(name: &str, count: Option<usize>) -> Result<usize> {
-    count.filter(|&count| count <= MOST_INSTANTS).ok_or_else(|| {
-        Error::parameter(name, "too many", format!("{MOST_INSTANTS} instants at most"))
-    })
-}
-
-/// Refuses a displacement that is not finite, reached at `time`, s.
-fn still_finite(displacement: f64, time: f64) -> Result<f64> {
-    if displacement.is_finite() {
-        return Ok(displacement);
-    }
-    Err(Error::Numerical(format!(
-        "the simulated displacement is not finite at {time:.6} s: check that the plant's \
-         parameters are in SI units, or that the loop is stable"
-    )))
-}
+pub use virtual_stage::{
+    DEAD_ZONES, PLAYS, RELAXATIONS, StagePlay, VirtualSettings, VirtualStage, VirtualState,
+};

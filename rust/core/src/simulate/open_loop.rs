@@ -1,8 +1,9 @@
 //! A drive without feedback: what a log is made of.
 
-use super::{Apparatus, ApparatusState, Plant, Stretch, instants, still_finite};
+use super::apparatus::{Apparatus, ApparatusState, Stretch, instants, still_finite};
 use crate::error::{Result, finite};
-use crate::integrate::{Drive, Stop, index};
+use crate::models::Plant;
+use crate::signal::{Drive, Stop, index};
 
 /// An apparatus at the samples of its drive.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! The displacement sensor: noise of a bandwidth, a smallest step, a range, a zero.
 
 use crate::error::{Error, Result, not_negative};
-use crate::random::Draws;
+use crate::math::Draws;
 
 /// A displacement sensor.
 ///

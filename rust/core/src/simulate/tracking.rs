@@ -5,10 +5,13 @@ use piezotrack_control::{
     StateSpaceState,
 };
 
-use super::{Apparatus, ApparatusState, ClosedLoop, Plant, Timing, closed_loop};
+use super::apparatus::{Apparatus, ApparatusState};
+use super::closed_loop::{ClosedLoop, closed_loop};
+use super::timing::Timing;
 use crate::design::LinearFeedback;
 use crate::error::{Error, Result};
-use crate::integrate::Stop;
+use crate::models::Plant;
+use crate::signal::Stop;
 
 /// Most states of a feedback law in state space.
 pub const MOST_STATES: usize = 16;

@@ -9,13 +9,14 @@
 
 use piezotrack_control::{Command, Controller, Feedback};
 
-use super::clock::{Clock, Commands, Delay, Event, SAMPLES, Timing, events};
-use super::closed_loop::{Record, checked};
-use super::open_loop::{BLOCK, checked as checked_drive, since};
-use super::tracking::{Leader, Tracked};
-use super::{Apparatus, ApparatusState, ClosedLoop, Course, OpenLoop, Plant, Stretch};
+use super::apparatus::{Apparatus, ApparatusState, Stretch};
+use super::closed_loop::{ClosedLoop, Record, checked};
+use super::open_loop::{BLOCK, OpenLoop, checked as checked_drive, since};
+use super::timing::{Clock, Commands, Delay, Event, SAMPLES, Timing, events};
+use super::tracking::{Course, Leader, Tracked};
 use crate::error::{Error, Result, finite, not_negative};
-use crate::integrate::{Drive, Stop, index};
+use crate::models::Plant;
+use crate::signal::{Drive, Stop, index};
 
 /// Two axes on one platform, under one computer.
 ///
@@ -319,9 +320,8 @@ pub fn track_both<X: Plant, Y: Plant, F: Feedback, G: Feedback>(
 /// Both sensors are read at once, at the samples of the drives.
 ///
 /// ```
-/// use piezotrack_core::integrate::{Drive, Hold, NEVER};
-/// use piezotrack_core::simulate::{TwoAxes, open_loops};
-/// use piezotrack_core::stage::VirtualStage;
+/// use piezotrack_core::signal::{Drive, Hold, NEVER};
+/// use piezotrack_core::simulate::{TwoAxes, VirtualStage, open_loops};
 ///
 /// # fn main() -> piezotrack_core::Result<()> {
 /// let (x, y) = (VirtualStage::xu_li_2010(1), VirtualStage::xu_li_2010_y(1));

@@ -20,7 +20,7 @@ mod update;
 pub use settings::{Boundary, SwarmSettings, Topology, Update};
 
 use crate::error::{Error, Result};
-use crate::random::Draws;
+use crate::math::Draws;
 use topology::{Links, leaders};
 
 /// A place in the unit box and what it cost.

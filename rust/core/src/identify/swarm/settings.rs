@@ -166,8 +166,8 @@ impl SwarmSettings {
         if iteration > self.inertia_iterations || self.inertia_iterations < 2 {
             return end;
         }
-        let passed = crate::integrate::index(iteration - 1);
-        let span = crate::integrate::index(self.inertia_iterations - 1);
+        let passed = crate::signal::index(iteration - 1);
+        let span = crate::signal::index(self.inertia_iterations - 1);
         start + (end - start) * passed / span
     }
 }

@@ -1,7 +1,7 @@
 //! Who tells whom: the best place that draws a particle besides its own.
 
 use super::{Best, Particle, Topology};
-use crate::random::Draws;
+use crate::math::Draws;
 
 /// Particles that one informs, itself aside: K of Clerc 2012, hal-00764996.
 const INFORMED: usize = 3;

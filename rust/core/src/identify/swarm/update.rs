@@ -1,7 +1,7 @@
 //! How a particle moves.
 
 use super::{Best, Boundary, Particle, SwarmSettings, Update};
-use crate::random::Draws;
+use crate::math::Draws;
 
 impl Particle {
     /// Moves on, drawn by its own best place and its leader's.

@@ -1,0 +1,168 @@
+//! Creep of a piezo actuator: first-order relaxations in parallel with a direct path.
+//!
+//! ```text
+//! d = h + sum_j c_j q_j,   tau_j q_j' = h - q_j
+//! ```
+//!
+//! h is the output of the hysteresis operator, d the displacement, both in m. A sum of relaxations
+//! is the linear creep operator of Krejci and Kuhnen 2001, IEE Proceedings - Control Theory and
+//! Applications 148(3), 185-192, doi 10.1049/ip-cta:20010375. With time constants a decade apart
+//! and about equal shares the creep grows nearly with the logarithm of time, as that of
+//! piezoceramics does.
+//!
+//! The input is taken to be a straight line from sample to sample (first-order hold). For such an
+//! input the step of length T is exact, with `r = h1 - h0` and `p = exp(-T/tau)`:
+//!
+//! ```text
+//! q1 = h1 - (p (h0 - q0 - r tau/T) + r tau/T)
+//! ```
+//!
+//! The relaxations are passed as slices, so that a model with room for more of them (the
+//! simulation's) and one of fixed size (the firmware's) run the same code.
+
+use crate::error::{Error, Result, not_negative, positive};
+
+/// One relaxation of the creep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Creep {
+    /// Displacement that it adds after a long time, as a share of the immediate one, c.
+    pub share: f64,
+    /// Time constant tau, s.
+    pub time: f64,
+}
+
+/// A first-order lag discretised for one step length; see [`Lag::step`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lag {
+    /// exp(-T/tau).
+    decay: f64,
+    /// tau/T.
+    ratio: f64,
+}
+
+impl Lag {
+    /// The lag with time constant `time` (s) for steps of `step` seconds.
+    #[must_use]
+    pub fn new(time: f64, step: f64) -> Self {
+        Self { decay: libm::exp(-step / time), ratio: time / step }
+    }
+
+    /// The output after one step; `output` is that before it. The input goes in a straight line,
+    /// by `rise`, to `end`. Output, `end` and `rise` have the same unit.
+    #[must_use]
+    #[inline(always)]
+    pub fn step(&self, output: f64, end: f64, rise: f64) -> f64 {
+        // Behind a ramp the output lags by `trail` in the end; the rest of the gap decays.
+        let trail = rise * self.ratio;
+        end - ((end - rise - output - trail) * self.decay + trail)
+    }
+}
+
+/// State of the creep: its input, and the output of each relaxation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CreepState<const N: usize> {
+    /// Input h, m.
+    pub input: f64,
+    /// Output of each relaxation, q, m.
+    pub reached: [f64; N],
+}
+
+impl<const N: usize> Default for CreepState<N> {
+    fn default() -> Self {
+        Self { input: 0.0, reached: [0.0; N] }
+    }
+}
+
+/// The displacement d (m) for the input h (m) and the outputs q (m) of the relaxations.
+#[must_use]
+#[inline(always)]
+pub fn output(relaxations: &[Creep], input: f64, reached: &[f64]) -> f64 {
+    let crept = relaxations.iter().zip(reached);
+    crept.fold(input, |sum, (creep, reached)| sum + creep.share * reached)
+}
+
+/// One step of every relaxation, in which the input goes in a straight line from `from` to `to`, m.
+#[inline(always)]
+pub fn advance(lags: &[Lag], reached: &mut [f64], from: f64, to: f64) {
+    let rise = to - from;
+    for (reached, lag) in reached.iter_mut().zip(lags) {
+        *reached = lag.step(*reached, to, rise);
+    }
+}
+
+/// Exact inverse of up to `N` relaxations for one sampling interval: displacement in, input out.
+///
+/// The displacement at the end of a step is linear in the input there, d1 = f + g h1, where f
+/// follows from the state and g is a constant.
+///
+/// ```
+/// use piezotrack_control::creep::{Creep, CreepInverse, CreepState};
+///
+/// let creep = [Creep { share: 0.01, time: 0.1 }, Creep { share: 0.01, time: 1.0 }];
+/// let inverse = CreepInverse::<2>::new(&creep, 1e-3)?;
+/// let mut state = CreepState::default();
+/// let at_once = inverse.jump(&mut state, 10e-6);
+/// assert_eq!(at_once, 10e-6);
+/// // To hold the displacement, the input falls as the creep grows.
+/// assert!(inverse.step(&mut state, 10e-6) < at_once);
+/// # Ok::<(), piezotrack_control::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CreepInverse<const N: usize> {
+    creep: [Creep; N],
+    lags: [Lag; N],
+    /// How many of them are in use.
+    count: usize,
+    /// g.
+    gain: f64,
+}
+
+impl<const N: usize> CreepInverse<N> {
+    /// The inverse of these relaxations for samples every `dt` seconds.
+    ///
+    /// # Errors
+    /// Names `creep` where there are more than `N`; `creep_shares`, `creep_times` or `dt` where
+    /// one is out of its range.
+    pub fn new(creep: &[Creep], dt: f64) -> Result<Self> {
+        positive("dt", dt, "s")?;
+        if creep.len() > N {
+            let value = u32::try_from(creep.len()).map_or(f64::INFINITY, f64::from);
+            let expected = "at most as many relaxations as the inverse has room for";
+            return Err(Error { name: "creep", value, unit: "entries", expected });
+        }
+        let mut used = [Creep { share: 0.0, time: 1.0 }; N];
+        for (slot, one) in used.iter_mut().zip(creep) {
+            slot.share = not_negative("creep_shares", one.share, "")?;
+            slot.time = positive("creep_times", one.time, "s")?;
+        }
+        let lags = used.map(|one| Lag::new(one.time, dt));
+        let mut gain = 1.0;
+        for (one, lag) in used.iter().zip(&lags).take(creep.len()) {
+            gain += one.share * lag.step(0.0, 1.0, 1.0);
+        }
+        Ok(Self { creep: used, lags, count: creep.len(), gain })
+    }
+
+    /// The input (m) at the end of the next step for which the displacement is `target` (m) there.
+    #[inline]
+    pub fn step(&self, state: &mut CreepState<N>, target: f64) -> f64 {
+        let used = self.creep.iter().zip(&self.lags).zip(&state.reached).take(self.count);
+        let fixed = used.fold(0.0, |sum, ((creep, lag), &reached)| {
+            sum + creep.share * lag.step(reached, 0.0, -state.input)
+        });
+        let input = (target - fixed) / self.gain;
+        let lags = self.lags.get(..self.count).unwrap_or_default();
+        advance(lags, &mut state.reached, state.input, input);
+        state.input = input;
+        input
+    }
+
+    /// The input (m) for which the displacement jumps to `target` (m), without time to creep.
+    #[inline]
+    pub fn jump(&self, state: &mut CreepState<N>, target: f64) -> f64 {
+        let used = self.creep.get(..self.count).unwrap_or_default();
+        let input = target - output(used, 0.0, &state.reached);
+        state.input = input;
+        input
+    }
+}

@@ -1,0 +1,321 @@
+//! The Bouc-Wen operator: drive in, hysteretic part out.
+//!
+//! ```text
+//! h' = A u' - beta |u'| h |h|^(n-1) - gamma u' |h|^n
+//! ```
+//!
+//! Xu and Li 2010, equation (20), doi 10.1115/1.4001712, with A = alpha d; after Bouc 1967 and
+//! Wen 1976. Along a monotone section of the path time drops out. With p the length of the path
+//! and z the output counted positive in the direction of motion,
+//!
+//! ```text
+//! dz/dp = A - kappa z |z|^(n-1),   kappa = beta + sgn(z) gamma
+//! ```
+//!
+//! For n = 1 the solution is an exponential in p up to the point where z changes sign, which has
+//! a closed form too, and another exponential beyond it. For any other exponent the equation is
+//! integrated in short Runge-Kutta steps of fourth order.
+
+use core::cmp::Ordering;
+
+use super::{Facing, Operator};
+use crate::Number;
+
+/// Bouc-Wen operator.
+///
+/// It is passive only for |gamma| <= beta. It is bounded only for beta + gamma > 0, by
+/// (A/(beta + gamma))^(1/n).
+///
+/// | field | symbol | unit | range |
+/// | --- | --- | --- | --- |
+/// | `rise` | A | output per input | any |
+/// | `beta` | beta | 1 over input and output^(n-1) | any, >= 0 to be passive |
+/// | `gamma` | gamma | as beta | any, within +-beta to be passive |
+/// | `exponent` | n | 1 | >= 1 |
+///
+/// ```
+/// use piezotrack_control::hysteresis::{BoucWen, Operator};
+///
+/// let hysteresis = BoucWen { rise: 1.0, beta: 0.5, gamma: 0.5, exponent: 1.0 };
+/// let up = hysteresis.branch(&hysteresis.rest(), 1.0);
+/// let there = hysteresis.along(&up, 2.0);
+/// assert!((there.value - (1.0 - (-2.0_f64).exp())).abs() < 1e-15);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoucWen<N> {
+    /// Slope where the output is 0, A.
+    pub rise: N,
+    /// Coefficient of the dissipative term, beta.
+    pub beta: N,
+    /// Coefficient of the non-dissipative term, gamma.
+    pub gamma: N,
+    /// Exponent n, the sharpness of the transition to saturation; the same for all lanes.
+    pub exponent: f64,
+}
+
+/// State of the operator: its output and the slope.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoucWenState<N> {
+    /// Output, h.
+    pub value: N,
+    /// Slope of the output along the path that led here.
+    pub slope: N,
+}
+
+/// A state about to be left in one direction.
+#[derive(Clone, Copy, Debug)]
+pub struct BoucWenBranch<N> {
+    /// Output counted along the direction.
+    pub(super) along: N,
+    pub(super) direction: N,
+}
+
+/// Longest piece with n = 1, times the rate: the series below are summed for it.
+const PIECE: f64 = 0.5;
+/// Terms of the exponential's series: the next is below 0.5^14 / 15! = 5e-17.
+const TERMS: usize = 14;
+/// Terms of the logarithm's series: the next is below 0.25^26 / 27 = 1e-17.
+const LOG_TERMS: usize = 13;
+/// Longest piece with another exponent, times the rate: an error of 1e-8 of the change.
+const SHORT_PIECE: f64 = 0.02;
+/// Most pieces with n = 1: e^-40 of the distance to the limit is left after them.
+const MOST_PIECES: usize = 80;
+/// Most pieces with another exponent.
+const MOST_SHORT_PIECES: usize = 2000;
+
+impl<N: Number> BoucWen<N> {
+    /// The output, counted along the direction of motion, after a path of length `length`.
+    #[inline(always)]
+    fn lead(&self, z: N, length: N) -> N {
+        if self.is_exact() {
+            return self.lead_exact(z, length);
+        }
+        let n = self.exponent;
+        let arguments = [z, length, self.rise, self.beta, self.gamma];
+        N::lanewise(arguments, move |[z, length, rise, beta, gamma]| {
+            Bend { rise, beta, gamma, n }.lead(z, length)
+        })
+    }
+
+    #[inline(always)]
+    fn is_exact(&self) -> bool {
+        (self.exponent - 1.0).abs() <= 0.0
+    }
+
+    /// n = 1, in pieces short enough for the series to converge: mostly one piece.
+    #[inline(always)]
+    fn lead_exact(&self, mut z: N, length: N) -> N {
+        let rate = magnitude(self.beta) + magnitude(self.gamma);
+        let longest = rate.like(PIECE) / rate;
+        let mut left = length;
+        for _ in 0..MOST_PIECES {
+            let more = (left - longest).where_negative(left, longest);
+            z = self.piece(z, more);
+            left = left - more;
+            if !(-left).any_negative() {
+                return z;
+            }
+        }
+        // A bounded output has reached its limit by now; any other grows without bound.
+        let kappa = self.side(z, longest).mul_add(self.gamma, self.beta);
+        let moving = magnitude(kappa.mul_add(-z, self.rise) * longest);
+        let still = magnitude(z).mul_add(z.like(-1e-9), moving - z.like(f64::MIN_POSITIVE));
+        (-left).where_negative(still.where_negative(z, z.like(f64::INFINITY)), z)
+    }
+
+    /// n = 1 over one piece: an exponential up to the sign change of z, another one beyond it.
+    #[inline(always)]
+    fn piece(&self, z: N, length: N) -> N {
+        let side = self.side(z, length);
+        let kappa = side.mul_add(self.gamma, self.beta);
+        let slope = kappa.mul_add(-z, self.rise);
+        let end = (slope * length).mul_add(growth(-(kappa * length)), z);
+        let crossed = side * end;
+        if !crossed.any_negative() {
+            return end;
+        }
+        // Where z = 0: 1 - exp(-kappa p) = -kappa z / slope
+        let reach = -(z / slope);
+        let zero_at = reach * logarithm(-(kappa * reach));
+        let rest = length - zero_at;
+        let kappa = self.beta - side * self.gamma;
+        let beyond = (self.rise * rest) * growth(-(kappa * rest));
+        crossed.where_negative(beyond, end)
+    }
+
+    /// dz/dp at the beginning of a path of length `length`.
+    #[inline(always)]
+    fn slope(&self, z: N, length: N) -> N {
+        let kappa = self.side(z, length).mul_add(self.gamma, self.beta);
+        if self.is_exact() {
+            return kappa.mul_add(-z, self.rise);
+        }
+        let n = self.exponent;
+        N::lanewise([z, kappa, self.rise], move |[z, kappa, rise]| {
+            Bend { rise, beta: kappa, gamma: 0.0, n }.slope(z, kappa)
+        })
+    }
+
+    /// Sign of z at the beginning of a move; where z = 0, its sign right after the beginning.
+    #[inline(always)]
+    fn side(&self, z: N, length: N) -> N {
+        let ahead = (self.rise * length).mul_add(z.like(1e-12), z);
+        ahead.where_negative(z.like(-1.0), z.like(1.0))
+    }
+}
+
+impl<N: Number> Operator<N> for BoucWen<N> {
+    type State = BoucWenState<N>;
+    type Branch = BoucWenBranch<N>;
+
+    #[inline(always)]
+    fn rest(&self) -> BoucWenState<N> {
+        BoucWenState { value: self.rise.like(0.0), slope: self.rise }
+    }
+
+    #[inline(always)]
+    fn output(&self, state: &BoucWenState<N>) -> (N, N) {
+        (state.value, state.slope)
+    }
+
+    #[inline(always)]
+    fn branch(&self, state: &BoucWenState<N>, direction: N) -> BoucWenBranch<N> {
+        BoucWenBranch { along: direction * state.value, direction }
+    }
+
+    #[inline(always)]
+    fn along(&self, branch: &BoucWenBranch<N>, distance: N) -> BoucWenState<N> {
+        let BoucWenBranch { along, direction } = *branch;
+        let length = direction * distance;
+        let z = self.lead(along, length);
+        BoucWenState { value: direction * z, slope: self.slope(z, length) }
+    }
+}
+
+impl<N: Number> Facing<N> for BoucWen<N> {
+    #[inline(always)]
+    fn facing(&self, state: &BoucWenState<N>, distance: N, direction: N) -> BoucWenState<N> {
+        BoucWenState { slope: self.slope(direction * state.value, direction * distance), ..*state }
+    }
+}
+
+/// The operator with an exponent other than 1, for scalars.
+#[derive(Clone, Copy)]
+struct Bend {
+    rise: f64,
+    beta: f64,
+    gamma: f64,
+    n: f64,
+}
+
+impl Bend {
+    /// Runge-Kutta steps of fourth order along the path, their length limited by the decay rate.
+    /// The distance to a sign change of z is found by quadrature over z.
+    #[inline(never)]
+    fn lead(self, mut z: f64, length: f64) -> f64 {
+        let mut left = length;
+        for _ in 0..MOST_SHORT_PIECES {
+            let side = if z + 1e-12 * self.rise * left < 0.0 { -1.0 } else { 1.0 };
+            let kappa = self.beta + side * self.gamma;
+            // The rate where |z| is largest: here, or at the limit that it tends to.
+            let here = kappa.abs() * libm::pow(z.abs(), self.n - 1.0);
+            let share = 1.0 / self.n;
+            let limit = libm::pow(self.rise.abs(), 1.0 - share) * libm::pow(kappa.abs(), share);
+            let longest = SHORT_PIECE / (self.n * here.max(limit));
+            let more = if left < longest { left } else { longest };
+            z = self.piece(z, more, side, kappa);
+            left -= more;
+            // Written so that NaN ends the loop too.
+            if left.partial_cmp(&0.0) != Some(Ordering::Greater) {
+                return z;
+            }
+        }
+        // A bounded output has reached its limit by now; any other grows without bound.
+        let kappa = self.beta + if z < 0.0 { -self.gamma } else { self.gamma };
+        if (self.slope(z, kappa) * left).abs() <= 1e-4 * z.abs() { z } else { f64::INFINITY }
+    }
+
+    fn piece(self, z: f64, length: f64, side: f64, kappa: f64) -> f64 {
+        let end = self.runge_kutta(z, length, kappa);
+        if side * end >= 0.0 {
+            return end;
+        }
+        // dp/dz is smooth between z and 0: Boole's rule.
+        let slowness = |part: f64| 1.0 / self.slope(z * part, kappa);
+        let sum = 7.0 * (slowness(1.0) + slowness(0.0))
+            + 32.0 * (slowness(0.75) + slowness(0.25))
+            + 12.0 * slowness(0.5);
+        let rest = length + z * sum / 90.0;
+        self.runge_kutta(0.0, rest, self.beta - side * self.gamma)
+    }
+
+    fn runge_kutta(self, z: f64, length: f64, kappa: f64) -> f64 {
+        let k1 = self.slope(z, kappa);
+        let k2 = self.slope(z + 0.5 * length * k1, kappa);
+        let k3 = self.slope(z + 0.5 * length * k2, kappa);
+        let k4 = self.slope(z + length * k3, kappa);
+        z + length / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+    }
+
+    /// dz/dp.
+    fn slope(self, z: f64, kappa: f64) -> f64 {
+        self.rise - kappa * z * libm::pow(z.abs(), self.n - 1.0)
+    }
+}
+
+/// (e^x - 1)/x for |x| up to [`PIECE`].
+#[inline(always)]
+fn growth<N: Number>(x: N) -> N {
+    let mut sum = x.like(RECIPROCAL_FACTORIAL[TERMS]);
+    for k in (1..TERMS).rev() {
+        sum = sum.mul_add(x, x.like(RECIPROCAL_FACTORIAL[k]));
+    }
+    sum
+}
+
+/// ln(1 + y)/y for y from e^-0.5 - 1 to e^0.5 - 1, by ln(1 + y) = 2 artanh(y/(2 + y)).
+#[inline(always)]
+fn logarithm<N: Number>(y: N) -> N {
+    let below = y + y.like(2.0);
+    let w = y / below;
+    let square = w * w;
+    let mut sum = y.like(RECIPROCAL_ODD[LOG_TERMS - 1]);
+    for k in (0..LOG_TERMS - 1).rev() {
+        sum = sum.mul_add(square, y.like(RECIPROCAL_ODD[k]));
+    }
+    sum * y.like(2.0) / below
+}
+
+#[inline(always)]
+fn magnitude<N: Number>(value: N) -> N {
+    value.where_negative(-value, value)
+}
+
+/// 1/k!
+const RECIPROCAL_FACTORIAL: [f64; TERMS + 1] = reciprocal_factorials();
+
+const fn reciprocal_factorials() -> [f64; TERMS + 1] {
+    let mut out = [1.0; TERMS + 1];
+    let (mut k, mut number, mut product) = (1, 1.0, 1.0);
+    while k <= TERMS {
+        product *= number;
+        out[k] = 1.0 / product;
+        number += 1.0;
+        k += 1;
+    }
+    out
+}
+
+/// 1/(2 k + 1)
+const RECIPROCAL_ODD: [f64; LOG_TERMS] = reciprocal_odds();
+
+const fn reciprocal_odds() -> [f64; LOG_TERMS] {
+    let mut out = [1.0; LOG_TERMS];
+    let (mut k, mut odd) = (0, 1.0);
+    while k < LOG_TERMS {
+        out[k] = 1.0 / odd;
+        odd += 2.0;
+        k += 1;
+    }
+    out
+}

@@ -1,0 +1,136 @@
+//! The first-order Dahl operator: displacement in, friction force out.
+//!
+//! ```text
+//! dF/dx = sigma |1 - F sgn(x')/Fc|^i sgn(1 - F sgn(x')/Fc)
+//! ```
+//!
+//! Dahl 1968, "A solid friction model", Aerospace Corporation TOR-0158(3107-18)-1, and Dahl 1976,
+//! equation (1), doi 10.2514/3.61511. With w = 1 - F sgn(x')/Fc, the normalised distance to the
+//! Coulomb force in the direction of motion, and p the length of the path,
+//!
+//! ```text
+//! dw/dp = -(sigma/Fc) |w|^i sgn(w)
+//! ```
+//!
+//! This has a closed form for every i: an exponential for i = 1, a power for any other i. The
+//! force stays within +-Fc, the influence of the initial state decays along the path, and loops
+//! close.
+
+use super::{BoucWen, BoucWenBranch, BoucWenState, Facing, Operator};
+use crate::Number;
+
+/// First-order Dahl operator.
+///
+/// | field | symbol | unit | range |
+/// | --- | --- | --- | --- |
+/// | `rest_stiffness` | sigma | N/m | >= 0 |
+/// | `coulomb_force` | Fc | N | > 0 |
+/// | `exponent` | i | 1 | >= 0 |
+///
+/// ```
+/// use piezotrack_control::hysteresis::{FirstOrderDahl, Operator};
+///
+/// let friction = FirstOrderDahl { rest_stiffness: 2.0, coulomb_force: 4.0, exponent: 1.0 };
+/// let up = friction.branch(&friction.rest(), 1.0);
+/// let there = friction.along(&up, 3.0);
+/// assert!((there.value - 4.0 * (1.0 - (-1.5_f64).exp())).abs() < 1e-15);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FirstOrderDahl<N> {
+    /// Slope where the force is 0, sigma.
+    pub rest_stiffness: N,
+    /// Coulomb force Fc, reached after a long path in one direction.
+    pub coulomb_force: N,
+    /// Exponent i, the shape of the transition; the same for all lanes.
+    pub exponent: f64,
+}
+
+impl<N: Number> FirstOrderDahl<N> {
+    /// The operator for i = 1: Bouc-Wen hysteresis with gamma = 0.
+    #[inline(always)]
+    fn exponential(&self) -> BoucWen<N> {
+        let beta = self.rest_stiffness / self.coulomb_force;
+        let gamma = beta.like(0.0);
+        BoucWen { rise: self.rest_stiffness, beta, gamma, exponent: 1.0 }
+    }
+
+    #[inline(always)]
+    fn is_exponential(&self) -> bool {
+        (self.exponent - 1.0).abs() <= 0.0
+    }
+
+    /// dF/dx at a force counted along the direction of motion.
+    #[inline(always)]
+    fn slope(&self, force: N) -> N {
+        let i = self.exponent;
+        N::lanewise([force, self.rest_stiffness, self.coulomb_force], move |[f, sigma, limit]| {
+            sigma * power(1.0 - f / limit, i)
+        })
+    }
+}
+
+impl<N: Number> Operator<N> for FirstOrderDahl<N> {
+    type State = BoucWenState<N>;
+    type Branch = BoucWenBranch<N>;
+
+    #[inline(always)]
+    fn rest(&self) -> BoucWenState<N> {
+        self.exponential().rest()
+    }
+
+    #[inline(always)]
+    fn output(&self, state: &BoucWenState<N>) -> (N, N) {
+        (state.value, state.slope)
+    }
+
+    #[inline(always)]
+    fn branch(&self, state: &BoucWenState<N>, direction: N) -> BoucWenBranch<N> {
+        BoucWenBranch { along: direction * state.value, direction }
+    }
+
+    #[inline(always)]
+    fn along(&self, branch: &BoucWenBranch<N>, distance: N) -> BoucWenState<N> {
+        if self.is_exponential() {
+            return self.exponential().along(branch, distance);
+        }
+        let BoucWenBranch { along, direction } = *branch;
+        let i = self.exponent;
+        let arguments = [along, direction * distance, self.rest_stiffness, self.coulomb_force];
+        let force = N::lanewise(arguments, move |[f, length, sigma, limit]| {
+            let left = 1.0 - f / limit;
+            // In this form a path of length 0 leaves the force unchanged to the last bit.
+            f + limit * (left - remainder(left, sigma * length / limit, i))
+        });
+        BoucWenState { value: direction * force, slope: self.slope(force) }
+    }
+}
+
+impl<N: Number> Facing<N> for FirstOrderDahl<N> {
+    #[inline(always)]
+    fn facing(&self, state: &BoucWenState<N>, distance: N, direction: N) -> BoucWenState<N> {
+        if self.is_exponential() {
+            return self.exponential().facing(state, distance, direction);
+        }
+        BoucWenState { slope: self.slope(direction * state.value), ..*state }
+    }
+}
+
+/// |w|^i sgn(w), 0 at the limit also for i = 0.
+fn power(w: f64, i: f64) -> f64 {
+    let share = if w.abs() > 0.0 { libm::pow(w.abs(), i) } else { 0.0 };
+    libm::copysign(share, w)
+}
+
+/// w after a path of `length` times Fc/sigma that begins at w = `left`, for i other than 1.
+fn remainder(left: f64, length: f64, i: f64) -> f64 {
+    let size = left.abs();
+    if size <= 0.0 {
+        return left;
+    }
+    // |w|^(1-i) falls by (1 - i) length; below 0 the limit has been reached.
+    let change = (i - 1.0) * libm::pow(size, i - 1.0) * length;
+    if change <= -1.0 {
+        return 0.0;
+    }
+    left * libm::exp(libm::log1p(change) / (1.0 - i))
+}

@@ -1,0 +1,153 @@
+//! Modified Prandtl-Ishlinskii operator: weighted play operators followed by dead-zone operators.
+//!
+//! ```text
+//! z_i = max(u - r_i, min(u + r_i, z_i))           play (backlash) of threshold r_i
+//! v   = w_0 u + sum_i w_i z_i                      Prandtl-Ishlinskii
+//! y   = v + sum_j s_j max(v - d_j, 0)              one-sided dead zones
+//! ```
+//!
+//! Kuhnen 2003, European Journal of Control 9(4), 407-418, doi 10.3166/ejc.9.407-418, with
+//! one-sided dead zones of the form max(v - d, 0) only: a piezo driven from 0 V up needs no
+//! others. Play operators alone give loops with point symmetry; the dead zones, which have no
+//! memory, make the loops asymmetric.
+
+use super::Operator;
+use crate::Number;
+
+/// Modified Prandtl-Ishlinskii operator with `PLAYS` play operators and `ZONES` dead zones.
+///
+/// ```
+/// use piezotrack_control::hysteresis::{Operator, Play};
+///
+/// let play = Play { linear: 0.0, thresholds: [3.0], weights: [1.0], corners: [], bends: [] };
+/// let mut state = play.rest();
+/// assert_eq!(play.follow(&mut state, 10.0), 7.0);
+/// assert_eq!(play.follow(&mut state, 5.0), 7.0); // the backlash is 6 wide
+/// assert_eq!(play.follow(&mut state, 0.0), 3.0);
+/// ```
+///
+/// It is strictly increasing, and so has an inverse, where `linear` and all partial sums of
+/// 1 + `bends` are positive and no weight is negative.
+///
+/// The unit of the output is free; it is written Y here: V, or m for a stage.
+///
+/// | field | symbol | unit | range |
+/// | --- | --- | --- | --- |
+/// | `linear` | w0 | Y/V | > 0 |
+/// | `thresholds` | r | V | >= 0, ascending |
+/// | `weights` | w | Y/V | >= 0 |
+/// | `corners` | d | Y | ascending |
+/// | `bends` | s | 1 | partial sums above -1 |
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Play<N, const PLAYS: usize, const ZONES: usize> {
+    /// Gain of the path without memory, w0: the slope right after a reversal.
+    pub linear: N,
+    /// Threshold of each play operator, half the width of its backlash, r, V.
+    pub thresholds: [N; PLAYS],
+    /// Weight of each play operator, w.
+    pub weights: [N; PLAYS],
+    /// Threshold of each dead zone, d, in the unit of the output.
+    pub corners: [N; ZONES],
+    /// Weight of each dead zone: the change of the slope at its threshold, s.
+    pub bends: [N; ZONES],
+}
+
+/// State of the operator: its input, the output of each play operator, and the slope.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlayState<N, const PLAYS: usize> {
+    /// Input, V.
+    pub input: N,
+    /// Output of each play operator, V.
+    pub plays: [N; PLAYS],
+    /// Slope of the weighted sum along the path that led here.
+    pub slope: N,
+}
+
+/// A state about to be left in one direction.
+#[derive(Clone, Copy, Debug)]
+pub struct PlayBranch<N, const PLAYS: usize> {
+    from: PlayState<N, PLAYS>,
+    direction: N,
+}
+
+impl<N: Number, const PLAYS: usize, const ZONES: usize> Play<N, PLAYS, ZONES> {
+    /// Moves the input to `input` (V) and returns the output.
+    ///
+    /// Exact for a step of any length, provided that the input is monotone within it.
+    #[inline(always)]
+    pub fn follow(&self, state: &mut PlayState<N, PLAYS>, input: N) -> N {
+        let distance = input - state.input;
+        let branch = self.branch(state, distance.where_negative(-one(input), one(input)));
+        // The input itself, not the old one plus the difference, which may be rounded.
+        *state = self.at(&branch, input);
+        self.output(state).0
+    }
+
+    /// The state where the input has become `input`.
+    #[inline(always)]
+    fn at(&self, branch: &PlayBranch<N, PLAYS>, input: N) -> PlayState<N, PLAYS> {
+        let zero = input.like(0.0);
+        let mut plays = branch.from.plays;
+        let mut slope = self.linear;
+        for (i, play) in plays.iter_mut().enumerate() {
+            let (low, high) = (input - self.thresholds[i], input + self.thresholds[i]);
+            *play = larger(low, smaller(high, *play));
+            // A play moves with the input where it touches the side that pushes it.
+            let gap = branch.direction.where_negative(*play - high, low - *play);
+            slope = slope + gap.where_negative(zero, self.weights[i]);
+        }
+        PlayState { input, plays, slope }
+    }
+}
+
+impl<N: Number, const PLAYS: usize, const ZONES: usize> Operator<N> for Play<N, PLAYS, ZONES> {
+    type State = PlayState<N, PLAYS>;
+    type Branch = PlayBranch<N, PLAYS>;
+
+    #[inline(always)]
+    fn rest(&self) -> PlayState<N, PLAYS> {
+        let zero = self.linear.like(0.0);
+        PlayState { input: zero, plays: [zero; PLAYS], slope: self.linear }
+    }
+
+    #[inline(always)]
+    fn output(&self, state: &PlayState<N, PLAYS>) -> (N, N) {
+        let mut value = self.linear * state.input;
+        for (weight, play) in self.weights.iter().zip(&state.plays) {
+            value = value + *weight * *play;
+        }
+        let zero = value.like(0.0);
+        let (mut bent, mut factor) = (value, one(value));
+        for (corner, bend) in self.corners.iter().zip(&self.bends) {
+            let beyond = value - *corner;
+            bent = bent + beyond.where_negative(zero, *bend * beyond);
+            factor = factor + beyond.where_negative(zero, *bend);
+        }
+        (bent, factor * state.slope)
+    }
+
+    #[inline(always)]
+    fn branch(&self, state: &PlayState<N, PLAYS>, direction: N) -> PlayBranch<N, PLAYS> {
+        PlayBranch { from: *state, direction }
+    }
+
+    #[inline(always)]
+    fn along(&self, branch: &PlayBranch<N, PLAYS>, distance: N) -> PlayState<N, PLAYS> {
+        self.at(branch, branch.from.input + distance)
+    }
+}
+
+#[inline(always)]
+fn one<N: Number>(like: N) -> N {
+    like.like(1.0)
+}
+
+#[inline(always)]
+fn larger<N: Number>(a: N, b: N) -> N {
+    (a - b).where_negative(b, a)
+}
+
+#[inline(always)]
+fn smaller<N: Number>(a: N, b: N) -> N {
+    (a - b).where_negative(a, b)
+}

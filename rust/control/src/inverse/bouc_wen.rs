@@ -1,0 +1,147 @@
+//! Feedforward: the inverse of the Bouc-Wen stage, sample by sample.
+//!
+//! ```text
+//! d u - h(u) = y,   y = (m xd'' + b xd' + k xd)/k
+//! ```
+//!
+//! from Xu and Li 2010, equations (19) and (20), doi 10.1115/1.4001712. The hysteresis h depends
+//! on the drive u, so this is an implicit equation for u. Along a monotone section its left side
+//! is a monotone function of u, and a few Newton steps solve it. Between two samples y is taken
+//! to be monotone.
+
+use super::Inverse;
+use crate::error::{Result, check, finite, not_negative, positive, usable};
+use crate::hysteresis::{BoucWen, BoucWenState, Operator};
+
+/// Parameters of the inverse of a Bouc-Wen stage.
+///
+/// | field | symbol | unit | range |
+/// | --- | --- | --- | --- |
+/// | `mass`, `damping`, `stiffness` | m, b, k | kg, N s/m, N/m | >= 0, >= 0, > 0 |
+/// | `piezo_coefficient` | d | m/V | not 0 |
+/// | `alpha` | alpha | 1 | below 1, and see [`BoucWenInverse::new`] |
+/// | `beta`, `gamma` | beta, gamma | 1/(V m^(n-1)) | beta + gamma >= 0, beta >= gamma |
+/// | `exponent` | n | 1 | >= 1 |
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoucWenInverse {
+    mass: f64,
+    damping: f64,
+    stiffness: f64,
+    piezo_coefficient: f64,
+    operator: BoucWen<f64>,
+}
+
+impl BoucWenInverse {
+    /// The inverse of the stage with these parameters, in SI units.
+    ///
+    /// # Errors
+    /// Names the parameter that is out of its range. `alpha` is refused where the left side of
+    /// the equation is not increasing: the slope of the hysteresis, relative to d, is alpha at
+    /// h = 0 and 2 alpha beta/(beta + gamma) after a reversal in saturation; both must stay
+    /// below 1.
+    #[expect(clippy::too_many_arguments, reason = "the stage's eight numbers, in their order")]
+    pub fn new(
+        mass: f64,
+        damping: f64,
+        stiffness: f64,
+        piezo_coefficient: f64,
+        alpha: f64,
+        beta: f64,
+        gamma: f64,
+        exponent: f64,
+    ) -> Result<Self> {
+        finite("piezo_coefficient", piezo_coefficient, "m/V")?;
+        let right = piezo_coefficient.abs() > 0.0;
+        check("piezo_coefficient", piezo_coefficient, "m/V", right, "a value other than 0")?;
+        finite("beta", beta, "1/V")?;
+        finite("gamma", gamma, "1/V")?;
+        let passive = gamma.abs() <= beta;
+        check("gamma", gamma, "1/V", passive, "a value within +-beta, for an inverse")?;
+        let limit = beta + gamma;
+        let steepest = if limit > 0.0 { 2.0 * alpha * beta / limit } else { alpha };
+        let right = finite("alpha", alpha, "")?.max(steepest) < 1.0;
+        let expected = "alpha and 2 alpha beta/(beta + gamma) below 1, for an inverse";
+        check("alpha", alpha, "", right && alpha >= 0.0, expected)?;
+        let right = exponent >= 1.0 && exponent.is_finite();
+        check("exponent", exponent, "", right, "a finite number, 1 or above")?;
+        Ok(Self {
+            mass: not_negative("mass", mass, "kg")?,
+            damping: not_negative("damping", damping, "N s/m")?,
+            stiffness: positive("stiffness", stiffness, "N/m")?,
+            piezo_coefficient,
+            operator: BoucWen { rise: alpha * piezo_coefficient, beta, gamma, exponent },
+        })
+    }
+
+    /// The state for a stage at rest that never moved.
+    #[must_use]
+    pub fn rest(&self) -> BoucWenInverseState {
+        BoucWenInverseState { u: 0.0, memory: self.operator.rest() }
+    }
+
+    /// The voltage for displacement `x` (m), velocity `v` (m/s) and acceleration `a` (m/s^2) of
+    /// the reference.
+    ///
+    /// NaN, with the state unchanged, where an input is not finite (or beyond 1e100) or the
+    /// iteration did not converge; a controller holds its feedforward then.
+    #[inline]
+    pub fn step(&self, state: &mut BoucWenInverseState, x: f64, v: f64, a: f64) -> f64 {
+        if !(usable(x) && usable(v) && usable(a)) {
+            return f64::NAN;
+        }
+        let d = self.piezo_coefficient;
+        let wanted = (self.mass * a + self.damping * v) / self.stiffness + x;
+        let rise = wanted - (d * state.u - state.memory.value);
+        // The change of u without hysteresis: a lower bound of its size, for alpha >= 0.
+        let plain = rise / d;
+        let direction = if plain < 0.0 { -1.0 } else { 1.0 };
+        let branch = self.operator.branch(&state.memory, direction);
+        let (mut low, mut high) = (0.0, f64::INFINITY);
+        let mut way = plain.abs();
+        for _ in 0..MOST_TRIES {
+            let there = self.operator.along(&branch, direction * way);
+            let short = rise - (d * direction * way - (there.value - state.memory.value));
+            if !short.is_finite() {
+                return f64::NAN;
+            }
+            let done = short.abs() <= 1e-15 * (wanted.abs() + (d * state.u).abs());
+            if short / d * direction > 0.0 {
+                low = way;
+            } else {
+                high = way;
+            }
+            let newton = way + short / (d - there.slope) * direction;
+            let inside = newton > low && newton < high;
+            let next = if inside { newton } else { 0.5 * (low + high.min(2.0 * way + 1.0)) };
+            if done || (next - way).abs() <= 1e-15 * (way + state.u.abs()) {
+                *state = BoucWenInverseState { u: state.u + direction * way, memory: there };
+                return state.u;
+            }
+            way = next;
+        }
+        f64::NAN
+    }
+}
+
+/// Most iterations: Newton steps, or bisection where a Newton step leaves the bracket.
+const MOST_TRIES: usize = 100;
+
+/// State of a [`BoucWenInverse`]: the last drive (V) and the state of the operator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoucWenInverseState {
+    u: f64,
+    memory: BoucWenState<f64>,
+}
+
+impl Inverse for BoucWenInverse {
+    type State = BoucWenInverseState;
+
+    fn rest(&self) -> Self::State {
+        self.rest()
+    }
+
+    #[inline]
+    fn step(&self, state: &mut Self::State, x: f64, v: f64, a: f64) -> f64 {
+        self.step(state, x, v, a)
+    }
+}

@@ -1,0 +1,167 @@
+//! Feedforward: the inverse of a stage whose hysteresis acts on the displacement, sample by sample.
+//!
+//! ```text
+//! uFF = (M xd'' + D xd' + K xd + F(xd))/T
+//! ```
+//!
+//! Xu and Li 2010, equation (21), doi 10.1115/1.4001712, for first-order Dahl friction and the
+//! Bouc-Wen oscillator: the force F depends on the path of the reference only, so the inverse is
+//! explicit. Reversals between two samples are treated as in [`crate::DahlInverse`].
+
+use super::Inverse;
+use crate::cubic_segment::{is_straight, legs};
+use crate::error::{Result, check, finite, not_negative, positive, usable};
+use crate::hysteresis::{BoucWen, BoucWenState, FirstOrderDahl, Operator};
+use crate::unfused::Plain;
+
+/// Inverse of a stage with first-order Dahl friction.
+pub type FirstOrderDahlInverse = FeedbackInverse<FirstOrderDahl<Plain>>;
+
+/// Inverse of a Bouc-Wen oscillator; its drive is a force, N.
+pub type OscillatorInverse = FeedbackInverse<BoucWen<Plain>>;
+
+/// Inverse of a stage with the operator `O` in feedback, for one sampling interval.
+///
+/// ```
+/// use piezotrack_control::FirstOrderDahlInverse;
+///
+/// let inverse = FirstOrderDahlInverse::new(0.18, 50.0, 2.6e4, 0.0468, (1e4, 0.3, 1.0), 2e-4)?;
+/// let mut state = inverse.rest();
+/// let volts = inverse.step(&mut state, 1e-6, 0.0, 0.0);
+/// assert!(volts > 2.6e4 * 1e-6 / 0.0468);
+/// # Ok::<(), piezotrack_control::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct FeedbackInverse<O> {
+    /// M/T, D/T and K/T.
+    inertia: f64,
+    damping: f64,
+    stiffness: f64,
+    /// T, N for one unit of the drive.
+    gain: f64,
+    operator: O,
+    dt: f64,
+}
+
+/// State of a [`FeedbackInverse`]: the last sample of the reference and the operator's state.
+#[derive(Clone, Copy, Debug)]
+pub struct FeedbackInverseState {
+    x: f64,
+    /// x' times the sampling interval, m; `None` before the first sample.
+    w: Option<f64>,
+    memory: BoucWenState<Plain>,
+}
+
+impl FirstOrderDahlInverse {
+    /// The inverse of the stage with this mass (kg), damping (N s/m), stiffness (N/m) and piezo
+    /// coefficient (N/V), and with rest stiffness (N/m), Coulomb force (N) and exponent of the
+    /// friction, for samples every `dt` seconds.
+    ///
+    /// # Errors
+    /// Names the parameter that is out of its range.
+    pub fn new(
+        mass: f64,
+        damping: f64,
+        stiffness: f64,
+        piezo_coefficient: f64,
+        (rest_stiffness, coulomb_force, exponent): (f64, f64, f64),
+        dt: f64,
+    ) -> Result<Self> {
+        finite("piezo_coefficient", piezo_coefficient, "N/V")?;
+        let right = piezo_coefficient.abs() > 0.0;
+        check("piezo_coefficient", piezo_coefficient, "N/V", right, "a value other than 0")?;
+        let operator = FirstOrderDahl {
+            rest_stiffness: Plain(not_negative("rest_stiffness", rest_stiffness, "N/m")?),
+            coulomb_force: Plain(positive("coulomb_force", coulomb_force, "N")?),
+            exponent: not_negative("exponent", exponent, "")?,
+        };
+        Self::with([mass, damping, stiffness], piezo_coefficient, operator, dt)
+    }
+}
+
+impl OscillatorInverse {
+    /// The inverse of the oscillator with this mass (kg), damping (N s/m) and stiffness (N/m), and
+    /// with alpha (N/m), beta gamma (1/m), beta delta (1/m) and exponent of the hysteresis, for
+    /// samples every `dt` seconds.
+    ///
+    /// # Errors
+    /// Names the parameter that is out of its range.
+    pub fn new(
+        mass: f64,
+        damping: f64,
+        stiffness: f64,
+        (alpha, dissipating, storing, exponent): (f64, f64, f64, f64),
+        dt: f64,
+    ) -> Result<Self> {
+        let right = exponent >= 1.0 && exponent.is_finite();
+        let operator = BoucWen {
+            rise: Plain(finite("alpha", alpha, "N/m")?),
+            beta: Plain(finite("beta gamma", dissipating, "1/m")?),
+            gamma: Plain(finite("beta delta", storing, "1/m")?),
+            exponent: check("exponent", exponent, "", right, "1 or more")?,
+        };
+        Self::with([mass, damping, stiffness], 1.0, operator, dt)
+    }
+}
+
+impl<O: Operator<Plain, State = BoucWenState<Plain>>> FeedbackInverse<O> {
+    fn with([mass, damping, stiffness]: [f64; 3], gain: f64, operator: O, dt: f64) -> Result<Self> {
+        Ok(Self {
+            inertia: not_negative("mass", mass, "kg")? / gain,
+            damping: not_negative("damping", damping, "N s/m")? / gain,
+            stiffness: not_negative("stiffness", stiffness, "N/m")? / gain,
+            gain,
+            operator,
+            dt: positive("dt", dt, "s")?,
+        })
+    }
+
+    /// The state for a stage at rest at 0 that never moved.
+    #[must_use]
+    pub fn rest(&self) -> FeedbackInverseState {
+        FeedbackInverseState { x: 0.0, w: None, memory: self.operator.rest() }
+    }
+
+    /// The drive for displacement `x` (m), velocity `v` (m/s) and acceleration `a` (m/s^2) of the
+    /// reference. The first sample is taken to be reached in a monotone move from 0.
+    ///
+    /// NaN, with the state unchanged, where an input is not finite (or beyond 1e100), or the
+    /// hysteresis force grows without bound; a controller holds its feedforward then.
+    pub fn step(&self, state: &mut FeedbackInverseState, x: f64, v: f64, a: f64) -> f64 {
+        if !(usable(x) && usable(v) && usable(a)) {
+            return f64::NAN;
+        }
+        let (rise, w) = (x - state.x, v * self.dt);
+        let legs = match state.w {
+            Some(w0) if !is_straight(w0, rise, w) => legs(w0, rise, w),
+            _ => [rise, 0.0, 0.0],
+        };
+        let memory = legs.iter().fold(state.memory, |memory, &leg| {
+            if leg == 0.0 {
+                return memory;
+            }
+            let branch = self.operator.branch(&memory, Plain(leg.signum()));
+            self.operator.along(&branch, Plain(leg))
+        });
+        let linear = self.inertia * a + self.damping * v + self.stiffness * x;
+        let drive = linear + memory.value.0 / self.gain;
+        if !drive.is_finite() {
+            return f64::NAN;
+        }
+        *state = FeedbackInverseState { x, w: Some(w), memory };
+        drive
+    }
+}
+
+impl<O: Operator<Plain, State = BoucWenState<Plain>>> Inverse for FeedbackInverse<O> {
+    type State = FeedbackInverseState;
+
+    fn rest(&self) -> Self::State {
+        self.rest()
+    }
+
+    #[inline]
+    fn step(&self, state: &mut Self::State, x: f64, v: f64, a: f64) -> f64 {
+        self.step(state, x, v, a)
+    }
+}

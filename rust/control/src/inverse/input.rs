@@ -1,0 +1,175 @@
+//! Feedforward: the inverse of a stage with its hysteresis at the input, sample by sample.
+//!
+//! ```text
+//! h = H(u)                                                    hysteresis, 0 at rest
+//! d = h + sum_k c_k q_k,   tau_k q_k' = h - q_k               creep
+//! x = d   or   T x' + x = d   or   x'' + 2 zeta wn x' + wn^2 x = wn^2 d
+//! ```
+//!
+//! The parts are inverted in reverse order: the linear dynamics with the derivatives of the
+//! reference, the creep by the exact inverse of its step, the hysteresis by its own inverse. With
+//! play operators this is Kuhnen 2003, European Journal of Control 9(4), 407-418, doi
+//! 10.3166/ejc.9.407-418.
+
+use super::{Inverse, PlayInverse};
+use crate::creep::{Creep, CreepInverse, CreepState};
+use crate::dynamics::Dynamics;
+use crate::error::{Result, usable};
+use crate::hysteresis::{Operator, Play};
+
+/// Inverse of a hysteresis operator: output in, input out.
+pub trait OperatorInverse: Copy {
+    /// What it remembers of the path.
+    type State: Copy;
+
+    /// The state for an operator that never moved.
+    fn rest(&self) -> Self::State;
+
+    /// Takes the output of the operator to `output` and returns its input; NaN, with the state
+    /// unchanged, where there is none.
+    fn follow(&self, state: &mut Self::State, output: f64) -> f64;
+}
+
+/// Inverse of a stage with the operator at the input: displacement in, voltage out.
+///
+/// ```
+/// use piezotrack_control::hysteresis::Play;
+/// use piezotrack_control::{Creep, Dynamics, PrandtlIshlinskiiInverse};
+///
+/// let play = Play {
+///     linear: 1e-6,
+///     thresholds: [10.0, 20.0],
+///     weights: [0.2e-6, 0.1e-6],
+///     corners: [],
+///     bends: [],
+/// };
+/// let creep = [Creep { share: 0.01, time: 0.3 }];
+/// let dynamics = Dynamics::First { time: 1e-3 };
+/// let inverse = PrandtlIshlinskiiInverse::<2, 0, 1>::new(&play, &creep, dynamics, 1e-4)?;
+/// let mut state = inverse.rest();
+/// let volts = inverse.step(&mut state, 5e-6, 0.0, 0.0);
+/// assert!((volts - 5.0).abs() < 1e-12); // no play has moved yet
+/// # Ok::<(), piezotrack_control::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InputInverse<I, const RELAXATIONS: usize> {
+    inverse: I,
+    creep: CreepInverse<RELAXATIONS>,
+    dynamics: Dynamics,
+    /// H(0) before the zero is taken off, m: the operator's output at rest.
+    zero: f64,
+}
+
+/// Inverse of a Prandtl-Ishlinskii stage, whose operator has its weights in m/V and its dead
+/// zones in m.
+pub type PrandtlIshlinskiiInverse<
+    const PLAYS: usize,
+    const ZONES: usize,
+    const RELAXATIONS: usize,
+> = InputInverse<PlayInverse<PLAYS, ZONES>, RELAXATIONS>;
+
+/// State of an [`InputInverse`]; `S` is the state of the operator's inverse.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InputInverseState<S, const RELAXATIONS: usize> {
+    operator: S,
+    creep: CreepState<RELAXATIONS>,
+    /// Whether the first sample has been.
+    begun: bool,
+}
+
+impl<const PLAYS: usize, const ZONES: usize, const RELAXATIONS: usize>
+    PrandtlIshlinskiiInverse<PLAYS, ZONES, RELAXATIONS>
+{
+    /// The inverse of the stage with these parts, for samples every `dt` seconds.
+    ///
+    /// # Errors
+    /// Those of [`PlayInverse::new`] and [`InputInverse::with`].
+    pub fn new(
+        play: &Play<f64, PLAYS, ZONES>,
+        creep: &[Creep],
+        dynamics: Dynamics,
+        dt: f64,
+    ) -> Result<Self> {
+        let zero = play.output(&play.rest()).0;
+        Self::with(PlayInverse::new(play)?, zero, creep, dynamics, dt)
+    }
+}
+
+impl<I: OperatorInverse, const RELAXATIONS: usize> InputInverse<I, RELAXATIONS> {
+    /// The inverse of the stage with these parts, for samples every `dt` seconds; the operator
+    /// puts out `zero` (m) at rest, which the stage does not show.
+    ///
+    /// # Errors
+    /// Names the parameter that is out of its range; `creep` where there are more relaxations
+    /// than `RELAXATIONS`.
+    pub fn with(
+        inverse: I,
+        zero: f64,
+        creep: &[Creep],
+        dynamics: Dynamics,
+        dt: f64,
+    ) -> Result<Self> {
+        dynamics.validate()?;
+        Ok(Self { inverse, creep: CreepInverse::new(creep, dt)?, dynamics, zero })
+    }
+
+    /// The inverse of the operator.
+    #[must_use]
+    pub fn operator(&self) -> &I {
+        &self.inverse
+    }
+
+    /// The state for a stage at rest that never moved.
+    #[must_use]
+    pub fn rest(&self) -> InputInverseState<I::State, RELAXATIONS> {
+        self.start(self.inverse.rest(), CreepState::default())
+    }
+
+    /// The state for a stage that has moved before: what hysteresis and creep remember.
+    #[must_use]
+    pub fn start(
+        &self,
+        operator: I::State,
+        creep: CreepState<RELAXATIONS>,
+    ) -> InputInverseState<I::State, RELAXATIONS> {
+        InputInverseState { operator, creep, begun: false }
+    }
+
+    /// The voltage (V) for displacement `x` (m), velocity `v` (m/s) and acceleration `a` (m/s^2)
+    /// of the reference. The first sample is reached in a jump, without time to creep.
+    ///
+    /// NaN, with the state unchanged, where an input is not finite (or beyond 1e100).
+    #[inline]
+    pub fn step(
+        &self,
+        state: &mut InputInverseState<I::State, RELAXATIONS>,
+        x: f64,
+        v: f64,
+        a: f64,
+    ) -> f64 {
+        let target = self.dynamics.inverse(x, v, a);
+        if !usable(target) {
+            return f64::NAN;
+        }
+        let output = if state.begun {
+            self.creep.step(&mut state.creep, target)
+        } else {
+            self.creep.jump(&mut state.creep, target)
+        };
+        state.begun = true;
+        self.inverse.follow(&mut state.operator, output + self.zero)
+    }
+}
+
+impl<I: OperatorInverse, const RELAXATIONS: usize> Inverse for InputInverse<I, RELAXATIONS> {
+    type State = InputInverseState<I::State, RELAXATIONS>;
+
+    fn rest(&self) -> Self::State {
+        self.rest()
+    }
+
+    #[inline]
+    fn step(&self, state: &mut Self::State, x: f64, v: f64, a: f64) -> f64 {
+        self.step(state, x, v, a)
+    }
+}

@@ -1,0 +1,185 @@
+//! The inverse of the modified Prandtl-Ishlinskii operator: one of the same kind, in closed form.
+//!
+//! ```text
+//! v = S^-1(y) = y + sum_j s'_j max(y - d'_j, 0)          inverse of the dead zones
+//! u = w'_0 v + sum_i w'_i z'_i,  z'_i a play of threshold r'_i driven by v
+//!
+//! r'_i = sum_{j <= i} w_j (r_i - r_j)                     r_0 = 0
+//! w'_0 = 1 / w_0,   w'_i = 1 / W_i - 1 / W_(i-1),         W_i = w_0 + ... + w_i
+//! z'_i = sum_{j <= i} w_j z_i + sum_{j > i} w_j z_j       the same memory
+//! d'_j = S(d_j),   s'_j = 1 / m_j - 1 / m_(j-1),          m_j = 1 + s_1 + ... + s_j
+//! ```
+//!
+//! Kuhnen 2003, European Journal of Control 9(4), 407-418, doi 10.3166/ejc.9.407-418. A step
+//! takes as long as one of the operator.
+
+use super::Inverse;
+use crate::error::{Result, check, finite, not_negative, positive, usable};
+use crate::hysteresis::{Operator, Play, PlayState};
+
+/// Inverse of a [`Play`] with `PLAYS` play operators and `ZONES` dead zones: output in, input out.
+///
+/// ```
+/// use piezotrack_control::PlayInverse;
+/// use piezotrack_control::hysteresis::{Operator, Play};
+///
+/// # fn main() -> piezotrack_control::Result<()> {
+/// let play = Play {
+///     linear: 0.5,
+///     thresholds: [1.0, 2.0],
+///     weights: [0.3, 0.2],
+///     corners: [4.0],
+///     bends: [0.1],
+/// };
+/// let inverse = PlayInverse::new(&play)?;
+/// let (mut there, mut back) = (play.rest(), inverse.rest());
+/// for input in [10.0, 2.0, 7.0, 6.5, 8.0, 0.0] {
+///     let output = play.follow(&mut there, input);
+///     assert!((inverse.follow(&mut back, output) - input).abs() < 1e-13);
+/// }
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlayInverse<const PLAYS: usize, const ZONES: usize> {
+    /// Thresholds of the dead zones at the output, d'.
+    corners: [f64; ZONES],
+    /// Changes of the slope of the inverse there, s'.
+    bends: [f64; ZONES],
+    /// Play operators with transformed thresholds and weights, without dead zones.
+    plays: Play<f64, PLAYS, 0>,
+}
+
+impl<const PLAYS: usize, const ZONES: usize> PlayInverse<PLAYS, ZONES> {
+    /// Transforms the thresholds, weights and dead zones.
+    ///
+    /// # Errors
+    /// Where the operator has no inverse of this form: `linear` is not above 0, a weight is
+    /// negative, thresholds or corners do not ascend, or a slope of the dead zones is not
+    /// above 0.
+    pub fn new(play: &Play<f64, PLAYS, ZONES>) -> Result<Self> {
+        let (corners, bends) = zones(play)?;
+        Ok(Self { corners, bends, plays: plays(play)? })
+    }
+
+    /// The state of the inverse of an operator at rest.
+    #[must_use]
+    pub fn rest(&self) -> PlayState<f64, PLAYS> {
+        self.plays.rest()
+    }
+
+    /// The state of the inverse of the operator `play` in the state `state`.
+    #[must_use]
+    pub fn memory<const ANY: usize>(
+        &self,
+        play: &Play<f64, PLAYS, ANY>,
+        state: &PlayState<f64, PLAYS>,
+    ) -> PlayState<f64, PLAYS> {
+        let mut inverse = self.rest();
+        let mut sum = play.linear;
+        let weighted = play.weights.iter().zip(&state.plays);
+        let mut after: f64 = weighted.map(|(weight, play)| weight * play).sum();
+        inverse.input = play.linear * state.input + after;
+        for i in 0..PLAYS {
+            sum += play.weights[i];
+            after -= play.weights[i] * state.plays[i];
+            inverse.plays[i] = sum * state.plays[i] + after;
+        }
+        inverse
+    }
+
+    /// Moves the output of the operator to `output` and returns its input (V).
+    ///
+    /// Exact for a step of any length, provided that the output is monotone within it. NaN, with
+    /// the state unchanged, where `output` is not finite (or beyond 1e100).
+    #[inline]
+    pub fn follow(&self, state: &mut PlayState<f64, PLAYS>, output: f64) -> f64 {
+        if !usable(output) {
+            return f64::NAN;
+        }
+        let mut value = output;
+        for (corner, bend) in self.corners.iter().zip(&self.bends) {
+            let beyond = output - corner;
+            if beyond > 0.0 {
+                value += bend * beyond;
+            }
+        }
+        self.plays.follow(state, value)
+    }
+}
+
+/// The operator's output is the displacement; velocity and acceleration have no effect.
+impl<const PLAYS: usize, const ZONES: usize> Inverse for PlayInverse<PLAYS, ZONES> {
+    type State = PlayState<f64, PLAYS>;
+
+    fn rest(&self) -> Self::State {
+        self.rest()
+    }
+
+    #[inline]
+    fn step(&self, state: &mut Self::State, x: f64, _v: f64, _a: f64) -> f64 {
+        self.follow(state, x)
+    }
+}
+
+/// Thresholds and slope changes of the inverse of the dead zones.
+fn zones<const PLAYS: usize, const ZONES: usize>(
+    play: &Play<f64, PLAYS, ZONES>,
+) -> Result<([f64; ZONES], [f64; ZONES])> {
+    let (mut corners, mut bends) = ([0.0; ZONES], [0.0; ZONES]);
+    let (mut slope, mut height, mut before) = (1.0, 0.0, 0.0);
+    for j in 0..ZONES {
+        let corner = finite("corners", play.corners[j], "")?;
+        if j == 0 {
+            height = corner;
+        } else {
+            check("corners", corner, "", corner >= before, "corners that ascend")?;
+            height += slope * (corner - before);
+        }
+        let next = slope + finite("bends", play.bends[j], "")?;
+        check("bends", play.bends[j], "", next > 0.0, "bends whose sums stay above -1")?;
+        (corners[j], bends[j]) = (height, (slope - next) / (next * slope));
+        (slope, before) = (next, corner);
+    }
+    Ok((corners, bends))
+}
+
+/// Play operators with transformed thresholds and weights.
+fn plays<const PLAYS: usize, const ZONES: usize>(
+    play: &Play<f64, PLAYS, ZONES>,
+) -> Result<Play<f64, PLAYS, 0>> {
+    let mut sum = positive("linear", play.linear, "")?;
+    let mut inverse = Play {
+        linear: 1.0 / sum,
+        thresholds: [0.0; PLAYS],
+        weights: [0.0; PLAYS],
+        corners: [],
+        bends: [],
+    };
+    // r'_i = r'_(i-1) + W_(i-1) (r_i - r_(i-1)): sums of what is not negative.
+    let (mut threshold, mut before) = (0.0, 0.0);
+    for i in 0..PLAYS {
+        let here = not_negative("thresholds", play.thresholds[i], "V")?;
+        check("thresholds", here, "V", here >= before, "thresholds that ascend")?;
+        let weight = not_negative("weights", play.weights[i], "")?;
+        threshold += sum * (here - before);
+        let next = sum + weight;
+        inverse.thresholds[i] = threshold;
+        inverse.weights[i] = -weight / (next * sum);
+        (sum, before) = (next, here);
+    }
+    Ok(inverse)
+}
+
+impl<const PLAYS: usize, const ZONES: usize> super::OperatorInverse for PlayInverse<PLAYS, ZONES> {
+    type State = PlayState<f64, PLAYS>;
+
+    fn rest(&self) -> Self::State {
+        self.rest()
+    }
+
+    #[inline]
+    fn follow(&self, state: &mut Self::State, output: f64) -> f64 {
+        self.follow(state, output)
+    }
+}

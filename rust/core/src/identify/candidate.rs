@@ -1,0 +1,37 @@
+//! A point of the search: the parameters of a stage, and the delay of its sensor.
+
+use crate::integrator::{MOST_PARAMETERS, Parameters};
+
+/// Places of a [`Theta`]: the parameters of a model, and the delay.
+pub const PLACES: usize = MOST_PARAMETERS + 1;
+
+/// Place of the delay in a [`Theta`].
+pub const DELAY: usize = MOST_PARAMETERS;
+
+/// Scalar parameters in the order of the model, 0 for those that it does not have, and after them
+/// the delay, s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Theta(pub [f64; PLACES]);
+
+impl Theta {
+    /// The parameters of the stage.
+    #[must_use]
+    pub fn parameters(&self) -> Parameters<f64> {
+        core::array::from_fn(|i| self.0[i])
+    }
+
+    /// Delay between drive and displacement, s.
+    #[must_use]
+    pub fn delay(&self) -> f64 {
+        self.0[DELAY]
+    }
+}
+
+/// Parameters to simulate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// The parameters, SI.
+    pub theta: Theta,
+    /// The cost, m, beyond which nobody asks how bad the candidate is; infinite for none.
+    pub limit: f64,
+}

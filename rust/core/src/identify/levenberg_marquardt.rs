@@ -1,0 +1,241 @@
+//! What is close by: the slope of the deviation at a candidate, a polish down it, and what the
+//! record tells of each parameter.
+//!
+//! The polish is the method of Levenberg and Marquardt (Marquardt 1963, doi 10.1137/0111030)
+//! in the unit box, with coordinates held where they press against a bound. The spread is the
+//! Cramer-Rao bound: with the Jacobian J of the simulated displacement, the covariance of the
+//! parameters is at least s^2 (J^T J)^-1 for independent deviations of variance s^2.
+//! Deviations that hang together, as those of a model that is not quite right do, make the
+//! true spread larger: Ljung 1999, System Identification, section 9.4.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::candidate::Candidate;
+use super::coordinate::Coordinate;
+use super::cost::Evaluator;
+use super::problem::Problem;
+use super::record::Record;
+use super::residual_sums::Costs;
+use crate::signal::{Stop, delayed, index};
+
+/// Most samples that enter the Jacobian: more would hardly change what it says.
+const MOST_ROWS: usize = 200_000;
+
+/// Change of a coordinate of the unit box, for the differences.
+const CHANGE: f64 = 1e-4;
+
+/// Most iterations of the polish.
+const ITERATIONS: usize = 60;
+
+/// Normal equations about a candidate, in coordinates of the unit box.
+struct Normal {
+    /// J^T J.
+    square: DMatrix<f64>,
+    /// J^T r, r being measured less simulated.
+    slope: DVector<f64>,
+    /// Samples that entered.
+    rows: usize,
+}
+
+/// A candidate after the polish.
+#[derive(Clone, Debug)]
+pub struct Polished {
+    /// Its place in the unit box.
+    pub place: Vec<f64>,
+    /// Its cost.
+    pub costs: Costs,
+    /// Simulations that the polish took.
+    pub evaluations: usize,
+}
+
+/// What the data tell of one free parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sensitivity {
+    /// Index of the parameter.
+    pub parameter: usize,
+    /// Standard deviation, SI; infinite where the data say nothing of it.
+    pub deviation: f64,
+    /// Whether the candidate lies on a bound.
+    pub at_bound: bool,
+}
+
+/// The neighbourhood of candidatees of one problem.
+#[derive(Clone, Copy)]
+pub struct Local<'a> {
+    /// The record.
+    pub record: &'a Record<'a>,
+    /// What is free, and where.
+    pub problem: &'a Problem,
+    /// Computes costs, with the sub-steps of the search.
+    pub evaluator: &'a Evaluator<'a>,
+    /// Asked whether to give up.
+    pub stop: Stop<'a>,
+}
+
+impl Local<'_> {
+    /// Goes down to the minimum next to a candidate; never returns a worse one.
+    #[must_use]
+    pub fn polish(&self, place: &[f64], costs: Costs) -> Polished {
+        let mut best = Polished { place: place.to_vec(), costs, evaluations: 0 };
+        let mut damping = 1e-3;
+        for _ in 0..ITERATIONS {
+            let Some(normal) = self.normal(&best.place) else {
+                break;
+            };
+            best.evaluations += 2 * place.len() + 1;
+            let before = best.costs.rms;
+            while damping < 1e8 {
+                let Some(next) = step(&normal, &best.place, damping) else {
+                    break;
+                };
+                let candidate =
+                    Candidate { theta: self.problem.theta(&next), limit: best.costs.rms };
+                let costs = self.evaluator.costs(&[candidate], self.stop);
+                best.evaluations += 1;
+                if let Some(&costs) = costs.first()
+                    && costs.rms < best.costs.rms
+                {
+                    best.place = next;
+                    best.costs = costs;
+                    damping = (0.1 * damping).max(1e-12);
+                    break;
+                }
+                damping *= 10.0;
+            }
+            let gained = before - best.costs.rms;
+            if gained <= 1e-12 * before || (self.stop)() {
+                break;
+            }
+        }
+        best
+    }
+
+    /// Standard deviations of the free parameters at a candidate.
+    ///
+    /// Empty where the candidate or its neighbours cannot be simulated.
+    #[must_use]
+    pub fn sensitivities(&self, place: &[f64], rms: f64) -> Vec<Sensitivity> {
+        let Some(normal) = self.normal(place) else {
+            return Vec::new();
+        };
+        let free = self.problem.free().zip(place).zip(spreads(&normal, rms, self.record));
+        let found = free.map(|((parameter, &z), spread)| {
+            let coordinate = self.problem.coordinates[parameter];
+            let at_bound = !(1e-3..=1.0 - 1e-3).contains(&z);
+            Sensitivity { parameter, deviation: spread * slope_at(coordinate, z), at_bound }
+        });
+        found.collect()
+    }
+
+    /// Normal equations at a place; `None` where a neighbour cannot be simulated.
+    fn normal(&self, place: &[f64]) -> Option<Normal> {
+        let window = &self.record.window;
+        let stride = window.len().div_ceil(MOST_ROWS);
+        let pairs: Vec<(f64, f64)> =
+            place.iter().map(|z| ((z - CHANGE).max(0.0), (z + CHANGE).min(1.0))).collect();
+        let mut residual = self.displacement(place, stride)?;
+        let measured = self.record.y[window.clone()].iter().step_by(stride);
+        residual.iter_mut().zip(measured).for_each(|(x, y)| *x = y - *x);
+        self.centre(&mut residual);
+        let columns: Option<Vec<Vec<f64>>> = pairs
+            .par_iter()
+            .enumerate()
+            .map(|(d, &(low, high))| {
+                let at = |z| {
+                    let mut moved = place.to_vec();
+                    moved[d] = z;
+                    self.displacement(&moved, stride)
+                };
+                let (below, mut column) = (at(low)?, at(high)?);
+                let scale = 1.0 / (high - low);
+                column.iter_mut().zip(below).for_each(|(x, b)| *x = (*x - b) * scale);
+                self.centre(&mut column);
+                Some(column)
+            })
+            .collect();
+        let columns = columns?;
+        let count = columns.len();
+        Some(Normal {
+            square: DMatrix::from_fn(count, count, |i, j| product(&columns[i], &columns[j])),
+            slope: DVector::from_fn(count, |i, _| product(&columns[i], &residual)),
+            rows: residual.len(),
+        })
+    }
+
+    /// Every stride-th sample of the window, simulated as the search does.
+    fn displacement(&self, place: &[f64], stride: usize) -> Option<Vec<f64>> {
+        let theta = self.problem.theta(place);
+        let [x, v] = self.evaluator.motion(&theta, self.stop)?;
+        let x = delayed(&x, &v, self.record.drive.dt, theta.delay());
+        Some(x[self.record.window.clone()].iter().step_by(stride).copied().collect())
+    }
+
+    /// Takes the mean off where an offset is fitted.
+    fn centre(&self, values: &mut [f64]) {
+        if self.problem.offset {
+            let mean = values.iter().sum::<f64>() / index(values.len());
+            for value in values {
+                *value -= mean;
+            }
+        }
+    }
+}
+
+/// A damped step that stays in the box; `None` where nothing can move.
+fn step(normal: &Normal, place: &[f64], damping: f64) -> Option<Vec<f64>> {
+    let presses = |d: usize, z: f64| {
+        (z <= 0.0 && normal.slope[d] < 0.0) || (z >= 1.0 && normal.slope[d] > 0.0)
+    };
+    let moving: Vec<usize> = (0..place.len())
+        .filter(|&d| normal.square[(d, d)] > 0.0 && !presses(d, place[d]))
+        .collect();
+    let square = DMatrix::from_fn(moving.len(), moving.len(), |i, j| {
+        let value = normal.square[(moving[i], moving[j])];
+        if i == j { value * (1.0 + damping) } else { value }
+    });
+    let slope = DVector::from_fn(moving.len(), |i, _| normal.slope[moving[i]]);
+    let change = square.cholesky()?.solve(&slope);
+    let mut next = place.to_vec();
+    for (&d, change) in moving.iter().zip(change.iter()) {
+        next[d] = (place[d] + change).clamp(0.0, 1.0);
+    }
+    (!moving.is_empty() && next != place).then_some(next)
+}
+
+/// Standard deviations in the unit box, from the eigenvalues of the scaled normal equations.
+fn spreads(normal: &Normal, rms: f64, record: &Record<'_>) -> Vec<f64> {
+    let count = normal.slope.len();
+    let sizes: Vec<f64> = (0..count).map(|d| normal.square[(d, d)].sqrt()).collect();
+    let scaled = DMatrix::from_fn(count, count, |i, j| {
+        let size = sizes[i] * sizes[j];
+        if size > 0.0 { normal.square[(i, j)] / size } else { 0.0 }
+    });
+    let decomposed = scaled.symmetric_eigen();
+    let samples = record.window.len();
+    let freedom = index(samples.saturating_sub(count + 1).max(1));
+    // Some rows stand for all of them.
+    let kept = index(normal.rows) / index(samples);
+    let noise = rms * (index(samples) / freedom * kept).sqrt();
+    let spread = |d: usize| {
+        let variance: f64 = (0..count)
+            .map(|k| {
+                let part = decomposed.eigenvectors[(d, k)];
+                part * part / decomposed.eigenvalues[k].max(0.0)
+            })
+            .sum();
+        let spread = noise * variance.sqrt() / sizes[d];
+        if spread.is_nan() { f64::INFINITY } else { spread }
+    };
+    (0..count).map(spread).collect()
+}
+
+/// Change of a parameter with its coordinate.
+fn slope_at(coordinate: Coordinate, z: f64) -> f64 {
+    let (low, high) = ((z - CHANGE).max(0.0), (z + CHANGE).min(1.0));
+    (coordinate.value(high) - coordinate.value(low)) / (high - low)
+}
+
+fn product(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

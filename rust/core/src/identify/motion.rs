@@ -1,0 +1,38 @@
+//! Motion of one candidate, stepped as the search steps.
+
+use super::candidate::Theta;
+use crate::integrator::{Kernel, LumpedStage, Parameters, Stepping};
+use crate::models::{Held, KernelVisitor, Model};
+use crate::signal::{Drive, Stop};
+
+/// Displacement and velocity; `None` where they are not finite or `stop` said so.
+pub(super) fn motion(
+    model: Model,
+    theta: &Theta,
+    drive: &Drive<'_>,
+    stepping: Stepping,
+    stop: Stop<'_>,
+) -> Option<[Vec<f64>; 2]> {
+    let parameters = theta.parameters();
+    let held = Held::all(model.info().parameters, &parameters);
+    let one = One { parameters, drive, substeps: stepping.substeps, stop };
+    model.kernel(&held, stepping.order, one).flatten()
+}
+
+/// One simulation from rest.
+struct One<'a> {
+    parameters: Parameters<f64>,
+    drive: &'a Drive<'a>,
+    substeps: usize,
+    stop: Stop<'a>,
+}
+
+impl KernelVisitor for One<'_> {
+    type Output = Option<[Vec<f64>; 2]>;
+
+    fn visit<K: Kernel>(self, kernel: K) -> Self::Output {
+        let stage = LumpedStage { kernel, parameters: self.parameters };
+        let run = stage.simulate_fixed(self.drive, stage.rest(), self.substeps, self.stop);
+        run.ok().flatten().map(|run| [run.x, run.v])
+    }
+}

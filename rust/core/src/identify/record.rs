@@ -1,0 +1,64 @@
+//! A measured record: the drive, and the displacement measured under it.
+
+use std::ops::Range;
+
+use crate::error::{Error, Result};
+use crate::signal::{Drive, Hold, range};
+
+/// A drive and the displacement measured under it.
+#[derive(Clone, Debug)]
+pub struct Record<'a> {
+    /// The drive from the first sample kept, warm-up included.
+    pub drive: Drive<'a>,
+    /// Displacement at the same samples, m.
+    pub y: &'a [f64],
+    /// The samples that count.
+    pub window: Range<usize>,
+}
+
+impl<'a> Record<'a> {
+    /// Checks that the record can tell anything.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] for unequal lengths, [`Error::Parameter`] for a bad `dt`,
+    /// [`Error::Data`] for a constant drive, a dead sensor or too short a window.
+    pub fn new(u: &'a [f64], y: &'a [f64], dt: f64, hold: Hold, start: usize) -> Result<Self> {
+        let drive = Drive::new(u, dt, hold)?;
+        if u.len() != y.len() {
+            return Err(Error::Shape {
+                name: "y".into(),
+                found: format!("{} samples", y.len()),
+                expected: format!("{}, as many as u", u.len()),
+            });
+        }
+        let window = start.min(u.len())..u.len();
+        if window.len() < 10 {
+            return Err(Error::Data(format!(
+                "the window has {} samples: expected at least 10",
+                window.len()
+            )));
+        }
+        let (low, high) = range(&u[window.clone()]);
+        if low >= high {
+            return Err(Error::Data(format!(
+                "the drive is constant at {low} V in the window: expected a drive that moves \
+                 the stage, up and down at least once"
+            )));
+        }
+        let (low, high) = range(&y[window.clone()]);
+        if low >= high {
+            return Err(Error::Data(format!(
+                "the displacement is constant at {low} m in the window while the drive moves: \
+                 the sensor seems dead or not connected"
+            )));
+        }
+        Ok(Self { drive, y, window })
+    }
+
+    /// Range of the displacement in the window, m.
+    #[must_use]
+    pub fn stroke(&self) -> f64 {
+        let (low, high) = range(&self.y[self.window.clone()]);
+        high - low
+    }
+}

@@ -1,0 +1,172 @@
+//! An operator in feedback on the displacement: `M x'' + D x' + K x = T u - F(x)`.
+//!
+//! The exponential scheme. Over a step the force is a polynomial in time; the linear part is
+//! exact for it, and the operator is exact in the displacement. The force is extrapolated along
+//! its slope, which alone gives second order. A corrector then reads the force off the operator
+//! where that leads and takes the cubic through values and slopes at both ends; a reversal
+//! inside the step is located, and the operator led to the turning point and back: fourth order.
+
+use piezotrack_control::Number;
+use piezotrack_control::hysteresis::Operator;
+
+use super::propagator::Propagator;
+use super::traits::{Coupling, FeedbackState};
+use crate::signal::between;
+
+/// An operator without dry friction in feedback, coupled to second or fourth order.
+#[derive(Clone, Copy, Debug)]
+pub struct Smooth<N, O, const FOURTH: bool> {
+    /// The linear part over one step.
+    pub linear: Propagator<N>,
+    /// The hysteresis.
+    pub operator: O,
+}
+
+impl<N: Number, O: Operator<N>, const FOURTH: bool> Coupling<N> for Smooth<N, O, FOURTH> {
+    type Memory = O::State;
+
+    #[inline(always)]
+    fn step(
+        &self,
+        state: &FeedbackState<N, O::State>,
+        drive: N,
+        rise: N,
+    ) -> FeedbackState<N, O::State> {
+        if FOURTH {
+            fourth_order(&self.linear, &self.operator, state, drive, rise)
+        } else {
+            second_order(&self.linear, &self.operator, state, drive, rise)
+        }
+    }
+}
+
+/// Where the force extrapolated along its slope leads.
+pub(super) struct Prediction<N> {
+    pub x: N,
+    pub w: N,
+    /// Force at the start, and its change over the step at the slope that it starts with.
+    force: N,
+    change: N,
+}
+
+/// The step whose force goes on along the slope that it starts with.
+#[inline(always)]
+pub(super) fn predict<N: Number, O: Operator<N>>(
+    linear: &Propagator<N>,
+    operator: &O,
+    state: &FeedbackState<N, O::State>,
+    drive: N,
+    rise: N,
+) -> Prediction<N> {
+    let (force, slope) = operator.output(&state.memory);
+    let change = slope * state.w;
+    let f0 = drive - force;
+    let f1 = rise - change;
+    // The force's change comes last: it is what the chain of operations waits for.
+    let x = linear.position.x.mul_add(state.x, linear.velocity.x * state.w);
+    let w = linear.position.w.mul_add(state.x, linear.velocity.w * state.w);
+    let x = linear.ramp.x.mul_add(f1, linear.constant.x.mul_add(f0, x));
+    let w = linear.ramp.w.mul_add(f1, linear.constant.w.mul_add(f0, w));
+    Prediction { x, w, force, change }
+}
+
+/// Displacement and scaled velocity with the cubic through the forces at both ends, the force
+/// at the end read off the branch where the prediction leads.
+#[inline(always)]
+pub(super) fn correct<N: Number, O: Operator<N>>(
+    linear: &Propagator<N>,
+    operator: &O,
+    branch: &O::Branch,
+    ahead: &Prediction<N>,
+    from: N,
+) -> (N, N) {
+    conclude(linear, ahead, operator.output(&operator.along(branch, ahead.x - from)))
+}
+
+/// Displacement and scaled velocity with the cubic through the forces at both ends, the one at
+/// the end given with its slope along the path.
+#[inline(always)]
+pub(super) fn conclude<N: Number>(
+    linear: &Propagator<N>,
+    ahead: &Prediction<N>,
+    (force, slope): (N, N),
+) -> (N, N) {
+    let excess = ahead.force + ahead.change - force;
+    let bend = ahead.change - slope * ahead.w;
+    let x = linear.excess.x.mul_add(excess, linear.bend.x.mul_add(bend, ahead.x));
+    let w = linear.excess.w.mul_add(excess, linear.bend.w.mul_add(bend, ahead.w));
+    (x, w)
+}
+
+/// One step of second order under a drive force that goes from `drive` to `drive + rise`.
+#[inline(always)]
+fn second_order<N: Number, O: Operator<N>>(
+    linear: &Propagator<N>,
+    operator: &O,
+    state: &FeedbackState<N, O::State>,
+    drive: N,
+    rise: N,
+) -> FeedbackState<N, O::State> {
+    let branch = operator.branch(&state.memory, sign(state.w));
+    let Prediction { x, w, .. } = predict(linear, operator, state, drive, rise);
+    FeedbackState { x, w, memory: operator.along(&branch, x - state.x) }
+}
+
+/// One step of fourth order under a drive force that goes from `drive` to `drive + rise`.
+#[inline(always)]
+fn fourth_order<N: Number, O: Operator<N>>(
+    linear: &Propagator<N>,
+    operator: &O,
+    state: &FeedbackState<N, O::State>,
+    drive: N,
+    rise: N,
+) -> FeedbackState<N, O::State> {
+    let ahead = predict(linear, operator, state, drive, rise);
+    let direction = sign(heading(state, &ahead));
+    let branch = operator.branch(&state.memory, direction);
+    let (x, w) = correct(linear, operator, &branch, &ahead, state.x);
+    let memory = lead(operator, state, &branch, x, w);
+    FeedbackState { x, w, memory }
+}
+
+/// What has the sign of the motion over the step: at rest the predicted velocity tells the
+/// direction; else it is too small to matter.
+#[inline(always)]
+pub(super) fn heading<N: Number, M>(from: &FeedbackState<N, M>, ahead: &Prediction<N>) -> N {
+    ahead.w.mul_add(ahead.w.like(1e-12), from.w)
+}
+
+/// The operator's memory where a step ends: along the branch, or to the turning point and back.
+#[inline(always)]
+pub(super) fn lead<N: Number, O: Operator<N>>(
+    operator: &O,
+    from: &FeedbackState<N, O::State>,
+    branch: &O::Branch,
+    x: N,
+    w: N,
+) -> O::State {
+    let turned = from.w * w;
+    if turned.any_negative() {
+        // Lanes that did not turn go to the end on the first leg; their second has length 0.
+        let turning = turned.where_negative(turning_point(from, x, w), x);
+        let there = operator.along(branch, turning - from.x);
+        operator.along(&operator.branch(&there, sign(w)), x - turning)
+    } else {
+        operator.along(branch, x - from.x)
+    }
+}
+
+/// +1 or -1; +1 for 0.
+#[inline(always)]
+pub(super) fn sign<N: Number>(value: N) -> N {
+    value.where_negative(value.like(-1.0), value.like(1.0))
+}
+
+/// Displacement where the velocity passes zero, on the cubic through both ends.
+///
+/// The time comes from a straight line through the velocities: the displacement is flat there,
+/// so its error is of fourth order.
+#[inline(always)]
+fn turning_point<N: Number, M>(from: &FeedbackState<N, M>, x: N, w: N) -> N {
+    between(from.x, from.w, x, w, from.w / (from.w - w))
+}

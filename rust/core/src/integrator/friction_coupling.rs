@@ -1,0 +1,385 @@
+//! The second-order Dahl operator with b0 other than 0: dry friction at reversals.
+//!
+//! ```text
+//! M x'' + D x' + K x = T u - Fh,   Fh = b1 q1 + sgn(x') b0 q2
+//! ```
+//!
+//! Xu and Li 2010, equations (2), (7) and (8), doi 10.1115/1.4001712. At a reversal the term
+//! b0 q2 changes sign at once. Where b0 q2 > 0 it is a dry friction, set-valued at rest: the
+//! stage sticks while the other forces are smaller (Filippov 1988, doi
+//! 10.1007/978-94-015-7793-9). Where b0 q2 < 0 it pushes along the motion, and a stage at rest
+//! under less force than that could go either way: it goes on in its present direction or, from
+//! rest, along the force, and the state remembers that this was a choice.
+//!
+//! Reversals, sticking and breaking away are located inside the step, each lane by itself.
+
+use piezotrack_control::Number;
+use piezotrack_control::hysteresis::{Dahl, DahlBranch, DahlState, Operator};
+
+use super::feedback_coupling::{Prediction, correct, predict, sign};
+use super::propagator::Propagator;
+use super::stepping_loop::TERMS;
+use super::traits::{Coupling, FeedbackState};
+
+/// Legs of one step between reversals, at most: more wait for the next step.
+const LEGS: usize = 4;
+
+/// Share of the forces by which the limit of sticking is widened, against rounding.
+const SLACK: f64 = 1e-12;
+
+/// A Dahl stage with dry friction over one step.
+#[derive(Clone, Copy, Debug)]
+pub struct Friction<N> {
+    /// The linear part over the whole step.
+    linear: Propagator<N>,
+    /// 1/M, D/M, K/M in units of the step.
+    rates: [N; 3],
+    halvings: u32,
+    stiffness: N,
+    rubbing: Rubbing<N>,
+}
+
+/// The parameters of a stage with friction, SI.
+#[derive(Clone, Copy, Debug)]
+pub struct FrictionParameters<N> {
+    /// M, D and K.
+    pub mechanics: [N; 3],
+    /// a1, a2 and up.
+    pub operator: [N; 3],
+    /// b1, N/m^2.
+    pub b1: N,
+    /// b0, N/m.
+    pub b0: N,
+}
+
+impl<N: Number> FrictionParameters<N> {
+    /// What a stage remembers whose velocity has the sign of `w`; it rests where `w` is 0.
+    #[inline(always)]
+    pub fn memory(&self, w: N, operator: DahlState<N>) -> FrictionMemory<N> {
+        self.rubbing().memory(w, operator)
+    }
+
+    #[inline(always)]
+    fn rubbing(&self) -> Rubbing<N> {
+        let [a1, a2, up] = self.operator;
+        let dahl = Dahl { a1, a2, gain: up };
+        Rubbing { dahl, b1: self.b1, b0: self.b0, direction: self.b1.like(1.0) }
+    }
+}
+
+/// What a stage with friction remembers.
+#[derive(Clone, Copy, Debug)]
+pub struct FrictionMemory<N> {
+    /// q1 and q2.
+    pub operator: DahlState<N>,
+    /// Direction of motion, +1 or -1; 0 where the stage sticks.
+    pub direction: N,
+    /// Hysteresis force Fh, N.
+    pub force: N,
+    /// Above 0 once rest was not unique.
+    pub doubt: N,
+}
+
+/// The operator in motion in one direction.
+#[derive(Clone, Copy, Debug)]
+struct Rubbing<N> {
+    /// The operator with q1 for a force.
+    dahl: Dahl<N, TERMS>,
+    b1: N,
+    b0: N,
+    /// +1 or -1.
+    direction: N,
+}
+
+impl<N: Number> Operator<N> for Rubbing<N> {
+    type State = DahlState<N>;
+    type Branch = DahlBranch<N, TERMS>;
+
+    #[inline(always)]
+    fn rest(&self) -> DahlState<N> {
+        self.dahl.rest()
+    }
+
+    /// b1 q1 + sgn(x') b0 q2, and its slope along the path.
+    #[inline(always)]
+    fn output(&self, state: &DahlState<N>) -> (N, N) {
+        let (q1, q2) = (state.force, state.slope);
+        let decay = -(self.direction * self.dahl.a1);
+        let bend = (-self.dahl.a2).mul_add(q1, decay.mul_add(q2, self.dahl.gain));
+        let friction = self.direction * self.b0;
+        (self.b1.mul_add(q1, friction * q2), self.b1.mul_add(q2, friction * bend))
+    }
+
+    #[inline(always)]
+    fn branch(&self, state: &DahlState<N>, direction: N) -> DahlBranch<N, TERMS> {
+        self.dahl.branch(state, direction)
+    }
+
+    #[inline(always)]
+    fn along(&self, branch: &DahlBranch<N, TERMS>, distance: N) -> DahlState<N> {
+        self.dahl.along(branch, distance)
+    }
+}
+
+impl<N: Number> Rubbing<N> {
+    #[inline(always)]
+    fn memory(self, w: N, operator: DahlState<N>) -> FrictionMemory<N> {
+        let zero = w.like(0.0);
+        let direction = w.where_negative(w.like(-1.0), (-w).where_negative(w.like(1.0), zero));
+        let force = Self { direction, ..self }.output(&operator).0;
+        FrictionMemory { operator, direction, force, doubt: zero }
+    }
+}
+
+type State<N> = FeedbackState<N, FrictionMemory<N>>;
+
+/// The way of the lanes through one step, leg by leg.
+struct Way<N> {
+    state: State<N>,
+    /// Part of the step that is behind.
+    passed: N,
+}
+
+/// A leg in motion: where it ends, and the branch that it went along.
+struct Glide<N> {
+    x: N,
+    /// Velocity times the length of the leg, m.
+    w: N,
+    branch: DahlBranch<N, TERMS>,
+}
+
+impl<N: Number> Friction<N> {
+    /// Works out what the parameters alone decide, for steps of `step` seconds.
+    #[inline(always)]
+    pub fn new(of: FrictionParameters<N>, step: f64, halvings: u32) -> Self {
+        let [mass, damping, stiffness] = of.mechanics;
+        let inverse = mass.like(1.0) / mass;
+        let h = mass.like(step);
+        let (damped, sprung) = (damping * inverse, stiffness * inverse);
+        Self {
+            linear: Propagator::new(inverse, damped, sprung, step, halvings),
+            rates: [inverse * h * h, damped * h, sprung * h * h],
+            halvings,
+            stiffness,
+            rubbing: of.rubbing(),
+        }
+    }
+
+    /// The state at a displacement, at rest where `w` is 0.
+    #[inline(always)]
+    pub fn start(&self, x: N, w: N, operator: DahlState<N>) -> State<N> {
+        FeedbackState { x, w, memory: self.rubbing.memory(w, operator) }
+    }
+
+    #[inline(always)]
+    fn moving(&self, direction: N) -> Rubbing<N> {
+        Rubbing { direction, ..self.rubbing }
+    }
+
+    /// b1 q1 + K x, the forces that do not depend on the direction.
+    #[inline(always)]
+    fn spring(&self, x: N, operator: &DahlState<N>) -> N {
+        self.rubbing.b1.mul_add(operator.force, self.stiffness * x)
+    }
+
+    /// What sticking bears, N: b0 q2, below 0 where the operator pushes.
+    #[inline(always)]
+    fn grip(&self, operator: &DahlState<N>, force: N) -> N {
+        let grip = self.rubbing.b0 * operator.slope;
+        grip.where_negative(grip, magnitude(force).mul_add(force.like(SLACK), grip))
+    }
+
+    /// A leg without a reversal, under a force that goes from `drive` to `drive + rise`.
+    #[inline(always)]
+    fn glide(
+        &self,
+        linear: &Propagator<N>,
+        state: &State<N>,
+        direction: N,
+        drive: N,
+        rise: N,
+    ) -> Glide<N> {
+        let operator = self.moving(direction);
+        let from = FeedbackState { x: state.x, w: state.w, memory: state.memory.operator };
+        let branch = operator.branch(&from.memory, direction);
+        let ahead: Prediction<N> = predict(linear, &operator, &from, drive, rise);
+        let (x, w) = correct(linear, &operator, &branch, &ahead, from.x);
+        Glide { x, w, branch }
+    }
+
+    /// The linear part over a part of the step, each lane its own.
+    #[inline(always)]
+    fn part(&self, length: N) -> Propagator<N> {
+        let [inverse, damping, stiffness] = self.rates;
+        let square = length * length;
+        Propagator::new(inverse * square, damping * length, stiffness * square, 1.0, self.halvings)
+    }
+
+    /// The next leg of every lane: to its reversal, to where it breaks away, or to the end.
+    #[inline(always)]
+    fn leg(&self, way: &Way<N>, drive: N, rise: N, last: bool) -> Way<N> {
+        let at = &way.state;
+        let memory = &at.memory;
+        let (zero, one) = (drive.like(0.0), drive.like(1.0));
+        let left = one - way.passed;
+        let now = rise.mul_add(way.passed, drive);
+        let held = drive.like(0.5) - memory.direction * memory.direction;
+
+        // Lanes at rest: how long they stick, and which way they go then.
+        let pull = now - self.spring(at.x, &memory.operator);
+        let grip = self.grip(&memory.operator, now);
+        let over = grip - magnitude(pull);
+        let heading = (-(pull * pull)).where_negative(pull, rise);
+        let wait = (grip - sign(rise) * pull) / magnitude(rise);
+        let wait = over.where_negative(zero, wait);
+        let wait = (-(heading * heading)).where_negative(wait, one + one);
+        let leaves = (-held).where_negative(wait - left, one);
+        let onward = over.where_negative(sign(heading), sign(rise));
+
+        // Lanes in motion: the whole rest of the step first, then up to the reversal.
+        let direction = sign(memory.direction);
+        let glide = |length: N| {
+            let scaled = FeedbackState { w: at.w * length, ..*at };
+            (scaled, self.glide(&self.part(length), &scaled, direction, now, rise * length))
+        };
+        let (from, whole) = glide(left);
+        let turns = if last { one } else { held.where_negative(direction * whole.w, one) };
+        let fraction = turning_fraction(direction, &from, whole.x, whole.w);
+        let length = turns.where_negative(fraction * left, left);
+        let (_, part) = glide(length);
+        let w = (drive.like(1e-12) - length).where_negative(part.w / length, at.w);
+
+        // What velocity the reversal is off by is made up for in its time.
+        let reached = rise.mul_add(length, now);
+        let rubbing = self.moving(direction);
+        let there = rubbing.along(&part.branch, part.x - at.x);
+        let net = reached - rubbing.output(&there).0 - self.stiffness * part.x;
+        let late = -(w / (net * self.rates[0]));
+        let late = (magnitude(late) - length * drive.like(0.1)).where_negative(late, zero);
+        let late = turns.where_negative(late, zero);
+        let x = (w * late).mul_add(drive.like(0.5), part.x);
+        let stop = way.passed + length + late;
+        let stop = turns.where_negative((stop - one).where_negative(stop, one), one);
+        let there = rubbing.along(&part.branch, x - at.x);
+
+        // After a reversal: sticking, the way back or, where both could be, on as before.
+        let turned_pull = rise.mul_add(stop, drive) - self.spring(x, &there);
+        let turned_grip = self.grip(&there, now);
+        let turned_over = turned_grip - magnitude(turned_pull);
+        let unsure = magnitude(turned_pull) + turned_grip;
+        let stays = unsure.where_negative(memory.direction, sign(turned_pull));
+        let after = turned_over.where_negative(stays, zero);
+        let end_w = (direction * w).where_negative(zero, w);
+
+        let moved = FrictionMemory {
+            operator: there,
+            direction: turns.where_negative(after, memory.direction),
+            force: memory.force,
+            doubt: memory.doubt + turns.where_negative(unsure.where_negative(one, zero), zero),
+        };
+        let unsure = magnitude(pull) + grip;
+        let rested = FrictionMemory {
+            direction: leaves.where_negative(onward, zero),
+            doubt: memory.doubt + unsure.where_negative(one, zero),
+            ..*memory
+        };
+        let moving = FeedbackState { x, w: turns.where_negative(zero, end_w), memory: moved };
+        let resting = FeedbackState { x: at.x, w: zero, memory: rested };
+        let waited = leaves.where_negative(way.passed + wait, one);
+        Way { state: choose(held, &moving, &resting), passed: held.where_negative(stop, waited) }
+    }
+}
+
+impl<N: Number> Coupling<N> for Friction<N> {
+    type Memory = FrictionMemory<N>;
+
+    #[inline(always)]
+    fn step(&self, state: &State<N>, drive: N, rise: N) -> State<N> {
+        let memory = &state.memory;
+        // Below 0 for lanes in motion.
+        let held = drive.like(0.5) - memory.direction * memory.direction;
+        let direction = sign(memory.direction);
+        let glide = self.glide(&self.linear, state, direction, drive, rise);
+        let pull = drive - self.spring(state.x, &memory.operator);
+        let grip = self.grip(&memory.operator, drive);
+        let (first, second) = (grip - magnitude(pull), grip - magnitude(pull + rise));
+        let sticks = (second - first).where_negative(second, first);
+        let calm = held.where_negative(direction * glide.w, sticks);
+
+        let rubbing = self.moving(direction);
+        let operator = rubbing.along(&glide.branch, glide.x - state.x);
+        let moved = FrictionMemory { operator, ..*memory };
+        let moving = FeedbackState { x: glide.x, w: glide.w, memory: moved };
+        let mut end = choose(held, &moving, state);
+        if calm.any_negative() {
+            let mut way = Way { state: *state, passed: drive.like(0.0) };
+            for leg in 1..=LEGS {
+                let left = way.passed - drive.like(1.0);
+                if !left.any_negative() {
+                    break;
+                }
+                let next = self.leg(&way, drive, rise, leg == LEGS);
+                way = Way {
+                    state: choose(left, &next.state, &way.state),
+                    passed: left.where_negative(next.passed, way.passed),
+                };
+            }
+            // Lanes without an event keep what they would have had alone.
+            end = choose(calm, &way.state, &end);
+        }
+        let memory = &end.memory;
+        let pull = drive + rise - self.stiffness * end.x;
+        let held = drive.like(0.5) - memory.direction * memory.direction;
+        let force = self.moving(memory.direction).output(&memory.operator).0;
+        end.memory.force = held.where_negative(force, pull);
+        end
+    }
+}
+
+/// `yes` in the lanes where `which < 0`, `no` in the others.
+#[inline(always)]
+fn choose<N: Number>(which: N, yes: &State<N>, no: &State<N>) -> State<N> {
+    let pick = |yes: N, no: N| which.where_negative(yes, no);
+    let (a, b) = (&yes.memory, &no.memory);
+    FeedbackState {
+        x: pick(yes.x, no.x),
+        w: pick(yes.w, no.w),
+        memory: FrictionMemory {
+            operator: DahlState {
+                force: pick(a.operator.force, b.operator.force),
+                slope: pick(a.operator.slope, b.operator.slope),
+            },
+            direction: pick(a.direction, b.direction),
+            force: pick(a.force, b.force),
+            doubt: pick(a.doubt, b.doubt),
+        },
+    }
+}
+
+#[inline(always)]
+fn magnitude<N: Number>(value: N) -> N {
+    value.where_negative(-value, value)
+}
+
+/// Part of a leg after which the velocity, which starts along `direction` and ends against it,
+/// passes zero, on the cubic through displacement and velocity at both ends.
+#[inline(always)]
+fn turning_fraction<N: Number, M>(direction: N, from: &FeedbackState<N, M>, x: N, w: N) -> N {
+    // Velocity c + b s + a s^2 along the direction.
+    let rise = x - from.x;
+    let c3 = rise.mul_add(rise.like(-2.0), from.w + w);
+    let c2 = rise - from.w - c3;
+    let c = direction * from.w;
+    let b = direction * (c2 + c2);
+    let a = direction * (c3 + c3 + c3);
+    let square = b.mul_add(b, -((a * c) * a.like(4.0)));
+    let root = square.where_negative(a.like(0.0), square).sqrt();
+    // Each form where it does not cancel.
+    let falling = (c + c) / (root - b);
+    let rising = -((b + root) / (a + a));
+    let part = (-b).where_negative(rising, falling);
+    // Within the leg, and 0 where there is no telling.
+    let part = part.where_negative(a.like(0.0), part);
+    let beyond = (a.like(1.0) - part).where_negative(a.like(1.0), part);
+    (beyond - a.like(2.0)).where_negative(beyond, a.like(0.0))
+}

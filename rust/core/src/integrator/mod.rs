@@ -1,0 +1,24 @@
+//! Time integration of a hysteresis operator coupled with linear mechanics.
+
+mod accuracy;
+mod feedback_coupling;
+mod friction_coupling;
+mod input_coupling;
+mod nonsmooth_coupling;
+mod propagator;
+mod simulate;
+mod stepping_loop;
+mod traits;
+
+pub use accuracy::steps_for;
+pub use feedback_coupling::Smooth;
+pub use friction_coupling::{Friction, FrictionMemory, FrictionParameters};
+pub use input_coupling::{AtInput, InputMemory};
+pub use nonsmooth_coupling::Kinked;
+pub use propagator::{Column, Mechanics, Propagator, halvings};
+pub use simulate::{Instant, LumpedStage, Motion};
+pub use stepping_loop::{FEW_TERMS, March, Order, Sink, Stepping, TERMS};
+pub use traits::{Coupling, FeedbackState, Kernel, MOST_PARAMETERS, Memory, Parameters};
+
+pub(crate) use accuracy::{MOST_SUBSTEPS, first_substeps, out_of_reach};
+pub(crate) use traits::linear;

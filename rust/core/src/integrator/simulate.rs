@@ -1,0 +1,209 @@
+//! Simulation of one stage under a sampled drive, to a requested accuracy.
+
+use pulp::{Simd, WithSimd};
+
+use super::accuracy::{MOST_SUBSTEPS, first_substeps, out_of_reach};
+use super::propagator::{Mechanics, halvings};
+use super::stepping_loop::{March, Sink};
+use super::traits::{FeedbackState, Kernel, Memory, Parameters};
+use crate::error::{Error, Result, positive};
+use crate::math::dispatch_fused;
+use crate::signal::{Drive, Stop, all_finite, index, largest_difference};
+
+/// Share of the displacement below which no steps make it more accurate.
+const ROUNDING: f64 = 1e-16;
+
+/// Most steps of one simulation, beyond [`FEW_SUBSTEPS`] in an interval: some ten seconds.
+const MOST_STEPS: usize = 100_000_000;
+const FEW_SUBSTEPS: usize = 64;
+
+/// Displacement, velocity and memory at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instant<M> {
+    /// Displacement, m.
+    pub x: f64,
+    /// Velocity, m/s.
+    pub v: f64,
+    /// What the hysteresis remembers.
+    pub memory: M,
+}
+
+/// Motion of a stage at the samples of its drive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Motion<M> {
+    /// Displacement, m.
+    pub x: Vec<f64>,
+    /// Velocity, m/s.
+    pub v: Vec<f64>,
+    /// Hysteresis force, N.
+    pub hysteresis: Vec<f64>,
+    /// State at the last sample.
+    pub last: Instant<M>,
+    /// Steps in each sampling interval.
+    pub substeps: usize,
+    /// Largest difference in displacement from half the sub-steps, m; 0 where there was none.
+    pub error_estimate: f64,
+}
+
+/// A stage of lumped mass, damping and stiffness: its kernel and its parameters.
+#[derive(Clone, Copy, Debug)]
+pub struct LumpedStage<K> {
+    /// How it steps.
+    pub kernel: K,
+    /// Its parameters, SI.
+    pub parameters: Parameters<f64>,
+}
+
+impl<K: Kernel> LumpedStage<K> {
+    /// The state before any motion.
+    #[must_use]
+    pub fn rest(&self) -> Instant<Memory<K, f64>> {
+        Instant { x: 0.0, v: 0.0, memory: self.kernel.rest(&self.parameters) }
+    }
+
+    /// Mass, damping and stiffness.
+    #[must_use]
+    pub fn mechanics(&self) -> Mechanics {
+        let [mass, damping, stiffness, ..] = self.parameters;
+        Mechanics { mass, damping, stiffness }
+    }
+
+    /// Simulates with given steps in each sampling interval; `None` where `stop` said so.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] where `substeps` is 0; [`Error::Numerical`] where the motion is not
+    /// finite.
+    pub fn simulate_fixed(
+        &self,
+        drive: &Drive<'_>,
+        start: Instant<Memory<K, f64>>,
+        substeps: usize,
+        stop: Stop<'_>,
+    ) -> Result<Option<Motion<Memory<K, f64>>>> {
+        if substeps == 0 {
+            return Err(Error::parameter("substeps", 0, "1 or more"));
+        }
+        let run = Run { of: *self, drive, start, substeps, stop };
+        let Some(motion) = dispatch_fused(run) else { return Ok(None) };
+        all_finite(&motion.x, drive.dt)?;
+        Ok(Some(motion))
+    }
+
+    /// Simulates with the fewest sub-steps that the oscillation needs and with twice as many,
+    /// and returns the finer motion with its difference from the coarser.
+    ///
+    /// # Errors
+    /// [`Error::Numerical`] where the motion is not finite.
+    pub fn simulate_once(
+        &self,
+        drive: &Drive<'_>,
+        start: Instant<Memory<K, f64>>,
+        stop: Stop<'_>,
+    ) -> Result<Option<Motion<Memory<K, f64>>>> {
+        let substeps = first_substeps(&self.mechanics(), drive.dt);
+        let Some(coarse) = self.simulate_fixed(drive, start, substeps, stop)? else {
+            return Ok(None);
+        };
+        let fine = self.simulate_fixed(drive, start, 2 * substeps, stop)?;
+        Ok(fine.map(|mut fine| {
+            fine.error_estimate = largest_difference(&coarse.x, &fine.x);
+            fine
+        }))
+    }
+
+    /// Simulates so that twice the sub-steps moved no sample by more than `accuracy`, m, and
+    /// returns the finer of the two; `None` where `stop` said so.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] where `accuracy` is not above 0; [`Error::Numerical`] where the
+    /// motion is not finite or the accuracy is out of reach.
+    pub fn simulate(
+        &self,
+        drive: &Drive<'_>,
+        start: Instant<Memory<K, f64>>,
+        accuracy: f64,
+        stop: Stop<'_>,
+    ) -> Result<Option<Motion<Memory<K, f64>>>> {
+        positive("accuracy", accuracy, "m")?;
+        let limit = (MOST_STEPS / drive.u.len().max(1)).clamp(FEW_SUBSTEPS, MOST_SUBSTEPS);
+        let mut substeps = first_substeps(&self.mechanics(), drive.dt).min(limit / 2);
+        let Some(mut coarse) = self.simulate_fixed(drive, start, substeps, stop)? else {
+            return Ok(None);
+        };
+        loop {
+            substeps *= 2;
+            let Some(mut fine) = self.simulate_fixed(drive, start, substeps, stop)? else {
+                return Ok(None);
+            };
+            fine.error_estimate = largest_difference(&coarse.x, &fine.x);
+            if fine.error_estimate <= accuracy {
+                return Ok(Some(fine));
+            }
+            let most = fine.x.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+            if substeps > limit / 2 || accuracy < ROUNDING * most {
+                return Err(out_of_reach(accuracy, substeps, fine.error_estimate));
+            }
+            coarse = fine;
+        }
+    }
+}
+
+/// One simulation.
+struct Run<'a, K: Kernel> {
+    of: LumpedStage<K>,
+    drive: &'a Drive<'a>,
+    start: Instant<Memory<K, f64>>,
+    substeps: usize,
+    stop: Stop<'a>,
+}
+
+impl<K: Kernel> WithSimd for Run<'_, K> {
+    type Output = Option<Motion<Memory<K, f64>>>;
+
+    // One lane needs no vectors; the dispatch is for the fused multiply-add instruction.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        let Self { of, drive, start, substeps, stop } = self;
+        let h = drive.dt / index(substeps);
+        let halvings = halvings(of.mechanics().rate(), h);
+        let (coupling, gain) = of.kernel.coupling(&of.parameters, h, halvings);
+        let n = drive.u.len();
+        let mut samples = Samples {
+            of,
+            x: Vec::with_capacity(n),
+            v: Vec::with_capacity(n),
+            hysteresis: Vec::with_capacity(n),
+            step: h,
+            stop,
+        };
+        let march = March { coupling, gain };
+        let from = FeedbackState { x: start.x, w: start.v * h, memory: start.memory };
+        let end = march.run(drive, substeps, from, &mut samples)?;
+        let last = Instant { x: end.x, v: end.w / h, memory: end.memory };
+        let Samples { x, v, hysteresis, .. } = samples;
+        Some(Motion { x, v, hysteresis, last, substeps, error_estimate: 0.0 })
+    }
+}
+
+/// Stores the state at each sample.
+struct Samples<'a, K> {
+    of: LumpedStage<K>,
+    x: Vec<f64>,
+    v: Vec<f64>,
+    hysteresis: Vec<f64>,
+    step: f64,
+    stop: Stop<'a>,
+}
+
+impl<K: Kernel> Sink<f64, Memory<K, f64>> for Samples<'_, K> {
+    #[inline(always)]
+    fn sample(&mut self, _k: usize, state: &FeedbackState<f64, Memory<K, f64>>) {
+        self.x.push(state.x);
+        self.v.push(state.w / self.step);
+        self.hysteresis.push(self.of.kernel.force(&self.of.parameters, &state.memory));
+    }
+
+    fn give_up(&mut self, _k: usize) -> bool {
+        (self.stop)()
+    }
+}

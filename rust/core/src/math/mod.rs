@@ -1,0 +1,16 @@
+//! Numerical methods: SIMD lanes, random numbers, least squares, line search, transfer functions.
+
+mod fused;
+mod golden_section;
+mod lanes;
+mod nnls;
+mod random;
+mod transfer_function;
+
+pub use lanes::Lanes;
+pub use nnls::{Rows, nnls};
+
+pub(crate) use fused::dispatch_fused;
+pub(crate) use golden_section::least;
+pub(crate) use random::Draws;
+pub(crate) use transfer_function::{C, Jet, Ratio};

@@ -1,0 +1,237 @@
+//! The classic Dahl stage: first-order Dahl friction in feedback on linear mechanics.
+//!
+//! ```text
+//! M x'' + D x' + K x = T u - F
+//! dF/dx = sigma |1 - F sgn(x')/Fc|^i sgn(1 - F sgn(x')/Fc)
+//! ```
+//!
+//! Dahl 1968, Aerospace Corporation TOR-0158(3107-18)-1; Dahl 1976, doi 10.2514/3.61511. Unlike
+//! the second-order form of [`super::DahlStage`] the operator is bounded and dissipative, and
+//! its loops close.
+
+use piezotrack_control::Number;
+use piezotrack_control::hysteresis::{BoucWenState, FirstOrderDahl, Operator};
+use piezotrack_control::inverse::{FeedbackInverseState, FirstOrderDahlInverse};
+
+use super::plant::KernelModel;
+use super::search_ranges::{Measures, Ranges};
+use super::traits::{
+    Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel, leading,
+    parameters, simulate_kernel,
+};
+use super::values::{Held, ParameterInfo, Values};
+use crate::design::{Gains, LoopPlant};
+use crate::error::{Result, not_negative, not_zero, positive, within};
+use crate::integrator::{Kernel, Kinked, LumpedStage, Mechanics, Order, Parameters, linear};
+
+const PARAMETERS: &[ParameterInfo] = &[
+    ParameterInfo::new("mass", "M", "kg").force(),
+    ParameterInfo::new("damping", "D", "N s/m").force(),
+    ParameterInfo::new("stiffness", "K", "N/m").force(),
+    ParameterInfo::new("piezo_coefficient", "T", "N/V").force(),
+    ParameterInfo::new("rest_stiffness", "sigma", "N/m").force(),
+    ParameterInfo::new("coulomb_force", "Fc", "N").force(),
+    ParameterInfo::new("exponent", "i", "")
+        .or(1.0)
+        .never_searched("exponent held, in fixed=: all candidates of a search share it"),
+];
+
+const STATE: &[ParameterInfo] = &[
+    ParameterInfo::new("x", "x", "m"),
+    ParameterInfo::new("v", "x'", "m/s"),
+    ParameterInfo::new("force", "F", "N"),
+];
+
+/// Largest exponent: far beyond it the force hardly leaves the rest stiffness, and then stands.
+const MOST_EXPONENT: f64 = 20.0;
+
+/// A stage with first-order Dahl friction.
+///
+/// | field | symbol | unit | range |
+/// | --- | --- | --- | --- |
+/// | `mechanics` | M, D, K | kg, N s/m, N/m | > 0, >= 0, > 0 |
+/// | `piezo_coefficient` | T | N/V | not 0 |
+/// | `rest_stiffness` | sigma | N/m | >= 0 |
+/// | `coulomb_force` | Fc | N | > 0 |
+/// | `exponent` | i | 1 | 0 to 20 |
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FirstOrderDahlStage {
+    /// Mass, damping and stiffness.
+    pub mechanics: Mechanics,
+    /// T, N/V.
+    pub piezo_coefficient: f64,
+    /// sigma, N/m.
+    pub rest_stiffness: f64,
+    /// Fc, N.
+    pub coulomb_force: f64,
+    /// i.
+    pub exponent: f64,
+}
+
+impl FirstOrderDahlStage {
+    /// The stage with its seven parameters in the order of the fields.
+    ///
+    /// # Errors
+    /// [`crate::Error::Parameter`] naming the parameter that is out of its range.
+    pub fn new(values: &[f64; 7]) -> Result<Self> {
+        let [mass, damping, stiffness, piezo_coefficient, rest_stiffness, coulomb, exponent] =
+            *values;
+        let mechanics = Mechanics::new(mass, damping, stiffness)?;
+        not_zero("piezo_coefficient", piezo_coefficient, "N/V")?;
+        within("exponent", exponent, 0.0, MOST_EXPONENT)?;
+        Ok(Self {
+            mechanics,
+            piezo_coefficient,
+            rest_stiffness: not_negative("rest_stiffness", rest_stiffness, "N/m")?,
+            coulomb_force: positive("coulomb_force", coulomb, "N")?,
+            exponent,
+        })
+    }
+
+    /// The hysteresis operator.
+    #[must_use]
+    pub fn operator(&self) -> FirstOrderDahl<f64> {
+        FirstOrderDahl {
+            rest_stiffness: self.rest_stiffness,
+            coulomb_force: self.coulomb_force,
+            exponent: self.exponent,
+        }
+    }
+}
+
+impl KernelModel for FirstOrderDahlStage {
+    type Kernel = FirstOrderDahlKernel;
+
+    fn lumped(&self) -> LumpedStage<FirstOrderDahlKernel> {
+        let Mechanics { mass, damping, stiffness } = self.mechanics;
+        let Self { piezo_coefficient, rest_stiffness, coulomb_force, exponent, .. } = *self;
+        let values =
+            [mass, damping, stiffness, piezo_coefficient, rest_stiffness, coulomb_force, exponent];
+        let kernel = FirstOrderDahlKernel { exponent };
+        LumpedStage { kernel, parameters: parameters(&values) }
+    }
+
+    fn memory(&self, state: &[f64]) -> BoucWenState<f64> {
+        let [_, _, value] = leading(state);
+        BoucWenState { value, ..self.operator().rest() }
+    }
+
+    fn state(&self, memory: &BoucWenState<f64>) -> Vec<f64> {
+        vec![memory.value]
+    }
+}
+
+impl StageModel for FirstOrderDahlStage {
+    const INFO: ModelInfo = ModelInfo {
+        name: "first-order-dahl",
+        title: "Dahl, first order",
+        drive_unit: "V",
+        parameters: PARAMETERS,
+        state: STATE,
+        published: &[],
+    };
+
+    fn build(values: &Values) -> Result<Self> {
+        Self::new(&values.numbers())
+    }
+
+    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
+        simulate_kernel(self, experiment)
+    }
+
+    /// On its settled loop between the displacements that the two voltages lead to without
+    /// friction: `T/(K + dF/dx)`.
+    fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
+        let (Mechanics { mass, damping, stiffness }, piezo) =
+            (self.mechanics, self.piezo_coefficient);
+        let ends = [low, high].map(|volts| piezo * volts / stiffness);
+        let ends = if piezo < 0.0 { [ends[1], ends[0]] } else { ends };
+        let gain = |slope: f64| piezo / (stiffness + slope);
+        let gains = Gains::of(&self.operator(), ends[0], ends[1], gain)?;
+        gains.plants(|gain| {
+            let mechanics = Mechanics { mass, damping, stiffness: piezo / gain };
+            LoopPlant::mechanical(&mechanics, piezo)
+        })
+    }
+}
+
+impl Searchable for FirstOrderDahlStage {
+    const KINKED: bool = true;
+
+    fn ranges(of: &Measures, held: &Held) -> Result<Ranges> {
+        let limit = held.value("coulomb_force").map(|limit| 10.0 * limit / of.stroke);
+        let hints = [held.value("rest_stiffness"), limit];
+        let (soft, hard) = of.stiffness(held, held.value("piezo_coefficient"), &hints);
+        let [mass, damping, stiffness] = of.mechanical((soft, hard));
+        Ok(vec![
+            ("mass", mass),
+            // The loop's width is the friction's: the damping may be far too small to show.
+            ("damping", (1e-2 * damping.0, damping.1)),
+            ("stiffness", stiffness),
+            ("piezo_coefficient", of.piezo(soft * of.gain, hard * of.gain)),
+            // The way to the Coulomb force is a hundredth of the stroke or all of it.
+            ("rest_stiffness", (1e-2 * soft, 10.0 * hard)),
+            ("coulomb_force", (1e-3 * soft * of.stroke, hard * of.stroke)),
+        ])
+    }
+
+    fn kernel<V: KernelVisitor>(held: &Held, _order: Order, visitor: V) -> V::Output {
+        visitor.visit(FirstOrderDahlKernel { exponent: held.value("exponent").unwrap_or(1.0) })
+    }
+}
+
+impl Invertible for FirstOrderDahlStage {
+    type Inverse = FirstOrderDahlInverse;
+
+    fn inverse(
+        &self,
+        dt: f64,
+        _initial: Option<&Values>,
+    ) -> Result<(FirstOrderDahlInverse, FeedbackInverseState)> {
+        let Mechanics { mass, damping, stiffness } = self.mechanics;
+        let hysteresis = (self.rest_stiffness, self.coulomb_force, self.exponent);
+        let piezo = self.piezo_coefficient;
+        let inverse = FirstOrderDahlInverse::new(mass, damping, stiffness, piezo, hysteresis, dt)?;
+        Ok((inverse, inverse.rest()))
+    }
+}
+
+/// First-order Dahl stages of one exponent.
+#[derive(Clone, Copy, Debug)]
+pub struct FirstOrderDahlKernel {
+    /// i, the same in all lanes.
+    pub exponent: f64,
+}
+
+impl FirstOrderDahlKernel {
+    #[inline(always)]
+    fn operator<N: Number>(self, parameters: &Parameters<N>) -> FirstOrderDahl<N> {
+        let [_, _, _, _, rest_stiffness, coulomb_force, ..] = *parameters;
+        FirstOrderDahl { rest_stiffness, coulomb_force, exponent: self.exponent }
+    }
+}
+
+impl Kernel for FirstOrderDahlKernel {
+    type Coupling<N: Number> = Kinked<N, FirstOrderDahl<N>>;
+
+    #[inline(always)]
+    fn coupling<N: Number>(
+        &self,
+        parameters: &Parameters<N>,
+        step: f64,
+        halvings: u32,
+    ) -> (Self::Coupling<N>, N) {
+        let linear = linear(parameters, step, halvings);
+        (Kinked { linear, operator: self.operator(parameters) }, parameters[3])
+    }
+
+    #[inline(always)]
+    fn rest<N: Number>(&self, parameters: &Parameters<N>) -> BoucWenState<N> {
+        self.operator(parameters).rest()
+    }
+
+    #[inline(always)]
+    fn force(&self, _parameters: &Parameters<f64>, memory: &BoucWenState<f64>) -> f64 {
+        memory.value
+    }
+}

@@ -1,0 +1,307 @@
+//! A stage composed of a hysteresis operator at the input, creep and linear dynamics.
+//!
+//! ```text
+//! h = H(u) - H(0)                                             hysteresis
+//! d = h + sum_k c_k q_k,   tau_k q_k' = h - q_k               creep
+//! T x' + x = d   or   x'' + 2 zeta wn x' + wn^2 x = wn^2 d   or   x = d
+//! ```
+//!
+//! The hysteresis is exact from sample to sample; between two samples its output is taken to go
+//! straight. A model brings its operator; creep and dynamics are the same for all.
+
+use core::fmt::Debug;
+
+use piezotrack_control::{CreepState, InputInverse, InputInverseState, OperatorInverse};
+
+use super::creep::{Dynamics, MOST_RELAXATIONS, Relaxation, RelaxationFlow, RelaxationState};
+use super::plant::Plant;
+use super::traits::{Experiment, Response};
+use super::values::{ParameterInfo, Values};
+use crate::design::LoopPlant;
+use crate::error::{Error, Result};
+use crate::signal::Hold;
+
+/// Samples between two questions whether to stop.
+const POLL: usize = 4096;
+
+/// Parameters of creep and dynamics, which follow those of the operator.
+pub(super) const DYNAMICS: [ParameterInfo; 5] = [
+    ParameterInfo::list("creep_weights", "c", ""),
+    ParameterInfo::list("creep_times", "tau", "s"),
+    ParameterInfo::optional("time_constant", "T", "s"),
+    ParameterInfo::optional("frequency", "fn", "Hz"),
+    ParameterInfo::optional("damping_ratio", "zeta", ""),
+];
+
+/// State of a stage whose operator has plays.
+pub(super) const PLAYS_STATE: &[ParameterInfo] = &[
+    ParameterInfo::new("x", "x", "m"),
+    ParameterInfo::new("v", "x'", "m/s"),
+    ParameterInfo::new("u", "u", "V"),
+    ParameterInfo::list("plays", "z", "V"),
+    ParameterInfo::list("creep", "q", "m"),
+];
+
+/// A hysteresis operator that is followed from sample to sample, V to m.
+pub trait InputOperator: Copy + Debug {
+    /// What it remembers.
+    type State: Copy + Debug;
+
+    /// The state before any voltage.
+    fn rest(&self) -> Self::State;
+
+    /// Takes the input to `volts` and returns the output, m.
+    fn follow(&self, state: &mut Self::State, volts: f64) -> f64;
+
+    /// Input of a state, V.
+    fn input(&self, state: &Self::State) -> f64;
+
+    /// The plays of a state: those that are used.
+    fn plays<'a>(&self, state: &'a mut Self::State) -> &'a mut [f64];
+}
+
+/// A stage with an operator at its input.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InputStage<O> {
+    /// Hysteresis, V to m.
+    pub operator: O,
+    /// Creep and linear dynamics.
+    pub relaxation: Relaxation,
+}
+
+/// Memory of an [`InputStage`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InputStageState<S> {
+    /// Of the operator, with the drive.
+    pub operator: S,
+    /// Creep and dynamics.
+    pub relaxation: RelaxationState,
+}
+
+/// Steps of one length, and the operator's output at rest, m.
+#[derive(Clone, Copy, Debug)]
+pub struct InputStageFlow {
+    relaxation: RelaxationFlow,
+    zero: f64,
+}
+
+impl Relaxation {
+    /// Creep and dynamics from the values of a stage.
+    pub(super) fn build(values: &Values) -> Result<Self> {
+        let list = |name| values.list(name);
+        let modal = (list("time_constant"), list("frequency"), list("damping_ratio"));
+        let dynamics = match modal {
+            ([], [], []) => Dynamics::None,
+            ([time], [], []) => Dynamics::First { time: *time },
+            ([], [frequency], [damping_ratio]) => {
+                Dynamics::Second { frequency: *frequency, damping_ratio: *damping_ratio }
+            }
+            ([time, ..], _, _) => {
+                let expected = "None beside a frequency or a damping ratio";
+                return Err(Error::parameter("time_constant", format!("{time} s"), expected));
+            }
+            _ => {
+                let expected = "both or neither";
+                return Err(Error::parameter("frequency and damping_ratio", "one", expected));
+            }
+        };
+        Self::new(list("creep_weights"), list("creep_times"), dynamics)
+    }
+
+    /// The values of creep and dynamics, in the order of [`DYNAMICS`].
+    pub(super) fn values(&self) -> [Vec<f64>; 5] {
+        let creep = self.used();
+        let [time, frequency, damping_ratio] = match self.dynamics {
+            Dynamics::None => [vec![], vec![], vec![]],
+            Dynamics::First { time } => [vec![time], vec![], vec![]],
+            Dynamics::Second { frequency, damping_ratio } => {
+                [vec![], vec![frequency], vec![damping_ratio]]
+            }
+        };
+        let weights = creep.iter().map(|creep| creep.share).collect();
+        let times = creep.iter().map(|creep| creep.time).collect();
+        [weights, times, time, frequency, damping_ratio]
+    }
+
+    /// A stage of some static gain (m/V) with these dynamics; its creep is slower than a loop and
+    /// left out.
+    pub(super) fn loop_plant(&self, gain: f64) -> Result<LoopPlant> {
+        match self.dynamics {
+            Dynamics::None => LoopPlant::fixed_gain(gain),
+            Dynamics::First { time } => {
+                LoopPlant::fixed_gain(gain)?.with_amplifier(1.0 / (core::f64::consts::TAU * time))
+            }
+            Dynamics::Second { frequency, damping_ratio } => {
+                LoopPlant::mode(gain, frequency, damping_ratio)
+            }
+        }
+    }
+}
+
+impl<O: InputOperator> InputStage<O> {
+    /// Creep and dynamics from the values of a stage.
+    pub(super) fn relaxation(values: &Values) -> Result<Relaxation> {
+        Relaxation::build(values)
+    }
+
+    /// The state before any voltage.
+    #[must_use]
+    pub fn at_rest(&self) -> InputStageState<O::State> {
+        let relaxation = RelaxationState::default();
+        InputStageState { operator: self.operator.rest(), relaxation }
+    }
+
+    /// A state from its values, or that at rest; a play that the drive would have pushed on
+    /// stands where it does.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] where the state is of another stage; [`Error::Parameter`] where it is not
+    /// finite.
+    pub fn state(&self, values: Option<&Values>) -> Result<InputStageState<O::State>> {
+        let mut state = self.at_rest();
+        let Some(values) = values else { return Ok(state) };
+        let (plays, creep) = (values.list("plays"), values.list("creep"));
+        let slots = self.operator.plays(&mut state.operator);
+        let (count, relaxations) = (slots.len(), self.relaxation.count);
+        if plays.len() != count || creep.len() != relaxations {
+            return Err(Error::Shape {
+                name: "initial".into(),
+                found: format!("{} plays and {} relaxations", plays.len(), creep.len()),
+                expected: format!("{count} plays and {relaxations} relaxations, as the stage"),
+            });
+        }
+        if !values.iter().flat_map(|(_, numbers)| numbers).all(|value| value.is_finite()) {
+            return Err(Error::parameter("initial", "not finite", "finite numbers"));
+        }
+        slots.copy_from_slice(plays);
+        let relaxation = &mut state.relaxation;
+        relaxation.creep[..relaxations].copy_from_slice(creep);
+        relaxation.input =
+            self.operator.follow(&mut state.operator, values.number("u")) - self.zero();
+        (relaxation.x, relaxation.v) = (values.number("x"), values.number("v"));
+        Ok(state)
+    }
+
+    /// The values of a state.
+    fn values_of(&self, state: &InputStageState<O::State>) -> Values {
+        let InputStageState { mut operator, relaxation } = *state;
+        let creep = relaxation.creep[..self.relaxation.count].to_vec();
+        let plays = self.operator.plays(&mut operator).to_vec();
+        let (x, v, input) = (relaxation.x, relaxation.v, self.operator.input(&operator));
+        Values::of(PLAYS_STATE, [vec![x], vec![v], vec![input], plays, creep])
+    }
+
+    /// The operator's output at rest, m.
+    #[must_use]
+    pub fn zero(&self) -> f64 {
+        let mut state = self.operator.rest();
+        self.operator.follow(&mut state, 0.0)
+    }
+
+    /// The drive jumps to `volts`, V.
+    fn jump(&self, state: &mut InputStageState<O::State>, volts: f64, zero: f64) {
+        let output = self.operator.follow(&mut state.operator, volts) - zero;
+        self.relaxation.jump(&mut state.relaxation, output);
+    }
+
+    /// Motion under a drive. Exact from sample to sample, so its error estimate is 0.
+    ///
+    /// The drive jumps from where the initial state has it to its first sample. With a zero-order
+    /// hold a sample shows the stage before the drive's step at that instant has any effect.
+    pub(super) fn follow(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
+        let Experiment { drive, initial, method, stop, .. } = *experiment;
+        method.exponential_only()?;
+        let count = drive.u.len();
+        let flow = self.relaxation.flow(drive.dt);
+        let zero = self.zero();
+        let mut state = self.state(initial)?;
+        let [mut x, mut v, mut hysteresis] = [0, 1, 2].map(|_| Vec::with_capacity(count));
+        for (k, &volts) in drive.u.iter().enumerate() {
+            if k % POLL == 0 && stop() {
+                return Ok(None);
+            }
+            match drive.hold {
+                Hold::First if k == 0 => self.jump(&mut state, volts, zero),
+                Hold::First => {
+                    let output = self.operator.follow(&mut state.operator, volts) - zero;
+                    self.relaxation.step(&flow, &mut state.relaxation, output);
+                }
+                Hold::Zero if k == 0 => {}
+                Hold::Zero => {
+                    self.jump(&mut state, drive.u[k - 1], zero);
+                    let held = state.relaxation.input;
+                    self.relaxation.step(&flow, &mut state.relaxation, held);
+                }
+            }
+            if !state.relaxation.x.is_finite() {
+                return Err(Error::Numerical(format!(
+                    "the displacement is not finite from sample {k} on"
+                )));
+            }
+            x.push(state.relaxation.x);
+            v.push(state.relaxation.v);
+            hysteresis.push(state.relaxation.input);
+        }
+        let last = self.values_of(&state);
+        Ok(Some(Response {
+            x,
+            v,
+            hysteresis,
+            last,
+            substeps: 1,
+            error_estimate: 0.0,
+            unique: true,
+        }))
+    }
+
+    /// The inverse of the stage for references sampled every `dt` seconds, from the inverse of
+    /// its operator.
+    ///
+    /// # Errors
+    /// Names `dt` where it is not above 0.
+    pub fn feedforward<I: OperatorInverse>(
+        &self,
+        operator: I,
+        dt: f64,
+    ) -> Result<InputInverse<I, MOST_RELAXATIONS>> {
+        let Relaxation { dynamics, .. } = self.relaxation;
+        Ok(InputInverse::with(operator, self.zero(), self.relaxation.used(), dynamics, dt)?)
+    }
+}
+
+/// What an inverse remembers that goes on from a state of its stage.
+pub(super) fn inverse_state<I: OperatorInverse>(
+    inverse: &InputInverse<I, MOST_RELAXATIONS>,
+    operator: I::State,
+    relaxation: &RelaxationState,
+) -> InputInverseState<I::State, MOST_RELAXATIONS> {
+    inverse.start(operator, CreepState { input: relaxation.input, reached: relaxation.creep })
+}
+
+impl<O: InputOperator> Plant for InputStage<O> {
+    type State = InputStageState<O::State>;
+    type Flow = InputStageFlow;
+
+    fn rest(&self) -> Self::State {
+        self.at_rest()
+    }
+
+    fn flow(&self, step: f64) -> InputStageFlow {
+        InputStageFlow { relaxation: self.relaxation.flow(step), zero: self.zero() }
+    }
+
+    #[inline(always)]
+    fn advance(&self, flow: &InputStageFlow, state: &mut Self::State, from: f64, to: f64) {
+        let InputStageFlow { relaxation, zero } = flow;
+        if (from - self.operator.input(&state.operator)).abs() > 0.0 {
+            self.jump(state, from, *zero);
+        }
+        let output = self.operator.follow(&mut state.operator, to) - zero;
+        self.relaxation.step(relaxation, &mut state.relaxation, output);
+    }
+
+    #[inline(always)]
+    fn displacement(&self, state: &Self::State) -> f64 {
+        state.relaxation.x
+    }
+}

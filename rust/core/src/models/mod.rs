@@ -1,0 +1,33 @@
+//! Models of a stage: one file each, what such a file says, and the list of them.
+
+mod bouc_wen;
+mod bouc_wen_oscillator;
+mod creep;
+pub mod dahl;
+mod first_order_dahl;
+mod input_stage;
+mod plant;
+mod prandtl_ishlinskii;
+mod registry;
+mod search_ranges;
+mod traits;
+mod values;
+mod weighted_plays;
+
+pub use bouc_wen::{BoucWenKernel, BoucWenStage};
+pub use bouc_wen_oscillator::{BoucWenOscillator, BoucWenOscillatorKernel};
+pub use creep::{Creep, Dynamics, MOST_RELAXATIONS, Relaxation, RelaxationFlow, RelaxationState};
+pub use dahl::{DahlStage, DahlStageState};
+pub use first_order_dahl::{FirstOrderDahlKernel, FirstOrderDahlStage};
+pub use input_stage::{InputOperator, InputStage, InputStageFlow, InputStageState};
+pub use plant::{KernelFlow, KernelModel, Plant};
+pub use prandtl_ishlinskii::{
+    MOST_PLAYS, MOST_ZONES, PlayHysteresis, Plays, PrandtlIshlinskiiStage,
+};
+pub use registry::{FoundBy, Model, Stage, StageFlow, StageInverse, StageInverseState, StageState};
+pub use search_ranges::{Measures, NOMINAL_STIFFNESS, Range, Ranges};
+pub use traits::{
+    Experiment, Invertible, KernelVisitor, Method, ModelInfo, Response, Searchable, StageModel,
+};
+pub use values::{Held, ParameterInfo, Values, position};
+pub use weighted_plays::{FittedPlays, WeightedPlays, WeightedVisitor};

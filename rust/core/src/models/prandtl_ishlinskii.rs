@@ -1,0 +1,261 @@
+//! The Prandtl-Ishlinskii stage: plays with dead zones at the input, creep, linear dynamics.
+//!
+//! ```text
+//! p = w_0 u + sum_i w_i z_i,  z_i = max(u - r_i, min(u + r_i, z_i))
+//! H = S(p),  S(p) = p + sum_j s_j max(p - d_j, 0)
+//! ```
+//!
+//! Kuhnen 2003, European Journal of Control 9(4), 407-418, doi 10.3166/ejc.9.407-418, with the
+//! weights in m/V; [`InputStage`] says what follows the operator.
+
+use piezotrack_control::hysteresis::{Operator, Play, PlayState};
+use piezotrack_control::{InputInverseState, PlayInverse, PrandtlIshlinskiiInverse};
+
+use super::creep::MOST_RELAXATIONS;
+use super::input_stage::{DYNAMICS, InputOperator, InputStage, PLAYS_STATE, inverse_state};
+use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
+use super::values::{ParameterInfo, Values};
+use super::weighted_plays::{FittedPlays, WeightedPlays};
+use crate::design::{Gains, LoopPlant};
+use crate::error::{Error, Result, finite, not_negative, positive};
+
+/// Most plays of a stage.
+pub const MOST_PLAYS: usize = 32;
+
+/// Most dead zones of a stage.
+pub const MOST_ZONES: usize = 8;
+
+/// The play operators, V to m; those plays and dead zones that are not used weigh 0.
+pub type Plays = Play<f64, MOST_PLAYS, MOST_ZONES>;
+
+const PARAMETERS: &[ParameterInfo] = &[
+    ParameterInfo::new("linear", "w0", "m/V"),
+    ParameterInfo::list("thresholds", "r", "V"),
+    ParameterInfo::list("weights", "w", "m/V"),
+    ParameterInfo::list("dead_zone_thresholds", "d", "m"),
+    ParameterInfo::list("dead_zone_weights", "s", ""),
+    DYNAMICS[0],
+    DYNAMICS[1],
+    DYNAMICS[2],
+    DYNAMICS[3],
+    DYNAMICS[4],
+];
+
+/// Plays with dead zones, and how many of the plays are used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlayHysteresis {
+    /// The operator.
+    pub plays: Plays,
+    /// Plays that are used.
+    pub count: usize,
+}
+
+/// A stage with play operators at its input.
+///
+/// ```
+/// use piezotrack_core::models::{
+///     Dynamics, Experiment, PlayHysteresis, PrandtlIshlinskiiStage, Relaxation, StageModel,
+/// };
+/// use piezotrack_core::signal::{Drive, Hold, NEVER};
+///
+/// # fn main() -> piezotrack_core::Result<()> {
+/// let stage = PrandtlIshlinskiiStage {
+///     operator: PlayHysteresis::new(1e-6, &[10.0, 20.0], &[0.2e-6, 0.1e-6], &[], &[])?,
+///     relaxation: Relaxation::new(&[], &[], Dynamics::None)?,
+/// };
+/// let drive = Drive::new(&[0.0, 50.0, 0.0], 0.01, Hold::First)?;
+/// let run = stage.simulate(&Experiment::of(&drive, NEVER))?.unwrap();
+/// assert!((run.x[1] - 61e-6).abs() < 1e-15);
+/// assert!((run.x[2] - 4e-6).abs() < 1e-15); // the plays stay behind
+/// # Ok(())
+/// # }
+/// ```
+pub type PrandtlIshlinskiiStage = InputStage<PlayHysteresis>;
+
+impl PlayHysteresis {
+    /// The hysteresis from its parameters: weights in m/V, thresholds in V, those of the dead
+    /// zones in m.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] where entries are missing or too many, [`Error::Parameter`] where one is
+    /// out of its range.
+    pub fn new(
+        linear: f64,
+        thresholds: &[f64],
+        weights: &[f64],
+        dead_zone_thresholds: &[f64],
+        dead_zone_weights: &[f64],
+    ) -> Result<Self> {
+        positive("linear", linear, "m/V")?;
+        let count = thresholds.len();
+        same_length("weights", weights.len(), "thresholds", count, MOST_PLAYS)?;
+        let (corners, bends) = (dead_zone_thresholds, dead_zone_weights);
+        let names = ("dead_zone_weights", "dead_zone_thresholds");
+        same_length(names.0, bends.len(), names.1, corners.len(), MOST_ZONES)?;
+        let mut plays = Plays {
+            linear,
+            // What is not used weighs 0; it stands at the end so that all ascend.
+            thresholds: [thresholds.last().copied().unwrap_or(0.0); MOST_PLAYS],
+            weights: [0.0; MOST_PLAYS],
+            corners: [corners.last().copied().unwrap_or(0.0); MOST_ZONES],
+            bends: [0.0; MOST_ZONES],
+        };
+        plays.thresholds[..count].copy_from_slice(&checked_thresholds(thresholds, "V")?);
+        for (i, weight) in weights.iter().enumerate() {
+            plays.weights[i] = not_negative(&format!("weights[{i}]"), *weight, "m/V")?;
+        }
+        let (mut before, mut slope) = (f64::NEG_INFINITY, 1.0);
+        for j in 0..corners.len() {
+            let name = format!("dead_zone_thresholds[{j}]");
+            before = ascending(&name, finite(&name, corners[j], "m")?, before, "m")?;
+            let name = format!("dead_zone_weights[{j}]");
+            slope += finite(&name, bends[j], "")?;
+            if slope <= 0.0 {
+                let expected =
+                    "dead-zone weights whose sums stay above -1, or the curve turns back";
+                return Err(Error::parameter(name, bends[j], expected));
+            }
+            (plays.corners[j], plays.bends[j]) = (before, bends[j]);
+        }
+        Ok(Self { plays, count })
+    }
+}
+
+/// Thresholds of plays, which are not below 0 and ascend.
+pub(super) fn checked_thresholds(thresholds: &[f64], unit: &str) -> Result<Vec<f64>> {
+    let mut before = 0.0;
+    let check = |(i, threshold): (usize, &f64)| {
+        let name = format!("thresholds[{i}]");
+        before = ascending(&name, not_negative(&name, *threshold, unit)?, before, unit)?;
+        Ok(before)
+    };
+    thresholds.iter().enumerate().map(check).collect()
+}
+
+/// Refuses lists of different lengths, and longer ones than there is room for.
+pub(super) fn same_length(
+    name: &str,
+    found: usize,
+    other: &str,
+    wanted: usize,
+    most: usize,
+) -> Result<()> {
+    if found == wanted && found <= most {
+        return Ok(());
+    }
+    Err(Error::Shape {
+        name: name.into(),
+        found: format!("{found} entries"),
+        expected: format!("as many as {other}, which has {wanted}, and {most} at most"),
+    })
+}
+
+fn ascending(name: &str, value: f64, before: f64, unit: &str) -> Result<f64> {
+    if value >= before {
+        return Ok(value);
+    }
+    let expected = format!("{before} {unit} or above: they ascend");
+    Err(Error::parameter(name, format!("{value} {unit}"), expected))
+}
+
+impl InputOperator for PlayHysteresis {
+    type State = PlayState<f64, MOST_PLAYS>;
+
+    fn rest(&self) -> Self::State {
+        self.plays.rest()
+    }
+
+    #[inline(always)]
+    fn follow(&self, state: &mut Self::State, volts: f64) -> f64 {
+        self.plays.follow(state, volts)
+    }
+
+    #[inline(always)]
+    fn input(&self, state: &Self::State) -> f64 {
+        state.input
+    }
+
+    fn plays<'a>(&self, state: &'a mut Self::State) -> &'a mut [f64] {
+        &mut state.plays[..self.count]
+    }
+}
+
+impl StageModel for PrandtlIshlinskiiStage {
+    const INFO: ModelInfo = ModelInfo {
+        name: "prandtl-ishlinskii",
+        title: "Prandtl-Ishlinskii",
+        drive_unit: "V",
+        parameters: PARAMETERS,
+        state: PLAYS_STATE,
+        published: &[],
+    };
+
+    fn build(values: &Values) -> Result<Self> {
+        let list = |name| values.list(name);
+        let operator = PlayHysteresis::new(
+            values.number("linear"),
+            list("thresholds"),
+            list("weights"),
+            list("dead_zone_thresholds"),
+            list("dead_zone_weights"),
+        )?;
+        Ok(Self { operator, relaxation: Self::relaxation(values)? })
+    }
+
+    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
+        self.follow(experiment)
+    }
+
+    /// On its settled loop between the two voltages.
+    fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
+        let gains = Gains::of(&self.operator.plays, low, high, |slope| slope)?;
+        gains.plants(|gain| self.relaxation.loop_plant(gain))
+    }
+}
+
+impl Invertible for PrandtlIshlinskiiStage {
+    type Inverse = PrandtlIshlinskiiInverse<MOST_PLAYS, MOST_ZONES, MOST_RELAXATIONS>;
+
+    fn inverse(
+        &self,
+        dt: f64,
+        initial: Option<&Values>,
+    ) -> Result<(Self::Inverse, InputInverseState<PlayState<f64, MOST_PLAYS>, MOST_RELAXATIONS>)>
+    {
+        let plays = &self.operator.plays;
+        let inverse = self.feedforward(PlayInverse::new(plays)?, dt)?;
+        let state = self.state(initial)?;
+        let memory = inverse.operator().memory(plays, &state.operator);
+        let start = inverse_state(&inverse, memory, &state.relaxation);
+        Ok((inverse, start))
+    }
+}
+
+impl WeightedPlays for PrandtlIshlinskiiStage {
+    type Envelope = ();
+
+    fn envelope(_shape: &[f64], _drive: (f64, f64)) {}
+
+    #[inline(always)]
+    fn edges((): &(), volts: f64) -> (f64, f64) {
+        (volts, volts)
+    }
+
+    fn values(fitted: &FittedPlays) -> Values {
+        let of = fitted.clone();
+        let [creep_weights, creep_times, time, frequency, damping_ratio] = of.relaxation.values();
+        let entries = [
+            vec![of.linear],
+            of.thresholds,
+            of.weights,
+            of.dead_zone_thresholds,
+            of.dead_zone_weights,
+            creep_weights,
+            creep_times,
+            time,
+            frequency,
+            damping_ratio,
+        ];
+        Values::of(PARAMETERS, entries)
+    }
+}

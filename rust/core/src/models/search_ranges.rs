@@ -1,0 +1,135 @@
+//! Ranges in which parameters are searched where the caller gave none, from the record.
+//!
+//! Voltage and displacement determine ratios: the gain T/K, the viscous time D/K, the mass over
+//! the stiffness, and the hysteresis force relative to the elastic one. Each ratio gets a generous
+//! range from the stroke, the drive and the sampling, and the stiffness turns it into a range of
+//! the parameter.
+
+use super::values::Held;
+use crate::signal::{Drive, index, range};
+
+/// Stiffness held where nothing in the input determines a force, N/m.
+pub const NOMINAL_STIFFNESS: f64 = 1e6;
+
+/// Lower and upper end of a range.
+pub type Range = (f64, f64);
+
+/// Ranges by the names of the parameters.
+pub type Ranges = Vec<(&'static str, Range)>;
+
+/// What the ranges are built from.
+#[derive(Clone, Copy, Debug)]
+pub struct Measures {
+    /// Range of the displacement, m.
+    pub stroke: f64,
+    /// Stroke over the range of the drive, m/V.
+    pub gain: f64,
+    /// Whether the displacement falls where the drive rises.
+    pub inverted: bool,
+    /// Rate of change of the drive over its size, rad/s: the frequency of a sine.
+    pub frequency: f64,
+    /// The lower of that and two periods in the window, rad/s: of steps, the former is far above
+    /// what moves the stage.
+    pub slow: f64,
+    /// Sampling interval, s.
+    pub dt: f64,
+    /// RMS of the drive about its mean, V or N.
+    pub drive_size: f64,
+    /// RMS of the displacement about its mean, m.
+    pub displacement_size: f64,
+    /// Rate of change of the displacement over its size, rad/s.
+    pub displacement_rate: f64,
+}
+
+impl Measures {
+    /// Measures a drive and the displacement `y` (m) under it, in the samples that count.
+    #[must_use]
+    pub fn of(drive: &Drive<'_>, y: &[f64], window: core::ops::Range<usize>) -> Self {
+        let (u, y, dt) = (&drive.u[window.clone()], &y[window], drive.dt);
+        let ((low, high), (least, most)) = (range(u), range(y));
+        let stroke = most - least;
+        let mean = u.iter().sum::<f64>() / index(u.len());
+        let (drive_size, frequency) = size_and_rate(u, dt);
+        let (displacement_size, displacement_rate) = size_and_rate(y, dt);
+        let level = y.iter().sum::<f64>() / index(y.len());
+        let together: f64 = u.iter().zip(y).map(|(u, y)| (u - mean) * (y - level)).sum();
+        let gain = stroke / (high - low);
+        let twice = 2.0 * core::f64::consts::TAU / (index(u.len()) * dt);
+        let slow = frequency.min(twice);
+        Self {
+            stroke,
+            gain,
+            inverted: together < 0.0,
+            frequency,
+            slow,
+            dt,
+            drive_size,
+            displacement_size,
+            displacement_rate,
+        }
+    }
+
+    /// Whether numbers of this size can be computed with.
+    #[must_use]
+    pub fn usable(&self) -> bool {
+        let usable = |value: f64| (1e-60..1e60).contains(&value);
+        [self.stroke, self.gain, self.frequency, self.dt].into_iter().all(usable)
+    }
+
+    /// Longest delay that is searched, s: twenty samples or a tenth of the drive's period.
+    #[must_use]
+    pub fn longest_delay(&self) -> f64 {
+        (20.0 * self.dt).min(0.1 * core::f64::consts::TAU / self.frequency)
+    }
+
+    /// Ranges of mass, damping and stiffness between a soft and a hard stiffness, N/m.
+    #[must_use]
+    pub fn mechanical(&self, (soft, hard): Range) -> [Range; 3] {
+        // Ten times the drive's frequency up to a tenth of the sampling rate, where the paper's
+        // rule for sampling still holds; never less than two octaves.
+        let slowest = 10.0 * self.frequency;
+        let fastest = (0.2 * core::f64::consts::PI / self.dt).max(4.0 * slowest);
+        [
+            (soft / (fastest * fastest), hard / (slowest * slowest)),
+            (soft * 5e-3 / self.frequency, hard / self.slow),
+            (soft, hard),
+        ]
+    }
+
+    /// Range of a piezo coefficient of about `least` to `most`, of the sign that the record shows.
+    #[must_use]
+    pub fn piezo(&self, least: f64, most: f64) -> Range {
+        let (low, high) = (least / 3.0, most * 3.0);
+        if self.inverted { (-high, -low) } else { (low, high) }
+    }
+
+    /// Range of the stiffness from whichever parameter that carries force is held; `hints` are
+    /// stiffnesses that parameters of the hysteresis tell, to a factor of 30.
+    #[must_use]
+    pub fn stiffness(&self, held: &Held, piezo: Option<f64>, hints: &[Option<f64>]) -> Range {
+        let around = |value: f64, factor: f64| (value.abs() / factor, value.abs() * factor);
+        let not_zero = |value: &f64| *value != 0.0;
+        if let Some(value) = held.value("stiffness") {
+            (value, value)
+        } else if let Some(value) = piezo {
+            around(value / self.gain, 3.0)
+        } else if let Some(value) = hints.iter().copied().flatten().find(not_zero) {
+            around(value, 30.0)
+        } else if let Some(value) = held.value("damping").filter(not_zero) {
+            (value * self.frequency, value * self.frequency * 1e3)
+        } else if let Some(value) = held.value("mass") {
+            let slowest = 3.0 * self.frequency;
+            (value * slowest * slowest, value * slowest * slowest * 1e4)
+        } else {
+            (NOMINAL_STIFFNESS, NOMINAL_STIFFNESS)
+        }
+    }
+}
+
+/// RMS about the mean, and the rate of change over it, rad/s: amplitude and frequency of a sine.
+fn size_and_rate(values: &[f64], dt: f64) -> (f64, f64) {
+    let mean = values.iter().sum::<f64>() / index(values.len());
+    let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
+    let change: f64 = values.windows(2).map(|w| (w[1] - w[0]) * (w[1] - w[0])).sum();
+    (libm::sqrt(squares / index(values.len())), libm::sqrt(change / squares) / dt)
+}

@@ -1,0 +1,221 @@
+//! What a model's file says of the model.
+
+use core::fmt;
+
+use piezotrack_control::inverse::Inverse;
+
+use super::plant::{KernelModel, Plant};
+use super::search_ranges::{Measures, Ranges};
+use super::values::{Held, ParameterInfo, Values};
+use crate::design::LoopPlant;
+use crate::error::{Error, Result};
+use crate::integrator::{Instant, Kernel, Motion, Order, Parameters};
+use crate::signal::{Drive, Stop};
+
+/// Name and parts of a model.
+#[derive(Clone, Copy)]
+pub struct ModelInfo {
+    /// The name that both languages use.
+    pub name: &'static str,
+    /// What a table or a picture calls it.
+    pub title: &'static str,
+    /// Unit of the drive: V, or N of a model under a force.
+    pub drive_unit: &'static str,
+    /// Its parameters; of a model that a swarm searches, mass, damping and stiffness first.
+    pub parameters: &'static [ParameterInfo],
+    /// Its state: displacement and velocity, and what the hysteresis remembers.
+    pub state: &'static [ParameterInfo],
+    /// Published parameters by a name.
+    pub published: &'static [(&'static str, fn() -> Values)],
+}
+
+impl fmt::Debug for ModelInfo {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(self.name)
+    }
+}
+
+/// How a stage is integrated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Linear part exact, hysteresis exact along its input, coupled to fourth order.
+    Exponential,
+    /// Classical Runge-Kutta of fourth order, in equal steps.
+    Rk4,
+    /// Dormand-Prince of order 5(4), adaptive.
+    Rk45,
+}
+
+impl Method {
+    /// Refuses methods that a model other than Dahl's does not have.
+    ///
+    /// # Errors
+    /// Names `method`.
+    pub fn exponential_only(self) -> Result<()> {
+        let name = match self {
+            Self::Exponential => return Ok(()),
+            Self::Rk4 => "'rk4'",
+            Self::Rk45 => "'rk45'",
+        };
+        Err(Error::parameter("method", name, "'exponential': only a Dahl stage has the others"))
+    }
+}
+
+/// A simulation that is asked for.
+#[derive(Clone, Copy)]
+pub struct Experiment<'a> {
+    /// Drive of the stage.
+    pub drive: &'a Drive<'a>,
+    /// State at the first sample; at rest where there is none.
+    pub initial: Option<&'a Values>,
+    /// How to integrate.
+    pub method: Method,
+    /// Largest error of the displacement, m.
+    pub accuracy: f64,
+    /// Asked whether to give up.
+    pub stop: Stop<'a>,
+}
+
+impl<'a> Experiment<'a> {
+    /// From rest, exponential, to 0.1 nm.
+    #[must_use]
+    pub fn of(drive: &'a Drive<'a>, stop: Stop<'a>) -> Self {
+        Self { drive, initial: None, method: Method::Exponential, accuracy: 1e-10, stop }
+    }
+}
+
+/// Motion of a stage at the samples of its drive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Response {
+    /// Displacement, m.
+    pub x: Vec<f64>,
+    /// Velocity, m/s.
+    pub v: Vec<f64>,
+    /// Hysteresis force, N; of plays at the input what comes out of the hysteresis, m.
+    pub hysteresis: Vec<f64>,
+    /// State at the last sample.
+    pub last: Values,
+    /// Steps of the integrator in each sampling interval.
+    pub substeps: usize,
+    /// Largest difference in displacement from a coarser simulation, m; 0 where there was none.
+    pub error_estimate: f64,
+    /// Whether each rest was unique: false once a stage with dry friction could have gone either
+    /// way.
+    pub unique: bool,
+}
+
+impl Response {
+    /// A motion, with the state at its end.
+    pub(super) fn of<M>(motion: Motion<M>, last: Values, unique: bool) -> Self {
+        let Motion { x, v, hysteresis, substeps, error_estimate, .. } = motion;
+        Self { x, v, hysteresis, last, substeps, error_estimate, unique }
+    }
+}
+
+/// A model of a stage: its parameters, its motion, and its gain in a loop.
+pub trait StageModel: Plant + Copy {
+    /// Name and parts.
+    const INFO: ModelInfo;
+
+    /// The stage with these parameters.
+    ///
+    /// # Errors
+    /// Names the parameter that is out of its range.
+    fn build(values: &Values) -> Result<Self>;
+
+    /// Motion under a drive; `None` where it was told to stop.
+    ///
+    /// # Errors
+    /// Names what cannot be used; [`Error::Numerical`] where the motion does not stay finite or
+    /// the accuracy is out of reach.
+    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>>;
+
+    /// The stage for small motions between two voltages: at the least gain, at a middle one and
+    /// at the largest.
+    ///
+    /// # Errors
+    /// Names `limits` where they are no range; [`Error::Numerical`] where the hysteresis grows
+    /// without bound between them.
+    fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]>;
+}
+
+/// A model with an inverse that runs at the sample rate.
+pub trait Invertible: StageModel {
+    /// The inverse.
+    type Inverse: Inverse + Clone;
+
+    /// The inverse for samples every `dt` seconds, and what it remembers of a stage in the state
+    /// `initial`, or of one that never moved.
+    ///
+    /// # Errors
+    /// Names the parameter, or `dt`, that is out of its range.
+    fn inverse(
+        &self,
+        dt: f64,
+        initial: Option<&Values>,
+    ) -> Result<(Self::Inverse, <Self::Inverse as Inverse>::State)>;
+}
+
+/// A model whose scalar parameters a swarm searches.
+pub trait Searchable: StageModel {
+    /// Whether the force has kinks at reversals: the middle of the box of parameters then stands
+    /// for all in the choice of the step. At its corners the kinks are a nanometre wide, which
+    /// would make every candidate a dozen times as dear, and an oscillator's hysteresis grows
+    /// without bound, which no steps follow.
+    const KINKED: bool = false;
+
+    /// Ranges of the parameters that are not held.
+    ///
+    /// # Errors
+    /// Names a held parameter with which nothing can be searched.
+    fn ranges(measures: &Measures, held: &Held) -> Result<Ranges>;
+
+    /// Hands the kernel of an order to a visitor; what all candidates share is in `held`.
+    fn kernel<V: KernelVisitor>(held: &Held, order: Order, visitor: V) -> V::Output;
+
+    /// Whether there is a kernel of second order too.
+    fn has_second_order(_held: &Held) -> bool {
+        false
+    }
+}
+
+/// What is done with a kernel, whichever it is.
+pub trait KernelVisitor {
+    /// What comes of it.
+    type Output;
+
+    /// Does it.
+    fn visit<K: Kernel>(self, kernel: K) -> Self::Output;
+}
+
+/// The first of some numbers; zeros where there are fewer.
+pub(super) fn leading<const N: usize>(numbers: &[f64]) -> [f64; N] {
+    core::array::from_fn(|i| numbers.get(i).copied().unwrap_or(0.0))
+}
+
+/// Values of the scalar parameters as a kernel takes them.
+pub(super) fn parameters(values: &[f64]) -> Parameters<f64> {
+    leading(values)
+}
+
+/// Motion of a model that one kernel describes.
+pub(super) fn simulate_kernel<M: StageModel + KernelModel>(
+    stage: &M,
+    experiment: &Experiment<'_>,
+) -> Result<Option<Response>> {
+    let Experiment { drive, initial, method, accuracy, stop } = *experiment;
+    method.exponential_only()?;
+    let lumped = stage.lumped();
+    let mut start = lumped.rest();
+    if let Some(initial) = initial {
+        let state: Vec<f64> = initial.iter().filter_map(|(_, n)| n.first().copied()).collect();
+        let [x, v] = leading(&state);
+        start = Instant { x, v, memory: stage.memory(&state) };
+    }
+    let motion = lumped.simulate(drive, start, accuracy, stop)?;
+    Ok(motion.map(|motion| {
+        let end = &motion.last;
+        let state = [vec![end.x, end.v], stage.state(&end.memory)].concat();
+        Response::of(motion, Values::scalars(M::INFO.state, &state), true)
+    }))
+}

@@ -1,0 +1,188 @@
+//! Names and values of a model's parameters and states.
+
+use crate::error::{Error, Result};
+use crate::integrator::{MOST_PARAMETERS, Parameters};
+
+/// Name, symbol and unit of one parameter, and what a search has to know of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ParameterInfo {
+    /// The name that both languages use.
+    pub name: &'static str,
+    /// The symbol in the literature.
+    pub symbol: &'static str,
+    /// SI unit, empty where there is none.
+    pub unit: &'static str,
+    /// Whether it carries force: all that do can be multiplied by one number.
+    pub carries_force: bool,
+    /// Value that is held where the caller says nothing.
+    pub default: Option<f64>,
+    /// Why it is never searched, where that is so.
+    pub held: Option<&'static str>,
+    /// Whether it is a list of numbers, as weights are.
+    pub is_list: bool,
+    /// Whether it may be left out: a list of none or one.
+    pub is_optional: bool,
+}
+
+impl ParameterInfo {
+    /// One number.
+    #[must_use]
+    pub const fn new(name: &'static str, symbol: &'static str, unit: &'static str) -> Self {
+        Self {
+            name,
+            symbol,
+            unit,
+            carries_force: false,
+            default: None,
+            held: None,
+            is_list: false,
+            is_optional: false,
+        }
+    }
+
+    /// A list of any length.
+    #[must_use]
+    pub const fn list(name: &'static str, symbol: &'static str, unit: &'static str) -> Self {
+        Self { is_list: true, ..Self::new(name, symbol, unit) }
+    }
+
+    /// One number, or none.
+    #[must_use]
+    pub const fn optional(name: &'static str, symbol: &'static str, unit: &'static str) -> Self {
+        Self { is_optional: true, ..Self::new(name, symbol, unit) }
+    }
+
+    /// It carries force.
+    #[must_use]
+    pub const fn force(self) -> Self {
+        Self { carries_force: true, ..self }
+    }
+
+    /// It has this value where the caller says nothing.
+    #[must_use]
+    pub const fn or(self, value: f64) -> Self {
+        Self { default: Some(value), ..self }
+    }
+
+    /// It is never searched, for this reason.
+    #[must_use]
+    pub const fn never_searched(self, reason: &'static str) -> Self {
+        Self { held: Some(reason), ..self }
+    }
+}
+
+/// Values of named parameters, or of a state, in the order of their descriptions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Values {
+    infos: &'static [ParameterInfo],
+    entries: Vec<Vec<f64>>,
+}
+
+impl Values {
+    /// Values by their names, in any order.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a name that is unknown, given twice or missing;
+    /// [`Error::Shape`] where a single number is a list of another length.
+    pub fn named(
+        infos: &'static [ParameterInfo],
+        given: impl IntoIterator<Item = (String, Vec<f64>)>,
+    ) -> Result<Self> {
+        let mut entries: Vec<Option<Vec<f64>>> = vec![None; infos.len()];
+        for (name, numbers) in given {
+            let i = position(infos, "parameters", &name)?;
+            let (found, info) = (numbers.len(), &infos[i]);
+            if !(info.is_list || found == 1 || info.is_optional && found == 0) {
+                let expected = if info.is_optional { "one number or none" } else { "one number" };
+                let found = format!("{found} numbers");
+                return Err(Error::Shape { name, found, expected: expected.into() });
+            }
+            if entries[i].replace(numbers).is_some() {
+                return Err(Error::parameter(name, "given twice", "one value"));
+            }
+        }
+        let mut whole = Vec::with_capacity(infos.len());
+        for (info, entry) in infos.iter().zip(entries) {
+            whole.push(entry.ok_or_else(|| Error::parameter(info.name, "missing", "a value"))?);
+        }
+        Ok(Self { infos, entries: whole })
+    }
+
+    /// Values of parameters that are single numbers, in their order; zeros where there are more.
+    #[must_use]
+    pub fn scalars(infos: &'static [ParameterInfo], numbers: &[f64]) -> Self {
+        let entry = |i: usize| vec![numbers.get(i).copied().unwrap_or(0.0)];
+        Self { infos, entries: (0..infos.len()).map(entry).collect() }
+    }
+
+    /// Values given whole, in the order of their descriptions.
+    #[must_use]
+    pub fn of<const N: usize>(infos: &'static [ParameterInfo], entries: [Vec<f64>; N]) -> Self {
+        Self { infos, entries: entries.into() }
+    }
+
+    /// The first number of each parameter, in their order.
+    #[must_use]
+    pub fn numbers<const N: usize>(&self) -> [f64; N] {
+        core::array::from_fn(|i| self.entries.get(i).and_then(|e| e.first()).map_or(0.0, |v| *v))
+    }
+
+    /// The numbers of a parameter by its name; none where there is no such parameter.
+    #[must_use]
+    pub fn list(&self, name: &str) -> &[f64] {
+        let place = self.infos.iter().position(|info| info.name == name);
+        place.map_or(&[], |i| &self.entries[i])
+    }
+
+    /// The number of a parameter by its name; 0 where there is no such parameter.
+    #[must_use]
+    pub fn number(&self, name: &str) -> f64 {
+        self.list(name).first().copied().unwrap_or(0.0)
+    }
+
+    /// Names and numbers, in their order.
+    pub fn iter(&self) -> impl Iterator<Item = (&'static str, &[f64])> {
+        self.infos.iter().zip(&self.entries).map(|(info, numbers)| (info.name, numbers.as_slice()))
+    }
+}
+
+/// Place of a parameter by its name.
+///
+/// # Errors
+/// [`Error::Parameter`] naming the `argument` where there is none of that name.
+pub fn position(infos: &[ParameterInfo], argument: &str, name: &str) -> Result<usize> {
+    infos.iter().position(|info| info.name == name).ok_or_else(|| {
+        let names: Vec<&str> = infos.iter().map(|info| info.name).collect();
+        Error::parameter(argument, format!("'{name}'"), format!("one of {}", names.join(", ")))
+    })
+}
+
+/// Parameters that all candidates of a search share; those that are searched have no value.
+#[derive(Clone, Copy, Debug)]
+pub struct Held {
+    infos: &'static [ParameterInfo],
+    /// In the order of the model's parameters.
+    pub values: [Option<f64>; MOST_PARAMETERS],
+}
+
+impl Held {
+    /// The defaults of a model's parameters, and nothing else.
+    #[must_use]
+    pub fn defaults(infos: &'static [ParameterInfo]) -> Self {
+        let values = core::array::from_fn(|i| infos.get(i).map_or(Some(0.0), |info| info.default));
+        Self { infos, values }
+    }
+
+    /// All parameters of one candidate.
+    #[must_use]
+    pub fn all(infos: &'static [ParameterInfo], parameters: &Parameters<f64>) -> Self {
+        Self { infos, values: parameters.map(Some) }
+    }
+
+    /// The value of a parameter by its name, where it is held.
+    #[must_use]
+    pub fn value(&self, name: &str) -> Option<f64> {
+        let place = self.infos.iter().position(|info| info.name == name)?;
+        self.values[place]
+    }
+}

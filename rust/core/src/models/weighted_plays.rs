@@ -1,0 +1,59 @@
+//! Models whose weights least squares find: plays of given thresholds, weighted and added up.
+
+use super::creep::Relaxation;
+use super::traits::StageModel;
+use super::values::Values;
+
+/// What least squares found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FittedPlays {
+    /// Weight of what passes without memory, w0.
+    pub linear: f64,
+    /// Thresholds of the plays, V.
+    pub thresholds: Vec<f64>,
+    /// Weights of the plays.
+    pub weights: Vec<f64>,
+    /// Thresholds of the dead zones behind them, m.
+    pub dead_zone_thresholds: Vec<f64>,
+    /// Weights of the dead zones.
+    pub dead_zone_weights: Vec<f64>,
+    /// Numbers of the envelope that were searched.
+    pub shape: Vec<f64>,
+    /// Range of the drive that the envelope was made for, V.
+    pub drive: (f64, f64),
+    /// Creep and dynamics.
+    pub relaxation: Relaxation,
+}
+
+/// A model of weighted plays.
+///
+/// A play of threshold r is pushed up to `up - r` and down to `down + r`, where up and down are the
+/// edges at the present voltage: the voltage itself for plain plays, an envelope of it for
+/// generalised ones.
+pub trait WeightedPlays: StageModel {
+    /// What makes edges of a voltage.
+    type Envelope: Clone;
+
+    /// Ranges of the envelope's numbers, which are searched around the least squares.
+    fn shapes() -> Vec<(f64, f64)> {
+        Vec::new()
+    }
+
+    /// The envelope of these numbers for a range of the drive, V.
+    fn envelope(shape: &[f64], drive: (f64, f64)) -> Self::Envelope;
+
+    /// Edges up and down at a voltage.
+    fn edges(envelope: &Self::Envelope, volts: f64) -> (f64, f64);
+
+    /// The parameters of the stage, as [`StageModel::build`] takes them.
+    fn values(fitted: &FittedPlays) -> Values;
+}
+
+/// What is done with a model of weighted plays, whichever it is.
+pub trait WeightedVisitor {
+    /// What comes of it.
+    type Output;
+
+    /// Does it.
+    fn visit<M: WeightedPlays>(self) -> Self::Output;
+}

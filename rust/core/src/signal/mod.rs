@@ -1,0 +1,18 @@
+//! Sampled signals: drives, delays, turning points, drift, frequency response, error measures.
+
+pub mod contour_error;
+mod delay;
+mod detrend;
+mod drive;
+mod frequency_response;
+pub mod metrics;
+mod turning_points;
+
+pub use delay::delayed;
+pub use drive::{Drive, Hold, NEVER, Stop};
+pub use turning_points::turns;
+
+pub(crate) use delay::{Late, between};
+pub(crate) use detrend::without_drift;
+pub(crate) use drive::{all_finite, index, largest_difference, range};
+pub(crate) use frequency_response::Spectrum;

@@ -1,0 +1,213 @@
+//! When a sampled controller looks and acts: delays, and samples that come late by chance.
+
+use crate::error::{Error, Result, not_negative, positive};
+use crate::math::Draws;
+use crate::signal::index;
+
+/// When a controller looks and acts, and at which instants the motion is kept.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Timing {
+    /// Control interval Ts, s.
+    pub interval: f64,
+    /// Control samples: the first at time 0, the last at `(samples - 1) Ts`, where the run ends.
+    pub samples: usize,
+    /// Time from a reading to the effect of the command computed from it, s; any fraction of
+    /// the interval, and more than one too.
+    pub delay: f64,
+    /// How late a control sample comes on average, s, as on a computer that has other things to
+    /// do. Each comes late by its own time, drawn from an exponential distribution that ends at
+    /// nine tenths of the interval; the draws follow from the seed of the sensor.
+    pub jitter: f64,
+    /// Instants kept in each control interval, 1 or more.
+    pub substeps: usize,
+}
+
+impl Timing {
+    /// Checks the numbers.
+    pub(super) fn validate(&self) -> Result<()> {
+        positive("interval", self.interval, "s")?;
+        not_negative("delay", self.delay, "s")?;
+        not_negative("jitter", self.jitter, "s")?;
+        for (name, value) in [("samples", self.samples), ("substeps", self.substeps)] {
+            if value == 0 {
+                return Err(Error::parameter(name, 0, "1 or more"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Parts of a control interval nearer than this are one.
+pub(super) const SAME: f64 = 1e-9;
+
+/// A time as whole control intervals and a fraction of one.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Delay {
+    pub(super) whole: usize,
+    pub(super) fraction: f64,
+}
+
+impl Delay {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+    pub(super) fn new(seconds: f64, interval: f64) -> Self {
+        let intervals = seconds / interval;
+        // 0.06 s are three intervals of 0.02 s, whatever the division says.
+        let nearest = intervals.round();
+        if (intervals - nearest).abs() < SAME {
+            return Self { whole: nearest as usize, fraction: 0.0 };
+        }
+        Self { whole: intervals as usize, fraction: intervals.fract() }
+    }
+}
+
+/// The samples of one axis: in each control interval one, `phase` of the interval after its
+/// beginning, and as much later as chance has it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Clock {
+    /// Mean lateness, as a part of the interval.
+    mean: f64,
+    seed: u64,
+    phase: f64,
+}
+
+/// Where in what is left of its interval a sample comes at the latest.
+const LATEST: f64 = 0.9;
+
+impl Clock {
+    /// Samples of an axis whose sensor has this seed.
+    pub(super) fn new(timing: &Timing, seed: u64) -> Self {
+        Self { mean: timing.jitter / timing.interval, seed, phase: 0.0 }
+    }
+
+    /// The same, but later in each interval.
+    pub(super) fn later(self, phase: f64) -> Self {
+        Self { phase, ..self }
+    }
+
+    /// How late the sample in control interval `k` comes, as a part of the interval.
+    fn late(&self, k: usize) -> f64 {
+        if self.mean == 0.0 {
+            return 0.0;
+        }
+        let drawn = self.mean * Draws::lateness(self.seed, k as u64);
+        drawn.min(LATEST * (1.0 - self.phase))
+    }
+
+    /// Where in control interval `k` its sample comes: 0 to below 1.
+    pub(super) fn at(&self, k: usize) -> f64 {
+        self.phase + self.late(k)
+    }
+}
+
+/// Commands of one controller in their order, and when each takes effect.
+pub(super) struct Commands {
+    issued: Vec<f64>,
+    /// What the amplifier follows before the first.
+    held: f64,
+    /// From the control interval that a command is for to its effect, were no sample late.
+    delay: Delay,
+    clock: Clock,
+    /// Intervals from the one that a command is for to the one in which it is computed.
+    behind: usize,
+}
+
+impl Commands {
+    /// Commands computed `behind` intervals after theirs, by the clock, that act `delay` after the
+    /// beginning of theirs when none is late.
+    pub(super) fn new(
+        samples: usize,
+        held: f64,
+        delay: Delay,
+        clock: Clock,
+        behind: usize,
+    ) -> Self {
+        Self { issued: Vec::with_capacity(samples), held, delay, clock, behind }
+    }
+
+    /// Takes the next command, V.
+    pub(super) fn push(&mut self, volts: f64) {
+        self.issued.push(volts);
+    }
+
+    /// The last command, V.
+    pub(super) fn last(&self) -> f64 {
+        self.issued.last().copied().unwrap_or(self.held)
+    }
+
+    /// When command `j` takes effect.
+    fn effect(&self, j: usize) -> Delay {
+        let Delay { whole, fraction } = self.delay;
+        let fraction = fraction + self.clock.late(j.saturating_add(self.behind));
+        if fraction > 1.0 - SAME {
+            return Delay { whole: j + whole + 1, fraction: (fraction - 1.0).max(0.0) };
+        }
+        Delay { whole: j + whole, fraction }
+    }
+
+    /// Where in control interval `k` commands take effect, as parts of it.
+    ///
+    /// Before the first command the interval is cut all the same, as if none were late.
+    pub(super) fn effects(&self, k: usize) -> Vec<f64> {
+        let whole = self.delay.whole;
+        let Some(newest) = k.checked_sub(whole) else { return vec![self.delay.fraction] };
+        (newest.saturating_sub(1)..=newest)
+            .map(|j| self.effect(j))
+            .filter(|effect| effect.whole == k)
+            .map(|effect| effect.fraction)
+            .collect()
+    }
+
+    /// The command that acts in control interval `k` from the part `from` of it on, V.
+    pub(super) fn acting(&self, k: usize, from: f64) -> f64 {
+        let newest = k.saturating_sub(self.delay.whole).saturating_add(1).min(self.issued.len());
+        (newest.saturating_sub(3)..newest)
+            .rev()
+            .find(|&j| {
+                let effect = self.effect(j);
+                effect.whole < k || (effect.whole == k && from > effect.fraction - SAME)
+            })
+            .map_or(self.held, |j| self.issued[j])
+    }
+}
+
+/// Most samples in a control interval: that of x, that of y for the record, that of y's controller.
+pub(super) const SAMPLES: usize = 3;
+
+/// What happens at the end of a part of a control interval.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Event {
+    /// Where it is, as a part of the interval.
+    pub(super) end: f64,
+    /// Whether an instant that is kept is there; that at the end of the interval is kept as the
+    /// next control sample.
+    pub(super) kept: bool,
+    /// Which of the samples come there.
+    pub(super) samples: [bool; SAMPLES],
+}
+
+/// Cuts a control interval at the instants kept, where commands take effect, and where samples come
+/// after its beginning; ascending to 1.
+pub(super) fn events(substeps: usize, effects: &[f64], samples: [f64; SAMPLES]) -> Vec<Event> {
+    let mut events: Vec<Event> = (1..=substeps)
+        .map(|j| Event {
+            end: index(j) / index(substeps),
+            kept: j < substeps,
+            samples: [false; SAMPLES],
+        })
+        .collect();
+    for &mark in effects.iter().chain(&samples) {
+        if mark > 0.0 && events.iter().all(|event| (event.end - mark).abs() > SAME) {
+            events.push(Event { end: mark, kept: false, samples: [false; SAMPLES] });
+        }
+    }
+    events.sort_by(|a, b| a.end.total_cmp(&b.end));
+    for (which, sample) in samples.into_iter().enumerate() {
+        // Once in an interval, however near its neighbours are.
+        if let Some(event) =
+            events.iter_mut().find(|event| sample > 0.0 && (event.end - sample).abs() <= SAME)
+        {
+            event.samples[which] = true;
+        }
+    }
+    events
+}

@@ -1,0 +1,342 @@
+//! The online feedforward: its differences, its delay compensation, and the inverses behind it.
+#![allow(missing_docs, clippy::unwrap_used, clippy::float_cmp)]
+
+use core::f64::consts::{PI, TAU};
+
+use piezotrack_control::hysteresis::{Operator, Play};
+use piezotrack_control::{
+    BoucWenInverse, Creep, DahlInverse, Dynamics, FirstOrderDahlInverse, Inverse,
+    OnlineFeedforward, OscillatorInverse, PlayInverse, PrandtlIshlinskiiInverse,
+    PrandtlIshlinskiiState, ReferenceSample,
+};
+use piezotrack_core::models::{PrandtlIshlinskiiStage, Relaxation, plays};
+use piezotrack_core::signal::{Drive, Hold, NEVER};
+
+/// Passes on the displacement, the velocity or the acceleration that reach an inverse.
+struct Probe(usize);
+
+impl Inverse for Probe {
+    type State = ();
+
+    fn rest(&self) {}
+
+    fn step(&self, (): &mut (), x: f64, v: f64, a: f64) -> f64 {
+        [x, v, a][self.0]
+    }
+}
+
+fn probe(what: usize, dt: f64, delay: f64) -> OnlineFeedforward<Probe> {
+    OnlineFeedforward::new(Probe(what), dt, 0.0, delay).unwrap()
+}
+
+const AMPLITUDE: f64 = 40e-6;
+const OMEGA: f64 = TAU * 5.0;
+
+/// Displacement, velocity and acceleration of a sine.
+fn sine(t: f64) -> [f64; 3] {
+    let (sin, cos) = (OMEGA * t).sin_cos();
+    [AMPLITUDE * sin, AMPLITUDE * OMEGA * cos, -AMPLITUDE * OMEGA * OMEGA * sin]
+}
+
+fn at(t: f64) -> ReferenceSample {
+    ReferenceSample::new(sine(t)[0])
+}
+
+fn with_preview(t: f64, dt: f64) -> ReferenceSample {
+    ReferenceSample { preview: Some(sine(t + dt)[0]), ..at(t) }
+}
+
+fn with_derivatives(t: f64) -> ReferenceSample {
+    let [position, v, a] = sine(t);
+    ReferenceSample { position, velocity: Some(v), acceleration: Some(a), preview: None }
+}
+
+/// Largest deviation of what a probe shows from `expected(t)` over a period, after the start.
+fn worst(
+    feedforward: &OnlineFeedforward<Probe>,
+    dt: f64,
+    sample: impl Fn(f64) -> ReferenceSample,
+    expected: impl Fn(f64) -> f64,
+) -> f64 {
+    let mut state = feedforward.rest();
+    let mut worst = 0.0;
+    let mut k = 0_u32;
+    while f64::from(k) * dt < 0.2 {
+        let t = f64::from(k) * dt;
+        let shown = feedforward.step(&mut state, &sample(t));
+        if k > 2 {
+            worst = f64::max(worst, (shown - expected(t)).abs());
+        }
+        k += 1;
+    }
+    worst
+}
+
+#[test]
+fn central_differences_are_of_second_order() {
+    for (what, third) in [(1, OMEGA.powi(2) / 6.0), (2, OMEGA.powi(2) / 12.0)] {
+        let scale = AMPLITUDE * OMEGA.powi(i32::try_from(what).unwrap());
+        let error = |dt: f64| {
+            let sample = |t: f64| with_preview(t, dt);
+            worst(&probe(what, dt, 0.0), dt, sample, |t| sine(t)[what]) / scale
+        };
+        let (coarse, fine) = (error(1e-3), error(5e-4));
+        assert!((coarse / fine - 4.0).abs() < 0.01, "{what}: {coarse} {fine}");
+        // The first term left out of the Taylor series.
+        assert!((coarse / (third * 1e-6) - 1.0).abs() < 0.01, "{what}: {coarse}");
+    }
+}
+
+#[test]
+fn without_preview_the_velocity_is_half_a_sample_and_the_acceleration_one_sample_late() {
+    for (what, samples) in [(1, 0.5), (2, 1.0)] {
+        let scale = AMPLITUDE * OMEGA.powi(i32::try_from(what).unwrap());
+        let error = |dt: f64, late: f64| {
+            worst(&probe(what, dt, 0.0), dt, at, |t| sine(t - late * dt)[what]) / scale
+        };
+        // Against the derivative of now the error is of first order, that of the lag ...
+        let (coarse, fine) = (error(1e-3, 0.0), error(5e-4, 0.0));
+        assert!((coarse / fine - 2.0).abs() < 0.05, "{what}: {coarse} {fine}");
+        assert!((coarse / (samples * OMEGA * 1e-3) - 1.0).abs() < 0.05, "{what}: {coarse}");
+        // ... and against the late one of second order.
+        let (coarse, fine) = (error(1e-3, samples), error(5e-4, samples));
+        assert!((coarse / fine - 4.0).abs() < 0.05, "{what}: {coarse} {fine}");
+    }
+}
+
+#[test]
+fn the_delay_is_compensated_to_third_order() {
+    let dt = 1e-3;
+    let error = |what: usize, delay: f64| {
+        worst(&probe(what, dt, delay), dt, with_derivatives, |t| sine(t + delay)[what])
+    };
+    let (coarse, fine) = (error(0, 4e-3), error(0, 2e-3));
+    assert!((coarse / fine - 8.0).abs() < 0.2, "{coarse} {fine}");
+    assert!((coarse / (AMPLITUDE * (OMEGA * 4e-3).powi(3) / 6.0) - 1.0).abs() < 0.05, "{coarse}");
+    let (coarse, fine) = (error(1, 4e-3), error(1, 2e-3));
+    assert!((coarse / fine - 4.0).abs() < 0.1, "{coarse} {fine}");
+}
+
+#[test]
+fn the_offset_is_taken_off_and_the_first_sample_stands_still() {
+    let shown = |what: usize| {
+        let feedforward = OnlineFeedforward::new(Probe(what), 1e-3, 0.5e-6, 0.01).unwrap();
+        feedforward.step(&mut feedforward.rest(), &ReferenceSample::new(2e-6))
+    };
+    assert_eq!([shown(0), shown(1), shown(2)], [1.5e-6, 0.0, 0.0]);
+}
+
+#[test]
+fn derivatives_that_are_given_are_used_as_they_are() {
+    let sample = ReferenceSample {
+        position: 1e-6,
+        velocity: Some(2e-3),
+        acceleration: Some(-0.25),
+        preview: Some(7e-6),
+    };
+    for (what, expected) in [1e-6, 2e-3, -0.25].into_iter().enumerate() {
+        let feedforward = probe(what, 1e-3, 0.0);
+        assert_eq!(feedforward.step(&mut feedforward.rest(), &sample), expected);
+    }
+}
+
+#[test]
+fn a_reference_that_is_missing_goes_on_with_its_velocity() {
+    let dt = 1e-3;
+    let ramp = |k: u32| 1e-6 + 3e-6 * f64::from(k);
+    let feedforward = probe(1, dt, 0.0);
+    for missing in [f64::NAN, f64::INFINITY] {
+        let mut state = feedforward.rest();
+        let first = feedforward.step(&mut state, &ReferenceSample::new(missing));
+        assert!(!first.is_finite());
+        assert_eq!(state, feedforward.rest()); // nothing to go on from
+        for k in 0..20 {
+            let lost = (5..=7).contains(&k);
+            let position = if lost { missing } else { ramp(k) };
+            let v = feedforward.step(&mut state, &ReferenceSample::new(position));
+            if lost {
+                assert!(!v.is_finite());
+            } else if k > 0 {
+                assert!((v - 3e-3).abs() < 1e-15, "{v} at {k}");
+            }
+        }
+    }
+}
+
+#[test]
+fn numbers_out_of_range_are_refused() {
+    let refused = |dt: f64, offset: f64, delay: f64| {
+        OnlineFeedforward::new(Probe(0), dt, offset, delay).map(drop).unwrap_err().name
+    };
+    assert_eq!(refused(0.0, 0.0, 0.0), "dt");
+    assert_eq!(refused(1e-3, f64::NAN, 0.0), "offset");
+    assert_eq!(refused(1e-3, 0.0, -1e-6), "delay");
+}
+
+/// A reference that starts smoothly from rest at 0.
+fn raised(t: f64) -> [f64; 3] {
+    let (sin, cos) = (OMEGA * t).sin_cos();
+    let a = AMPLITUDE;
+    [a * (1.0 - cos), a * OMEGA * sin, a * OMEGA * OMEGA * cos]
+}
+
+/// Largest difference between online feedforward, with preview, and the inverse fed with the
+/// derivatives of the reference, as a share of the largest drive.
+fn deviation<I: Inverse>(make: impl Fn(f64) -> I, dt: f64) -> f64 {
+    let whole = make(dt);
+    let mut along = whole.rest();
+    let online = OnlineFeedforward::new(make(dt), dt, 0.0, 0.0).unwrap();
+    let mut state = online.rest();
+    let (mut worst, mut largest) = (0.0, 0.0);
+    let mut k = 0_u32;
+    while f64::from(k) * dt < 0.4 {
+        let t = f64::from(k) * dt;
+        let [x, v, a] = raised(t);
+        let preview = Some(raised(t + dt)[0]);
+        let sample = ReferenceSample { preview, ..ReferenceSample::new(x) };
+        let exact = whole.step(&mut along, x, v, a);
+        let found = online.step(&mut state, &sample);
+        // The first sample counts as having stood still.
+        if k > 0 {
+            worst = f64::max(worst, (found - exact).abs());
+        }
+        largest = f64::max(largest, exact.abs());
+        k += 1;
+    }
+    assert!(largest > 0.0 && worst.is_finite());
+    worst / largest
+}
+
+#[test]
+fn every_inverse_gives_the_drive_of_the_exact_derivatives() {
+    let dahl = |dt: f64| DahlInverse::xu_li_2010().at(dt).unwrap();
+    let first = |dt: f64| {
+        FirstOrderDahlInverse::new(0.18, 50.0, 2.6e4, 0.0468, (1e4, 0.3, 1.0), dt).unwrap()
+    };
+    let oscillator =
+        |dt: f64| OscillatorInverse::new(0.18, 50.0, 2.6e4, (1e4, 2e4, -1e4, 1.0), dt).unwrap();
+    let bouc_wen = |_| BoucWenInverse::new(0.2, 40.0, 2e4, 1.2e-6, 0.3, 0.05, 0.02, 1.0).unwrap();
+    let prandtl_ishlinskii = |dt: f64| {
+        let creep = [Creep { share: 0.01, time: 0.1 }];
+        PrandtlIshlinskiiInverse::<3, 1, 1>::new(&PLAY, &creep, MODE, dt).unwrap()
+    };
+    let errors = |dt: f64| {
+        [
+            deviation(dahl, dt),
+            deviation(first, dt),
+            deviation(oscillator, dt),
+            deviation(bouc_wen, dt),
+            deviation(prandtl_ishlinskii, dt),
+        ]
+    };
+    // (w dt)^2 / 6 = 1.6e-6 of the velocity and half as much of the acceleration.
+    for (coarse, fine) in errors(1e-4).into_iter().zip(errors(5e-5)) {
+        assert!(coarse < 2e-6 && fine < 0.3 * coarse, "{coarse} {fine}");
+    }
+}
+
+/// Weights in m/V, dead zones in m.
+const PLAY: Play<f64, 3, 1> = Play {
+    linear: 1e-6,
+    thresholds: [4.0, 10.0, 20.0],
+    weights: [0.2e-6, 0.1e-6, 0.15e-6],
+    corners: [30e-6],
+    bends: [0.1],
+};
+const MODE: Dynamics = Dynamics::Second { frequency: 300.0, damping_ratio: 0.05 };
+
+/// A drive that turns at places which do not repeat, V.
+fn path(count: u32) -> Vec<f64> {
+    let wave = |t: f64| 25.0 * t.sin() + 12.0 * (2.7 * t).sin() + 3.0 * (17.3 * t).sin();
+    (0..count).map(|k| wave(0.01 * f64::from(k))).collect()
+}
+
+const CREEP: [Creep; 2] = [Creep { share: 0.02, time: 0.03 }, Creep { share: 0.01, time: 2.0 }];
+
+fn stage() -> PrandtlIshlinskiiStage {
+    let Play { linear, thresholds, weights, corners, bends } = PLAY;
+    let (shares, times) = (CREEP.map(|one| one.share), CREEP.map(|one| one.time));
+    PrandtlIshlinskiiStage {
+        plays: plays(linear, &thresholds, &weights, &corners, &bends).unwrap(),
+        relaxation: Relaxation::new(&shares, &times, Dynamics::None).unwrap(),
+    }
+}
+
+#[test]
+fn hysteresis_and_creep_are_undone_to_rounding() {
+    let (stage, dt) = (stage(), 0.01);
+    let u = path(5000);
+    let drive = Drive::new(&u, dt, Hold::First).unwrap();
+    let run = stage.simulate(&drive, stage.at_rest(), NEVER).unwrap().unwrap();
+    // The simulation's inverse with room for more, and one of just the size that is needed.
+    let roomy = stage.inverse(dt).unwrap();
+    let exact =
+        PrandtlIshlinskiiInverse::<3, 1, 2>::new(&PLAY, &CREEP, Dynamics::None, dt).unwrap();
+    let (mut first, mut second) = (roomy.rest(), exact.rest());
+    let largest = u.iter().fold(0.0, |most, volts| f64::max(most, volts.abs()));
+    for (&x, &volts) in run.x.iter().zip(&u) {
+        for found in [roomy.step(&mut first, x, 0.0, 0.0), exact.step(&mut second, x, 0.0, 0.0)] {
+            assert!((found - volts).abs() < 1e-12 * largest, "{found} for {volts}");
+        }
+    }
+}
+
+#[test]
+fn an_inverse_goes_on_from_where_a_stage_is() {
+    let (stage, dt) = (stage(), 0.01);
+    let u = path(3000);
+    let (before, after) = u.split_at(1111);
+    let drive = Drive::new(before, dt, Hold::First).unwrap();
+    let middle = stage.simulate(&drive, stage.at_rest(), NEVER).unwrap().unwrap().last;
+    let drive = Drive::new(after, dt, Hold::First).unwrap();
+    let run = stage.simulate(&drive, middle, NEVER).unwrap().unwrap();
+    let inverse = stage.inverse(dt).unwrap();
+    let memory = PrandtlIshlinskiiState::from(&middle);
+    assert_eq!(inverse.start(&middle), inverse.start(memory));
+    let feedforward = OnlineFeedforward::new(inverse, dt, 0.0, 0.0).unwrap();
+    let mut state = feedforward.start(inverse.start(&middle));
+    for (&x, &volts) in run.x.iter().zip(after) {
+        let found = feedforward.step(&mut state, &ReferenceSample::new(x));
+        assert!((found - volts).abs() < 1e-12 * 40.0, "{found} for {volts}");
+    }
+}
+
+#[test]
+fn the_inverse_of_the_plays_alone_needs_no_derivatives() {
+    let inverse = PlayInverse::new(&PLAY).unwrap();
+    let feedforward = OnlineFeedforward::new(inverse, 1.0, 0.0, 0.0).unwrap();
+    let (mut there, mut state) = (PLAY.rest(), feedforward.rest());
+    for volts in path(2000) {
+        let x = PLAY.follow(&mut there, volts);
+        let found = feedforward.step(&mut state, &ReferenceSample::new(x));
+        assert!((found - volts).abs() < 1e-12 * 40.0, "{found} for {volts}");
+    }
+}
+
+#[test]
+fn a_bad_sample_leaves_the_prandtl_ishlinskii_inverse_alone() {
+    let inverse = PrandtlIshlinskiiInverse::<3, 1, 2>::new(&PLAY, &CREEP, MODE, 1e-3).unwrap();
+    let mut state = inverse.rest();
+    inverse.step(&mut state, 5e-6, 0.0, 0.0);
+    let before = state;
+    for bad in [f64::NAN, f64::INFINITY, -1e200] {
+        assert!(inverse.step(&mut state, bad, 0.0, 0.0).is_nan());
+        assert!(inverse.step(&mut state, 5e-6, bad, 0.0).is_nan());
+        assert!(inverse.step(&mut state, 5e-6, 0.0, if bad < 0.0 { -1e300 } else { bad }).is_nan());
+        assert_eq!(state, before);
+    }
+}
+
+#[test]
+fn stages_without_an_inverse_are_refused() {
+    let refused = |play: Play<f64, 3, 1>, creep: &[Creep], dynamics: Dynamics, dt: f64| {
+        PrandtlIshlinskiiInverse::<3, 1, 1>::new(&play, creep, dynamics, dt).unwrap_err().name
+    };
+    let none = Dynamics::None;
+    assert_eq!(refused(PLAY, &[], none, 0.0), "dt");
+    assert_eq!(refused(PLAY, &CREEP, none, 1e-3), "creep");
+    assert_eq!(refused(PLAY, &[Creep { share: -0.1, time: 1.0 }], none, 1e-3), "creep_shares");
+    assert_eq!(refused(PLAY, &[Creep { share: 0.1, time: 0.0 }], none, 1e-3), "creep_times");
+    assert_eq!(refused(PLAY, &[], Dynamics::First { time: -PI }, 1e-3), "time_constant");
+    assert_eq!(refused(Play { linear: 0.0, ..PLAY }, &[], none, 1e-3), "linear");
+}
