@@ -32,6 +32,9 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module 'piezotrack' has no attribute {name!r}")
     from importlib import import_module
 
+    if _HOMES[name] == ".":
+        # A package of this one, which the import has set.
+        return import_module(f".{name}", __name__)
     value = getattr(import_module(_HOMES[name], __name__), name)
     globals()[name] = value
     return value

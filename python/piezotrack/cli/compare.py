@@ -55,7 +55,7 @@ def compare_command(
     dt: Interval = None,
     hold: HoldOption = "foh",
     seed: Annotated[int, typer.Option(help="Same seed, same result.")] = 0,
-    runs: Annotated[int, typer.Option(help="Swarms that search apart; do they agree?")] = 4,
+    runs: Annotated[int, typer.Option(help="Number of independent restarts.")] = 4,
     threads: Annotated[int | None, typer.Option(help="Up to 256; else all cores.")] = None,
 ) -> None:
     """Fit several models on a part of a log and judge them on the rest: a table, a picture."""

@@ -161,7 +161,7 @@ def _stage(seed: int, lag: float | None, cross_talk: str | None) -> XYStage:
 
 def _inverse(model: Path | None, seed: int) -> tuple[Inverse, str]:
     """Invert the model, or identify one as the paper does."""
-    from ..identification.model_file import load
+    from ..identification.identified import load
     from ..xu_li_2010.demo import demo_log, identify_demo
 
     if model is not None:

@@ -40,7 +40,7 @@ def simulate_command(
     """Simulate a model under a drive: a CSV with the displacement, and a picture."""
     from .._support.files import make_folder, save_figures, write_columns
     from ..data.reader import read_drive
-    from ..identification.model_file import load
+    from ..identification.identified import load
     from ..identification.plot import plot_response
 
     known = load(model)

@@ -82,7 +82,7 @@ def _write(step: StepResult, folder: Path) -> Path:
         "schema_version": 1,
         "unit": "V, m, s, Hz, rad/s; a1 1/m, a2 1/m^2, b1 N/m^2, b0 N/m",
         "readings": asdict(step.readings),
-        "natural_frequency": step.natural_frequency,
+        "natural_angular_frequency": step.natural_angular_frequency,
         "damping_ratio": step.damping_ratio,
         "damping_by_decrement": step.damping_by_decrement,
         "time_constant": step.time_constant,

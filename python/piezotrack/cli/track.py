@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from ..control.controller import Controller
     from ..control.tracking import Tracking
-    from ..identification.identified import Identified
+    from ..identification.identified import IdentifiedModel
     from ..references.reference import Reference
 
 __all__ = ["feedforward_command", "track_command"]
@@ -81,7 +81,7 @@ def track_command(
     from ..control.components import Pid, Repetitive
     from ..control.controller import Controller
     from ..control.tracking import track
-    from ..identification.model_file import load
+    from ..identification.identified import load
     from ..stages.virtual import VirtualStage
 
     known = load(model)
@@ -127,7 +127,7 @@ def feedforward_command(
     """Write the voltage table that leads a stage along a reference."""
     from .._support.files import make_folder, save_figures, write_columns
     from ..control.tracking_plot import plot_feedforward
-    from ..identification.model_file import load
+    from ..identification.identified import load
 
     known = load(model)
     course = _reference(reference, duration, period)
@@ -145,7 +145,7 @@ def feedforward_command(
     list_files(written)
 
 
-def _note_range(known: Identified[Any], volts: NDArray[np.float64]) -> None:
+def _note_range(known: IdentifiedModel, volts: NDArray[np.float64]) -> None:
     """Say where a model is used outside of the voltages that it was fitted at."""
     if fitted := known.drive_range:
         margin = 0.01 * (fitted[1] - fitted[0])
@@ -165,7 +165,7 @@ def _reference(text: str, duration: float | None, period: float | None) -> Refer
     return parse_reference(text, duration=duration)
 
 
-def _write(run: Tracking, known: Identified[Any], loop: Controller, out: Path) -> list[Path]:
+def _write(run: Tracking, known: IdentifiedModel, loop: Controller, out: Path) -> list[Path]:
     """Write the samples, the figures as JSON, and the pictures."""
     from .. import __version__
     from .._support.files import make_folder, save_figures, write_columns, write_document

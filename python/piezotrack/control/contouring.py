@@ -257,7 +257,7 @@ def contour(
         except ParameterError as error:
             raise ParameterError(f"{name}: {error}") from None
         volts.append(feedforward_of(controller, ahead))
-    runs = stage.core().track(
+    runs = stage._core.track(
         (both[0].core, both[1].core),
         (samples[0].x, samples[1].x),
         (volts[0][0], volts[1][0]),

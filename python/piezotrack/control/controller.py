@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from .. import _core
 from .._support.arguments import finite, positive
@@ -14,7 +14,7 @@ from ..stages.inverse import Inverse, InverseSession
 from .components import LowPass, Notch, Pid, Repetitive, StateSpace
 
 if TYPE_CHECKING:
-    from ..identification.identified import Identified
+    from ..identification.identified import IdentifiedModel
     from .plant import Plant
     from .stability import LoopReport
 
@@ -128,7 +128,7 @@ class Controller:
         )
         object.__setattr__(self, "core", core)
 
-    def check(self, stage: Plant | Identified[Any], *, delay: float = 0.0) -> LoopReport:
+    def check(self, stage: Plant | IdentifiedModel, *, delay: float = 0.0) -> LoopReport:
         """Gain and phase margins on a stage, and whether the loop is stable: see `check_loop`.
 
         Parameters

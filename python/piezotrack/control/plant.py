@@ -1,18 +1,13 @@
-"""What a controller can lead: stages by their kinds, and how each moves and counts in a loop."""
+"""Plants that a controller can drive: closed-loop simulation and linearisation of a stage."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .. import _core
 from ..errors import ParameterError
-from ..identification.identified import Identified
-from ..stages.base import MODEL_STEP
-from ..stages.bouc_wen import BoucWenStage
-from ..stages.dahl import DahlStage
-from ..stages.first_order_dahl import FirstOrderDahlStage
-from ..stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
-from ..stages.registry import kind_of
+from ..identification.identified import IdentifiedModel
+from ..stages.base import MODEL_STEP, Stage
 from ..stages.virtual import VirtualStage
 
 if TYPE_CHECKING:
@@ -25,11 +20,10 @@ if TYPE_CHECKING:
 
 __all__ = ["Plant", "linearised_plants", "run_closed_loop", "unwrap"]
 
-Plant = VirtualStage | DahlStage | BoucWenStage | PrandtlIshlinskiiStage | FirstOrderDahlStage
-PLANTS = (VirtualStage, DahlStage, BoucWenStage, PrandtlIshlinskiiStage, FirstOrderDahlStage)
+Plant = VirtualStage | Stage
 
 
-def unwrap(stage: Plant | Identified[Any]) -> tuple[Plant, float, float]:
+def unwrap(stage: Plant | IdentifiedModel) -> tuple[Plant, float, float]:
     """Return the stage itself, and the offset [m] and delay [s] that its sensor shows.
 
     Raises
@@ -38,12 +32,12 @@ def unwrap(stage: Plant | Identified[Any]) -> tuple[Plant, float, float]:
         It is nothing that can be led.
     """
     offset = late = 0.0
-    if isinstance(stage, Identified):
+    if isinstance(stage, IdentifiedModel):
         offset, late, stage = stage.offset, stage.delay, stage.model
-    if not isinstance(stage, PLANTS):
-        expected = ", ".join(f"pt.{one.__name__}" for one in PLANTS)
+    if not isinstance(stage, Plant):
         raise ParameterError(
-            f"stage is {type(stage).__name__}: expected {expected} or an identified one"
+            f"stage is {type(stage).__name__}: expected a pt.VirtualStage, a stage of a model, as "
+            "a pt.DahlStage, or an identified one"
         )
     return stage, offset, late
 
@@ -61,11 +55,8 @@ def run_closed_loop(
     """
     course = (controller.core, reference, volts, pace)
     if isinstance(stage, VirtualStage):
-        return stage.core().track(*course)
-    step = min(MODEL_STEP, controller.dt / 4)
-    if isinstance(stage, PrandtlIshlinskiiStage):
-        return stage.core.track(step, *course)
-    return _core.track_model(kind_of(stage).name, stage.theta, step, *course)
+        return stage._core.track(*course)
+    return stage._core.track(min(MODEL_STEP, controller.dt / 4), *course)
 
 
 def linearised_plants(
@@ -75,14 +66,5 @@ def linearised_plants(
     low, high = (float(volts) for volts in limits)
     if isinstance(stage, VirtualStage):
         mode = (stage.frequency, stage.damping_ratio, stage.bandwidth, delay)
-        return [_core.LoopPlant.mode(gain, *mode) for gain in stage.core().gains()]
-    if isinstance(stage, BoucWenStage):
-        return _core.LoopPlant.bouc_wen(stage.theta, low, high, delay)
-    if isinstance(stage, FirstOrderDahlStage):
-        return _core.LoopPlant.first_order_dahl(stage.theta, low, high, delay)
-    if isinstance(stage, PrandtlIshlinskiiStage):
-        return stage.core.loop_plants(low, high, delay)
-    ends = [stage.piezo_coefficient * volts / stage.stiffness for volts in (low, high)]
-    soft, stiff = _core.LoopPlant.dahl(stage.theta, min(ends), max(ends), delay)
-    half = 0.5 * sum(ends)
-    return [stiff, _core.LoopPlant.dahl(stage.theta, half, half, delay)[0], soft]
+        return [_core.LoopPlant.mode(gain, *mode) for gain in stage._core.gains()]
+    return stage._core.loop_plants(low, high, delay)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from ..identification.identified import Identified
+    from ..identification.identified import IdentifiedModel
     from .controller import Controller
     from .plant import Plant
 
@@ -201,7 +201,7 @@ class LoopReport:
 
 def check_loop(
     controller: Controller,
-    stage: Plant | Identified[Any],
+    stage: Plant | IdentifiedModel,
     *,
     delay: float = 0.0,
 ) -> LoopReport:

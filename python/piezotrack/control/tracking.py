@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from ..identification.identified import Identified
+    from ..identification.identified import IdentifiedModel
     from .plant import Plant
 
     Array = NDArray[np.float64]
@@ -240,7 +240,7 @@ def _metrics(
 
 
 def track(
-    stage: Plant | Identified[Any],
+    stage: Plant | IdentifiedModel,
     controller: Controller,
     reference: Reference,
     *,

@@ -1,4 +1,4 @@
-"""What a record is not good for, in words: refusals before a search, remarks after it."""
+"""Diagnostics of a record: errors before an identification, warnings with its result."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .._support.units import best_length_unit
 from ..errors import DataError
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Sequence
 
     from numpy.typing import NDArray
 
@@ -42,7 +42,6 @@ BINS = 16
 FEWEST = 10
 # Share of the loop's width, squared, that is not the same above and below the middle.
 LOPSIDED = 0.05
-HYSTERESIS = ("a1", "a2", "b1")
 
 
 def refuse(data: Dataset, *, searches_hysteresis: bool) -> None:
@@ -101,7 +100,13 @@ would be 40 um if it is 1e6 too large, as um taken as m
     return [*_units(data), *_periods(data), *_clipping(data)]
 
 
-def of_fit(data: Dataset, x: Array, cost_percent: float, held: Collection[str]) -> list[str]:
+def of_fit(
+    data: Dataset,
+    x: Array,
+    cost_percent: float,
+    hysteresis: Sequence[str],
+    held: Collection[str],
+) -> list[str]:
     """Say where what a fit leaves is the loop's shape and not noise.
 
     Parameters
@@ -112,6 +117,8 @@ def of_fit(data: Dataset, x: Array, cost_percent: float, held: Collection[str]) 
         Displacement of the model in the window, with the offset [m].
     cost_percent : float
         What remains, in per cent of the stroke.
+    hysteresis : sequence of str
+        The parameters of the model's hysteresis.
     held : collection of str
         The parameters that were not searched.
 
@@ -137,11 +144,13 @@ def of_fit(data: Dataset, x: Array, cost_percent: float, held: Collection[str]) 
         f"{scale * means[way, place]:+.3g} {unit} near {volts:.3g} {data.drive_unit} on the way "
         f"{('up', 'down')[way]}"
     )
-    kept = [name for name in HYSTERESIS if name in held]
+    kept = [name for name in hysteresis if name in held]
     if kept:
+        *first, last = hysteresis
         return [
             f"the loop is not of the model's shape: {where}; {', '.join(kept)} "
-            f"{'were' if len(kept) > 1 else 'was'} held: search all of a1, a2 and b1"
+            f"{'were' if len(kept) > 1 else 'was'} held: search all of "
+            f"{', '.join(first)} and {last}"
         ]
     what = "is asymmetric, which" if _lopsided(data) else "has a shape that"
     return [f"the loop {what} this model cannot describe: {where}"]

@@ -1,4 +1,4 @@
-"""Several models of one record: fitted on a part of it, judged on the rest."""
+"""Comparison of models of one record: fitted on a part of it, scored on the rest."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from .. import _core
 from .._support.files import write_document
 from ..data.dataset import Dataset
 from ..errors import ParameterError
-from ..stages.registry import KINDS, Kind, kind_of
-from .identified import Identified, Score
-from .model_file import load, provenance
-from .search import identify
+from ..stages.registry import MODELS, ModelInfo
+from .identified import IdentifiedModel, Score, load
+from .identify import identify
+from .model_file import provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Compared", "Comparison", "compare"]
+__all__ = ["Comparison", "ModelScore", "compare"]
 
 FORMAT = "piezotrack-comparison"
 SCHEMA_VERSION = 1
@@ -34,16 +34,16 @@ Window = tuple[float | None, float | None]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Compared:
+class ModelScore:
     """One model of a comparison.
 
     Attributes
     ----------
     name : str
-        Of its files: the kind of stage, or the name of the file that it comes from.
+        Of its files: the name of the model, or of the file that it comes from.
     title : str
         As the table has it.
-    fit : Identification, PlaysIdentification, IdentifiedModel or IdentifiedPlays
+    fit : Identification or IdentifiedModel
         The model, with what is known of how it was found.
     train, test : Score
         How far it is from the part that was fitted, and from the one that was not; per cent are
@@ -60,7 +60,7 @@ class Compared:
 
     name: str
     title: str
-    fit: Identified[Any]
+    fit: IdentifiedModel
     train: Score
     test: Score
     autocorrelation: float
@@ -75,7 +75,7 @@ class Comparison:
 
     Attributes
     ----------
-    rows : tuple of Compared
+    rows : tuple of ModelScore
         In the order in which they were asked for.
     train, test : Dataset
         What was fitted and what was not.
@@ -84,28 +84,28 @@ class Comparison:
         else it is another one, with an offset of its own.
     """
 
-    rows: tuple[Compared, ...]
+    rows: tuple[ModelScore, ...]
     train: Dataset
     test: Dataset
     carried: bool
 
     def __repr__(self) -> str:
-        scores = ", ".join(f"{row.title} {row.test.rms_percent:.3g} %" for row in self.rows)
+        scores = "; ".join(f"{row.title} {row.test.rms_percent:.3g} %" for row in self.rows)
         return f"<Comparison, rms on what was not fitted: {scores}; see summary()>"
 
     @property
-    def best(self) -> Compared:
+    def best(self) -> ModelScore:
         """The model with the lowest RMS on what was not fitted."""
         return min(self.rows, key=lambda row: row.test.rms)
 
     @property
-    def fits(self) -> dict[str, Identified[Any]]:
+    def fits(self) -> dict[str, IdentifiedModel]:
         """The models by name."""
         return {row.name: row.fit for row in self.rows}
 
     @property
     def notes(self) -> list[str]:
-        """What a careful reader should know: models that were fitted to what judges them."""
+        """Warnings: models that were fitted to a part of what scores them here."""
         seen = ((row, row.fit.window_on(self.test)) for row in self.rows)
         return [
             f"{row.title} was fitted on {window[0]:.6g} to {window[1]:.6g} s of "
@@ -114,12 +114,12 @@ class Comparison:
             if window is not None
         ]
 
-    def followed(self, row: Compared, part: Literal["train", "test"]) -> Array:
+    def followed(self, row: ModelScore, part: Literal["train", "test"]) -> Array:
         """Displacement of a model on one of the two parts.
 
         Parameters
         ----------
-        row : Compared
+        row : ModelScore
             One of `rows`.
         part : {"train", "test"}
             Which part.
@@ -205,8 +205,8 @@ class Comparison:
 
 
 def compare(
-    log: Dataset,
-    models: Iterable[str | os.PathLike[str] | Identified[Any]] | None = None,
+    data: Dataset,
+    models: Iterable[str | os.PathLike[str] | IdentifiedModel] | None = None,
     *,
     train: Window | None = None,
     test: Window | Dataset | None = None,
@@ -228,17 +228,17 @@ def compare(
     with K the number of values fitted and one for the variance (Burnham and Anderson 2002, Model
     Selection and Multimodel Inference, 2nd edition, sections 2.2 and 6.4, doi 10.1007/b97636).
     Both take the residuals for independent. Those of a hysteresis model are not: neighbours are
-    alike (`Compared.autocorrelation`), so n samples count for fewer and both criteria ask for too
-    many parameters. The error on what was not fitted has the last word.
+    correlated (`ModelScore.autocorrelation`), so n samples count for fewer and both criteria favour
+    too many parameters. The error on what was not fitted decides.
 
     Parameters
     ----------
-    log : Dataset
+    data : Dataset
         The record.
     models : iterable, optional
-        Kinds of stage by name, as for `identify`, which are fitted; files of models and models
-        that are identified already, which are taken as they are. Where not given, all kinds that
-        the drive suits: a Bouc-Wen oscillator is for forces, ``drive_unit="N"``.
+        Names of models, as for `identify`, which are fitted; files of models and models that are
+        identified already, which are taken as they are. Where not given, all models for the
+        unit of the drive: a Bouc-Wen oscillator is for forces, ``drive_unit="N"``.
     train : (float, float), optional
         Window to fit [s], either end may be None. Where not given, the first half of the record,
         or all that is before `test`, or all of it where `test` is another record.
@@ -256,7 +256,7 @@ def compare(
     Raises
     ------
     ParameterError
-        A model is neither a kind nor a file, a window is out of the record, or `train` and
+        A model is neither a name nor a file, a window is out of the record, or `train` and
         `test` overlap.
     DataError
         A record cannot be used, see `identify`; a file is not that of a model.
@@ -276,28 +276,29 @@ def compare(
     >>> found.best.name, found.train.duration, found.test.duration
     ('prandtl-ishlinskii', 10.0, 10.0)
     """
-    if not isinstance(log, Dataset):
-        raise ParameterError(f"log is {type(log).__name__}: expected a Dataset, see pt.read")
-    wanted = _wanted(models, log.drive_unit)
-    first, second, carried = _parts(log, train, test)
+    if not isinstance(data, Dataset):
+        raise ParameterError(f"data is {type(data).__name__}: expected a Dataset, see pt.read")
+    wanted = _wanted(models, data.drive_unit)
+    first, second, carried = _parts(data, train, test)
+    of_swarm = {"seed": seed, "runs": runs, "threads": threads, "progress": progress}
     rows = []
     for name, title, source in wanted:
-        if isinstance(source, Kind):
-            found: Identified[Any] = identify(
-                first, source.name, seed=seed, runs=runs, threads=threads, progress=progress
-            )
+        found: IdentifiedModel
+        if isinstance(source, ModelInfo):
+            options: dict[str, Any] = of_swarm if source.searched else {}
+            found = identify(first, source.name, **options)
         else:
             found = source
         rows.append(_compared(name, title, found, first, second, carried))
     return Comparison(rows=tuple(rows), train=first, test=second, carried=carried)
 
 
-def _wanted(models: object, drive_unit: str) -> list[tuple[str, str, Kind | Identified[Any]]]:
-    """Name, title and source of what is to be compared: kinds to fit, and models."""
+def _wanted(models: object, drive_unit: str) -> list[tuple[str, str, ModelInfo | IdentifiedModel]]:
+    """Name, title and source of what is compared: models to fit, and identified ones."""
     if models is None:
         # A voltage is no force; a force may be taken for one, in its own scale.
-        kinds = [kind for kind in KINDS if kind.drive_unit in ("V", drive_unit)]
-        return [(kind.name, kind.title, kind) for kind in kinds]
+        suited = [info for info in MODELS if info.drive_unit in ("V", drive_unit)]
+        return [(info.name, info.title, info) for info in suited]
     if isinstance(models, (str, os.PathLike, Mapping)) or not isinstance(models, Iterable):
         raise ParameterError(f"models is {models!r}: expected several in a list, as ['dahl']")
     sources = [_source(model) for model in models]
@@ -308,21 +309,24 @@ def _wanted(models: object, drive_unit: str) -> list[tuple[str, str, Kind | Iden
     names: dict[int, str] = {}
     for i in sorted(range(len(sources)), key=lambda i: sources[i][0] is None):
         file, model = sources[i]
-        kind = model if isinstance(model, Kind) else kind_of(model.model)
-        names[i] = _unused(file or kind.name, taken)
+        names[i] = _unused(file or _info(model).name, taken)
         taken.add(names[i])
-    wanted = []
-    for i, (_, model) in enumerate(sources):
-        kind = model if isinstance(model, Kind) else kind_of(model.model)
-        wanted.append((names[i], _title(kind, names[i]), model))
-    return wanted
+    return [
+        (names[i], _title(_info(model), names[i]), model) for i, (_, model) in enumerate(sources)
+    ]
 
 
-def _title(kind: Kind, name: str) -> str:
-    """Say of which kind a name is, where it does not say so itself."""
-    if name.startswith(kind.name):
-        return kind.title + name.removeprefix(kind.name).replace("-", " ")
-    return f"{kind.title} ({name})"
+def _info(model: ModelInfo | IdentifiedModel) -> ModelInfo:
+    """Return the model that is to be fitted, or that an identified one is of."""
+    info: ModelInfo = model if isinstance(model, ModelInfo) else model.model.info
+    return info
+
+
+def _title(info: ModelInfo, name: str) -> str:
+    """Say of which model a name is, where it does not say so itself."""
+    if name.startswith(info.name):
+        return info.title + name.removeprefix(info.name).replace("-", " ")
+    return f"{info.title} ({name})"
 
 
 def _unused(name: str, taken: set[str]) -> str:
@@ -331,18 +335,18 @@ def _unused(name: str, taken: set[str]) -> str:
     return next(one for one in (name, *free) if one not in taken)
 
 
-def _source(model: object) -> tuple[str | None, Kind | Identified[Any]]:
-    """Name of the file, if any, and the kind or model that an entry of `models` stands for."""
-    if isinstance(model, Identified):
+def _source(model: object) -> tuple[str | None, ModelInfo | IdentifiedModel]:
+    """Name of the file, if any, and the model that an entry of `models` stands for."""
+    if isinstance(model, IdentifiedModel):
         return None, model
     if isinstance(model, (str, os.PathLike)):
-        for kind in KINDS:
-            if kind.name == model:
-                return None, kind
+        for info in MODELS:
+            if info.name == model:
+                return None, info
         if Path(model).suffix == ".json":
             return Path(model).stem, load(model)
     shown = model if isinstance(model, (str, os.PathLike)) else type(model).__name__
-    known = ", ".join(repr(kind.name) for kind in KINDS)
+    known = ", ".join(repr(info.name) for info in MODELS)
     raise ParameterError(
         f"models has {str(shown)!r}: expected {known}, the JSON file of a model, or an identified "
         "model"
@@ -411,8 +415,8 @@ def _windowed(name: str, log: Dataset, window: Window) -> Dataset:
 
 
 def _compared(
-    name: str, title: str, fit: Identified[Any], train: Dataset, test: Dataset, carried: bool
-) -> Compared:
+    name: str, title: str, fit: IdentifiedModel, train: Dataset, test: Dataset, carried: bool
+) -> ModelScore:
     """Judge a model on both parts."""
     here = fit.fitted_on(train)
     score = fit.score(train, offset=fit.offset if here else "own")
@@ -420,7 +424,7 @@ def _compared(
     count = fit.free_count if here else None
     _, _, autocorrelation, aic, bic = _core.residual(error, count or 0)
     judged = fit.score(test, offset=score.offset if carried else "own")
-    return Compared(
+    return ModelScore(
         name=name,
         title=title,
         fit=fit,
@@ -433,12 +437,12 @@ def _compared(
     )
 
 
-def _entry(row: Compared) -> dict[str, Any]:
+def _entry(row: ModelScore) -> dict[str, Any]:
     """Content of the JSON file for one model."""
     return {
         "name": row.name,
         "title": row.title,
-        "model": kind_of(row.fit.model).name,
+        "model": row.fit.model.info.name,
         "train": asdict(row.train),
         "test": asdict(row.test),
         "parameters": row.parameters,

@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from .comparison import Compared, Comparison
+    from .comparison import Comparison, ModelScore
 
     Array = NDArray[np.float64]
 
 __all__ = ["plot_comparison"]
 
-# Told apart by their dashes too, for black and white.
+# Distinct in black and white as well.
 LINES: tuple[dict[str, Any], ...] = (
     {"color": "#b3400a", "linestyle": "-"},
     {"color": "#1b6ca8", "linestyle": "--"},
@@ -149,7 +149,7 @@ def _errors(comparison: Comparison, axes: list[Axes]) -> None:
         )
 
 
-def _heading(row: Compared) -> str:
+def _heading(row: ModelScore) -> str:
     best = f"{row.title}: rms {row.train.rms_percent:.3g} % fitted"
     return f"{best}, {row.test.rms_percent:.3g} % not fitted"
 

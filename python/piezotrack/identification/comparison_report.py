@@ -1,4 +1,4 @@
-"""What a person reads of a comparison of models."""
+"""The table of a comparison of models."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ..data.dataset import Dataset
-    from .comparison import Compared, Comparison
+    from .comparison import Comparison, ModelScore
 
 __all__ = ["comparison_text"]
 
 NOTES = """\
-* has the lowest rms where it was not fitted, which has the last word. K: values fitted, - for a
+* has the lowest rms where it was not fitted, which decides. K: values fitted, - for a
 model that was given. dAIC and dBIC: above the lowest, of n ln(RSS/n) + 2 (K + 1) and n ln(RSS/n) +
 (K + 1) ln n, for residuals that are independent. These are not: r1 is the correlation of one sample
 with the next, so n counts for less and both ask for too many parameters (Burnham and Anderson 2002,
@@ -53,7 +53,7 @@ def comparison_text(comparison: Comparison) -> str:
     return "\n".join([*(line.rstrip() for line in lines), "", NOTES])
 
 
-def _figures(row: Compared, aic: float, bic: float) -> str:
+def _figures(row: ModelScore, aic: float, bic: float) -> str:
     """Write the figures of one model; the criteria above their lowest."""
     scores = "  ".join(
         f"{1e6 * score.rms:>9.4g}{score.rms_percent:>8.3g}{1e6 * score.max_error:>9.4g}"

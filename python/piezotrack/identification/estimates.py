@@ -1,16 +1,16 @@
-"""The small parts of a result: where a search stands, what it found of one parameter."""
+"""Parts of a result: progress of a search, estimates of parameters, restarts of the swarm."""
 
 from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-__all__ = ["Estimate", "Progress", "Run", "StopReason"]
+__all__ = ["Estimate", "Progress", "StopReason", "SwarmRun"]
 
-StopReason = Literal["stalled", "iterations", "interrupted"]
+StopReason = Literal["stalled", "iterations", "interrupted", "solved"]
 
 
 class Progress(NamedTuple):
-    """Where a search stands after an iteration.
+    """Progress of a search after an iteration.
 
     Attributes
     ----------
@@ -20,8 +20,8 @@ class Progress(NamedTuple):
         Most iterations.
     nfev : int
         Simulations done.
-    cost_um : float
-        Best cost so far [um].
+    cost : float
+        Best cost so far [m].
     parameters : dict of str to float
         The parameters that gave it, SI.
     delay : float
@@ -31,7 +31,7 @@ class Progress(NamedTuple):
     nit: int
     iterations: int
     nfev: int
-    cost_um: float
+    cost: float
     parameters: dict[str, float]
     delay: float = 0.0
 
@@ -53,8 +53,8 @@ class Estimate(NamedTuple):
         Of the search.
     deviation : float or None
         Standard deviation that the residuals and the sensitivity of the model imply, for
-        independent deviations. Deviations of a model that is not quite right hang together,
-        so the true spread is larger.
+        independent residuals. Where the model is not exact, the residuals are correlated and
+        the true spread is larger.
     at_bound : bool
         Whether the value lies on a bound.
     """
@@ -76,17 +76,17 @@ class Estimate(NamedTuple):
 
     @property
     def identified(self) -> bool:
-        """Whether the record fixes the value: to better than a half, and inside its bounds."""
+        """Whether the record determines the value: to better than a half, inside its bounds."""
         return self.precise and not self.at_bound
 
 
-class Run(NamedTuple):
-    """One of the swarms of a search.
+class SwarmRun(NamedTuple):
+    """One of the independent restarts of a search.
 
     Attributes
     ----------
     cost : float
-        Its lowest cost [m], polished where asked.
+        Its lowest cost [m], after local refinement where that is asked for.
     nit, nfev : int
         Its iterations and simulations.
     stop_reason : {"stalled", "iterations", "interrupted"}

@@ -1,41 +1,33 @@
-"""What all identified stages have in common, and how far one is from a record."""
+"""Identified models: a stage with the offset and delay of its sensor, on records and in files."""
 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from .. import _core
 from .._support.files import write_document
-from ..data import diagnostics
 from ..data.dataset import Dataset
 from ..errors import ParameterError
-from ..stages.base import Response
-from ..stages.prandtl_ishlinskii import PlaysResponse
-from ..stages.registry import kind_of
+from .model_file import document_of, read_model
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Collection, Mapping
+    from collections.abc import Mapping
     from pathlib import Path
 
-    from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
     from ..data.dataset import Hold
+    from ..stages.base import Response, StageState
     from ..stages.inverse import Inverse
 
     Array = NDArray[np.float64]
 
-__all__ = ["Fitted", "Identified", "Score"]
-
-# What a simulation of the stage gives.
-R = TypeVar("R", Response, PlaysResponse)
+__all__ = ["IdentifiedModel", "Score", "load"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,33 +67,36 @@ class Score:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Identified(ABC, Generic[R]):
+class IdentifiedModel:
     """A stage as identified, with what is needed to use it on a record.
 
     Attributes
     ----------
-    model : stage
+    model : Stage
         The stage.
     offset : float
         Displacement of the sensor where the stage is at rest without drive [m].
     offset_fitted : bool
-        Whether the offset was fitted; a record of its own then gets an offset of its own.
+        Whether the offset was fitted; another record then gets an offset of its own.
     stroke : float
         Stroke of the record identified [m]; percentages refer to it.
+    scale_assumed : bool
+        Whether the stiffness is nominal: only ratios of the parameters that carry force are then
+        known.
+    delay : float
+        Delay of the displacement, in the amplifier or the reading of the sensor [s].
     details : mapping
         Everything else that is kept in the file: fit, provenance.
     """
 
+    # A stage of any model: each has its own parameters.
     model: Any
     offset: float
     offset_fitted: bool
     stroke: float
+    scale_assumed: bool = False
+    delay: float = 0.0
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
-
-    @property
-    def delay(self) -> float:
-        """Time by which the displacement is late, besides the stage's own dynamics [s]."""
-        return 0.0
 
     @property
     def drive_range(self) -> tuple[float, float] | None:
@@ -116,9 +111,18 @@ class Identified(ABC, Generic[R]):
         return found
 
     @property
-    @abstractmethod
     def free_count(self) -> int | None:
-        """Number of values fitted, the offset with them; None where the file does not tell."""
+        """Number of values fitted, the offset with them; None where the file does not tell.
+
+        Thresholds and time constants that are chosen beforehand do not count; a weight that came
+        out as 0 does.
+        """
+        found = self.details.get("parameters", {})
+        if not any("free" in entry for entry in found.values()):
+            return None
+        free = [name for name, entry in found.items() if entry.get("free", False)]
+        delay = bool(self.details.get("delay", {}).get("free", False))
+        return sum(_count(getattr(self.model, name)) for name in free) + delay + self.offset_fitted
 
     def fitted_on(self, data: Dataset) -> bool:
         """Tell whether a record is the one identified, sample by sample.
@@ -155,23 +159,29 @@ class Identified(ABC, Generic[R]):
         return float(window[0]), float(window[1])
 
     def inverse(
-        self, *, playback: Literal["table", "online"] = "table", settle: int = 1
+        self,
+        *,
+        playback: Literal["table", "online"] = "table",
+        settle: int = 1,
+        initial: StageState | None = None,
     ) -> Inverse:
         """Feedforward with the offset and the delay of this model, as `Inverse` describes.
 
         Parameters
         ----------
         playback : {"table", "online"}, optional
-            Whether one settled period is played again and again, or all is computed.
+            Whether one settled period is repeated from a table, or all is computed.
         settle : int, optional
             Periods before the one of the table.
+        initial : StageState, optional
+            State of the stage before the reference begins, as for `Inverse`.
 
         Returns
         -------
         Inverse
             For `Controller` or on its own. That of the bare stage is ``model.inverse()``.
         """
-        bare: Inverse = self.model.inverse(playback=playback, settle=settle)
+        bare: Inverse = self.model.inverse(playback=playback, settle=settle, initial=initial)
         return replace(bare, offset=self.offset, delay=self.delay)
 
     def displacement(self, u: ArrayLike, dt: float, *, hold: Hold = "foh") -> Array:
@@ -193,13 +203,18 @@ class Identified(ABC, Generic[R]):
         """
         return self._shown(self.model.simulate(u, dt, hold=hold)) + self.offset
 
-    def _shown(self, run: R) -> Array:
-        """Displacement as late as the sensor shows it [m]."""
-        return run.x
+    def _shown(self, run: Response) -> Array:
+        """Displacement with the delay of the sensor [m]."""
+        dt = float(run.t[1]) if run.t.size > 1 else 1.0
+        return _core.delayed(run.x, run.v, dt, self.delay) if self.delay else run.x
 
     def simulate(
-        self, data: Dataset, *, offset: float | Literal["own"] = "own", initial: Any = None
-    ) -> R:
+        self,
+        data: Dataset,
+        *,
+        offset: float | Literal["own"] = "own",
+        initial: StageState | None = None,
+    ) -> Response:
         """Displacement that the model gives under the drive of a record.
 
         Parameters
@@ -209,13 +224,13 @@ class Identified(ABC, Generic[R]):
         offset : float or "own", optional
             Added to the displacement [m]. ``"own"``: the one that fits the record's window
             best where an offset was fitted, none where not.
-        initial : state, optional
+        initial : StageState, optional
             State at the first sample of the record and its warm-up, such as the `final` of the
             record before it; at rest where it is not given.
 
         Returns
         -------
-        Response or PlaysResponse
+        Response
             Motion in the window; offset and delay are in its displacement, the rest is the
             stage's own.
         """
@@ -230,11 +245,15 @@ class Identified(ABC, Generic[R]):
             if isinstance(value := getattr(run, one.name), np.ndarray)
         }
         signals |= {"t": data.t, "u": data.u, "x": x + self._shift(data, x, offset)}
-        windowed: R = replace(run, **signals)
+        windowed: Response = replace(run, **signals)
         return windowed
 
     def score(
-        self, data: Dataset, *, offset: float | Literal["own"] = "own", initial: Any = None
+        self,
+        data: Dataset,
+        *,
+        offset: float | Literal["own"] = "own",
+        initial: StageState | None = None,
     ) -> Score:
         """Deviation of the model from a record, in the record's window.
 
@@ -244,7 +263,7 @@ class Identified(ABC, Generic[R]):
             The record, e.g. one that was not fitted.
         offset : float or "own", optional
             As in `simulate`.
-        initial : state, optional
+        initial : StageState, optional
             As in `simulate`.
 
         Returns
@@ -271,7 +290,6 @@ class Identified(ABC, Generic[R]):
             return shift
         return float(np.mean(data.y - x)) if self.offset_fitted else 0.0
 
-    @abstractmethod
     def document(self) -> dict[str, Any]:
         """Content of the JSON file.
 
@@ -280,6 +298,7 @@ class Identified(ABC, Generic[R]):
         dict
             Of numbers, texts, lists and dicts only.
         """
+        return document_of(self)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the model to a JSON file that `load` reads back bit for bit.
@@ -310,86 +329,39 @@ class Identified(ABC, Generic[R]):
         return write_document(path, self.document())
 
 
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Fitted(Identified[R]):
-    """What a fit found, with the record that it was found on.
+def load(path: str | os.PathLike[str]) -> IdentifiedModel:
+    """Read a model file.
 
-    Attributes
+    Parameters
     ----------
-    data : Dataset
-        The record.
-    cost : float
-        RMS deviation in the window [m], equation (16) of Xu and Li 2010.
+    path : path-like
+        A file that `save` of an identified model wrote, with this version of piezotrack or an
+        older one.
+
+    Returns
+    -------
+    IdentifiedModel
+        The model, its numbers as they were saved, bit for bit.
+
+    Raises
+    ------
+    DataError
+        The file is missing, is not a model file, or was written by a newer version.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> model = pt.IdentifiedModel(
+    ...     model=pt.DahlStage.xu_li_2010(), offset=0.0, offset_fitted=False, stroke=119e-6
+    ... )
+    >>> import os, tempfile
+    >>> path = model.save(os.path.join(tempfile.mkdtemp(), "dahl.json"))
+    >>> pt.load(path).model == model.model
+    True
     """
+    return IdentifiedModel(**read_model(path))
 
-    data: Dataset
-    cost: float
 
-    def __repr__(self) -> str:
-        return (
-            f"<Identification of a {kind_of(self.model).title} stage: {self.cost_um:.4g} um rms, "
-            f"{self.cost_percent:.3g} % of stroke; see summary()>"
-        )
-
-    @property
-    def cost_um(self) -> float:
-        """The cost [um]."""
-        return 1e6 * self.cost
-
-    @property
-    def cost_percent(self) -> float:
-        """The cost in per cent of the stroke."""
-        return 100.0 * self.cost / self.stroke
-
-    @cached_property
-    def fitted(self) -> Score:
-        """Score on the record that was identified, converged in the sub-steps."""
-        return self.score(self.data, offset=self.offset)
-
-    @property
-    @abstractmethod
-    def notes(self) -> list[str]:
-        """What a careful reader should know before using the result."""
-
-    @abstractmethod
-    def summary(self) -> str:
-        """Table of the result.
-
-        Returns
-        -------
-        str
-            Several lines: the cost, then the parameters.
-        """
-
-    def _remarks(self, held: Collection[str]) -> list[str]:
-        """Say what is odd about the record, and what the fit leaves of its loop."""
-        notes = diagnostics.of_record(self.data)
-        if self.cost_percent > 5.0:
-            notes.append(
-                f"the model does not follow this record: {self.cost_percent:.3g} % of stroke remain"
-            )
-        if self.cost_percent > diagnostics.REMAINS:
-            notes += diagnostics.of_fit(self.data, self._followed, self.cost_percent, held)
-        return notes
-
-    @cached_property
-    def _followed(self) -> Array:
-        """Displacement of the model on the record [m]."""
-        return self.simulate(self.data, offset=self.offset).x
-
-    def plot(self, data: Dataset | None = None) -> Figure:
-        """Loop, displacement with its error over time, and convergence where a swarm searched.
-
-        Parameters
-        ----------
-        data : Dataset, optional
-            Another record to show the model on.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            Not yet shown or saved.
-        """
-        from .plot import plot_identification
-
-        return plot_identification(self, data)
+def _count(value: object) -> int:
+    """Numbers in a parameter: several of a list, none of one that is left out."""
+    return len(value) if isinstance(value, tuple) else int(value is not None)

@@ -1,270 +1,159 @@
-"""Identified models as values and as JSON files, with a sentence for what is wrong in a file."""
+"""Model files: identified models as JSON, with a sentence for what is wrong in a file."""
 
 from __future__ import annotations
 
 import math
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from .. import _core
 from ..errors import DataError, ParameterError, PiezotrackError
-from ..stages.base import Response
-from ..stages.prandtl_ishlinskii import (
-    PARAMETERS,
-    VECTORS,
-    PlaysResponse,
-    PlaysState,
-    PrandtlIshlinskiiStage,
-)
-from ..stages.registry import Kind, kind_named, kind_of
-from .identified import Identified
+from ..stages.registry import model_named, stage_class
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Iterator, Mapping
 
-    import numpy as np
-    from numpy.typing import NDArray
-
     from ..data.dataset import Dataset
-    from ..stages.inverse import Inverse
+    from .identified import IdentifiedModel
 
-__all__ = ["IdentifiedModel", "IdentifiedPlays", "load", "provenance"]
+__all__ = ["document_of", "provenance", "read_model"]
 
 FORMAT = "piezotrack-model"
-SCHEMA_VERSION = 1
-MODEL = "prandtl-ishlinskii"
+SCHEMA_VERSION = 2
+# Parameters of the model "prandtl-ishlinskii" by their names in version 1.
+NAMES_1 = {
+    "corners": "dead_zone_thresholds",
+    "bends": "dead_zone_weights",
+    "creep_shares": "creep_weights",
+}
+# Entries that are fields of a model; all others are its details.
+OWN = {
+    "format",
+    "schema_version",
+    "model",
+    "parameters",
+    "scale_assumed",
+    "offset",
+    "stroke",
+    "delay",
+}
+# What the file keeps of a parameter besides the fit's remarks on it.
+FACTS = ("value", "unit", "symbol")
 
 
-@dataclass(frozen=True, kw_only=True)
-class IdentifiedModel(Identified[Response]):
-    """A stage as identified, with what is needed to use it on a record.
-
-    Attributes
-    ----------
-    model : DahlStage or BoucWenStage
-        The stage.
-    delay : float
-        Time by which the displacement is late, in the amplifier or the reading of the sensor
-        [s].
-    scale_assumed : bool
-        Whether the stiffness is nominal: only ratios of mass, damping, stiffness, piezo
-        coefficient and b1 are then known.
-    """
-
-    scale_assumed: bool
-    delay: float = 0.0
-
-    @property
-    def free_count(self) -> int | None:
-        """Number of values fitted, the offset with them; None where the file does not tell."""
-        found = self.details.get("parameters")
-        if not found:
-            return None
-        free = [entry.get("free", False) for entry in found.values()]
-        late = self.details.get("delay", {}).get("free", False)
-        return sum(map(bool, [*free, late, self.offset_fitted]))
-
-    def _shown(self, run: Response) -> NDArray[np.float64]:
-        dt = float(run.t[1]) if run.t.size > 1 else 1.0
-        return _core.delayed(run.x, run.v, dt, self.delay)
-
-    def document(self) -> dict[str, Any]:
-        """Content of the JSON file.
-
-        Returns
-        -------
-        dict
-            Of numbers, texts, lists and dicts only.
-        """
-        details, kind = dict(self.details), kind_of(self.model)
-        found = details.pop("parameters", {})
-        delay = dict(details.pop("delay", {}))
-        parameters = {
-            name: {"value": getattr(self.model, name), "unit": unit, "symbol": symbol}
-            | dict(found.get(name, {}))
-            for name, symbol, unit in kind.parameters
-        }
-        return {
-            "format": FORMAT,
-            "schema_version": SCHEMA_VERSION,
-            "model": kind.name,
-            "parameters": parameters,
-            "scale_assumed": self.scale_assumed,
-            "offset": {"value": self.offset, "unit": "m", "fitted": self.offset_fitted},
-            "stroke": {"value": self.stroke, "unit": "m"},
-            "delay": {"value": self.delay, "unit": "s"} | delay,
-            **details,
-        }
-
-
-def load(path: str | os.PathLike[str]) -> IdentifiedModel | IdentifiedPlays:
-    """Read a model file of any kind of stage.
+def document_of(model: IdentifiedModel) -> dict[str, Any]:
+    """Content of the file of a model.
 
     Parameters
     ----------
-    path : path-like
-        A file that `save` of an identified model wrote.
+    model : IdentifiedModel
+        The model.
 
     Returns
     -------
-    IdentifiedModel or IdentifiedPlays
-        The model, its numbers as they were saved, bit for bit; the latter where it is a
-        Prandtl-Ishlinskii stage.
-
-    Raises
-    ------
-    DataError
-        The file is missing, is not a model file, or was written by a newer version.
-
-    Examples
-    --------
-    >>> import piezotrack as pt
-    >>> model = pt.IdentifiedModel(
-    ...     model=pt.DahlStage.xu_li_2010(),
-    ...     offset=0.0,
-    ...     offset_fitted=False,
-    ...     scale_assumed=False,
-    ...     stroke=119e-6,
-    ... )
-    >>> import os, tempfile
-    >>> path = model.save(os.path.join(tempfile.mkdtemp(), "dahl.json"))
-    >>> pt.load(path).model == model.model
-    True
+    dict
+        Of numbers, texts, lists and dicts only.
     """
-    name, document = read_document(path)
-    try:
-        kind = kind_named(document.get("model"))
-    except ParameterError as error:
-        raise DataError(f"{name} holds a {str(error).replace(' is', '', 1)}") from None
-    return _identified(name, document, kind) if kind.searched else plays_of(name, document)
-
-
-def _identified(name: str, document: dict[str, Any], kind: Kind) -> IdentifiedModel:
-    own = {"format", "schema_version", "model", "parameters"}
-    own |= {"scale_assumed", "offset", "stroke", "delay"}
-    with entries_of(name):
-        parameters = document["parameters"]
-        values = {key: parameters[key]["value"] for key, _, _ in kind.parameters}
-        details = {key: value for key, value in document.items() if key not in own}
-        extra = {
-            key: {k: v for k, v in entry.items() if k not in ("value", "unit", "symbol")}
-            for key, entry in parameters.items()
+    details, info = dict(model.details), model.model.info
+    found = details.pop("parameters", {})
+    delay = dict(details.pop("delay", {}))
+    parameters = {
+        one.name: {
+            "value": _plain(getattr(model.model, one.name)),
+            "unit": one.unit,
+            "symbol": one.symbol,
         }
-        for key, _, unit in kind.parameters:
-            require_unit(key, parameters[key], unit)
-        # Files of version 0.1.0 have no delay.
-        late = document.get("delay", {"value": 0.0, "unit": "s"})
-        delay = {k: v for k, v in late.items() if k not in ("value", "unit")}
-        return IdentifiedModel(
-            model=kind.stage(**values),
-            offset=file_number("offset", document["offset"], "m"),
-            offset_fitted=_core.as_truth("offset fitted", document["offset"]["fitted"]),
-            scale_assumed=_core.as_truth("scale_assumed", document["scale_assumed"]),
-            stroke=file_number("stroke", document["stroke"], "m", above=0.0),
-            delay=file_number("delay", late, "s", least=0.0),
-            details={"parameters": extra, "delay": delay, **details},
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class IdentifiedPlays(Identified[PlaysResponse]):
-    """A Prandtl-Ishlinskii stage as identified, with what is needed to use it on a record.
-
-    Attributes
-    ----------
-    model : PrandtlIshlinskiiStage
-        The stage.
-    """
-
-    @property
-    def free_count(self) -> int:
-        """Number of values fitted, the offset with them.
-
-        Thresholds, corners and the time constants of the creep are chosen beforehand and do not
-        count; a weight that came out as 0 does.
-        """
-        model = self.model
-        vectors = len(model.weights) + len(model.bends) + len(model.creep_shares)
-        dynamics = (model.time_constant, model.frequency, model.damping_ratio)
-        lumped = sum(value is not None for value in dynamics)
-        return 1 + vectors + lumped + self.offset_fitted
-
-    def inverse(
-        self,
-        *,
-        playback: Literal["table", "online"] = "table",
-        settle: int = 1,
-        initial: PlaysState | None = None,
-    ) -> Inverse:
-        """Feedforward with the offset of this model, as `PrandtlIshlinskiiStage.inverse`.
-
-        Parameters
-        ----------
-        playback : {"table", "online"}, optional
-            Whether one settled period is played again and again, or all is computed.
-        settle : int, optional
-            Periods before the one of the table.
-        initial : PlaysState, optional
-            What the stage remembers before the reference begins, such as the `final` of a
-            response to the drive that settled it; at rest where it is not given.
-
-        Returns
-        -------
-        Inverse
-            For `Controller` or on its own. That of the bare stage is ``model.inverse()``.
-        """
-        inverse = super().inverse(playback=playback, settle=settle)
-        return replace(inverse, initial=initial)
-
-    def document(self) -> dict[str, Any]:
-        """Content of the JSON file.
-
-        Returns
-        -------
-        dict
-            Of numbers, texts, lists and dicts only.
-        """
-        return {
-            "format": FORMAT,
-            "schema_version": SCHEMA_VERSION,
-            "model": MODEL,
-            "parameters": {
-                name: {"value": _plain(getattr(self.model, name)), "unit": unit, "symbol": symbol}
-                for name, symbol, unit in PARAMETERS
-            },
-            "offset": {"value": self.offset, "unit": "m", "fitted": self.offset_fitted},
-            "stroke": {"value": self.stroke, "unit": "m"},
-            **dict(self.details),
-        }
+        | dict(found.get(one.name, {}))
+        for one in info.parameters
+    }
+    return {
+        "format": FORMAT,
+        "schema_version": SCHEMA_VERSION,
+        "model": info.name,
+        "parameters": parameters,
+        "scale_assumed": model.scale_assumed,
+        "offset": {"value": model.offset, "unit": "m", "fitted": model.offset_fitted},
+        "stroke": {"value": model.stroke, "unit": "m"},
+        "delay": {"value": model.delay, "unit": "s"} | delay,
+        **details,
+    }
 
 
 def _plain(value: Any) -> Any:
     return list(value) if isinstance(value, tuple) else value
 
 
-def plays_of(name: str, document: dict[str, Any]) -> IdentifiedPlays:
-    """Take a model from the content of the file `name`; errors as of `load`."""
-    own = ("format", "schema_version", "model", "parameters", "offset", "stroke")
+def read_model(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read a model file.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+
+    Returns
+    -------
+    dict
+        The fields of an `IdentifiedModel`.
+
+    Raises
+    ------
+    DataError
+        The file is missing, is not a model file, or was written by a newer version.
+    """
+    name, document = read_document(path)
+    try:
+        info = model_named(document.get("model"))
+    except ParameterError as error:
+        raise DataError(f"{name} holds a {str(error).replace(' is', '', 1)}") from None
     with entries_of(name):
+        if document["schema_version"] == 1:
+            _from_version_1(document, searched=info.searched)
         parameters = document["parameters"]
-        for key, _, unit in PARAMETERS:
-            require_unit(key, parameters[key], unit)
-        values = {key: parameters[key]["value"] for key, _, _ in PARAMETERS}
-        values |= {key: tuple(values[key]) for key in VECTORS}
-        return IdentifiedPlays(
-            model=PrandtlIshlinskiiStage(**values),
-            offset=file_number("offset", document["offset"], "m"),
-            offset_fitted=_core.as_truth("offset fitted", document["offset"]["fitted"]),
-            stroke=file_number("stroke", document["stroke"], "m", above=0.0),
-            details={key: value for key, value in document.items() if key not in own},
-        )
+        for one in info.parameters:
+            require_unit(one.name, parameters[one.name], one.unit)
+        values = {one.name: parameters[one.name]["value"] for one in info.parameters}
+        for one in info.parameters:
+            if one.is_list:
+                values[one.name] = tuple(values[one.name])
+        delay = document["delay"]
+        return {
+            "model": stage_class(info)(**values),
+            "offset": file_number("offset", document["offset"], "m"),
+            "offset_fitted": _core.as_truth("offset fitted", document["offset"]["fitted"]),
+            "scale_assumed": _core.as_truth("scale_assumed", document["scale_assumed"]),
+            "stroke": file_number("stroke", document["stroke"], "m", above=0.0),
+            "delay": file_number("delay", delay, "s", least=0.0),
+            "details": {
+                "parameters": {key: _remarks(entry) for key, entry in parameters.items()},
+                "delay": _remarks(delay),
+                **{key: value for key, value in document.items() if key not in OWN},
+            },
+        }
+
+
+def _remarks(entry: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in entry.items() if key not in FACTS}
+
+
+def _from_version_1(document: dict[str, Any], *, searched: bool) -> None:
+    """Bring the content of a file of version 1 to that of this version."""
+    # Files of the first models have no delay.
+    document.setdefault("delay", {"value": 0.0, "unit": "s"})
+    if searched:
+        return
+    document.setdefault("scale_assumed", False)
+    parameters = document["parameters"]
+    document["parameters"] = {NAMES_1.get(key, key): entry for key, entry in parameters.items()}
+    for key, entry in document["parameters"].items():
+        chosen = key in ("thresholds", "dead_zone_thresholds", "creep_times")
+        entry.setdefault("free", not chosen)
 
 
 def read_document(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
-    """Read a model file of any kind of stage.
+    """Read the JSON of a model file.
 
     Parameters
     ----------
@@ -304,10 +193,10 @@ def read_document(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise DataError(f"{file.name} is not a piezotrack model: its 'format' is not '{FORMAT}'")
     version = document.get("schema_version")
-    if version != SCHEMA_VERSION:
+    if version not in (1, SCHEMA_VERSION) or isinstance(version, bool):
         raise DataError(
             f"{file.name} has schema_version {version!r}: this version of piezotrack reads "
-            f"{SCHEMA_VERSION}"
+            f"1 to {SCHEMA_VERSION}"
         )
     return file.name, document
 

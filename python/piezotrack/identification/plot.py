@@ -1,7 +1,6 @@
 """Pictures of a fit: loop, displacement and error over time, convergence of the swarm.
 
-Every function takes the axes to draw on and returns them, so the pictures can be put together
-anew.
+Every function takes the axes to draw on and returns them, so that the pictures can be combined.
 """
 
 from __future__ import annotations
@@ -12,7 +11,6 @@ import numpy as np
 
 from .._support.plot_style import MEASURED, axes_or_new, plain_log_ticks, thinned
 from .._support.units import best_length_unit
-from ..stages.registry import kind_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,9 +21,7 @@ if TYPE_CHECKING:
 
     from ..data.dataset import Dataset
     from ..stages.base import Response
-    from ..stages.prandtl_ishlinskii import PlaysResponse
-    from .identified import Fitted
-    from .search import Identification
+    from .result import Identification
 
     Array = NDArray[np.float64]
 
@@ -42,15 +38,15 @@ SIMULATED: dict[str, Any] = {"color": "#b3400a", "linewidth": 1.0, "label": "sim
 ERROR: dict[str, Any] = {"color": "#1b6ca8", "linewidth": 0.8}
 
 
-def plot_loop(data: Dataset, run: Response | PlaysResponse, ax: Axes | None = None) -> Axes:
+def plot_loop(data: Dataset, run: Response, ax: Axes | None = None) -> Axes:
     """Draw the hysteresis loop: displacement over drive, measured and simulated.
 
     Parameters
     ----------
     data : Dataset
         The record.
-    run : Response or PlaysResponse
-        The model on that record.
+    run : Response
+        Response of the model on that record.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure where not given.
 
@@ -72,7 +68,7 @@ def plot_loop(data: Dataset, run: Response | PlaysResponse, ax: Axes | None = No
 
 def plot_time(
     data: Dataset,
-    run: Response | PlaysResponse,
+    run: Response,
     axes: Sequence[Axes] | None = None,
     *,
     stroke: float | None = None,
@@ -84,8 +80,8 @@ def plot_time(
     ----------
     data : Dataset
         The record.
-    run : Response or PlaysResponse
-        The model on that record.
+    run : Response
+        Response of the model on that record.
     axes : two matplotlib.axes.Axes, optional
         Where to draw; a new figure where not given.
     stroke : float, optional
@@ -161,12 +157,12 @@ def plot_convergence(fit: Identification, ax: Axes | None = None) -> Axes:
     ax.margins(x=0.02)
     if finite.any():
         plain_log_ticks(ax)
-    told = f"{1e6 * fit.history[-1]:.4g} um after {fit.nit} iterations,\n{fit.nfev} simulations"
+    caption = f"{1e6 * fit.history[-1]:.4g} um after {fit.nit} iterations,\n{fit.nfev} simulations"
     if fit.npolish and fit.cost > 0.0:
         ax.plot(fit.nit, fit.cost_um, "o", color="#b3400a", markersize=5)
-        told += f";\npolished to {fit.cost_um:.4g} um"
+        caption += f";\npolished to {fit.cost_um:.4g} um"
     ax.annotate(
-        told,
+        caption,
         (0.97, 0.93),
         xycoords="axes fraction",
         ha="right",
@@ -202,12 +198,12 @@ def plot_response(t: Array, u: Array, x: Array) -> Figure:
     return figure
 
 
-def plot_identification(fit: Fitted[Any], data: Dataset | None = None) -> Figure:
+def plot_identification(fit: Identification, data: Dataset | None = None) -> Figure:
     """Put loop, displacement and error on one sheet, and convergence where a swarm searched.
 
     Parameters
     ----------
-    fit : Identification or PlaysIdentification
+    fit : Identification
         What a fit found.
     data : Dataset, optional
         Another record to show the model on.
@@ -222,12 +218,12 @@ def plot_identification(fit: Fitted[Any], data: Dataset | None = None) -> Figure
     own = data is None
     record = fit.data if data is None else data
     run = fit.simulate(record, offset=fit.offset if own else "own")
-    searched = kind_of(fit.model).searched
+    searched = fit.swarm is not None
     figure = plt.figure(figsize=(11.0, 6.4 if searched else 5.4), layout="constrained")
     grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.35])
     plot_loop(record, run, figure.add_subplot(grid[0 if searched else slice(None), 0]))
     if searched:
-        plot_convergence(fit, figure.add_subplot(grid[1, 0]))  # type: ignore[arg-type]
+        plot_convergence(fit, figure.add_subplot(grid[1, 0]))
     above = figure.add_subplot(grid[0, 1])
     below = figure.add_subplot(grid[1, 1], sharex=above)
     plot_time(record, run, (above, below), stroke=fit.stroke)

@@ -1,24 +1,25 @@
-"""What a person reads of a result: the table, and the files with their pictures."""
+"""Reports of an identification: the table, and the files with their pictures."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .._support.files import make_folder, save_figures
-from ..stages.registry import kind_of
 
 if TYPE_CHECKING:
     import os
     from pathlib import Path
 
     from ..data.dataset import Dataset
+    from ..stages.base import Parameter
     from .estimates import Estimate
-    from .identified import Fitted
-    from .least_squares import PlaysIdentification
-    from .search import Identification
+    from .result import Identification
 
-__all__ = ["plays_text", "save_identification", "summary_text"]
+__all__ = ["save_identification", "summary_text"]
+
+# SI units that a person reads in micrometres, and the factor.
+SHOWN_UNITS = {"m": ("um", 1e6), "m/V": ("um/V", 1e6)}
 
 
 def summary_text(fit: Identification) -> str:
@@ -27,27 +28,39 @@ def summary_text(fit: Identification) -> str:
     Parameters
     ----------
     fit : Identification
-        What a search found.
+        What an identification found.
 
     Returns
     -------
     str
         Several lines.
     """
-    kind = kind_of(fit.model)
+    data = fit.data
     lines = [
-        *_heading(fit),
-        f"      {fit.nit} iterations, {fit.nfev} simulations, seed {fit.seed}: {fit.message}",
-        *_runs(fit),
-        *(f"note  {note}" for note in fit.notes),
-        "",
-        *_known(fit),
-        "",
+        f"{fit.model.info.title}: stage identified from {data.source or 'a record'}, "
+        f"{len(data)} samples, {data.duration:.4g} s at {1 / data.dt:.6g} Hz, "
+        f"stroke {1e6 * data.stroke:.4g} um",
+        f"cost  {fit.cost_um:.4g} um rms = {fit.cost_percent:.3g} % of stroke"
+        + (f", offset {1e6 * fit.offset:.5g} um fitted" if fit.offset_fitted else ""),
     ]
+    searched = fit.swarm is not None
+    if searched:
+        how = f"{fit.nit} iterations, {fit.nfev} simulations, seed {fit.seed}: {fit.message}"
+        lines += [f"      {how}", *_runs(fit)]
+    else:
+        lines.append(f"      least squares, {fit.nfev} simulations")
+    lines += [*(f"note  {note}" for note in fit.notes), ""]
+    return "\n".join([*lines, *(_estimates(fit) if searched else _values(fit))])
+
+
+def _estimates(fit: Identification) -> list[str]:
+    """List what the data determine, and every parameter with its standard deviation."""
+    lines = [*_known(fit), ""]
     if fit.scale_assumed:
         lines += [
             f"parameters, scale assumed: K = {fit.model.stiffness:g} N/m is nominal. Voltage and",
-            f"displacement fix no force; with the true stiffness=, {kind.forces} scale along.",
+            "displacement determine no force; with the true stiffness=, "
+            f"{fit.model.info.force_symbols} scale along.",
         ]
     else:
         lines.append("parameters")
@@ -55,68 +68,49 @@ def summary_text(fit: Identification) -> str:
     lines.append(f"  {'':<18}{'':<{width}}{'value':>13}  {'':<9}{'standard deviation'}")
     lines += [_row(name, estimate, width) for name, estimate in fit.parameters.items()]
     if unclear := [n for n, e in fit.parameters.items() if not e.identified]:
-        lines += ["", "Not fixed by this record: " + ", ".join(unclear) + "."]
+        lines += ["", "Not determined by this record: " + ", ".join(unclear) + "."]
     if fit.nfail:
         lines += ["", f"{fit.nfail} simulations did not stay finite and counted as infinitely bad."]
-    return "\n".join(lines)
+    return lines
 
 
-def plays_text(fit: PlaysIdentification) -> str:
-    """Write a fit of play operators as a table.
-
-    Parameters
-    ----------
-    fit : PlaysIdentification
-        What a fit found.
-
-    Returns
-    -------
-    str
-        Several lines.
-    """
-    model = fit.model
-    lines = [
-        *_heading(fit),
-        f"      {fit.nfev} simulations",
-        *(f"note  {note}" for note in fit.notes),
-        "",
-        f"  {'linear':<16}{'w0':<6}{1e6 * model.linear:>12.6g}  um/V",
-        f"  {'plays':<16}{'r':<6}{'threshold [V]':>14}  {'w':<4}{'weight [um/V]':>14}",
-    ]
-    for r, w in zip(model.thresholds, model.weights, strict=True):
-        lines.append(f"  {'':<22}{r:>14.6g}  {'':<4}{1e6 * w:>14.6g}")
-    if model.corners:
-        lines.append(f"  {'dead zones':<16}{'d':<6}{'corner [um]':>14}  {'s':<4}{'bend':>14}")
-        for d, s in zip(model.corners, model.bends, strict=True):
-            lines.append(f"  {'':<22}{1e6 * d:>14.6g}  {'':<4}{s:>14.6g}")
-    if model.creep_times:
-        lines.append(f"  {'creep':<16}{'tau':<6}{'time [s]':>14}  {'c':<4}{'share':>14}")
-        for tau, c in zip(model.creep_times, model.creep_shares, strict=True):
-            lines.append(f"  {'':<22}{tau:>14.6g}  {'':<4}{c:>14.6g}")
-    if model.time_constant is not None:
-        lines.append(f"  {'time_constant':<16}{'T':<6}{1e3 * model.time_constant:>12.6g}  ms")
-    if model.frequency is not None:
-        lines.append(f"  {'frequency':<16}{'fn':<6}{model.frequency:>12.6g}  Hz")
-        lines.append(f"  {'damping_ratio':<16}{'zeta':<6}{model.damping_ratio:>12.6g}")
-    return "\n".join(lines)
+def _values(fit: Identification) -> list[str]:
+    """List the values of the parameters, lists of one length side by side in pairs."""
+    lines, parts = ["parameters"], list(fit.model.info.parameters)
+    while parts:
+        one = parts.pop(0)
+        value = getattr(fit.model, one.name)
+        if value is None or value == ():
+            continue
+        if not one.is_list:
+            unit, scale = SHOWN_UNITS.get(one.unit, (one.unit, 1.0))
+            row = f"  {one.name:<22}{one.symbol:<6}{scale * value:>12.6g}  {unit}"
+            lines.append(row.rstrip())
+            continue
+        columns = [one]
+        if parts and parts[0].is_list and len(getattr(fit.model, parts[0].name)) == len(value):
+            columns.append(parts.pop(0))
+        lines += ["", "  " + "".join(f"{_heading(column):>32}" for column in columns)]
+        for row_values in zip(*(_scaled(fit, column) for column in columns), strict=True):
+            lines.append("  " + "".join(f"{number:>32.6g}" for number in row_values))
+        lines.append("")
+    return lines
 
 
-def _heading(fit: Fitted[Any]) -> list[str]:
-    """Say what was identified from which record, and what is left."""
-    data = fit.data
-    return [
-        f"{kind_of(fit.model).title} stage identified from {data.source or 'a record'}: "
-        f"{len(data)} samples, {data.duration:.4g} s at {1 / data.dt:.6g} Hz, "
-        f"stroke {1e6 * data.stroke:.4g} um",
-        f"cost  {fit.cost_um:.4g} um rms = {fit.cost_percent:.3g} % of stroke"
-        + (f", offset {1e6 * fit.offset:.5g} um fitted" if fit.offset_fitted else ""),
-    ]
+def _heading(one: Parameter) -> str:
+    unit, _ = SHOWN_UNITS.get(one.unit, (one.unit, 1.0))
+    return f"{one.name} {one.symbol}" + (f" [{unit}]" if unit else "")
+
+
+def _scaled(fit: Identification, one: Parameter) -> list[float]:
+    _, scale = SHOWN_UNITS.get(one.unit, (one.unit, 1.0))
+    return [scale * number for number in getattr(fit.model, one.name)]
 
 
 def _runs(fit: Identification) -> list[str]:
     """Say whether several runs agree."""
     if len(fit.runs) == 1:
-        return ["      one run: several, runs=4, would tell whether there are other valleys"]
+        return ["      one run: several, runs=4, would show whether other local minima exist"]
     costs = ", ".join(f"{1e6 * cost:.4g}" for cost in sorted(run.cost for run in fit.runs)[:4])
     more = ", ..." if len(fit.runs) > 4 else ""
     verdict = f"{fit.agreeing} of {len(fit.runs)} runs end within 0.1 % of the best"
@@ -124,12 +118,12 @@ def _runs(fit: Identification) -> list[str]:
 
 
 def _known(fit: Identification) -> list[str]:
-    """List what the data tell, whatever the scale of the forces, and what they do not."""
+    """List what the data determine, whatever the scale of the forces, and what they do not."""
     ratios = _ratios(fit)
     if "delay" in fit.parameters:
         ratios.append(("delay", "delay", 1e3 * fit.delay, "ms"))
-    # A ratio to a stiffness that was searched is known where both are; a stiffness that presses
-    # against its bound takes the others along.
+    # A ratio to a stiffness that was searched is known where both are; a stiffness on its bound
+    # makes the others uncertain.
     whole = fit.parameters["stiffness"]
     known: list[tuple[str, str]] = []
     unknown: list[tuple[str, str]] = []
@@ -140,10 +134,10 @@ def _known(fit: Identification) -> list[str]:
         sure = estimate.identified and (whole.precise or alone)
         if not held:
             (known if sure else unknown).append((symbol, f"{value:>12.6g}  {unit}"))
-    lines = ["fixed by the data" if known else "nothing is fixed by these data"]
+    lines = ["determined by the data" if known else "nothing is determined by these data"]
     lines += [f"  {symbol:<10} {text}" for symbol, text in known]
     if unknown:
-        lines.append("not fixed by them: " + ", ".join(symbol for symbol, _ in unknown))
+        lines.append("not determined by them: " + ", ".join(symbol for symbol, _ in unknown))
     return lines
 
 
@@ -173,7 +167,7 @@ def _row(name: str, estimate: Estimate, width: int) -> str:
 
 
 def save_identification(
-    fit: Fitted[Any],
+    fit: Identification,
     folder: str | os.PathLike[str],
     *,
     name: str | None = None,
@@ -183,8 +177,8 @@ def save_identification(
 
     Parameters
     ----------
-    fit : Identification or PlaysIdentification
-        What a fit found.
+    fit : Identification
+        What an identification found.
     folder : path-like
         Where to; made where it is missing.
     name : str, optional
@@ -201,8 +195,7 @@ def save_identification(
     from .plot import plot_convergence, plot_loop, plot_time
 
     path = make_folder(folder)
-    kind = kind_of(fit.model)
-    name = kind.name if name is None else name
+    name = fit.model.info.name if name is None else name
     record = fit.data if shown is None else shown
     run = fit.simulate(record, offset=fit.offset)
     until = None if shown is None else float(fit.data.t[-1])
@@ -210,6 +203,6 @@ def save_identification(
         f"{name}_loop": plot_loop(record, run).figure,
         f"{name}_time": plot_time(record, run, stroke=fit.stroke, fitted_until=until)[0].figure,
     }
-    if kind.searched:
-        figures[f"{name}_convergence"] = plot_convergence(fit).figure  # type: ignore[arg-type]
+    if fit.swarm is not None:
+        figures[f"{name}_convergence"] = plot_convergence(fit).figure
     return [fit.save(path / f"{name}.json"), *save_figures(figures, path)]  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""What is read off a step response, found in a record or typed in."""
+"""Readings of a step response, found in a record or typed in."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from .. import _core
+from .._core import Conventional
 from ..errors import ParameterError
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ __all__ = ["StepReadings"]
 
 @dataclass(frozen=True, kw_only=True)
 class StepReadings:
-    """What is read off a step response; typed in, or found by `identify_step`.
+    """Readings of a step response, typed in or found by `identify_step`.
 
     Parameters
     ----------
@@ -77,17 +78,12 @@ class StepReadings:
             raise ParameterError(f"peaks is {self.peaks!r}: expected several numbers") from None
         peaks = tuple(_core.as_number(f"peaks[{k}]", value) for k, value in enumerate(values))
         object.__setattr__(self, "peaks", peaks)
-        self.core()
+        _ = self._core
 
-    def core(self) -> _core.Conventional:
-        """Apply the formulas in the core, which checks every number.
-
-        Returns
-        -------
-        Conventional
-            Of the core.
-        """
-        return _core.Conventional(
+    @property
+    def _core(self) -> Conventional:
+        """The formulas in the core, which checks every number."""
+        return Conventional(
             voltage=self.voltage,
             steady_state=self.steady_state,
             peaks=list(self.peaks),

@@ -1,4 +1,4 @@
-"""What a person reads of a step response."""
+"""The table of a step response."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def step_text(step: StepResult) -> str:
     Parameters
     ----------
     step : StepResult
-        What a step told.
+        Result of a step response.
 
     Returns
     -------
@@ -47,7 +47,7 @@ def step_text(step: StepResult) -> str:
         ),
         "",
         "the mode",
-        _row("wn", f"{step.natural_frequency:.5g}", "rad/s", "(5)"),
+        _row("wn", f"{step.natural_angular_frequency:.5g}", "rad/s", "(5)"),
         _row("zeta", f"{step.damping_ratio:.4g}", "by the gains", "(4)"),
         _row("", f"{step.damping_by_decrement:.4g}", "by the logarithmic decrement"),
         _row("tau", f"{1e3 * step.time_constant:.4g}", "ms", "(6)"),
@@ -60,7 +60,7 @@ def step_text(step: StepResult) -> str:
     ratio = step.ratios
     lines += [
         "",
-        "ratios that any step tells",
+        "ratios that any step determines",
         _row("K/M", f"{ratio['K/M']:.5g}", "1/s^2"),
         _row("D/M", f"{ratio['D/M']:.5g}", "1/s"),
         _row("T/K", f"{1e6 * ratio['T/K']:.5g}", "um/V"),

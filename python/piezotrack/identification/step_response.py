@@ -127,7 +127,7 @@ class StepResult:
 
     @cached_property
     def _mode(self) -> tuple[float, float, float, float, float, float]:
-        return self.readings.core().mode()
+        return self.readings._core.mode()
 
     @property
     def overshoot_ratio(self) -> float:
@@ -150,8 +150,8 @@ class StepResult:
         return self._mode[3]
 
     @property
-    def natural_frequency(self) -> float:
-        """Natural frequency [rad/s], equation (5)."""
+    def natural_angular_frequency(self) -> float:
+        """Natural angular frequency [rad/s], equation (5)."""
         return self._mode[4]
 
     @property
@@ -162,15 +162,15 @@ class StepResult:
     @cached_property
     def hysteresis(self) -> dict[str, float]:
         """The parameters a1, a2, b1 and b0 of the Dahl operator, equations (9) to (13)."""
-        return dict(zip(("a1", "a2", "b1", "b0"), self.readings.core().hysteresis(), strict=True))
+        return dict(zip(("a1", "a2", "b1", "b0"), self.readings._core.hysteresis(), strict=True))
 
     @property
     def ratios(self) -> dict[str, float]:
-        """What any step tells: K/M [1/s^2], D/M [1/s] and T/K [m/V], of equation (3).
+        """What any step determines: K/M [1/s^2], D/M [1/s] and T/K [m/V], of equation (3).
 
         T/K is the gain at standstill, with what hysteresis takes off in it.
         """
-        wn = self.natural_frequency
+        wn = self.natural_angular_frequency
         gain = self.readings.steady_state / self.readings.voltage
         return {"K/M": wn * wn, "D/M": 2.0 * self.damping_ratio * wn, "T/K": gain}
 
@@ -191,7 +191,7 @@ class StepResult:
 
     @property
     def advice(self) -> str:
-        """What the step says of sampling, in words."""
+        """Recommended sampling rates, in words."""
         return (
             f"sample such a stage above {self.lowest_sampling_rate:.4g} Hz (10 x the natural "
             f"frequency; 3 in a time constant are {3.0 / self.time_constant:.4g} Hz), and a closed "
@@ -200,7 +200,7 @@ class StepResult:
 
     @property
     def notes(self) -> list[str]:
-        """What a careful reader should know before using the result."""
+        """Remarks on the record and the readings that limit the use of the result."""
         notes = [] if self.trace is None else self._of_the_record(self.trace)
         gains, decay = self.damping_ratio, self.damping_by_decrement
         if not abs(gains - decay) <= APART * max(gains, decay):
@@ -275,32 +275,32 @@ class StepResult:
 
 
 def identify_step(
-    log: Dataset | StepReadings,
+    data: Dataset | StepReadings,
     *,
     stiffness: float | None = None,
     mass: float | None = None,
     second_level: tuple[float, float] | StepResult | None = None,
 ) -> StepResult:
-    r"""Identify a stage from the step response of the conventional way.
+    r"""Identify a stage from its step response, by the conventional method.
 
     The jump of the drive, the steady state, the overshoot peaks and the period of the ringing
     are read off the record. The natural frequency is the highest point of the gain, which is the
     Fourier transform of the displacement's changes over that of the drive's. `StepResult` has
     the formulas.
 
-    One step tells K/M, D/M and T/K only. A force is fixed by one of:
+    One step determines K/M, D/M and T/K only. A force is fixed by one of:
 
     - `stiffness` or `mass`, where it is known;
-    - a second static level: the published way takes b1 as it comes, as the scale, and
+    - a second static level: the published method takes b1 as it comes, as the scale, and
 
       .. math:: K x_i + F_h(x_i) = T u_i, \qquad i = 1, 2
 
-      with the hysteresis force on the way from rest straight to x. This hangs on how little the
+      with the hysteresis force from rest straight to x. This depends on how little the
       gain falls from one level to the other, so both levels must be good.
 
     Parameters
     ----------
-    log : Dataset or StepReadings
+    data : Dataset or StepReadings
         The record, its window with one step and some samples before it; or readings typed in.
     stiffness : float, optional
         K [N/m].
@@ -332,18 +332,18 @@ def identify_step(
     >>> print(f"a1 = {published.hysteresis['a1']:.4f} 1/m")
     a1 = 121.9874 1/m
     """
-    if isinstance(log, StepReadings):
-        readings, trace = log, None
-    elif isinstance(log, Dataset):
-        readings, trace = _read(log)
+    if isinstance(data, StepReadings):
+        readings, trace = data, None
+    elif isinstance(data, Dataset):
+        readings, trace = _read(data)
     else:
-        kind = type(log).__name__
-        raise ParameterError(f"log is {kind}: expected a Dataset, see pt.read, or a StepReadings")
+        kind = type(data).__name__
+        raise ParameterError(f"data is {kind}: expected a Dataset, see pt.read, or a StepReadings")
     given = {"stiffness": stiffness, "mass": mass, "second_level": second_level}
     named = [name for name, value in given.items() if value is not None]
     if len(named) > 1:
         raise ParameterError(f"{' and '.join(named)} are given: expected one, it fixes the scale")
-    core = readings.core()
+    core = readings._core
     wn, zeta = core.mode()[4], core.mode()[2]
     level = (readings.voltage, readings.steady_state)
     known_stiffness: float | None = None
@@ -358,14 +358,14 @@ def identify_step(
         known_stiffness, scale = _positive("mass", mass, "kg") * wn * wn, "the mass given"
     if known_stiffness is not None and coefficient is None:
         coefficient = core.piezo_coefficient(known_stiffness, level)
-    weight = None if known_stiffness is None else known_stiffness / (wn * wn)
+    known_mass = None if known_stiffness is None else known_stiffness / (wn * wn)
     return StepResult(
         readings=readings,
         trace=trace,
         stiffness=known_stiffness,
-        mass=weight,
+        mass=known_mass,
         piezo_coefficient=coefficient,
-        damping=None if weight is None else 2.0 * zeta * wn * weight,
+        damping=None if known_mass is None else 2.0 * zeta * wn * known_mass,
         scale=scale,
     )
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, Literal
 
 from .. import _core
-from ..errors import ParameterError
+from .._core import SwarmSettings
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,7 +16,7 @@ __all__ = ["ParticleSwarm"]
 
 @dataclass(frozen=True, kw_only=True)
 class ParticleSwarm:
-    r"""How a swarm searches.
+    r"""Settings of the particle swarm.
 
     .. math::
 
@@ -25,10 +24,10 @@ class ParticleSwarm:
         X_i \leftarrow X_i + V_i
 
     Xu and Li 2010, equations (17) and (18), doi 10.1115/1.4001712. r1 and r2 are drawn anew for
-    each particle and coordinate. A swarm of the other update takes the centre of gravity of the
-    particle, a point beyond its own best place and one beyond its leader's, draws a point evenly
-    from the hypersphere about it whose surface holds the particle, and is the same however the
-    coordinates are turned:
+    each particle and coordinate. The hypersphere update takes the centre of gravity of the
+    particle, a point beyond its own best position and one beyond that of its best informant, draws
+    a point evenly from the hypersphere about it whose surface holds the particle, and does not
+    depend on the orientation of the coordinates:
 
     .. math::
 
@@ -37,11 +36,10 @@ class ParticleSwarm:
         X'_i &\sim \mathcal{U}\bigl(\mathcal{H}(G_i, |G_i - X_i|)\bigr), \qquad
         V_i \leftarrow w V_i + X'_i - X_i, \qquad X_i \leftarrow X_i + V_i
 
-    Clerc 2012, hal-00764996. A particle that is its own leader has G half-way between X and the
-    point beyond P. The default is a ring of 64 particles with the constriction
-    of Clerc and Kennedy 2002, doi 10.1109/4235.985692: it takes more evaluations than a swarm
-    that follows its one best, and ends in the same valley from seed to seed where that one
-    does not.
+    Clerc 2012, hal-00764996. A particle that is its own best informant has G half-way between X
+    and the point beyond P. The default is a ring of 64 particles with the constriction of Clerc
+    and Kennedy 2002, doi 10.1109/4235.985692: it takes more evaluations than the global topology,
+    and ends in the same local minimum from seed to seed where that one does not.
 
     Parameters
     ----------
@@ -59,7 +57,7 @@ class ParticleSwarm:
     cognitive, social : float, optional
         c1 and c2.
     topology : {"ring", "global", "random"}, optional
-        P_g is the best place of a particle and its two neighbours, or of all particles, or of
+        P_g is the best position of a particle and its two neighbours, or of all particles, or of
         the particle and those that inform it: each informs three, drawn anew after every
         iteration that did not improve the swarm's best.
     velocity_limit : float, optional
@@ -68,12 +66,12 @@ class ParticleSwarm:
         A particle that leaves the box stops at the bound with velocity 0, or with half its
         velocity reversed, or comes back from the bound with all of it reversed, or flies on
         outside without being evaluated.
-    min_improvement_um : float, optional
-        Improvement of the best cost [um] below which an iteration counts as a stall.
+    min_improvement : float, optional
+        Improvement of the best cost [m] below which an iteration counts as a stall.
     stall_iterations : int, optional
         Stalled iterations in a row after which the search stops.
     polish : bool, optional
-        Whether the best guess then goes down to the minimum next to it, by the method of
+        Whether the best candidate is then refined to the local minimum, by the method of
         Levenberg and Marquardt: Marquardt 1963, doi 10.1137/0111030.
 
     Raises
@@ -99,16 +97,17 @@ class ParticleSwarm:
     topology: Literal["ring", "global", "random"] = "ring"
     velocity_limit: float = 0.5
     boundary: Literal["absorb", "rebound", "reflect", "invisible"] = "absorb"
-    min_improvement_um: float = 1e-6
+    min_improvement: float = 1e-12
     stall_iterations: int = 50
     polish: bool = True
 
     def __post_init__(self) -> None:
-        self.checked()
         # NumPy's numbers become Python's: they are compared, printed and written to JSON.
         for field in fields(self):
             value = CHECKS[field.name](field.name, getattr(self, field.name))
             object.__setattr__(self, field.name, value)
+        # The core checks the ranges.
+        _ = self._core
 
     @classmethod
     def xu_li_2010(cls) -> ParticleSwarm:
@@ -126,20 +125,7 @@ class ParticleSwarm:
         ParticleSwarm
             The paper's settings.
         """
-        return cls(
-            particles=10,
-            iterations=2000,
-            inertia_start=0.9,
-            inertia_end=0.4,
-            inertia_iterations=500,
-            cognitive=2.0,
-            social=2.0,
-            topology="global",
-            velocity_limit=0.1,
-            min_improvement_um=1e-6,
-            stall_iterations=500,
-            polish=False,
-        )
+        return cls(**_core.SwarmSettings.xu_li_2010())
 
     @classmethod
     def spso_2011(cls) -> ParticleSwarm:
@@ -165,40 +151,12 @@ class ParticleSwarm:
         >>> pt.ParticleSwarm.spso_2011().update
         'hypersphere'
         """
-        return cls(
-            particles=40,
-            iterations=1000,
-            update="hypersphere",
-            inertia_start=0.5 / math.log(2.0),
-            inertia_end=0.5 / math.log(2.0),
-            cognitive=0.5 + math.log(2.0),
-            social=0.5 + math.log(2.0),
-            topology="random",
-            velocity_limit=math.inf,
-            boundary="rebound",
-            stall_iterations=200,
-            polish=False,
-        )
+        return cls(**_core.SwarmSettings.spso_2011())
 
-    def checked(self) -> _core.SwarmSettings:
-        """Return the settings as the core takes them.
-
-        Returns
-        -------
-        piezotrack._core.SwarmSettings
-            The same settings, in SI.
-        """
-        settings: dict[str, Any] = {}
-        for field in fields(self):
-            value = getattr(self, field.name)
-            settings[field.name] = CHECKS[field.name](field.name, value)
-        improvement = settings.pop("min_improvement_um")
-        if not 0.0 <= improvement < math.inf:
-            raise ParameterError(
-                f"min_improvement_um is {improvement}: expected a finite number, 0 or above"
-            )
-        # Divided, not multiplied: 1e-6 um is then 1e-12 m to the last bit.
-        return _core.SwarmSettings(**settings, min_improvement=improvement / 1e6)
+    @property
+    def _core(self) -> SwarmSettings:
+        """The settings in the core."""
+        return SwarmSettings(**{field.name: getattr(self, field.name) for field in fields(self)})
 
 
 def _text(_name: str, value: object) -> str:
@@ -218,7 +176,7 @@ CHECKS: dict[str, Callable[[str, object], Any]] = {
     "topology": _text,
     "velocity_limit": _core.as_number,
     "boundary": _text,
-    "min_improvement_um": _core.as_number,
+    "min_improvement": _core.as_number,
     "stall_iterations": _core.as_count,
     "polish": _core.as_truth,
 }

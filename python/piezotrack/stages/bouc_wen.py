@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from .. import _core
-from .base import DrivenStage, mechanical_ratios
+from .base import Stage, StageState, mechanical_ratios, stage
 
 if TYPE_CHECKING:
     from .base import Ratio
@@ -15,34 +14,24 @@ __all__ = ["BoucWenStage", "BoucWenState"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class BoucWenState:
-    """Where a Bouc-Wen stage is and what its hysteresis remembers, at one instant.
+class BoucWenState(StageState):
+    """State of a Bouc-Wen stage at one instant.
 
     Parameters
     ----------
-    x : float
-        Displacement [m].
-    v : float
-        Velocity [m/s].
     u : float
         Drive that the hysteresis has seen last [V].
     h : float
         State of the hysteresis [m].
     """
 
-    x: float = 0.0
-    v: float = 0.0
     u: float = 0.0
     h: float = 0.0
 
-    @property
-    def values(self) -> tuple[float, float, float, float]:
-        """The four values in their order."""
-        return self.x, self.v, self.u, self.h
 
-
+@stage("bouc-wen", state=BoucWenState)
 @dataclass(frozen=True, kw_only=True)
-class BoucWenStage(DrivenStage[BoucWenState]):
+class BoucWenStage(Stage):
     r"""A stage with Bouc-Wen hysteresis at its input.
 
     .. math::
@@ -104,10 +93,6 @@ class BoucWenStage(DrivenStage[BoucWenState]):
     gamma: float
     exponent: float = 1.0
 
-    _parameters = _core.BOUC_WEN_PARAMETERS
-    _kind = "bouc-wen"
-    _state = BoucWenState
-
     @classmethod
     def xu_li_2010(cls) -> BoucWenStage:
         """Parameters below equation (20) of Xu and Li 2010, doi 10.1115/1.4001712, as printed.
@@ -120,7 +105,7 @@ class BoucWenStage(DrivenStage[BoucWenState]):
         BoucWenStage
             With k = 1.9567e3 N/m.
         """
-        return cls._published(corrected=False)
+        return cls._published("xu_li_2010")
 
     @classmethod
     def xu_li_2010_corrected(cls) -> BoucWenStage:
@@ -136,12 +121,7 @@ class BoucWenStage(DrivenStage[BoucWenState]):
         BoucWenStage
             With k = 1.9567e4 N/m.
         """
-        return cls._published(corrected=True)
-
-    @classmethod
-    def _published(cls, *, corrected: bool) -> BoucWenStage:
-        values = _core.bouc_wen_xu_li_2010(corrected)
-        return cls(**dict(zip(cls.parameter_names(), values, strict=True)))
+        return cls._published("xu_li_2010_corrected")
 
     def force_ratios(self) -> list[Ratio]:
         """Return all but the exponent, which is held, forces over the stiffness."""

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from .. import _core
-from .base import DrivenStage, FeedbackState
-
-if TYPE_CHECKING:
-    from .base import Ratio
+from .base import ForceState, Stage, stage
 
 __all__ = ["BoucWenOscillator"]
 
 
+@stage("bouc-wen-oscillator", state=ForceState)
 @dataclass(frozen=True, kw_only=True)
-class BoucWenOscillator(DrivenStage[FeedbackState]):
+class BoucWenOscillator(Stage):
     r"""A mass on a spring with Bouc-Wen hysteresis, driven by a force.
 
     .. math::
@@ -65,10 +61,6 @@ class BoucWenOscillator(DrivenStage[FeedbackState]):
     0.67 mm
     """
 
-    _kind = "bouc-wen-oscillator"
-    _state = FeedbackState
-    _parameters = _core.BOUC_WEN_OSCILLATOR_PARAMETERS
-
     mass: float
     damping: float
     stiffness: float
@@ -87,10 +79,4 @@ class BoucWenOscillator(DrivenStage[FeedbackState]):
         BoucWenOscillator
             The system of the benchmark.
         """
-        values = _core.bouc_wen_benchmark()
-        return cls(**dict(zip(cls.parameter_names(), values, strict=True)))
-
-    def force_ratios(self) -> list[Ratio]:
-        """Return every parameter as it is: the drive is a force."""
-        values = zip(self._parameters, self.theta, strict=True)
-        return [(name, symbol, value, unit) for (name, symbol, unit), value in values]
+        return cls._published("benchmark")

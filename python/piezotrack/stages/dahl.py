@@ -1,55 +1,42 @@
-"""Stage models: hysteresis coupled with linear mechanics, simulated by the Rust core."""
+"""The Dahl stage: second-order Dahl hysteresis in feedback on the displacement."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-
-from .. import _core
-from .base import LumpedStage, Response, mechanical_ratios
+from .base import Response, Stage, StageState, mechanical_ratios, stage
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike
 
     from ..data.dataset import Hold
     from .base import Ratio
 
-    Array = NDArray[np.float64]
-
-__all__ = ["DahlStage", "StageState"]
+__all__ = ["DahlStage", "DahlState"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class StageState:
-    """Where a stage is and what its hysteresis remembers, at one instant.
+class DahlState(StageState):
+    """State of a Dahl stage at one instant.
 
     Parameters
     ----------
-    x : float
-        Displacement [m].
-    v : float
-        Velocity [m/s].
     q1 : float
         First state of the hysteresis operator.
     q2 : float
         Second state, its slope along the path [1/m]. Both are 0 where b1 and b0 are 0.
     """
 
-    x: float = 0.0
-    v: float = 0.0
     q1: float = 0.0
     q2: float = 0.0
 
-    @property
-    def values(self) -> tuple[float, float, float, float]:
-        """The four values in their order."""
-        return self.x, self.v, self.q1, self.q2
 
-
+@stage("dahl", state=DahlState)
 @dataclass(frozen=True, kw_only=True)
-class DahlStage(LumpedStage):
+class DahlStage(Stage):
     r"""A stage with second-order Dahl hysteresis in feedback on its displacement.
 
     .. math::
@@ -80,7 +67,7 @@ class DahlStage(LumpedStage):
     b0 : float, optional
         Gain of the friction force [N/m]. With any value but 0 the hysteresis force jumps by
         2 b0 q2 at a reversal: the stage sticks where the other forces are smaller than b0 q2.
-        Where b0 q2 is below 0, rest is not unique: see ``Response.well_posed``.
+        Where b0 q2 is below 0, rest is not unique: see ``Response.unique``.
     up : float, optional
         Constant input of the operator. Only the product ``b1 * up`` shows in the motion.
 
@@ -120,9 +107,6 @@ class DahlStage(LumpedStage):
     b0: float = 0.0
     up: float = 30.0
 
-    _parameters = _core.DAHL_PARAMETERS
-    _kind = "dahl"
-
     @classmethod
     def xu_li_2010(cls) -> DahlStage:
         """Table 1 of Xu and Li 2010, doi 10.1115/1.4001712.
@@ -132,7 +116,7 @@ class DahlStage(LumpedStage):
         DahlStage
             The stage of the paper's x axis.
         """
-        return cls(**dict(zip(cls.parameter_names(), _core.dahl_xu_li_2010(), strict=True)))
+        return cls._published("xu_li_2010")
 
     def simulate(
         self,
@@ -159,10 +143,10 @@ class DahlStage(LumpedStage):
             Sampling interval [s].
         hold : {"foh", "zoh"}, optional
             Between two samples the drive goes straight from one to the next (``"foh"``), or
-            stays where it is until the next (``"zoh"``).
-        initial : StageState, optional
-            State at the first sample; at rest where it is not given. To carry on, begin the new
-            drive with the last sample of the one before.
+            stays constant until the next (``"zoh"``).
+        initial : DahlState, optional
+            State at the first sample; at rest where it is not given. To continue a simulation,
+            begin the new drive with the last sample of the one before.
         method : {"exponential", "rk4", "rk45"}, optional
             The scheme above, or for comparison the classical Runge-Kutta methods: fourth order
             in equal steps, or Dormand and Prince's adaptive pair, doi
@@ -196,21 +180,7 @@ class DahlStage(LumpedStage):
         >>> bool(abs(second.x[-1] - whole.x[-1]) < 1e-10)
         True
         """
-        start = StageState() if initial is None else initial
-        dt = _core.as_number("dt", dt)
-        accuracy = _core.as_number("accuracy", accuracy)
-        run = _core.dahl_simulate(self.theta, u, dt, hold, start.values, method, accuracy)
-        return Response(
-            t=np.arange(run.x.size, dtype=np.float64) * dt,
-            u=np.array(u, dtype=np.float64),
-            x=run.x,
-            v=run.v,
-            hysteresis=run.hysteresis,
-            final=StageState(**dict(zip(("x", "v", "q1", "q2"), run.last, strict=True))),
-            substeps=run.substeps,
-            difference=run.difference,
-            well_posed=run.well_posed,
-        )
+        return self._simulate(u, dt, hold, initial, method, accuracy)
 
     def force_ratios(self) -> list[Ratio]:
         """Return all but up, which the data do not tell from b1 and b0, over the stiffness."""
@@ -222,4 +192,12 @@ class DahlStage(LumpedStage):
             ("a1", "a1", self.a1, "1/m"),
             ("a2", "a2", self.a2, "1/m^2"),
             ("b0", "b0 up/K", self.b0 * self.up / self.stiffness, ""),
+        ]
+
+    def _notes(self, response: Callable[[], Response]) -> list[str]:
+        if self.b0 == 0.0 or response().unique:
+            return []
+        return [
+            "b0 q2 falls below 0 at rest: the solution is not unique, another motion satisfies the "
+            "same drive"
         ]

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from .. import _core
-from .base import DrivenStage, FeedbackState, mechanical_ratios
+from .base import ForceState, Stage, mechanical_ratios, stage
 
 if TYPE_CHECKING:
     from .base import Ratio
@@ -14,8 +13,9 @@ if TYPE_CHECKING:
 __all__ = ["FirstOrderDahlStage"]
 
 
+@stage("first-order-dahl", state=ForceState)
 @dataclass(frozen=True, kw_only=True)
-class FirstOrderDahlStage(DrivenStage[FeedbackState]):
+class FirstOrderDahlStage(Stage):
     r"""A stage with first-order Dahl friction in feedback on its displacement.
 
     .. math::
@@ -68,10 +68,6 @@ class FirstOrderDahlStage(DrivenStage[FeedbackState]):
     >>> print(np.round(1e6 * low[:3], 4), f"{1e9 * np.ptp(low[1:]):.2f} nm")
     [11.0023 11.0157 11.0157] 0.02 nm
     """
-
-    _kind = "first-order-dahl"
-    _state = FeedbackState
-    _parameters = _core.FIRST_ORDER_DAHL_PARAMETERS
 
     mass: float
     damping: float

@@ -1,4 +1,4 @@
-"""Feedforward: the voltage that would lead an identified stage along a reference."""
+"""Feedforward: the voltage with which an identified stage follows a reference."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from .._support.arguments import finite, not_negative, positive
 from ..errors import ParameterError
 from ..references.motions import Spline
 from ..references.reference import Reference
-from .prandtl_ishlinskii import PlaysState, PrandtlIshlinskiiStage
-from .registry import Stage, kind_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from .base import Stage, StageState
 
     Array = NDArray[np.float64]
 
@@ -38,27 +38,33 @@ class Inverse:
 
     .. math:: d u - h(u) = (m \ddot x_d + b \dot x_d + k x_d) / k
 
-    is solved for it sample by sample, taken to be monotone between two of them. Of a
-    Prandtl-Ishlinskii stage it is the inverse of each part in turn: see its `inverse`.
+    is solved for it sample by sample, taken to be monotone between two of them. That of a
+    `PrandtlIshlinskiiStage` is the inverse of each of its parts in turn.
 
     Parameters
     ----------
-    stage : DahlStage or another kind of stage
-        The model.
+    stage : Stage
+        The model, as a `DahlStage`.
     offset : float, optional
         What the sensor shows where the stage is at rest without drive [m].
     delay : float, optional
-        Time by which the displacement is late [s]: the voltage comes that much earlier.
+        Delay of the displacement beyond the model [s]: the voltage comes that much earlier.
     playback : {"table", "online"}, optional
         ``"table"``, as in the paper: of a reference that repeats one settled period is
-        computed and played again and again. ``"online"``: computed along the whole path. The
+        computed and repeated. ``"online"``: computed along the whole path. The
         printed model drifts from period to period, its table does not.
     settle : int, optional
-        Periods before the one that is played again, 1 or more; those in which the reference
+        Periods before the one that is repeated, 1 or more; those in which the reference
         starts smoothly are never the one.
-    initial : PlaysState, optional
-        What a Prandtl-Ishlinskii stage remembers before the reference begins, such as the
-        `final` of a response; that of a stage at rest that never moved where it is not given.
+    initial : StageState, optional
+        State of the stage before the reference begins, such as the `final` of a response; at
+        rest, never driven, where it is not given. Models other than `PrandtlIshlinskiiStage`
+        begin there always.
+
+    Raises
+    ------
+    ParameterError, ShapeError
+        An argument cannot be used, or `initial` is the state of another stage.
 
     Examples
     --------
@@ -77,31 +83,26 @@ class Inverse:
     delay: float = 0.0
     playback: Playback = "table"
     settle: int = 1
-    initial: PlaysState | None = None
+    initial: StageState | None = None
 
     def __post_init__(self) -> None:
-        kind = kind_of(self.stage, "stage")
-        if not isinstance(self.stage, PrandtlIshlinskiiStage):
-            # A stage that has no inverse is refused here.
-            _core.InverseSession(kind.name, self.stage.theta, 1.0)
+        if not isinstance(getattr(self.stage, "_core", None), _core.Stage):
+            raise ParameterError(
+                f"stage is {type(self.stage).__name__}: expected a stage, as a pt.DahlStage"
+            )
         finite("offset", self.offset, "m")
         not_negative("delay", self.delay, "s")
         if self.playback not in ("table", "online"):
             raise ParameterError(f"playback is {self.playback!r}: expected 'table' or 'online'")
         if not 1 <= _core.as_count("settle", self.settle) <= 1000:
             raise ParameterError(f"settle is {self.settle}: expected 1 period or more, up to 1000")
-        if self.initial is not None and not (
-            isinstance(self.initial, PlaysState) and isinstance(self.stage, PrandtlIshlinskiiStage)
-        ):
-            raise ParameterError(
-                f"initial is {type(self.initial).__name__}: expected the final of a response of a "
-                "Prandtl-Ishlinskii stage, and such a stage"
-            )
+        # The core refuses a stage without an inverse, and a state that is none of the stage's.
+        self._begun(1.0)
 
-    @property
-    def _kind(self) -> str:
-        """Name of the model."""
-        return kind_of(self.stage).name
+    def _begun(self, dt: float) -> _core.Inverse:
+        """Return the inverse in the core, before its first sample."""
+        initial = None if self.initial is None else self.stage._checked(self.initial)._named
+        return self.stage._core.inverse(dt, offset=self.offset, delay=self.delay, initial=initial)
 
     def voltage(self, reference: Reference, dt: float) -> Array:
         """Voltage along the whole path of a reference, the stage being at rest before.
@@ -133,10 +134,7 @@ class Inverse:
         else:
             longer = replace(reference, duration=reference.duration + self.delay + samples.dt)
             x, v, a = longer.at(t)
-        if isinstance(self.stage, PrandtlIshlinskiiStage):
-            memory = None if self.initial is None else self.initial.values
-            return self.stage.core.feedforward(samples.dt, x - self.offset, v, a, memory)
-        return _core.feedforward(self._kind, self.stage.theta, samples.dt, x - self.offset, v, a)
+        return self._begun(samples.dt).along(x - self.offset, v, a)
 
     def table(self, reference: Reference, dt: float) -> Array:
         """One settled period, as a lookup table to be played at the sampling instants.
@@ -178,7 +176,7 @@ class Inverse:
         return self.voltage(replace(reference, duration=length), dt)[-count:]
 
     def played(self, reference: Reference, dt: float) -> tuple[Array, str]:
-        """Feedforward of a run as `playback` says.
+        """Feedforward of an experiment as `playback` says.
 
         Parameters
         ----------
@@ -192,7 +190,7 @@ class Inverse:
         volts : ndarray, shape (n,)
             Voltage at the samples [V].
         how : str
-            Which way it was computed, in words.
+            How it was computed, in words.
         """
         volts = self.voltage(reference, dt)
         period = reference.period
@@ -241,7 +239,7 @@ def _goes_on(reference: Reference) -> bool:
 
 
 class InverseSession:
-    """An inverse at work, sample by sample.
+    """An inverse that is evaluated sample by sample.
 
     Parameters
     ----------
@@ -259,16 +257,7 @@ class InverseSession:
     """
 
     def __init__(self, inverse: Inverse, dt: float) -> None:
-        self._inverse = inverse
-        self._dt = dt
-        stage = inverse.stage
-        self._core: _core.InverseSession | _core.PlaysInverse = (
-            stage.core.inverse(dt, None if inverse.initial is None else inverse.initial.values)
-            if isinstance(stage, PrandtlIshlinskiiStage)
-            else _core.InverseSession(inverse._kind, stage.theta, dt)
-        )
-        # The last two references; none before the first.
-        self._past: tuple[float, float] | None = None
+        self._core = inverse._begun(dt)
 
     def step(
         self,
@@ -286,8 +275,7 @@ class InverseSession:
             Displacement to be followed [m].
         velocity, acceleration : float, optional
             Its derivatives [m/s, m/s^2]. Where not given they are differences: central ones of
-            the sample before and `preview`, or of the last two samples and so half a sample
-            late.
+            the sample before and `preview`, or backward ones, which are delayed by half a sample.
         preview : float, optional
             The reference one sample ahead [m].
 
@@ -298,7 +286,7 @@ class InverseSession:
             differences go on as if the reference had kept its velocity meanwhile.
         """
         try:
-            return self._step(reference, velocity, acceleration, preview)
+            return self._core.step(reference, velocity, acceleration, preview)
         except TypeError:
             given = {"reference": reference, "velocity": velocity}
             given |= {"acceleration": acceleration, "preview": preview}
@@ -307,32 +295,6 @@ class InverseSession:
                     _core.as_number(name, value)
             raise
 
-    def _step(
-        self,
-        reference: float,
-        velocity: float | None,
-        acceleration: float | None,
-        preview: float | None,
-    ) -> float:
-        past, dt = self._past, self._dt
-        first, before = past or (reference, reference)
-        if preview is not None:
-            rough = (0.5 * (preview - before) / dt, (preview - 2 * reference + before) / dt**2)
-        else:
-            rough = ((reference - before) / dt, (reference - 2 * before + first) / dt**2)
-        v = rough[0] if velocity is None else velocity
-        a = rough[1] if acceleration is None else acceleration
-        # Where the delay leads, the velocity held along with the acceleration.
-        late = self._inverse.delay
-        x = reference + late * (v + 0.5 * late * a) - self._inverse.offset
-        volts = self._core.step(x, v + late * a, a)
-        if math.isfinite(reference):
-            self._past = (before, reference)
-        elif past:
-            self._past = (before, 2.0 * before - first)
-        return volts
-
     def reset(self) -> None:
         """Forget the path."""
-        self._past = None
         self._core.reset()

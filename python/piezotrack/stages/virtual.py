@@ -1,4 +1,4 @@
-"""The virtual stage: what stands in for a piezo stage, richer than the models fitted to it."""
+"""The virtual stage: a simulated piezo stage, richer than the models that are fitted to it."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
+from .._core import VirtualStage as CoreStage
 from .._support.arguments import one_or_more_numbers
 from ..data.dataset import Dataset
 from ..errors import ParameterError
@@ -49,7 +50,7 @@ class VirtualResponse:
 
 @dataclass(frozen=True, kw_only=True)
 class VirtualStage:
-    r"""A stage to experiment on, with all that a hysteresis model leaves out.
+    r"""A simulated stage with amplifier, creep and sensor, for experiments.
 
     Command, amplifier, hysteresis of weighted play operators with dead zones, creep, a mode
     that rings, sensor:
@@ -145,17 +146,12 @@ class VirtualStage:
                 object.__setattr__(self, one.name, value)
         _core.as_truth("preconditioned", self.preconditioned)
         object.__setattr__(self, "seed", _core.as_count("seed", self.seed))
-        self.core()
+        _ = self._core
 
-    def core(self) -> _core.VirtualStage:
-        """Build the stage in the core, which checks every number.
-
-        Returns
-        -------
-        VirtualStage
-            Of the core.
-        """
-        return _core.VirtualStage(asdict(self))
+    @property
+    def _core(self) -> CoreStage:
+        """The stage in the core, which checks every number."""
+        return CoreStage(asdict(self))
 
     @classmethod
     def xu_li_2010(cls, *, seed: int = 0) -> VirtualStage:
@@ -196,7 +192,7 @@ class VirtualStage:
             Motion at the n samples.
         """
         dt = _core.as_number("dt", dt)
-        x, y, applied = self.core().simulate(u, dt, hold)
+        x, y, applied = self._core.simulate(u, dt, hold)
         t = np.arange(x.size, dtype=np.float64) * dt
         return VirtualResponse(t=t, u=np.array(u, dtype=np.float64), applied=applied, x=x, y=y)
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from .. import _core
+from .._core import XYStage as CoreStage
 from ..data.dataset import Dataset
 from ..errors import ParameterError
 from ..references.xy_reference import square_matrix
-from .base import MODEL_STEP
-from .dahl import DahlStage
+from .base import MODEL_STEP, Stage
 from .virtual import VirtualResponse, VirtualStage
 
 if TYPE_CHECKING:
@@ -39,8 +39,8 @@ class XYStage:
 
     Parameters
     ----------
-    x, y : VirtualStage or DahlStage
-        The stages; they may differ.
+    x, y : VirtualStage or Stage
+        The stages, of any models; they may differ. Of an identified one it is its `model`.
     cross_talk : (float, float) or array_like of shape (2, 2), optional
         What of y shows in x and what of x shows in y, or a matrix with 1 on its diagonal.
     lag : float, optional
@@ -63,35 +63,31 @@ class XYStage:
     116 um and 1.2 um
     """
 
-    x: VirtualStage | DahlStage
-    y: VirtualStage | DahlStage
+    x: VirtualStage | Stage
+    y: VirtualStage | Stage
     cross_talk: tuple[float, float] = (0.0, 0.0)
     lag: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("x", "y"):
             stage = getattr(self, name)
-            if not isinstance(stage, (VirtualStage, DahlStage)):
+            if not isinstance(stage, (VirtualStage, Stage)):
                 raise ParameterError(
-                    f"{name} is {type(stage).__name__}: expected pt.VirtualStage or pt.DahlStage"
+                    f"{name} is {type(stage).__name__}: expected a pt.VirtualStage or a stage of a "
+                    "model, as a pt.DahlStage"
                 )
         object.__setattr__(self, "cross_talk", _shares(self.cross_talk))
         object.__setattr__(self, "lag", _core.as_number("lag", self.lag))
-        self.core()
+        _ = self._core
 
-    def core(self) -> _core.XYStage:
-        """Build the stage in the core, which checks every number.
-
-        Returns
-        -------
-        XYStage
-            Of the core.
-        """
+    @property
+    def _core(self) -> CoreStage:
+        """The stage in the core, which checks every number."""
         x, y = (
-            stage.core() if isinstance(stage, VirtualStage) else (stage.theta, MODEL_STEP)
+            stage._core if isinstance(stage, VirtualStage) else (stage._core, MODEL_STEP)
             for stage in (self.x, self.y)
         )
-        return _core.XYStage(x, y, self.cross_talk, self.lag)
+        return CoreStage(x, y, self.cross_talk, self.lag)
 
     @property
     def matrix(self) -> Array:
@@ -160,7 +156,7 @@ class XYStage:
                 y=read,
             )
             for u, (true, read, applied) in zip(
-                (ux, uy), self.core().simulate(ux, uy, dt, hold), strict=True
+                (ux, uy), self._core.simulate(ux, uy, dt, hold), strict=True
             )
         )
         return x, y

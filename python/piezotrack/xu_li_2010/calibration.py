@@ -13,7 +13,7 @@ import numpy as np
 from .. import _core
 from ..control.tracking import check_stable
 from ..errors import PiezotrackError
-from ..identification.search import identify
+from ..identification.identify import identify
 from ..identification.swarm import ParticleSwarm
 from ..stages.dahl import DahlStage
 from . import fig_04_step_test, fig_06_identification, fig_12_14_tracking, fig_15_circles
@@ -122,7 +122,7 @@ def _round(
     progress: Progress | None,
 ) -> tuple[float, dict[str, float]]:
     """Search a box by the swarm of the core: best cost, and where it is."""
-    swarm = _core.Swarm(settings.checked(), len(box), seed)
+    swarm = _core.Swarm(settings._core, len(box), seed)
     with ThreadPoolExecutor(max_workers=2) as pool:
         for iteration in range(settings.iterations + 1):
             places = [None if one is None else theta_at(one, box) for one in swarm.ask()]

@@ -10,7 +10,7 @@ from .._support.files import write_columns
 from ..control.components import Pid, Repetitive
 from ..control.controller import Controller
 from ..control.tracking import Tracking, track
-from ..identification.search import Identification, identify
+from ..identification.identify import identify
 from ..references.waveforms import sine
 from ..stages.dahl import DahlStage
 from ..stages.virtual import VirtualStage
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from ..data.dataset import Dataset
     from ..identification.estimates import Progress
+    from ..identification.result import Identification
 
 __all__ = ["demo_log", "identify_demo", "track_demo", "write_log"]
 

@@ -9,7 +9,7 @@ from ..control.components import LowPass, Notch, Pid, Repetitive
 from ..control.tracking import Tracking, track
 from ..data.dataset import Dataset
 from ..errors import NumericalError, ParameterError
-from ..identification.search import identify
+from ..identification.identify import identify
 from ..stages.dahl import DahlStage
 from . import fig_06_identification, fig_07_model_comparison, fig_12_14_tracking
 from .apparatus import DT, loop

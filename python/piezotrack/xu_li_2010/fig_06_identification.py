@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..data.dataset import Dataset
-from ..identification.search import Identification, identify
+from ..identification.identify import identify
 from ..identification.swarm import ParticleSwarm
 from ..stages.dahl import DahlStage
 from .procedure import FITTED_SECONDS, SEARCH_BOX
@@ -15,6 +15,7 @@ from .procedure import FITTED_SECONDS, SEARCH_BOX
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from ..identification.result import Identification
     from .apparatus import Apparatus
 
 __all__ = ["draw", "observe", "record", "search", "thinned"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..identification.comparison import Comparison, compare
-from ..identification.search import identify
+from ..identification.identify import identify
 from ..stages.bouc_wen import BoucWenStage
 from .fig_06_identification import thinned
 from .procedure import FITTED_SECONDS
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..data.dataset import Dataset
-    from ..identification.search import Identification
+    from ..identification.result import Identification
 
 __all__ = ["draw", "judge", "largest", "observe"]
 

@@ -152,7 +152,7 @@ def _of_the_step() -> list[Observable]:
     """Take Fig. 4 from where the step response has it."""
     step = StepReadings.xu_li_2010()
     first, second = step.peaks
-    zeta = step.core().mode()[2]
+    zeta = step._core.mode()[2]
     rows = [
         ("steady", "steady state under 75 V", "um", step.steady_state),
         ("peak_1", "first overshoot peak", "um", first),

@@ -16,7 +16,7 @@ from . import (
 
 if TYPE_CHECKING:
     from ..identification.comparison import Comparison
-    from ..identification.search import Identification
+    from ..identification.result import Identification
     from ..identification.sensor_noise import Noise
     from ..identification.step_response import StepResult
     from .apparatus import Apparatus
