@@ -17,8 +17,10 @@ def _read_homes() -> dict[str, str]:
     """Read from the stub beside this file which module each public name is in."""
     path = os.path.join(os.path.dirname(__file__), "__init__.pyi")
     with open(path, encoding="utf-8") as stub:
-        # One name a line, as the formatter keeps it; importing ast would cost more than all else.
-        lines = [line.split() for line in stub if line.startswith("from ")]
+        # One name a line, as the formatter keeps it, or in parentheses where it is too long for
+        # one; importing ast would cost more than all else.
+        text = stub.read().replace("import (\n", "import ")
+    lines = [line.split() for line in text.splitlines() if line.startswith("from ")]
     return {name: home for _, home, _, name, *_ in lines}
 
 

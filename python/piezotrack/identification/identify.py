@@ -67,9 +67,9 @@ def identify(
         Name of the model. A swarm searches ``"dahl"`` (`DahlStage`), ``"bouc-wen"``
         (`BoucWenStage`), ``"first-order-dahl"`` (`FirstOrderDahlStage`) and
         ``"bouc-wen-oscillator"`` (`BoucWenOscillator`); least squares find
-        ``"prandtl-ishlinskii"`` (`PrandtlIshlinskiiStage`). Of what follows, `offset` applies to
-        every model, `least_squares` to the last one only and all else to the others only; an
-        argument that does not apply to the model is refused.
+        ``"prandtl-ishlinskii"`` (`PrandtlIshlinskiiStage`) and other models of weighted plays. Of
+        what follows, `offset` applies to every model, `least_squares` to the latter only and all
+        else to the former only; an argument that does not apply to the model is refused.
     free : iterable of str, optional
         Parameters to search: all that are not fixed, where not given. `b0`, dry friction at
         reversals, is held at 0 unless it is named here or in `fixed`; exponents, and the beta of

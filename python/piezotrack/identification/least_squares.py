@@ -45,7 +45,7 @@ class LeastSquares:
         Thresholds of the plays [V], in place of `count`.
     dead_zones : bool or int, optional
         Number of one-sided dead zones, 0 to 8, spread evenly over the displacement; True stands
-        for 2.
+        for 2, or for none where the model has no dead zones.
     creep : bool or sequence of float, optional
         Time constants of the creep [s]; True stands for the powers of ten between five samples
         and half of the window.
@@ -107,8 +107,10 @@ class LeastSquares:
         spread: list[float] = (reach * np.arange(1, count + 1) / (count + 1)).tolist()
         return spread
 
-    def _zones(self) -> int:
-        return 2 if self.dead_zones is True else int(self.dead_zones)
+    def _zones(self, info: ModelInfo) -> int:
+        if self.dead_zones is True:
+            return 2 if info.has_dead_zones else 0
+        return int(self.dead_zones)
 
     def _times(self, data: Dataset) -> Sequence[float]:
         if not isinstance(self.creep, bool):
@@ -161,13 +163,16 @@ def solve_least_squares(
         hold_name=data.hold,
         start=data.warmup,
         thresholds=list(settings._thresholds(data)),
-        zones=settings._zones(),
+        zones=settings._zones(info),
         creep_times=list(settings._times(data)),
         dynamics=settings.dynamics or "none",
         offset=offset,
     )
     details: dict[str, Any] = {
-        "parameters": {name: {"free": name not in CHOSEN} for name, _ in found.parameters},
+        "parameters": {
+            one.name: {"free": one.name not in CHOSEN and one.held is None}
+            for one in info.parameters
+        },
         "fit": {
             "cost": {"value": found.rms, "unit": "m"},
             "simulations": found.evaluations,

@@ -110,6 +110,11 @@ class ModelInfo:
         )
 
     @property
+    def has_dead_zones(self) -> bool:
+        """Whether dead zones may follow the plays."""
+        return any(one.name == "dead_zone_weights" for one in self.parameters)
+
+    @property
     def force_symbols(self) -> str:
         """Symbols of the parameters that scale with the stiffness, in words."""
         symbols = [
@@ -190,8 +195,8 @@ class Response:
     v : ndarray, shape (n,)
         Velocity [m/s]; 0 where the model has no mechanics.
     hysteresis : ndarray, shape (n,)
-        Hysteresis force [N]; for `PrandtlIshlinskiiStage` the output of the hysteresis, before
-        creep and dynamics [m].
+        Hysteresis force [N]; where the hysteresis is at the input its output, before creep and
+        dynamics [m].
     final : StageState
         State of the model at the last sample; ``initial=final`` continues from there.
     substeps : int
@@ -390,8 +395,8 @@ class Stage:
             Periods before the one of the table.
         initial : StageState, optional
             State of the stage before the reference begins, such as the `final` of a response to
-            the drive that settled it; at rest, never driven, where it is not given. Models other
-            than `PrandtlIshlinskiiStage` begin there always.
+            the drive that settled it; at rest, never driven, where it is not given. Models whose
+            hysteresis is not at their input begin there always.
 
         Returns
         -------

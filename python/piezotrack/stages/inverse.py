@@ -38,8 +38,9 @@ class Inverse:
 
     .. math:: d u - h(u) = (m \ddot x_d + b \dot x_d + k x_d) / k
 
-    is solved for it sample by sample, taken to be monotone between two of them. That of a
-    `PrandtlIshlinskiiStage` is the inverse of each of its parts in turn.
+    is solved for it sample by sample, taken to be monotone between two of them. Where the
+    hysteresis is at the input, as of a `PrandtlIshlinskiiStage`, it is the inverse of each part in
+    turn.
 
     Parameters
     ----------
@@ -58,7 +59,7 @@ class Inverse:
         starts smoothly are never the one.
     initial : StageState, optional
         State of the stage before the reference begins, such as the `final` of a response; at
-        rest, never driven, where it is not given. Models other than `PrandtlIshlinskiiStage`
+        rest, never driven, where it is not given. Models whose hysteresis is not at their input
         begin there always.
 
     Raises
