@@ -1,12 +1,14 @@
 # What a person types. Needs a Rust toolchain and Python 3.11 or newer; all else is put in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo reproduce test lint rust-test python-test bench docs clean
+.PHONY: help demo reproduce test lint rust-test no-std python-test bench docs clean
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 WHEELS := target/wheels
-SOURCES := $(shell find rust python/piezotrack -name '*.rs' -o -name '*.py' -o -name '*.pyi' -o -name '*.json' -o -name '*.css' -o -name '*.js' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
+# A Cortex-M4F.
+EMBEDDED := thumbv7em-none-eabihf
+SOURCES := $(shell find rust python/piezotrack -name '*.rs' -o -name '*.py' -o -name '*.pyi' -o -name '*.json' -o -name '*.css' -o -name '*.js' -o -name '*.gz' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
 help: ## What can be typed
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/'
@@ -17,7 +19,7 @@ demo: $(VENV)/installed ## Build, then the way from a log to a model on a built-
 reproduce: $(VENV)/installed ## Every figure and table of the paper, published beside obtained
 	$(BIN)/piezotrack reproduce --out report
 
-test: lint rust-test python-test ## Everything that must hold before a change lands
+test: lint rust-test no-std python-test ## Everything that must hold before a change lands
 
 lint: $(VENV)/installed $(VENV)/tools ## Formatting, clippy, ruff, types, stubs
 	cargo fmt --all --check
@@ -25,11 +27,21 @@ lint: $(VENV)/installed $(VENV)/tools ## Formatting, clippy, ruff, types, stubs
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
 	$(BIN)/mypy
+	$(BIN)/lint-imports
 	$(BIN)/python -m mypy.stubtest piezotrack._core
 
 rust-test: ## Tests of the crates, the control crate also without std
 	cargo test --locked --release
 	cargo test --locked --release -p piezotrack-control --no-default-features
+
+no-std: ## The control crate where there is no std and no allocator
+	cargo build --locked --manifest-path tests/no_std/Cargo.toml --target-dir target/no-std
+	@if [ -d "$$(rustc --print target-libdir --target $(EMBEDDED))" ]; then \
+		set -x; \
+		cargo build --locked --release -p piezotrack-control --no-default-features --target $(EMBEDDED); \
+	else \
+		echo "not built for $(EMBEDDED), which is not installed; to have it: rustup target add $(EMBEDDED)"; \
+	fi
 
 python-test: $(VENV)/installed $(VENV)/tools ## Tests of the package, its docstrings and pages
 	$(BIN)/pytest

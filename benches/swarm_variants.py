@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 import piezotrack as pt
-from piezotrack.demo import SEARCH_BOX
+from piezotrack.xu_li_2010.procedure import SEARCH_BOX
 
 RUNS = 100
 NEVER = 10**6

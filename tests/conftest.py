@@ -26,4 +26,5 @@ def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
         plt.close("all")
         return []
 
-    monkeypatch.setattr("piezotrack.report.save_figures", none)
+    for module in ("_support.files", "identification.report"):
+        monkeypatch.setattr(f"piezotrack.{module}.save_figures", none)

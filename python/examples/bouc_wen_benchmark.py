@@ -73,7 +73,7 @@ def main() -> None:
         f"{fit.cost_um:.2f} um rms remain"
     )
     print(f"{'parameter':<12}{'true':>10}{'found':>14}{'error':>10}")
-    for name, value in zip(true.parameter_names(), true.theta, strict=True):
+    for name, value in asdict(true).items():
         found = getattr(fit.model, name)
         print(f"{name:<12}{value:>10g}{found:>14.6g}{100 * (found / value - 1):>9.2f} %")
 

@@ -1,7 +1,7 @@
 """Calibrate the virtual stage to what Xu and Li 2010 publish.
 
 ``python calibrate_virtual_stage.py [FILE [PARTICLES [ITERATIONS [RUNS]]]]`` writes what
-``piezotrack reproduce`` loads, which is kept as ``python/piezotrack/reproduce/calibrated.json``:
+``piezotrack reproduce`` loads, which is kept as ``python/piezotrack/xu_li_2010/calibrated.json``:
 40 particles, 40 iterations and 2 runs, half an hour on two cores. Without arguments it does a
 small search, to show the way.
 """
@@ -10,8 +10,8 @@ import sys
 from itertools import zip_longest
 from pathlib import Path
 
-from piezotrack.documents import write_document
-from piezotrack.reproduce.calibration import calibrate
+from piezotrack._support.files import write_document
+from piezotrack.xu_li_2010.calibration import calibrate
 
 file = Path(sys.argv[1] if len(sys.argv) > 1 else "calibration.txt")
 particles, iterations, runs = (

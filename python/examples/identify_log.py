@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import piezotrack as pt
-from piezotrack.demo import demo_log
+from piezotrack.xu_li_2010.demo import demo_log
 
 
 def main() -> None:

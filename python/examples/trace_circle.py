@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import piezotrack as pt
-from piezotrack.demo import demo_log, identify_demo
+from piezotrack.xu_li_2010.demo import demo_log, identify_demo
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "contouring")
 folder.mkdir(parents=True, exist_ok=True)

@@ -5,80 +5,52 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
-    "BOUC_WEN_OSCILLATOR_PARAMETERS",
-    "BOUC_WEN_PARAMETERS",
-    "DAHL_PARAMETERS",
-    "FIRST_ORDER_DAHL_PARAMETERS",
     "Controller",
     "Conventional",
-    "InverseSession",
+    "Inverse",
+    "LeastSquaresFit",
     "LoopPlant",
-    "Plays",
-    "PlaysFit",
-    "PlaysInverse",
-    "PlaysMotion",
+    "Response",
     "Search",
     "Session",
+    "Stage",
     "StepResponse",
     "Swarm",
     "SwarmSettings",
     "Tracked",
-    "Trajectory",
     "VirtualStage",
     "XYStage",
     "__version__",
     "as_count",
     "as_number",
     "as_truth",
-    "bouc_wen_benchmark",
-    "bouc_wen_xu_li_2010",
     "check_loop",
     "circle_errors",
     "cross_talk_share",
-    "dahl_simulate",
-    "dahl_simulate_fixed",
-    "dahl_xu_li_2010",
     "delayed",
-    "feedforward",
     "identify",
-    "identify_plays",
+    "identify_weights",
     "loop_response",
+    "models",
     "nnls",
     "path_errors",
     "period_metrics",
+    "published",
     "read_step",
     "residual",
     "sensor_noise",
     "spread",
-    "stage_check",
-    "stage_simulate",
-    "track_model",
     "tracking_metrics",
     "turns",
 ]
 
 __version__: str
-BOUC_WEN_OSCILLATOR_PARAMETERS: list[tuple[str, str, str]]
-BOUC_WEN_PARAMETERS: list[tuple[str, str, str]]
-DAHL_PARAMETERS: list[tuple[str, str, str]]
-FIRST_ORDER_DAHL_PARAMETERS: list[tuple[str, str, str]]
 
 def as_number(name: str, value: object) -> float: ...
 def as_count(name: str, value: object) -> int: ...
 def as_truth(name: str, value: object) -> bool: ...
-def dahl_xu_li_2010() -> list[float]: ...
-def dahl_simulate(
-    theta: tuple[float, ...],
-    u: ArrayLike,
-    dt: float,
-    hold: str,
-    initial: tuple[float, ...],
-    method: str,
-    accuracy: float,
-) -> Trajectory: ...
-def dahl_simulate_fixed(
-    theta: tuple[float, ...], u: ArrayLike, dt: float, hold: str, substeps: int
-) -> Trajectory: ...
+def models() -> list[dict[str, Any]]: ...
+def published(model: str, name: str) -> _Named: ...
 def delayed(x: ArrayLike, v: ArrayLike, dt: float, delay: float) -> NDArray[np.float64]: ...
 def identify(
     *,
@@ -102,8 +74,37 @@ def identify(
     progress: Callable[[int, int, int, float, list[float]], None] | None,
 ) -> Search | None: ...
 
+# Names and numbers: a scalar as a list of one, an optional one as a list of none or one.
+_Named = list[tuple[str, list[float]]]
+
 @final
-class Trajectory:
+class Stage:
+    def __new__(cls, model: str, parameters: _Named) -> Stage: ...
+    def simulate(
+        self,
+        u: ArrayLike,
+        dt: float,
+        hold_name: str,
+        *,
+        initial: _Named | None,
+        method: str,
+        accuracy: float,
+    ) -> Response: ...
+    def track(
+        self,
+        step: float,
+        controller: Controller,
+        reference: ArrayLike,
+        feedforward: ArrayLike,
+        pace: _Pace,
+    ) -> Tracked: ...
+    def loop_plants(self, low: float, high: float, delay: float) -> list[LoopPlant]: ...
+    def inverse(
+        self, dt: float, *, offset: float, delay: float, initial: _Named | None
+    ) -> Inverse: ...
+
+@final
+class Response:
     @property
     def x(self) -> NDArray[np.float64]: ...
     @property
@@ -111,13 +112,25 @@ class Trajectory:
     @property
     def hysteresis(self) -> NDArray[np.float64]: ...
     @property
-    def last(self) -> tuple[float, float, float, float]: ...
+    def last(self) -> _Named: ...
     @property
     def substeps(self) -> int: ...
     @property
-    def difference(self) -> float: ...
+    def error_estimate(self) -> float: ...
     @property
-    def well_posed(self) -> bool: ...
+    def unique(self) -> bool: ...
+
+@final
+class Inverse:
+    def step(
+        self,
+        reference: float,
+        velocity: float | None,
+        acceleration: float | None,
+        preview: float | None,
+    ) -> float: ...
+    def along(self, x: ArrayLike, v: ArrayLike, a: ArrayLike) -> NDArray[np.float64]: ...
+    def reset(self) -> None: ...
 
 @final
 class Swarm:
@@ -149,6 +162,10 @@ class SwarmSettings:
         stall_iterations: int,
         polish: bool,
     ) -> SwarmSettings: ...
+    @staticmethod
+    def xu_li_2010() -> dict[str, Any]: ...
+    @staticmethod
+    def spso_2011() -> dict[str, Any]: ...
 
 @final
 class Search:
@@ -185,35 +202,6 @@ class Search:
     @property
     def sensitivities(self) -> list[tuple[int, float, bool]]: ...
 
-def bouc_wen_xu_li_2010(corrected: bool) -> list[float]: ...
-def stage_check(model: str, theta: tuple[float, ...]) -> None: ...
-def bouc_wen_benchmark() -> list[float]: ...
-def stage_simulate(
-    model: str,
-    theta: tuple[float, ...],
-    u: ArrayLike,
-    dt: float,
-    hold: str,
-    initial: tuple[float, ...],
-    accuracy: float,
-) -> Trajectory: ...
-def feedforward(
-    model: str,
-    theta: tuple[float, ...],
-    dt: float,
-    x: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-) -> NDArray[np.float64]: ...
-def track_model(
-    model: str,
-    theta: tuple[float, ...],
-    step: float,
-    controller: Controller,
-    reference: ArrayLike,
-    feedforward: ArrayLike,
-    pace: _Pace,
-) -> Tracked: ...
 def tracking_metrics(
     desired: ArrayLike, actual: ArrayLike, dt: float, frequency: float | None
 ) -> tuple[float, float, float, float, float, float | None, float | None]: ...
@@ -237,18 +225,6 @@ class LoopPlant:
     def mode(
         gain: float, frequency: float, damping_ratio: float, bandwidth: float, delay: float
     ) -> LoopPlant: ...
-    @staticmethod
-    def dahl(
-        theta: tuple[float, ...], low: float, high: float, delay: float
-    ) -> list[LoopPlant]: ...
-    @staticmethod
-    def bouc_wen(
-        theta: tuple[float, ...], low: float, high: float, delay: float
-    ) -> list[LoopPlant]: ...
-    @staticmethod
-    def first_order_dahl(
-        theta: tuple[float, ...], low: float, high: float, delay: float
-    ) -> list[LoopPlant]: ...
     @property
     def static_gain(self) -> float: ...
 
@@ -277,12 +253,6 @@ class Session:
     def retune(self, other: Controller) -> None: ...
 
 @final
-class InverseSession:
-    def __new__(cls, model: str, theta: tuple[float, ...], dt: float) -> InverseSession: ...
-    def step(self, x: float, v: float, a: float) -> float: ...
-    def reset(self) -> None: ...
-
-@final
 class VirtualStage:
     def __new__(cls, settings: dict[str, Any]) -> VirtualStage: ...
     @staticmethod
@@ -303,7 +273,7 @@ class VirtualStage:
 
 # Delay and jitter [s], and instants kept in each control interval.
 _Pace = tuple[float, float, int]
-_Axis = VirtualStage | tuple[tuple[float, ...], float]
+_Axis = VirtualStage | tuple[Stage, float]
 _Motion = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 _Spread = tuple[float, float, float, float, float]
 
@@ -383,83 +353,10 @@ class StepResponse:
 def read_step(u: ArrayLike, y: ArrayLike, dt: float, hold_name: str) -> StepResponse: ...
 def turns(signal: ArrayLike, least: float) -> list[int]: ...
 
-_PlaysState = tuple[float, list[float], list[float], float, float]
-
 @final
-class Plays:
-    def __new__(
-        cls,
-        *,
-        linear: float,
-        thresholds: Sequence[float],
-        weights: Sequence[float],
-        corners: Sequence[float],
-        bends: Sequence[float],
-        creep_shares: Sequence[float],
-        creep_times: Sequence[float],
-        time_constant: float | None,
-        mode: tuple[float, float] | None,
-    ) -> Plays: ...
-    def simulate(
-        self,
-        u: ArrayLike,
-        dt: float,
-        hold_name: str,
-        initial: tuple[float, Sequence[float], Sequence[float], float, float] | None,
-    ) -> PlaysMotion: ...
-    def track(
-        self,
-        step: float,
-        controller: Controller,
-        reference: ArrayLike,
-        feedforward: ArrayLike,
-        pace: _Pace,
-    ) -> Tracked: ...
-    def loop_plants(self, low: float, high: float, delay: float) -> list[LoopPlant]: ...
-    def feedforward(
-        self,
-        dt: float,
-        x: ArrayLike,
-        v: ArrayLike,
-        a: ArrayLike,
-        initial: tuple[float, Sequence[float], Sequence[float], float, float] | None = None,
-    ) -> NDArray[np.float64]: ...
-    def inverse(
-        self,
-        dt: float,
-        initial: tuple[float, Sequence[float], Sequence[float], float, float] | None = None,
-    ) -> PlaysInverse: ...
-
-@final
-class PlaysMotion:
+class LeastSquaresFit:
     @property
-    def x(self) -> NDArray[np.float64]: ...
-    @property
-    def hysteresis(self) -> NDArray[np.float64]: ...
-    @property
-    def last(self) -> _PlaysState: ...
-
-@final
-class PlaysInverse:
-    def step(self, x: float, v: float, a: float) -> float: ...
-    def reset(self) -> None: ...
-
-@final
-class PlaysFit:
-    @property
-    def linear(self) -> float: ...
-    @property
-    def weights(self) -> list[float]: ...
-    @property
-    def corners(self) -> list[float]: ...
-    @property
-    def bends(self) -> list[float]: ...
-    @property
-    def creep_shares(self) -> list[float]: ...
-    @property
-    def time_constant(self) -> float | None: ...
-    @property
-    def mode(self) -> tuple[float, float] | None: ...
+    def parameters(self) -> _Named: ...
     @property
     def offset(self) -> float: ...
     @property
@@ -469,8 +366,9 @@ class PlaysFit:
     @property
     def at_bound(self) -> bool: ...
 
-def identify_plays(
+def identify_weights(
     *,
+    model: str,
     u: ArrayLike,
     y: ArrayLike,
     dt: float,
@@ -481,5 +379,5 @@ def identify_plays(
     creep_times: Sequence[float],
     dynamics: str,
     offset: bool,
-) -> PlaysFit: ...
+) -> LeastSquaresFit: ...
 def nnls(a: Sequence[Sequence[float]], b: Sequence[float], free: Sequence[bool]) -> list[float]: ...

@@ -5,8 +5,9 @@ use core::f64::consts::{PI, TAU};
 
 use piezotrack_control::hysteresis::{Operator, Play};
 use piezotrack_control::{
-    BoucWenInverse, Creep, DahlInverse, Dynamics, FirstOrderDahlInverse, Inverse,
-    OnlineFeedforward, OscillatorInverse, PlayInverse, PrandtlIshlinskiiInverse, ReferenceSample,
+    BoucWenInverse, Creep, DahlInverse, Dynamics, FirstOrderDahlInverse, InputInverse, Inverse,
+    OnlineFeedforward, OperatorInverse, OscillatorInverse, PlayInverse, PrandtlIshlinskiiInverse,
+    ReferenceSample,
 };
 use piezotrack_core::models::{
     Experiment, Invertible, PlayHysteresis, PrandtlIshlinskiiStage, Relaxation, StageModel,
@@ -334,6 +335,32 @@ fn a_bad_sample_leaves_the_prandtl_ishlinskii_inverse_alone() {
         assert!(inverse.step(&mut state, 5e-6, 0.0, if bad < 0.0 { -1e300 } else { bad }).is_nan());
         assert_eq!(state, before);
     }
+}
+
+/// An operator that puts out at most 1 m.
+#[derive(Clone, Copy)]
+struct Saturated;
+
+impl OperatorInverse for Saturated {
+    type State = ();
+
+    fn rest(&self) {}
+
+    fn follow(&self, (): &mut (), output: f64) -> f64 {
+        libm::atanh(output)
+    }
+}
+
+#[test]
+fn what_the_operator_cannot_put_out_leaves_no_trace() {
+    let inverse = InputInverse::<_, 2>::with(Saturated, 0.0, &CREEP, Dynamics::None, 0.01).unwrap();
+    let mut state = inverse.rest();
+    assert!(inverse.step(&mut state, 2.0, 0.0, 0.0).is_nan());
+    assert_eq!(state, inverse.rest());
+    inverse.step(&mut state, 0.3, 0.0, 0.0);
+    let before = state;
+    assert!(inverse.step(&mut state, -2.0, 0.0, 0.0).is_nan());
+    assert_eq!(state, before);
 }
 
 #[test]

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from .error_messages import in_words
 from .options import (
     Columns,
     DisplacementColumn,
@@ -22,7 +23,6 @@ from .options import (
     seconds,
     windowed,
 )
-from .words import in_words
 
 __all__ = ["compare_command"]
 
@@ -55,11 +55,11 @@ def compare_command(
     dt: Interval = None,
     hold: HoldOption = "foh",
     seed: Annotated[int, typer.Option(help="Same seed, same result.")] = 0,
-    runs: Annotated[int, typer.Option(help="Swarms that search apart; do they agree?")] = 4,
+    runs: Annotated[int, typer.Option(help="Number of independent restarts.")] = 4,
     threads: Annotated[int | None, typer.Option(help="Up to 256; else all cores.")] = None,
 ) -> None:
     """Fit several models on a part of a log and judge them on the rest: a table, a picture."""
-    from ..comparison import compare
+    from ..identification.comparison import compare
 
     columns = Columns(time, drive, displacement, unit, dt)
     log = columns.read(file, hold)

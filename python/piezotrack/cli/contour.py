@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import DataError, ParameterError
+from .error_messages import in_words
 from .options import (
     ControlInterval,
     Duration,
@@ -19,15 +20,14 @@ from .options import (
     list_files,
     number_range,
 )
-from .words import in_words
 
 if TYPE_CHECKING:
-    from ..contouring import Contour
-    from ..cross_talk import CrossTalk
-    from ..inverse import Inverse
-    from ..table_2 import Table2
-    from ..xyreference import XYReference
-    from ..xystage import XYStage
+    from ..control.contouring import Contour
+    from ..identification.cross_talk import CrossTalk
+    from ..references.xy_reference import XYReference
+    from ..stages.inverse import Inverse
+    from ..stages.xy import XYStage
+    from ..xu_li_2010.table_2 import Table2
 
 __all__ = ["contour_command"]
 
@@ -87,10 +87,10 @@ def contour_command(
     ] = False,
 ) -> None:
     """Let two controllers lead the virtual XY stage along a path: figures, a table, pictures."""
-    from ..contouring import contour
-    from ..control import Controller
-    from ..laws import Pid
-    from ..table_2 import run_table_2
+    from ..control.components import Pid
+    from ..control.contouring import contour
+    from ..control.controller import Controller
+    from ..xu_li_2010.table_2 import run_table_2
 
     if table_2 == (path is not None):
         given = "both are" if table_2 else "neither is"
@@ -131,8 +131,8 @@ def contour_command(
 
 def _path(text: str, duration: float | None, period: float | None, dt: float | None) -> XYReference:
     """Read a file where the text names one, else a description."""
-    from ..path_text import parse_path
-    from ..xyreference import read_path
+    from ..references.parse import parse_path
+    from ..references.xy_reference import read_path
 
     if Path(text).is_file():
         try:
@@ -149,7 +149,7 @@ def _path(text: str, duration: float | None, period: float | None, dt: float | N
 
 def _stage(seed: int, lag: float | None, cross_talk: str | None) -> XYStage:
     """Take the virtual stage with what the options change of it."""
-    from ..xystage import XYStage
+    from ..stages.xy import XYStage
 
     stage = XYStage.xu_li_2010(seed=seed)
     if lag is not None:
@@ -161,8 +161,8 @@ def _stage(seed: int, lag: float | None, cross_talk: str | None) -> XYStage:
 
 def _inverse(model: Path | None, seed: int) -> tuple[Inverse, str]:
     """Invert the model, or identify one as the paper does."""
-    from ..demo import demo_log, identify_demo
-    from ..modelfile import load
+    from ..identification.identified import load
+    from ..xu_li_2010.demo import demo_log, identify_demo
 
     if model is not None:
         return load(model).inverse(), f"feedforward by {model.name} on both axes"
@@ -175,7 +175,7 @@ def _cross_talk(stage: XYStage) -> CrossTalk:
     """Drive one axis after the other, as an experimenter does, and find the cross-talk."""
     import numpy as np
 
-    from ..cross_talk import identify_cross_talk
+    from ..identification.cross_talk import identify_cross_talk
 
     t = np.arange(8000) / 1000.0
     slow, held = 37.5 * (1.0 - np.cos(2.0 * np.pi * 0.25 * t)), np.zeros(t.size)
@@ -185,9 +185,7 @@ def _cross_talk(stage: XYStage) -> CrossTalk:
 def _write(run: Contour, out: Path) -> list[Path]:
     """Write the samples, the figures as JSON, and the picture."""
     from .. import __version__
-    from ..documents import write_document
-    from ..files import write_columns
-    from ..report import make_folder, save_figures
+    from .._support.files import make_folder, save_figures, write_columns, write_document
 
     folder = make_folder(out)
     table = {"time_s": run.t}
@@ -220,9 +218,8 @@ def _write_table(table: Table2, out: Path) -> list[Path]:
     """Write the table, published beside obtained, and pictures of it and of each circle."""
     import numpy as np
 
-    from ..files import write_columns
-    from ..report import make_folder, save_figures
-    from ..table_2 import PUBLISHED
+    from .._support.files import make_folder, save_figures, write_columns
+    from ..xu_li_2010.table_2 import PUBLISHED
 
     folder = make_folder(out)
     columns = {

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
+from .error_messages import in_words
 from .options import Out, can_be_folder, list_files
-from .words import in_words
 
 __all__ = ["demo_command"]
 
@@ -19,8 +19,9 @@ def demo_command(
     seed: Annotated[int, typer.Option(help="Same seed, same result.")] = 1,
 ) -> None:
     """Show the way from a log to a model to a tracked reference, on the virtual stage."""
-    from ..demo import demo_log, identify_demo, track_demo, write_log
-    from ..report import make_folder, save_figures, save_identification
+    from .._support.files import make_folder, save_figures
+    from ..identification.report import save_identification
+    from ..xu_li_2010.demo import demo_log, identify_demo, track_demo, write_log
 
     log = demo_log(seed)
     can_be_folder(out)

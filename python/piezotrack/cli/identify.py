@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import Interrupted, ParameterError
+from .error_messages import in_words
 from .options import (
     Columns,
     DisplacementColumn,
@@ -27,12 +28,12 @@ from .options import (
     pairs,
     windowed,
 )
-from .words import in_words
 
 if TYPE_CHECKING:
-    from ..dataset import Dataset
-    from ..identified import Fitted, Score
-    from ..swarm import ParticleSwarm
+    from ..data.dataset import Dataset
+    from ..identification.identified import Score
+    from ..identification.result import Identification
+    from ..identification.swarm import ParticleSwarm
 
 __all__ = ["identify_command"]
 
@@ -70,10 +71,12 @@ def identify_command(
         typer.Option(metavar="fit|S|LOW:HIGH", help="Delay of the displacement in s: fit it?"),
     ] = None,
     swarm: Annotated[
-        str, typer.Option(help="Settings: default, xu-li-2010 or spso-2011.")
-    ] = "default",
-    seed: Annotated[int, typer.Option(help="Same seed, same result.")] = 0,
-    runs: Annotated[int, typer.Option(help="Swarms that search apart; do they agree?")] = 4,
+        str | None, typer.Option(help="Settings: default, xu-li-2010 or spso-2011.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Same seed, same result; else 0.")] = None,
+    runs: Annotated[
+        int | None, typer.Option(help="Number of independent restarts; else 4.")
+    ] = None,
     threads: Annotated[int | None, typer.Option(help="Up to 256; else all cores.")] = None,
     validate: Annotated[
         Path | None, typer.Option(help="A second log, to judge the model on; not fitted.")
@@ -91,10 +94,11 @@ def identify_command(
         whole = columns.read(validate, hold)
         second = windowed(whole, validate, "--validate-window", validate_window)
     can_be_folder(out)
-    arguments = {
+    options = {
         "free": None if free is None else [name.strip() for name in free.split(",")],
-        "fixed": {name: number("--fix", text) for name, text in pairs("--fix", fix)},
-        "bounds": {name: number_range("--bound", text) for name, text in pairs("--bound", bound)},
+        "fixed": {name: number("--fix", text) for name, text in pairs("--fix", fix)} or None,
+        "bounds": {name: number_range("--bound", text) for name, text in pairs("--bound", bound)}
+        or None,
         "stiffness": stiffness,
         "offset": offset,
         "delay": _delay(delay),
@@ -103,10 +107,11 @@ def identify_command(
         "runs": runs,
         "threads": threads,
     }
+    arguments = {name: value for name, value in options.items() if value is not None}
     told, written = [], []
     for kind in kinds:
         with of_file(file):
-            fit = _search(log, out, kind, **arguments)
+            fit = _search(log, out, kind, **_of_model(kind, kinds, arguments))
         score = None if second is None else fit.score(second)
         written += _write(fit, out, second, score)
         told.append(fit.summary())
@@ -120,14 +125,23 @@ def identify_command(
 
 def _kinds(given: list[str] | None) -> list[str]:
     """Check the kinds named before anything is searched."""
-    from ..kinds import kind_named
+    from ..stages.registry import model_named
 
     kinds = given or ["dahl"]
     for i, name in enumerate(kinds):
-        kind_named(name)
+        model_named(name)
         if name in kinds[:i]:
             raise ParameterError(f"--model names {name} twice: expected it once")
     return kinds
+
+
+def _of_model(name: str, names: list[str], arguments: dict[str, Any]) -> dict[str, Any]:
+    """Leave out the effort of a search where another of the models named is searched."""
+    from ..stages.registry import model_named
+
+    if model_named(name).searched or not any(model_named(one).searched for one in names):
+        return arguments
+    return {key: arguments[key] for key in arguments if key not in ("seed", "runs", "threads")}
 
 
 def _partial(model: str) -> str:
@@ -135,10 +149,10 @@ def _partial(model: str) -> str:
     return f"{model}.partial.json"
 
 
-def _search(log: Dataset, out: Path, kind: str, **arguments: Any) -> Fitted[Any]:
+def _search(log: Dataset, out: Path, kind: str, **arguments: Any) -> Identification:
     """Identify; on Ctrl-C keep the best so far as a file."""
-    from ..identification import identify
-    from ..report import make_folder
+    from .._support.files import make_folder
+    from ..identification.identify import identify
 
     try:
         return identify(log, kind, **arguments)
@@ -149,13 +163,15 @@ def _search(log: Dataset, out: Path, kind: str, **arguments: Any) -> Fitted[Any]
         raise KeyboardInterrupt(f"{stopped}; the best so far is in {path}") from None
 
 
-def _write(fit: Fitted[Any], out: Path, second: Dataset | None, score: Score | None) -> list[Path]:
+def _write(
+    fit: Identification, out: Path, second: Dataset | None, score: Score | None
+) -> list[Path]:
     """Write the model, with what it is worth on a second log, and the pictures."""
-    from ..kinds import kind_of
-    from ..plotting import plot_loop, plot_time
-    from ..report import save_figures, save_identification
+    from .._support.files import save_figures
+    from ..identification.plot import plot_loop, plot_time
+    from ..identification.report import save_identification
 
-    kind = kind_of(fit.model)
+    kind = fit.model.info
     if second is None or score is None:
         written = save_identification(fit, out)
     else:
@@ -180,20 +196,22 @@ def _write(fit: Fitted[Any], out: Path, second: Dataset | None, score: Score | N
     return written
 
 
-def _swarm(name: str) -> ParticleSwarm | None:
-    from ..swarm import ParticleSwarm
+def _swarm(name: str | None) -> ParticleSwarm | None:
+    from ..identification.swarm import ParticleSwarm
 
     known = {
         "default": None,
         "xu-li-2010": ParticleSwarm.xu_li_2010(),
         "spso-2011": ParticleSwarm.spso_2011(),
     }
+    if name is None:
+        return None
     if name not in known:
         raise ParameterError(f"--swarm is '{name}': expected {', '.join(known)}")
     return known[name]
 
 
-def _delay(text: str | None) -> bool | float | tuple[float, float]:
+def _delay(text: str | None) -> bool | float | tuple[float, float] | None:
     if text is None or text == "fit":
-        return text is not None
+        return None if text is None else True
     return number_range("--delay", text) if ":" in text else number("--delay", text)

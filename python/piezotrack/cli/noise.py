@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from .error_messages import in_words
 from .options import (
     Columns,
     DisplacementColumn,
@@ -20,10 +21,9 @@ from .options import (
     of_file,
     windowed,
 )
-from .words import in_words
 
 if TYPE_CHECKING:
-    from ..noise import Noise
+    from ..identification.sensor_noise import Noise
 
 __all__ = ["noise_command"]
 
@@ -41,9 +41,9 @@ def noise_command(
     dt: Interval = None,
 ) -> None:
     """Read a record at rest: rms, steps, spectrum and a model of the noise."""
-    from ..io import read_displacement
-    from ..noise import identify_noise
-    from ..report import make_folder, save_figures
+    from .._support.files import make_folder, save_figures
+    from ..data.reader import read_displacement
+    from ..identification.sensor_noise import identify_noise
 
     columns = Columns(time, None, displacement, unit, dt)
     log = read_displacement(
@@ -62,7 +62,7 @@ def noise_command(
 def _write(found: Noise, folder: Path) -> Path:
     """Write the figures as JSON."""
     from .. import __version__
-    from ..documents import write_document
+    from .._support.files import write_document
 
     document = {
         "format": "piezotrack-noise",

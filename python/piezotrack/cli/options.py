@@ -14,7 +14,7 @@ from ..errors import ParameterError, PiezotrackError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from ..dataset import Dataset, Hold
+    from ..data.dataset import Dataset, Hold
 
 __all__ = [
     "Columns",
@@ -91,7 +91,7 @@ class Columns:
 
     def read(self, file: Path, hold: Hold) -> Dataset:
         """Read a log with these columns."""
-        from ..io import read
+        from ..data.reader import read
 
         return read(
             file,

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
+from .error_messages import in_words
 from .options import Out, can_be_folder, list_files
-from .words import in_words
 
 __all__ = ["reproduce_command"]
 
@@ -29,7 +29,7 @@ def reproduce_command(
     ] = None,
 ) -> None:
     """Go the way of Xu and Li 2010 on the virtual stage: a report as HTML, PDF and JSON."""
-    from ..reproduce import reproduce_xu_li_2010
+    from ..xu_li_2010.reproduction import reproduce_xu_li_2010
 
     can_be_folder(out)
     found = reproduce_xu_li_2010(seeds=2 if quick else seeds, dbo=dbo)

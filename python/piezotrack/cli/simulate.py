@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from .error_messages import in_words
 from .options import (
     Columns,
     DriveColumn,
@@ -19,7 +20,6 @@ from .options import (
     list_files,
     of_file,
 )
-from .words import in_words
 
 __all__ = ["simulate_command"]
 
@@ -38,11 +38,10 @@ def simulate_command(
     hold: HoldOption = "foh",
 ) -> None:
     """Simulate a model under a drive: a CSV with the displacement, and a picture."""
-    from ..files import write_columns
-    from ..io import read_drive
-    from ..modelfile import load
-    from ..plotting import plot_response
-    from ..report import make_folder, save_figures
+    from .._support.files import make_folder, save_figures, write_columns
+    from ..data.reader import read_drive
+    from ..identification.identified import load
+    from ..identification.plot import plot_response
 
     known = load(model)
     columns = Columns(time, drive, None, unit, dt)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import ParameterError
+from .error_messages import in_words
 from .options import (
     Columns,
     DisplacementColumn,
@@ -24,10 +25,9 @@ from .options import (
     of_file,
     windowed,
 )
-from .words import in_words
 
 if TYPE_CHECKING:
-    from ..step import StepResult
+    from ..identification.step_response import StepResult
 
 __all__ = ["step_command"]
 
@@ -55,8 +55,8 @@ def step_command(
     ] = None,
 ) -> None:
     """Read a step response: frequency, damping, and the hysteresis parameters, as a table."""
-    from ..report import make_folder, save_figures
-    from ..step import identify_step
+    from .._support.files import make_folder, save_figures
+    from ..identification.step_response import identify_step
 
     log = Columns(time, drive, displacement, unit, dt).read(file, hold)
     log = windowed(log, file, "--window", window)
@@ -75,14 +75,14 @@ def step_command(
 def _write(step: StepResult, folder: Path) -> Path:
     """Write readings and results as JSON, SI."""
     from .. import __version__
-    from ..documents import write_document
+    from .._support.files import write_document
 
     document = {
         "format": "piezotrack-step",
         "schema_version": 1,
         "unit": "V, m, s, Hz, rad/s; a1 1/m, a2 1/m^2, b1 N/m^2, b0 N/m",
         "readings": asdict(step.readings),
-        "natural_frequency": step.natural_frequency,
+        "natural_angular_frequency": step.natural_angular_frequency,
         "damping_ratio": step.damping_ratio,
         "damping_by_decrement": step.damping_by_decrement,
         "time_constant": step.time_constant,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ..errors import ParameterError
+from .error_messages import in_words
 from .options import (
     ControlInterval,
     Duration,
@@ -19,16 +20,15 @@ from .options import (
     list_files,
     number_range,
 )
-from .words import in_words
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ..control import Controller
-    from ..identified import Identified
-    from ..references import Reference
-    from ..tracking import Tracking
+    from ..control.controller import Controller
+    from ..control.tracking import Tracking
+    from ..identification.identified import IdentifiedModel
+    from ..references.reference import Reference
 
 __all__ = ["feedforward_command", "track_command"]
 
@@ -78,11 +78,11 @@ def track_command(
     ] = False,
 ) -> None:
     """Let a controller lead the virtual stage along a reference: figures, a table, pictures."""
-    from ..control import Controller
-    from ..laws import Pid, Repetitive
-    from ..modelfile import load
-    from ..tracking import track
-    from ..virtual import VirtualStage
+    from ..control.components import Pid, Repetitive
+    from ..control.controller import Controller
+    from ..control.tracking import track
+    from ..identification.identified import load
+    from ..stages.virtual import VirtualStage
 
     known = load(model)
     course = _reference(reference, duration, period)
@@ -125,10 +125,9 @@ def feedforward_command(
     period: Period = None,
 ) -> None:
     """Write the voltage table that leads a stage along a reference."""
-    from ..files import write_columns
-    from ..modelfile import load
-    from ..plotting_tracking import plot_feedforward
-    from ..report import make_folder, save_figures
+    from .._support.files import make_folder, save_figures, write_columns
+    from ..control.tracking_plot import plot_feedforward
+    from ..identification.identified import load
 
     known = load(model)
     course = _reference(reference, duration, period)
@@ -146,7 +145,7 @@ def feedforward_command(
     list_files(written)
 
 
-def _note_range(known: Identified[Any], volts: NDArray[np.float64]) -> None:
+def _note_range(known: IdentifiedModel, volts: NDArray[np.float64]) -> None:
     """Say where a model is used outside of the voltages that it was fitted at."""
     if fitted := known.drive_range:
         margin = 0.01 * (fitted[1] - fitted[0])
@@ -156,8 +155,8 @@ def _note_range(known: Identified[Any], volts: NDArray[np.float64]) -> None:
 
 def _reference(text: str, duration: float | None, period: float | None) -> Reference:
     """Read a file where the text names one, else a description."""
-    from ..reference_text import parse_reference
-    from ..references import read_reference
+    from ..references.parse import parse_reference
+    from ..references.reference import read_reference
 
     if Path(text).is_file():
         return read_reference(text, duration=duration, period=period)
@@ -166,12 +165,10 @@ def _reference(text: str, duration: float | None, period: float | None) -> Refer
     return parse_reference(text, duration=duration)
 
 
-def _write(run: Tracking, known: Identified[Any], loop: Controller, out: Path) -> list[Path]:
+def _write(run: Tracking, known: IdentifiedModel, loop: Controller, out: Path) -> list[Path]:
     """Write the samples, the figures as JSON, and the pictures."""
     from .. import __version__
-    from ..documents import write_document
-    from ..files import write_columns
-    from ..report import make_folder, save_figures
+    from .._support.files import make_folder, save_figures, write_columns, write_document
 
     folder = make_folder(out)
     table = {

@@ -69,6 +69,71 @@ impl PySettings {
         settings.validate().map_err(|error| raise(&error))?;
         Ok(Self(settings))
     }
+
+    /// Settings of Xu and Li 2010, section 3.3, by their names.
+    #[staticmethod]
+    fn xu_li_2010() -> Settings {
+        Settings::of(&SwarmSettings::xu_li_2010())
+    }
+
+    /// Settings of Standard Particle Swarm Optimisation 2011, by their names.
+    #[staticmethod]
+    fn spso_2011() -> Settings {
+        Settings::of(&SwarmSettings::spso_2011())
+    }
+}
+
+/// Settings of a swarm, as a dict in Python.
+#[derive(IntoPyObject)]
+struct Settings {
+    particles: usize,
+    iterations: usize,
+    update: &'static str,
+    inertia_start: f64,
+    inertia_end: f64,
+    inertia_iterations: usize,
+    cognitive: f64,
+    social: f64,
+    topology: &'static str,
+    velocity_limit: f64,
+    boundary: &'static str,
+    min_improvement: f64,
+    stall_iterations: usize,
+    polish: bool,
+}
+
+impl Settings {
+    fn of(settings: &SwarmSettings) -> Self {
+        Self {
+            particles: settings.particles,
+            iterations: settings.iterations,
+            update: match settings.update {
+                Update::Classic => "classic",
+                Update::Hypersphere => "hypersphere",
+                Update::HypersphereRadial => "hypersphere-radial",
+            },
+            inertia_start: settings.inertia.0,
+            inertia_end: settings.inertia.1,
+            inertia_iterations: settings.inertia_iterations,
+            cognitive: settings.cognitive,
+            social: settings.social,
+            topology: match settings.topology {
+                Topology::Global => "global",
+                Topology::Ring => "ring",
+                Topology::Random => "random",
+            },
+            velocity_limit: settings.velocity_limit,
+            boundary: match settings.boundary {
+                Boundary::Absorb => "absorb",
+                Boundary::Rebound => "rebound",
+                Boundary::Reflect => "reflect",
+                Boundary::Invisible => "invisible",
+            },
+            min_improvement: settings.min_improvement,
+            stall_iterations: settings.stall_iterations,
+            polish: settings.polish,
+        }
+    }
 }
 
 fn update_named(name: &str) -> Result<Update> {

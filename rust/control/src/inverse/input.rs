@@ -138,7 +138,8 @@ impl<I: OperatorInverse, const RELAXATIONS: usize> InputInverse<I, RELAXATIONS> 
     /// The voltage (V) for displacement `x` (m), velocity `v` (m/s) and acceleration `a` (m/s^2)
     /// of the reference. The first sample is reached in a jump, without time to creep.
     ///
-    /// NaN, with the state unchanged, where an input is not finite (or beyond 1e100).
+    /// NaN, with the state unchanged, where an input is not finite (or beyond 1e100) or the
+    /// operator puts out nothing of that size.
     #[inline]
     pub fn step(
         &self,
@@ -151,13 +152,17 @@ impl<I: OperatorInverse, const RELAXATIONS: usize> InputInverse<I, RELAXATIONS> 
         if !usable(target) {
             return f64::NAN;
         }
+        let mut creep = state.creep;
         let output = if state.begun {
-            self.creep.step(&mut state.creep, target)
+            self.creep.step(&mut creep, target)
         } else {
-            self.creep.jump(&mut state.creep, target)
+            self.creep.jump(&mut creep, target)
         };
-        state.begun = true;
-        self.inverse.follow(&mut state.operator, output + self.zero)
+        let input = self.inverse.follow(&mut state.operator, output + self.zero);
+        if !input.is_nan() {
+            (state.creep, state.begun) = (creep, true);
+        }
+        input
     }
 }
 

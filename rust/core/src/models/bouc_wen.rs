@@ -14,8 +14,8 @@ use piezotrack_control::inverse::{BoucWenInverse, BoucWenInverseState};
 use super::plant::KernelModel;
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
-    Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel, leading,
-    parameters, simulate_kernel,
+    Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
+    from_rest_only, leading, parameters, simulate_kernel,
 };
 use super::values::{Held, ParameterInfo, Values};
 use crate::design::{Gains, LoopPlant};
@@ -220,8 +220,9 @@ impl Invertible for BoucWenStage {
     fn inverse(
         &self,
         dt: f64,
-        _initial: Option<&Values>,
+        initial: Option<&Values>,
     ) -> Result<(BoucWenInverse, BoucWenInverseState)> {
+        from_rest_only(initial)?;
         positive("dt", dt, "s")?;
         let [m, b, k, d, alpha, beta, gamma, n] = self.values();
         let inverse = BoucWenInverse::new(m, b, k, d, alpha, beta, gamma, n)?;

@@ -15,8 +15,8 @@ use piezotrack_control::inverse::{FeedbackInverseState, OscillatorInverse};
 use super::plant::KernelModel;
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
-    Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel, leading,
-    parameters, simulate_kernel,
+    Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
+    from_rest_only, leading, parameters, simulate_kernel,
 };
 use super::values::{Held, ParameterInfo, Values};
 use crate::design::{Gains, LoopPlant};
@@ -215,8 +215,9 @@ impl Invertible for BoucWenOscillator {
     fn inverse(
         &self,
         dt: f64,
-        _initial: Option<&Values>,
+        initial: Option<&Values>,
     ) -> Result<(OscillatorInverse, FeedbackInverseState)> {
+        from_rest_only(initial)?;
         let Mechanics { mass, damping, stiffness } = self.mechanics;
         let Self { alpha, beta, gamma, delta, exponent, .. } = *self;
         let hysteresis = (alpha, beta * gamma, beta * delta, exponent);

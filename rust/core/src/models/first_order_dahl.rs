@@ -16,8 +16,8 @@ use piezotrack_control::inverse::{FeedbackInverseState, FirstOrderDahlInverse};
 use super::plant::KernelModel;
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
-    Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel, leading,
-    parameters, simulate_kernel,
+    Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
+    from_rest_only, leading, parameters, simulate_kernel,
 };
 use super::values::{Held, ParameterInfo, Values};
 use crate::design::{Gains, LoopPlant};
@@ -188,8 +188,9 @@ impl Invertible for FirstOrderDahlStage {
     fn inverse(
         &self,
         dt: f64,
-        _initial: Option<&Values>,
+        initial: Option<&Values>,
     ) -> Result<(FirstOrderDahlInverse, FeedbackInverseState)> {
+        from_rest_only(initial)?;
         let Mechanics { mass, damping, stiffness } = self.mechanics;
         let hysteresis = (self.rest_stiffness, self.coulomb_force, self.exponent);
         let piezo = self.piezo_coefficient;

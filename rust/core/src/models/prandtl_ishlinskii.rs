@@ -238,6 +238,8 @@ impl Invertible for PrandtlIshlinskiiStage {
 }
 
 impl WeightedPlays for PrandtlIshlinskiiStage {
+    const DEAD_ZONES: bool = true;
+
     type Envelope = ();
 
     fn envelope(_shape: &[f64], _drive: (f64, f64)) {}

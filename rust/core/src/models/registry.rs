@@ -2,12 +2,7 @@
 
 use piezotrack_control::inverse::Inverse;
 
-use super::bouc_wen::BoucWenStage;
-use super::bouc_wen_oscillator::BoucWenOscillator;
-use super::dahl::DahlStage;
-use super::first_order_dahl::FirstOrderDahlStage;
 use super::plant::Plant;
-use super::prandtl_ishlinskii::PrandtlIshlinskiiStage;
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
     Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
@@ -44,7 +39,7 @@ macro_rules! models {
         /// A model of the list.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Model {
-            $(#[doc = concat!("[`", stringify!($stage), "`].")] $variant,)*
+            $(#[doc = concat!("[", stringify!($variant), "](", stringify!($stage), ").")] $variant,)*
         }
 
         impl Model {
@@ -143,14 +138,14 @@ macro_rules! models {
 
         /// A stage of any model.
         #[derive(Clone, Copy, Debug)]
-        #[expect(clippy::large_enum_variant, reason = "one in an experiment")]
+        #[allow(clippy::large_enum_variant, reason = "one in an experiment, whichever models there are")]
         pub enum Stage {
-            $(#[doc = concat!("[`", stringify!($stage), "`].")] $variant($stage),)*
+            $(#[doc = concat!("[", stringify!($variant), "](", stringify!($stage), ").")] $variant($stage),)*
         }
 
         /// State of a [`Stage`].
         #[derive(Clone, Debug)]
-        #[expect(clippy::large_enum_variant, reason = "one in an experiment")]
+        #[allow(clippy::large_enum_variant, reason = "one in an experiment, whichever models there are")]
         #[expect(missing_docs, reason = "one for each model")]
         pub enum StageState {
             $($variant(<$stage as Plant>::State),)*
@@ -244,14 +239,14 @@ macro_rules! models {
         /// Inverse of a [`Stage`].
         #[derive(Clone)]
         #[expect(missing_docs, missing_debug_implementations, reason = "one for each model")]
-        #[expect(clippy::large_enum_variant, reason = "one in a controller")]
+        #[allow(clippy::large_enum_variant, reason = "one in a controller, whichever models there are")]
         pub enum StageInverse {
             $($variant(<$stage as Invertible>::Inverse),)*
         }
 
         /// What a [`StageInverse`] remembers.
         #[derive(Clone, Copy)]
-        #[expect(clippy::large_enum_variant, reason = "one in a controller")]
+        #[allow(clippy::large_enum_variant, reason = "one in a controller, whichever models there are")]
         #[expect(missing_docs, missing_debug_implementations, reason = "one for each model")]
         pub enum StageInverseState {
             $($variant(<<$stage as Invertible>::Inverse as Inverse>::State),)*
@@ -281,11 +276,11 @@ macro_rules! models {
 }
 
 models! {
-    Dahl: DahlStage, swarm;
-    BoucWen: BoucWenStage, swarm;
-    FirstOrderDahl: FirstOrderDahlStage, swarm;
-    BoucWenOscillator: BoucWenOscillator, swarm;
-    PrandtlIshlinskii: PrandtlIshlinskiiStage, least_squares;
+    Dahl: super::DahlStage, swarm;
+    BoucWen: super::BoucWenStage, swarm;
+    FirstOrderDahl: super::FirstOrderDahlStage, swarm;
+    BoucWenOscillator: super::BoucWenOscillator, swarm;
+    PrandtlIshlinskii: super::PrandtlIshlinskiiStage, least_squares;
 }
 
 impl Model {

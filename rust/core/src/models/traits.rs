@@ -151,12 +151,22 @@ pub trait Invertible: StageModel {
     /// `initial`, or of one that never moved.
     ///
     /// # Errors
-    /// Names the parameter, or `dt`, that is out of its range.
+    /// Names the parameter, or `dt`, that is out of its range, or `initial` where the model's
+    /// inverse begins at rest only.
     fn inverse(
         &self,
         dt: f64,
         initial: Option<&Values>,
     ) -> Result<(Self::Inverse, <Self::Inverse as Inverse>::State)>;
+}
+
+/// Refuses a state for the inverse of a model whose memory cannot be told from one.
+pub(super) fn from_rest_only(initial: Option<&Values>) -> Result<()> {
+    if initial.is_none() {
+        return Ok(());
+    }
+    let expected = "none: the inverse of this model begins with a stage that never moved";
+    Err(Error::parameter("initial", "a state", expected))
 }
 
 /// A model whose scalar parameters a swarm searches.

@@ -31,10 +31,14 @@ pub struct FittedPlays {
 /// edges at the present voltage: the voltage itself for plain plays, an envelope of it for
 /// generalised ones.
 pub trait WeightedPlays: StageModel {
+    /// Whether dead zones may follow the plays.
+    const DEAD_ZONES: bool;
+
     /// What makes edges of a voltage.
     type Envelope: Clone;
 
-    /// Ranges of the envelope's numbers, which are searched around the least squares.
+    /// Ranges of the envelope's numbers, above 0, which are searched around the least squares on
+    /// a logarithmic scale. A number that gains little stays at the middle of its range.
     #[must_use]
     fn shapes() -> Vec<(f64, f64)> {
         Vec::new()
@@ -43,7 +47,7 @@ pub trait WeightedPlays: StageModel {
     /// The envelope of these numbers for a range of the drive, V.
     fn envelope(shape: &[f64], drive: (f64, f64)) -> Self::Envelope;
 
-    /// Edges up and down at a voltage.
+    /// Edges up and down at a voltage; at 0 V both are 0, where the plays rest.
     fn edges(envelope: &Self::Envelope, volts: f64) -> (f64, f64);
 
     /// The parameters of the stage, as [`StageModel::build`] takes them.

@@ -13,6 +13,10 @@ const LEAST_LINEAR: f64 = 1e-3;
 /// Rounds over the numbers of an envelope, at most.
 const SHAPE_ROUNDS: usize = 4;
 
+/// Least share by which a number of an envelope has to lower the deviation: what a record does not
+/// fix is left alone.
+const LEAST_GAIN: f64 = 0.1;
+
 /// Least slope of the dead zones while they are searched.
 const LEAST_SLOPE: f64 = 0.05;
 
@@ -78,7 +82,8 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
             shares: vec![0.0; settings.times.len()],
             offset: 0.0,
         };
-        let shape: Vec<f64> = M::shapes().iter().map(|(from, to)| 0.5 * (from + to)).collect();
+        let middle = |(from, to): &(f64, f64)| libm::sqrt(from * to);
+        let shape: Vec<f64> = M::shapes().iter().map(middle).collect();
         Self {
             envelope: M::envelope(&shape, (low, high)),
             shape,
@@ -150,16 +155,22 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
     /// The numbers of the envelope in turn, each from its range.
     fn search_shape(&mut self) -> Option<()> {
         let ranges = M::shapes();
-        let mut before = f64::INFINITY;
         for _ in 0..SHAPE_ROUNDS {
+            let mut moved = false;
             for (i, &range) in ranges.iter().enumerate() {
-                let place = self.along(range, 1e-3, |fit, place| fit.reshape(i, place))?;
-                self.reshape(i, place);
+                let before = (self.rms, self.unknowns.clone(), self.shape[i]);
+                let place = self.along(range, 1e-4, |fit, place| fit.reshape(i, place))?;
+                if self.rms < (1.0 - LEAST_GAIN) * before.0 {
+                    self.reshape(i, place);
+                    moved = true;
+                } else {
+                    (self.rms, self.unknowns) = (before.0, before.1);
+                    self.reshape(i, before.2);
+                }
             }
-            if self.rms > 0.999 * before {
+            if !moved {
                 break;
             }
-            before = self.rms;
         }
         self.at_bound = false;
         Some(())

@@ -104,6 +104,10 @@ impl WeightedVisitor for Search<'_> {
     type Output = Result<Option<LeastSquaresFit>>;
 
     fn visit<M: WeightedPlays>(self) -> Self::Output {
+        if self.settings.zones > 0 && !M::DEAD_ZONES {
+            let expected = format!("0: {} has no dead zones", M::INFO.title);
+            return Err(Error::parameter("dead_zones", self.settings.zones, expected));
+        }
         let mut fit = Fit::<M>::new(self.record, self.settings, self.stop);
         fit.run().then(|| fit.result()).transpose()
     }

@@ -17,6 +17,7 @@ use piezotrack_control::inverse::{DahlInverse, InverseState, SampledDahlInverse}
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
     Experiment, Invertible, KernelVisitor, Method, ModelInfo, Response, Searchable, StageModel,
+    from_rest_only,
 };
 use super::values::{Held, ParameterInfo, Values};
 use crate::design::LoopPlant;
@@ -308,8 +309,9 @@ impl Invertible for DahlStage {
     fn inverse(
         &self,
         dt: f64,
-        _initial: Option<&Values>,
+        initial: Option<&Values>,
     ) -> Result<(SampledDahlInverse, InverseState)> {
+        from_rest_only(initial)?;
         let [m, d, k, t, a1, a2, b1, b0, up] = self.values();
         let inverse = DahlInverse::new(m, d, k, t, a1, a2, b1, b0, up)?.at(dt)?;
         Ok((inverse, inverse.rest()))

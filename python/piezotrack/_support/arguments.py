@@ -1,0 +1,195 @@
+"""Numbers that come in as arguments: what they have to be, and the words when they are not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import _core
+from ..errors import ParameterError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "as_numbers",
+    "bounds",
+    "check_length",
+    "check_reach",
+    "finite",
+    "in_range",
+    "not_negative",
+    "numbers",
+    "one_or_more_numbers",
+    "plain",
+    "positive",
+]
+
+# A displacement [m] that only a mistaken unit explains.
+TOO_FAR = 1.0
+
+
+def finite(name: str, value: object, unit: str) -> float:
+    """Return a finite number as a float.
+
+    Parameters
+    ----------
+    name : str
+        The argument.
+    value : object
+        Its value.
+    unit : str
+        Its unit, for the message.
+
+    Returns
+    -------
+    float
+        The number.
+
+    Raises
+    ------
+    ParameterError
+        It is not a number, or NaN, or infinite.
+
+    Examples
+    --------
+    >>> finite("low", 3, "m")
+    3.0
+    """
+    number = _core.as_number(name, value)
+    if not math.isfinite(number):
+        raise ParameterError(f"{name} is {number}: expected a finite number, in {unit}")
+    return number
+
+
+def positive(name: str, value: object, unit: str) -> float:
+    """Return a finite number above 0 as a float; arguments and errors as in `finite`.
+
+    Examples
+    --------
+    >>> positive("frequency", 5, "Hz")
+    5.0
+    """
+    number = _core.as_number(name, value)
+    if not 0.0 < number < math.inf:
+        raise ParameterError(f"{name} is {number:g}: expected a finite number above 0, in {unit}")
+    return number
+
+
+def not_negative(name: str, value: object, unit: str) -> float:
+    """Return a finite number of 0 or above as a float; arguments and errors as in `finite`.
+
+    Examples
+    --------
+    >>> not_negative("ramp", 0, "s")
+    0.0
+    """
+    return in_range(name, value, math.inf, unit)
+
+
+def in_range(name: str, value: object, highest: float, unit: str) -> float:
+    """Return a finite number from 0 to `highest` as a float.
+
+    Examples
+    --------
+    >>> in_range("rounding", 1, 1.0, "parts of the period")
+    1.0
+    """
+    number = _core.as_number(name, value)
+    if not 0.0 <= number <= highest or number == math.inf:
+        end = f"from 0 to {highest:g}" if highest < math.inf else "of 0 or above"
+        raise ParameterError(f"{name} is {number:g}: expected a finite number {end}, in {unit}")
+    return number
+
+
+def plain(number: float) -> str:
+    """Write a number with up to six digits, and zero without a sign or an exponent.
+
+    Examples
+    --------
+    >>> plain(110.00000000000001), plain(-1e-15)
+    ('110', '0')
+    """
+    return f"{round(number, 9) + 0.0:.6g}"
+
+
+def bounds(low: object, high: object) -> tuple[float, float]:
+    """Return the lowest and the highest displacement [m] of a motion that moves, checked.
+
+    Examples
+    --------
+    >>> bounds(0, 110e-6)
+    (0.0, 0.00011)
+    """
+    bottom, top = finite("low", low, "m"), finite("high", high, "m")
+    check_reach(bottom, top)
+    if not bottom < top:
+        raise ParameterError(f"low is {bottom:g}: expected less than high, which is {top:g} m")
+    return bottom, top
+
+
+def check_reach(low: float, high: float) -> None:
+    """Raise ParameterError if a displacement [m] is so large that it must be in another unit."""
+    check_length("low", low)
+    check_length("high", high)
+
+
+def check_length(name: str, value: float) -> None:
+    """Raise ParameterError if a length [m] is so large that it must be in another unit."""
+    if abs(value) >= TOO_FAR:
+        raise ParameterError(
+            f"{name} is {value:g}: expected metres, and no piezo stage goes so far; "
+            f"{plain(value)} um is {plain(value)}e-6"
+        )
+
+
+def numbers(
+    name: str, values: ArrayLike, unit: str, *, least: int = 1, above: float = -math.inf
+) -> NDArray[np.float64]:
+    """Return one or several finite numbers above `above` as an array of one dimension.
+
+    Examples
+    --------
+    >>> numbers("levels", [0, 1e-5], "m")
+    array([0.e+00, 1.e-05])
+    """
+    several = isinstance(values, Sequence) or (isinstance(values, np.ndarray) and values.ndim > 0)
+    entries: list[object] = list(values) if several else [values]  # type: ignore[arg-type]
+    array = np.array([_core.as_number(name, value) for value in entries])
+    if array.size < least:
+        raise ParameterError(f"{name} has {array.size} entries: expected at least {least}")
+    for number in array:
+        if not (math.isfinite(number) and number > above):
+            limit = "" if above == -math.inf else f" above {above:g}"
+            raise ParameterError(
+                f"{name} has {number:g}: expected finite numbers{limit}, in {unit}"
+            )
+    return array
+
+
+def as_numbers(name: str, values: object) -> tuple[float, ...]:
+    """Return a sequence of numbers as a tuple of floats.
+
+    Examples
+    --------
+    >>> as_numbers("thresholds", [1, 2.5])
+    (1.0, 2.5)
+    """
+    if not isinstance(values, Iterable) or isinstance(values, (str, bytes)):
+        raise ParameterError(f"{name} is {values!r}: expected numbers in a list")
+    return tuple(_core.as_number(f"{name}[{i}]", value) for i, value in enumerate(values))
+
+
+def one_or_more_numbers(name: str, values: object) -> tuple[float, ...]:
+    """Return a number, or a sequence of numbers, as a tuple of floats.
+
+    Examples
+    --------
+    >>> one_or_more_numbers("weights", 1)
+    (1.0,)
+    """
+    entries = np.atleast_1d(np.asarray(values, dtype=object)).tolist()
+    return tuple(_core.as_number(f"{name}[{i}]", value) for i, value in enumerate(entries))

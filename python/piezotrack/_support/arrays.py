@@ -1,0 +1,121 @@
+"""What an array of samples and its times must be."""
+
+from __future__ import annotations
+
+import math
+from numbers import Real
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import DataError, ParameterError, ShapeError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Array = NDArray[np.float64]
+
+__all__ = ["check_dt", "real", "signal_of", "time_axis", "time_fault"]
+
+# How far, in sampling intervals, a time may be off before the record counts as uneven.
+UNEVEN = 0.05
+USE_DT = (
+    "an evenly sampled record whose times are coarse or jittery can be given with dt=, "
+    "which is used in place of the times"
+)
+
+
+def check_dt(dt: float) -> float:
+    """Return `dt` [s] as a float, or raise ParameterError unless it is above 0 and finite."""
+    number = real(dt)
+    if not 0.0 < number < math.inf:
+        raise ParameterError(f"dt is {dt!r}: expected a finite number of seconds above 0")
+    return number
+
+
+def time_fault(t: Array) -> tuple[int, str] | None:
+    """Return the first sample at which times [s] are not increasing or even, and a sentence.
+
+    Return None where all is well.
+    """
+    with np.errstate(all="ignore"):
+        steps = np.diff(t)
+        if steps.size == 0:
+            return None
+        if (backward := _first(~(steps > 0.0))) is not None:
+            k = backward + 1
+            hint = f"; {USE_DT}" if steps[backward] == 0.0 else ""
+            return k, (
+                f"t goes from {t[k - 1]:.10g} s to {t[k]:.10g} s at sample {k}: "
+                f"expected increasing times{hint}"
+            )
+        typical = np.median(steps)
+        if (uneven := _first(~(np.abs(steps - typical) <= UNEVEN * typical))) is not None:
+            return uneven + 1, (
+                f"t is not even: it goes {steps[uneven]:.6g} s forward to sample {uneven + 1}, "
+                f"where most steps are {typical:.6g} s; {USE_DT}"
+            )
+        dt = (t[-1] - t[0]) / steps.size
+        departure = np.abs(t - (t[0] + dt * np.arange(t.size)))
+        if (drifted := _first(~(departure <= UNEVEN * dt))) is not None:
+            return drifted, (
+                f"t is not even: {t[drifted]:.10g} s at sample {drifted} is "
+                f"{departure[drifted]:.3g} s off an even grid of {dt:.6g} s; {USE_DT}"
+            )
+    return None
+
+
+def _first(mask: NDArray[np.bool_]) -> int | None:
+    """Return the place of the first true entry, or None."""
+    return int(np.argmax(mask)) if mask.any() else None
+
+
+def real(value: object) -> float:
+    """Return a real number as a float, and NaN for anything else (a truth value, a text)."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
+def time_axis(t: ArrayLike | None, dt: float | None, u: Array) -> tuple[Array, float]:
+    """Return the times of the samples of `u` and their interval [s], given either."""
+    if (t is None) == (dt is None):
+        given = "neither is" if t is None else "both are"
+        raise ParameterError(f"t and dt: expected exactly one of them, {given} given")
+    if t is None and dt is not None:
+        interval = check_dt(dt)
+        return signal_of("t", interval * np.arange(u.size)), interval
+    times = signal_of("t", t, like=u)
+    if (fault := time_fault(times)) is not None:
+        raise DataError(fault[1])
+    return times, float(times[-1] - times[0]) / (times.size - 1)
+
+
+def signal_of(
+    name: str, values: ArrayLike | None, *, like: Array | None = None, finite: bool = True
+) -> Array:
+    """Return a read-only float64 copy of one-dimensional `values`, as long as `like`."""
+    if isinstance(values, np.ma.MaskedArray) and values.dtype.kind in "biuf":
+        # A masked sample is a missing one; asarray would bring its number back.
+        values = np.ma.filled(values.astype(np.float64), np.nan)
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError, OverflowError):
+        raise ShapeError(f"{name} is not an array: expected one number for each sample") from None
+    if array.dtype.kind not in "biuf":
+        raise DataError(f"{name} holds values of type {array.dtype}: expected real numbers")
+    if array.ndim != 1:
+        raise ShapeError(f"{name} has the shape {array.shape}: expected one dimension")
+    if like is not None and array.size != like.size:
+        raise ShapeError(
+            f"u has {like.size} samples and {name} has {array.size}: expected equally many"
+        )
+    with np.errstate(over="ignore"):
+        signal = np.array(array, dtype=np.float64)
+    if finite and (bad := _first(~np.isfinite(signal))) is not None:
+        raise DataError(f"{name} is {signal[bad]} at sample {bad}: expected finite numbers")
+    signal.setflags(write=False)
+    return signal

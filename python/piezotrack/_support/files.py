@@ -1,0 +1,170 @@
+"""Writing files whole or not at all: CSV, JSON, pictures, and the folder for them."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import DataError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from matplotlib.figure import Figure
+
+__all__ = ["make_folder", "replacing", "save_figures", "write_columns", "write_document"]
+
+
+@contextmanager
+def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Write to a temporary file beside `path`, which is renamed when all went well.
+
+    Parameters
+    ----------
+    path : path-like
+        The file to write.
+
+    Yields
+    ------
+    pathlib.Path
+        The temporary file, with the same ending.
+
+    Raises
+    ------
+    DataError
+        The folder is missing, or the file cannot be written.
+    """
+    import tempfile
+
+    file = Path(path)
+    try:
+        handle, name = tempfile.mkstemp(prefix=".", suffix=file.suffix, dir=file.parent)
+        os.close(handle)
+        temporary = Path(name)
+        try:
+            yield temporary
+            # mkstemp makes files that only their owner can read.
+            mask = os.umask(0)
+            os.umask(mask)
+            temporary.chmod(0o666 & ~mask)
+            temporary.replace(file)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise DataError(f"{file} cannot be written: {reason}") from None
+
+
+def write_columns(path: Path, columns: Mapping[str, np.ndarray]) -> Path:
+    """Write columns of numbers as a CSV file with a header.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        The file.
+    columns : mapping of str to ndarray, each of shape (n,)
+        By title, with the unit in it.
+
+    Returns
+    -------
+    pathlib.Path
+        The file.
+    """
+    with replacing(path) as temporary:
+        np.savetxt(
+            temporary,
+            np.column_stack(list(columns.values())),
+            delimiter=",",
+            fmt="%.10g",
+            header=",".join(columns),
+            comments="",
+        )
+    return path
+
+
+def write_document(path: str | os.PathLike[str], document: Mapping[str, Any]) -> Path:
+    """Write a JSON file, whole or not at all; arguments and errors as of `save`."""
+    import json
+
+    text = json.dumps(_finite(document), indent=2, allow_nan=False)
+    with replacing(path) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
+    return Path(path)
+
+
+def make_folder(folder: str | os.PathLike[str]) -> Path:
+    """Make the folder for results.
+
+    Parameters
+    ----------
+    folder : path-like
+        It may exist.
+
+    Returns
+    -------
+    pathlib.Path
+        The folder.
+
+    Raises
+    ------
+    DataError
+        It cannot be made.
+    """
+    path = Path(folder)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise DataError(f"{path} cannot be made a folder: {reason}") from None
+    return path
+
+
+def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
+    """Save figures as PNG and SVG, and close them.
+
+    Parameters
+    ----------
+    figures : mapping of str to matplotlib.figure.Figure
+        By the name of the file, without its ending.
+    folder : pathlib.Path
+        Where to.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The files written.
+    """
+    import matplotlib as mpl
+    import matplotlib.pyplot as plt
+
+    written = []
+    try:
+        for name, figure in figures.items():
+            for ending in ("png", "svg"):
+                path = folder / f"{name}.{ending}"
+                # Without a date and with fixed ids, the same result gives the same file.
+                stamp = {"Date": None} if ending == "svg" else {}
+                with replacing(path) as temporary, mpl.rc_context({"svg.hashsalt": name}):
+                    figure.savefig(temporary, dpi=150, metadata=stamp)
+                written.append(path)
+    finally:
+        for figure in figures.values():
+            plt.close(figure)
+    return written
+
+
+def _finite(value: Any) -> Any:
+    """Replace what JSON cannot say, NaN and infinity, by null."""
+    if isinstance(value, Mapping):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

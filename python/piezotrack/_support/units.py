@@ -1,0 +1,216 @@
+"""The units that logs are written in and plots are drawn in.
+
+Everything inside piezotrack is in seconds, volts and metres. The table here is the one place
+where other units are turned into these.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ..errors import ParameterError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+__all__ = [
+    "Unit",
+    "best_length_unit",
+    "known_units",
+    "lookup",
+    "require",
+    "split_unit",
+]
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit and the way from it to SI: ``value * factor / divisor``.
+
+    One of `factor` and `divisor` is 1 and the other a number that float64 holds exactly, so a
+    conversion rounds once. (1e-6 is not exact: multiplying by it rounds twice.)
+
+    Attributes
+    ----------
+    name : str
+        The unit in ASCII, e.g. ``"um"``.
+    quantity : str
+        ``"time"``, ``"voltage"`` or ``"displacement"``.
+    si : str
+        The SI unit of the quantity: ``"s"``, ``"V"`` or ``"m"``.
+    factor, divisor : float
+        What to multiply with and to divide by.
+    """
+
+    name: str
+    quantity: str
+    si: str
+    factor: float = 1.0
+    divisor: float = 1.0
+
+    def to_si(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return `values`, an array of any shape in this unit, in SI.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from piezotrack._support.units import require
+        >>> require("um").to_si(np.array([45.1]))
+        array([4.51e-05])
+        """
+        converted: NDArray[np.float64] = values * self.factor / self.divisor
+        return converted
+
+
+_TABLE = (
+    Unit("s", "time", "s"),
+    Unit("ms", "time", "s", divisor=1e3),
+    Unit("us", "time", "s", divisor=1e6),
+    Unit("ns", "time", "s", divisor=1e9),
+    Unit("min", "time", "s", factor=60.0),
+    Unit("V", "voltage", "V"),
+    Unit("mV", "voltage", "V", divisor=1e3),
+    Unit("uV", "voltage", "V", divisor=1e6),
+    Unit("kV", "voltage", "V", factor=1e3),
+    Unit("m", "displacement", "m"),
+    Unit("mm", "displacement", "m", divisor=1e3),
+    Unit("um", "displacement", "m", divisor=1e6),
+    Unit("nm", "displacement", "m", divisor=1e9),
+    Unit("pm", "displacement", "m", divisor=1e12),
+)
+_BY_NAME = {unit.name: unit for unit in _TABLE} | {
+    other: unit for unit in _TABLE if unit.name == "um" for other in ("micron", "microns")
+}
+_BY_LOWER = {name.lower(): unit for name, unit in _BY_NAME.items()}
+
+# The micro sign and the Greek letter look the same and are different characters.
+_MICRO = str.maketrans({"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u"})
+
+
+def lookup(text: str) -> Unit | None:
+    """Return the unit that `text` names, or None where it names none.
+
+    Upper and lower case may differ from the table only where the text is all of one case and
+    cannot mean something else: ``v`` is V and ``UM`` is um, but ``MV`` would be megavolt and
+    ``Nm`` is a torque.
+
+    Examples
+    --------
+    >>> from piezotrack._support.units import lookup
+    >>> lookup("UM").name, lookup("MV"), lookup("furlong")
+    ('um', None, None)
+    """
+    plain = text.strip().translate(_MICRO)
+    if plain in _BY_NAME:
+        return _BY_NAME[plain]
+    unit = _BY_LOWER.get(plain.lower())
+    if unit is None or not (plain.islower() or plain.isupper()):
+        return None
+    is_mega = plain in ("MM", "MS", "MV")
+    return None if is_mega else unit
+
+
+def require(text: str, quantity: str | None = None) -> Unit:
+    """Return the unit that `text` names.
+
+    Parameters
+    ----------
+    text : str
+        The unit, e.g. ``"um"``.
+    quantity : {"time", "voltage", "displacement"}, optional
+        What the unit has to measure; any quantity where left out.
+
+    Raises
+    ------
+    ParameterError
+        The unit is not known, or it measures another quantity. The message lists the known ones.
+
+    Examples
+    --------
+    >>> from piezotrack._support.units import require
+    >>> require("mV", "voltage").si
+    'V'
+    """
+    unit = lookup(text)
+    if unit is None:
+        raise ParameterError(f"unknown unit {text!r}: expected one of {known_units(quantity)}")
+    if quantity is not None and unit.quantity != quantity:
+        raise ParameterError(
+            f"{text!r} is a unit of {unit.quantity}: expected a unit of {quantity}, "
+            f"one of {known_units(quantity)}"
+        )
+    return unit
+
+
+def known_units(quantity: str | None = None) -> str:
+    """Return the names of the units of `quantity` (of all where None), separated by commas.
+
+    Examples
+    --------
+    >>> from piezotrack._support.units import known_units
+    >>> known_units("voltage")
+    'V, mV, uV, kV'
+    """
+    return ", ".join(unit.name for unit in _TABLE if quantity in (None, unit.quantity))
+
+
+_BRACKETS = re.compile(r"^(.*?)[\s_]*[(\[]([^()\[\]]*)[)\]]$")
+_SUFFIX = re.compile(r"^(.+?)[\s_,]+([^\s_,]+)$")
+
+
+def split_unit(header: str) -> tuple[str, str]:
+    """Split the title of a column into its name and the text of its unit.
+
+    A unit in brackets or after a slash is taken as it stands. After an underscore or a space it
+    is taken only if it is a known unit: ``sensor_left`` is a name.
+
+    Examples
+    --------
+    >>> from piezotrack._support.units import split_unit
+    >>> split_unit("voltage_V"), split_unit("Time (s)"), split_unit("x/um")
+    (('voltage', 'V'), ('Time', 's'), ('x', 'um'))
+    >>> split_unit("sensor_left")
+    ('sensor_left', '')
+    """
+    title = header.strip()
+    if match := _BRACKETS.match(title):
+        return match[1].strip(), match[2].strip()
+    name, slash, unit = title.rpartition("/")
+    if slash and name.strip():
+        return name.strip(), unit.strip()
+    match = _SUFFIX.match(title)
+    if match and lookup(match[2]):
+        return match[1], match[2]
+    return title, ""
+
+
+def best_length_unit(stroke_m: float) -> tuple[str, float]:
+    """Choose the unit in which a displacement is easy to read.
+
+    Parameters
+    ----------
+    stroke_m : float
+        The largest displacement to show [m]; the sign does not matter.
+
+    Returns
+    -------
+    name : str
+        ``"nm"`` below 1 um, ``"mm"`` from 1 mm on, ``"um"`` between them and where `stroke_m`
+        is zero or not finite.
+    scale : float
+        What to multiply metres with to get this unit.
+
+    Examples
+    --------
+    >>> from piezotrack._support.units import best_length_unit
+    >>> best_length_unit(45e-6)
+    ('um', 1000000.0)
+    """
+    size = abs(stroke_m)
+    if not math.isfinite(size) or size == 0.0 or 1e-6 <= size < 1e-3:
+        return "um", 1e6
+    return ("nm", 1e9) if size < 1e-6 else ("mm", 1e3)

@@ -1,0 +1,308 @@
+"""What a controller is made of besides feedforward: PID, state space, repetitive part, filters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from .. import _core
+from .._support.arguments import finite, in_range, not_negative, positive
+from ..errors import ParameterError, ShapeError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["LowPass", "Notch", "Pid", "Repetitive", "StateSpace"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pid:
+    r"""Incremental PID controller with back-calculation antiwindup.
+
+    .. math::
+
+        u_k = u_{k-1} + K_p (e_k - e_{k-1}) + \frac{K_p T_s}{T_i} e_k
+        + \frac{K_p T_d}{T_s} (e_k - 2 e_{k-1} + e_{k-2}) + \frac{T_s}{T_t} (v - u)_{k-1}
+
+    Xu and Li 2010, equations (22) to (25), doi 10.1115/1.4001712, corrected: the recursion is
+    that of the feedback part alone, while `v - u` is what the amplifier gave less what all parts
+    together asked for.
+
+    Parameters
+    ----------
+    kp : float
+        Proportional gain [V/m]. `from_um` takes it in V/um.
+    ti : float
+        Integral time [s], above 0; infinity for no integral part.
+    td : float, optional
+        Derivative time [s], 0 or above.
+    tt : float, optional
+        Tracking time of the antiwindup [s], above half a sampling interval; ``sqrt(ti td)``
+        where it is not given, and `ti` where `td` is 0.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> pt.Pid.from_um(kp=0.120, ti=0.009, td=0.044).kp
+    120000.0
+    """
+
+    kp: float
+    ti: float
+    td: float = 0.0
+    tt: float | None = None
+
+    def __post_init__(self) -> None:
+        finite("kp", self.kp, "V/m")
+        if not (_core.as_number("ti", self.ti) > 0.0):
+            raise ParameterError(
+                f"ti is {self.ti} s: expected a time above 0, or infinity for no integral part"
+            )
+        not_negative("td", self.td, "s")
+        if self.tt is not None and not (_core.as_number("tt", self.tt) > 0.0):
+            raise ParameterError(f"tt is {self.tt} s: expected a time above 0")
+
+    @classmethod
+    def from_um(cls, *, kp: float, ti: float, td: float = 0.0, tt: float | None = None) -> Pid:
+        """Make a controller from a proportional gain in V/um.
+
+        Parameters
+        ----------
+        kp : float
+            Proportional gain [V/um].
+        ti, td, tt : float
+            Times [s], as in the class.
+
+        Returns
+        -------
+        Pid
+            The controller.
+        """
+        return cls(kp=1e6 * _core.as_number("kp", kp), ti=ti, td=td, tt=tt)
+
+    @classmethod
+    def xu_li_2010(cls) -> Pid:
+        """Gains of Xu and Li 2010: 0.120 V/um, 0.009 s, 0.044 s, for a loop at 50 Hz.
+
+        Returns
+        -------
+        Pid
+            The controller.
+        """
+        return cls.from_um(kp=0.120, ti=0.009, td=0.044)
+
+
+@dataclass(frozen=True, eq=False)
+class StateSpace:
+    r"""Feedback law in discrete state space, from the error [m] to a voltage [V].
+
+    .. math:: x_{k+1} = A x_k + B e_k, \qquad u_k = C x_k + D e_k
+
+    Parameters
+    ----------
+    a : array_like, shape (n, n)
+        A, with n up to 16.
+    b : array_like, shape (n,)
+        B.
+    c : array_like, shape (n,)
+        C.
+    d : float, optional
+        D [V/m].
+    back : array_like, shape (n,), optional
+        Gain of back-calculation, with which what the amplifier gave less what was asked for [V]
+        enters the state. Without it the state stays while the command is clipped and would go
+        further out.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> integrator = pt.StateSpace([[1.0]], [2000.0], [1.0])
+    """
+
+    a: ArrayLike
+    b: ArrayLike
+    c: ArrayLike
+    d: float = 0.0
+    back: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        _ = self.matrices
+
+    @property
+    def matrices(self) -> tuple[list[float], list[float], list[float], float, list[float] | None]:
+        """A row by row, B, C, D and the gain of back-calculation."""
+        a, b, c = (_matrix(name, getattr(self, name)) for name in ("a", "b", "c"))
+        n = b.size
+        if n == 0:
+            raise ShapeError("b has 0 entries: expected one for each state, 1 to 16")
+        if a.size != n * n or c.size != n:
+            raise ShapeError(
+                f"a, b and c have {a.size}, {n} and {c.size} entries: expected n x n, n and n"
+            )
+        back = None if self.back is None else _matrix("back", self.back).tolist()
+        return a.tolist(), b.tolist(), c.tolist(), finite("d", self.d, "V/m"), back
+
+
+def _matrix(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    try:
+        entries = np.asarray(value, dtype=np.float64).ravel()
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name} is {value!r}: expected an array of numbers") from None
+    if not np.isfinite(entries).all():
+        raise ParameterError(f"{name} has {entries}: expected finite numbers")
+    return entries
+
+
+Smoothing = Literal["lag", "zero phase", "none"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Repetitive:
+    r"""Repetitive controller, plugged in beside the feedback: it learns what each period needs.
+
+    .. math::
+
+        u_k = p\, u_{k-1} + (1 - p)\,(u_{k-N-1} + K_q e_{k-N-1}),
+        \qquad p = e^{-T_s/T_q}, \quad N = L/T_s
+
+    Xu and Li 2010, equations (26) to (28), doi 10.1115/1.4001712; the coefficients printed with
+    (29) and (30) are unstable. `xu_li_2010` is the paper's form as it was meant.
+
+    Parameters
+    ----------
+    period : float
+        L [s], of the reference; no whole number of samples is needed, two at least.
+    tq : float, optional
+        Time constant of the filter Q [s].
+    kq : float, optional
+        Learning gain [V/um], above 0 and below 2; that is necessary, not sufficient.
+    smoothing : {"lag", "zero phase", "none"}, optional
+        The filter Q: the paper's first-order lag, which at 0.2 s passes half of a 0.5 Hz error;
+        a symmetric one of `order`, which delays nothing; or none.
+    order : int, optional
+        Order of the symmetric filter, 1 to 4.
+    compensated : bool, optional
+        Whether the delay line is shorter by the filter's lag, so that what was learnt comes in
+        time.
+    lead : int, optional
+        Samples by which what was learnt from the error comes earlier, against the lag of the
+        stage.
+    leak : float, optional
+        What is kept of a constant from period to period, above 0, at most 1. Below 1 it ends
+        the drift of uRC against uFB, whose difference the error does not show.
+    pause : bool, optional
+        Whether nothing is learnt while the voltage is clipped.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> pt.Repetitive(period=5.0, tq=0.2, kq=1.0).leak
+    0.99
+    """
+
+    period: float
+    tq: float = 0.2
+    kq: float = 1.0
+    smoothing: Smoothing = "lag"
+    order: int = 2
+    compensated: bool = False
+    lead: int = 0
+    leak: float = 0.99
+    pause: bool = True
+
+    def __post_init__(self) -> None:
+        positive("period", self.period, "s")
+        positive("tq", self.tq, "s")
+        if not 0.0 < _core.as_number("kq", self.kq) < 2.0:
+            raise ParameterError(
+                f"kq is {self.kq} V/um: expected above 0 and below 2, equation (28)"
+            )
+        if self.smoothing not in ("lag", "zero phase", "none"):
+            raise ParameterError(
+                f"smoothing is {self.smoothing!r}: expected 'lag', 'zero phase' or 'none'"
+            )
+        if not 1 <= _core.as_count("order", self.order) <= 4:
+            raise ParameterError(f"order is {self.order}: expected 1 to 4")
+        if _core.as_count("lead", self.lead) >= 2**32:
+            raise ParameterError(f"lead is {self.lead}: expected less than the period allows")
+        if in_range("leak", self.leak, 1.0, "parts of 1") == 0.0:
+            raise ParameterError("leak is 0: expected above 0, at most 1")
+        _core.as_truth("compensated", self.compensated)
+        _core.as_truth("pause", self.pause)
+
+    @classmethod
+    def xu_li_2010(cls, period: float) -> Repetitive:
+        """Form of Xu and Li 2010: Tq = 0.2 s, Kq = 1.0 V/um, no leak, learning while clipped.
+
+        Parameters
+        ----------
+        period : float
+            L [s]: 5 for 0.2 Hz, 2 for 0.5 Hz.
+
+        Returns
+        -------
+        Repetitive
+            The controller.
+        """
+        return cls(period=period, leak=1.0, pause=False)
+
+    @property
+    def settings(self) -> tuple[float, float, str, float, float, int, bool]:
+        """The numbers as the core takes them."""
+        lag = "compensated lag" if self.compensated else "lag"
+        kind, number = (
+            (lag, self.tq) if self.smoothing == "lag" else (self.smoothing, float(self.order))
+        )
+        return self.period, self.kq, kind, number, self.leak, self.lead, self.pause
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """First-order low-pass on the measurement.
+
+    Parameters
+    ----------
+    cutoff : float
+        Frequency at which half of the power passes [Hz].
+    """
+
+    cutoff: float
+
+    def __post_init__(self) -> None:
+        positive("cutoff", self.cutoff, "Hz")
+
+    @property
+    def settings(self) -> tuple[str, float, float, float]:
+        """The numbers as the core takes them."""
+        return "low pass", self.cutoff, 0.0, 0.0
+
+
+@dataclass(frozen=True)
+class Notch:
+    """Notch on the measurement.
+
+    Parameters
+    ----------
+    frequency : float
+        Its middle [Hz], below half the sampling rate.
+    width : float, optional
+        Damping ratio of its poles.
+    depth : float, optional
+        Gain in the middle, 0 to 1.
+    """
+
+    frequency: float
+    width: float = 0.5
+    depth: float = 0.0
+
+    def __post_init__(self) -> None:
+        positive("frequency", self.frequency, "Hz")
+        positive("width", self.width, "parts of the frequency")
+        in_range("depth", self.depth, 1.0, "parts of 1")
+
+    @property
+    def settings(self) -> tuple[str, float, float, float]:
+        """The numbers as the core takes them."""
+        return "notch", self.frequency, self.width, self.depth

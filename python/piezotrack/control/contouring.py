@@ -1,0 +1,290 @@
+"""Contouring: two controllers lead an XY stage along a path, and how far it is off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import _core
+from .._support.arguments import not_negative
+from .._support.statistics import ErrorStatistics
+from ..errors import ParameterError
+from ..references.xy_reference import XYReference, square_matrix
+from ..stages.xy import XYStage
+from .controller import Controller
+from .tracking import (
+    Tracking,
+    check_period,
+    check_stable,
+    check_within_reach,
+    feedforward_of,
+    followed,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike, NDArray
+
+    Array = NDArray[np.float64]
+
+__all__ = ["Contour", "contour"]
+
+# A start so far from the stage, as a part of the path's size, is worth a note.
+JUMP = 0.05
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Contour:
+    """A path that was run.
+
+    Attributes
+    ----------
+    path : XYReference
+        What was to be followed.
+    x, y : Tracking
+        Each axis as `track` has it, with its own metrics: desired, measured and true
+        displacement, voltage and its parts. Both sensors are read at once at the instants ``t``.
+    """
+
+    path: XYReference
+    x: Tracking
+    y: Tracking
+
+    def __repr__(self) -> str:
+        return f"<Contour of {self.path!r}: {_words(self.metrics)}>"
+
+    @property
+    def t(self) -> Array:
+        """Time of the control samples of x [s], shape (n,)."""
+        return self.x.t
+
+    @property
+    def settled(self) -> float:
+        """Time from which on `metrics` counts [s].
+
+        As for `Tracking`, but never before the path itself has begun: on the smooth way to it
+        there is no path to be compared with.
+        """
+        ramp = max(self.path.x.ramp, self.path.y.ramp)
+        late = ramp if ramp < self.t[-1] - 1e-9 else 0.0
+        return max(self.x.settled, late)
+
+    @cached_property
+    def error(self) -> Array:
+        """Contour error of the measured positions [m], shape (n,): see `XYReference.errors`."""
+        return self.path.errors(self.x.measured, self.y.measured)
+
+    @cached_property
+    def fine_error(self) -> Array:
+        """Contour error of the true positions between the samples too [m], at ``x.fine_t``."""
+        return self.path.errors(self.x.fine_displacement, self.y.fine_displacement)
+
+    @cached_property
+    def metrics(self) -> ErrorStatistics:
+        """Figures of the measured contour error, from `settled` on."""
+        return self.score()
+
+    def score(
+        self, start: float | None = None, stop: float | None = None, *, true: bool = False
+    ) -> ErrorStatistics:
+        """Figures of the contour error in a part of the run.
+
+        Parameters
+        ----------
+        start, stop : float, optional
+            The part [s]; from `settled` to the end where not given.
+        true : bool, optional
+            Whether the true positions are scored, between the samples too and without noise and
+            steps of the sensors.
+
+        Returns
+        -------
+        ErrorStatistics
+            Table 2 of Xu and Li 2010 has `peak_to_peak`, `mean_error` and `sd_error`.
+
+        Raises
+        ------
+        ParameterError
+            There are less than two samples in it.
+        """
+        t, errors = (self.x.fine_t, self.fine_error) if true else (self.t, self.error)
+        first = self.settled if start is None else start
+        return ErrorStatistics.of(_core.spread(errors[self.x.part(t, first, stop)]))
+
+    def plot(self) -> Figure:
+        """Path and positions, the error magnified along the path, and the errors over time.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Not yet shown or saved.
+        """
+        from .contouring_plot import plot_contour
+
+        return plot_contour(self)
+
+    @property
+    def notes(self) -> list[str]:
+        """What a careful reader should know of the run."""
+        jump = float(np.hypot(self.x.error[0], self.y.error[0]))
+        reach = max(float(np.ptp(axis.desired)) for axis in (self.x, self.y))
+        if jump <= JUMP * reach:
+            return []
+        return [
+            f"the path begins {1e6 * jump:.3g} um from where the stage is, which has to jump "
+            "there: let it begin at home, (0, 0), or give it a smooth start"
+        ]
+
+    def summary(self) -> str:
+        """Table of the run: contour error, and each axis.
+
+        Returns
+        -------
+        str
+            Several lines.
+        """
+        since = f"from {self.settled:g} s on" if self.settled else "all of it"
+        return "\n".join(
+            [
+                f"{self.path!r} at {1.0 / self.x.controller.dt:g} Hz; {self.x.note}",
+                *(f"note  {note}" for note in self.notes),
+                f"contour error {since}, signed, positive to the left of the path",
+                f"  measured: {_words(self.metrics)}",
+                f"  true, between the samples too: {_words(self.score(true=True))}",
+                f"x: {self.x.metrics}",
+                f"y: {self.y.metrics}",
+            ]
+        )
+
+
+def _words(spread: ErrorStatistics) -> str:
+    return (
+        f"peak to peak {1e6 * spread.peak_to_peak:.3f} um, mean {1e6 * spread.mean_error:.3f} um, "
+        f"SD {1e6 * spread.sd_error:.3f} um"
+    )
+
+
+def contour(
+    stage: XYStage,
+    controllers: Sequence[Controller],
+    path: XYReference,
+    *,
+    decoupling: ArrayLike | None = None,
+    delay: float = 0.0,
+    jitter: float = 0.0,
+    substeps: int = 10,
+    beyond_reach: bool = False,
+    unstable: bool = False,
+) -> Contour:
+    """Let two controllers lead an XY stage along a path.
+
+    Both axes move in one continuous time. At each sampling instant x is read and its voltage goes
+    out; the stage's lag later the same is done for y, with the same point of the path. Cross-talk
+    couples the loops through their sensors.
+
+    Parameters
+    ----------
+    stage : XYStage
+        What is led.
+    controllers : (Controller, Controller)
+        Those of x and y, with one sampling interval.
+    path : XYReference
+        What is to be followed, as ``pt.circle(...)``.
+    decoupling : array_like, shape (2, 2), optional
+        Cross-talk as `identify_cross_talk` finds it: the feedforward follows the path times its
+        inverse, so that what each axis adds to the other is what the other leaves out.
+    delay : float, optional
+        Time from a reading to the effect of its voltage [s], besides the hold.
+    jitter : float, optional
+        How late a sample comes on average [s], as for `track`: of each axis by its own time, but
+        the same for two models, which have no sensor with a seed.
+    substeps : int, optional
+        Instants kept in each sampling interval.
+    beyond_reach, unstable : bool, optional
+        As for `track`.
+
+    Returns
+    -------
+    Contour
+        The motion, its metrics and pictures.
+
+    Raises
+    ------
+    ParameterError
+        A number is out of its range, the path leaves the reach of a stage, or a loop is unstable.
+    NumericalError
+        A loop runs away.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> loop = pt.Controller(
+    ...     dt=0.02,
+    ...     limits=(0.0, 75.0),
+    ...     feedforward=pt.DahlStage.xu_li_2010().inverse(),
+    ...     feedback=pt.Pid.xu_li_2010(),
+    ... )
+    >>> path = pt.circle(frequency=0.1, radius=10e-6)
+    >>> run = pt.contour(pt.XYStage.xu_li_2010(seed=1), (loop, loop), path)
+    >>> run.metrics.peak_to_peak < 1.5e-6
+    True
+    """
+    if not isinstance(stage, XYStage):
+        raise ParameterError(f"stage is {type(stage).__name__}: expected pt.XYStage")
+    if not isinstance(path, XYReference):
+        raise ParameterError(f"path is {type(path).__name__}: expected pt.XYReference")
+    both = _two(controllers)
+    delay = not_negative("delay", delay, "s")
+    jitter = not_negative("jitter", jitter, "s")
+    substeps = _core.as_count("substeps", substeps)
+    forward = path if decoupling is None else path.transformed(_inverse(decoupling))
+    free = (_core.as_truth("unstable", unstable), _core.as_truth("beyond_reach", beyond_reach))
+    samples, volts = [], []
+    parts = zip("xy", (stage.x, stage.y), both, path.axes, forward.axes, strict=True)
+    for name, axis, controller, reference, ahead in parts:
+        samples.append(reference.sample(controller.dt))
+        try:
+            check_period(controller, reference)
+            if not free[0]:
+                check_stable(axis, controller, delay)
+            if not free[1]:
+                check_within_reach(axis, controller, samples[-1], 0.0)
+        except ParameterError as error:
+            raise ParameterError(f"{name}: {error}") from None
+        volts.append(feedforward_of(controller, ahead))
+    runs = stage._core.track(
+        (both[0].core, both[1].core),
+        (samples[0].x, samples[1].x),
+        (volts[0][0], volts[1][0]),
+        (delay, jitter, substeps),
+    )
+    x, y = (
+        followed(run, controller, reference, note, substeps)
+        for run, controller, reference, (_, note) in zip(runs, both, path.axes, volts, strict=True)
+    )
+    return Contour(path=path, x=x, y=y)
+
+
+def _two(controllers: Sequence[Controller]) -> tuple[Controller, Controller]:
+    """Return the controllers of x and y, which have one interval."""
+    given = list(controllers) if isinstance(controllers, (tuple, list)) else []
+    both = [one for one in given if isinstance(one, Controller)]
+    if not len(given) == len(both) == 2:
+        kinds = ", ".join(type(one).__name__ for one in given) or type(controllers).__name__
+        raise ParameterError(f"controllers are {kinds}: expected two pt.Controller, for x and y")
+    x, y = both
+    if x.dt != y.dt:
+        raise ParameterError(f"dt of y is {y.dt:g} s: expected that of x, {x.dt:g} s")
+    return x, y
+
+
+def _inverse(matrix: ArrayLike) -> Array:
+    rows = square_matrix("decoupling", matrix)
+    if abs(float(np.linalg.det(rows))) < 1e-3:
+        raise ParameterError(f"decoupling is {rows.tolist()}: expected a matrix near unity")
+    return np.asarray(np.linalg.inv(rows), dtype=np.float64)

@@ -1,0 +1,193 @@
+"""Pictures of a path that was run."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from .._support.plot_style import ACTUAL, DESIRED, above, axes_or_new
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from .contouring import Contour
+
+    Array = NDArray[np.float64]
+
+__all__ = [
+    "last_turn",
+    "plot_contour",
+    "plot_contour_error",
+    "plot_magnified",
+    "plot_path",
+]
+
+# How large the largest error is drawn, as a part of the path's smaller side.
+SHOWN = 0.12
+
+
+def plot_path(run: Contour, ax: Axes | None = None) -> Axes:
+    """Plot the path and the measured positions in the plane, with the way to the path.
+
+    Parameters
+    ----------
+    run : Contour
+        A path that was run.
+    ax : matplotlib.axes.Axes, optional
+        Where to.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        With the picture.
+    """
+    (ax,) = axes_or_new(ax, 1)
+    x, y = run.path.outline
+    ax.plot(1e6 * x, 1e6 * y, **{**DESIRED, "linewidth": 2.6, "color": "0.72"})
+    way, part = run.t < run.settled, last_turn(run)
+    ax.plot(
+        1e6 * run.x.measured[way], 1e6 * run.y.measured[way], color="0.5", linewidth=0.6, ls=":"
+    )
+    ax.plot(1e6 * run.x.measured[part], 1e6 * run.y.measured[part], **{**ACTUAL, "linewidth": 0.9})
+    _plane(ax, run)
+    above(ax)
+    return ax
+
+
+def plot_magnified(run: Contour, ax: Axes | None = None, factor: float | None = None) -> Axes:
+    """Plot the contour error, magnified, along the path.
+
+    Parameters
+    ----------
+    run : Contour
+        A path that was run.
+    ax : matplotlib.axes.Axes, optional
+        Where to.
+    factor : float, optional
+        By how much; a round number that keeps the errors readable where it is not given.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        With the picture.
+    """
+    (ax,) = axes_or_new(ax, 1)
+    part = last_turn(run)
+    if factor is None:
+        side = min(float(np.ptp(axis)) for axis in run.path.outline)
+        factor = _round_down(SHOWN * side / run.metrics.max_error)
+    x, y = run.path.outline
+    ax.plot(1e6 * x, 1e6 * y, color="0.72", linewidth=1.6, label="path")
+    # The place on the path where the motion should be, and to the left of its direction.
+    (px, vx, _), (py, vy, _) = (axis.at(run.t[part]) for axis in run.path.axes)
+    speed = np.maximum(np.hypot(vx, vy), 1e-30)
+    off = factor * run.error[part]
+    ax.plot(
+        1e6 * (px - off * vy / speed),
+        1e6 * (py + off * vx / speed),
+        color="C3",
+        linewidth=0.8,
+        label=f"contour error x {factor:g}",
+    )
+    _plane(ax, run)
+    above(ax)
+    return ax
+
+
+def plot_contour_error(run: Contour, ax: Axes | None = None) -> Axes:
+    """Plot the measured contour error over the last turn, with mean and standard deviation.
+
+    Parameters
+    ----------
+    run : Contour
+        A path that was run.
+    ax : matplotlib.axes.Axes, optional
+        Where to.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        With the picture.
+    """
+    (ax,) = axes_or_new(ax, 1)
+    part = last_turn(run)
+    found = run.metrics
+    mean, sd = 1e6 * found.mean_error, 1e6 * found.sd_error
+    ax.axhspan(mean - sd, mean + sd, color="0.9", label="mean +- SD")
+    ax.plot(run.t[part], 1e6 * run.error[part], color="C3", linewidth=0.8, label="contour error")
+    ax.axhline(mean, color="0.4", linewidth=0.8, linestyle="--")
+    ax.set(xlabel="time [s]", ylabel="contour error [um]")
+    above(ax)
+    ax.margins(x=0)
+    return ax
+
+
+def plot_contour(run: Contour) -> Figure:
+    """Plot all four: path, magnified error, errors of the axes and contour error, in the last turn.
+
+    Parameters
+    ----------
+    run : Contour
+        A path that was run.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Not yet shown or saved.
+    """
+    figure = plt.figure(figsize=(11.0, 8.4), layout="constrained")
+    grid = figure.add_gridspec(2, 2, height_ratios=[1.6, 1.0])
+    plot_path(run, figure.add_subplot(grid[0, 0]))
+    plot_magnified(run, figure.add_subplot(grid[0, 1]))
+    part, shared = last_turn(run), None
+    inner = grid[1, 0].subgridspec(2, 1, hspace=0.1)
+    for row, (name, axis) in enumerate((("x", run.x), ("y", run.y))):
+        ax = figure.add_subplot(inner[row], sharex=shared, sharey=shared)
+        ax.plot(run.t[part], 1e6 * axis.error[part], color="C0", linewidth=0.8)
+        ax.axhline(0.0, color="0.7", linewidth=0.6)
+        ax.set(xlabel="time [s]" if row else "", ylabel=f"error of {name} [um]")
+        ax.tick_params(labelbottom=bool(row))
+        ax.locator_params(axis="y", nbins=4, prune="both")
+        ax.margins(x=0)
+        shared = shared or ax
+    contour = figure.add_subplot(grid[1, 1])
+    plot_contour_error(run, contour)
+    found = run.metrics
+    figure.suptitle(
+        f"{run.path.name}: contour error {1e6 * found.peak_to_peak:.3f} um peak to peak, "
+        f"mean {1e6 * found.mean_error:.3f} um, SD {1e6 * found.sd_error:.3f} um"
+    )
+    return figure
+
+
+def last_turn(run: Contour) -> NDArray[np.bool_]:
+    """Tell the samples of the last turn; all that count where the path is run once."""
+    turn = run.path.period
+    start = run.settled
+    if turn is not None:
+        start = max(start, run.t[-1] + run.x.controller.dt - turn)
+    last: NDArray[np.bool_] = run.t >= start - 1e-9
+    return last
+
+
+def _plane(ax: Axes, run: Contour) -> None:
+    """Label a picture in the plane, and cut away most of the way from home."""
+    ax.set(xlabel="x [um]", ylabel="y [um]", aspect="equal")
+    edges = [(1e6 * float(axis.min()), 1e6 * float(axis.max())) for axis in run.path.outline]
+    room = 0.2 * max(high - low for low, high in edges)
+    ax.set(
+        xlim=(edges[0][0] - room, edges[0][1] + room),
+        ylim=(edges[1][0] - room, edges[1][1] + room),
+    )
+
+
+def _round_down(value: float) -> float:
+    """Return the largest of 1, 2, 5, 10, ... that is not above `value`, 1 at least."""
+    if not value > 1.0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value))

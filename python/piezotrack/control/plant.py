@@ -1,0 +1,70 @@
+"""Plants that a controller can drive: closed-loop simulation and linearisation of a stage."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from .. import _core
+from ..errors import ParameterError
+from ..identification.identified import IdentifiedModel
+from ..stages.base import MODEL_STEP, Stage
+from ..stages.virtual import VirtualStage
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from .controller import Controller
+
+    Array = NDArray[np.float64]
+
+__all__ = ["Plant", "linearised_plants", "run_closed_loop", "unwrap"]
+
+Plant = VirtualStage | Stage
+
+
+def unwrap(stage: Plant | IdentifiedModel) -> tuple[Plant, float, float]:
+    """Return the stage itself, and the offset [m] and delay [s] that its sensor shows.
+
+    Raises
+    ------
+    ParameterError
+        It is nothing that can be led.
+    """
+    offset = late = 0.0
+    if isinstance(stage, IdentifiedModel):
+        offset, late, stage = stage.offset, stage.delay, stage.model
+    if not isinstance(stage, Plant):
+        raise ParameterError(
+            f"stage is {type(stage).__name__}: expected a pt.VirtualStage, a stage of a model, as "
+            "a pt.DahlStage, or an identified one"
+        )
+    return stage, offset, late
+
+
+def run_closed_loop(
+    stage: Plant,
+    controller: Controller,
+    reference: Array,
+    volts: Array,
+    pace: tuple[float, float, int],
+) -> _core.Tracked:
+    """Let a controller lead a stage from rest along a reference [m], with a feedforward [V].
+
+    `pace` is delay and jitter [s], and the instants kept in each control interval.
+    """
+    course = (controller.core, reference, volts, pace)
+    if isinstance(stage, VirtualStage):
+        return stage._core.track(*course)
+    return stage._core.track(min(MODEL_STEP, controller.dt / 4), *course)
+
+
+def linearised_plants(
+    stage: Plant, limits: tuple[float, float], delay: float
+) -> list[_core.LoopPlant]:
+    """Take a stage for small motions: at its lowest, a middle and its highest gain."""
+    low, high = (float(volts) for volts in limits)
+    if isinstance(stage, VirtualStage):
+        mode = (stage.frequency, stage.damping_ratio, stage.bandwidth, delay)
+        return [_core.LoopPlant.mode(gain, *mode) for gain in stage._core.gains()]
+    return stage._core.loop_plants(low, high, delay)

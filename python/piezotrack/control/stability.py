@@ -1,0 +1,263 @@
+"""Is a controller stable on a stage, and by how much: design of the sampled loop."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import _core
+from .._support.arguments import not_negative
+from ..errors import ParameterError
+from .plant import linearised_plants, unwrap
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from ..identification.identified import IdentifiedModel
+    from .controller import Controller
+    from .plant import Plant
+
+    Array = NDArray[np.float64]
+
+__all__ = ["LoopCheck", "LoopReport", "LoopResponse", "check_loop"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopCheck:
+    """The loop at one gain of the stage.
+
+    Attributes
+    ----------
+    gain : float
+        Static gain of the stage for small motions [m/V].
+    stable : bool
+        Whether the loop is stable.
+    exact : bool
+        Whether that was decided by counting roots; of periods above 10 000 samples the
+        small-gain bound decides, which is enough and not necessary.
+    gain_margin : float or None
+        Factor by which the gain may rise until the feedback is unstable; of an unstable one,
+        that which would make it stable; None where no gain would.
+    phase_margin : float or None
+        Of the feedback without the repetitive part [rad]; None where its gain is never 1.
+    delay_margin : float or None
+        Delay that makes it unstable [s], counted in whole samples. A part of a sample also
+        moves the samples along the ringing of a fast mode, which can do it much sooner: ask
+        `check_loop` with that delay.
+    crossover : float or None
+        Highest frequency at which its gain is 1 [Hz].
+    sensitivity : float
+        Ms, the largest amplification of a disturbance.
+    slowest_root : float or None
+        Largest radius of a root of the whole loop.
+    periods : float or None
+        Periods until 1/e of an error is left; None without a repetitive part.
+    small_gain : float or None
+        Largest share of an error that a period leaves, by the small-gain bound: below 1 is
+        enough for stability at any period, and not necessary.
+    hidden_roots : int
+        Roots at exactly 1 that show in no error: uRC and uFB moving against each other.
+    hint : str or None
+        What may be wrong with the gain.
+    """
+
+    gain: float
+    stable: bool
+    exact: bool
+    gain_margin: float | None
+    phase_margin: float | None
+    delay_margin: float | None
+    crossover: float | None
+    sensitivity: float
+    slowest_root: float | None
+    periods: float | None
+    small_gain: float | None
+    hidden_roots: int
+    hint: str | None
+
+    def __str__(self) -> str:
+        text = f"{1e6 * self.gain:.3g} um/V: {'stable' if self.stable else 'UNSTABLE'}"
+        if self.gain_margin is not None:
+            text += f", gain margin {self.gain_margin:.3g}"
+        if self.stable and self.phase_margin is not None:
+            text += f", phase margin {self.phase_margin:.2g} rad"
+        if self.stable:
+            text += f", Ms {self.sensitivity:.3g}"
+        if self.periods is not None:
+            text += f", learns in {self.periods:.2g} periods"
+        return text
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopResponse:
+    """The loop over frequency.
+
+    Attributes
+    ----------
+    frequency : ndarray, shape (n,)
+        Frequencies [Hz].
+    open_loop, sensitivity, complementary : ndarray of complex, shape (n,)
+        L, 1/(1 + L) and L/(1 + L) of the whole loop.
+    learning : ndarray, shape (n,)
+        What a period leaves of an error; 0 without a repetitive part.
+    """
+
+    frequency: Array
+    open_loop: NDArray[np.complex128]
+    sensitivity: NDArray[np.complex128]
+    complementary: NDArray[np.complex128]
+    learning: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LoopReport:
+    """The loop at the lowest, a middle and the highest gain that a stage has for small motions.
+
+    Hysteresis makes the gain depend on the way: least just after a reversal.
+
+    Attributes
+    ----------
+    controller : Controller
+        The controller.
+    low, middle, high : LoopCheck
+        The loop at these gains.
+    plant : LoopPlant
+        The stage at the middle gain, as the core has it.
+    """
+
+    controller: Controller
+    low: LoopCheck
+    middle: LoopCheck
+    high: LoopCheck
+    plant: _core.LoopPlant
+
+    @property
+    def stable(self) -> bool:
+        """Whether the loop is stable at the middle gain."""
+        return self.middle.stable
+
+    @property
+    def everywhere(self) -> bool:
+        """Whether it is stable at all three."""
+        return self.low.stable and self.middle.stable and self.high.stable
+
+    def __str__(self) -> str:
+        lines = [f"{name:<7} {one}" for name, one in self._cases]
+        if self.middle.hint:
+            lines.append(f"hint: {self.middle.hint}")
+        return "\n".join(lines)
+
+    @property
+    def _cases(self) -> tuple[tuple[str, LoopCheck], ...]:
+        return ("low", self.low), ("middle", self.middle), ("high", self.high)
+
+    def response(self, count: int = 400) -> LoopResponse:
+        """Frequency response at the middle gain, up to half the sampling rate.
+
+        Parameters
+        ----------
+        count : int, optional
+            Frequencies, evenly spaced in their logarithm.
+
+        Returns
+        -------
+        LoopResponse
+            The curves.
+        """
+        highest = 0.499 / self.controller.dt
+        count = max(2, _core.as_count("count", count))
+        if count > 100_000:
+            raise ParameterError(f"count is {count}: expected 100000 at most")
+        frequency = np.geomspace(1e-3 * highest, highest, count)
+        curves = _core.loop_response(self.controller.core, self.plant, frequency.tolist())
+        *pairs, learning = curves
+        loop, sensitivity, complementary = (
+            np.asarray(pair) @ np.array([1.0, 1.0j]) for pair in pairs
+        )
+        return LoopResponse(
+            frequency=frequency,
+            open_loop=loop,
+            sensitivity=sensitivity,
+            complementary=complementary,
+            learning=np.asarray(learning),
+        )
+
+    def plot(self) -> Figure:
+        """Open loop, sensitivity and, with a repetitive part, what a period leaves.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Not yet shown or saved.
+        """
+        from .stability_plot import plot_loop_report
+
+        return plot_loop_report(self)
+
+
+def check_loop(
+    controller: Controller,
+    stage: Plant | IdentifiedModel,
+    *,
+    delay: float = 0.0,
+) -> LoopReport:
+    """Tell whether a controller is stable on a stage, and by how much.
+
+    The stage is taken for small motions: the mode of a virtual stage with its amplifier, a Dahl
+    stage with the slope of its hysteresis force for a spring, or a stage with its hysteresis at
+    the input with the slope of that on the settled loop between the limits, without creep. The
+    voltage is held from sample to sample, and the repetitive part is that which really runs, taps
+    and all.
+
+    Parameters
+    ----------
+    controller : Controller
+        The controller.
+    stage : VirtualStage, DahlStage, BoucWenStage or PrandtlIshlinskiiStage
+        The stage, or an identified one, whose own delay counts.
+    delay : float, optional
+        Time from a reading to the effect of its voltage [s], besides the hold.
+
+    Returns
+    -------
+    LoopReport
+        At the lowest, a middle and the highest gain of the stage.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+    >>> report = pt.check_loop(loop, pt.VirtualStage.xu_li_2010())
+    >>> report.stable
+    True
+    """
+    led, _, late = unwrap(stage)
+    plants = linearised_plants(led, controller.limits, not_negative("delay", delay, "s") + late)
+    cases = [_check(controller, plant) for plant in plants]
+    return LoopReport(
+        controller=controller, low=cases[0], middle=cases[1], high=cases[2], plant=plants[1]
+    )
+
+
+def _check(controller: Controller, plant: _core.LoopPlant) -> LoopCheck:
+    found = _core.check_loop(controller.core, plant)
+    slowest, margin = found["slowest"], found["gain_margin"]
+    return LoopCheck(
+        gain=plant.static_gain,
+        stable=found["stable"],
+        exact=found["exact"],
+        gain_margin=None if margin is None or math.isinf(margin) else margin,
+        phase_margin=found["phase_margin"],
+        delay_margin=found["delay_margin"],
+        crossover=found["crossover"],
+        sensitivity=found["sensitivity"],
+        slowest_root=None if slowest is None else slowest[0],
+        periods=found["periods"],
+        small_gain=found["small_gain"],
+        hidden_roots=found["hidden"],
+        hint=found["hint"],
+    )

@@ -1,0 +1,424 @@
+"""Tracking: a controller leads a stage along a reference, and how well it does."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import _core
+from .._support.arguments import not_negative
+from .._support.statistics import FIGURES, ErrorStatistics
+from ..errors import ParameterError
+from ..references.reference import Reference, SampledReference
+from .controller import Controller
+from .plant import run_closed_loop, unwrap
+from .stability import check_loop
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from ..identification.identified import IdentifiedModel
+    from .plant import Plant
+
+    Array = NDArray[np.float64]
+
+__all__ = ["Metrics", "Tracking", "track"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Metrics(ErrorStatistics):
+    """How well a motion follows its reference; errors are desired less actual.
+
+    Attributes
+    ----------
+    phase_lag : float or None
+        Of the fundamental [rad]; None where the reference does not repeat.
+    widest_loop : float or None
+        Of actual against desired, as a part of the travel; None where it never turns.
+    """
+
+    phase_lag: float | None
+    widest_loop: float | None
+
+    def __str__(self) -> str:
+        text = f"max {1e6 * self.max_error:.3f} um, rms {1e6 * self.rms_error:.3f} um"
+        if self.phase_lag is not None:
+            text += f", phase lag {self.phase_lag:.4f} rad"
+        if self.widest_loop is not None:
+            text += f", widest loop {100.0 * self.widest_loop:.2f} % of travel"
+        return text
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Tracking:
+    """A tracked motion.
+
+    Attributes
+    ----------
+    reference : Reference
+        What was to be followed.
+    controller : Controller
+        What led the stage.
+    t : ndarray, shape (n,)
+        Time of the control samples [s].
+    desired, measured, displacement : ndarray, shape (n,)
+        Reference, reading of the sensor, true displacement [m]; the reading is that which the
+        voltage of the same sample was computed from.
+    loop_error : ndarray, shape (n,)
+        Error that the controller computed last [m]: of its own reading, after its filters. Of an
+        axis that is served later than the other it is of the point of the path that it was served
+        with, and 0 before.
+    voltage : ndarray, shape (n,)
+        Command to the amplifier [V].
+    feedforward, feedback, repetitive : ndarray, shape (n,)
+        Its parts before it was clipped [V].
+    saturated : ndarray of bool, shape (n,)
+        Whether it was clipped.
+    fine_t, fine_displacement, fine_voltage : ndarray, shape (m,)
+        Time [s], true displacement [m] and applied voltage [V] between the samples too.
+    note : str
+        How the feedforward was computed.
+    """
+
+    reference: Reference
+    controller: Controller
+    t: Array
+    desired: Array
+    measured: Array
+    displacement: Array
+    loop_error: Array
+    voltage: Array
+    feedforward: Array
+    feedback: Array
+    repetitive: Array
+    saturated: NDArray[np.bool_]
+    fine_t: Array
+    fine_displacement: Array
+    fine_voltage: Array
+    note: str
+
+    def __repr__(self) -> str:
+        return f"<Tracking of {self.reference!r}: {self.metrics}>"
+
+    @property
+    def error(self) -> Array:
+        """Desired less measured [m]."""
+        return self.desired - self.measured
+
+    @property
+    def settled(self) -> float:
+        """Time from which on `metrics` counts [s].
+
+        After the smooth start; of a reference that repeats, from the first whole period after it
+        where there is one. 0 where the smooth start is all there is.
+        """
+        period = self.reference.period
+        if period is None:
+            return self.reference.ramp if self.reference.ramp < self.t[-1] - 1e-9 else 0.0
+        start = math.ceil(self.reference.ramp / period - 1e-9) * period
+        return start if start + period <= self.reference.duration * (1 + 1e-9) else 0.0
+
+    @cached_property
+    def metrics(self) -> Metrics:
+        """Figures of the measured motion, from `settled` on."""
+        return self.score()
+
+    def score(
+        self, start: float | None = None, stop: float | None = None, *, true: bool = False
+    ) -> Metrics:
+        """Figures of a part of the run.
+
+        Parameters
+        ----------
+        start, stop : float, optional
+            The part [s]; from `settled` to the end where not given.
+        true : bool, optional
+            Whether the true displacement is scored, without noise and steps of the sensor.
+
+        Returns
+        -------
+        Metrics
+            The figures.
+        """
+        part = self.part(self.t, start, stop)
+        actual = self.displacement if true else self.measured
+        dt, period = self.controller.dt, self.reference.period
+        # A phase needs a whole period, and more than two samples of it.
+        frequency = None if period is None else 1.0 / period
+        if frequency and not (part.sum() * dt * frequency >= 0.999 and frequency * dt < 0.5):
+            frequency = None
+        return _metrics(_core.tracking_metrics(self.desired[part], actual[part], dt, frequency))
+
+    def part(self, t: Array, start: float | None, stop: float | None) -> NDArray[np.bool_]:
+        """Tell which instants lie in a part of the run.
+
+        Parameters
+        ----------
+        t : ndarray, shape (n,)
+            Instants [s].
+        start, stop : float or None
+            As in `score`.
+
+        Returns
+        -------
+        ndarray of bool, shape (n,)
+            True for two instants at least.
+
+        Raises
+        ------
+        ParameterError
+            There are less.
+        """
+        first = self.settled if start is None else not_negative("start", start, "s")
+        last = math.inf if stop is None else _core.as_number("stop", stop)
+        part: NDArray[np.bool_] = (t >= first - 1e-9) & (t < last - 1e-9)
+        if part.sum() < 2:
+            raise ParameterError(
+                f"start and stop are {first:g} and {last:g} s: expected a part of the run, 0 to "
+                f"{t[-1]:g} s, with two samples"
+            )
+        return part
+
+    @cached_property
+    def periods(self) -> list[Metrics]:
+        """Figures of each whole period, the first with the smooth start in it.
+
+        Empty where the reference does not repeat, ends before its first period does, or has less
+        than four samples in one.
+        """
+        dt, period = self.controller.dt, self.reference.period
+        if period is None or not 4.0 <= period / dt <= self.t.size + 0.01:
+            return []
+        found = _core.period_metrics(self.desired, self.measured, dt, period)
+        return [_metrics(figures) for figures in found]
+
+    def plot(self) -> Figure:
+        """Desired and actual motion, error, actual against desired, and the parts of the voltage.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Not yet shown or saved.
+        """
+        from .tracking_plot import plot_tracking
+
+        return plot_tracking(self)
+
+    def summary(self) -> str:
+        """Table of the run: all of it, and period by period.
+
+        Returns
+        -------
+        str
+            Several lines.
+        """
+        lines = [f"{self.reference!r} at {1.0 / self.controller.dt:g} Hz; {self.note}"]
+        since = f"from {self.settled:g} s on" if self.settled else "all of it"
+        lines.append(f"{since}: {self.metrics}")
+        if self.saturated.any():
+            lines.append(f"clipped in {100.0 * self.saturated.mean():.1f} % of the samples")
+        if self.periods:
+            lines.append("period  max um  rms um  mean um")
+            lines += [
+                f"{i:>6}  {1e6 * one.max_error:>6.3f}  {1e6 * one.rms_error:>6.3f}  "
+                f"{1e6 * one.mean_error:>7.3f}"
+                for i, one in enumerate(self.periods, 1)
+            ]
+        return "\n".join(lines)
+
+
+def _metrics(
+    figures: tuple[float, float, float, float, float, float | None, float | None],
+) -> Metrics:
+    *errors, lag, loop = figures
+    return Metrics(**dict(zip(FIGURES, errors, strict=True)), phase_lag=lag, widest_loop=loop)
+
+
+def track(
+    stage: Plant | IdentifiedModel,
+    controller: Controller,
+    reference: Reference,
+    *,
+    delay: float = 0.0,
+    jitter: float = 0.0,
+    substeps: int = 10,
+    beyond_reach: bool = False,
+    unstable: bool = False,
+) -> Tracking:
+    """Let a controller lead a stage along a reference.
+
+    The stage moves in continuous time; at each sampling instant the sensor is read and the
+    voltage computed from the reading goes out, held until the next.
+
+    Parameters
+    ----------
+    stage : VirtualStage, DahlStage, BoucWenStage or PrandtlIshlinskiiStage
+        What is led, or an identified one. A model is without noise and amplifier, and starts at
+        rest; with an identified one its offset and delay are in the displacement.
+    controller : Controller
+        What leads it.
+    reference : Reference
+        What is to be followed, as ``pt.sine(...)``.
+    delay : float, optional
+        Time from a reading to the effect of its voltage [s], besides the hold.
+    jitter : float, optional
+        How late a sample comes on average [s], as on a computer that has other things to do: each
+        by its own time, drawn from an exponential distribution that ends at nine tenths of the
+        sampling interval. The draws follow from the seed of the stage's sensor.
+    substeps : int, optional
+        Instants kept for plots in each sampling interval.
+    beyond_reach : bool, optional
+        Whether a reference may leave what the stage can reach within the limits, as to study
+        saturation.
+    unstable : bool, optional
+        Whether a loop that is unstable for small motions may run.
+
+    Returns
+    -------
+    Tracking
+        The motion, its metrics and pictures.
+
+    Raises
+    ------
+    ParameterError
+        A number is out of its range, the reference leaves the reach of the stage, or the loop
+        is unstable on it.
+    NumericalError
+        The loop runs away.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+    >>> reference = pt.sine(frequency=0.2, low=0.0, high=100e-6, duration=10.0)
+    >>> run = pt.track(pt.VirtualStage.xu_li_2010(seed=1), loop, reference)
+    >>> print(f"{run.metrics.phase_lag:.2f} rad")
+    0.06 rad
+    """
+    led, offset, late = unwrap(stage)
+    for name, value, kind in (
+        ("controller", controller, Controller),
+        ("reference", reference, Reference),
+    ):
+        if not isinstance(value, kind):
+            raise ParameterError(f"{name} is {type(value).__name__}: expected pt.{kind.__name__}")
+    # A displacement that is late shows the same as a voltage that is late.
+    delay = not_negative("delay", delay, "s") + late
+    substeps = _core.as_count("substeps", substeps)
+    samples = reference.sample(controller.dt)
+    check_period(controller, reference)
+    if not _core.as_truth("unstable", unstable):
+        check_stable(led, controller, delay)
+    if not _core.as_truth("beyond_reach", beyond_reach):
+        check_within_reach(led, controller, samples, offset)
+    volts, note = feedforward_of(controller, reference)
+    pace = (delay, not_negative("jitter", jitter, "s"), substeps)
+    run = run_closed_loop(led, controller, samples.x - offset, volts, pace)
+    return followed(run, controller, reference, note, substeps, offset)
+
+
+def feedforward_of(controller: Controller, reference: Reference) -> tuple[Array, str]:
+    """Compute the feedforward of a whole run [V], and say how."""
+    if controller.feedforward is None:
+        return np.zeros(len(reference.sample(controller.dt))), "no feedforward"
+    return controller.feedforward.played(reference, controller.dt)
+
+
+def followed(
+    run: _core.Tracked,
+    controller: Controller,
+    reference: Reference,
+    note: str,
+    substeps: int,
+    offset: float = 0.0,
+) -> Tracking:
+    """Put together what the core returns of one axis, its sensor `offset` [m] off."""
+    samples = reference.sample(controller.dt)
+    fine_t, fine_displacement, fine_voltage = run.motion()
+    fine_displacement = fine_displacement + offset
+    return Tracking(
+        reference=reference,
+        controller=controller,
+        t=samples.t,
+        desired=samples.x,
+        measured=run.measured + offset,
+        displacement=fine_displacement[::substeps],
+        loop_error=run.part("error"),
+        voltage=run.part("volts"),
+        feedforward=run.part("feedforward"),
+        feedback=run.part("feedback"),
+        repetitive=run.part("repetitive"),
+        saturated=run.saturated,
+        fine_t=fine_t,
+        fine_displacement=fine_displacement,
+        fine_voltage=fine_voltage,
+        note=note,
+    )
+
+
+def check_period(controller: Controller, reference: Reference) -> None:
+    """Refuse a repetitive part that learns another period than that of the reference."""
+    if controller.addon is None:
+        return
+    if reference.period is None:
+        raise ParameterError(
+            f"reference ({reference.name}) does not repeat: expected one that does, for the "
+            "repetitive part"
+        )
+    turns = controller.addon.period / reference.period
+    if abs(turns - max(1, round(turns))) > 1e-6 * turns:
+        raise ParameterError(
+            f"addon has a period of {controller.addon.period:g} s: expected that of the "
+            f"reference ({reference.name}), {reference.period:g} s, or a multiple"
+        )
+
+
+def check_stable(stage: Plant, controller: Controller, delay: float) -> None:
+    """Refuse a loop that is unstable at the middle gain of the stage."""
+    if controller.feedback is None and controller.addon is None:
+        return
+    report = check_loop(controller, stage, delay=delay)
+    if report.stable:
+        return
+    one = report.middle
+    found = f"the loop is unstable on this stage, {1e6 * one.gain:.3g} um/V"
+    if one.slowest_root is not None:
+        found += f": its largest root is {one.slowest_root:.5g}"
+    if one.gain_margin is not None and one.gain_margin < 1.0:
+        found += f", and {one.gain_margin:.3g} times the gain would be at the limit"
+    elif controller.addon is not None:
+        found += "; without the repetitive part it is stable, so lower kq or take another filter"
+    hint = f" ({one.hint})" if one.hint else ""
+    raise ParameterError(f"{found}{hint}: expected a stable one, or unstable=True")
+
+
+def check_within_reach(
+    stage: Plant,
+    controller: Controller,
+    samples: SampledReference,
+    offset: float,
+) -> None:
+    """Refuse a reference that leaves what the stage reaches between the limits."""
+    low, high = controller.limits
+    # To the lower limit, and then slowly to the upper one and back: 4 s each way, with rests.
+    t = np.arange(0.0, 11.0, 1e-3)
+    u = np.interp(t, [0, 0.5, 1, 5, 6, 10], [0.0, low, low, high, high, low])
+    x = stage.simulate(u, 1e-3).x[t >= 1.0] + offset
+    bottom, top = float(x.min()), float(x.max())
+    slack = 0.01 * (top - bottom)
+    for value, past, edge in (
+        (samples.x.max(), samples.x.max() - top, top),
+        (samples.x.min(), bottom - samples.x.min(), bottom),
+    ):
+        if past > slack:
+            k = int(np.flatnonzero(samples.x == value)[0])
+            raise ParameterError(
+                f"reference is {1e6 * value:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} um "
+                f"beyond {1e6 * edge:.4g} um: expected what the stage reaches from {low:g} to "
+                f"{high:g} V, or beyond_reach=True"
+            )

@@ -1,0 +1,170 @@
+"""The columns of a log: which one is the time, the drive, the displacement, and in which unit.
+
+A column says so by its title; where it does not, or not clearly, the caller has to.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from numbers import Integral
+from typing import TYPE_CHECKING
+
+from .._support.units import known_units, lookup, require, split_unit
+from ..errors import DataError, ParameterError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+__all__ = ["Column", "Columns"]
+
+# The roles of columns: what they measure, and what they are usually called.
+QUANTITIES = {"time": "time", "drive": "voltage", "displacement": "displacement"}
+NAMES = {
+    "time": ("time", "t", "timestamp"),
+    "drive": ("voltage", "drive", "u", "v", "command", "input", "control", "drive voltage"),
+    "displacement": ("displacement", "position", "pos", "x", "y", "output", "sensor", "measured"),
+}
+# What a displacement is called that is to be followed.
+TO_FOLLOW = ("reference", "desired", "target", "setpoint")
+BY_NUMBER = (
+    "there is no header line: name the columns by number and give their units, as in "
+    "time=0, drive=1, displacement=2, units={0: 's', 1: 'V', 2: 'um'}"
+)
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: its number, its title as written, and the title's name and unit."""
+
+    index: int
+    title: str
+    name: str
+    unit: str
+    unit_from_caller: bool = False
+
+    def __str__(self) -> str:
+        return f"column {self.title!r}" if self.title else f"column {self.index}"
+
+
+class Columns(list[Column]):
+    """The columns of a log in order, made from their titles.
+
+    Its errors say nothing of the file, which it does not know.
+    """
+
+    def __init__(self, titles: Sequence[str], *, has_titles: bool) -> None:
+        names = titles if has_titles else [""] * len(titles)
+        super().__init__(Column(k, title, *split_unit(title)) for k, title in enumerate(names))
+        self.has_titles = has_titles
+
+    def roles(
+        self,
+        wanted: Mapping[str, str | int | None],
+        units: Mapping[str | int, str] | None,
+        *,
+        needs_time: bool,
+    ) -> dict[str, Column]:
+        """Find the column in each role of `wanted` and see that its unit fits.
+
+        Raises
+        ------
+        ParameterError
+            `wanted` or `units` name a column that is not there, or a unit that does not fit.
+        DataError
+            A role that the caller leaves open has no column or several, or a title has no unit
+            or one that does not fit.
+        """
+        units = {} if units is None else units
+        if not isinstance(units, Mapping):
+            raise ParameterError(f"units is {units!r}: expected a mapping of columns to units")
+        for key, unit in units.items():
+            if not isinstance(unit, str):
+                raise ParameterError(f"units has {unit!r} for {key!r}: expected text")
+            if key not in QUANTITIES:
+                self._set_unit(self._find(key, "units"), unit)
+        roles = {role: self._find(key, role) for role, key in wanted.items() if key is not None}
+        for role in [role for role in wanted if role not in roles]:
+            found = self._candidates(role, taken={column.index for column in roles.values()})
+            if len(found) == 1 or role != "time" or needs_time:
+                roles[role] = self._only(found, role)
+        if len({column.index for column in roles.values()}) < len(roles):
+            raise ParameterError(f"{', '.join(roles)}: two of them are the same column")
+        for role in roles:
+            if role in units:
+                roles[role] = self._set_unit(roles[role], units[role])
+            if role != "time" or needs_time:
+                _check_unit(roles[role], role)
+        return roles
+
+    def to_follow(self) -> int | None:
+        """Return the number of the one column that is called a reference, or None."""
+        found = [column.index for column in self if column.name.lower() in TO_FOLLOW]
+        return found[0] if len(found) == 1 else None
+
+    def _set_unit(self, column: Column, unit: str) -> Column:
+        self[column.index] = replace(column, unit=unit, unit_from_caller=True)
+        return self[column.index]
+
+    def _find(self, key: str | int, argument: str) -> Column:
+        """Return the column that the caller names by its title, its name or its number."""
+        found: list[Column] = []
+        if isinstance(key, Integral) and not isinstance(key, bool):
+            found = [column for column in self if column.index == key]
+        elif isinstance(key, str):
+            text = key.strip()
+            found = (
+                [column for column in self if text and column.title == text]
+                or [column for column in self if text and column.name == text]
+                or [c for c in self if text and text.lower() in (c.title.lower(), c.name.lower())]
+            )
+        if len(found) == 1:
+            return found[0]
+        problem = "is the name of several columns" if found else "is not a column"
+        listed = _titles(self) if self.has_titles else f"0 to {len(self) - 1}, without titles"
+        raise ParameterError(f"{argument}: {key!r} {problem}; the columns are {listed}")
+
+    def _candidates(self, role: str, taken: set[int]) -> list[Column]:
+        """Return the columns with a usual name for `role`, those whose unit fits if there are."""
+        found, fitting = [], []
+        for column in self:
+            name = re.sub(r"[\s_-]+", " ", column.name).lower()
+            unit = lookup(column.unit)
+            fits = unit is not None and unit.quantity == QUANTITIES[role]
+            # Without a unit, v is as likely a velocity.
+            if column.index not in taken and name in NAMES[role] and (fits or name != "v"):
+                found.append(column)
+                if fits or unit is None:
+                    fitting.append(column)
+        return fitting or found
+
+    def _only(self, found: Sequence[Column], role: str) -> Column:
+        if len(found) == 1:
+            return found[0]
+        if not self.has_titles:
+            raise DataError(BY_NUMBER)
+        if found:
+            several = f"several columns could be the {role}: {_titles(found)}"
+            raise DataError(f"{several}; choose one with {role}=")
+        instead = ", or give the sampling interval with dt=" if role == "time" else ""
+        nothing = f"no column is known to be the {role}: name it with {role}={instead}"
+        raise DataError(f"{nothing}; the columns are {_titles(self)}")
+
+
+def _titles(columns: Sequence[Column]) -> str:
+    return ", ".join(repr(column.title) for column in columns)
+
+
+def _check_unit(column: Column, role: str) -> None:
+    quantity = QUANTITIES[role]
+    if not column.unit:
+        raise DataError(
+            f"{column} has no unit: write it into the header, or give it as "
+            f"units={{{role!r}: ...}}, one of {known_units(quantity)}"
+        )
+    try:
+        require(column.unit, quantity)
+    except ParameterError as error:
+        kind = ParameterError if column.unit_from_caller else DataError
+        raise kind(f"{column}: {error}") from None

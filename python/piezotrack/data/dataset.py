@@ -1,0 +1,415 @@
+"""A record of one axis of a stage: the drive that went in, the displacement that came out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from numbers import Integral
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from .._support.arrays import real, signal_of, time_axis
+from .._support.units import best_length_unit
+from ..errors import DataError, ParameterError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import ArrayLike, NDArray
+
+    Array = NDArray[np.float64]
+
+__all__ = ["Dataset", "Hold"]
+
+Hold = Literal["foh", "zoh"]
+
+MIN_SAMPLES = 3
+
+
+class Dataset:
+    """An evenly sampled record of one axis, in seconds, volts and metres.
+
+    Parameters
+    ----------
+    u : array_like, shape (n,)
+        Drive [V].
+    y : array_like, shape (n,)
+        Displacement [m].
+    t : array_like, shape (n,), optional
+        Time of each sample [s], increasing and even. Give either `t` or `dt`.
+    dt : float, optional
+        Sampling interval [s]; the first sample is then at 0 s.
+    hold : {"foh", "zoh"}, optional
+        What the drive does between two samples: ``"foh"`` runs straight from one to the next,
+        ``"zoh"`` stays where it is, as the output of a digital controller does.
+    drive_unit : str, optional
+        Unit of `u`, for labels.
+    columns : mapping of str to array_like, shape (n,), optional
+        Further signals of the same record. They may hold NaN.
+    column_units : mapping of str to str, optional
+        Units of `columns`, for labels.
+    source : str, optional
+        Where the record comes from, e.g. the name of a file.
+
+    Raises
+    ------
+    ShapeError
+        An array is not one-dimensional, or the lengths differ.
+    DataError
+        There are fewer than 3 samples, a sample is not a finite number, or `t` is not
+        increasing or not even (off by more than 5 % of the interval).
+    ParameterError
+        `t` and `dt` are both given or both missing, another argument has a value that cannot be
+        used, or a window reaches out of the record or holds fewer than 3 samples.
+
+    Notes
+    -----
+    A slice in seconds is a window: ``log[3.0:23.0]`` has the samples with 3 s <= t < 23 s. The
+    drive before the window is kept as warm-up, because hysteresis remembers it; what comes after
+    the window is dropped. The bounds are times on the record's own axis and have to lie in it. A
+    window of a window narrows it. `cut` makes a window without warm-up.
+
+    A dataset does not change, and its arrays are read-only. It unpacks as ``u, y = log``.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import piezotrack as pt
+    >>> u = 5.0 * np.sin(np.arange(5000) / 500.0)
+    >>> log = pt.Dataset(u=u, y=4e-6 * u, dt=0.005)
+    >>> log
+    Dataset(5000 samples, 25 s at 200 Hz, stroke 40 um)
+    >>> log[3.0:23.0]
+    Dataset(4000 samples, 20 s at 200 Hz, stroke 40 um, warm-up 600 samples)
+    >>> log.cut(3.0, 23.0).warmup
+    0
+    """
+
+    def __init__(
+        self,
+        *,
+        u: ArrayLike,
+        y: ArrayLike,
+        t: ArrayLike | None = None,
+        dt: float | None = None,
+        hold: Hold = "foh",
+        drive_unit: str = "V",
+        columns: Mapping[str, ArrayLike] | None = None,
+        column_units: Mapping[str, str] | None = None,
+        source: str | None = None,
+    ) -> None:
+        if hold not in ("foh", "zoh"):
+            raise ParameterError(f"hold is {hold!r}: expected 'foh' or 'zoh'")
+        for name, text in (("drive_unit", drive_unit), ("source", source or "")):
+            if not isinstance(text, str):
+                raise ParameterError(f"{name} is {text!r}: expected text")
+        # The arrays hold the warm-up and the window, which begins at sample `_start`.
+        self._u = signal_of("u", u)
+        self._y = signal_of("y", y, like=self._u)
+        if self._u.size < MIN_SAMPLES:
+            raise DataError(f"u has {self._u.size} samples: expected at least {MIN_SAMPLES}")
+        self._t, self._dt = time_axis(t, dt, self._u)
+        self._columns, self._column_units = _further(columns, column_units, self._u)
+        self._hold, self._drive_unit, self._source = hold, drive_unit, source
+        self._start = 0
+        self._sha256: str | None = None
+
+    @property
+    def t(self) -> Array:
+        """Times of the samples in the window [s], shape (n,)."""
+        return self._t[self._start :]
+
+    @property
+    def u(self) -> Array:
+        """Drive in the window [V], shape (n,)."""
+        return self._u[self._start :]
+
+    @property
+    def y(self) -> Array:
+        """Displacement in the window [m], shape (n,)."""
+        return self._y[self._start :]
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval [s]."""
+        return self._dt
+
+    @property
+    def hold(self) -> Hold:
+        """What the drive does between two samples: ``"foh"`` or ``"zoh"``."""
+        return self._hold
+
+    @property
+    def drive_unit(self) -> str:
+        """Unit of `u`."""
+        return self._drive_unit
+
+    @property
+    def columns(self) -> Mapping[str, Array]:
+        """Further signals in the window by name, each of shape (n,)."""
+        return MappingProxyType({k: v[self._start :] for k, v in self._columns.items()})
+
+    @property
+    def column_units(self) -> Mapping[str, str]:
+        """Units of `columns` by name; an empty text where there is none."""
+        return MappingProxyType(self._column_units)
+
+    @property
+    def source(self) -> str | None:
+        """Where the record comes from, e.g. the name of a file."""
+        return self._source
+
+    @property
+    def warmup(self) -> int:
+        """Number of samples kept in front of the window."""
+        return self._start
+
+    @property
+    def full(self) -> Dataset:
+        """The window together with its warm-up, all of them as ordinary samples."""
+        return self._part(0, self._u.size, start=0)
+
+    @property
+    def duration(self) -> float:
+        """Length of the window [s]: its number of samples times `dt`."""
+        return len(self) * self._dt
+
+    @property
+    def stroke(self) -> float:
+        """Largest less smallest displacement in the window [m]."""
+        return float(self.y.max()) - float(self.y.min())
+
+    @property
+    def sha256(self) -> str:
+        """Fingerprint of the numbers, 64 hexadecimal digits.
+
+        SHA-256 over little-endian float64: `dt`, all of `full.u`, all of `full.y`, `warmup`.
+        """
+        if self._sha256 is None:
+            import hashlib
+
+            digest = hashlib.sha256()
+            for part in (self._dt, self._u, self._y, self._start):
+                digest.update(np.asarray(part, dtype="<f8").tobytes())
+            self._sha256 = digest.hexdigest()
+        return self._sha256
+
+    def __len__(self) -> int:
+        return int(self._u.size) - self._start
+
+    def __iter__(self) -> Iterator[Array]:
+        return iter((self.u, self.y))
+
+    def __getitem__(self, window: slice) -> Dataset:
+        if not isinstance(window, slice):
+            raise ParameterError(
+                f"{window!r} is not a slice: a dataset is sliced in seconds, as in log[3.0:23.0]; "
+                "for single samples use log.u, log.y and log.t"
+            )
+        if window.step is not None:
+            raise ParameterError(
+                f"the slice has a step of {window.step!r}: expected log[start:stop] in seconds"
+            )
+        first, stop = self._samples(window.start, window.stop)
+        return self._part(0, stop, start=first)
+
+    def cut(self, start: float | None = None, stop: float | None = None) -> Dataset:
+        """Return the window from `start` to `stop` without the drive before it.
+
+        Parameters
+        ----------
+        start, stop : float, optional
+            Bounds on the record's own time axis [s]; used and checked as in ``log[start:stop]``.
+        """
+        first, end = self._samples(start, stop)
+        return self._part(first, end, start=0)
+
+    def decimate(self, factor: int) -> Dataset:
+        """Return the record at a lower sampling rate, without what that rate cannot show.
+
+        Drive, displacement and further columns go through the same low-pass filter, which
+        shifts nothing in time: a finite impulse response with 80 dB from 1.2 times the new
+        Nyquist frequency on, flat up to 0.8 times. The drive then goes straight from sample to
+        sample.
+
+        Parameters
+        ----------
+        factor : int
+            How many samples become one, 2 or more.
+
+        Returns
+        -------
+        Dataset
+            The window begins with the same sample as before.
+
+        Raises
+        ------
+        ParameterError
+            `factor` is not a whole number of 2 or more, or leaves fewer than 3 samples.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import piezotrack as pt
+        >>> u = np.sin(np.arange(5000) / 500.0)
+        >>> pt.Dataset(u=u, y=1e-6 * u, dt=0.001).decimate(10).dt
+        0.01
+        """
+        from .resampling import low_passed
+
+        factor = _factor(factor)
+        if len(self) < MIN_SAMPLES * factor:
+            raise ParameterError(
+                f"factor is {factor}: that leaves fewer than {MIN_SAMPLES} of {len(self)} samples"
+            )
+        first = self._start % factor
+        less = Dataset(
+            u=low_passed(self._u, factor)[first::factor],
+            y=low_passed(self._y, factor)[first::factor],
+            t=self._t[first::factor],
+            hold="foh",
+            drive_unit=self._drive_unit,
+            columns={k: low_passed(v, factor)[first::factor] for k, v in self._columns.items()},
+            column_units=self._column_units,
+            source=self._source,
+        )
+        less._start = self._start // factor
+        return less
+
+    def interpolate(self, factor: int) -> Dataset:
+        """Return the record at a higher sampling rate, with what was between the samples.
+
+        For a drive whose highest frequencies are near half the sampling rate, where a line from
+        sample to sample falls short: at a tenth of the sampling rate by 3 %. Drive, displacement
+        and further columns are interpolated band-limited, exactly up to 0.8 times the old
+        Nyquist frequency (80 dB), and keep their samples. Only for a drive that the low-pass
+        before the log, or the signal itself, kept below that; not for steps.
+
+        Parameters
+        ----------
+        factor : int
+            How many samples one becomes, 2 or more.
+
+        Returns
+        -------
+        Dataset
+            The window begins with the same sample as before; the drive goes straight from sample
+            to sample.
+
+        Raises
+        ------
+        ParameterError
+            `factor` is not a whole number of 2 or more, or the record's hold is "zoh", which
+            says what was between the samples.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import piezotrack as pt
+        >>> t = np.arange(2000) / 1000.0
+        >>> log = pt.Dataset(u=np.sin(2 * np.pi * 200 * t), y=np.cos(2 * np.pi * 200 * t), t=t)
+        >>> fine = log.interpolate(5)
+        >>> error = fine.u - np.sin(2 * np.pi * 200 * fine.t)
+        >>> bool(np.abs(error[500:-500]).max() < 2e-4)
+        True
+        """
+        from .resampling import interpolated
+
+        factor = _factor(factor)
+        if self._hold == "zoh":
+            raise ParameterError("hold is 'zoh': expected 'foh', as nothing is between the samples")
+        fine = Dataset(
+            u=interpolated(self._u, factor),
+            y=interpolated(self._y, factor),
+            t=self._t[0] + np.arange((self._t.size - 1) * factor + 1) * (self._dt / factor),
+            hold="foh",
+            drive_unit=self._drive_unit,
+            columns={k: interpolated(v, factor) for k, v in self._columns.items()},
+            column_units=self._column_units,
+            source=self._source,
+        )
+        fine._start = self._start * factor
+        return fine
+
+    def _samples(self, start: float | None, stop: float | None) -> tuple[int, int]:
+        """Turn the bounds of a window [s] into sample numbers of the arrays kept."""
+        t = self.t
+        # Times and bounds are decimal numbers rounded to binary: equal ones may differ a little.
+        slack = max(1e-6 * self._dt, 4.0 * float(np.spacing(np.abs(t).max())))
+        low, high = float(t[0]), float(t[-1]) + self._dt
+        begin = low if start is None else _seconds("start", start)
+        end = high if stop is None else _seconds("stop", stop)
+        window = f"the window from {begin:.10g} s to {end:.10g} s"
+        record = f"the record, whose samples go from {low:.10g} s to {float(t[-1]):.10g} s"
+        if begin < low - self._dt / 2 or end > high + self._dt / 2:
+            raise ParameterError(f"{window} reaches out of {record}")
+        if begin >= end:
+            raise ParameterError(f"{window} is empty: expected start < stop within {record}")
+        first, last = (int(np.searchsorted(t, bound - slack)) for bound in (begin, end))
+        if last - first < MIN_SAMPLES:
+            few = f"holds {last - first} samples: expected at least {MIN_SAMPLES}"
+            raise ParameterError(f"{window} {few}, within {record}")
+        return self._start + first, self._start + last
+
+    def _part(self, first: int, stop: int, start: int) -> Dataset:
+        """Keep samples `first` to `stop` of the arrays and begin the window at `start`."""
+        part = object.__new__(type(self))
+        part.__dict__.update(self.__dict__)
+        part._t, part._u, part._y = (a[first:stop] for a in (self._t, self._u, self._y))
+        part._columns = {name: a[first:stop] for name, a in self._columns.items()}
+        part._start, part._sha256 = start, None
+        return part
+
+    def __repr__(self) -> str:
+        unit, scale = best_length_unit(self.stroke)
+        parts = [
+            f"{len(self)} samples",
+            f"{self.duration:.6g} s at {1.0 / self._dt:.6g} Hz",
+            f"stroke {self.stroke * scale:.3g} {unit}",
+        ]
+        if self._start:
+            parts.append(f"warm-up {self._start} samples")
+        return f"Dataset({', '.join(parts)})"
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        # Pickles and deep copies do not carry the read-only flag.
+        for array in (self._t, self._u, self._y, *self._columns.values()):
+            array.setflags(write=False)
+
+
+def _factor(value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < 2:
+        raise ParameterError(f"factor is {value!r}: expected a whole number, 2 or more")
+    return int(value)
+
+
+def _seconds(name: str, value: object) -> float:
+    number = real(value)
+    if not math.isfinite(number):
+        raise ParameterError(f"{name} is {value!r}: expected a finite number of seconds or None")
+    return number
+
+
+def _further(
+    columns: Mapping[str, ArrayLike] | None, units: Mapping[str, str] | None, u: Array
+) -> tuple[dict[str, Array], dict[str, str]]:
+    """Check the further columns and their units; every column gets a unit, if an empty one."""
+    columns, units = columns or {}, units or {}
+    for argument, mapping in (("columns", columns), ("column_units", units)):
+        if not isinstance(mapping, Mapping):
+            raise ParameterError(f"{argument} is {mapping!r}: expected a mapping by name")
+    for name in (*columns, *units):
+        if name not in columns or not isinstance(name, str):
+            known = ", ".join(map(repr, columns)) or "none"
+            raise ParameterError(f"{name!r} is not the name of a column: the names are {known}")
+    for name, unit in units.items():
+        if not isinstance(unit, str):
+            raise ParameterError(f"column_units has {unit!r} for {name!r}: expected text")
+    kept = {
+        name: signal_of(f"column {name!r}", values, like=u, finite=False)
+        for name, values in columns.items()
+    }
+    return kept, {name: units.get(name, "") for name in kept}

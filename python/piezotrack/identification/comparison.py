@@ -1,0 +1,452 @@
+"""Comparison of models of one record: fitted on a part of it, scored on the rest."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from .. import _core
+from .._support.files import write_document
+from ..data.dataset import Dataset
+from ..errors import ParameterError
+from ..stages.registry import MODELS, ModelInfo
+from .identified import IdentifiedModel, Score, load
+from .identify import identify
+from .model_file import provenance
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+__all__ = ["Comparison", "ModelScore", "compare"]
+
+FORMAT = "piezotrack-comparison"
+SCHEMA_VERSION = 1
+
+Window = tuple[float | None, float | None]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModelScore:
+    """One model of a comparison.
+
+    Attributes
+    ----------
+    name : str
+        Of its files: the name of the model, or of the file that it comes from.
+    title : str
+        As the table has it.
+    fit : Identification or IdentifiedModel
+        The model, with what is known of how it was found.
+    train, test : Score
+        How far it is from the part that was fitted, and from the one that was not; per cent are
+        of the stroke of the former.
+    autocorrelation : float
+        Of the residual on the fitted part, from one sample to the next: near 1 where the model
+        and not the noise is what limits the fit.
+    parameters : int or None
+        Number of values fitted, the offset with them; None where the model was not fitted on
+        this part.
+    aic, bic : float or None
+        Information criteria on the fitted part, with `parameters` and a variance counted.
+    """
+
+    name: str
+    title: str
+    fit: IdentifiedModel
+    train: Score
+    test: Score
+    autocorrelation: float
+    parameters: int | None
+    aic: float | None
+    bic: float | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Comparison:
+    """Models side by side; see `compare`.
+
+    Attributes
+    ----------
+    rows : tuple of ModelScore
+        In the order in which they were asked for.
+    train, test : Dataset
+        What was fitted and what was not.
+    carried : bool
+        Whether the test goes on in the same record, with the state and the offset carried on;
+        else it is another one, with an offset of its own.
+    """
+
+    rows: tuple[ModelScore, ...]
+    train: Dataset
+    test: Dataset
+    carried: bool
+
+    def __repr__(self) -> str:
+        scores = "; ".join(f"{row.title} {row.test.rms_percent:.3g} %" for row in self.rows)
+        return f"<Comparison, rms on what was not fitted: {scores}; see summary()>"
+
+    @property
+    def best(self) -> ModelScore:
+        """The model with the lowest RMS on what was not fitted."""
+        return min(self.rows, key=lambda row: row.test.rms)
+
+    @property
+    def fits(self) -> dict[str, IdentifiedModel]:
+        """The models by name."""
+        return {row.name: row.fit for row in self.rows}
+
+    @property
+    def notes(self) -> list[str]:
+        """Warnings: models that were fitted to a part of what scores them here."""
+        seen = ((row, row.fit.window_on(self.test)) for row in self.rows)
+        return [
+            f"{row.title} was fitted on {window[0]:.6g} to {window[1]:.6g} s of "
+            f"{self.test.source}, a part of what judges it here"
+            for row, window in seen
+            if window is not None
+        ]
+
+    def followed(self, row: ModelScore, part: Literal["train", "test"]) -> Array:
+        """Displacement of a model on one of the two parts.
+
+        Parameters
+        ----------
+        row : ModelScore
+            One of `rows`.
+        part : {"train", "test"}
+            Which part.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Displacement with the offset that was scored [m].
+        """
+        data, score = (self.train, row.train) if part == "train" else (self.test, row.test)
+        x: Array = row.fit.simulate(data, offset=score.offset).x
+        return x
+
+    def summary(self) -> str:
+        """Table of the comparison, the best one marked.
+
+        Returns
+        -------
+        str
+            Several lines.
+        """
+        from .comparison_report import comparison_text
+
+        return comparison_text(self)
+
+    def plot(self) -> Figure:
+        """Loops over each other, errors over time with the split marked, and the RMS as bars.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Not yet shown or saved.
+        """
+        from .comparison_plot import plot_comparison
+
+        return plot_comparison(self)
+
+    def document(self) -> dict[str, Any]:
+        """Content of the JSON file.
+
+        Returns
+        -------
+        dict
+            Of numbers, texts, lists and dicts only.
+        """
+        where = provenance(self.train)
+        return {
+            "format": FORMAT,
+            "schema_version": SCHEMA_VERSION,
+            "unit": "errors, offsets and strokes in m",
+            "best": self.best.name,
+            "carried": self.carried,
+            "models": [_entry(row) for row in self.rows],
+            "train": where.pop("data"),
+            "test": provenance(self.test)["data"],
+            "provenance": where,
+        }
+
+    def save(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write the figures as JSON, the models, and the picture.
+
+        Parameters
+        ----------
+        folder : path-like
+            Where to; made where it is missing.
+
+        Returns
+        -------
+        list of pathlib.Path
+            ``comparison.json``, ``{name}.json`` of each model, ``comparison.png`` and ``.svg``.
+
+        Raises
+        ------
+        DataError
+            The folder cannot be made or written to.
+        """
+        from .._support.files import make_folder, save_figures
+
+        path = make_folder(folder)
+        written = [write_document(path / "comparison.json", self.document())]
+        written += [row.fit.save(path / f"{row.name}.json") for row in self.rows]
+        return [*written, *save_figures({"comparison": self.plot()}, path)]
+
+
+def compare(
+    data: Dataset,
+    models: Iterable[str | os.PathLike[str] | IdentifiedModel] | None = None,
+    *,
+    train: Window | None = None,
+    test: Window | Dataset | None = None,
+    seed: int = 0,
+    runs: int = 4,
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> Comparison:
+    r"""Fit several models on one part of a record and judge them on the rest.
+
+    The drive is simulated through from the first sample of the record to the last, and so the
+    state that hysteresis remembers is carried on from what was fitted to what was not. Over the
+    n residuals :math:`e_i` of the fitted part,
+
+    .. math::
+
+        AIC = n \ln(RSS/n) + 2 K, \qquad BIC = n \ln(RSS/n) + K \ln n, \qquad RSS = \sum_i e_i^2
+
+    with K the number of values fitted and one for the variance (Burnham and Anderson 2002, Model
+    Selection and Multimodel Inference, 2nd edition, sections 2.2 and 6.4, doi 10.1007/b97636).
+    Both take the residuals for independent. Those of a hysteresis model are not: neighbours are
+    correlated (`ModelScore.autocorrelation`), so n samples count for fewer and both criteria favour
+    too many parameters. The error on what was not fitted decides.
+
+    Parameters
+    ----------
+    data : Dataset
+        The record.
+    models : iterable, optional
+        Names of models, as for `identify`, which are fitted; files of models and models that are
+        identified already, which are taken as they are. Where not given, all models for the
+        unit of the drive: a Bouc-Wen oscillator is for forces, ``drive_unit="N"``.
+    train : (float, float), optional
+        Window to fit [s], either end may be None. Where not given, the first half of the record,
+        or all that is before `test`, or all of it where `test` is another record.
+    test : (float, float) or Dataset, optional
+        Window of the same record to judge on [s], or another record. What follows `train` where
+        not given.
+    seed, runs, threads, progress : optional
+        As for `identify`, for the models that a swarm searches.
+
+    Returns
+    -------
+    Comparison
+        Table, figures, picture and the models.
+
+    Raises
+    ------
+    ParameterError
+        A model is neither a name nor a file, a window is out of the record, or `train` and
+        `test` overlap.
+    DataError
+        A record cannot be used, see `identify`; a file is not that of a model.
+    Interrupted
+        Ctrl-C stopped a search.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import piezotrack as pt
+    >>> stage = pt.PrandtlIshlinskiiStage(
+    ...     linear=1e-6, thresholds=[10.0, 20.0], weights=[0.2e-6, 0.1e-6]
+    ... )
+    >>> u = 37.5 * (1 - np.cos(np.arange(2000) / 100.0))
+    >>> log = pt.Dataset(u=u, y=stage.simulate(u, 0.01).x, dt=0.01)
+    >>> found = pt.compare(log, ["bouc-wen", "prandtl-ishlinskii"], runs=1, seed=1)
+    >>> found.best.name, found.train.duration, found.test.duration
+    ('prandtl-ishlinskii', 10.0, 10.0)
+    """
+    if not isinstance(data, Dataset):
+        raise ParameterError(f"data is {type(data).__name__}: expected a Dataset, see pt.read")
+    wanted = _wanted(models, data.drive_unit)
+    first, second, carried = _parts(data, train, test)
+    of_swarm = {"seed": seed, "runs": runs, "threads": threads, "progress": progress}
+    rows = []
+    for name, title, source in wanted:
+        found: IdentifiedModel
+        if isinstance(source, ModelInfo):
+            options: dict[str, Any] = of_swarm if source.searched else {}
+            found = identify(first, source.name, **options)
+        else:
+            found = source
+        rows.append(_compared(name, title, found, first, second, carried))
+    return Comparison(rows=tuple(rows), train=first, test=second, carried=carried)
+
+
+def _wanted(models: object, drive_unit: str) -> list[tuple[str, str, ModelInfo | IdentifiedModel]]:
+    """Name, title and source of what is compared: models to fit, and identified ones."""
+    if models is None:
+        # A voltage is no force; a force may be taken for one, in its own scale.
+        suited = [info for info in MODELS if info.drive_unit in ("V", drive_unit)]
+        return [(info.name, info.title, info) for info in suited]
+    if isinstance(models, (str, os.PathLike, Mapping)) or not isinstance(models, Iterable):
+        raise ParameterError(f"models is {models!r}: expected several in a list, as ['dahl']")
+    sources = [_source(model) for model in models]
+    if not sources:
+        raise ParameterError("models is empty: expected one or more")
+    # Names of files come first, so that a model saved beside them does not take their place.
+    taken = {"comparison"}
+    names: dict[int, str] = {}
+    for i in sorted(range(len(sources)), key=lambda i: sources[i][0] is None):
+        file, model = sources[i]
+        names[i] = _unused(file or _info(model).name, taken)
+        taken.add(names[i])
+    return [
+        (names[i], _title(_info(model), names[i]), model) for i, (_, model) in enumerate(sources)
+    ]
+
+
+def _info(model: ModelInfo | IdentifiedModel) -> ModelInfo:
+    """Return the model that is to be fitted, or that an identified one is of."""
+    info: ModelInfo = model if isinstance(model, ModelInfo) else model.model.info
+    return info
+
+
+def _title(info: ModelInfo, name: str) -> str:
+    """Say of which model a name is, where it does not say so itself."""
+    if name.startswith(info.name):
+        return info.title + name.removeprefix(info.name).replace("-", " ")
+    return f"{info.title} ({name})"
+
+
+def _unused(name: str, taken: set[str]) -> str:
+    """Give a name a number where it is taken."""
+    free = (f"{name}-{i}" for i in range(2, len(taken) + 3))
+    return next(one for one in (name, *free) if one not in taken)
+
+
+def _source(model: object) -> tuple[str | None, ModelInfo | IdentifiedModel]:
+    """Name of the file, if any, and the model that an entry of `models` stands for."""
+    if isinstance(model, IdentifiedModel):
+        return None, model
+    if isinstance(model, (str, os.PathLike)):
+        for info in MODELS:
+            if info.name == model:
+                return None, info
+        if Path(model).suffix == ".json":
+            return Path(model).stem, load(model)
+    shown = model if isinstance(model, (str, os.PathLike)) else type(model).__name__
+    known = ", ".join(repr(info.name) for info in MODELS)
+    raise ParameterError(
+        f"models has {str(shown)!r}: expected {known}, the JSON file of a model, or an identified "
+        "model"
+    )
+
+
+def _parts(log: Dataset, train: object, test: object) -> tuple[Dataset, Dataset, bool]:
+    """Give the parts to fit and to judge on, and whether the second goes on in the same record."""
+    first = _bounds("train", train)
+    if isinstance(test, Dataset):
+        one = _windowed("train", log, first)
+        _check_apart(one, test)
+        return one, test, False
+    second = _bounds("test", test)
+    if train is None and test is None:
+        middle = float(log.t[len(log) // 2])
+        first, second = (None, middle), (middle, None)
+    elif train is None:
+        if second[0] is None:
+            raise ParameterError(
+                "test begins with the record, which leaves nothing to fit: expected a later "
+                "beginning, or train="
+            )
+        first = (None, second[0])
+    elif test is None:
+        if first[1] is None:
+            raise ParameterError(
+                "train goes to the end of the record, which leaves nothing to judge on: expected "
+                "an end, or test="
+            )
+        second = (first[1], None)
+    one, two = _windowed("train", log, first), _windowed("test", log, second)
+    _check_apart(one, two)
+    return one, two, True
+
+
+def _check_apart(one: Dataset, two: Dataset) -> None:
+    """Refuse two windows that share a part of one record."""
+    begin, end = max(one.t[0], two.t[0]), min(one.t[-1], two.t[-1])
+    shared = [(part.t >= begin) & (part.t <= end) for part in (one, two)]
+    if not shared[0].any() or not np.array_equal(one.y[shared[0]], two.y[shared[1]]):
+        return
+    raise ParameterError(
+        f"test goes from {two.t[0]:.6g} to {two.t[-1]:.6g} s and train from {one.t[0]:.6g} to "
+        f"{one.t[-1]:.6g} s: expected windows that do not overlap"
+    )
+
+
+def _bounds(name: str, window: object) -> Window:
+    """Check that a window has two ends, which may be open; the log checks their values."""
+    if window is None:
+        return None, None
+    ends = list(window) if isinstance(window, (tuple, list)) else []
+    if len(ends) != 2:
+        what = f"{window!r}" if isinstance(window, (tuple, list, str)) else type(window).__name__
+        other = " or a Dataset" if name == "test" else ""
+        raise ParameterError(f"{name} is {what}: expected (start, stop) in seconds{other}")
+    return ends[0], ends[1]
+
+
+def _windowed(name: str, log: Dataset, window: Window) -> Dataset:
+    try:
+        return log if window == (None, None) else log[window[0] : window[1]]
+    except ParameterError as error:
+        raise ParameterError(f"{name}: {error}") from None
+
+
+def _compared(
+    name: str, title: str, fit: IdentifiedModel, train: Dataset, test: Dataset, carried: bool
+) -> ModelScore:
+    """Judge a model on both parts."""
+    here = fit.fitted_on(train)
+    score = fit.score(train, offset=fit.offset if here else "own")
+    error = train.y - fit.simulate(train, offset=score.offset).x
+    count = fit.free_count if here else None
+    _, _, autocorrelation, aic, bic = _core.residual(error, count or 0)
+    judged = fit.score(test, offset=score.offset if carried else "own")
+    return ModelScore(
+        name=name,
+        title=title,
+        fit=fit,
+        train=replace(score, stroke=train.stroke),
+        test=replace(judged, stroke=train.stroke),
+        autocorrelation=autocorrelation,
+        parameters=count,
+        aic=None if count is None else aic,
+        bic=None if count is None else bic,
+    )
+
+
+def _entry(row: ModelScore) -> dict[str, Any]:
+    """Content of the JSON file for one model."""
+    return {
+        "name": row.name,
+        "title": row.title,
+        "model": row.fit.model.info.name,
+        "train": asdict(row.train),
+        "test": asdict(row.test),
+        "parameters": row.parameters,
+        "aic": row.aic,
+        "bic": row.bic,
+        "autocorrelation": row.autocorrelation,
+    }

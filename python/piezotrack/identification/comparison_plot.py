@@ -1,0 +1,159 @@
+"""Picture of a comparison: loops over each other, errors over time, RMS as bars."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._support.plot_style import MEASURED, thinned
+from .._support.units import best_length_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from .comparison import Comparison, ModelScore
+
+    Array = NDArray[np.float64]
+
+__all__ = ["plot_comparison"]
+
+# Distinct in black and white as well.
+LINES: tuple[dict[str, Any], ...] = (
+    {"color": "#b3400a", "linestyle": "-"},
+    {"color": "#1b6ca8", "linestyle": "--"},
+    {"color": "#1d7a3a", "linestyle": "-."},
+    {"color": "#7a3b8f", "linestyle": ":"},
+    {"color": "#8a6d00", "linestyle": (0, (6, 1.5, 1, 1.5, 1, 1.5))},
+    {"color": "#000000", "linestyle": (0, (8, 3))},
+)
+FITTED: dict[str, Any] = {"color": "0.8", "edgecolor": "0.3", "hatch": "///", "label": "fitted"}
+JUDGED: dict[str, Any] = {"color": "0.35", "edgecolor": "0.2", "label": "not fitted"}
+# Letters of a name in a line beside its bars.
+LABEL = 20
+
+
+def plot_comparison(comparison: Comparison) -> Figure:
+    """Put loops, errors and bars on one sheet.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        The models, compared.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        A loop, bars, and the error of each model.
+    """
+    import matplotlib.pyplot as plt
+
+    rows = comparison.rows
+    height = max(6.0, 1.25 * len(rows) + 1.6)
+    figure = plt.figure(figsize=(11.0, height), layout="constrained")
+    grid = figure.add_gridspec(1, 2, width_ratios=[1.0, 1.35])
+    left = grid[0].subgridspec(2, 1, height_ratios=[2.2, 1.0])
+    right = grid[1].subgridspec(len(rows), 1)
+    _loops(comparison, figure.add_subplot(left[0]))
+    _bars(comparison, figure.add_subplot(left[1]))
+    _errors(comparison, [figure.add_subplot(right[i]) for i in range(len(rows))])
+    return figure
+
+
+def _loops(comparison: Comparison, ax: Axes) -> None:
+    """Draw the cycle on which a model is furthest off, measured and by each model."""
+    data = comparison.test
+    followed = [comparison.followed(row, "test") for row in comparison.rows]
+    off: Array = np.max([np.abs(data.y - x) for x in followed], axis=0)
+    part = _cycle(data.u, off)
+    unit, scale = best_length_unit(data.stroke)
+    ax.plot(data.u[part], scale * data.y[part], **MEASURED)
+    for row, x, line in zip(comparison.rows, followed, _lines(comparison), strict=True):
+        ax.plot(data.u[part], scale * x[part], label=row.title, linewidth=1.1, **line)
+    ax.set(xlabel=f"drive [{data.drive_unit}]", ylabel=f"displacement [{unit}]")
+    when = f"{data.t[part][0]:.4g} to {data.t[part][-1]:.4g} s"
+    where = "" if comparison.carried else f" of {data.source or 'the other record'}"
+    ax.set_title(f"Where one is furthest off: {when}{where}", fontsize="medium")
+    ax.legend(loc="upper left", frameon=False, fontsize="small")
+
+
+def _cycle(u: Array, off: Array) -> slice:
+    """Find the cycle of a drive with the largest error, all of it where there is no cycle."""
+    middle = 0.5 * (float(u.min()) + float(u.max()))
+    up = np.flatnonzero((u[:-1] < middle) & (u[1:] >= middle)) + 1
+    cycles = [slice(int(first), int(last) + 1) for first, last in pairwise(up)]
+    return max(cycles, key=lambda one: float(off[one].max()), default=slice(None))
+
+
+def _bars(comparison: Comparison, ax: Axes) -> None:
+    """Draw the RMS of each model on both parts."""
+    rows = comparison.rows
+    places = np.arange(len(rows))
+    for shift, style, scores in (
+        (-0.2, FITTED, [row.train for row in rows]),
+        (0.2, JUDGED, [row.test for row in rows]),
+    ):
+        lengths = [score.rms_percent for score in scores]
+        bars = ax.barh(places + shift, lengths, height=0.38, **style)
+        ax.bar_label(bars, fmt=" %.3g", fontsize="small")
+    ax.set_yticks(places, [fill(row.title, LABEL) for row in rows])
+    ax.invert_yaxis()
+    ax.margins(x=0.15)
+    ax.set(xlabel="rms error [% of stroke]")
+    ax.legend(fontsize="small", frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+
+
+def _errors(comparison: Comparison, axes: list[Axes]) -> None:
+    """Draw measured less simulated over time, one model below the other on one scale."""
+    first, second = comparison.train, comparison.test
+    # Another record goes on where the first ends.
+    gap = 0.0 if comparison.carried else float(first.t[-1] - second.t[0]) + second.dt
+    # The test may also come before what was fitted.
+    split = max(float(first.t[0]), float(second.t[0]) + gap) - 0.5 * first.dt
+    worst = max(max(row.train.max_error, row.test.max_error) for row in comparison.rows)
+    unit, scale = best_length_unit(worst)
+    reach = 1.1 * scale * worst or 1.0
+    for ax, row, line in zip(axes, comparison.rows, _lines(comparison), strict=True):
+        for t, error in (
+            (first.t, first.y - comparison.followed(row, "train")),
+            (second.t + gap, second.y - comparison.followed(row, "test")),
+        ):
+            shown = thinned(error)
+            ax.plot(t[shown], scale * error[shown], color=line["color"], linewidth=0.7)
+        ax.axhline(0.0, color="0.7", linewidth=0.8, zorder=0)
+        ax.axvline(split, color="0.2", linestyle=":", linewidth=1.4)
+        ax.set_ylim(-reach, reach)
+        ax.margins(x=0.0)
+        ax.set_ylabel(f"error [{unit}]")
+        ax.set_title(_heading(row), fontsize="medium", loc="left")
+        ax.sharex(axes[0])
+        ax.tick_params(labelbottom=ax is axes[-1])
+    how = "" if comparison.carried else ", the other record after the first"
+    axes[-1].set_xlabel(f"time [s]{how}")
+    words = ("fitted ", " not fitted")
+    if float(second.t[0]) + gap < first.t[0]:
+        words = ("not fitted ", " fitted")
+    for text, side in zip(words, ("right", "left"), strict=True):
+        axes[0].annotate(
+            text,
+            (split, 0.96),
+            xycoords=("data", "axes fraction"),
+            fontsize="small",
+            ha=side,
+            va="top",
+            color="0.2",
+        )
+
+
+def _heading(row: ModelScore) -> str:
+    best = f"{row.title}: rms {row.train.rms_percent:.3g} % fitted"
+    return f"{best}, {row.test.rms_percent:.3g} % not fitted"
+
+
+def _lines(comparison: Comparison) -> list[dict[str, Any]]:
+    """Give each model its line."""
+    return [LINES[i % len(LINES)] for i in range(len(comparison.rows))]

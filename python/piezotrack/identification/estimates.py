@@ -1,0 +1,99 @@
+"""Parts of a result: progress of a search, estimates of parameters, restarts of the swarm."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+__all__ = ["Estimate", "Progress", "StopReason", "SwarmRun"]
+
+StopReason = Literal["stalled", "iterations", "interrupted", "solved"]
+
+
+class Progress(NamedTuple):
+    """Progress of a search after an iteration.
+
+    Attributes
+    ----------
+    nit : int
+        Iterations done; 0 after the first evaluation.
+    iterations : int
+        Most iterations.
+    nfev : int
+        Simulations done.
+    cost : float
+        Best cost so far [m].
+    parameters : dict of str to float
+        The parameters that gave it, SI.
+    delay : float
+        The delay that gave it [s].
+    """
+
+    nit: int
+    iterations: int
+    nfev: int
+    cost: float
+    parameters: dict[str, float]
+    delay: float = 0.0
+
+
+class Estimate(NamedTuple):
+    """One parameter as identified.
+
+    Attributes
+    ----------
+    value : float
+        In `unit`.
+    unit : str
+        SI; empty where there is none.
+    symbol : str
+        As in the literature.
+    free : bool
+        Whether it was searched.
+    bounds : (float, float) or None
+        Of the search.
+    deviation : float or None
+        Standard deviation that the residuals and the sensitivity of the model imply, for
+        independent residuals. Where the model is not exact, the residuals are correlated and
+        the true spread is larger.
+    at_bound : bool
+        Whether the value lies on a bound.
+    """
+
+    value: float
+    unit: str
+    symbol: str
+    free: bool
+    bounds: tuple[float, float] | None
+    deviation: float | None
+    at_bound: bool
+
+    @property
+    def precise(self) -> bool:
+        """Whether the standard deviation is below half of the value, or the value held."""
+        if not self.free:
+            return True
+        return self.deviation is not None and self.deviation < 0.5 * abs(self.value)
+
+    @property
+    def identified(self) -> bool:
+        """Whether the record determines the value: to better than a half, inside its bounds."""
+        return self.precise and not self.at_bound
+
+
+class SwarmRun(NamedTuple):
+    """One of the independent restarts of a search.
+
+    Attributes
+    ----------
+    cost : float
+        Its lowest cost [m], after local refinement where that is asked for.
+    nit, nfev : int
+        Its iterations and simulations.
+    stop_reason : {"stalled", "iterations", "interrupted"}
+        Why it ended.
+    """
+
+    cost: float
+    nit: int
+    nfev: int
+    stop_reason: StopReason

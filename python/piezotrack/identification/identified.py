@@ -1,0 +1,367 @@
+"""Identified models: a stage with the offset and delay of its sensor, on records and in files."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from .. import _core
+from .._support.files import write_document
+from ..data.dataset import Dataset
+from ..errors import ParameterError
+from .model_file import document_of, read_model
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from ..data.dataset import Hold
+    from ..stages.base import Response, StageState
+    from ..stages.inverse import Inverse
+
+    Array = NDArray[np.float64]
+
+__all__ = ["IdentifiedModel", "Score", "load"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Score:
+    """How far a simulated displacement is from a measured one.
+
+    Attributes
+    ----------
+    rms, max_error : float
+        Root mean square and largest absolute deviation [m].
+    stroke : float
+        Stroke that the percentages refer to [m].
+    offset : float
+        Offset added to the simulated displacement [m].
+    """
+
+    rms: float
+    max_error: float
+    stroke: float
+    offset: float
+
+    @property
+    def rms_percent(self) -> float:
+        """`rms` in per cent of the stroke."""
+        return 100.0 * self.rms / self.stroke
+
+    @property
+    def max_percent(self) -> float:
+        """`max_error` in per cent of the stroke."""
+        return 100.0 * self.max_error / self.stroke
+
+    def __str__(self) -> str:
+        return (
+            f"rms {1e6 * self.rms:.4g} um ({self.rms_percent:.3g} % of stroke), "
+            f"max {1e6 * self.max_error:.4g} um ({self.max_percent:.3g} %)"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class IdentifiedModel:
+    """A stage as identified, with what is needed to use it on a record.
+
+    Attributes
+    ----------
+    model : Stage
+        The stage.
+    offset : float
+        Displacement of the sensor where the stage is at rest without drive [m].
+    offset_fitted : bool
+        Whether the offset was fitted; another record then gets an offset of its own.
+    stroke : float
+        Stroke of the record identified [m]; percentages refer to it.
+    scale_assumed : bool
+        Whether the stiffness is nominal: only ratios of the parameters that carry force are then
+        known.
+    delay : float
+        Delay of the displacement, in the amplifier or the reading of the sensor [s].
+    details : mapping
+        Everything else that is kept in the file: fit, provenance.
+    """
+
+    # A stage of any model: each has its own parameters.
+    model: Any
+    offset: float
+    offset_fitted: bool
+    stroke: float
+    scale_assumed: bool = False
+    delay: float = 0.0
+    details: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def drive_range(self) -> tuple[float, float] | None:
+        """Lowest and highest drive of the record identified, where the file tells them."""
+        found = self._record.get("drive_range")
+        return (float(found[0]), float(found[1])) if found else None
+
+    @property
+    def _record(self) -> Mapping[str, Any]:
+        """What the file tells of the record identified."""
+        found: Mapping[str, Any] = self.details.get("provenance", {}).get("data", {})
+        return found
+
+    @property
+    def free_count(self) -> int | None:
+        """Number of values fitted, the offset with them; None where the file does not tell.
+
+        Thresholds and time constants that are chosen beforehand do not count; a weight that came
+        out as 0 does.
+        """
+        found = self.details.get("parameters", {})
+        if not any("free" in entry for entry in found.values()):
+            return None
+        free = [name for name, entry in found.items() if entry.get("free", False)]
+        delay = bool(self.details.get("delay", {}).get("free", False))
+        return sum(_count(getattr(self.model, name)) for name in free) + delay + self.offset_fitted
+
+    def fitted_on(self, data: Dataset) -> bool:
+        """Tell whether a record is the one identified, sample by sample.
+
+        Parameters
+        ----------
+        data : Dataset
+            The record.
+
+        Returns
+        -------
+        bool
+            Whether window, warm-up and all numbers are the same.
+        """
+        return self._record.get("sha256") == data.sha256
+
+    def window_on(self, data: Dataset) -> tuple[float, float] | None:
+        """Tell which seconds of a record were fitted, as far as its name tells.
+
+        Parameters
+        ----------
+        data : Dataset
+            The record.
+
+        Returns
+        -------
+        (float, float) or None
+            The window [s] where `data` has a part of it; None where not.
+        """
+        window = self._record.get("window_s")
+        same = data.source is not None and self._record.get("source") == data.source
+        if not same or not window or window[0] > data.t[-1] or window[1] < data.t[0]:
+            return None
+        return float(window[0]), float(window[1])
+
+    def inverse(
+        self,
+        *,
+        playback: Literal["table", "online"] = "table",
+        settle: int = 1,
+        initial: StageState | None = None,
+    ) -> Inverse:
+        """Feedforward with the offset and the delay of this model, as `Inverse` describes.
+
+        Parameters
+        ----------
+        playback : {"table", "online"}, optional
+            Whether one settled period is repeated from a table, or all is computed.
+        settle : int, optional
+            Periods before the one of the table.
+        initial : StageState, optional
+            State of the stage before the reference begins, as for `Inverse`.
+
+        Returns
+        -------
+        Inverse
+            For `Controller` or on its own. That of the bare stage is ``model.inverse()``.
+        """
+        bare: Inverse = self.model.inverse(playback=playback, settle=settle, initial=initial)
+        return replace(bare, offset=self.offset, delay=self.delay)
+
+    def displacement(self, u: ArrayLike, dt: float, *, hold: Hold = "foh") -> Array:
+        """Displacement that the sensor shows under a drive, from rest.
+
+        Parameters
+        ----------
+        u : array_like, shape (n,)
+            Drive [V].
+        dt : float
+            Sampling interval [s].
+        hold : {"foh", "zoh"}, optional
+            As for `simulate` of the stage.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Displacement with offset and delay [m].
+        """
+        return self._shown(self.model.simulate(u, dt, hold=hold)) + self.offset
+
+    def _shown(self, run: Response) -> Array:
+        """Displacement with the delay of the sensor [m]."""
+        dt = float(run.t[1]) if run.t.size > 1 else 1.0
+        return _core.delayed(run.x, run.v, dt, self.delay) if self.delay else run.x
+
+    def simulate(
+        self,
+        data: Dataset,
+        *,
+        offset: float | Literal["own"] = "own",
+        initial: StageState | None = None,
+    ) -> Response:
+        """Displacement that the model gives under the drive of a record.
+
+        Parameters
+        ----------
+        data : Dataset
+            The record. Its warm-up is simulated too.
+        offset : float or "own", optional
+            Added to the displacement [m]. ``"own"``: the one that fits the record's window
+            best where an offset was fitted, none where not.
+        initial : StageState, optional
+            State at the first sample of the record and its warm-up, such as the `final` of the
+            record before it; at rest where it is not given.
+
+        Returns
+        -------
+        Response
+            Motion in the window; offset and delay are in its displacement, the rest is the
+            stage's own.
+        """
+        if not isinstance(data, Dataset):
+            raise ParameterError(f"data is {type(data).__name__}: expected a Dataset")
+        start = data.warmup
+        run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=initial)
+        x = self._shown(run)[start:]
+        signals = {
+            one.name: value[start:]
+            for one in fields(run)
+            if isinstance(value := getattr(run, one.name), np.ndarray)
+        }
+        signals |= {"t": data.t, "u": data.u, "x": x + self._shift(data, x, offset)}
+        windowed: Response = replace(run, **signals)
+        return windowed
+
+    def score(
+        self,
+        data: Dataset,
+        *,
+        offset: float | Literal["own"] = "own",
+        initial: StageState | None = None,
+    ) -> Score:
+        """Deviation of the model from a record, in the record's window.
+
+        Parameters
+        ----------
+        data : Dataset
+            The record, e.g. one that was not fitted.
+        offset : float or "own", optional
+            As in `simulate`.
+        initial : StageState, optional
+            As in `simulate`.
+
+        Returns
+        -------
+        Score
+            Percentages refer to the stroke of the record identified.
+        """
+        x = self.simulate(data, offset=0.0, initial=initial).x
+        shift = self._shift(data, x, offset)
+        error = data.y - x - shift
+        return Score(
+            rms=float(np.sqrt(np.mean(error**2))),
+            max_error=float(np.abs(error).max()),
+            stroke=self.stroke,
+            offset=shift,
+        )
+
+    def _shift(self, data: Dataset, x: Array, offset: float | Literal["own"]) -> float:
+        """Offset to add to a simulated displacement [m]."""
+        if offset != "own":
+            shift = _core.as_number("offset", offset)
+            if not math.isfinite(shift):
+                raise ParameterError(f"offset is {shift}: expected a finite number or 'own'")
+            return shift
+        return float(np.mean(data.y - x)) if self.offset_fitted else 0.0
+
+    def document(self) -> dict[str, Any]:
+        """Content of the JSON file.
+
+        Returns
+        -------
+        dict
+            Of numbers, texts, lists and dicts only.
+        """
+        return document_of(self)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the model to a JSON file that `load` reads back bit for bit.
+
+        Parameters
+        ----------
+        path : path-like
+            The file. It is written beside and renamed, so a file that was there stays whole
+            until then.
+
+        Returns
+        -------
+        pathlib.Path
+            The file written.
+
+        Raises
+        ------
+        DataError
+            The file cannot be written.
+        ParameterError
+            Offset, stroke or delay are not finite numbers.
+        """
+        # What load would refuse is refused now, while the fit is still there.
+        numbers = {"offset": self.offset, "stroke": self.stroke, "delay": self.delay}
+        for name, value in numbers.items():
+            if not math.isfinite(_core.as_number(name, value)):
+                raise ParameterError(f"{name} is {value}: expected a finite number")
+        return write_document(path, self.document())
+
+
+def load(path: str | os.PathLike[str]) -> IdentifiedModel:
+    """Read a model file.
+
+    Parameters
+    ----------
+    path : path-like
+        A file that `save` of an identified model wrote, with this version of piezotrack or an
+        older one.
+
+    Returns
+    -------
+    IdentifiedModel
+        The model, its numbers as they were saved, bit for bit.
+
+    Raises
+    ------
+    DataError
+        The file is missing, is not a model file, or was written by a newer version.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> model = pt.IdentifiedModel(
+    ...     model=pt.DahlStage.xu_li_2010(), offset=0.0, offset_fitted=False, stroke=119e-6
+    ... )
+    >>> import os, tempfile
+    >>> path = model.save(os.path.join(tempfile.mkdtemp(), "dahl.json"))
+    >>> pt.load(path).model == model.model
+    True
+    """
+    return IdentifiedModel(**read_model(path))
+
+
+def _count(value: object) -> int:
+    """Numbers in a parameter: several of a list, none of one that is left out."""
+    return len(value) if isinstance(value, tuple) else int(value is not None)

@@ -1,0 +1,184 @@
+"""`identify`: the one entry to identification, for every model."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from .. import _core
+from ..data.dataset import Dataset
+from ..errors import ParameterError
+from ..stages.registry import model_named
+from .least_squares import LeastSquares, solve_least_squares
+from .search import search
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    from ..stages.base import ModelInfo
+    from .estimates import Progress
+    from .result import Identification
+    from .step_response import StepResult
+    from .swarm import ParticleSwarm
+
+__all__ = ["identify"]
+
+
+def identify(
+    data: Dataset,
+    model: str = "dahl",
+    *,
+    free: Iterable[str] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    initial: StepResult | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    stiffness: float | None = None,
+    offset: bool = True,
+    delay: bool | float | tuple[float, float] | None = None,
+    swarm: ParticleSwarm | None = None,
+    least_squares: LeastSquares | None = None,
+    seed: int | None = None,
+    runs: int | None = None,
+    threads: int | None = None,
+    progress: bool | None = None,
+    callback: Callable[[Progress], object] | None = None,
+) -> Identification:
+    r"""Find the parameters with which a stage model follows a record best.
+
+    Minimises the RMS deviation over the record's window,
+
+    .. math:: f = \sqrt{\tfrac{1}{n} \sum_i (x_i - \hat x_i)^2}
+
+    (Xu and Li 2010, equation (16), doi 10.1115/1.4001712), by a particle swarm or, where the
+    model is linear in its weights, by least squares. The warm-up before the window is simulated,
+    from rest, and not counted.
+
+    Voltage and displacement determine ratios only: mass, damping, stiffness, piezo coefficient, b1 and
+    b0 of a Dahl stage, or mass, damping and stiffness of a Bouc-Wen stage, can all be multiplied
+    by one number without changing the motion. Where nothing in the call fixes a force, a nominal
+    stiffness of 1e6 N/m is held, and the result says "scale assumed". The drive of a Bouc-Wen
+    oscillator is a force itself; of one that is given in volts, forces come out in volts too.
+
+    Parameters
+    ----------
+    data : Dataset
+        The record. ``log[3.0:23.0]`` counts this window only and keeps the drive before it as
+        warm-up.
+    model : str, optional
+        Name of the model. A swarm searches ``"dahl"`` (`DahlStage`), ``"bouc-wen"``
+        (`BoucWenStage`), ``"first-order-dahl"`` (`FirstOrderDahlStage`) and
+        ``"bouc-wen-oscillator"`` (`BoucWenOscillator`); least squares find
+        ``"prandtl-ishlinskii"`` (`PrandtlIshlinskiiStage`) and other models of weighted plays. Of
+        what follows, `offset` applies to every model, `least_squares` to the latter only and all
+        else to the former only; an argument that does not apply to the model is refused.
+    free : iterable of str, optional
+        Parameters to search: all that are not fixed, where not given. `b0`, dry friction at
+        reversals, is held at 0 unless it is named here or in `fixed`; exponents, and the beta of
+        an oscillator, of which the data tell the products with gamma and delta only, at 1 unless
+        they are in `fixed`.
+    fixed : mapping of str to float, optional
+        Parameters to hold, SI.
+    initial : StepResult, optional
+        Result of a step response, see `identify_step`: its a1, a2, b1 and b0 are held, as in
+        section 3.3 of the paper, and b1 then fixes the scale of the forces. Those named in
+        `fixed`, `free` or `bounds` are not taken from it.
+    bounds : mapping of str to (float, float), optional
+        Bounds of free parameters, SI; derived from the record where not given. Where both are
+        positive and two decades or more apart, the search is on a logarithmic scale.
+    stiffness : float, optional
+        K [N/m] where it is known.
+    offset : bool, optional
+        Whether a constant offset of the displacement is fitted with the rest.
+    delay : bool, float or (float, float), optional
+        Delay of the displacement behind the drive [s], as amplifiers and slow readings cause
+        it: none (False, the default), fitted (True), known, or fitted between two bounds. Under
+        one slow sine a delay looks like damping; a drive of several frequencies separates them.
+    swarm : ParticleSwarm, optional
+        Settings of the swarm.
+    least_squares : LeastSquares, optional
+        Settings of the least squares: ``pt.identification.LeastSquares``.
+    seed : int, optional
+        0 or above, 0 where not given. The same seed gives the same bits, for any number of
+        threads.
+    runs : int, optional
+        Number of independent restarts, 4 where not given, each with its own random numbers;
+        different costs at their ends show that the cost has other local minima. They share the
+        lanes of the processor.
+    threads : int, optional
+        Up to 256; all cores where it is 0 or not given.
+    progress : bool, optional
+        Whether a progress bar is shown; where not given, in a terminal or notebook only.
+    callback : callable, optional
+        Called with a `Progress` after every iteration; a true return value, or StopIteration,
+        stops the search.
+
+    Returns
+    -------
+    Identification
+        The model, its parameters and how they were found.
+
+    Raises
+    ------
+    ParameterError
+        An argument has a value that cannot be used, or does not apply to the model.
+    DataError
+        The drive or the displacement is constant in the window, or hysteresis is searched
+        where neither ever reverses; for least squares also where the displacement falls as the
+        drive rises, or the window is too short.
+    NumericalError
+        No candidate could be simulated.
+    Interrupted
+        Ctrl-C or the callback stopped the search; ``.partial`` has the best so far.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import piezotrack as pt
+    >>> t = np.arange(1000) / 250.0
+    >>> u = 37.5 * (1 - np.cos(2 * np.pi * 0.25 * t))
+    >>> y = pt.DahlStage.xu_li_2010().simulate(u, 1 / 250.0).x
+    >>> fit = pt.identify(
+    ...     pt.Dataset(u=u, y=y, dt=1 / 250.0),
+    ...     fixed={"mass": 0.1828, "a1": 121.9874, "a2": 1.1773e6, "b1": 1.8485e6},
+    ...     seed=1,
+    ... )
+    >>> print(f"K = {fit.model.stiffness:.0f} N/m, {fit.nit > 0}")
+    K = 26065 N/m, True
+    """
+    if not isinstance(data, Dataset):
+        raise ParameterError(f"data is {type(data).__name__}: expected a Dataset, see pt.read")
+    info = model_named(model)
+    offset = _core.as_truth("offset", offset)
+    of_swarm: dict[str, Any] = {
+        "free": free,
+        "fixed": fixed,
+        "initial": initial,
+        "bounds": bounds,
+        "stiffness": stiffness,
+        "delay": delay,
+        "swarm": swarm,
+        "seed": seed,
+        "runs": runs,
+        "threads": threads,
+        "progress": progress,
+        "callback": callback,
+    }
+    if info.searched:
+        _refuse(info, {"least_squares": least_squares}, "a swarm searches")
+        return search(data, info, offset=offset, **of_swarm)
+    _refuse(info, of_swarm, "least squares find")
+    settings = LeastSquares() if least_squares is None else least_squares
+    if not isinstance(settings, LeastSquares):
+        raise ParameterError(
+            f"least_squares is {settings!r}: expected a pt.identification.LeastSquares"
+        )
+    return solve_least_squares(data, info, settings, offset)
+
+
+def _refuse(info: ModelInfo, given: Mapping[str, object], how: str) -> None:
+    """Refuse arguments that do not apply to a model."""
+    for name, value in given.items():
+        if value is not None:
+            raise ParameterError(
+                f"{name} is {value!r}: expected none with the model {info.name!r}, whose "
+                f"parameters {how}"
+            )

@@ -1,0 +1,257 @@
+"""Model files: identified models as JSON, with a sentence for what is wrong in a file."""
+
+from __future__ import annotations
+
+import math
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .. import _core
+from ..errors import DataError, ParameterError, PiezotrackError
+from ..stages.registry import model_named, stage_class
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterator, Mapping
+
+    from ..data.dataset import Dataset
+    from .identified import IdentifiedModel
+
+__all__ = ["document_of", "provenance", "read_model"]
+
+FORMAT = "piezotrack-model"
+SCHEMA_VERSION = 2
+# Parameters of the model "prandtl-ishlinskii" by their names in version 1.
+NAMES_1 = {
+    "corners": "dead_zone_thresholds",
+    "bends": "dead_zone_weights",
+    "creep_shares": "creep_weights",
+}
+# Entries that are fields of a model; all others are its details.
+OWN = {
+    "format",
+    "schema_version",
+    "model",
+    "parameters",
+    "scale_assumed",
+    "offset",
+    "stroke",
+    "delay",
+}
+# What the file keeps of a parameter besides the fit's remarks on it.
+FACTS = ("value", "unit", "symbol")
+
+
+def document_of(model: IdentifiedModel) -> dict[str, Any]:
+    """Content of the file of a model.
+
+    Parameters
+    ----------
+    model : IdentifiedModel
+        The model.
+
+    Returns
+    -------
+    dict
+        Of numbers, texts, lists and dicts only.
+    """
+    details, info = dict(model.details), model.model.info
+    found = details.pop("parameters", {})
+    delay = dict(details.pop("delay", {}))
+    parameters = {
+        one.name: {
+            "value": _plain(getattr(model.model, one.name)),
+            "unit": one.unit,
+            "symbol": one.symbol,
+        }
+        | dict(found.get(one.name, {}))
+        for one in info.parameters
+    }
+    return {
+        "format": FORMAT,
+        "schema_version": SCHEMA_VERSION,
+        "model": info.name,
+        "parameters": parameters,
+        "scale_assumed": model.scale_assumed,
+        "offset": {"value": model.offset, "unit": "m", "fitted": model.offset_fitted},
+        "stroke": {"value": model.stroke, "unit": "m"},
+        "delay": {"value": model.delay, "unit": "s"} | delay,
+        **details,
+    }
+
+
+def _plain(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value
+
+
+def read_model(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read a model file.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+
+    Returns
+    -------
+    dict
+        The fields of an `IdentifiedModel`.
+
+    Raises
+    ------
+    DataError
+        The file is missing, is not a model file, or was written by a newer version.
+    """
+    name, document = read_document(path)
+    try:
+        info = model_named(document.get("model"))
+    except ParameterError as error:
+        raise DataError(f"{name} holds a {str(error).replace(' is', '', 1)}") from None
+    with entries_of(name):
+        if document["schema_version"] == 1:
+            _from_version_1(document, searched=info.searched)
+        parameters = document["parameters"]
+        for one in info.parameters:
+            require_unit(one.name, parameters[one.name], one.unit)
+        values = {one.name: parameters[one.name]["value"] for one in info.parameters}
+        for one in info.parameters:
+            if one.is_list:
+                values[one.name] = tuple(values[one.name])
+        delay = document["delay"]
+        return {
+            "model": stage_class(info)(**values),
+            "offset": file_number("offset", document["offset"], "m"),
+            "offset_fitted": _core.as_truth("offset fitted", document["offset"]["fitted"]),
+            "scale_assumed": _core.as_truth("scale_assumed", document["scale_assumed"]),
+            "stroke": file_number("stroke", document["stroke"], "m", above=0.0),
+            "delay": file_number("delay", delay, "s", least=0.0),
+            "details": {
+                "parameters": {key: _remarks(entry) for key, entry in parameters.items()},
+                "delay": _remarks(delay),
+                **{key: value for key, value in document.items() if key not in OWN},
+            },
+        }
+
+
+def _remarks(entry: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in entry.items() if key not in FACTS}
+
+
+def _from_version_1(document: dict[str, Any], *, searched: bool) -> None:
+    """Bring the content of a file of version 1 to that of this version."""
+    # Files of the first models have no delay.
+    document.setdefault("delay", {"value": 0.0, "unit": "s"})
+    if searched:
+        return
+    document.setdefault("scale_assumed", False)
+    parameters = document["parameters"]
+    document["parameters"] = {NAMES_1.get(key, key): entry for key, entry in parameters.items()}
+    for key, entry in document["parameters"].items():
+        chosen = key in ("thresholds", "dead_zone_thresholds", "creep_times")
+        entry.setdefault("free", not chosen)
+
+
+def read_document(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
+    """Read the JSON of a model file.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+
+    Returns
+    -------
+    name : str
+        Of the file, for messages.
+    document : dict
+        Its content.
+
+    Raises
+    ------
+    DataError
+        The file is missing, is not a model file, or was written by a newer version.
+    """
+    import json
+
+    try:
+        file = Path(path)
+    except TypeError:
+        raise ParameterError(f"path is {path!r}: expected the name of a file") from None
+    try:
+        document = json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DataError(f"{file.name}: {(error.strerror or str(error)).lower()}") from None
+    except RecursionError:
+        raise DataError(f"{file.name} is not a piezotrack model: it is nested too deep") from None
+    except UnicodeDecodeError:
+        raise DataError(f"{file.name} is not a text file: expected a model in JSON") from None
+    except json.JSONDecodeError as error:
+        raise DataError(f"{file.name}:{error.lineno}: not JSON: {error.msg}") from None
+    except ValueError as error:
+        raise DataError(f"{file.name} cannot be read: {error}") from None
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise DataError(f"{file.name} is not a piezotrack model: its 'format' is not '{FORMAT}'")
+    version = document.get("schema_version")
+    if version not in (1, SCHEMA_VERSION) or isinstance(version, bool):
+        raise DataError(
+            f"{file.name} has schema_version {version!r}: this version of piezotrack reads "
+            f"1 to {SCHEMA_VERSION}"
+        )
+    return file.name, document
+
+
+@contextmanager
+def entries_of(name: str) -> Iterator[None]:
+    """Say of which file an entry is missing or not as `save` writes it."""
+    try:
+        yield
+    except KeyError as error:
+        raise DataError(f"{name}: the entry {error} is missing") from None
+    except (TypeError, AttributeError):
+        raise DataError(f"{name}: an entry is not of the form that 'save' writes") from None
+    except PiezotrackError as error:
+        raise DataError(f"{name}: {error}") from None
+
+
+def provenance(data: Dataset, **settings: Any) -> dict[str, Any]:
+    """Say in a file which version and which record a model comes from, and how."""
+    return {
+        "package": "piezotrack",
+        "version": _core.__version__,
+        **settings,
+        "data": {
+            "source": data.source,
+            "sha256": data.sha256,
+            "samples": len(data),
+            "warmup_samples": data.warmup,
+            "window_s": [float(data.t[0]), float(data.t[-1])],
+            "dt_s": data.dt,
+            "drive_range": [float(data.full.u.min()), float(data.full.u.max())],
+            "drive_unit": data.drive_unit,
+            "hold": data.hold,
+        },
+    }
+
+
+def require_unit(name: str, entry: Mapping[str, Any], unit: str) -> None:
+    """Refuse an entry that is in another unit than the one that is written."""
+    if entry.get("unit") != unit:
+        raise ParameterError(f"the unit of {name} is {entry.get('unit')!r}: expected {unit!r}")
+
+
+def file_number(
+    name: str,
+    entry: Mapping[str, Any],
+    unit: str,
+    *,
+    above: float = -math.inf,
+    least: float = -math.inf,
+) -> float:
+    """Take a length or a time from the file."""
+    require_unit(name, entry, unit)
+    value = _core.as_number(name, entry["value"])
+    if not math.isfinite(value) or value <= above or value < least:
+        limit = " above 0" if above == 0.0 else ", 0 or above" if least == 0.0 else ""
+        raise ParameterError(f"{name} is {value} {unit}: expected a finite number{limit}")
+    return value

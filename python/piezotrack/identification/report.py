@@ -1,0 +1,208 @@
+"""Reports of an identification: the table, and the files with their pictures."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from .._support.files import make_folder, save_figures
+
+if TYPE_CHECKING:
+    import os
+    from pathlib import Path
+
+    from ..data.dataset import Dataset
+    from ..stages.base import Parameter
+    from .estimates import Estimate
+    from .result import Identification
+
+__all__ = ["save_identification", "summary_text"]
+
+# SI units that a person reads in micrometres, and the factor.
+SHOWN_UNITS = {"m": ("um", 1e6), "m/V": ("um/V", 1e6)}
+
+
+def summary_text(fit: Identification) -> str:
+    """Write a result as a table.
+
+    Parameters
+    ----------
+    fit : Identification
+        What an identification found.
+
+    Returns
+    -------
+    str
+        Several lines.
+    """
+    data = fit.data
+    lines = [
+        f"{fit.model.info.title}: stage identified from {data.source or 'a record'}, "
+        f"{len(data)} samples, {data.duration:.4g} s at {1 / data.dt:.6g} Hz, "
+        f"stroke {1e6 * data.stroke:.4g} um",
+        f"cost  {fit.cost_um:.4g} um rms = {fit.cost_percent:.3g} % of stroke"
+        + (f", offset {1e6 * fit.offset:.5g} um fitted" if fit.offset_fitted else ""),
+    ]
+    searched = fit.swarm is not None
+    if searched:
+        how = f"{fit.nit} iterations, {fit.nfev} simulations, seed {fit.seed}: {fit.message}"
+        lines += [f"      {how}", *_runs(fit)]
+    else:
+        lines.append(f"      least squares, {fit.nfev} simulations")
+    lines += [*(f"note  {note}" for note in fit.notes), ""]
+    return "\n".join([*lines, *(_estimates(fit) if searched else _values(fit))])
+
+
+def _estimates(fit: Identification) -> list[str]:
+    """List what the data determine, and every parameter with its standard deviation."""
+    lines = [*_known(fit), ""]
+    if fit.scale_assumed:
+        lines += [
+            f"parameters, scale assumed: K = {fit.model.stiffness:g} N/m is nominal. Voltage and",
+            "displacement determine no force; with the true stiffness=, "
+            f"{fit.model.info.force_symbols} scale along.",
+        ]
+    else:
+        lines.append("parameters")
+    width = 1 + max(3, *(len(estimate.symbol) for estimate in fit.parameters.values()))
+    lines.append(f"  {'':<18}{'':<{width}}{'value':>13}  {'':<9}{'standard deviation'}")
+    lines += [_row(name, estimate, width) for name, estimate in fit.parameters.items()]
+    if unclear := [n for n, e in fit.parameters.items() if not e.identified]:
+        lines += ["", "Not determined by this record: " + ", ".join(unclear) + "."]
+    if fit.nfail:
+        lines += ["", f"{fit.nfail} simulations did not stay finite and counted as infinitely bad."]
+    return lines
+
+
+def _values(fit: Identification) -> list[str]:
+    """List the values of the parameters, lists of one length side by side in pairs."""
+    lines, parts = ["parameters"], list(fit.model.info.parameters)
+    while parts:
+        one = parts.pop(0)
+        value = getattr(fit.model, one.name)
+        if value is None or value == ():
+            continue
+        if not one.is_list:
+            unit, scale = SHOWN_UNITS.get(one.unit, (one.unit, 1.0))
+            row = f"  {one.name:<22}{one.symbol:<6}{scale * value:>12.6g}  {unit}"
+            lines.append(row.rstrip())
+            continue
+        columns = [one]
+        if parts and parts[0].is_list and len(getattr(fit.model, parts[0].name)) == len(value):
+            columns.append(parts.pop(0))
+        lines += ["", "  " + "".join(f"{_heading(column):>32}" for column in columns)]
+        for row_values in zip(*(_scaled(fit, column) for column in columns), strict=True):
+            lines.append("  " + "".join(f"{number:>32.6g}" for number in row_values))
+        lines.append("")
+    return lines
+
+
+def _heading(one: Parameter) -> str:
+    unit, _ = SHOWN_UNITS.get(one.unit, (one.unit, 1.0))
+    return f"{one.name} {one.symbol}" + (f" [{unit}]" if unit else "")
+
+
+def _scaled(fit: Identification, one: Parameter) -> list[float]:
+    _, scale = SHOWN_UNITS.get(one.unit, (one.unit, 1.0))
+    return [scale * number for number in getattr(fit.model, one.name)]
+
+
+def _runs(fit: Identification) -> list[str]:
+    """Say whether several runs agree."""
+    if len(fit.runs) == 1:
+        return ["      one run: several, runs=4, would show whether other local minima exist"]
+    costs = ", ".join(f"{1e6 * cost:.4g}" for cost in sorted(run.cost for run in fit.runs)[:4])
+    more = ", ..." if len(fit.runs) > 4 else ""
+    verdict = f"{fit.agreeing} of {len(fit.runs)} runs end within 0.1 % of the best"
+    return [f"      {verdict}: {costs}{more} um"]
+
+
+def _known(fit: Identification) -> list[str]:
+    """List what the data determine, whatever the scale of the forces, and what they do not."""
+    ratios = _ratios(fit)
+    if "delay" in fit.parameters:
+        ratios.append(("delay", "delay", 1e3 * fit.delay, "ms"))
+    # A ratio to a stiffness that was searched is known where both are; a stiffness on its bound
+    # makes the others uncertain.
+    whole = fit.parameters["stiffness"]
+    known: list[tuple[str, str]] = []
+    unknown: list[tuple[str, str]] = []
+    for name, symbol, value, unit in ratios:
+        estimate = fit.parameters[name]
+        alone = "/" not in symbol
+        held = not estimate.free and (not whole.free or alone)
+        sure = estimate.identified and (whole.precise or alone)
+        if not held:
+            (known if sure else unknown).append((symbol, f"{value:>12.6g}  {unit}"))
+    lines = ["determined by the data" if known else "nothing is determined by these data"]
+    lines += [f"  {symbol:<10} {text}" for symbol, text in known]
+    if unknown:
+        lines.append("not determined by them: " + ", ".join(symbol for symbol, _ in unknown))
+    return lines
+
+
+def _ratios(fit: Identification) -> list[tuple[str, str, float, str]]:
+    """Parameter, symbol, value and unit of what does not depend on the scale of the forces."""
+    ratios = fit.model.force_ratios()
+    # Friction that was neither searched nor there is not worth a line.
+    return [r for r in ratios if r[0] != "b0" or fit.parameters["b0"].free or r[2]]
+
+
+def _row(name: str, estimate: Estimate, width: int) -> str:
+    if not estimate.free:
+        note = "held"
+    elif estimate.deviation is None:
+        note = "unknown"
+    elif not math.isfinite(estimate.deviation):
+        note = "no trace in the data"
+    else:
+        share = 100 * estimate.deviation / abs(estimate.value) if estimate.value else math.inf
+        digits = f"{share:.2g}" if share < 10 else f"{share:.0f}"
+        note = f"{digits} %" if share < 100 else "larger than the value"
+    if estimate.at_bound:
+        note += ", on a bound"
+    return (
+        f"  {name:<18}{estimate.symbol:<{width}}{estimate.value:>13.6g}  {estimate.unit:<9}{note}"
+    ).rstrip()
+
+
+def save_identification(
+    fit: Identification,
+    folder: str | os.PathLike[str],
+    *,
+    name: str | None = None,
+    shown: Dataset | None = None,
+) -> list[Path]:
+    """Write the model and its pictures.
+
+    Parameters
+    ----------
+    fit : Identification
+        What an identification found.
+    folder : path-like
+        Where to; made where it is missing.
+    name : str, optional
+        Beginning of the names of the files; that of the model where it is not given.
+    shown : Dataset, optional
+        A longer record that the pictures show, with the end of the fit marked.
+
+    Returns
+    -------
+    list of pathlib.Path
+        ``{name}.json``, and as PNG and SVG ``{name}_loop``, ``{name}_time`` and, where a swarm
+        searched, ``{name}_convergence``.
+    """
+    from .plot import plot_convergence, plot_loop, plot_time
+
+    path = make_folder(folder)
+    name = fit.model.info.name if name is None else name
+    record = fit.data if shown is None else shown
+    run = fit.simulate(record, offset=fit.offset)
+    until = None if shown is None else float(fit.data.t[-1])
+    figures = {
+        f"{name}_loop": plot_loop(record, run).figure,
+        f"{name}_time": plot_time(record, run, stroke=fit.stroke, fitted_until=until)[0].figure,
+    }
+    if fit.swarm is not None:
+        figures[f"{name}_convergence"] = plot_convergence(fit).figure
+    return [fit.save(path / f"{name}.json"), *save_figures(figures, path)]  # type: ignore[arg-type]

@@ -1,0 +1,199 @@
+"""The result of an identification: the model, the record, and how the fit ended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..data import diagnostics
+from .identified import IdentifiedModel, Score
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from ..data.dataset import Dataset
+    from ..stages.base import Response
+    from .estimates import Estimate, StopReason, SwarmRun
+    from .least_squares import LeastSquares
+    from .swarm import ParticleSwarm
+
+    Array = NDArray[np.float64]
+
+__all__ = ["Identification"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Identification(IdentifiedModel):
+    """What an identification found; see `IdentifiedModel` for its use.
+
+    A swarm fills all attributes but `least_squares` and `at_bound`, least squares those two and
+    the first three.
+
+    Attributes
+    ----------
+    data : Dataset
+        The record.
+    cost : float
+        RMS deviation in the window [m], equation (16) of Xu and Li 2010.
+    nfev : int
+        Simulations of the record, of all runs.
+    stop_reason : {"stalled", "iterations", "interrupted", "solved"}
+        Why the fit ended; the last of least squares.
+    parameters : dict of str to Estimate
+        The parameters with units, bounds and standard deviations; the delay with them where it
+        was fitted. Empty of least squares.
+    history : ndarray, shape (nit + 1,)
+        Best cost after each iteration of the swarm [m].
+    nit : int
+        Iterations of the swarm that found the best candidate.
+    nfail : int
+        Simulations that did not stay finite.
+    npolish : int
+        Simulations of the local refinement after that swarm; `history` is the swarm's alone.
+    runs : tuple of SwarmRun
+        The independent restarts; the rest is of the best of them.
+    substeps, order : int
+        Steps of the integrator in each sampling interval and their order, fixed for the search.
+    seed : int or None
+        Seed of the random numbers.
+    swarm : ParticleSwarm or None
+        Settings of the swarm.
+    least_squares : LeastSquares or None
+        Settings of the least squares.
+    at_bound : bool
+        Whether a time constant or a frequency lies on the edge of the range searched.
+    """
+
+    data: Dataset
+    cost: float
+    nfev: int
+    stop_reason: StopReason
+    parameters: Mapping[str, Estimate] = field(default_factory=dict)
+    history: Array = field(default_factory=lambda: np.empty(0))
+    nit: int = 0
+    nfail: int = 0
+    npolish: int = 0
+    runs: tuple[SwarmRun, ...] = ()
+    substeps: int = 1
+    order: int = 0
+    seed: int | None = None
+    swarm: ParticleSwarm | None = None
+    least_squares: LeastSquares | None = None
+    at_bound: bool = False
+
+    def __repr__(self) -> str:
+        return (
+            f"<Identification, {self.model.info.title}: {self.cost_um:.4g} um rms, "
+            f"{self.cost_percent:.3g} % of stroke; see summary()>"
+        )
+
+    @property
+    def fun(self) -> float:
+        """The cost [m], under SciPy's name."""
+        return self.cost
+
+    @property
+    def cost_um(self) -> float:
+        """The cost [um]."""
+        return 1e6 * self.cost
+
+    @property
+    def cost_percent(self) -> float:
+        """The cost in per cent of the stroke."""
+        return 100.0 * self.cost / self.stroke
+
+    @cached_property
+    def fitted(self) -> Score:
+        """Score on the record that was identified, converged in the sub-steps."""
+        return self.score(self.data, offset=self.offset)
+
+    @cached_property
+    def _response(self) -> Response:
+        """Motion of the model on the record."""
+        return self.simulate(self.data, offset=self.offset)
+
+    @property
+    def notes(self) -> list[str]:
+        """Remarks on the record and on the fit that limit the use of the result."""
+        info, data = self.model.info, self.data
+        notes = diagnostics.of_record(data)
+        if self.cost_percent > 5.0:
+            notes.append(
+                f"the model does not follow this record: {self.cost_percent:.3g} % of stroke remain"
+            )
+        if self.cost_percent > diagnostics.REMAINS:
+            held = [name for name, estimate in self.parameters.items() if not estimate.free]
+            notes += diagnostics.of_fit(
+                data, self._response.x, self.cost_percent, info.hysteresis, held
+            )
+        if info.drive_unit == "N" and data.drive_unit != "N":
+            notes.append(f"the drive is in {data.drive_unit}: forces are in it too, not in N")
+        notes += self.model._notes(lambda: self._response)
+        if self.at_bound:
+            notes.append(
+                "the record does not determine the dynamics: they lie on the edge of the search"
+            )
+        if len(self.runs) > 1 and self.agreeing == 1:
+            notes.append("no other run ended where the best one did: try more, with runs=")
+        return notes
+
+    @property
+    def agreeing(self) -> int:
+        """Number of runs that ended within 0.1 % of the lowest cost.
+
+        Costs below 0.001 % of the stroke count as equal.
+        """
+        near = max(1.001 * self.cost, 1e-5 * self.stroke)
+        return sum(run.cost <= near for run in self.runs)
+
+    @property
+    def success(self) -> bool:
+        """Whether the fit ended by itself."""
+        return self.stop_reason != "interrupted"
+
+    @property
+    def message(self) -> str:
+        """Why the fit ended, in words."""
+        if self.stop_reason == "stalled" and self.swarm is not None:
+            return (
+                f"{self.swarm.stall_iterations} iterations in a row improved the cost by less than "
+                f"{1e6 * self.swarm.min_improvement:g} um"
+            )
+        if self.stop_reason == "iterations" and self.swarm is not None:
+            return f"all {self.swarm.iterations} iterations were done"
+        return self.stop_reason
+
+    def summary(self) -> str:
+        """Table of the result.
+
+        Returns
+        -------
+        str
+            Several lines: the cost, what the data determine, the parameters.
+        """
+        from .report import summary_text
+
+        return summary_text(self)
+
+    def plot(self, data: Dataset | None = None) -> Figure:
+        """Loop, displacement with its error over time, and convergence of a swarm.
+
+        Parameters
+        ----------
+        data : Dataset, optional
+            Another record to show the model on.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Not yet shown or saved.
+        """
+        from .plot import plot_identification
+
+        return plot_identification(self, data)

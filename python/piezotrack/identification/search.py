@@ -1,0 +1,250 @@
+"""Identification by a particle swarm that searches the parameters of a stage model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from .. import _core
+from .._support.progress_bar import ProgressBar
+from ..data import diagnostics
+from ..errors import Interrupted, ParameterError
+from ..stages.registry import stage_class
+from .estimates import Estimate, Progress, SwarmRun
+from .model_file import provenance
+from .result import Identification
+from .step_response import StepResult
+from .swarm import ParticleSwarm
+
+if TYPE_CHECKING:
+    from ..data.dataset import Dataset
+    from ..stages.base import ModelInfo
+
+__all__ = ["search"]
+
+DEFAULT_RUNS = 4
+
+
+def search(
+    data: Dataset,
+    info: ModelInfo,
+    *,
+    offset: bool,
+    free: object = None,
+    fixed: object = None,
+    initial: object = None,
+    bounds: object = None,
+    stiffness: object = None,
+    delay: object = None,
+    swarm: object = None,
+    seed: object = None,
+    runs: object = None,
+    threads: object = None,
+    progress: bool | None = None,
+    callback: object = None,
+) -> Identification:
+    """Search the parameters of a model with a swarm.
+
+    Parameters
+    ----------
+    data : Dataset
+        The record.
+    info : ModelInfo
+        The model.
+    offset : bool
+        Whether an offset of the sensor is fitted.
+    free, fixed, initial, bounds, stiffness, delay, swarm, seed, runs, threads, progress, callback
+        As for `identify`, not yet checked; the default of each where it is None.
+
+    Returns
+    -------
+    Identification
+        The best candidate.
+
+    Raises
+    ------
+    ParameterError, DataError, NumericalError, Interrupted
+        As for `identify`.
+    """
+    swarm = ParticleSwarm() if swarm is None else swarm
+    if not isinstance(swarm, ParticleSwarm):
+        raise ParameterError(f"swarm is {swarm!r}: expected a ParticleSwarm, as pt.ParticleSwarm()")
+    if callback is not None and not callable(callback):
+        raise ParameterError(f"callback is {callback!r}: expected a function, or None")
+    seed = 0 if seed is None else _core.as_count("seed", seed)
+    searched_delay = _delay(False if delay is None else delay)
+    held = _held(initial, fixed, free, bounds)
+    diagnostics.refuse(data, searches_hysteresis=bool(set(info.hysteresis) - set(held)))
+    full = data.full
+    with ProgressBar(progress) as bar:
+        found = _core.identify(
+            model=info.name,
+            u=full.u,
+            y=full.y,
+            dt=data.dt,
+            hold_name=data.hold,
+            start=data.warmup,
+            free=_names(free),
+            fixed=list(held.items()),
+            bounds=[(name, _pair(name, pair)) for name, pair in _items("bounds", bounds)],
+            stiffness=None if stiffness is None else _core.as_number("stiffness", stiffness),
+            offset=offset,
+            delay=searched_delay,
+            settings=swarm._core,
+            seed=seed,
+            runs=DEFAULT_RUNS if runs is None else _core.as_count("runs", runs),
+            threads=0 if threads is None else _core.as_count("threads", threads),
+            callback=None if callback is None else _reporting(info, callback),
+            progress=bar.update,
+        )
+    if found is None:
+        raise Interrupted("interrupted before the first cost was computed")
+    fit = _identification(info, found, data, swarm, seed, offset)
+    if not fit.success:
+        raise Interrupted(
+            f"interrupted after {fit.nit} iterations, best cost {fit.cost_um:.4g} um", fit
+        )
+    return fit
+
+
+def _reporting(info: ModelInfo, callback: Callable[[Progress], object]) -> Callable[..., bool]:
+    """Call back with a `Progress` where the core has plain numbers."""
+    names = [one.name for one in info.parameters]
+
+    def report(nit: int, most: int, nfev: int, cost: float, theta: list[float]) -> bool:
+        parameters = dict(zip(names, theta, strict=False))
+        return bool(callback(Progress(nit, most, nfev, cost, parameters, theta[-1])))
+
+    return report
+
+
+def _names(free: object) -> list[str] | None:
+    """Check that free names parameters in a list."""
+    if free is None:
+        return None
+    if isinstance(free, str) or not isinstance(free, Iterable):
+        raise ParameterError(f"free is {free!r}: expected names in a list, as ['mass']")
+    return [str(name) for name in free]
+
+
+def _held(initial: object, fixed: object, free: object, bounds: object) -> dict[str, float]:
+    """Merge what is held: by a step response, unless the call names the parameter, and by name."""
+    given = {name: _core.as_number(name, value) for name, value in _items("fixed", fixed)}
+    if initial is None:
+        return given
+    if not isinstance(initial, StepResult):
+        raise ParameterError(
+            f"initial is {type(initial).__name__}: expected a StepResult, see pt.identify_step"
+        )
+    said = {*(_names(free) or []), *(name for name, _ in _items("bounds", bounds))}
+    return {n: v for n, v in initial.hysteresis.items() if n not in said} | given
+
+
+def _items(argument: str, mapping: object) -> list[tuple[str, Any]]:
+    """Check that an argument maps names of parameters to something."""
+    if mapping is None:
+        return []
+    if not isinstance(mapping, Mapping):
+        raise ParameterError(f"{argument} is {mapping!r}: expected a mapping of names to values")
+    return [(str(name), value) for name, value in mapping.items()]
+
+
+def _pair(name: str, pair: object) -> tuple[float, float]:
+    """Check that bounds are two numbers."""
+    two = list(pair) if isinstance(pair, Iterable) and not isinstance(pair, str) else []
+    if len(two) != 2:
+        raise ParameterError(f"bounds of {name} are {pair!r}: expected (low, high)")
+    low, high = two
+    return (
+        _core.as_number(f"lower bound of {name}", low),
+        _core.as_number(f"upper bound of {name}", high),
+    )
+
+
+def _delay(delay: object) -> tuple[float, float] | None:
+    """Bounds of the delay; none where the core chooses them, equal ones where it is known."""
+    if isinstance(delay, bool):
+        return None if delay else (0.0, 0.0)
+    if isinstance(delay, Iterable) and not isinstance(delay, str):
+        low, high = _pair("delay", delay)
+        if low == high:
+            raise ParameterError(f"bounds of delay are ({low}, {high}) s: expected the lower first")
+        return low, high
+    known = _core.as_number("delay", delay)
+    return known, known
+
+
+def _identification(
+    info: ModelInfo,
+    found: _core.Search,
+    data: Dataset,
+    swarm: ParticleSwarm,
+    seed: int,
+    offset: bool,
+) -> Identification:
+    deviations = {i: (deviation, at_bound) for i, deviation, at_bound in found.sensitivities}
+    parameters = {}
+    listed = [(one.name, one.symbol, one.unit) for one in info.parameters]
+    for i, (name, symbol, unit) in enumerate([*listed, ("delay", "Td", "s")]):
+        bounds = found.bounds[i]
+        deviation, at_bound = deviations.get(i, (None, False))
+        parameters[name] = Estimate(
+            found.theta[i], unit, symbol, bounds is not None, bounds, deviation, at_bound
+        )
+    delay = found.theta[-1]
+    if delay == 0.0 and not parameters["delay"].free:
+        del parameters["delay"]
+    details: dict[str, Any] = {
+        "parameters": {
+            name: _details(estimate) for name, estimate in parameters.items() if name != "delay"
+        },
+        "delay": _details(parameters["delay"]) if "delay" in parameters else {},
+        "fit": {
+            "cost": {"value": found.rms, "unit": "m"},
+            "iterations": found.iterations,
+            "simulations": sum(nfev for _, _, nfev, _ in found.runs),
+            "polish_simulations": found.polish_evaluations,
+            "failed_simulations": found.failures,
+            "stop_reason": found.stop_reason,
+            "runs": [{"cost": cost, "stop_reason": reason} for cost, _, _, reason in found.runs],
+            "substeps": found.substeps,
+            "order": found.order,
+        },
+        "provenance": provenance(data, seed=seed, swarm=asdict(swarm)),
+    }
+    return Identification(
+        model=stage_class(info)._from(
+            (one.name, [value]) for one, value in zip(info.parameters, found.theta, strict=False)
+        ),
+        delay=delay,
+        offset=found.offset,
+        offset_fitted=offset,
+        scale_assumed=found.scale_assumed,
+        stroke=data.stroke,
+        details=details,
+        data=data,
+        parameters=parameters,
+        cost=found.rms,
+        history=found.history,
+        nit=found.iterations,
+        nfev=sum(nfev for _, _, nfev, _ in found.runs),
+        nfail=found.failures,
+        npolish=found.polish_evaluations,
+        stop_reason=found.stop_reason,
+        runs=tuple(SwarmRun(*run) for run in found.runs),
+        substeps=found.substeps,
+        order=found.order,
+        seed=seed,
+        swarm=swarm,
+    )
+
+
+def _details(estimate: Estimate) -> dict[str, Any]:
+    """Entries of the file for a parameter."""
+    return {
+        "free": estimate.free,
+        "bounds": estimate.bounds,
+        "standard_deviation": estimate.deviation,
+        "at_bound": estimate.at_bound,
+    }

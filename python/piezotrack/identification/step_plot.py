@@ -1,0 +1,184 @@
+"""Pictures of a step response: the step with its peaks, the spectrum with its resonance."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._support.plot_style import axes_or_new
+from .._support.units import best_length_unit
+from ..errors import ParameterError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from .step_response import StepResult, StepTrace
+
+__all__ = ["plot_spectrum", "plot_step", "plot_step_result"]
+
+MEASURED: dict[str, Any] = {"color": "#1b6ca8", "linewidth": 1.1, "label": "measured"}
+MARKS: dict[str, Any] = {
+    "color": "#b3400a",
+    "linestyle": "none",
+    "marker": "o",
+    "markersize": 4.5,
+    "markerfacecolor": "none",
+}
+QUIET: dict[str, Any] = {"color": "0.45", "linewidth": 0.9, "linestyle": "--"}
+# Time constants that are shown, and samples at most.
+SHOWN, MOST_POINTS = 8.0, 20000
+MARGIN = 0.06
+
+
+def plot_step(step: StepResult, ax: Axes | None = None) -> Axes:
+    """Draw the displacement after the step, with the peaks and the level it ends at.
+
+    Parameters
+    ----------
+    step : StepResult
+        What a step told.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure where not given.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    ParameterError
+        The readings were typed in.
+    """
+    trace, (ax,) = _trace(step), axes_or_new(ax, 1)
+    read = step.readings
+    unit, scale = best_length_unit(max(abs(peak) for peak in read.peaks))
+    until = trace.peak_times[-1] + 2.0 * read.period
+    until = min(max(until, trace.step_time + SHOWN * step.time_constant), trace.end_time)
+    since = trace.step_time - MARGIN * (until - trace.step_time)
+    t = trace.data.t
+    shown = np.flatnonzero((t >= since) & (t <= until))
+    shown = shown[:: max(1, shown.size // MOST_POINTS)]
+    ms = 1e3 * (t[shown] - trace.step_time)
+    ax.plot(ms, scale * (trace.data.y[shown] - trace.rest), **MEASURED)
+    steady = scale * read.steady_state
+    ax.axhline(steady, **QUIET, zorder=0, label=f"steady state, {steady:.4g} {unit}")
+    times = [1e3 * (time - trace.step_time) for time in trace.peak_times]
+    ax.plot(times, [scale * peak for peak in read.peaks], **MARKS, label="overshoot peaks")
+    for time, peak in list(zip(times, read.peaks, strict=True))[:2]:
+        ax.annotate(
+            f"{scale * peak:.4g}",
+            (time, scale * peak),
+            xytext=(6, 3),
+            textcoords="offset points",
+            fontsize="small",
+            color="#b3400a",
+        )
+    ax.set(xlabel="time after the step [ms]", ylabel=f"displacement [{unit}]")
+    ax.set_title(
+        f"Step of {read.voltage:.4g} {trace.data.drive_unit}: Td = {1e3 * read.period:.4g} ms, "
+        f"overshoot {100 * step.overshoot_ratio:.3g} %",
+        fontsize="medium",
+    )
+    ax.margins(x=0.0, y=0.08)
+    ax.legend(loc="lower right" if steady > 0.0 else "upper right", frameon=False)
+    return ax
+
+
+def plot_spectrum(step: StepResult, ax: Axes | None = None) -> Axes:
+    """Draw the gain over the frequency, with the resonance and the gain at standstill.
+
+    Parameters
+    ----------
+    step : StepResult
+        What a step told.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure where not given.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    ParameterError
+        The readings were typed in.
+    """
+    trace, (ax,) = _trace(step), axes_or_new(ax, 1)
+    read = step.readings
+    unit, scale = best_length_unit(abs(read.steady_state))
+    static, resonance = scale * abs(read.static_gain), scale * abs(read.resonance_gain)
+    per_volt = f"{unit}/{trace.data.drive_unit}"
+    # The curve may step over a narrow peak; the peak itself is known.
+    places = np.append(trace.frequencies, read.frequency)
+    gains = np.append(trace.gains, abs(read.resonance_gain))
+    order = np.argsort(places)
+    ax.plot(places[order], scale * gains[order], color=MEASURED["color"], linewidth=1.1)
+    ax.axhline(static, **QUIET, zorder=0)
+    ax.plot([read.frequency], [resonance], **MARKS)
+    ax.set_yscale("log")
+    low, high = ax.get_ylim()
+    ax.set_ylim(max(low, 1e-3 * resonance), 1.6 * max(high, resonance))
+    right = float(trace.frequencies[-1])
+    ax.annotate(
+        f"resonance {read.frequency:.4g} Hz,\n{resonance:.4g} {per_volt}",
+        (read.frequency, resonance),
+        xytext=(10, -2),
+        textcoords="offset points",
+        fontsize="small",
+        va="center",
+        color="#b3400a",
+    )
+    ax.annotate(
+        f"static gain {static:.4g} {per_volt}",
+        (right, static),
+        xytext=(-4, 4),
+        textcoords="offset points",
+        fontsize="small",
+        ha="right",
+        color="0.3",
+    )
+    ax.set(xlabel="frequency [Hz]", ylabel=f"gain [{per_volt}]")
+    ax.set_title(
+        f"Spectrum: zeta = {step.damping_ratio:.3g} by the gains, "
+        f"{step.damping_by_decrement:.3g} by the decrement",
+        fontsize="medium",
+    )
+    ax.set_xlim(0.0, right)
+    return ax
+
+
+def plot_step_result(step: StepResult) -> Figure:
+    """Put step and spectrum on one sheet.
+
+    Parameters
+    ----------
+    step : StepResult
+        What a step told.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Two panels.
+
+    Raises
+    ------
+    ParameterError
+        The readings were typed in.
+    """
+    import matplotlib.pyplot as plt
+
+    _trace(step)
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.4), layout="constrained")
+    plot_step(step, left)
+    plot_spectrum(step, right)
+    return figure
+
+
+def _trace(step: StepResult) -> StepTrace:
+    if step.trace is None:
+        raise ParameterError("the readings were typed in: expected a record, to have what to draw")
+    return step.trace

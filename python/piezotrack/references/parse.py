@@ -1,0 +1,358 @@
+"""References and paths as text: ``sine:0.2Hz,0..110um``, ``circle:0.1Hz,10um``."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .._support.units import Unit, known_units, lookup
+from ..errors import ParameterError
+from .paths import circle, lissajous, raster, spiral
+from .reference import read_reference
+from .waveforms import chirp, multisine, sine, staircase, triangle
+from .xy_reference import read_path
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from .reference import Reference
+    from .xy_reference import XYReference
+
+__all__ = ["parse_path", "parse_reference"]
+
+# How long a reference is that repeats and says nothing of its length.
+PERIODS = 4.0
+
+HERTZ = Unit("Hz", "frequency", "Hz")
+OTHER_UNITS = {
+    "Hz": HERTZ,
+    "hz": HERTZ,
+    "mHz": Unit("mHz", "frequency", "Hz", divisor=1e3),
+    "kHz": Unit("kHz", "frequency", "Hz", factor=1e3),
+    "rad": Unit("rad", "angle", "rad"),
+    "deg": Unit("deg", "angle", "rad", factor=math.pi, divisor=180.0),
+}
+UNITS = {"frequency": "Hz, mHz, kHz", "angle": "rad, deg", "number": "none"}
+UNITS |= {quantity: known_units(quantity) for quantity in ("time", "displacement")}
+PLAIN = Unit("", "number", "")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """How a kind of reference is written, and what its items are for.
+
+    An item without keyword is told by what it measures and how its values are joined.
+    """
+
+    make: Callable[..., Any]
+    form: str
+    example: str
+    items: Mapping[tuple[str, str], tuple[str, ...]]
+    keywords: Mapping[str, str]
+    needed: tuple[str, ...]
+
+    @property
+    def expected(self) -> str:
+        return f"expected {self.form}, as in {self.example}"
+
+
+RANGE: dict[tuple[str, str], tuple[str, ...]] = {
+    ("displacement", ".."): ("low", "high"),
+    ("time", ""): ("duration",),
+}
+KINDS = {
+    "sine": Kind(
+        sine,
+        "sine:FREQUENCY,LOW..HIGH[,DURATION][,phase=ANGLE][,ramp=TIME]",
+        "sine:0.2Hz,0..110um",
+        {("frequency", ""): ("frequency",), **RANGE},
+        {"phase": "angle", "ramp": "time"},
+        ("frequency", "low", "duration"),
+    ),
+    "triangle": Kind(
+        triangle,
+        "triangle:FREQUENCY,LOW..HIGH[,DURATION][,rounding=SHARE][,ramp=TIME]",
+        "triangle:1Hz,0..50um",
+        {("frequency", ""): ("frequency",), **RANGE},
+        {"rounding": "number", "ramp": "time"},
+        ("frequency", "low", "duration"),
+    ),
+    "staircase": Kind(
+        staircase,
+        "staircase:STEPS,LOW..HIGH,dwell=TIME[,rise=TIME][,DURATION]",
+        "staircase:5,0..100um,dwell=1s or staircase:levels=0/30/10um,dwell=1s",
+        {("number", ""): ("steps",), **RANGE},
+        {"levels": "displacement", "dwell": "time", "rise": "time"},
+        ("dwell",),
+    ),
+    "chirp": Kind(
+        chirp,
+        "chirp:START..STOP,LOW..HIGH,DURATION[,ramp=TIME]",
+        "chirp:0.1..5Hz,0..110um,20s",
+        {("frequency", ".."): ("start_frequency", "stop_frequency"), **RANGE},
+        {"ramp": "time"},
+        ("start_frequency", "low", "duration"),
+    ),
+    "multisine": Kind(
+        multisine,
+        "multisine:FREQUENCY/FREQUENCY/...,LOW..HIGH,DURATION[,seed=NUMBER][,ramp=TIME]",
+        "multisine:0.5/1.3/2.7Hz,0..50um,20s",
+        {("frequency", "/"): ("frequencies",), ("frequency", ""): ("frequencies",), **RANGE},
+        {"seed": "number", "ramp": "time"},
+        ("frequencies", "low", "duration"),
+    ),
+}
+# Arguments that take a list, and what the rest is called where it is missing.
+LISTS = ("levels", "frequencies", "sizes", "centre")
+MISSING = {"low": "range", "start_frequency": "frequencies"}
+
+_VALUE = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\W\d_]*)")
+
+
+def parse_reference(text: str, *, duration: float | None = None) -> Reference:
+    r"""Make a reference from a text, as the command line takes it.
+
+    =============================  =========================================================
+    ``sine:0.2Hz,0..110um``        frequency, lowest and highest displacement; optional
+                                   duration, ``phase=90deg``, ``ramp=1s``
+    ``triangle:1Hz,0..50um``       the same; optional duration, ``rounding=0.2``, ``ramp=1s``
+    ``chirp:0.1..5Hz,0..50um,20s`` first and last frequency, range, duration; optional
+                                   ``ramp=1s``
+    ``staircase:5,0..100um``       number of steps up, range, and ``dwell=1s``; or
+    ``staircase:levels=0/30/10um`` levels and ``dwell=1s``; optional ``rise=0.1s``, duration
+    ``multisine:0.5/1.3Hz,0..9um`` frequencies, range, duration; optional ``seed=1``,
+                                   ``ramp=1s``
+    ``target.csv``                 a file, as `read_reference` takes it
+    =============================  =========================================================
+
+    Parameters
+    ----------
+    text : str
+        The kind and what is to be known of it. A length of time on its own is the duration; the
+        last of several values joined by ``..`` or ``/`` gives its unit to those without one.
+    duration : float, optional
+        Length [s], where `text` has none. Without either, a sine or a triangle lasts four
+        periods, a staircase and a file as long as they are, and the others need one.
+
+    Returns
+    -------
+    Reference
+        As `sine`, `triangle`, `staircase`, `chirp`, `multisine` or `read_reference` make it.
+
+    Raises
+    ------
+    ParameterError
+        The text cannot be understood, or a value cannot be used. The message shows what was
+        expected.
+    DataError
+        The file cannot be read or used.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> pt.parse_reference("sine:0.2Hz,0..110um")
+    Reference(sine 0.2 Hz, 0 to 110 um, 20 s)
+    >>> pt.parse_reference("staircase:levels=0/30/10um,dwell=500ms")
+    Reference(staircase of 3 levels, 0 to 30 um, 1.7 s)
+    """
+    reference: Reference = made_from_text("reference", text, KINDS, read_reference, duration)
+    return reference
+
+
+def made_from_text(
+    what: str,
+    text: str,
+    kinds: Mapping[str, Kind],
+    read: Callable[..., Any],
+    duration: float | None,
+) -> Any:
+    """Make what a text describes, or read it where the text is a file's name."""
+    examples = ", ".join(kind.example for kind in kinds.values())
+    if not isinstance(text, str) or not text.strip():
+        raise ParameterError(f"{what} is {text!r}: expected a file or one of {examples}")
+    name, colon, rest = (part.strip() for part in text.partition(":"))
+    kind = kinds.get(name.lower())
+    is_there = os.path.exists(text)
+    if kind is None or (is_there and not colon):
+        # A colon after one letter is that of a drive.
+        is_path = not colon or len(name) == 1
+        if is_there or (is_path and Path(text).suffix):
+            return read(text, duration=duration)
+        raise ParameterError(
+            f"{what} {text!r} is neither a file nor a known kind: expected a file or one of "
+            f"{examples}"
+        )
+    try:
+        values = _values(kind, rest)
+        if duration is not None:
+            values.setdefault("duration", duration)
+        elif kind.make in (sine, triangle) and values.get("frequency", 0.0) > 0.0:
+            values.setdefault("duration", PERIODS / values["frequency"])
+        if missing := [argument for argument in kind.needed if argument not in values]:
+            called = MISSING.get(missing[0], missing[0])
+            raise ParameterError(f"there is no {called}: {kind.expected}")
+        return kind.make(**values)
+    except ParameterError as error:
+        raise ParameterError(f"{what} {text!r}: {error}") from None
+
+
+def _values(kind: Kind, text: str) -> dict[str, Any]:
+    """Return the values in a text by the arguments that they are for."""
+    values: dict[str, Any] = {}
+    for item in filter(None, (part.strip() for part in text.split(","))):
+        keyword, equals, written = (part.strip() for part in item.rpartition("="))
+        numbers, quantity, join = _item(written)
+        if equals and keyword not in kind.keywords:
+            known = ", ".join(kind.keywords)
+            raise ParameterError(f"{keyword!r} is not one of {known}: {kind.expected}")
+        if equals and quantity != (wanted := kind.keywords[keyword]):
+            units = UNITS[wanted]
+            raise ParameterError(f"{item!r} has the wrong unit: expected {wanted}, unit {units}")
+        if equals and join != ("/" if keyword in LISTS else ""):
+            raise ParameterError(f"{item!r} cannot be understood: {kind.expected}")
+        names = (keyword,) if equals else kind.items.get((quantity, join))
+        if names is None:
+            problem = "has no unit" if quantity == "number" else "has no place here"
+            raise ParameterError(f"{item!r} {problem}: {kind.expected}")
+        for name, number in zip(names, [numbers] if names[0] in LISTS else numbers, strict=True):
+            if name in values:
+                raise ParameterError(f"{item!r} gives {name} a second time: {kind.expected}")
+            values[name] = number
+    return values
+
+
+def _item(text: str) -> tuple[list[float], str, str]:
+    """Read one value or several: the numbers in SI, what they measure and how they are joined."""
+    if "..." in text:
+        raise ParameterError(f"{text!r} has three dots: expected two, as in 0..110um")
+    join = next((mark for mark in ("..", "/") if mark in text), "")
+    found = []
+    for part in text.split(join) if join else [text]:
+        match = _VALUE.fullmatch(part.strip())
+        if match is None:
+            raise ParameterError(f"{part.strip()!r} in {text!r} is not a number with its unit")
+        found.append((float(match[1]), match[2]))
+    if join == ".." and len(found) != 2:
+        raise ParameterError(f"{text!r} has {len(found)} values: expected two, as in 0..110um")
+    # The last unit counts for the values before it that have none.
+    units = [_unit(name or found[-1][1]) for _, name in found]
+    if len({unit.quantity for unit in units}) > 1:
+        raise ParameterError(f"{text!r} mixes {units[0].name} and {units[-1].name}")
+    numbers = [
+        number * unit.factor / unit.divisor for (number, _), unit in zip(found, units, strict=True)
+    ]
+    if units[0] is PLAIN:
+        numbers = [int(number) if number.is_integer() else number for number in numbers]
+    return numbers, units[0].quantity, join
+
+
+def _unit(name: str) -> Unit:
+    unit = PLAIN if not name else OTHER_UNITS.get(name) or lookup(name)
+    if unit is None:
+        known = ", ".join(UNITS[quantity] for quantity in ("frequency", "displacement", "time"))
+        raise ParameterError(f"unknown unit {name!r}: expected one of {known}")
+    return unit
+
+
+PLACED = {"centre": "displacement", "ramp": "time"}
+PATHS = {
+    "circle": Kind(
+        circle,
+        "circle:FREQUENCY,RADIUS[,DURATION][,phase=ANGLE][,centre=X/Y][,ramp=TIME]",
+        "circle:0.1Hz,10um",
+        {
+            ("frequency", ""): ("frequency",),
+            ("displacement", ""): ("radius",),
+            ("time", ""): ("duration",),
+        },
+        {"phase": "angle", **PLACED},
+        ("frequency", "radius"),
+    ),
+    "lissajous": Kind(
+        lissajous,
+        "lissajous:FX/FY,AX/AY[,DURATION][,phase=ANGLE][,centre=X/Y][,ramp=TIME]",
+        "lissajous:0.2/0.3Hz,20/20um",
+        {
+            ("frequency", "/"): ("frequencies",),
+            ("displacement", "/"): ("sizes",),
+            ("time", ""): ("duration",),
+        },
+        {"phase": "angle", **PLACED},
+        ("frequencies", "sizes"),
+    ),
+    "raster": Kind(
+        raster,
+        "raster:RATE,WIDTH/HEIGHT,lines=NUMBER[,flyback=SHARE][,DURATION][,centre=X/Y][,ramp=TIME]",
+        "raster:1Hz,20/20um,lines=9",
+        {
+            ("frequency", ""): ("line_rate",),
+            ("displacement", "/"): ("sizes",),
+            ("time", ""): ("duration",),
+        },
+        {"lines": "number", "flyback": "number", **PLACED},
+        ("line_rate", "sizes", "lines"),
+    ),
+    "spiral": Kind(
+        spiral,
+        "spiral:FREQUENCY,RADIUS,pitch=LENGTH[,centre=X/Y][,ramp=TIME]",
+        "spiral:0.5Hz,20um,pitch=2um",
+        {("frequency", ""): ("frequency",), ("displacement", ""): ("radius",)},
+        {"pitch": "displacement", **PLACED},
+        ("frequency", "radius", "pitch"),
+    ),
+}
+
+
+def parse_path(text: str, *, duration: float | None = None) -> XYReference:
+    r"""Make a path from a text, as the command line takes it.
+
+    =================================  =====================================================
+    ``circle:0.1Hz,10um``              frequency and radius; optional duration,
+                                       ``phase=90deg``
+    ``lissajous:0.2/0.3Hz,20/20um``    frequencies and amplitudes of x and y; optional
+                                       duration, ``phase=90deg``
+    ``raster:1Hz,20/20um,lines=9``     lines in a second, width and height, lines in a frame;
+                                       optional ``flyback=0.25``, duration
+    ``spiral:0.5Hz,20um,pitch=2um``    turns in a second, radius, distance of turns
+    ``path.csv``                       a file, as `read_path` takes it
+    =================================  =====================================================
+
+    All but files take ``centre=58.5/58.5um`` and ``ramp=2s``.
+
+    Parameters
+    ----------
+    text : str
+        The kind and what is to be known of it, as for `parse_reference`.
+    duration : float, optional
+        Length [s], where `text` has none; not for a spiral, which has its own.
+
+    Returns
+    -------
+    XYReference
+        As `circle`, `lissajous`, `raster`, `spiral` or `read_path` make it.
+
+    Raises
+    ------
+    ParameterError
+        The text cannot be understood, or a value cannot be used. The message shows what was
+        expected.
+    DataError
+        The file cannot be read or used.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> pt.parse_path("circle:0.1Hz,10um,centre=50/50um")
+    XYReference(circle 10 um, 0.1 Hz, 40 to 60 by 40 to 60 um, 30 s)
+    """
+    if duration is not None and str(text).strip().lower().startswith("spiral:"):
+        raise ParameterError(
+            f"duration is {duration:g} s: expected none, as radius, pitch and frequency of a "
+            "spiral are its length"
+        )
+    path: XYReference = made_from_text("path", text, PATHS, read_path, duration)
+    return path

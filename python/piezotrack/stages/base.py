@@ -1,0 +1,488 @@
+"""Base class of the stage models, their states and their response."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self, TypeVar
+
+import numpy as np
+
+from .. import _core
+from .._core import Stage as CoreStage
+from .._support.arguments import as_numbers
+from ..errors import ParameterError
+from .inverse import Inverse
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from ..data.dataset import Hold
+
+    Array = NDArray[np.float64]
+
+__all__ = [
+    "MODEL_STEP",
+    "ForceState",
+    "ModelInfo",
+    "Parameter",
+    "Ratio",
+    "Response",
+    "Stage",
+    "StageState",
+    "mechanical_ratios",
+    "stage",
+]
+
+# Longest step in which a model's mechanics are followed under a jumping voltage [s].
+MODEL_STEP = 5e-5
+# Parameters that do not describe hysteresis.
+MECHANICS = ("mass", "damping", "stiffness", "piezo_coefficient")
+# Parameter, symbol, value and unit.
+Ratio = tuple[str, str, float, str]
+# Names and numbers, as the core takes and gives them.
+Named = list[tuple[str, list[float]]]
+Method = Literal["exponential", "rk4", "rk45"]
+
+
+class Parameter(NamedTuple):
+    """A parameter of a model, or a part of its state, as the core describes it.
+
+    Attributes
+    ----------
+    name, symbol, unit : str
+        Name in both languages, symbol in the literature, SI unit.
+    carries_force : bool
+        Whether it scales with the unit of force.
+    default : float or None
+        Value where the caller gives none.
+    held : str or None
+        Why it is never searched, where that is so.
+    is_list, is_optional : bool
+        Whether it is a list of numbers, or may be left out.
+    """
+
+    name: str
+    symbol: str
+    unit: str
+    carries_force: bool
+    default: float | None
+    held: str | None
+    is_list: bool
+    is_optional: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelInfo:
+    """Name, title, parameters and state of a model, as the core lists it.
+
+    Attributes
+    ----------
+    name : str
+        Name in files and on the command line.
+    title : str
+        Name in tables and pictures.
+    drive_unit : str
+        Unit of the drive.
+    searched : bool
+        Whether a swarm searches the parameters; otherwise they follow by least squares.
+    parameters, state : tuple of Parameter
+        The parameters, and the parts of the state.
+    """
+
+    name: str
+    title: str
+    drive_unit: str
+    searched: bool
+    parameters: tuple[Parameter, ...]
+    state: tuple[Parameter, ...]
+
+    @property
+    def hysteresis(self) -> tuple[str, ...]:
+        """Parameters of the hysteresis of a model that a swarm searches by default."""
+        return tuple(
+            one.name
+            for one in self.parameters
+            if self.searched and one.default is None and one.name not in MECHANICS
+        )
+
+    @property
+    def has_dead_zones(self) -> bool:
+        """Whether dead zones may follow the plays."""
+        return any(one.name == "dead_zone_weights" for one in self.parameters)
+
+    @property
+    def force_symbols(self) -> str:
+        """Symbols of the parameters that scale with the stiffness, in words."""
+        symbols = [
+            one.symbol for one in self.parameters if one.carries_force and one.name != "stiffness"
+        ]
+        return " and ".join(filter(None, [", ".join(symbols[:-1]), *symbols[-1:]]))
+
+
+def _listed(entry: dict[str, Any]) -> ModelInfo:
+    return ModelInfo(
+        name=entry["name"],
+        title=entry["title"],
+        drive_unit=entry["drive_unit"],
+        searched=entry["searched"],
+        parameters=tuple(Parameter(**one) for one in entry["parameters"]),
+        state=tuple(Parameter(**one) for one in entry["state"]),
+    )
+
+
+# The models of the core, in its order.
+LISTED = {entry["name"]: _listed(entry) for entry in _core.models()}
+
+
+@dataclass(frozen=True, kw_only=True)
+class StageState:
+    """State of a stage at one instant; each model adds the memory of its hysteresis.
+
+    Parameters
+    ----------
+    x : float
+        Displacement [m].
+    v : float
+        Velocity [m/s].
+    """
+
+    x: float = 0.0
+    v: float = 0.0
+
+    @property
+    def _named(self) -> Named:
+        """Names and numbers of the state."""
+        return [(one.name, _entries(one.name, getattr(self, one.name))) for one in fields(self)]
+
+    @classmethod
+    def _from(cls, named: Iterable[tuple[str, list[float]]], parts: Iterable[Parameter]) -> Self:
+        lists = {part.name for part in parts if part.is_list}
+        given: dict[str, Any] = {
+            name: tuple(numbers) if name in lists else numbers[0] for name, numbers in named
+        }
+        return cls(**given)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceState(StageState):
+    """State of a stage whose hysteresis is a force in feedback on the displacement.
+
+    Parameters
+    ----------
+    force : float
+        Hysteresis force [N].
+    """
+
+    force: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Response:
+    """Motion of a stage at the samples of its drive.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n,)
+        Time [s], from 0 on.
+    u : ndarray, shape (n,)
+        Drive [V], or [N] for a model that is driven by a force.
+    x : ndarray, shape (n,)
+        Displacement [m].
+    v : ndarray, shape (n,)
+        Velocity [m/s]; 0 where the model has no mechanics.
+    hysteresis : ndarray, shape (n,)
+        Hysteresis force [N]; where the hysteresis is at the input its output, before creep and
+        dynamics [m].
+    final : StageState
+        State of the model at the last sample; ``initial=final`` continues from there.
+    substeps : int
+        Steps of the integrator in each sampling interval.
+    error_estimate : float
+        Largest change of `x` from a coarser simulation [m]; the error of `x` is a third of it,
+        and a fifteenth where the drive asked for the scheme's fourth order. 0 where the model is
+        exact from sample to sample.
+    unique : bool
+        Whether the solution is unique. False where a `DahlStage` with `b0` other than 0 came to
+        rest with the friction term along the motion and too little force to decide: another
+        motion then satisfies the same drive.
+    """
+
+    t: Array
+    u: Array
+    x: Array
+    v: Array
+    hysteresis: Array
+    final: Any
+    substeps: int
+    error_estimate: float
+    unique: bool
+
+
+class Stage:
+    """Base class of the stage models.
+
+    A model is a frozen dataclass with one field for each parameter that the core lists for it,
+    registered with the decorator `stage`.
+    """
+
+    info: ClassVar[ModelInfo]
+    _state: ClassVar[type[StageState]]
+
+    def __post_init__(self) -> None:
+        for one in self.info.parameters:
+            value = getattr(self, one.name)
+            if one.is_list:
+                value = as_numbers(one.name, value)
+            elif not (one.is_optional and value is None):
+                value = _core.as_number(one.name, value)
+            object.__setattr__(self, one.name, value)
+        # The core checks the ranges.
+        _ = self._core
+
+    def __getstate__(self) -> dict[str, Any]:
+        # What is cached stays behind: the core's stage cannot be pickled.
+        return {one.name: getattr(self, one.name) for one in self.info.parameters}
+
+    @classmethod
+    def parameter_names(cls) -> tuple[str, ...]:
+        """Names of the parameters, in their order.
+
+        Returns
+        -------
+        tuple of str
+            As the constructor takes them.
+        """
+        return tuple(one.name for one in cls.info.parameters)
+
+    @classmethod
+    def _from(cls, named: Iterable[tuple[str, list[float]]]) -> Self:
+        """Make a stage of names and numbers as the core gives them."""
+        parameters = {one.name: one for one in cls.info.parameters}
+        given: dict[str, Any] = {}
+        for name, numbers in named:
+            if parameters[name].is_list:
+                given[name] = tuple(numbers)
+            else:
+                given[name] = numbers[0] if numbers else None
+        return cls(**given)
+
+    @classmethod
+    def _published(cls, name: str) -> Self:
+        """Make the stage with published parameters."""
+        return cls._from(_core.published(cls.info.name, name))
+
+    @cached_property
+    def _core(self) -> CoreStage:
+        """The stage in the core."""
+        entries = [(name, _entries(name, getattr(self, name))) for name in self.parameter_names()]
+        return CoreStage(self.info.name, entries)
+
+    def simulate(
+        self,
+        u: ArrayLike,
+        dt: float,
+        *,
+        hold: Hold = "foh",
+        initial: StageState | None = None,
+        accuracy: float = 1e-10,
+    ) -> Response:
+        """Displacement under a sampled drive.
+
+        The linear part is exact, the hysteresis is exact along its input, and the force between
+        two steps is the cubic through its values and slopes; where the displacement leads the
+        hysteresis, a predictor and a corrector find them. The number of steps in a sampling
+        interval is doubled until no sample moves by more than `accuracy`. A model with play
+        operators is exact from sample to sample and takes one step.
+
+        Parameters
+        ----------
+        u : array_like, shape (n,)
+            Drive [V], or [N] for `BoucWenOscillator`.
+        dt : float
+            Sampling interval [s].
+        hold : {"foh", "zoh"}, optional
+            Between two samples the drive goes straight from one to the next (``"foh"``), or
+            stays constant until the next (``"zoh"``). With play operators, a sample under
+            ``"zoh"`` shows the stage before the step of the drive at that instant has an effect.
+        initial : StageState, optional
+            State of this model at the first sample; at rest, never driven, where it is not given.
+            To continue a simulation, begin the new drive with the last sample of the one before.
+            A model whose hysteresis is at its input lets the drive jump from the state's `u` to
+            the first sample.
+        accuracy : float, optional
+            Largest error of the displacement [m] that is accepted.
+
+        Returns
+        -------
+        Response
+            Motion at the n samples, with a `final` state to continue from.
+
+        Raises
+        ------
+        ParameterError
+            `dt` or `accuracy` is not above 0, or `hold` is unknown.
+        ShapeError, DataError
+            `u` is not one-dimensional, is empty, or holds NaN or infinity; `initial` is the state
+            of a stage with another number of plays or relaxations.
+        NumericalError
+            The motion does not stay finite, or the accuracy is out of reach.
+
+        Examples
+        --------
+        >>> import piezotrack as pt
+        >>> stage = pt.BoucWenOscillator.benchmark()
+        >>> u = [0.0, 10.0, 20.0, 10.0, 0.0]
+        >>> whole = stage.simulate(u, 0.001)
+        >>> first = stage.simulate(u[:3], 0.001)
+        >>> second = stage.simulate(u[2:], 0.001, initial=first.final)
+        >>> bool(abs(second.x[-1] - whole.x[-1]) < 1e-10)
+        True
+        """
+        return self._simulate(u, dt, hold, initial, "exponential", accuracy)
+
+    def _simulate(
+        self,
+        u: ArrayLike,
+        dt: float,
+        hold: Hold,
+        initial: StageState | None,
+        method: Method,
+        accuracy: float,
+    ) -> Response:
+        dt = _core.as_number("dt", dt)
+        accuracy = _core.as_number("accuracy", accuracy)
+        start = None if initial is None else self._checked(initial)._named
+        run = self._core.simulate(u, dt, hold, initial=start, method=method, accuracy=accuracy)
+        return Response(
+            t=np.arange(run.x.size, dtype=np.float64) * dt,
+            u=np.array(u, dtype=np.float64),
+            x=run.x,
+            v=run.v,
+            hysteresis=run.hysteresis,
+            final=self._state._from(run.last, self.info.state),
+            substeps=run.substeps,
+            error_estimate=run.error_estimate,
+            unique=run.unique,
+        )
+
+    def _checked(self, initial: object) -> StageState:
+        """Refuse what is not a state of this model."""
+        if isinstance(initial, self._state):
+            return initial
+        raise ParameterError(
+            f"initial is {type(initial).__name__}: expected a pt.{self._state.__name__}, as the "
+            "final of a response"
+        )
+
+    def inverse(
+        self,
+        *,
+        playback: Literal["table", "online"] = "table",
+        settle: int = 1,
+        initial: StageState | None = None,
+    ) -> Inverse:
+        """Feedforward of the bare stage, as `Inverse` describes.
+
+        Parameters
+        ----------
+        playback : {"table", "online"}, optional
+            Whether one settled period is repeated from a table, or all is computed.
+        settle : int, optional
+            Periods before the one of the table.
+        initial : StageState, optional
+            State of the stage before the reference begins, such as the `final` of a response to
+            the drive that settled it; at rest, never driven, where it is not given. Models whose
+            hysteresis is not at their input begin there always.
+
+        Returns
+        -------
+        Inverse
+            For `Controller` or on its own.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import piezotrack as pt
+        >>> stage = pt.PrandtlIshlinskiiStage(
+        ...     linear=1e-6, thresholds=[10.0, 20.0], weights=[0.2e-6, 0.1e-6]
+        ... )
+        >>> reference = pt.sine(frequency=1.0, low=0.0, high=50e-6, duration=3.0)
+        >>> volts = stage.inverse().voltage(reference, 1e-3)
+        >>> error = stage.simulate(volts, 1e-3).x - reference.sample(1e-3).x
+        >>> bool(np.abs(error).max() < 1e-15)
+        True
+        """
+        return Inverse(stage=self, playback=playback, settle=settle, initial=initial)
+
+    def force_ratios(self) -> list[Ratio]:
+        """Return what a record determines without a force known, as ratios to the stiffness.
+
+        Returns
+        -------
+        list of (str, str, float, str)
+            Parameter, symbol, value and unit; each parameter as it is where a model says nothing
+            else.
+        """
+        return [
+            (one.name, one.symbol, getattr(self, one.name), one.unit)
+            for one in self.info.parameters
+            if not (one.is_list or one.is_optional)
+        ]
+
+    def _notes(self, response: Callable[[], Response]) -> list[str]:
+        """Remarks on an identified stage; `response` is its motion on the record."""
+        del response
+        return []
+
+
+# The classes of the models that have been imported, by their names.
+REGISTERED: dict[str, type[Stage]] = {}
+
+S = TypeVar("S", bound=Stage)
+
+
+def stage(name: str, *, state: type[StageState]) -> Callable[[type[S]], type[S]]:
+    """Register the class of a model that the core lists under a name.
+
+    Parameters
+    ----------
+    name : str
+        Name of the model. The module that has the class is named like it, with underscores.
+    state : type
+        Its state: a subclass of `StageState` with the fields that the core lists.
+
+    Returns
+    -------
+    callable
+        Decorator of the class.
+    """
+
+    def register(cls: type[S]) -> type[S]:
+        cls.info, cls._state = LISTED[name], state
+        REGISTERED[name] = cls
+        return cls
+
+    return register
+
+
+def mechanical_ratios(stage: Any, damping: str, mass: str) -> list[Ratio]:
+    """Viscous time and mass over stiffness, with the natural frequency that they mean."""
+    frequency = math.sqrt(stage.stiffness / stage.mass) / (2 * math.pi)
+    hertz = f"s^2, a natural frequency of {frequency:.4g} Hz"
+    return [
+        ("damping", damping, 1e3 * stage.damping / stage.stiffness, "ms"),
+        ("mass", mass, stage.mass / stage.stiffness, hertz),
+    ]
+
+
+def _entries(name: str, value: object) -> list[float]:
+    """Numbers of a parameter as the core takes them: a list of one, of none or of several."""
+    if value is None:
+        return []
+    if isinstance(value, (tuple, list)):
+        return list(as_numbers(name, value))
+    return [_core.as_number(name, value)]

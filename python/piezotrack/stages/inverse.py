@@ -1,0 +1,301 @@
+"""Feedforward: the voltage with which an identified stage follows a reference."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from .. import _core
+from .._support.arguments import finite, not_negative, positive
+from ..errors import ParameterError
+from ..references.motions import Spline
+from ..references.reference import Reference
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from .base import Stage, StageState
+
+    Array = NDArray[np.float64]
+
+__all__ = ["Inverse", "InverseSession"]
+
+Playback = Literal["table", "online"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inverse:
+    r"""Inverse of a stage, with the offset and the delay of what measured it.
+
+    .. math:: u_{FF} = (M \ddot x_d + D \dot x_d + K x_d + F_h(x_d)) / T
+
+    Xu and Li 2010, equation (21), doi 10.1115/1.4001712. The hysteresis force depends on the
+    path of the reference only, so the inverse is explicit, and exact along it. With a
+    `BoucWenStage` the hysteresis depends on the voltage, and
+
+    .. math:: d u - h(u) = (m \ddot x_d + b \dot x_d + k x_d) / k
+
+    is solved for it sample by sample, taken to be monotone between two of them. Where the
+    hysteresis is at the input, as of a `PrandtlIshlinskiiStage`, it is the inverse of each part in
+    turn.
+
+    Parameters
+    ----------
+    stage : Stage
+        The model, as a `DahlStage`.
+    offset : float, optional
+        What the sensor shows where the stage is at rest without drive [m].
+    delay : float, optional
+        Delay of the displacement beyond the model [s]: the voltage comes that much earlier.
+    playback : {"table", "online"}, optional
+        ``"table"``, as in the paper: of a reference that repeats one settled period is
+        computed and repeated. ``"online"``: computed along the whole path. The
+        printed model drifts from period to period, its table does not.
+    settle : int, optional
+        Periods before the one that is repeated, 1 or more; those in which the reference
+        starts smoothly are never the one.
+    initial : StageState, optional
+        State of the stage before the reference begins, such as the `final` of a response; at
+        rest, never driven, where it is not given. Models whose hysteresis is not at their input
+        begin there always.
+
+    Raises
+    ------
+    ParameterError, ShapeError
+        An argument cannot be used, or `initial` is the state of another stage.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import piezotrack as pt
+    >>> stage = pt.DahlStage.xu_li_2010()
+    >>> reference = pt.sine(frequency=0.2, low=0.0, high=110e-6, duration=2.0)
+    >>> volts = stage.inverse().voltage(reference, 2e-4)
+    >>> error = stage.simulate(volts, 2e-4).x - reference.sample(2e-4).x
+    >>> bool(np.abs(error).max() < 1e-10)
+    True
+    """
+
+    stage: Stage
+    offset: float = 0.0
+    delay: float = 0.0
+    playback: Playback = "table"
+    settle: int = 1
+    initial: StageState | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(getattr(self.stage, "_core", None), _core.Stage):
+            raise ParameterError(
+                f"stage is {type(self.stage).__name__}: expected a stage, as a pt.DahlStage"
+            )
+        finite("offset", self.offset, "m")
+        not_negative("delay", self.delay, "s")
+        if self.playback not in ("table", "online"):
+            raise ParameterError(f"playback is {self.playback!r}: expected 'table' or 'online'")
+        if not 1 <= _core.as_count("settle", self.settle) <= 1000:
+            raise ParameterError(f"settle is {self.settle}: expected 1 period or more, up to 1000")
+        # The core refuses a stage without an inverse, and a state that is none of the stage's.
+        self._begun(1.0)
+
+    def _begun(self, dt: float) -> _core.Inverse:
+        """Return the inverse in the core, before its first sample."""
+        initial = None if self.initial is None else self.stage._checked(self.initial)._named
+        return self.stage._core.inverse(dt, offset=self.offset, delay=self.delay, initial=initial)
+
+    def voltage(self, reference: Reference, dt: float) -> Array:
+        """Voltage along the whole path of a reference, the stage being at rest before.
+
+        Parameters
+        ----------
+        reference : Reference
+            What is to be followed.
+        dt : float
+            Sampling interval [s].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Voltage at the samples ``reference.sample(dt).t`` [V]. Limits are not applied.
+
+        Raises
+        ------
+        ParameterError
+            `dt` is out of its range.
+        NumericalError
+            The reference asks for a voltage that is not finite.
+        """
+        _check(reference)
+        samples = reference.sample(dt)
+        t = samples.t + self.delay
+        if not _goes_on(reference):
+            x, v, a = reference.at(np.minimum(t, reference.duration))
+        else:
+            longer = replace(reference, duration=reference.duration + self.delay + samples.dt)
+            x, v, a = longer.at(t)
+        return self._begun(samples.dt).along(x - self.offset, v, a)
+
+    def table(self, reference: Reference, dt: float) -> Array:
+        """One settled period, as a lookup table to be played at the sampling instants.
+
+        Parameters
+        ----------
+        reference : Reference
+            One that repeats, after a whole number of samples.
+        dt : float
+            Sampling interval [s].
+
+        Returns
+        -------
+        ndarray, shape (period / dt,)
+            Voltage [V], the first at the beginning of a period.
+
+        Raises
+        ------
+        ParameterError
+            The reference does not repeat, or not after a whole number of samples, or is a record
+            that ends before its period has settled.
+        """
+        _check(reference)
+        if reference.period is None:
+            raise ParameterError(f"reference ({reference.name}) does not repeat: it has no table")
+        turn = reference.period / positive("dt", dt, "s")
+        if abs(turn - round(turn)) > 1e-6:
+            raise ParameterError(
+                f"dt is {dt:g} s: expected a whole number of samples in the period, "
+                f"{reference.period:g} s; online playback has no such need"
+            )
+        count = round(turn)
+        length = (self._settled(reference, reference.period) + 1) * reference.period
+        if not _goes_on(reference) and length > reference.duration + 1e-3 * dt:
+            raise ParameterError(
+                f"reference ({reference.name}) lasts {reference.duration:g} s: expected "
+                f"{length:g} s, until a period has settled"
+            )
+        return self.voltage(replace(reference, duration=length), dt)[-count:]
+
+    def played(self, reference: Reference, dt: float) -> tuple[Array, str]:
+        """Feedforward of an experiment as `playback` says.
+
+        Parameters
+        ----------
+        reference : Reference
+            What is to be followed.
+        dt : float
+            Sampling interval [s].
+
+        Returns
+        -------
+        volts : ndarray, shape (n,)
+            Voltage at the samples [V].
+        how : str
+            How it was computed, in words.
+        """
+        volts = self.voltage(reference, dt)
+        period = reference.period
+        before = 0 if period is None else self._settled(reference, period)
+        head = 0 if period is None else round((before + 1) * period / dt)
+        if self.playback == "online" or period is None or volts.size <= head:
+            return volts, "feedforward computed along the whole path"
+        # Between samples where a period is no whole number of them.
+        late = np.arange(head, volts.size, dtype=np.float64)
+        turns = np.floor((late - head) * dt / period) + 1.0
+        volts[head:] = np.interp(late - turns * period / dt, np.arange(head + 1), volts[: head + 1])
+        return volts, f"feedforward of period {before + 1} repeated from a table"
+
+    def _settled(self, reference: Reference, period: float) -> int:
+        """Periods before the one of the table: `settle`, or as many as the smooth start takes."""
+        return max(self.settle, math.ceil(reference.ramp / period - 1e-9))
+
+    def start(self, dt: float) -> InverseSession:
+        """Begin a computation sample by sample.
+
+        Parameters
+        ----------
+        dt : float
+            Sampling interval [s].
+
+        Returns
+        -------
+        InverseSession
+            With a memory of its own; any number can run at once.
+        """
+        return InverseSession(self, positive("dt", dt, "s"))
+
+
+def _check(reference: object) -> None:
+    if not isinstance(reference, Reference):
+        raise ParameterError(
+            f"reference is {type(reference).__name__}: expected a Reference, as pt.sine(...)"
+        )
+
+
+def _goes_on(reference: Reference) -> bool:
+    """Whether the motion is known after the end: it repeats, and is not a record that stops."""
+    motion = reference.motion
+    stops = isinstance(motion, Spline) and not motion.cyclic
+    return reference.period is not None and not stops
+
+
+class InverseSession:
+    """An inverse that is evaluated sample by sample.
+
+    Parameters
+    ----------
+    inverse : Inverse
+        The model with offset and delay.
+    dt : float
+        Sampling interval [s].
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> session = pt.DahlStage.xu_li_2010().inverse().start(0.02)
+    >>> print(f"{session.step(10e-6, velocity=50e-6, acceleration=0.0):.2f} V")
+    8.40 V
+    """
+
+    def __init__(self, inverse: Inverse, dt: float) -> None:
+        self._core = inverse._begun(dt)
+
+    def step(
+        self,
+        reference: float,
+        *,
+        velocity: float | None = None,
+        acceleration: float | None = None,
+        preview: float | None = None,
+    ) -> float:
+        """Voltage for the next sample of a reference.
+
+        Parameters
+        ----------
+        reference : float
+            Displacement to be followed [m].
+        velocity, acceleration : float, optional
+            Its derivatives [m/s, m/s^2]. Where not given they are differences: central ones of
+            the sample before and `preview`, or backward ones, which are delayed by half a sample.
+        preview : float, optional
+            The reference one sample ahead [m].
+
+        Returns
+        -------
+        float
+            Voltage [V]; NaN, with nothing remembered, where an input is not finite. The
+            differences go on as if the reference had kept its velocity meanwhile.
+        """
+        try:
+            return self._core.step(reference, velocity, acceleration, preview)
+        except TypeError:
+            given = {"reference": reference, "velocity": velocity}
+            given |= {"acceleration": acceleration, "preview": preview}
+            for name, value in given.items():
+                if value is not None or name == "reference":
+                    _core.as_number(name, value)
+            raise
+
+    def reset(self) -> None:
+        """Forget the path."""
+        self._core.reset()

@@ -1,0 +1,83 @@
+"""The list of stage models: their classes by name, and the facts of a stage's model."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from ..errors import ParameterError
+from .base import LISTED, REGISTERED, ModelInfo, Stage
+
+__all__ = ["MODELS", "ModelInfo", "Stage", "model_named", "model_of", "stage_class"]
+
+# What the core knows of each model, in its order.
+MODELS: tuple[ModelInfo, ...] = tuple(LISTED.values())
+
+
+def model_named(name: object) -> ModelInfo:
+    """Find the model of a name.
+
+    Parameters
+    ----------
+    name : object
+        What the caller gave as the model.
+
+    Returns
+    -------
+    ModelInfo
+        The model.
+
+    Raises
+    ------
+    ParameterError
+        There is no such model.
+    """
+    for model in MODELS:
+        if model.name == name:
+            return model
+    expected = " or ".join(repr(model.name) for model in MODELS)
+    raise ParameterError(f"model is {name!r}: expected {expected}")
+
+
+def stage_class(model: ModelInfo) -> type[Stage]:
+    """Find the class of a model, in the module that is named like it.
+
+    Parameters
+    ----------
+    model : ModelInfo
+        The model.
+
+    Returns
+    -------
+    type
+        The class of its stages.
+    """
+    if model.name not in REGISTERED:
+        import_module(f".{model.name.replace('-', '_')}", __package__)
+    return REGISTERED[model.name]
+
+
+def model_of(stage: object, argument: str = "model") -> ModelInfo:
+    """Find the model of a stage that was given as an argument of this name.
+
+    Parameters
+    ----------
+    stage : object
+        The stage.
+    argument : str, optional
+        The argument, for the message.
+
+    Returns
+    -------
+    ModelInfo
+        The model.
+
+    Raises
+    ------
+    ParameterError
+        It is no stage.
+    """
+    if isinstance(stage, Stage):
+        return stage.info
+    raise ParameterError(
+        f"{argument} is {type(stage).__name__}: expected a stage, as a pt.DahlStage"
+    )

@@ -1,0 +1,111 @@
+"""The stage that stands in for the paper's, and the settings of its controllers."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, fields, replace
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+
+from ..control.controller import Controller
+from ..stages.virtual import VirtualStage
+from ..stages.xy import XYStage
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from ..stages.inverse import Inverse
+
+__all__ = ["DT", "LIMITS", "Apparatus", "loop"]
+
+# The loop of the paper runs at 50 Hz, its amplifiers give 0 to 75 V.
+DT, LIMITS = 0.02, (0.0, 75.0)
+# A y with the seed of x would have the noise of x.
+Y_SEEDS = 1 << 32
+
+
+@dataclass(frozen=True, kw_only=True)
+class Apparatus:
+    """An XY stage with its computer.
+
+    Attributes
+    ----------
+    stage : XYStage
+        Both axes, their cross-talk and the lag between them.
+    delay : float
+        From a reading to the effect of its voltage [s].
+    jitter : float
+        How late a sample comes on average [s].
+    """
+
+    stage: XYStage
+    delay: float
+    jitter: float
+
+    @property
+    def x(self) -> VirtualStage:
+        """The axis of Figs. 3 to 14."""
+        assert isinstance(self.stage.x, VirtualStage)
+        return self.stage.x
+
+    @property
+    def y(self) -> VirtualStage:
+        """The other one."""
+        assert isinstance(self.stage.y, VirtualStage)
+        return self.stage.y
+
+    @property
+    def pace(self) -> dict[str, Any]:
+        """Delay and jitter, as `track` and `contour` take them."""
+        return {"delay": self.delay, "jitter": self.jitter}
+
+    def seeded(self, seed: int) -> Apparatus:
+        """Return the same apparatus with other noise of both sensors."""
+        x, y = replace(self.x, seed=seed), replace(self.y, seed=seed + Y_SEEDS)
+        return replace(self, stage=replace(self.stage, x=x, y=y))
+
+    def document(self) -> dict[str, Any]:
+        """Numbers of the apparatus for a file, SI."""
+        return {
+            "x": _numbers(self.x),
+            "y": _numbers(self.y),
+            "cross_talk": list(self.stage.cross_talk),
+            "lag": self.stage.lag,
+            "delay": self.delay,
+            "jitter": self.jitter,
+        }
+
+    @classmethod
+    def of(cls, document: Mapping[str, Any]) -> Apparatus:
+        """Make the apparatus that `document` describes."""
+        x, y = (VirtualStage(**document[axis], seed=0) for axis in "xy")
+        stage = XYStage(x=x, y=y, cross_talk=document["cross_talk"], lag=document["lag"])
+        return cls(stage=stage, delay=document["delay"], jitter=document["jitter"]).seeded(0)
+
+    @classmethod
+    def calibrated(cls) -> Apparatus:
+        """Load the apparatus that `calibration` found, as it is in the package."""
+        return cls.of(calibration_file()["apparatus"])
+
+
+def calibration_file() -> dict[str, Any]:
+    """Read what the calibration found, with its provenance."""
+    text = files(__package__).joinpath("calibrated.json").read_text(encoding="utf-8")
+    document: dict[str, Any] = json.loads(text)
+    return document
+
+
+def _numbers(stage: VirtualStage) -> dict[str, Any]:
+    """All settings but the seed, which is not one of the stage."""
+    return {one.name: getattr(stage, one.name) for one in fields(stage) if one.name != "seed"}
+
+
+def loop(
+    inverse: Inverse | None = None,
+    *,
+    limits: tuple[float, float] = LIMITS,
+    dt: float = DT,
+    **parts: Any,
+) -> Controller:
+    """Make a controller at 50 Hz between 0 and 75 V, as the paper's."""
+    return Controller(dt=dt, limits=limits, feedforward=inverse, **parts)

@@ -1,0 +1,252 @@
+"""Calibration: a swarm finds the virtual stage that agrees best with what is published."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import _core
+from ..control.tracking import check_stable
+from ..errors import PiezotrackError
+from ..identification.identify import identify
+from ..identification.swarm import ParticleSwarm
+from ..stages.dahl import DahlStage
+from . import fig_04_step_test, fig_06_identification, fig_12_14_tracking, fig_15_circles
+from .apparatus import loop
+from .free_parameters import FREE, SEED, Free, apparatus_at, theta_at
+from .procedure import FITTED_SECONDS, SEARCH_BOX
+from .published import observables
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from .apparatus import Apparatus
+
+__all__ = ["calibrate", "cost", "medians", "values_of"]
+
+# The model is fitted to every tenth sample: 500 Hz is plenty for 0.25 Hz.
+THINNED = 10
+# Larger circles are left out [m].
+RADIUS = 20e-6
+
+
+def values_of(apparatus: Apparatus) -> dict[str, float]:
+    """Go the part of the way that the calibrated observables need, SI.
+
+    Raises
+    ------
+    PiezotrackError
+        A loop is unstable or runs away, or the step has no overshoot.
+    """
+    log = fig_06_identification.record(apparatus)
+    thin = fig_06_identification.thinned(log, THINNED)
+    published = DahlStage.xu_li_2010()
+    fit = identify(
+        thin[:FITTED_SECONDS],
+        fixed={"a1": published.a1, "a2": published.a2, "b1": published.b1},
+        bounds=SEARCH_BOX,
+        seed=SEED,
+        runs=1,
+        threads=1,
+        progress=False,
+    )
+    inverse = fit.inverse()
+    one = loop(inverse, feedback=fig_12_14_tracking.PID)
+    for stage in (apparatus.x, apparatus.y):
+        check_stable(stage, one, apparatus.delay)
+    table = fig_15_circles.circles(apparatus, inverse, largest=RADIUS, checked=False)
+    error = log.y - fit.simulate(log, offset=fit.offset).x
+    return {
+        **fig_04_step_test.observe(fig_04_step_test.step_test(apparatus)),
+        **fig_06_identification.observe(fit),
+        "models.dahl": float(np.abs(error).max()),
+        **fig_12_14_tracking.observe_compensation(
+            fig_12_14_tracking.compensation(apparatus, inverse)
+        ),
+        **fig_15_circles.observe(table, apparatus.stage.lag),
+    }
+
+
+def cost(values: Mapping[str, float]) -> float:
+    """Mean over the observables of r^4 / (1 + r^4), r what is off in units of the goal.
+
+    Nearly the share of the numbers that are not reached, so that one that cannot be reached does
+    not outweigh the others. A bound costs nothing within.
+    """
+    terms = []
+    for one in observables():
+        if one.calibrated and one.key in values:
+            off = values[one.key] - one.published
+            off = max(off, 0.0) if one.kind == "bound" else off
+            power = (off / one.slack) ** 4
+            terms.append(power / (1.0 + power))
+    return math.fsum(terms) / len(terms)
+
+
+def medians(theta: Mapping[str, float], seeds: Sequence[int]) -> dict[str, float]:
+    """Give the medians of `values_of` over seeds of the sensors, SI.
+
+    Raises
+    ------
+    PiezotrackError
+        As for `values_of`.
+    """
+    apparatus = apparatus_at(theta)
+    runs = [values_of(apparatus.seeded(seed)) for seed in seeds]
+    return {key: float(np.median([run[key] for run in runs])) for key in runs[0]}
+
+
+def _cost_at(theta: Mapping[str, float] | None, seeds: Sequence[int]) -> float:
+    """Cost of a place; infinite where the stage cannot be led, or outside the box."""
+    if theta is None:
+        return math.inf
+    try:
+        return cost(medians(theta, seeds))
+    except PiezotrackError:
+        return math.inf
+
+
+Progress = Callable[[int, float, dict[str, float]], object]
+
+
+def _round(
+    box: Sequence[Free],
+    seeds: Sequence[int],
+    settings: ParticleSwarm,
+    seed: int,
+    progress: Progress | None,
+) -> tuple[float, dict[str, float]]:
+    """Search a box by the swarm of the core: best cost, and where it is."""
+    swarm = _core.Swarm(settings._core, len(box), seed)
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        for iteration in range(settings.iterations + 1):
+            places = [None if one is None else theta_at(one, box) for one in swarm.ask()]
+            swarm.tell(list(pool.map(lambda theta: _cost_at(theta, seeds), places)))
+            if progress is not None:
+                place, least = swarm.best
+                progress(iteration, least, theta_at(place, box))
+    place, least = swarm.best
+    return least, theta_at(place, box)
+
+
+# The later rounds: share of the first box, about the best place so far, and seeds of the sensors.
+# The last one takes medians, or the result would be fitted to the noise of one seed, for half as
+# many iterations.
+LATER = ((0.4, (SEED,)), (0.15, (SEED, SEED + 1, SEED + 2)))
+
+
+def calibrate(
+    *,
+    particles: int = 40,
+    iterations: int = 40,
+    runs: int = 2,
+    seed: int = SEED,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Search the free parameters, and describe what was found.
+
+    Several swarms search the whole box apart; about the best place of them all another searches a
+    smaller box, and one more a smaller one still, there with medians over three seeds of the
+    sensors.
+
+    Parameters
+    ----------
+    particles, iterations, seed : int, optional
+        Of each swarm.
+    runs : int, optional
+        Swarms in the whole box.
+    progress : callable, optional
+        Called with iteration, best cost of its swarm and where that is.
+
+    Returns
+    -------
+    dict
+        Content of ``calibrated.json``.
+    """
+    settings = ParticleSwarm(
+        particles=particles, iterations=iterations, stall_iterations=iterations, topology="random"
+    )
+    found = [_round(FREE, (SEED,), settings, seed + run, progress) for run in range(runs)]
+    costs = [least for least, _ in found]
+    least, theta = min(found, key=lambda one: one[0])
+    for share, seeds in LATER:
+        box = [free.about(theta[free.name], share) for free in FREE]
+        before = _cost_at(theta, seeds), theta
+        length = iterations if len(seeds) == 1 else max(1, iterations // 2)
+        after = _round(box, seeds, replace(settings, iterations=length), seed, progress)
+        least, theta = min(before, after, key=lambda one: one[0])
+        costs.append(least)
+    shares = " and ".join(f"{share:g}" for share, _ in LATER)
+    how = (
+        f"{len(FREE)} free parameters of the virtual stage were found by {runs} swarms of "
+        f"{particles} particles in {iterations} iterations each, and by two more in boxes of "
+        f"{shares} of the ranges about the best, so that it agrees with {{}} published numbers; "
+        "the mass of Table 1, the 40 um row of Table 2 and Figs. 13 and 14 were left out."
+    )
+    provenance = {"costs": costs, "cost": least, "seed": seed, "sensor_seeds": list(seeds)}
+    return _document(theta, how, provenance)
+
+
+# A parameter is moved by this part of its range, to see what it acts on.
+NUDGE = 0.05
+
+
+def _moved(
+    theta: dict[str, float], free: Free, values: Mapping[str, float], seeds: Sequence[int]
+) -> dict[str, float]:
+    """Tell which three observables a parameter moves most, by how many goals in 5 % of its range.
+
+    Empty where the stage cannot be led there.
+    """
+    part = free.part(theta[free.name])
+    step = NUDGE if part + NUDGE <= 1.0 else -NUDGE
+    try:
+        moved = medians({**theta, free.name: free.at(part + step)}, seeds)
+    except PiezotrackError:
+        return {}
+    changes = {
+        one.key: (moved[one.key] - values[one.key]) / one.slack * math.copysign(1.0, step)
+        for one in observables()
+        if one.key in values
+    }
+    largest = sorted(changes, key=lambda key: -abs(changes[key]))[:3]
+    return {key: changes[key] for key in largest}
+
+
+def _document(theta: dict[str, float], how: str, provenance: dict[str, Any]) -> dict[str, Any]:
+    """Content of the file: the apparatus, and how it was found."""
+    seeds = provenance["sensor_seeds"]
+    values = medians(theta, seeds)
+    used = [one for one in observables() if one.calibrated and one.key in values]
+    free = [
+        {
+            "name": one.name,
+            "meaning": one.meaning,
+            "bounds": [one.low, one.high],
+            "value": theta[one.name],
+            "moves": _moved(theta, one, values, seeds),
+        }
+        for one in FREE
+    ]
+    return {
+        "format": "piezotrack-calibration",
+        "schema_version": 1,
+        "apparatus": apparatus_at(theta).document(),
+        "free": free,
+        "observables": [
+            {"key": one.key, "published": one.published, "obtained": values[one.key]}
+            for one in used
+        ],
+        "provenance": {
+            "package": "piezotrack",
+            "version": _core.__version__,
+            "script": "python/examples/calibrate_virtual_stage.py",
+            "how": how.format(len(used)),
+            **provenance,
+        },
+    }

@@ -1,0 +1,33 @@
+"""Fig. 3: the sensor at rest."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..identification.sensor_noise import Noise, identify_noise
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from .apparatus import Apparatus
+
+__all__ = ["at_rest", "draw", "observe"]
+
+RATE, SECONDS = 5000.0, 10.0
+
+
+def at_rest(apparatus: Apparatus) -> Noise:
+    """Record the sensor while nothing moves."""
+    return identify_noise(apparatus.x.record(np.zeros(int(RATE * SECONDS)), 1.0 / RATE))
+
+
+def observe(noise: Noise) -> dict[str, float]:
+    """Read off what the paper publishes, SI."""
+    return {"rest.rms": noise.rms, "rest.step": noise.resolution}
+
+
+def draw(noise: Noise) -> Figure:
+    """Draw record and spectrum."""
+    return noise.plot()

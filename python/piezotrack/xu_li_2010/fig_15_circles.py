@@ -1,0 +1,63 @@
+"""Fig. 15 and Table 2: circles."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .apparatus import loop
+from .fig_12_14_tracking import PID
+from .table_2 import Table2, run_table_2
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..control.tracking import Tracking
+    from ..stages.inverse import Inverse
+    from .apparatus import Apparatus
+
+__all__ = ["circles", "draw", "observe"]
+
+
+def circles(
+    apparatus: Apparatus, inverse: Inverse, *, largest: float = 1.0, checked: bool = True
+) -> Table2:
+    """Run the nine circles, up to a radius [m], with the feedforward of x on both axes."""
+    one = loop(inverse, feedback=PID)
+    return run_table_2(
+        apparatus.stage, (one, one), **apparatus.pace, largest=largest, checked=checked
+    )
+
+
+def observe(table: Table2, lag: float, *, true: bool = False) -> dict[str, float]:
+    """Read off what the paper publishes, SI.
+
+    Of the readings at 50 Hz, as the paper's; with `true`, of the true positions between them too.
+    The errors of an axis are those that its controller saw, y's `lag` [s] after x's.
+    """
+    found = {}
+    for case, run in table.cases:
+        key, metrics = f"circle.{1e6 * case.radius:g}um.{case.frequency:g}Hz", run.score(true=true)
+        found[f"{key}.max"] = metrics.peak_to_peak
+        found[f"{key}.mean"] = metrics.mean_error
+        found[f"{key}.sd"] = metrics.sd_error
+    small = table.runs[0]
+    found["circle.axes"] = max(
+        _largest(small.x, small.settled, 0.0, true), _largest(small.y, small.settled, lag, true)
+    )
+    return found
+
+
+def _largest(axis: Tracking, settled: float, lag: float, true: bool) -> float:
+    """Largest error that a controller saw, or the true one when it looked [m]."""
+    if not true:
+        return float(np.abs(axis.loop_error[axis.t >= settled + lag]).max())
+    seen = np.interp(axis.t + lag, axis.fine_t, axis.fine_displacement)
+    part = (axis.t >= settled) & (axis.t + lag <= axis.t[-1])
+    return float(np.abs(axis.desired - seen)[part].max())
+
+
+def draw(table: Table2) -> Figure:
+    """Draw circles, errors and the table as bars."""
+    return table.plot()

@@ -1,0 +1,177 @@
+"""The same way on a measured log, up to the feedforward.
+
+The log is that of Y. N. Aye and W. T. Ang, "A Discrete Backlash Operator for Identification and
+Compensation of Hysteresis and Non-linearity for Piezoelectric Micromanipulator", ICSTSD 2018: a
+piezo stack under 1 Hz. In its second part the drive is the feedforward of its authors' own inverse
+model, which is what ours is compared with.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..data.reader import read
+from ..errors import DataError
+from ..identification.identify import identify
+from ..references.reference import Reference, read_reference
+from .extensions import rivals
+from .section import Section
+
+if TYPE_CHECKING:
+    import os
+
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+__all__ = ["Drives", "drives"]
+
+# Of training.csv: behind the transient of an unknown history [s].
+FITTED = (3.0, 23.0)
+# Of tracking.csv: the row from which on the drive is the authors' feedforward, and the rows after
+# it that are left to the change of drive.
+COMPENSATED, CHANGE = 7432, 200
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Drives:
+    """Drive that was measured, and those computed for the same reference.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n,)
+        Time in tracking.csv [s].
+    desired : ndarray, shape (n,)
+        Reference [m], in the frame of the sensor.
+    measured : ndarray, shape (n,)
+        Drive of the authors' inverse [V].
+    line : ndarray, shape (n,)
+        Best line of the reference through it [V]: what a drive without compensation is.
+    computed : dict of str to ndarray, shape (n,)
+        Drive of each of our inverses [V], its mean that of the measured one.
+    fits : dict of str to float
+        RMS of each model on what it was fitted to, in parts of the stroke.
+    shifts : dict of str to float
+        What the means were apart [V].
+    """
+
+    t: Array
+    desired: Array
+    measured: Array
+    line: Array
+    computed: dict[str, Array]
+    fits: dict[str, float]
+    shifts: dict[str, float]
+
+    def section(self) -> Section:
+        """Table of how far the drives are apart."""
+        span = float(np.ptp(self.measured))
+        off = _rms(self.line - self.measured)
+        rows = [("no compensation", "", f"{1e3 * off:.1f}", f"{100 * off / span:.2f}", "", "")]
+        for name, volts in self.computed.items():
+            away = _rms(volts - self.measured)
+            rows.append(
+                (
+                    name,
+                    f"{100 * self.fits[name]:.2f}",
+                    f"{1e3 * away:.1f}",
+                    f"{100 * away / span:.2f}",
+                    f"{100 * (1.0 - (away / off) ** 2):.0f}",
+                    f"{1e3 * self.shifts[name]:.0f}",
+                )
+            )
+        return Section(
+            title="On a measured log: our inverse beside the drive that its authors measured",
+            text="Models fitted to 20 s of training.csv; their inverse along the reference of "
+            f"tracking.csv, compared from row {COMPENSATED + CHANGE} on with the drive that is "
+            "there, the feedforward of another group's inverse of another model. Means are taken "
+            "off, as the two records have different offsets. Explained: of the variance of what "
+            "that feedforward adds to a straight line.",
+            heads=(
+                *("inverse of", "fit, % of stroke", "rms apart, mV", "% of range"),
+                *("explained, %", "means apart, mV"),
+            ),
+            rows=tuple(rows),
+        )
+
+    def plot(self) -> Figure:
+        """Draw the drives over the reference and, less the line, over time."""
+        import matplotlib.pyplot as plt
+
+        from ..identification.comparison_plot import LINES
+
+        figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.6), layout="constrained")
+        # Two periods of 1 Hz.
+        part = self.t < self.t[0] + 2.0
+        t, um = self.t[part], 1e6 * (self.desired - self.desired.mean())[part]
+        wide = {"color": "0.68", "linewidth": 3.2, "label": "measured"}
+        left.plot(um, (self.measured - self.line)[part], **wide)
+        right.plot(t, (self.measured - self.line)[part], **wide)
+        for (name, volts), line in zip(self.computed.items(), LINES, strict=False):
+            added = (volts - self.line)[part]
+            left.plot(um, added, linewidth=1.1, label=name, **line)
+            right.plot(t, added, linewidth=1.1, label=name, **line)
+        left.set(xlabel="reference [um]", ylabel="drive less a straight line [V]")
+        right.set(xlabel="time [s]", ylabel="drive less a straight line [V]")
+        right.margins(x=0.0)
+        right.legend(
+            loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, frameon=False, fontsize="small"
+        )
+        return figure
+
+
+def drives(folder: str | os.PathLike[str]) -> Drives:
+    """Identify on ``training.csv`` and lead along the reference of ``tracking.csv``.
+
+    Parameters
+    ----------
+    folder : path-like
+        With both files.
+
+    Returns
+    -------
+    Drives
+        Measured and computed.
+
+    Raises
+    ------
+    DataError
+        A file is missing, or is not of that log.
+    """
+    where = Path(folder)
+    training = read(where / "training.csv")[FITTED[0] : FITTED[1]]
+    file = where / "tracking.csv"
+    log, wanted = read(file), read_reference(file)
+    asked = wanted.sample(log.dt).x
+    if len(log) < COMPENSATED + 2 * CHANGE or asked.size != len(log):
+        raise DataError(
+            f"{file.name} has {len(log)} rows: expected those of the log, more than "
+            f"{COMPENSATED + 2 * CHANGE}, each with a reference"
+        )
+    part = slice(COMPENSATED + CHANGE, None)
+    # The reference is from its own zero; the sensor's is wherever it is.
+    asked = asked + float(np.mean((log.y - asked)[part]))
+    reference = Reference.from_samples(asked, log.dt, name=file.name)
+    desired, measured = asked[part], log.u[part]
+    slope, level = np.polyfit(desired, measured, 1)
+    line = float(slope) * desired + float(level)
+    computed, fits, shifts = {}, {}, {}
+    dahl = identify(training, seed=1, runs=2, progress=False)
+    found: dict[str, Any] = {"Dahl": dahl, **rivals(training)}
+    for name, fit in found.items():
+        volts = fit.inverse().voltage(reference, log.dt)[part]
+        shifts[name] = float(np.mean(volts - measured))
+        computed[name], fits[name] = volts - shifts[name], fit.cost / training.stroke
+    return Drives(
+        t=log.t[part], desired=desired, measured=measured, line=line,
+        computed=computed, fits=fits, shifts=shifts,
+    )  # fmt: skip
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

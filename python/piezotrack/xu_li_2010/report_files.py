@@ -1,0 +1,62 @@
+"""Writing the report: HTML, PDF and JSON, each whole or not at all."""
+
+from __future__ import annotations
+
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+from .._support.files import make_folder, replacing, write_document
+from .figures import Drawn, drawn
+from .report_html import html_text
+from .report_text import summary_text
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from .reproduction import Reproduction
+
+__all__ = ["save_report"]
+
+# Lines of small type on a page.
+LINES = 58
+
+
+def save_report(found: Reproduction, folder: str | os.PathLike[str]) -> list[Path]:
+    """Write the three files; arguments, result and errors as of `Reproduction.save`."""
+    import matplotlib.pyplot as plt
+
+    path = make_folder(folder)
+    figures = drawn(found.way, found.drives)
+    try:
+        page = html_text(found, figures)
+        with replacing(path / "report.html") as temporary:
+            temporary.write_text(page, encoding="utf-8")
+        with replacing(path / "report.pdf") as temporary:
+            _write_pdf(found, figures, temporary)
+    finally:
+        for one in figures:
+            plt.close(one.figure)
+    document = write_document(path / "report.json", found.document())
+    return [path / "report.html", path / "report.pdf", document]
+
+
+def _write_pdf(found: Reproduction, figures: Sequence[Drawn], file: Path) -> None:
+    import matplotlib.pyplot as plt
+    from matplotlib.backends.backend_pdf import PdfPages
+
+    lines = ["Xu and Li 2010, doi 10.1115/1.4001712, published beside obtained", ""]
+    lines += summary_text(found).splitlines()
+    # Without a date the same result gives the same file.
+    with PdfPages(file, metadata={"CreationDate": None}) as pdf:
+        for first in range(0, len(lines), LINES):
+            page = plt.figure(figsize=(11.7, 8.3))
+            text = "\n".join(lines[first : first + LINES])
+            page.text(0.04, 0.96, text, family="monospace", fontsize=8, va="top")
+            pdf.savefig(page)
+            plt.close(page)
+        for one in figures:
+            words = f"{one.title}\n{one.caption}"
+            one.figure.text(0.01, 1.02, "\n".join(fill(line, 150) for line in words.splitlines()))
+            pdf.savefig(one.figure, bbox_inches="tight", pad_inches=0.3)

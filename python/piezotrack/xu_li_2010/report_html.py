@@ -1,0 +1,191 @@
+"""The report as one HTML file that needs nothing else: tables, inline SVG, a script to zoom."""
+
+from __future__ import annotations
+
+import io
+from html import escape
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+
+from .apparatus import calibration_file
+from .published import observables
+from .references import RULES
+from .report_text import number, reading, seen, tally
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from .figures import Drawn
+    from .reproduction import Reproduction
+
+__all__ = ["html_text", "svg_text"]
+
+
+def html_text(found: Reproduction, figures: Sequence[Drawn]) -> str:
+    """Write the page.
+
+    Parameters
+    ----------
+    found : Reproduction
+        The numbers.
+    figures : sequence of Drawn
+        The pictures, in their order.
+
+    Returns
+    -------
+    str
+        HTML with style, pictures and script in it.
+    """
+    package = files(__package__)
+    style = package.joinpath("report.css").read_text(encoding="utf-8")
+    script = package.joinpath("report.js").read_text(encoding="utf-8")
+    body = [
+        "<h1>Xu and Li 2010, published beside obtained</h1>",
+        "<p>Dahl model-based hysteresis compensation of an XY micromanipulator, doi "
+        '<a href="https://doi.org/10.1115/1.4001712">10.1115/1.4001712</a>, on a virtual stage: '
+        "no measured data of the paper's stage is public. The controllers see readings at 50 Hz "
+        "with noise and steps, and errors are of these, as the paper's were; the true ones are "
+        "beside.</p>",
+        *_numbers(found),
+        *_conclusions(found),
+        "<h2>Figures</h2>",
+        f"<p>Of the first seed, {found.seeds[0]}. Zoom with the buttons, a double click or "
+        "Ctrl and the wheel; then drag to move.</p>",
+        *(_figure(one) for one in figures),
+        *_beyond(found),
+        *_stage(found),
+    ]
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>Xu and Li 2010, reproduced</title>\n<style>\n{style}</style>\n</head>\n<body>\n"
+        f"{chr(10).join(body)}\n<script>\n{script}</script>\n</body>\n</html>\n"
+    )
+
+
+def _numbers(found: Reproduction) -> list[str]:
+    rows = []
+    for one in found.obtained:
+        known, true = one.observable, found.true_median(one.observable.key)
+        low, high = one.quartiles
+        unit = f", {known.unit}" if known.unit else ""
+        cells = [
+            f'<span title="{escape(known.how)}">{escape(known.name + unit)}</span>',
+            reading(one),
+            f"<b>{number(one, one.median)}</b>",
+            f"{one.ratio:.2f}",
+            "yes" if one.reached else "<b>no</b>",
+            "calibrated" if known.calibrated else "left out",
+            f"{number(one, low)} to {number(one, high)}",
+            "" if true is None else number(one, true),
+            f"{'' if known.figure.startswith('Table') else 'Fig. '}{escape(known.figure)}",
+        ]
+        rows.append(cells)
+    heads = ("what", "published", "obtained", "ratio", "reached", "use", "quartiles", "true", "in")
+    return [
+        "<h2>Numbers</h2>",
+        f"<p>{escape(tally(found).replace(' * marks the others.', ''))}</p>",
+        f'<div class="numbers">{table(heads, rows)}</div>',
+    ]
+
+
+def _conclusions(found: Reproduction) -> list[str]:
+    rows = [
+        [escape(one.text), f"<b>{seen(one.holds)}</b>", f"{one.seen} of {one.seeds}",
+         escape(one.words)]
+        for one in found.conclusions
+    ]  # fmt: skip
+    return ["<h2>Conclusions</h2>", table(("the paper says", "", "runs", "what is seen"), rows)]
+
+
+def _beyond(found: Reproduction) -> list[str]:
+    parts = ["<h2>Beyond the paper</h2>", "<p>On the same stage, with the noise of one seed.</p>"]
+    for one in found.sections:
+        rows = [[escape(cell) for cell in row] for row in one.rows]
+        parts += [
+            f"<h3>{escape(one.title)}</h3>",
+            f"<p>{escape(one.text)}</p>",
+            table(map(escape, one.heads), rows),
+        ]
+    return parts
+
+
+def _stage(found: Reproduction) -> list[str]:
+    parts = found.apparatus.document()
+    rows = [
+        [escape(name.replace("_", " ")), escape(_short(value)), escape(_short(parts["y"][name]))]
+        for name, value in parts["x"].items()
+    ]
+    xy, yx = parts["cross_talk"]
+    rules = "".join(f"<li>Fig. {key}: {escape(text)}</li>" for key, text in RULES.items())
+    return [
+        "<h2>The stage</h2>",
+        f"<p>{escape(calibration_file()['provenance']['how'])}</p>",
+        f"<p>Lag of y {1e3 * parts['lag']:.3g} ms, delay {1e3 * parts['delay']:.3g} ms, "
+        f"samples late by {1e3 * parts['jitter']:.2g} ms on average, cross-talk "
+        f"{100 * xy:.3g} % and {100 * yx:.3g} %. SI units:</p>",
+        table(("parameter", "x", "y"), rows),
+        *_calibration(),
+        "<p>What the paper does not state, and the rule in its place, written down before any "
+        f"calibration:</p><ul>{rules}</ul>",
+    ]
+
+
+def _calibration() -> list[str]:
+    """Table of the free parameters against the observables that they move most."""
+    named = {one.key: one.name for one in observables()}
+    rows = [
+        [
+            escape(one["meaning"]),
+            _short(one["value"]) + (", on a bound" if _on_a_bound(one) else ""),
+            f"{_short(one['bounds'][0])} to {_short(one['bounds'][1])}",
+            escape(
+                "; ".join(f"{named[key]} {change:+.1f}" for key, change in one["moves"].items())
+            ),
+        ]
+        for one in calibration_file()["free"]
+    ]
+    return [
+        "<h3>Free parameters against observables</h3>",
+        "<p>Right the three numbers that each moves most, in units of the goal, 15 % or 0.04 um, "
+        "for a step of 5 % of its range. SI units.</p>",
+        table(("parameter", "found", "searched in", "what it moves"), rows),
+    ]
+
+
+def _on_a_bound(one: Mapping[str, Any]) -> bool:
+    low, high = one["bounds"]
+    return bool(min(one["value"] - low, high - one["value"]) < 1e-3 * (high - low))
+
+
+def _short(value: object) -> str:
+    if isinstance(value, (tuple, list)):
+        return ", ".join(_short(one) for one in value)
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def table(heads: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
+    """Write a table that scrolls sideways where the page is narrow; cells are HTML."""
+    head = "".join(f"<th>{one}</th>" for one in heads)
+    body = "\n".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
+    return f'<div class="wide"><table><thead><tr>{head}</tr></thead>\n{body}</table></div>'
+
+
+def _figure(one: Drawn) -> str:
+    return (
+        f'<figure id="{one.name}"><h3>{escape(one.title)}</h3>\n'
+        f'<div class="picture">{svg_text(one)}</div>\n'
+        f"<figcaption>{escape(one.caption)}</figcaption></figure>"
+    )
+
+
+def svg_text(one: Drawn) -> str:
+    """Write a picture as an SVG element, the same for the same picture."""
+    import matplotlib as mpl
+
+    buffer = io.StringIO()
+    # Ids that differ from picture to picture, as all of them are on one page.
+    with mpl.rc_context({"svg.hashsalt": one.name}):
+        one.figure.savefig(buffer, format="svg", metadata={"Date": None})
+    text = buffer.getvalue()
+    return text[text.index("<svg") :]

@@ -1,0 +1,268 @@
+"""The paper's way over many seeds, and what came of it."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import _core
+from ..errors import ParameterError
+from .apparatus import Apparatus, calibration_file
+from .conclusions import Conclusion, conclusions
+from .extensions import sections
+from .measured_log import Drives, drives
+from .published import SI, Obtained, gathered
+from .references import RULES
+from .run import Way, go
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from .section import Section
+
+__all__ = ["Reproduction", "reproduce_xu_li_2010"]
+
+SEEDS = 20
+# The calibration uses seeds below this, and no report does.
+FIRST_SEED = 1000
+FORMAT, SCHEMA_VERSION = "piezotrack-reproduction", 1
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Reproduction:
+    """The paper's numbers and figures, published beside obtained; see `reproduce_xu_li_2010`.
+
+    Attributes
+    ----------
+    way : Way
+        What the first seed gave, of which the figures are.
+    values, true_values : tuple of dict
+        For each seed what was obtained, SI, from the readings and from the true displacement.
+    seeds : tuple of int
+        Seeds of the sensors and searches.
+    apparatus : Apparatus
+        The stage and its computer.
+    sections : tuple of Section
+        What goes beyond the paper.
+    drives : Drives or None
+        Of a measured log, where one was given.
+    """
+
+    way: Way
+    values: tuple[dict[str, float], ...]
+    true_values: tuple[dict[str, float], ...]
+    seeds: tuple[int, ...]
+    apparatus: Apparatus
+    sections: tuple[Section, ...]
+    drives: Drives | None
+
+    def __repr__(self) -> str:
+        reached = sum(one.reached for one in self.obtained)
+        return f"<Reproduction, {reached} of {len(self.obtained)} numbers reached>"
+
+    @property
+    def obtained(self) -> tuple[Obtained, ...]:
+        """Every published number with what was obtained, in the order of the paper."""
+        return gathered(self.values)
+
+    @property
+    def conclusions(self) -> tuple[Conclusion, ...]:
+        """What the paper concludes, checked."""
+        return conclusions(self.values)
+
+    def true_median(self, key: str) -> float | None:
+        """Give the median of the true values of an observable.
+
+        Parameters
+        ----------
+        key : str
+            Of the observable.
+
+        Returns
+        -------
+        float or None
+            SI; None where the paper's number is not of a motion under control.
+        """
+        if key not in self.true_values[0]:
+            return None
+        return float(np.median([one[key] for one in self.true_values]))
+
+    def summary(self) -> str:
+        """Table of published beside obtained, and the conclusions.
+
+        Returns
+        -------
+        str
+            Several lines.
+        """
+        from .report_text import summary_text
+
+        return summary_text(self)
+
+    def document(self) -> dict[str, Any]:
+        """Content of the JSON file.
+
+        Returns
+        -------
+        dict
+            Of numbers, texts, lists and dicts only.
+        """
+        entries = []
+        for one in self.obtained:
+            entry, true = one.document(), self.true_median(one.observable.key)
+            entry["true_median"] = None if true is None else true / SI[one.observable.unit]
+            entries.append(entry)
+        return {
+            "format": FORMAT,
+            "schema_version": SCHEMA_VERSION,
+            "source": "Xu and Li 2010, doi 10.1115/1.4001712",
+            "rules": RULES,
+            "observables": entries,
+            "conclusions": [
+                {"text": one.text, "holds": one.holds, "seeds": [one.seen, one.seeds],
+                 "seen": one.words}
+                for one in self.conclusions
+            ],
+            "beyond": [one.document() for one in self.sections],
+            "apparatus": self.apparatus.document(),
+            "calibration": calibration_file()["provenance"],
+            "provenance": {
+                "package": "piezotrack",
+                "version": _core.__version__,
+                "seeds": list(self.seeds),
+            },
+        }  # fmt: skip
+
+    def save(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write the report as HTML and PDF, and the same as JSON.
+
+        Parameters
+        ----------
+        folder : path-like
+            Where to; made where it is missing.
+
+        Returns
+        -------
+        list of pathlib.Path
+            ``report.html``, ``report.pdf`` and ``report.json``.
+
+        Raises
+        ------
+        DataError
+            The folder cannot be made or written to.
+        """
+        from .report_files import save_report
+
+        return save_report(self, folder)
+
+
+def reproduce_xu_li_2010(
+    *,
+    seeds: int = SEEDS,
+    apparatus: Apparatus | None = None,
+    dbo: str | os.PathLike[str] | None = None,
+    progress: bool | None = None,
+) -> Reproduction:
+    """Go the way of Xu and Li 2010, doi 10.1115/1.4001712, on the calibrated virtual stage.
+
+    Sensor at rest, step test, particle swarm, comparison with a Bouc-Wen model, feedforward, PID,
+    antiwindup, repetitive control, circles: each once for every seed of the sensors' noise. The
+    controllers see samples at 50 Hz with noise and steps, and errors are computed from these, as
+    the paper's were.
+
+    Parameters
+    ----------
+    seeds : int, optional
+        How many, 1 to 1000; none of them was used in the calibration.
+    apparatus : Apparatus, optional
+        Another stage in place of the calibrated one.
+    dbo : path-like, optional
+        Folder with ``training.csv`` and ``tracking.csv`` of the measured log of a piezo stack of
+        github.com/yan9a/DiscreteBacklashOperator, with times and units added: the same way on it,
+        up to the feedforward.
+    progress : bool, optional
+        Whether a progress bar is shown; where not given, in a terminal only.
+
+    Returns
+    -------
+    Reproduction
+        Published beside obtained, conclusions, figures.
+
+    Raises
+    ------
+    ParameterError
+        `seeds` is out of its range, or `apparatus` is something else.
+    DataError
+        A file of `dbo` is missing or is not of that log.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> found = pt.reproduce_xu_li_2010(seeds=1)
+    >>> by_key = {one.observable.key: one for one in found.obtained}
+    >>> one = by_key["back.lag"]
+    >>> print(f"{one.observable.published} rad published, {one.median:.2f} obtained")
+    0.063 rad published, 0.06 obtained
+    """
+    count = _core.as_count("seeds", seeds)
+    if not 1 <= count <= 1000:
+        raise ParameterError(f"seeds is {count}: expected 1 to 1000")
+    apparatus = Apparatus.calibrated() if apparatus is None else apparatus
+    if not isinstance(apparatus, Apparatus):
+        kind = type(apparatus).__name__
+        raise ParameterError(
+            f"apparatus is {kind}: expected a piezotrack.xu_li_2010.apparatus.Apparatus"
+        )
+    chosen = tuple(range(FIRST_SEED, FIRST_SEED + count))
+    # What may be missing is looked at first.
+    log = None if dbo is None else drives(dbo)
+    way = go(apparatus, chosen[0])
+    more = sections(apparatus.seeded(chosen[0]), way)
+    rest = _scored(apparatus, chosen[1:], progress)
+    values, true = zip((way.values, way.true_values), *rest, strict=True)
+    return Reproduction(
+        way=way,
+        values=values,
+        true_values=true,
+        seeds=chosen,
+        apparatus=apparatus,
+        sections=tuple(more if log is None else [*more, log.section()]),
+        drives=log,
+    )
+
+
+def _scored(
+    apparatus: Apparatus, seeds: Sequence[int], progress: bool | None
+) -> list[tuple[dict[str, float], dict[str, float]]]:
+    """Go the way with other seeds, and keep the numbers only."""
+
+    def score(seed: int) -> tuple[dict[str, float], dict[str, float]]:
+        way = go(apparatus, seed)
+        return way.values, way.true_values
+
+    from rich.console import Console
+    from rich.progress import track
+
+    console = Console(stderr=True)
+    shown = console.is_terminal if progress is None else progress
+    # The core releases Python's lock, so threads do.
+    pool = ThreadPoolExecutor(max_workers=2)
+    try:
+        return list(
+            track(
+                pool.map(score, seeds),
+                total=len(seeds),
+                description="seeds",
+                console=console,
+                transient=True,
+                disable=not shown,
+            )
+        )
+    finally:
+        # After Ctrl-C those that have not begun are given up.
+        pool.shutdown(cancel_futures=True)

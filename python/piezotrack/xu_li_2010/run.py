@@ -1,0 +1,107 @@
+"""The paper's way from one end to the other, with one seed of the sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from . import (
+    fig_03_sensor_at_rest,
+    fig_04_step_test,
+    fig_06_identification,
+    fig_07_model_comparison,
+    fig_12_14_tracking,
+    fig_15_circles,
+)
+
+if TYPE_CHECKING:
+    from ..identification.comparison import Comparison
+    from ..identification.result import Identification
+    from ..identification.sensor_noise import Noise
+    from ..identification.step_response import StepResult
+    from .apparatus import Apparatus
+    from .fig_12_14_tracking import Runs
+    from .table_2 import Table2
+
+__all__ = ["Way", "go"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Way:
+    """All that one seed gave.
+
+    Attributes
+    ----------
+    noise, step, fit, judged : Noise, StepResult, Identification, Comparison
+        Figs. 3, 4, 6 and 7.
+    compensation, antiwindup, repetitive : dict of str to Tracking
+        Figs. 12, 13 and 14.
+    table : Table2
+        Fig. 15 and Table 2.
+    lag : float
+        From serving x to serving y [s].
+    """
+
+    noise: Noise
+    step: StepResult
+    fit: Identification
+    judged: Comparison
+    compensation: Runs
+    antiwindup: Runs
+    repetitive: Runs
+    table: Table2
+    lag: float
+
+    @property
+    def values(self) -> dict[str, float]:
+        """What it gave for each observable, SI, and for the conclusions."""
+        return {
+            **fig_03_sensor_at_rest.observe(self.noise),
+            **fig_04_step_test.observe(self.step),
+            **fig_06_identification.observe(self.fit),
+            **fig_07_model_comparison.observe(self.judged),
+            **fig_12_14_tracking.observe(self.compensation, self.antiwindup, self.repetitive),
+            **fig_15_circles.observe(self.table, self.lag),
+        }
+
+    @property
+    def true_values(self) -> dict[str, float]:
+        """The same of the true displacement, for what is followed under control."""
+        return {
+            **fig_12_14_tracking.observe(
+                self.compensation, self.antiwindup, self.repetitive, true=True
+            ),
+            **fig_15_circles.observe(self.table, self.lag, true=True),
+        }
+
+
+def go(apparatus: Apparatus, seed: int) -> Way:
+    """Go the whole way with one seed, of the sensors and of the searches.
+
+    Parameters
+    ----------
+    apparatus : Apparatus
+        The stage and its computer.
+    seed : int
+        0 or above.
+
+    Returns
+    -------
+    Way
+        Every stage of it.
+    """
+    apparatus = apparatus.seeded(seed)
+    log = fig_06_identification.record(apparatus)
+    fit = fig_06_identification.search(log, seed)
+    inverse = fit.inverse()
+    return Way(
+        noise=fig_03_sensor_at_rest.at_rest(apparatus),
+        step=fig_04_step_test.step_test(apparatus),
+        fit=fit,
+        judged=fig_07_model_comparison.judge(log, fit, seed),
+        compensation=fig_12_14_tracking.compensation(apparatus, inverse),
+        antiwindup=fig_12_14_tracking.antiwindup(apparatus, inverse),
+        repetitive=fig_12_14_tracking.repetitive(apparatus, inverse),
+        table=fig_15_circles.circles(apparatus, inverse),
+        lag=apparatus.stage.lag,
+    )

@@ -1,0 +1,158 @@
+"""Table 2 of Xu and Li 2010: circles of three radii at three frequencies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+from ..control.contouring import Contour, contour
+from ..references.paths import circle
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
+
+    from ..control.controller import Controller
+    from ..stages.xy import XYStage
+
+__all__ = ["PUBLISHED", "Table2", "run_table_2"]
+
+
+class Published(NamedTuple):
+    """One case: radius [m], frequency [Hz]; contour error: peak to peak, mean and SD [m]."""
+
+    radius: float
+    frequency: float
+    peak_to_peak: float
+    mean: float
+    sd: float
+
+
+# Doi 10.1115/1.4001712; printed in um. "Max" is of the peak-to-peak error.
+PUBLISHED = tuple(
+    Published(radius / 1e6, frequency, *(value / 1e6 for value in errors))
+    for radius, frequency, *errors in (
+        (10.0, 0.1, 0.957, 0.021, 0.184),
+        (10.0, 0.2, 1.406, 0.095, 0.311),
+        (10.0, 0.5, 2.606, 0.570, 0.485),
+        (20.0, 0.1, 1.499, 0.063, 0.300),
+        (20.0, 0.2, 2.250, 0.210, 0.480),
+        (20.0, 0.5, 4.118, 1.030, 0.831),
+        (40.0, 0.1, 2.347, 0.052, 0.472),
+        (40.0, 0.2, 4.152, 0.272, 0.853),
+        (40.0, 0.5, 7.048, 1.649, 1.518),
+    )
+)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Table2:
+    """The nine circles, run.
+
+    Attributes
+    ----------
+    runs : tuple of Contour
+        In the order of the table: by radius, then by frequency.
+    """
+
+    runs: tuple[Contour, ...]
+
+    @property
+    def cases(self) -> list[tuple[Published, Contour]]:
+        """What is published of each circle, and its run."""
+        return list(zip(PUBLISHED, self.runs, strict=False))
+
+    def __str__(self) -> str:
+        lines = [
+            "contour error in um, published / obtained; max is peak to peak",
+            "radius um  frequency Hz          max               mean                SD",
+        ]
+        for case, run in self.cases:
+            found = run.metrics
+            pairs = (
+                (case.peak_to_peak, found.peak_to_peak),
+                (case.mean, found.mean_error),
+                (case.sd, found.sd_error),
+            )
+            cells = "  ".join(f"{1e6 * one:>7.3f} /{1e6 * other:>7.3f}" for one, other in pairs)
+            lines.append(f"{1e6 * case.radius:>9g}  {case.frequency:>12g}  {cells}")
+        return "\n".join(lines)
+
+    def plot(self) -> Figure:
+        """Circles at 0.1 Hz as in Fig. 15, errors magnified, and the table as bars.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Not yet shown or saved.
+        """
+        from .table_2_plot import plot_table_2
+
+        return plot_table_2(self)
+
+
+def run_table_2(
+    stage: XYStage,
+    controllers: Sequence[Controller],
+    *,
+    decoupling: ArrayLike | None = None,
+    delay: float = 0.0,
+    jitter: float = 0.0,
+    largest: float = 1.0,
+    checked: bool = True,
+) -> Table2:
+    """Run the nine circles of Table 2 of Xu and Li 2010, doi 10.1115/1.4001712.
+
+    Three turns each, about the middle of the workspace; the turns after the smooth start count,
+    which the paper does not tell. A circle at 0.5 Hz so has fewer samples for its extremes.
+
+    Parameters
+    ----------
+    stage : XYStage
+        What is led.
+    controllers : (Controller, Controller)
+        Those of x and y.
+    decoupling, delay, jitter
+        As for `contour`.
+    largest : float, optional
+        Radius up to which circles are run [m]: 20e-6 leaves out the last three.
+    checked : bool, optional
+        Whether reach and stability are checked before each circle.
+
+    Returns
+    -------
+    Table2
+        The runs; printed, they are a table beside the published one.
+
+    Raises
+    ------
+    ParameterError, NumericalError
+        As for `contour`.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+    >>> table = pt.run_table_2(pt.XYStage.xu_li_2010(seed=1), (loop, loop))
+    >>> run = table.runs[0]
+    >>> print(f"{run.path.name}: SD {1e6 * run.metrics.sd_error:.2f} um, published 0.18 um")
+    circle 10 um, 0.1 Hz: SD 0.16 um, published 0.18 um
+    """
+    return Table2(
+        runs=tuple(
+            contour(
+                stage,
+                controllers,
+                circle(frequency=case.frequency, radius=case.radius),
+                decoupling=decoupling,
+                delay=delay,
+                jitter=jitter,
+                beyond_reach=not checked,
+                unstable=not checked,
+            )
+            for case in PUBLISHED
+            if case.radius <= largest
+        )
+    )

@@ -1,0 +1,143 @@
+"""`piezotrack contour` and `piezotrack noise`: what they write, and what they refuse."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import piezotrack as pt
+from commands import ran, refusal, table
+from loops import PID, fitted, loop, model_text
+
+STAGE = pt.XYStage.xu_li_2010(seed=1)
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("dahl.json").write_text(model_text(), encoding="utf-8")
+
+
+def test_contour_writes_what_python_finds() -> None:
+    printed = ran("contour", "dahl.json", "--path", "circle:0.5Hz,10um")
+    written = sorted(path.name for path in Path("results").iterdir())
+    assert written == ["contour.csv", "contour.json", "contour.png", "contour.svg"]
+    one = loop(feedforward=fitted().inverse(), feedback=PID)
+    expected = pt.contour(STAGE, (one, one), pt.circle(frequency=0.5, radius=10e-6))
+    assert expected.summary() in printed
+    assert printed.startswith("the virtual XY stage: y lags by 0.01 s, 1.5 % of y in x")
+    rows = table("results/contour.csv")
+    assert np.allclose(rows["measured_y_um"], 1e6 * expected.y.measured, rtol=1e-9, atol=1e-9)
+    radial = 10.0 - np.hypot(rows["measured_x_um"] - 58.5, rows["measured_y_um"] - 58.5)
+    assert np.allclose(rows["contour_error_um"], radial, atol=1e-8)
+    document = json.loads(Path("results/contour.json").read_text(encoding="utf-8"))
+    assert document["format"] == "piezotrack-contour"
+    assert document["contour"]["sd_error"] == expected.metrics.sd_error
+    assert document["y"]["max_error"] == expected.y.metrics.max_error
+
+
+def test_the_options_reach_the_stage_and_the_loops() -> None:
+    printed = ran(
+        *("contour", "--path", "lissajous:0.5/1Hz,5/5um", "--no-feedforward", "--lag", "0.04"),
+        *("--cross-talk", "0.1:-0.08", "--decouple", "--kp", "0.1", "--duration", "4"),
+        *("--out", "a/b", "--seed", "3"),
+    )
+    assert "y lags by 0.04 s, 10 % of y in x, -8 % of x in y; no feedforward" in printed
+    assert "cross-talk identified: 10." in printed or "cross-talk identified: 9.9" in printed
+    assert table("a/b/contour.csv").size == 200
+
+
+def test_a_file_is_run_again_and_again() -> None:
+    angle = 2.0 * np.pi * np.arange(200) / 200
+    rows = zip(0.01 * np.arange(200), 50 + 8 * np.cos(angle), 50 + 4 * np.sin(angle), strict=True)
+    text = "\n".join(f"{t:.2f},{x:.9f},{y:.9f}" for t, x, y in rows)
+    Path("ellipse.csv").write_text("time_s,x_um,y_um\n" + text + "\n", encoding="utf-8")
+    printed = ran("contour", "--path", "ellipse.csv", "--period", "2", "--duration", "6")
+    assert "XYReference(ellipse.csv, 42 to 58 by 46 to 54 um, 6 s)" in printed
+    rows_written = table("results/contour.csv")
+    assert rows_written["desired_x_um"][0] == 0.0
+    assert np.abs(rows_written["contour_error_um"][100:]).max() < 1.5
+    assert "--period is for a path from a file" in refusal(
+        "contour", "--path", "circle:1Hz,1um", "--period", "2"
+    )
+
+
+@pytest.mark.usefixtures("_no_pictures_at_all")
+def test_table_2_is_one_command() -> None:
+    printed = ran("contour", "--table-2")
+    assert "a model of x, fitted to" in printed
+    rows = table("results/table_2.csv")
+    assert rows.size == 9
+    assert rows["published_sd_um"][0] == 0.184
+    assert rows["obtained_sd_um"][0] == pytest.approx(0.184, rel=0.25)
+    for row in rows:
+        assert f"{row['published_mean_um']:.3f} /{row['obtained_mean_um']:>7.3f}" in printed
+
+
+@pytest.fixture
+def _no_pictures_at_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    import matplotlib.pyplot as plt
+
+    def none(figures: object, folder: object) -> list[Path]:
+        del folder
+        assert len(figures) == 10  # type: ignore[arg-type]
+        plt.close("all")
+        return []
+
+    monkeypatch.setattr("piezotrack._support.files.save_figures", none)
+
+
+def rest_log(name: str = "rest.csv") -> None:
+    y = pt.VirtualStage.xu_li_2010(seed=1).record(np.zeros(10000), 1 / 5000.0).y
+    rows = "\n".join(f"{k / 5000.0:.4f},{1e6 * value:.6f}" for k, value in enumerate(y))
+    Path(name).write_text("time_s,displacement_um\n" + rows + "\n", encoding="utf-8")
+
+
+def test_noise_needs_no_drive() -> None:
+    rest_log()
+    printed = ran("noise", "rest.csv", "--window", "0.2:")
+    assert "9000 samples" in printed
+    assert "0.0381" in printed
+    written = sorted(path.name for path in Path("results").iterdir())
+    assert written == ["noise.json", "noise.png", "noise.svg"]
+    document = json.loads(Path("results/noise.json").read_text(encoding="utf-8"))
+    assert document["spread"]["sd_error"] == pytest.approx(0.097e-6, rel=0.05)
+    assert document["resolution"] == pytest.approx(2.5e-3 / 65536, rel=1e-4)
+
+
+def test_what_cannot_be_done_is_refused_in_one_sentence() -> None:
+    assert "--path and --table-2: expected one of them, neither" in refusal("contour", "dahl.json")
+    assert "both are" in refusal("contour", "--table-2", "--path", "circle:0.1Hz,10um")
+    assert "expected none with --table-2" in refusal("contour", "--table-2", "--unstable")
+    assert "neither a file nor a known kind" in refusal("contour", "--path", "square:1Hz")
+    assert "--beyond-reach" in refusal("contour", "dahl.json", "--path", "circle:0.1Hz,80um")
+    assert "LOW:HIGH" in refusal("contour", "--path", "circle:0.1Hz,1um", "--cross-talk", "3")
+    assert "lag is -1" in refusal("contour", "--path", "circle:0.1Hz,1um", "--lag", "-1")
+    assert "x: the loop is unstable" in refusal(
+        "contour", "dahl.json", "--path", "circle:0.1Hz,1um", "--kp", "0.9"
+    )
+    Path("still.csv").write_text(
+        "time_s,x_um\n" + "\n".join(f"{k / 100},1.0" for k in range(200)), encoding="utf-8"
+    )
+    assert refusal("noise", "still.csv").startswith("still.csv: all 200 samples are")
+    rest_log("short.csv")
+    lines = Path("short.csv").read_text(encoding="utf-8").splitlines()[:40]
+    Path("short.csv").write_text("\n".join(lines), encoding="utf-8")
+    assert "short.csv: record has 39 samples: expected 100" in refusal("noise", "short.csv")
+    assert not Path("results").exists()
+
+
+def test_a_path_of_two_columns_needs_an_interval() -> None:
+    t = np.arange(201) / 20.0
+    rows = np.column_stack([50.0 + 10.0 * np.cos(t), 50.0 + 10.0 * np.sin(t)])
+    np.savetxt("path.csv", rows, delimiter=",", header="x_um,y_um", comments="", fmt="%.4f")
+    words = refusal("contour", "dahl.json", "--path", "path.csv")
+    assert words.startswith("path.csv:1: no column is known to be the time: expected time_s")
+    assert "--path-dt" in words
+    printed = ran("contour", "dahl.json", "--path", "path.csv", "--path-dt", "0.05")
+    assert "XYReference(path.csv, 40 to 60 by 40 to 60 um, 10" in printed
+    assert "note  the path begins 78 um from where the stage is" in printed
+    assert "expected none" in refusal("contour", "--path", "circle:1Hz,10um", "--path-dt", "0.05")

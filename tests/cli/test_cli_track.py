@@ -1,0 +1,230 @@
+"""`piezotrack track` and `piezotrack feedforward`: what they write, and what they refuse."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezotrack as pt
+from commands import ran, refusal, table
+from loops import PID, STAGE, fitted, loop, model_text, sine
+
+COURSE = "sine:0.5Hz,0..110um,6s"
+ROWS = "time_s,desired_um,measured_um,voltage_V,feedforward_V,feedback_V,repetitive_V"
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("dahl.json").write_text(model_text(), encoding="utf-8")
+
+
+def report(folder: str = "results") -> dict[str, Any]:
+    text = Path(folder, "tracking.json").read_text(encoding="utf-8")
+
+    def refuse(word: str) -> None:
+        raise AssertionError(f"{word} is no JSON")
+
+    document: dict[str, Any] = json.loads(text, parse_constant=refuse)
+    return document
+
+
+# What they do.
+
+
+def test_track_writes_what_python_finds() -> None:
+    printed = ran("track", "dahl.json", "--reference", COURSE)
+    written = sorted(path.name for path in Path("results").iterdir())
+    assert written == ["tracking.csv", "tracking.json", "tracking.png", "tracking.svg"]
+    expected = pt.track(STAGE, loop(feedforward=fitted().inverse(), feedback=PID), sine(0.5, 6.0))
+    assert expected.summary() in printed
+    assert printed.startswith("the virtual stage, Reference(sine 0.5 Hz, 0 to 110 um, 6 s)")
+    for name in written:
+        assert f"  {Path('results', name)}\n" in printed
+    assert Path("results/tracking.csv").read_text(encoding="utf-8").startswith(ROWS + "\n")
+    rows = table("results/tracking.csv")
+    assert rows.size == 300
+    assert np.allclose(rows["voltage_V"], expected.voltage, rtol=1e-9, atol=1e-9)
+    assert np.allclose(rows["measured_um"], 1e6 * expected.measured, rtol=1e-9, atol=1e-9)
+    document = report()
+    assert document["format"] == "piezotrack-tracking"
+    assert document["metrics"]["max_error"] == expected.metrics.max_error
+    assert [one["rms_error"] for one in document["periods"]] == [
+        one.rms_error for one in expected.periods
+    ]
+    assert document["model_drive_range"] == pytest.approx([0.0, 75.0])
+    assert document["limits"] == {"value": [0.0, 75.0], "unit": "V"}
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_every_option_of_a_loop_reaches_it() -> None:
+    ran(
+        *("track", "dahl.json", "--reference", "sine:0.5Hz,10..60um,6s", "--out", "a/b"),
+        *("--dt", "0.01", "--limits", "-5:60", "--online", "--kp", "0.05", "--ti", "0.02"),
+        *("--td", "0.01", "--tt", "inf", "--repetitive", "--kq", "0.5", "--tq", "0.1"),
+        *("--delay", "0.001", "--seed", "7"),
+    )
+    expected = pt.track(
+        pt.VirtualStage.xu_li_2010(seed=7),
+        pt.Controller(
+            dt=0.01,
+            limits=(-5.0, 60.0),
+            feedforward=fitted().inverse(playback="online"),
+            feedback=pt.Pid.from_um(kp=0.05, ti=0.02, td=0.01, tt=float("inf")),
+            addon=pt.Repetitive(period=2.0, kq=0.5, tq=0.1),
+        ),
+        sine(0.5, 6.0, 10e-6, 60e-6),
+        delay=0.001,
+    )
+    assert report("a/b")["metrics"]["rms_error"] == expected.metrics.rms_error
+    assert expected.repetitive.any()
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_parts_can_be_left_out() -> None:
+    ran("track", "dahl.json", "--reference", COURSE, "--no-feedback")
+    alone = report()
+    assert alone["feedback"] is None
+    ran("track", "dahl.json", "--reference", COURSE, "--no-feedforward")
+    assert report()["feedforward"] == "no feedforward"
+    assert not table("results/tracking.csv")["feedforward_V"].any()
+    assert report()["metrics"]["rms_error"] > 0.0
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_the_model_itself_is_led_almost_perfectly() -> None:
+    """With its offset: what is left is the hold of 0.002 s, half a sample late."""
+    course = "sine:0.5Hz,10..100um,6s"
+    options = ("--stage", "model", "--no-feedback", "--dt", "0.002")
+    printed = ran("track", "dahl.json", "--reference", course, *options)
+    assert printed.startswith("the model itself, Reference(")
+    metrics = report()["metrics"]
+    assert metrics["phase_lag"] == pytest.approx(np.pi * 0.001, rel=0.1)
+    assert abs(metrics["mean_error"]) < 0.1e-6
+    assert metrics["max_error"] < 0.3e-6
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_the_same_command_writes_the_same_bytes() -> None:
+    for folder in ("one", "two"):
+        ran("track", "dahl.json", "--reference", COURSE, "--out", folder)
+    for name in ("tracking.csv", "tracking.json"):
+        assert Path("one", name).read_bytes() == Path("two", name).read_bytes()
+
+
+@pytest.mark.usefixtures("_no_pictures")
+@pytest.mark.parametrize("course", ["chirp:0.1..1Hz,0..50um,4s", "sine:0.2Hz,0..50um,2s", "levels"])
+def test_every_kind_of_reference_can_be_reported(course: str) -> None:
+    if course == "levels":
+        rows = [f"{0.02 * k},{min(0.5 * k, 40.0)}" for k in range(200)]
+        Path("levels.csv").write_text("\n".join(["time_s,target_um", *rows]), encoding="utf-8")
+        course = "levels.csv"
+    ran("track", "dahl.json", "--reference", course)
+    document = report()
+    assert document["metrics"]["phase_lag"] is None
+    assert document["periods"] == []
+
+
+def test_feedforward_writes_the_table_that_python_computes() -> None:
+    printed = ran("feedforward", "dahl.json", "sine:0.5Hz,0..110um,6s", "--out", "ff")
+    names = sorted(path.name for path in Path("ff").iterdir())
+    assert names == ["feedforward.csv", "feedforward.png", "feedforward.svg"]
+    rows = table("ff/feedforward.csv")
+    volts = fitted().inverse().played(sine(0.5, 6.0), 0.02)[0]
+    assert np.allclose(rows["voltage_V"], volts, rtol=1e-9, atol=1e-9)
+    assert np.allclose(rows["displacement_um"], 1e6 * sine(0.5, 6.0).sample(0.02).x, atol=1e-9)
+    assert "repeated from a table" in printed
+    assert "300 samples" in printed
+
+
+def test_feedforward_of_a_file_leads_the_model_along_it() -> None:
+    t = np.arange(2001) / 1000.0
+    wanted = 30.0 - 30.0 * np.cos(2 * np.pi * 0.5 * t)
+    lines = [f"{a:.17g},{b:.17g}" for a, b in zip(t, wanted, strict=True)]
+    Path("target.csv").write_text("\n".join(["time_s,displacement_um", *lines]), encoding="utf-8")
+    printed = ran("feedforward", "dahl.json", "target.csv", "--dt", "0.001", "--online")
+    rows = table("results/feedforward.csv")
+    known = pt.load("dahl.json")
+    shown = known.displacement(rows["voltage_V"], 1e-3)
+    late = rows["time_s"] > 1.2
+    assert np.abs(shown - 1e-6 * rows["displacement_um"])[late].max() < 5e-9
+    assert np.allclose(rows["displacement_um"][:2001], wanted, atol=1e-9)
+    assert "computed along the whole path" in printed
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_feedforward_says_where_the_model_was_not_fitted() -> None:
+    printed = ran("feedforward", "dahl.json", "sine:0.5Hz,0..200um,6s")
+    assert "note  the model was fitted from 0 to 75 V only" in printed
+
+
+# What they refuse.
+
+TRACK = ("track", "dahl.json", "--reference", COURSE)
+REFUSED: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "no model": (("track", "none.json", "--reference", COURSE), ("none.json", "no such file")),
+    "not a model": (("track", "log.txt", "--reference", COURSE), ("log.txt", "not JSON")),
+    "reference": (("track", "dahl.json", "--reference", "sinus:1Hz"), ("'sinus", "sine")),
+    "no such file": (("track", "dahl.json", "--reference", "none.csv"), ("none.csv",)),
+    "reference in no unit": (
+        ("track", "dahl.json", "--reference", "sine:0.5,0..110um"),
+        ("sine:0.5",),
+    ),
+    "limits": ((*TRACK, "--limits", "75"), ("--limits has '75'", "LOW:HIGH")),
+    "limits of words": ((*TRACK, "--limits", "low:75"), ("--limits has 'low'", "a number")),
+    "limits crossed": ((*TRACK, "--limits", "75:0"), ("limits", "the lower one first")),
+    "limits not finite": ((*TRACK, "--limits", "0:nan"), ("limits", "finite")),
+    "kp in V/m": ((*TRACK, "--kp", "120000"), ("kp is 1.2e+11 V/m", "0.12 V/um")),
+    "kp in MV/um": ((*TRACK, "--kp", "1.2e-7"), ("kp is 0.12 V/m", "a value in V/um")),
+    "kp": ((*TRACK, "--kp", "nan"), ("kp is nan",)),
+    "ti": ((*TRACK, "--ti", "0"), ("ti is 0.0 s", "above 0")),
+    "tt": ((*TRACK, "--tt", "0.005"), ("tt is 0.005 s", "half a sampling interval")),
+    "kq": ((*TRACK, "--repetitive", "--kq", "2"), ("kq is 2.0 V/um", "below 2")),
+    "dt": ((*TRACK, "--dt", "0"), ("dt is 0",)),
+    "coarse": ((*TRACK, "--dt", "1.5", "--tt", "9"), ("dt is 1.5 s", "two samples")),
+    "no period": (
+        ("track", "dahl.json", "--reference", "chirp:0.1..1Hz,0..50um,4s", "--repetitive"),
+        ("--repetitive", "does not repeat"),
+    ),
+    "a period twice": ((*TRACK, "--period", "2"), ("--period", "from a file")),
+    "stage": ((*TRACK, "--stage", "real"), ("--stage is 'real'", "virtual or model")),
+    "delay": ((*TRACK, "--delay", "-1"), ("delay is -1",)),
+    "seed": ((*TRACK, "--seed", "-1"), ("seed is -1",)),
+    "duration": (
+        ("track", "dahl.json", "--reference", "sine:0.5Hz,0..110um", "--duration", "-1"),
+        ("duration is -1",),
+    ),
+    "out is a file": ((*TRACK, "--out", "log.txt"), ("--out", "log.txt is a file")),
+    "out of reach": (
+        ("track", "dahl.json", "--reference", "sine:0.5Hz,0..150um,6s"),
+        ("150 um at 1 s", "beyond", "--beyond-reach"),
+    ),
+    "table for no model": (("feedforward", "none.json", COURSE), ("none.json", "no such file")),
+    "table of no reference": (("feedforward", "dahl.json", "sinus:1Hz"), ("'sinus",)),
+    "table into a file": (("feedforward", "dahl.json", COURSE, "--out", "log.txt"), ("--out",)),
+    "dt of a table": (("feedforward", "dahl.json", COURSE, "--dt", "nan"), ("dt is",)),
+    "a period of a text": (("feedforward", "dahl.json", COURSE, "--period", "2"), ("--period",)),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_refuses_in_one_sentence(name: str) -> None:
+    Path("log.txt").write_text("0 1 2\n", encoding="utf-8")
+    arguments, pieces = REFUSED[name]
+    sentence = refusal(*arguments)
+    for piece in pieces:
+        assert piece in sentence, sentence
+    assert not Path("results").exists()
+    assert "pt." not in sentence
+    assert "=True" not in sentence
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_beyond_reach_is_let_through_where_it_is_asked_for() -> None:
+    course = "sine:0.5Hz,0..150um,6s"
+    printed = ran("track", "dahl.json", "--reference", course, "--beyond-reach")
+    assert "clipped in" in printed

@@ -1,0 +1,401 @@
+"""Models side by side: what is fitted, what is judged, and how it is told."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.patches import Rectangle
+
+import piezotrack as pt
+from commands import names, ran, refusal
+from folders import MEASURED
+from piezotrack.stages.registry import KINDS
+from piezotrack.xu_li_2010.demo import write_log
+
+TIMES = np.arange(1600) / 200.0
+DRIVE = 37.5 - 25.0 * np.cos(np.pi * TIMES) - 12.0 * np.cos(1.5 * np.pi * TIMES)
+# Some of the thresholds that a fit takes: elevenths of half the drive's range.
+PLAYS = pt.PrandtlIshlinskiiStage(
+    linear=0.9e-6,
+    thresholds=tuple(np.ptp(DRIVE) / 22.0 * np.array([1.0, 3.0, 5.0, 8.0])),
+    weights=(0.1e-6, 0.2e-6, 0.15e-6, 0.12e-6),
+)
+NOISE = 0.05e-6
+PAIR = ["bouc-wen", "prandtl-ishlinskii"]
+
+
+@cache
+def log(seed: int = 1, shift: float = 3e-6) -> pt.Dataset:
+    """Play operators under two tones, 8 s at 200 Hz, with a noisy sensor."""
+    noise = np.random.default_rng(seed).normal(0.0, NOISE, TIMES.size)
+    y = PLAYS.simulate(DRIVE, 0.005).x + noise + shift
+    return pt.Dataset(u=DRIVE, y=y, dt=0.005, source="plays.csv")
+
+
+@cache
+def found() -> pt.Comparison:
+    return pt.compare(log(), PAIR, train=(1.0, 5.0), seed=1, runs=1)
+
+
+def row(name: str, of: pt.Comparison | None = None) -> pt.Compared:
+    return {one.name: one for one in (of or found()).rows}[name]
+
+
+# What is fitted and what is judged.
+
+
+def test_each_model_is_what_identify_finds_on_the_fitted_part() -> None:
+    part = log()[1.0:5.0]
+    for one in found().rows:
+        alone = pt.identify(part, one.name, seed=1, runs=1)
+        assert one.fit.document() == alone.document()
+        assert one.train.rms == pytest.approx(alone.cost, rel=1e-9)
+        assert one.title == ("Bouc-Wen" if one.name == "bouc-wen" else "Prandtl-Ishlinskii")
+    assert found().fits == {one.name: one.fit for one in found().rows}
+
+
+def test_the_rest_is_simulated_through_with_state_and_offset_carried_on() -> None:
+    for one in found().rows:
+        through = one.fit.model.simulate(log().u, 0.005).x + one.fit.offset
+        error = (log().y - through)[1000:]
+        assert len(found().test) == 600
+        assert one.test.rms == pytest.approx(float(np.sqrt(np.mean(error**2))), rel=1e-9)
+        assert one.test.max_error == pytest.approx(float(np.abs(error).max()), rel=1e-9)
+        assert one.test.offset == one.train.offset == one.fit.offset
+        assert one.test.stroke == one.train.stroke == log()[1.0:5.0].stroke
+    assert found().carried
+    # A restart would have forgotten what the plays remember.
+    best = row("prandtl-ishlinskii").fit
+    assert best.score(log().cut(5.0), offset=best.offset).rms > 5.0 * found().best.test.rms
+
+
+def test_what_the_record_is_made_of_is_best() -> None:
+    assert found().best.name == "prandtl-ishlinskii"
+    # Nothing but the noise is left, where it was fitted and where not.
+    assert found().best.train.rms == pytest.approx(NOISE, rel=0.1)
+    assert found().best.test.rms == pytest.approx(NOISE, rel=0.15)
+    assert row("bouc-wen").test.rms > 4.0 * NOISE
+    assert abs(found().best.autocorrelation) < 0.15
+    assert row("bouc-wen").autocorrelation > 0.8
+
+
+def test_the_criteria_are_burnham_and_andersons() -> None:
+    data = found().train
+    for one in found().rows:
+        error = data.y - one.fit.simulate(data, offset=one.fit.offset).x
+        n, rss = error.size, float(np.sum(error**2))
+        # m/k, b/k, d, alpha, beta, gamma; w0, ten weights, two bends, a lag; the offset each.
+        free = 7 if one.name == "bouc-wen" else 15
+        assert one.parameters == free
+        likelihood = n * np.log(rss / n)
+        assert one.aic == pytest.approx(likelihood + 2 * (free + 1), rel=1e-12)
+        assert one.bic == pytest.approx(likelihood + (free + 1) * np.log(n), rel=1e-12)
+        from_mean = error - error.mean()
+        lagged = float(from_mean[:-1] @ from_mean[1:]) / float(from_mean @ from_mean)
+        assert one.autocorrelation == pytest.approx(lagged, rel=1e-9)
+
+
+def windows(comparison: pt.Comparison) -> list[tuple[float, float, int]]:
+    parts = (comparison.train, comparison.test)
+    return [(round(float(p.t[0]), 6), round(float(p.t[-1]), 6), p.warmup) for p in parts]
+
+
+def test_windows_where_nothing_is_said() -> None:
+    plays = ["prandtl-ishlinskii"]
+    halves = pt.compare(log(), plays)
+    assert windows(halves) == [(0.0, 3.995, 0), (4.0, 7.995, 800)]
+    assert windows(pt.compare(log(), plays, train=(1.0, 3.0))) == [
+        (1.0, 2.995, 200),
+        (3.0, 7.995, 600),
+    ]
+    assert windows(pt.compare(log(), plays, test=(6.0, None))) == [
+        (0.0, 5.995, 0),
+        (6.0, 7.995, 1200),
+    ]
+    assert windows(pt.compare(log()[2.0:], plays)) == [(2.0, 4.995, 400), (5.0, 7.995, 1000)]
+    before = pt.compare(log(), plays, train=(5.0, None), test=(1.0, 3.0))
+    assert windows(before) == [(5.0, 7.995, 1000), (1.0, 2.995, 200)]
+
+
+def test_another_record_has_an_offset_of_its_own() -> None:
+    other = log(seed=2, shift=-7e-6)
+    comparison = pt.compare(log(), ["prandtl-ishlinskii"], test=other[1.0:])
+    one = comparison.rows[0]
+    assert not comparison.carried
+    assert comparison.train is log()
+    assert one.test.offset == pytest.approx(-7e-6, abs=0.05e-6)
+    assert one.train.offset == pytest.approx(3e-6, abs=0.05e-6)
+    assert one.test.rms == pytest.approx(NOISE, rel=0.1)
+    assert one.test.rms == one.fit.score(other[1.0:]).rms
+
+
+def test_all_kinds_are_compared_where_none_is_named() -> None:
+    comparison = pt.compare(log()[:4.0], seed=1, runs=1)
+    # A voltage is no force: the oscillator is for records whose drive is in newtons.
+    kinds = [kind.name for kind in KINDS if kind.drive_unit == "V"]
+    assert [one.name for one in comparison.rows] == kinds
+    assert len(kinds) == len(KINDS) - 1
+
+
+# Models that are there already.
+
+
+def test_a_model_and_a_file_are_taken_as_they_are(tmp_path: Path) -> None:
+    elsewhere = pt.identify_plays(log()[2.0:6.0], asymmetry=False)
+    file = elsewhere.save(tmp_path / "mine.json")
+    comparison = pt.compare(log(), [file, elsewhere, str(file)], train=(1.0, 5.0))
+    assert [one.name for one in comparison.rows] == ["mine", "prandtl-ishlinskii", "mine-2"]
+    assert [one.title for one in comparison.rows] == [
+        "Prandtl-Ishlinskii (mine)",
+        "Prandtl-Ishlinskii",
+        "Prandtl-Ishlinskii (mine-2)",
+    ]
+    for one in comparison.rows:
+        assert one.fit.model == elsewhere.model
+        # It was not fitted here: there is nothing to count, and the offset is this part's.
+        assert (one.parameters, one.aic, one.bic) == (None, None, None)
+        own = elsewhere.score(log()[1.0:5.0])
+        assert (one.train.rms, one.train.offset) == (own.rms, own.offset)
+    assert comparison.summary().count("   -") == 9
+
+
+def test_a_model_fitted_on_this_very_part_is_counted(tmp_path: Path) -> None:
+    finer = pt.identify_plays(log()[1.0:5.0], count=20, asymmetry=False, dynamics=None)
+    file = finer.save(tmp_path / "finer.json")
+    comparison = pt.compare(log(), [finer, file, "prandtl-ishlinskii"], train=(1.0, 5.0))
+    assert [one.parameters for one in comparison.rows] == [22, 22, 15]
+    assert comparison.rows[0].aic == comparison.rows[1].aic
+    assert comparison.rows[0].train.rms == pytest.approx(finer.cost, rel=1e-9)
+
+
+def test_a_file_keeps_its_name_when_all_are_saved_beside_it(tmp_path: Path) -> None:
+    old = pt.identify_plays(log()[2.0:6.0], count=3)
+    file = old.save(tmp_path / "prandtl-ishlinskii.json")
+    before = file.read_bytes()
+    comparison = pt.compare(log(), ["prandtl-ishlinskii", file])
+    assert [one.title for one in comparison.rows] == ["Prandtl-Ishlinskii 2", "Prandtl-Ishlinskii"]
+    comparison.save(tmp_path)
+    assert file.read_bytes() == before
+    assert (tmp_path / "prandtl-ishlinskii-2.json").exists()
+
+
+# What is told.
+
+
+def test_the_table_marks_the_best() -> None:
+    lines = found().summary().splitlines()
+    assert lines[0] == "fitted on 1 to 4.995 s of plays.csv, 800 samples"
+    assert lines[1].endswith("600 samples; state and offset carried on")
+    table = {line[2:20].strip(): line for line in lines if line.startswith(("  B", "* P", "  P"))}
+    assert table["Prandtl-Ishlinskii"].startswith("*")
+    assert table["Bouc-Wen"].startswith(" ")
+    figures = [float(text) for text in table["Bouc-Wen"].split()[1:]]
+    one = row("bouc-wen")
+    scores = [one.train.rms, one.train.max_error, one.test.rms, one.test.max_error]
+    assert [figures[i] for i in (0, 2, 3, 5)] == pytest.approx([1e6 * s for s in scores], rel=1e-3)
+    assert figures[6] == 7
+    best = found().best
+    assert one.aic is not None
+    assert best.aic is not None
+    assert figures[7] == pytest.approx(one.aic - best.aic, rel=1e-3)
+    assert "doi 10.1007/b97636" in lines[-1]
+    assert "Prandtl-Ishlinskii 0.0" in repr(found())
+
+
+def test_an_exact_fit_can_be_told_and_drawn() -> None:
+    u = 37.5 - 37.5 * np.cos(np.arange(800) / 50.0)
+    exact = pt.Dataset(u=u, y=PLAYS.simulate(u, 0.005).x, dt=0.005)
+    model = pt.IdentifiedPlays(model=PLAYS, offset=0.0, offset_fitted=False, stroke=exact.stroke)
+    comparison = pt.compare(exact, [model])
+    assert comparison.best.test.rms == 0.0
+    assert "Prandtl-Ishlinskii" in comparison.summary()
+    plt.close(comparison.plot())
+
+
+def test_the_picture_has_loops_bars_and_an_error_for_each() -> None:
+    figure = found().plot()
+    loops, bars, *errors = figure.axes
+    assert loops.get_xlabel() == "drive [V]"
+    assert loops.get_ylabel() == "displacement [um]"
+    labels = [line.get_label() for line in loops.lines]
+    assert labels == ["measured", "Bouc-Wen", "Prandtl-Ishlinskii"]
+    # Told apart without colours.
+    assert len({line.get_linestyle() for line in loops.lines[1:]}) == 2
+    # The loop is one cycle of what was not fitted, where one of them is furthest off.
+    drawn = 1e-6 * np.asarray(loops.lines[0].get_ydata())
+    assert np.isin(np.round(drawn, 12), np.round(found().test.y, 12)).all()
+    lengths = [patch.get_width() for patch in bars.patches if isinstance(patch, Rectangle)]
+    scores = [one.train for one in found().rows] + [one.test for one in found().rows]
+    assert lengths == pytest.approx([score.rms_percent for score in scores])
+    assert len(errors) == 2
+    for ax, one in zip(errors, found().rows, strict=True):
+        fitted, judged, _, split = ax.lines
+        unit = 1e-9 if "[nm]" in ax.get_ylabel() else 1e-6
+        largest = [unit * float(np.abs(line.get_ydata()).max()) for line in (fitted, judged)]
+        assert largest == pytest.approx([one.train.max_error, one.test.max_error])
+        assert float(np.asarray(split.get_xdata())[0]) == pytest.approx(4.9975)
+        assert one.title in ax.get_title(loc="left")
+    assert errors[-1].get_xlabel() == "time [s]"
+    plt.close(figure)
+
+
+def test_another_record_is_drawn_behind_the_first() -> None:
+    comparison = pt.compare(log(), ["prandtl-ishlinskii"], test=log(seed=2))
+    figure = comparison.plot()
+    fitted, judged = (np.asarray(line.get_xdata()) for line in figure.axes[-1].lines[:2])
+    assert judged[0] == pytest.approx(fitted[-1] + 0.005)
+    assert "the other record" in figure.axes[-1].get_xlabel()
+    plt.close(figure)
+
+
+def test_it_is_saved_with_its_models(tmp_path: Path) -> None:
+    written = found().save(tmp_path / "out")
+    models = ["bouc-wen.json", "prandtl-ishlinskii.json"]
+    expected = ["comparison.json", "comparison.png", "comparison.svg", *models]
+    assert sorted(path.name for path in written) == names(str(tmp_path / "out")) == sorted(expected)
+    for one in found().rows:
+        assert pt.load(tmp_path / "out" / f"{one.name}.json").model == one.fit.model
+    document = json.loads((tmp_path / "out" / "comparison.json").read_text())
+    assert document["format"] == "piezotrack-comparison"
+    assert document["best"] == "prandtl-ishlinskii"
+    assert document["train"]["window_s"] == [1.0, pytest.approx(4.995)]
+    assert document["train"]["sha256"] == found().train.sha256
+    for entry, one in zip(document["models"], found().rows, strict=True):
+        assert entry["test"]["rms"] == one.test.rms
+        assert (entry["aic"], entry["parameters"]) == (one.aic, one.parameters)
+    again = pt.compare(log(), PAIR, train=(1.0, 5.0), seed=1, runs=1, threads=1)
+    for path in again.save(tmp_path / "again"):
+        assert path.read_bytes() == (tmp_path / "out" / path.name).read_bytes(), path.name
+    with pytest.raises(pt.DataError, match="is not a piezotrack model"):
+        pt.load(tmp_path / "out" / "comparison.json")
+
+
+# What is refused.
+
+REFUSED: dict[str, tuple[dict[str, Any], str]] = {
+    "one name": ({"models": "dahl"}, r"models is 'dahl': expected several in a list"),
+    "no model": ({"models": []}, "models is empty"),
+    "unknown": ({"models": ["preisach"]}, "models has 'preisach': expected 'dahl', 'bouc-wen'"),
+    "a stage": ({"models": [PLAYS]}, "models has 'PrandtlIshlinskiiStage': expected"),
+    "no file": ({"models": ["gone.json"]}, "gone.json: no such file"),
+    "train": ({"train": 3.0}, "train is float: expected"),
+    "train of three": ({"train": (1.0, 2.0, 3.0)}, r"train is \(1.0, 2.0, 3.0\): expected"),
+    "train outside": ({"train": (1.0, 30.0)}, "train: the window from 1 s to 30 s reaches out"),
+    "train of words": ({"train": ("a", 3.0)}, "train: start is 'a'"),
+    "train to the end": ({"train": (1.0, None)}, "leaves nothing to judge on: expected an end"),
+    "all fitted": ({"train": (1.0, 8.0)}, "test: the window from 8 s to 8 s is empty"),
+    "test": ({"test": "5:8"}, r"test is '5:8': expected \(start, stop\) in seconds or a Dataset"),
+    "test from the start": ({"test": (None, 4.0)}, "leaves nothing to fit"),
+    "overlap": ({"train": (1.0, 5.0), "test": (4.0, 6.0)}, "windows that do not overlap"),
+    "seed": ({"models": ["dahl"], "seed": -1}, "seed is -1"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_refuses(name: str) -> None:
+    arguments, words = REFUSED[name]
+    with pytest.raises(pt.PiezotrackError, match=words):
+        pt.compare(log(), **({"models": ["prandtl-ishlinskii"]} | arguments))
+
+
+def test_refuses_what_is_no_record() -> None:
+    with pytest.raises(pt.ParameterError, match="log is ndarray: expected a Dataset"):
+        pt.compare(log().u, ["dahl"])  # type: ignore[arg-type]
+
+
+# The command.
+
+
+@pytest.fixture
+def _logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_log(log(), Path("log.csv"))
+    write_log(log(seed=2), Path("other.csv"))
+    Path("file").write_text("not a folder", encoding="utf-8")
+
+
+MODELS = ("--model", "bouc-wen", "--model", "prandtl-ishlinskii", "--runs", "1", "--seed", "1")
+
+
+@pytest.mark.usefixtures("_logs")
+def test_the_command_writes_what_python_finds() -> None:
+    printed = ran("compare", "log.csv", *MODELS, "--train", "1:5", "--threads", "1")
+    comparison = pt.compare(pt.read("log.csv"), PAIR, train=(1.0, 5.0), seed=1, runs=1)
+    assert printed.startswith(comparison.summary())
+    for path in comparison.save("expected"):
+        assert Path("results", path.name).read_bytes() == path.read_bytes()
+        assert f"  {Path('results', path.name)}\n" in printed
+
+
+@pytest.mark.usefixtures("_logs", "_no_pictures")
+def test_the_command_judges_on_another_log_and_takes_files() -> None:
+    second = ("--test-log", "other.csv", "--test", "2:", "--out", "a/b")
+    plays = ("--model", "prandtl-ishlinskii", "--hold", "foh")
+    ran("compare", "log.csv", *plays, "--train", "1:5", *second)
+    document = json.loads(Path("a/b/comparison.json").read_text())
+    assert document["test"]["source"] == "other.csv"
+    assert document["test"]["window_s"][0] == pytest.approx(2.0)
+    assert not document["carried"]
+    printed = ran("compare", "log.csv", "--model", "a/b/prandtl-ishlinskii.json", "--test", "6:")
+    assert "fitted on 0 to 5.995 s of log.csv" in printed
+
+
+REFUSED_COMMANDS: dict[str, tuple[str, ...]] = {
+    "compare gone.csv": ("gone.csv: there is no such file",),
+    "compare log.csv --model preisach": ("log.csv: models has 'preisach'", "'dahl'"),
+    "compare log.csv --model gone.json": ("gone.json: no such file",),
+    "compare log.csv --model log.json": ("log.json",),
+    "compare log.csv --train 5": ("--train is '5'", "expected A:B"),
+    "compare log.csv --train a:b": ("--train has 'a'", "number"),
+    "compare log.csv --train 1:": ("nothing to judge on", "or --test"),
+    "compare log.csv --test :4": ("nothing to fit", "or --train"),
+    "compare log.csv --train 1:30": ("log.csv: train: the window from 1 s to 30 s",),
+    "compare log.csv --train 1:5 --test 4:6": ("log.csv: test goes from 4", "do not overlap"),
+    "compare log.csv --test-log gone.csv": ("gone.csv: there is no such file",),
+    "compare log.csv --test-log other.csv --test 50:": ("other.csv: --test 50:", "start < stop"),
+    "compare log.csv --out file": ("file cannot be made a folder",),
+    "compare log.csv --model dahl --seed -1": ("seed is -1", "0 or above"),
+    "compare log.csv --model dahl --runs 0": ("runs is 0", "1 or more"),
+}
+
+
+@pytest.mark.usefixtures("_logs")
+@pytest.mark.parametrize("command", REFUSED_COMMANDS)
+def test_the_command_refuses(command: str) -> None:
+    sentence = refusal(*command.split())
+    for piece in REFUSED_COMMANDS[command]:
+        assert piece in sentence
+    assert names(".") == ["file", "log.csv", "other.csv"]
+    assert "pt." not in sentence
+
+
+@pytest.mark.skipif(not MEASURED.is_dir(), reason=f"the measured logs are not in {MEASURED}")
+def test_on_the_measured_log_plays_are_best() -> None:
+    other = pt.read(MEASURED / "tracking.csv")[3.0:]
+    training = pt.read(MEASURED / "training.csv")
+    comparison = pt.compare(training, PAIR, train=(3.0, 23.0), test=other, seed=1)
+    plays = row("prandtl-ishlinskii", comparison)
+    assert plays.train.rms_percent <= 0.6
+    assert plays.test.rms_percent <= 1.1
+    assert comparison.best is plays
+    # Even there neighbours are alike, so the criteria are to be read with care.
+    assert plays.autocorrelation > 0.5
+
+
+def test_a_record_that_is_a_part_of_what_was_fitted_does_not_judge() -> None:
+    with pytest.raises(pt.ParameterError, match="expected windows that do not overlap"):
+        pt.compare(log(), ["prandtl-ishlinskii"], train=(1.0, 3.0), test=log()[2.0:4.0])
+
+
+def test_a_model_that_was_fitted_on_what_judges_it_is_remarked_upon() -> None:
+    named = pt.Dataset(u=log().full.u, y=log().full.y, dt=log().dt, source="log.csv")
+    fit = pt.identify(named[1.0:6.0], "prandtl-ishlinskii")
+    found = pt.compare(named, [fit, "prandtl-ishlinskii"], train=(1.0, 3.0), test=(4.0, 7.0))
+    assert len(found.notes) == 1
+    assert "was fitted on 1 to 5.9" in found.summary()

@@ -1,0 +1,39 @@
+"""The version is written once; what has to repeat it agrees."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from typing import Any
+
+import piezotrack as pt
+from folders import ROOT
+
+
+def toml(name: str) -> dict[str, Any]:
+    return tomllib.loads((ROOT / name).read_text(encoding="utf-8"))
+
+
+VERSION: str = toml("Cargo.toml")["workspace"]["package"]["version"]
+
+
+def test_the_package_has_the_version_of_the_workspace() -> None:
+    assert pt.__version__ == VERSION
+
+
+def test_the_locks_have_the_version_of_the_workspace() -> None:
+    # With another one, --locked refuses to build.
+    for lock in ("Cargo.lock", "tests/no_std/Cargo.lock"):
+        own = [package for package in toml(lock)["package"] if "source" not in package]
+        versions = {p["name"]: p["version"] for p in own if p["name"] != "piezotrack-no-std"}
+        assert versions
+        assert set(versions.values()) == {VERSION}, lock
+
+
+def test_the_citation_and_the_changelog_have_the_version_and_one_date() -> None:
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    newest = re.search(r"^## \[(\d[^]]*)\] - (\d{4}-\d{2}-\d{2})$", changes, re.MULTILINE)
+    assert newest is not None
+    assert newest[1] == VERSION
+    assert f"\nversion: {VERSION}\ndate-released: {newest[2]}\n" in citation
