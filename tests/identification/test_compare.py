@@ -15,8 +15,9 @@ from matplotlib.patches import Rectangle
 import piezotrack as pt
 from commands import names, ran, refusal
 from folders import MEASURED
-from piezotrack.stages.registry import KINDS
+from piezotrack.stages.registry import MODELS as LISTED
 from piezotrack.xu_li_2010.demo import write_log
+from play_records import fit_plays
 
 TIMES = np.arange(1600) / 200.0
 DRIVE = 37.5 - 25.0 * np.cos(np.pi * TIMES) - 12.0 * np.cos(1.5 * np.pi * TIMES)
@@ -43,20 +44,19 @@ def found() -> pt.Comparison:
     return pt.compare(log(), PAIR, train=(1.0, 5.0), seed=1, runs=1)
 
 
-def row(name: str, of: pt.Comparison | None = None) -> pt.Compared:
+def row(name: str, of: pt.Comparison | None = None) -> pt.ModelScore:
     return {one.name: one for one in (of or found()).rows}[name]
 
 
 # What is fitted and what is judged.
 
 
-def test_each_model_is_what_identify_finds_on_the_fitted_part() -> None:
-    part = log()[1.0:5.0]
-    for one in found().rows:
-        alone = pt.identify(part, one.name, seed=1, runs=1)
-        assert one.fit.document() == alone.document()
-        assert one.train.rms == pytest.approx(alone.cost, rel=1e-9)
-        assert one.title == ("Bouc-Wen" if one.name == "bouc-wen" else "Prandtl-Ishlinskii")
+def test_a_model_is_what_identify_finds_on_the_fitted_part() -> None:
+    one = row("bouc-wen")
+    alone = pt.identify(log()[1.0:5.0], "bouc-wen", seed=1, runs=1)
+    assert one.fit.document() == alone.document()
+    assert one.train.rms == pytest.approx(alone.cost, rel=1e-9)
+    assert one.title == "Bouc-Wen"
     assert found().fits == {one.name: one.fit for one in found().rows}
 
 
@@ -138,16 +138,16 @@ def test_another_record_has_an_offset_of_its_own() -> None:
 def test_all_kinds_are_compared_where_none_is_named() -> None:
     comparison = pt.compare(log()[:4.0], seed=1, runs=1)
     # A voltage is no force: the oscillator is for records whose drive is in newtons.
-    kinds = [kind.name for kind in KINDS if kind.drive_unit == "V"]
+    kinds = [info.name for info in LISTED if info.drive_unit == "V"]
     assert [one.name for one in comparison.rows] == kinds
-    assert len(kinds) == len(KINDS) - 1
+    assert len(kinds) == len(LISTED) - 1
 
 
 # Models that are there already.
 
 
 def test_a_model_and_a_file_are_taken_as_they_are(tmp_path: Path) -> None:
-    elsewhere = pt.identify_plays(log()[2.0:6.0], asymmetry=False)
+    elsewhere = fit_plays(log()[2.0:6.0], dead_zones=False)
     file = elsewhere.save(tmp_path / "mine.json")
     comparison = pt.compare(log(), [file, elsewhere, str(file)], train=(1.0, 5.0))
     assert [one.name for one in comparison.rows] == ["mine", "prandtl-ishlinskii", "mine-2"]
@@ -166,7 +166,7 @@ def test_a_model_and_a_file_are_taken_as_they_are(tmp_path: Path) -> None:
 
 
 def test_a_model_fitted_on_this_very_part_is_counted(tmp_path: Path) -> None:
-    finer = pt.identify_plays(log()[1.0:5.0], count=20, asymmetry=False, dynamics=None)
+    finer = fit_plays(log()[1.0:5.0], count=20, dead_zones=False, dynamics=None)
     file = finer.save(tmp_path / "finer.json")
     comparison = pt.compare(log(), [finer, file, "prandtl-ishlinskii"], train=(1.0, 5.0))
     assert [one.parameters for one in comparison.rows] == [22, 22, 15]
@@ -175,7 +175,7 @@ def test_a_model_fitted_on_this_very_part_is_counted(tmp_path: Path) -> None:
 
 
 def test_a_file_keeps_its_name_when_all_are_saved_beside_it(tmp_path: Path) -> None:
-    old = pt.identify_plays(log()[2.0:6.0], count=3)
+    old = fit_plays(log()[2.0:6.0], count=3)
     file = old.save(tmp_path / "prandtl-ishlinskii.json")
     before = file.read_bytes()
     comparison = pt.compare(log(), ["prandtl-ishlinskii", file])
@@ -211,7 +211,7 @@ def test_the_table_marks_the_best() -> None:
 def test_an_exact_fit_can_be_told_and_drawn() -> None:
     u = 37.5 - 37.5 * np.cos(np.arange(800) / 50.0)
     exact = pt.Dataset(u=u, y=PLAYS.simulate(u, 0.005).x, dt=0.005)
-    model = pt.IdentifiedPlays(model=PLAYS, offset=0.0, offset_fitted=False, stroke=exact.stroke)
+    model = pt.IdentifiedModel(model=PLAYS, offset=0.0, offset_fitted=False, stroke=exact.stroke)
     comparison = pt.compare(exact, [model])
     assert comparison.best.test.rms == 0.0
     assert "Prandtl-Ishlinskii" in comparison.summary()
@@ -305,7 +305,7 @@ def test_refuses(name: str) -> None:
 
 
 def test_refuses_what_is_no_record() -> None:
-    with pytest.raises(pt.ParameterError, match="log is ndarray: expected a Dataset"):
+    with pytest.raises(pt.ParameterError, match="data is ndarray: expected a Dataset"):
         pt.compare(log().u, ["dahl"])  # type: ignore[arg-type]
 
 
