@@ -43,7 +43,7 @@ def test_page_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         limits=(0.0, 75.0),
         feedforward=fit.inverse(),
         feedback=pt.Pid.from_um(kp=0.120, ti=0.009, td=0.044),
-        addon=pt.Repetitive(period=5.0, tq=0.2, kq=1.0),
+        repetitive=pt.Repetitive.from_um(period=5.0, tq=0.2, kq=1.0),
     )
     run = pt.track(
         pt.VirtualStage.xu_li_2010(seed=1),

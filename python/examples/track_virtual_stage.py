@@ -61,7 +61,10 @@ runs = {
     "Fig. 13, 6 to 28 V, antiwindup": run("fig13_antiwindup", small, (6.0, 28.0), **both),
     "Fig. 14, 0.5 Hz": run("fig14_both", fast, **both),
     "Fig. 14, repetitive": run(
-        "fig14_repetitive", fast, **both, addon=pt.Repetitive(period=2.0, tq=0.2, kq=1.0)
+        "fig14_repetitive",
+        fast,
+        **both,
+        repetitive=pt.Repetitive.from_um(period=2.0, tq=0.2, kq=1.0),
     ),
 }
 published = {

@@ -121,8 +121,8 @@ def test_several_kinds_are_identified_in_one_go() -> None:
     printed = ran("identify", "log.csv", *models, "--window", "1:", "--seed", "2", "--runs", "1")
     assert names("results") == ["dahl.json", "prandtl-ishlinskii.json"]
     log = pt.read("log.csv")[1.0:]
-    for fit in (pt.identify_plays(log), pt.identify(log, seed=2, runs=1)):
-        kind = "dahl" if isinstance(fit, pt.Identification) else "prandtl-ishlinskii"
+    for fit in (pt.identification.identify_plays(log), pt.identify(log, seed=2, runs=1)):
+        kind = "dahl" if isinstance(fit, pt.identification.Identification) else "prandtl-ishlinskii"
         assert fit.summary() in printed
         expected = fit.save("expected.json").read_bytes()
         assert Path("results", f"{kind}.json").read_bytes() == expected
@@ -148,7 +148,7 @@ def test_simulate_writes_the_displacement() -> None:
     assert names("run") == ["simulated.csv", "simulated.png", "simulated.svg"]
     assert "1001 samples" in printed
     back = pt.read("run/simulated.csv", hold="zoh")
-    t, u = pt.read_drive("drive.csv")
+    t, u = pt.data.read_drive("drive.csv")
     assert np.array_equal(back.u, u)
     assert np.allclose(back.t, t, atol=1e-12)
     x = pt.DahlStage.xu_li_2010().simulate(u, 0.004, hold="zoh").x + 1e-6

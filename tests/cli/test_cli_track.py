@@ -75,7 +75,7 @@ def test_every_option_of_a_loop_reaches_it() -> None:
             limits=(-5.0, 60.0),
             feedforward=fitted().inverse(playback="online"),
             feedback=pt.Pid.from_um(kp=0.05, ti=0.02, td=0.01, tt=float("inf")),
-            addon=pt.Repetitive(period=2.0, kq=0.5, tq=0.1),
+            repetitive=pt.Repetitive.from_um(period=2.0, kq=0.5, tq=0.1),
         ),
         sine(0.5, 6.0, 10e-6, 60e-6),
         delay=0.001,

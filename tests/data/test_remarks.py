@@ -89,7 +89,7 @@ def test_a_drive_that_never_reverses_is_refused(u: NDArray[np.float64]) -> None:
 def test_unless_hysteresis_is_held() -> None:
     fit = pt.identify(log(75.0 * T / 4.0), fixed=HELD, bounds=BOX, swarm=SMALL)
     assert "the drive never reverses: this record says nothing of hysteresis" in fit.notes
-    step = pt.identify_step(pt.StepReadings.xu_li_2010())
+    step = pt.identify_step(pt.identification.StepReadings.xu_li_2010())
     pt.identify(log(75.0 * T / 4.0), initial=step, bounds=BOX, swarm=SMALL)
 
 

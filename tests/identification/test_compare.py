@@ -39,11 +39,11 @@ def log(seed: int = 1, shift: float = 3e-6) -> pt.Dataset:
 
 
 @cache
-def found() -> pt.Comparison:
+def found() -> pt.identification.Comparison:
     return pt.compare(log(), PAIR, train=(1.0, 5.0), seed=1, runs=1)
 
 
-def row(name: str, of: pt.Comparison | None = None) -> pt.Compared:
+def row(name: str, of: pt.identification.Comparison | None = None) -> pt.identification.Compared:
     return {one.name: one for one in (of or found()).rows}[name]
 
 
@@ -101,7 +101,7 @@ def test_the_criteria_are_burnham_and_andersons() -> None:
         assert one.autocorrelation == pytest.approx(lagged, rel=1e-9)
 
 
-def windows(comparison: pt.Comparison) -> list[tuple[float, float, int]]:
+def windows(comparison: pt.identification.Comparison) -> list[tuple[float, float, int]]:
     parts = (comparison.train, comparison.test)
     return [(round(float(p.t[0]), 6), round(float(p.t[-1]), 6), p.warmup) for p in parts]
 
@@ -147,7 +147,7 @@ def test_all_kinds_are_compared_where_none_is_named() -> None:
 
 
 def test_a_model_and_a_file_are_taken_as_they_are(tmp_path: Path) -> None:
-    elsewhere = pt.identify_plays(log()[2.0:6.0], asymmetry=False)
+    elsewhere = pt.identification.identify_plays(log()[2.0:6.0], asymmetry=False)
     file = elsewhere.save(tmp_path / "mine.json")
     comparison = pt.compare(log(), [file, elsewhere, str(file)], train=(1.0, 5.0))
     assert [one.name for one in comparison.rows] == ["mine", "prandtl-ishlinskii", "mine-2"]
@@ -166,7 +166,9 @@ def test_a_model_and_a_file_are_taken_as_they_are(tmp_path: Path) -> None:
 
 
 def test_a_model_fitted_on_this_very_part_is_counted(tmp_path: Path) -> None:
-    finer = pt.identify_plays(log()[1.0:5.0], count=20, asymmetry=False, dynamics=None)
+    finer = pt.identification.identify_plays(
+        log()[1.0:5.0], count=20, asymmetry=False, dynamics=None
+    )
     file = finer.save(tmp_path / "finer.json")
     comparison = pt.compare(log(), [finer, file, "prandtl-ishlinskii"], train=(1.0, 5.0))
     assert [one.parameters for one in comparison.rows] == [22, 22, 15]
@@ -175,7 +177,7 @@ def test_a_model_fitted_on_this_very_part_is_counted(tmp_path: Path) -> None:
 
 
 def test_a_file_keeps_its_name_when_all_are_saved_beside_it(tmp_path: Path) -> None:
-    old = pt.identify_plays(log()[2.0:6.0], count=3)
+    old = pt.identification.identify_plays(log()[2.0:6.0], count=3)
     file = old.save(tmp_path / "prandtl-ishlinskii.json")
     before = file.read_bytes()
     comparison = pt.compare(log(), ["prandtl-ishlinskii", file])
@@ -211,7 +213,9 @@ def test_the_table_marks_the_best() -> None:
 def test_an_exact_fit_can_be_told_and_drawn() -> None:
     u = 37.5 - 37.5 * np.cos(np.arange(800) / 50.0)
     exact = pt.Dataset(u=u, y=PLAYS.simulate(u, 0.005).x, dt=0.005)
-    model = pt.IdentifiedPlays(model=PLAYS, offset=0.0, offset_fitted=False, stroke=exact.stroke)
+    model = pt.identification.IdentifiedPlays(
+        model=PLAYS, offset=0.0, offset_fitted=False, stroke=exact.stroke
+    )
     comparison = pt.compare(exact, [model])
     assert comparison.best.test.rms == 0.0
     assert "Prandtl-Ishlinskii" in comparison.summary()

@@ -268,7 +268,7 @@ def log(noise: float = 0.0, exponent: float = 1.0) -> pt.Dataset:
     return pt.Dataset(u=u, y=y, dt=dt, source="made-up")
 
 
-def identified(noise: float = 0.05e-6) -> pt.Identification:
+def identified(noise: float = 0.05e-6) -> pt.identification.Identification:
     swarm = pt.ParticleSwarm(particles=40, iterations=150)
     return pt.identify(log(noise), model="bouc-wen", stiffness=19567.0, seed=2, runs=2, swarm=swarm)
 

@@ -284,7 +284,7 @@ def test_a_run_can_be_carried_on(stage: pt.FirstOrderDahlStage | pt.BoucWenOscil
     second = stage.simulate(u[200:], dt, initial=first.final, accuracy=1e-13)
     np.testing.assert_allclose(second.x, whole.x[200:], rtol=0, atol=1e-12)
     with pytest.raises(pt.ParameterError, match=r"initial is .*expected a pt\.FeedbackState"):
-        stage.simulate(u, dt, initial=pt.StageState())  # type: ignore[arg-type]
+        stage.simulate(u, dt, initial=pt.stages.StageState())  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

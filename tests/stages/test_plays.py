@@ -157,7 +157,7 @@ def test_it_is_a_feedforward_for_a_controller() -> None:
     virtual = pt.VirtualStage.xu_li_2010(seed=1)
     u = 37.5 * (1.0 - np.cos(2.0 * np.pi * np.arange(8000) * 1e-3))
     log = virtual.record(u, 1e-3)
-    fit = pt.identify_plays(log[1.0:8.0])
+    fit = pt.identification.identify_plays(log[1.0:8.0])
     worst = {}
     for name, inverse in {"inverse": fit.inverse(), "none": None}.items():
         pid = pt.Pid.from_um(kp=0.01, ti=0.009, td=0.0)
@@ -196,15 +196,15 @@ def test_the_inverse_can_begin_on_a_settled_loop() -> None:
 
 
 @cache
-def fitted() -> pt.PlaysIdentification:
+def fitted() -> pt.identification.PlaysIdentification:
     stage = replace(CREEPING, time_constant=4e-3)
-    return pt.identify_plays(record(stage), creep=(0.1, 1.0))
+    return pt.identification.identify_plays(record(stage), creep=(0.1, 1.0))
 
 
 def test_identify_finds_the_same() -> None:
     log = record(PLAIN, samples=1000)
     fit = pt.identify(log, model="prandtl-ishlinskii", seed=3, threads=1)
-    assert fit.document() == pt.identify_plays(log).document()
+    assert fit.document() == pt.identification.identify_plays(log).document()
     bare = pt.identify(log, model="prandtl-ishlinskii", offset=False)
     assert bare.offset == 0.0
     assert not bare.offset_fitted
@@ -322,7 +322,7 @@ def test_a_record_that_tells_nothing_is_refused(name: str) -> None:
     volts, metres, words = LOGS[name]
     log = record(PLAIN)
     with pytest.raises(pt.DataError, match=words):
-        pt.identify_plays(pt.Dataset(u=volts(log.u), y=metres(log.y), dt=1e-3))
+        pt.identification.identify_plays(pt.Dataset(u=volts(log.u), y=metres(log.y), dt=1e-3))
 
 
 ARGUMENTS: dict[str, tuple[dict[str, Any], str]] = {
@@ -339,9 +339,9 @@ ARGUMENTS: dict[str, tuple[dict[str, Any], str]] = {
 def test_an_argument_that_cannot_be_is_refused(name: str) -> None:
     keywords, words = ARGUMENTS[name]
     with pytest.raises(pt.PiezotrackError, match=words):
-        pt.identify_plays(record(PLAIN), **keywords)
+        pt.identification.identify_plays(record(PLAIN), **keywords)
 
 
 def test_a_short_window_is_refused() -> None:
     with pytest.raises(pt.DataError, match="twice the number of unknowns"):
-        pt.identify_plays(record(PLAIN)[1.0:1.01])
+        pt.identification.identify_plays(record(PLAIN)[1.0:1.01])

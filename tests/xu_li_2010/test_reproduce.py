@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
 
 @cache
-def quick() -> pt.Reproduction:
-    return pt.reproduce_xu_li_2010(seeds=2)
+def quick() -> pt.xu_li_2010.Reproduction:
+    return pt.xu_li_2010.reproduce(seeds=2)
 
 
 def by_key() -> dict[str, Observable]:
@@ -116,7 +116,7 @@ def test_conclusions_tell_what_is_not_so() -> None:
 
 def test_another_apparatus_has_to_be_one() -> None:
     with pytest.raises(pt.ParameterError, match="apparatus is int: expected"):
-        pt.reproduce_xu_li_2010(apparatus=5)  # type: ignore[arg-type]
+        pt.xu_li_2010.reproduce(apparatus=5)  # type: ignore[arg-type]
 
 
 # The way.
@@ -153,7 +153,7 @@ def test_the_readings_are_those_of_a_sensor() -> None:
 
 
 def test_the_same_seeds_give_the_same_numbers() -> None:
-    again = pt.reproduce_xu_li_2010(seeds=2)
+    again = pt.xu_li_2010.reproduce(seeds=2)
     assert again.values == quick().values
     assert again.values[0] != again.values[1]
 
@@ -167,7 +167,7 @@ def test_an_apparatus_survives_its_file() -> None:
 @pytest.mark.parametrize("seeds", [0, 1001])
 def test_seeds_are_refused(seeds: int) -> None:
     with pytest.raises(pt.ParameterError, match=f"seeds is {seeds}: expected 1 to 1000"):
-        pt.reproduce_xu_li_2010(seeds=seeds)
+        pt.xu_li_2010.reproduce(seeds=seeds)
 
 
 # Beyond the paper.
@@ -226,7 +226,7 @@ def test_the_way_on_the_measured_log() -> None:
 
 def test_a_missing_log_is_named(tmp_path: Path) -> None:
     with pytest.raises(pt.DataError, match=r"training\.csv"):
-        pt.reproduce_xu_li_2010(seeds=1, dbo=tmp_path)
+        pt.xu_li_2010.reproduce(seeds=1, dbo=tmp_path)
 
 
 def test_the_command_refuses(tmp_path: Path) -> None:

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["FIGURES", "ErrorStatistics", "Spread"]
+__all__ = ["FIGURES", "ErrorStatistics"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ErrorStatistics:
-    """How a signed error is spread.
+    """Statistics of a signed error.
 
     Attributes
     ----------
@@ -49,7 +49,3 @@ class ErrorStatistics:
 
 
 FIGURES = tuple(field.name for field in fields(ErrorStatistics))
-
-
-# Its public name up to now.
-Spread = ErrorStatistics

@@ -29,10 +29,10 @@ def reproduce_command(
     ] = None,
 ) -> None:
     """Go the way of Xu and Li 2010 on the virtual stage: a report as HTML, PDF and JSON."""
-    from ..xu_li_2010.reproduction import reproduce_xu_li_2010
+    from ..xu_li_2010.reproduction import reproduce
 
     can_be_folder(out)
-    found = reproduce_xu_li_2010(seeds=2 if quick else seeds, dbo=dbo)
+    found = reproduce(seeds=2 if quick else seeds, dbo=dbo)
     written = found.save(out)
     print(found.summary())
     list_files(written)

@@ -80,6 +80,7 @@ def track_command(
     """Let a controller lead the virtual stage along a reference: figures, a table, pictures."""
     from ..control.components import Pid, Repetitive
     from ..control.controller import Controller
+    from ..control.stability import check_loop
     from ..control.tracking import track
     from ..identification.model_file import load
     from ..stages.virtual import VirtualStage
@@ -94,7 +95,9 @@ def track_command(
         limits=number_range("--limits", limits),
         feedforward=known.inverse(playback=playback) if feedforward else None,
         feedback=Pid.from_um(kp=kp, ti=ti, td=td, tt=tt) if feedback else None,
-        addon=Repetitive(period=course.period or 0.0, tq=tq, kq=kq) if repetitive else None,
+        repetitive=Repetitive.from_um(period=course.period or 0.0, tq=tq, kq=kq)
+        if repetitive
+        else None,
     )
     if stage not in ("virtual", "model"):
         raise ParameterError(f"--stage is '{stage}': expected virtual or model")
@@ -107,8 +110,8 @@ def track_command(
     print(run.summary())
     if feedforward:
         _note_range(known, run.voltage)
-    if loop.feedback is not None or loop.addon is not None:
-        print(f"loop at {loop.check(led, delay=delay).middle}")
+    if loop.feedback is not None or loop.repetitive is not None:
+        print(f"loop at {check_loop(led, loop, delay=delay).middle}")
     list_files(written)
 
 
@@ -188,7 +191,7 @@ def _write(run: Tracking, known: Identified[Any], loop: Controller, out: Path) -
         "dt": {"value": loop.dt, "unit": "s"},
         "limits": {"value": list(loop.limits), "unit": "V"},
         "feedback": None if loop.feedback is None else repr(loop.feedback),
-        "repetitive": None if loop.addon is None else repr(loop.addon),
+        "repetitive": None if loop.repetitive is None else repr(loop.repetitive),
         "feedforward": run.note,
         "unit": "errors in m, phase lag in rad, widest loop as a part of the travel",
         "from_s": run.settled,

@@ -258,7 +258,7 @@ def contour(
             raise ParameterError(f"{name}: {error}") from None
         volts.append(feedforward_of(controller, ahead))
     runs = stage.core().track(
-        (both[0].core, both[1].core),
+        (both[0]._core, both[1]._core),
         (samples[0].x, samples[1].x),
         (volts[0][0], volts[1][0]),
         (delay, jitter, substeps),

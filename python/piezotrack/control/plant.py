@@ -59,7 +59,7 @@ def run_closed_loop(
 
     `pace` is delay and jitter [s], and the instants kept in each control interval.
     """
-    course = (controller.core, reference, volts, pace)
+    course = (controller._core, reference, volts, pace)
     if isinstance(stage, VirtualStage):
         return stage.core().track(*course)
     step = min(MODEL_STEP, controller.dt / 4)

@@ -173,7 +173,7 @@ class LoopReport:
         if count > 100_000:
             raise ParameterError(f"count is {count}: expected 100000 at most")
         frequency = np.geomspace(1e-3 * highest, highest, count)
-        curves = _core.loop_response(self.controller.core, self.plant, frequency.tolist())
+        curves = _core.loop_response(self.controller._core, self.plant, frequency.tolist())
         *pairs, learning = curves
         loop, sensitivity, complementary = (
             np.asarray(pair) @ np.array([1.0, 1.0j]) for pair in pairs
@@ -200,8 +200,8 @@ class LoopReport:
 
 
 def check_loop(
-    controller: Controller,
     stage: Plant | Identified[Any],
+    controller: Controller,
     *,
     delay: float = 0.0,
 ) -> LoopReport:
@@ -215,10 +215,10 @@ def check_loop(
 
     Parameters
     ----------
+    stage : stage model, VirtualStage or identified model
+        The plant; the delay of an identified one counts.
     controller : Controller
         The controller.
-    stage : VirtualStage, DahlStage, BoucWenStage or PrandtlIshlinskiiStage
-        The stage, or an identified one, whose own delay counts.
     delay : float, optional
         Time from a reading to the effect of its voltage [s], besides the hold.
 
@@ -231,7 +231,7 @@ def check_loop(
     --------
     >>> import piezotrack as pt
     >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
-    >>> report = pt.check_loop(loop, pt.VirtualStage.xu_li_2010())
+    >>> report = pt.check_loop(pt.VirtualStage.xu_li_2010(), loop)
     >>> report.stable
     True
     """
@@ -244,7 +244,7 @@ def check_loop(
 
 
 def _check(controller: Controller, plant: _core.LoopPlant) -> LoopCheck:
-    found = _core.check_loop(controller.core, plant)
+    found = _core.check_loop(controller._core, plant)
     slowest, margin = found["slowest"], found["gain_margin"]
     return LoopCheck(
         gain=plant.static_gain,

@@ -363,26 +363,26 @@ def followed(
 
 def check_period(controller: Controller, reference: Reference) -> None:
     """Refuse a repetitive part that learns another period than that of the reference."""
-    if controller.addon is None:
+    if controller.repetitive is None:
         return
     if reference.period is None:
         raise ParameterError(
             f"reference ({reference.name}) does not repeat: expected one that does, for the "
             "repetitive part"
         )
-    turns = controller.addon.period / reference.period
+    turns = controller.repetitive.period / reference.period
     if abs(turns - max(1, round(turns))) > 1e-6 * turns:
         raise ParameterError(
-            f"addon has a period of {controller.addon.period:g} s: expected that of the "
+            f"repetitive has a period of {controller.repetitive.period:g} s: expected that of the "
             f"reference ({reference.name}), {reference.period:g} s, or a multiple"
         )
 
 
 def check_stable(stage: Plant, controller: Controller, delay: float) -> None:
     """Refuse a loop that is unstable at the middle gain of the stage."""
-    if controller.feedback is None and controller.addon is None:
+    if controller.feedback is None and controller.repetitive is None:
         return
-    report = check_loop(controller, stage, delay=delay)
+    report = check_loop(stage, controller, delay=delay)
     if report.stable:
         return
     one = report.middle
@@ -391,7 +391,7 @@ def check_stable(stage: Plant, controller: Controller, delay: float) -> None:
         found += f": its largest root is {one.slowest_root:.5g}"
     if one.gain_margin is not None and one.gain_margin < 1.0:
         found += f", and {one.gain_margin:.3g} times the gain would be at the limit"
-    elif controller.addon is not None:
+    elif controller.repetitive is not None:
         found += "; without the repetitive part it is stable, so lower kq or take another filter"
     hint = f" ({one.hint})" if one.hint else ""
     raise ParameterError(f"{found}{hint}: expected a stable one, or unstable=True")

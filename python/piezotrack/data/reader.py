@@ -135,7 +135,7 @@ def read_drive(
     >>> folder = tempfile.TemporaryDirectory()
     >>> path = pathlib.Path(folder.name, "drive.csv")
     >>> _ = path.write_text("t (s);u (V)\n0,0;1,5\n0,1;2,5\n0,2;3,5\n")
-    >>> t, u = pt.read_drive(path)
+    >>> t, u = pt.data.read_drive(path)
     >>> u
     array([1.5, 2.5, 3.5])
     >>> folder.cleanup()

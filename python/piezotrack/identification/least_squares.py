@@ -121,7 +121,7 @@ def identify_plays(
     ... )
     >>> u = 37.5 * (1 - np.cos(np.arange(2000) / 100.0))
     >>> log = pt.Dataset(u=u, y=stage.simulate(u, 0.01).x, dt=0.01)
-    >>> fit = pt.identify_plays(
+    >>> fit = pt.identification.identify_plays(
     ...     log, thresholds=[5.0, 10.0, 20.0], asymmetry=False, dynamics=None
     ... )
     >>> print(", ".join(f"{1e6 * weight:.3f}" for weight in fit.model.weights), "um/V")

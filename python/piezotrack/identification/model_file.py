@@ -122,7 +122,7 @@ def load(path: str | os.PathLike[str]) -> IdentifiedModel | IdentifiedPlays:
     Examples
     --------
     >>> import piezotrack as pt
-    >>> model = pt.IdentifiedModel(
+    >>> model = pt.identification.IdentifiedModel(
     ...     model=pt.DahlStage.xu_li_2010(),
     ...     offset=0.0,
     ...     offset_fitted=False,

@@ -346,7 +346,7 @@ def parse_path(text: str, *, duration: float | None = None) -> XYReference:
     Examples
     --------
     >>> import piezotrack as pt
-    >>> pt.parse_path("circle:0.1Hz,10um,centre=50/50um")
+    >>> pt.references.parse_path("circle:0.1Hz,10um,centre=50/50um")
     XYReference(circle 10 um, 0.1 Hz, 40 to 60 by 40 to 60 um, 30 s)
     """
     if duration is not None and str(text).strip().lower().startswith("spiral:"):

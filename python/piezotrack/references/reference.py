@@ -390,7 +390,7 @@ def read_reference(
     >>> path = pathlib.Path(folder.name, "target.csv")
     >>> lines = [f"{k / 50},{k * k / 100}" for k in range(101)]
     >>> _ = path.write_text("\n".join(["time_s,displacement_um", *lines]))
-    >>> pt.read_reference(path)
+    >>> pt.references.read_reference(path)
     Reference(target.csv, 0 to 102.01 um, 2.02 s)
     >>> folder.cleanup()
     """

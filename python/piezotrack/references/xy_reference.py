@@ -259,7 +259,7 @@ def read_path(
     >>> file = pathlib.Path(folder.name, "parabola.csv")
     >>> lines = [f"{k / 50},{k / 4},{k * k / 100}" for k in range(101)]
     >>> _ = file.write_text("\n".join(["time_s,x_um,y_um", *lines]))
-    >>> pt.read_path(file)
+    >>> pt.references.read_path(file)
     XYReference(parabola.csv, 0 to 25.25 by 0 to 102 um, 2.02 s)
     >>> folder.cleanup()
     """

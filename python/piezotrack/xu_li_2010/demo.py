@@ -99,12 +99,12 @@ def track_demo(fit: Identification, seed: int = 1) -> dict[str, Tracking]:
     stage = VirtualStage.xu_li_2010(seed=seed)
     reference = sine(frequency=0.2, low=0.0, high=110e-6, duration=20.0)
     inverse, pid = fit.inverse(), Pid.xu_li_2010()
-    learning = Repetitive(period=5.0, tq=0.2, kq=1.0)
+    learning = Repetitive.from_um(period=5.0, tq=0.2, kq=1.0)
     loops = {
         "feedforward": Controller(dt=0.02, limits=(0.0, 75.0), feedforward=inverse),
         "pid": Controller(dt=0.02, limits=(0.0, 75.0), feedback=pid),
         "all": Controller(
-            dt=0.02, limits=(0.0, 75.0), feedforward=inverse, feedback=pid, addon=learning
+            dt=0.02, limits=(0.0, 75.0), feedforward=inverse, feedback=pid, repetitive=learning
         ),
     }
     return {name: track(stage, loop, reference) for name, loop in loops.items()}

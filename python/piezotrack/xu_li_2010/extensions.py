@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from ..control.components import LowPass, Notch, Pid, Repetitive
+from ..control.components import Lag, LowPass, Notch, Pid, Repetitive, ZeroPhase
 from ..control.tracking import Tracking, track
 from ..data.dataset import Dataset
 from ..errors import NumericalError, ParameterError
@@ -157,19 +157,21 @@ def _learning(apparatus: Apparatus, inverse: Inverse) -> Section:
     forms = {
         "none": None,
         "as published: lag of 0.2 s, no leak": Repetitive.xu_li_2010(period),
-        "lag of 0.2 s, its delay made up for": Repetitive(period=period, compensated=True),
-        "lag of 0.05 s, its delay made up for, Kq 0.6": Repetitive(
-            period=period, tq=0.05, kq=0.6, compensated=True
+        "lag of 0.2 s, its delay made up for": Repetitive(
+            period=period, smoothing=Lag(compensated=True)
         ),
-        "zero phase, second order, Kq 0.6": Repetitive(
-            period=period, smoothing="zero phase", kq=0.6
+        "lag of 0.05 s, its delay made up for, Kq 0.6": Repetitive.from_um(
+            period=period, kq=0.6, smoothing=Lag(tq=0.05, compensated=True)
         ),
-        "the same, one sample ahead": Repetitive(
-            period=period, smoothing="zero phase", kq=0.6, lead=1
+        "zero phase, second order, Kq 0.6": Repetitive.from_um(
+            period=period, kq=0.6, smoothing=ZeroPhase()
+        ),
+        "the same, one sample ahead": Repetitive.from_um(
+            period=period, kq=0.6, smoothing=ZeroPhase(), lead=1
         ),
     }
     loops = {
-        name: loop(inverse, feedback=fig_12_14_tracking.PID, addon=one)
+        name: loop(inverse, feedback=fig_12_14_tracking.PID, repetitive=one)
         for name, one in forms.items()
     }
 

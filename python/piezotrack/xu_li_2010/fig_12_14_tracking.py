@@ -62,7 +62,7 @@ def repetitive(apparatus: Apparatus, inverse: Inverse, part: float = 1.0) -> Run
     learning = Repetitive.xu_li_2010(reference.period)
     loops = {
         "without": loop(inverse, feedback=PID),
-        "with": loop(inverse, feedback=PID, addon=learning),
+        "with": loop(inverse, feedback=PID, repetitive=learning),
     }
     return {
         name: track(apparatus.x, one, reference, **apparatus.pace, unstable=True)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from .section import Section
 
-__all__ = ["Reproduction", "reproduce_xu_li_2010"]
+__all__ = ["Reproduction", "reproduce"]
 
 SEEDS = 20
 # The calibration uses seeds below this, and no report does.
@@ -35,7 +35,7 @@ FORMAT, SCHEMA_VERSION = "piezotrack-reproduction", 1
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Reproduction:
-    """The paper's numbers and figures, published beside obtained; see `reproduce_xu_li_2010`.
+    """The paper's numbers and figures, published beside obtained; see `reproduce`.
 
     Attributes
     ----------
@@ -161,7 +161,7 @@ class Reproduction:
         return save_report(self, folder)
 
 
-def reproduce_xu_li_2010(
+def reproduce(
     *,
     seeds: int = SEEDS,
     apparatus: Apparatus | None = None,
@@ -203,7 +203,7 @@ def reproduce_xu_li_2010(
     Examples
     --------
     >>> import piezotrack as pt
-    >>> found = pt.reproduce_xu_li_2010(seeds=1)
+    >>> found = pt.xu_li_2010.reproduce(seeds=1)
     >>> by_key = {one.observable.key: one for one in found.obtained}
     >>> one = by_key["back.lag"]
     >>> print(f"{one.observable.published} rad published, {one.median:.2f} obtained")

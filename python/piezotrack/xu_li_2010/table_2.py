@@ -135,7 +135,7 @@ def run_table_2(
     --------
     >>> import piezotrack as pt
     >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
-    >>> table = pt.run_table_2(pt.XYStage.xu_li_2010(seed=1), (loop, loop))
+    >>> table = pt.xu_li_2010.run_table_2(pt.XYStage.xu_li_2010(seed=1), (loop, loop))
     >>> run = table.runs[0]
     >>> print(f"{run.path.name}: SD {1e6 * run.metrics.sd_error:.2f} um, published 0.18 um")
     circle 10 um, 0.1 Hz: SD 0.16 um, published 0.18 um
