@@ -136,8 +136,10 @@ def feedforward_command(
     course = _reference(reference, duration, period)
     interval = 0.02 if dt is None else dt
     can_be_folder(out)
-    volts, how = known.inverse(playback="online" if online else "table").played(course, interval)
     samples = course.sample(interval)
+    volts, how = known.inverse(playback="online" if online else "table").played(
+        course, interval, samples=samples
+    )
     folder = make_folder(out)
     table = {"time_s": samples.t, "voltage_V": volts, "displacement_um": 1e6 * samples.x}
     written = [write_columns(folder / "feedforward.csv", table)]

@@ -20,8 +20,8 @@ from .tracking import (
     check_period,
     check_stable,
     check_within_reach,
+    collected,
     feedforward_of,
-    followed,
 )
 
 if TYPE_CHECKING:
@@ -244,7 +244,7 @@ def contour(
     substeps = _core.as_count("substeps", substeps)
     forward = path if decoupling is None else path.transformed(_inverse(decoupling))
     free = (_core.as_truth("unstable", unstable), _core.as_truth("beyond_reach", beyond_reach))
-    samples, volts = [], []
+    samples, voltages = [], []
     parts = zip("xy", (stage.x, stage.y), both, path.axes, forward.axes, strict=True)
     for name, axis, controller, reference, ahead in parts:
         samples.append(reference.sample(controller.dt))
@@ -256,16 +256,19 @@ def contour(
                 check_within_reach(axis, controller, samples[-1], 0.0)
         except ParameterError as error:
             raise ParameterError(f"{name}: {error}") from None
-        volts.append(feedforward_of(controller, ahead))
+        along = samples[-1] if ahead is reference else ahead.sample(controller.dt)
+        voltages.append(feedforward_of(controller, ahead, along))
     runs = stage.core().track(
         (both[0]._core, both[1]._core),
         (samples[0].x, samples[1].x),
-        (volts[0][0], volts[1][0]),
+        (voltages[0][0], voltages[1][0]),
         (delay, jitter, substeps),
     )
     x, y = (
-        followed(run, controller, reference, note, substeps)
-        for run, controller, reference, (_, note) in zip(runs, both, path.axes, volts, strict=True)
+        collected(run, controller, reference, sampled, note, substeps)
+        for run, controller, reference, sampled, (_, note) in zip(
+            runs, both, path.axes, samples, voltages, strict=True
+        )
     )
     return Contour(path=path, x=x, y=y)
 

@@ -300,45 +300,47 @@ def track(
     >>> print(f"{run.metrics.phase_lag:.2f} rad")
     0.06 rad
     """
-    led, offset, late = unwrap(stage)
+    plant, offset, plant_delay = unwrap(stage)
     for name, value, kind in (
         ("controller", controller, Controller),
         ("reference", reference, Reference),
     ):
         if not isinstance(value, kind):
             raise ParameterError(f"{name} is {type(value).__name__}: expected pt.{kind.__name__}")
-    # A displacement that is late shows the same as a voltage that is late.
-    delay = not_negative("delay", delay, "s") + late
+    # A delayed displacement and a delayed voltage have the same effect.
+    delay = not_negative("delay", delay, "s") + plant_delay
     substeps = _core.as_count("substeps", substeps)
     samples = reference.sample(controller.dt)
     check_period(controller, reference)
     if not _core.as_truth("unstable", unstable):
-        check_stable(led, controller, delay)
+        check_stable(plant, controller, delay)
     if not _core.as_truth("beyond_reach", beyond_reach):
-        check_within_reach(led, controller, samples, offset)
-    volts, note = feedforward_of(controller, reference)
-    pace = (delay, not_negative("jitter", jitter, "s"), substeps)
-    run = run_closed_loop(led, controller, samples.x - offset, volts, pace)
-    return followed(run, controller, reference, note, substeps, offset)
+        check_within_reach(plant, controller, samples, offset)
+    voltage, note = feedforward_of(controller, reference, samples)
+    sampling = (delay, not_negative("jitter", jitter, "s"), substeps)
+    run = run_closed_loop(plant, controller, samples.x - offset, voltage, sampling)
+    return collected(run, controller, reference, samples, note, substeps, offset)
 
 
-def feedforward_of(controller: Controller, reference: Reference) -> tuple[Array, str]:
-    """Compute the feedforward of a whole run [V], and say how."""
+def feedforward_of(
+    controller: Controller, reference: Reference, samples: SampledReference
+) -> tuple[Array, str]:
+    """Compute the feedforward of a whole run [V], and a note of how."""
     if controller.feedforward is None:
-        return np.zeros(len(reference.sample(controller.dt))), "no feedforward"
-    return controller.feedforward.played(reference, controller.dt)
+        return np.zeros(len(samples)), "no feedforward"
+    return controller.feedforward.played(reference, controller.dt, samples=samples)
 
 
-def followed(
+def collected(
     run: _core.Tracked,
     controller: Controller,
     reference: Reference,
+    samples: SampledReference,
     note: str,
     substeps: int,
     offset: float = 0.0,
 ) -> Tracking:
-    """Put together what the core returns of one axis, its sensor `offset` [m] off."""
-    samples = reference.sample(controller.dt)
+    """Collect the results of one axis, whose sensor has an `offset` [m]."""
     fine_t, fine_displacement, fine_voltage = run.motion()
     fine_displacement = fine_displacement + offset
     return Tracking(

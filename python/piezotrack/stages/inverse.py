@@ -19,6 +19,8 @@ from .registry import Stage, kind_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..references.reference import SampledReference
+
     Array = NDArray[np.float64]
 
 __all__ = ["Inverse", "InverseSession"]
@@ -103,7 +105,9 @@ class Inverse:
         """Name of the model."""
         return kind_of(self.stage).name
 
-    def voltage(self, reference: Reference, dt: float) -> Array:
+    def voltage(
+        self, reference: Reference, dt: float, *, samples: SampledReference | None = None
+    ) -> Array:
         """Voltage along the whole path of a reference, the stage being at rest before.
 
         Parameters
@@ -112,6 +116,8 @@ class Inverse:
             What is to be followed.
         dt : float
             Sampling interval [s].
+        samples : SampledReference, optional
+            ``reference.sample(dt)``, where it is known already.
 
         Returns
         -------
@@ -126,9 +132,11 @@ class Inverse:
             The reference asks for a voltage that is not finite.
         """
         _check(reference)
-        samples = reference.sample(dt)
+        samples = reference.sample(dt) if samples is None else samples
         t = samples.t + self.delay
-        if not _goes_on(reference):
+        if self.delay == 0.0:
+            x, v, a = samples.x, samples.v, samples.a
+        elif not _goes_on(reference):
             x, v, a = reference.at(np.minimum(t, reference.duration))
         else:
             longer = replace(reference, duration=reference.duration + self.delay + samples.dt)
@@ -177,7 +185,9 @@ class Inverse:
             )
         return self.voltage(replace(reference, duration=length), dt)[-count:]
 
-    def played(self, reference: Reference, dt: float) -> tuple[Array, str]:
+    def played(
+        self, reference: Reference, dt: float, *, samples: SampledReference | None = None
+    ) -> tuple[Array, str]:
         """Feedforward of a run as `playback` says.
 
         Parameters
@@ -186,6 +196,8 @@ class Inverse:
             What is to be followed.
         dt : float
             Sampling interval [s].
+        samples : SampledReference, optional
+            ``reference.sample(dt)``, where it is known already.
 
         Returns
         -------
@@ -194,7 +206,7 @@ class Inverse:
         how : str
             Which way it was computed, in words.
         """
-        volts = self.voltage(reference, dt)
+        volts = self.voltage(reference, dt, samples=samples)
         period = reference.period
         before = 0 if period is None else self._settled(reference, period)
         head = 0 if period is None else round((before + 1) * period / dt)
