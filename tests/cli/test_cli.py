@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import typer
 
 import piezotrack as pt
 from commands import (
@@ -23,10 +24,12 @@ from commands import (
     log_text,
     names,
     ran,
+    refusal,
     run,
     write,
     write_model,
 )
+from piezotrack.cli import app
 from piezotrack.xu_li_2010.demo import write_log
 from records import BOX, HELD, quick
 
@@ -172,7 +175,7 @@ def test_the_demonstration_tells_the_whole_story() -> None:
         score = model.score(part)
         assert 0.098e-6 < score.rms < 2e-6
         assert score.max_error < 5e-6
-    assert "the other 8 s, not fitted: rms 1." in printed
+    assert "validation on the other 8 s: rms 1." in printed
     largest = {
         name: float(found)
         for name, found in re.findall(r"  (\S.*?) +max (\d+\.\d+) um, rms", printed)
@@ -189,10 +192,46 @@ def test_the_version_is_printed() -> None:
     assert ran("--version") == f"piezotrack {pt.__version__}\n"
 
 
-def test_help_names_every_option() -> None:
-    printed = ran("identify", "--help")
-    for option in ("window", "fix", "bound", "free", "stiffness", "validate", "swarm", "seed"):
-        assert f"--{option} " in printed
+# The options that `ran(command, "--help")` has to name, of every command.
+OPTIONS = {
+    name: [
+        option
+        for parameter in command.params
+        if parameter.param_type_name == "option"
+        for option in (*parameter.opts, *parameter.secondary_opts)
+    ]
+    for name, command in vars(typer.main.get_command(app))["commands"].items()
+}
+
+
+@pytest.mark.parametrize("command", OPTIONS)
+def test_help_names_every_option(command: str) -> None:
+    printed = ran(command, "--help")
+    assert OPTIONS[command]
+    for option in OPTIONS[command]:
+        assert re.search(rf"{option}\b", printed), option
+
+
+NO_EFFECT = {
+    "identify log.csv --model prandtl-ishlinskii --seed 1": "--seed",
+    "identify log.csv --model prandtl-ishlinskii --runs 4": "--runs",
+    "identify log.csv --model prandtl-ishlinskii --threads 2": "--threads",
+    "compare log.csv --model prandtl-ishlinskii --seed 1": "--seed",
+    "reproduce --quick --seeds 3": "--seeds",
+    "track m.json --reference sine:1Hz,0..9um --no-feedforward --online": "--online",
+    "track m.json --reference sine:1Hz,0..9um --no-feedback --kp 0.1": "--kp",
+    "track m.json --reference sine:1Hz,0..9um --kq 1": "--kq",
+    "track m.json --reference sine:1Hz,0..9um --tq 0.1": "--tq",
+    "track m.json --reference sine:1Hz,0..9um --stage model --seed 2": "--seed",
+    "contour --path circle:1Hz,1um --no-feedforward --decouple": "--decouple",
+    "contour --path circle:1Hz,1um --no-feedback --ti 0.1": "--ti",
+    "contour --table-2 --duration 4": "--duration",
+}
+
+
+@pytest.mark.parametrize("command", NO_EFFECT)
+def test_an_option_without_effect_is_refused_by_name(command: str) -> None:
+    assert refusal(*command.split()).startswith(f"{NO_EFFECT[command]} has no effect with")
 
 
 def test_the_installed_command_works_and_repeats_itself() -> None:
