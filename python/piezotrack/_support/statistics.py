@@ -33,7 +33,7 @@ class ErrorStatistics:
 
     @classmethod
     def of(cls, figures: Sequence[float]) -> ErrorStatistics:
-        """Name the core's figures.
+        """Make the statistics from the tuple of the core.
 
         Parameters
         ----------
@@ -43,7 +43,7 @@ class ErrorStatistics:
         Returns
         -------
         ErrorStatistics
-            The same with names.
+            With named fields.
         """
         return cls(**dict(zip(FIGURES, figures, strict=True)))
 

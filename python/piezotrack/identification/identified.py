@@ -363,13 +363,13 @@ class Fitted(Identified[R]):
 
     def _remarks(self, held: Collection[str]) -> list[str]:
         """Say what is odd about the record, and what the fit leaves of its loop."""
-        notes = diagnostics.of_record(self.data)
+        notes = diagnostics.record_warnings(self.data)
         if self.cost_percent > 5.0:
             notes.append(
                 f"the model does not follow this record: {self.cost_percent:.3g} % of stroke remain"
             )
         if self.cost_percent > diagnostics.REMAINS:
-            notes += diagnostics.of_fit(self.data, self._followed, self.cost_percent, held)
+            notes += diagnostics.fit_warnings(self.data, self._followed, self.cost_percent, held)
         return notes
 
     @cached_property

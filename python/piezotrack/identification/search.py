@@ -318,7 +318,7 @@ def identify(
     held = _held(initial, fixed, free, bounds)
     searched = {name for name, _, _ in kind.parameters} - set(held)
     searched &= HYSTERESIS
-    diagnostics.refuse(data, searches_hysteresis=bool(searched))
+    diagnostics.check_record(data, searches_hysteresis=bool(searched))
     full = data.full
     with ProgressBar(progress) as bar:
         found = _core.identify(
