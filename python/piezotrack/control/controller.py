@@ -1,4 +1,4 @@
-"""Controllers: feedforward, feedback and repetitive part together, and sessions of them."""
+"""Controllers of feedforward, feedback and repetitive control, and their sessions."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ class Command(NamedTuple):
     feedforward, feedback, repetitive : float
         Its parts [V].
     error : float
-        The tracking error that was used [m].
+        Tracking error of the sample [m].
     saturated : bool
         Whether it was clipped.
     measurement_valid : bool
-        False where the measurement was not a number, and feedback and learning paused.
+        False where the measurement was not finite: feedback and learning pause.
     reference_valid : bool
-        False where the reference or the feedforward was not a number; the last one is kept.
+        False where the reference or the feedforward was not finite: the last one is held.
     """
 
     voltage: float
@@ -52,7 +52,7 @@ class Command(NamedTuple):
 class Controller:
     """Feedforward, feedback and repetitive part, clipped to the limits of the amplifier.
 
-    ``u = uFB + uFF + uRC``, and ``v = clip(u)`` goes out.
+    ``u = uFB + uFF + uRC``, and the command is ``v = clip(u)``.
 
     Parameters
     ----------
@@ -65,14 +65,14 @@ class Controller:
     feedback : Pid or StateSpace, optional
         The feedback law.
     repetitive : Repetitive, optional
-        For a reference that repeats.
+        Repetitive control, for a reference that repeats.
     filters : sequence of LowPass or Notch, optional
         Up to two, on the measurement, one after the other.
 
     Raises
     ------
     ParameterError
-        A number is out of its range; `kp` is so large or so small that its unit must be wrong.
+        A number is out of its range; `kp` or `kq` is so large or small that its unit must be wrong.
 
     Examples
     --------
@@ -120,18 +120,18 @@ class Controller:
         object.__setattr__(self, "_core", core)
 
     def start(self, *, present: float | None = None) -> Session:
-        """Begin to control, with a memory of its own.
+        """Start a session with its own state.
 
         Parameters
         ----------
         present : float, optional
-            Voltage that the stage has now [V], to go on from without a bump. Where it is not
-            given the feedback part begins at 0 V.
+            Voltage at the stage now [V], for a bumpless start. By default the feedback part begins
+            at 0 V.
 
         Returns
         -------
         Session
-            To be asked once a sampling interval.
+            To be stepped once in each sampling interval.
         """
         return Session(self, present)
 
@@ -169,14 +169,14 @@ def _check_unit(name: str, gain: float, span: float, owner: str) -> None:
 
 
 class Session:
-    """A controller at work: one call in each sampling interval.
+    """A running controller: one call of `step` in each sampling interval.
 
     Parameters
     ----------
     controller : Controller
         The configuration.
     present : float or None
-        Voltage to go on from [V].
+        Voltage for a bumpless start [V].
     """
 
     def __init__(self, controller: Controller, present: float | None = None) -> None:
@@ -204,13 +204,13 @@ class Session:
         Parameters
         ----------
         reference : float
-            Displacement to be followed [m].
+            Desired displacement [m].
         measured : float
-            Displacement measured [m]. NaN is not passed on: feedback and learning hold.
+            Measured displacement [m]. Feedback and learning pause where it is NaN.
         velocity, acceleration, preview : float, optional
             For the inverse, as in `InverseSession.step`.
         feedforward : float, optional
-            Voltage of a table of one's own [V], in place of the inverse's.
+            Voltage of your own table [V], in place of the inverse.
 
         Returns
         -------
@@ -226,15 +226,15 @@ class Session:
             raise ParameterError(
                 f"reference is {reference:g} m: expected metres, and no piezo stage goes so far"
             )
-        volts = 0.0 if feedforward is None else feedforward
+        voltage = 0.0 if feedforward is None else feedforward
         if feedforward is None and self._inverse is not None:
-            volts = self._inverse.step(
+            voltage = self._inverse.step(
                 reference, velocity=velocity, acceleration=acceleration, preview=preview
             )
         try:
-            return self._core.step(reference, measured, volts)
+            return self._core.step(reference, measured, voltage)
         except TypeError:
-            given = {"reference": reference, "measured": measured, "feedforward": volts}
+            given = {"reference": reference, "measured": measured, "feedforward": voltage}
             for name, value in given.items():
                 _core.as_number(name, value)
             raise
@@ -260,7 +260,7 @@ class Session:
         self._core.applied(finite("voltage", voltage, "V"))
 
     def retune(self, controller: Controller) -> None:
-        """Go on with other gains, without a bump.
+        """Change the gains without a bump.
 
         Parameters
         ----------
@@ -288,7 +288,7 @@ class Session:
         self._controller = controller
 
     def reset(self) -> None:
-        """Forget errors, learning and path."""
+        """Reset the state: errors, learnt signal and hysteresis."""
         self._core.reset()
         if self._inverse is not None:
             self._inverse.reset()

@@ -1,4 +1,4 @@
-"""What a controller can lead: stages by their kinds, and how each moves and counts in a loop."""
+"""Plants that a controller can drive: closed-loop simulation and linearisation of each stage."""
 
 from __future__ import annotations
 
@@ -35,44 +35,44 @@ def unwrap(stage: Plant | Identified[Any]) -> tuple[Plant, float, float]:
     Raises
     ------
     ParameterError
-        It is nothing that can be led.
+        It is neither a stage model nor an identified one.
     """
-    offset = late = 0.0
+    offset = delay = 0.0
     if isinstance(stage, Identified):
-        offset, late, stage = stage.offset, stage.delay, stage.model
+        offset, delay, stage = stage.offset, stage.delay, stage.model
     if not isinstance(stage, PLANTS):
         expected = ", ".join(f"pt.{one.__name__}" for one in PLANTS)
         raise ParameterError(
             f"stage is {type(stage).__name__}: expected {expected} or an identified one"
         )
-    return stage, offset, late
+    return stage, offset, delay
 
 
 def run_closed_loop(
     stage: Plant,
     controller: Controller,
     reference: Array,
-    volts: Array,
-    pace: tuple[float, float, int],
+    feedforward: Array,
+    sampling: tuple[float, float, int],
 ) -> _core.Tracked:
-    """Let a controller lead a stage from rest along a reference [m], with a feedforward [V].
+    """Simulate a closed loop from rest, with reference [m] and feedforward [V] at the samples.
 
-    `pace` is delay and jitter [s], and the instants kept in each control interval.
+    `sampling` is delay and jitter [s], and the substeps kept in each sampling interval.
     """
-    course = (controller._core, reference, volts, pace)
+    run = (controller._core, reference, feedforward, sampling)
     if isinstance(stage, VirtualStage):
-        return stage.core().track(*course)
+        return stage.core().track(*run)
     step = min(MODEL_STEP, controller.dt / 4)
     if isinstance(stage, PrandtlIshlinskiiStage):
-        return stage.core.track(step, *course)
-    return _core.track_model(kind_of(stage).name, stage.theta, step, *course)
+        return stage.core.track(step, *run)
+    return _core.track_model(kind_of(stage).name, stage.theta, step, *run)
 
 
 def linearised_plants(
     stage: Plant, limits: tuple[float, float], delay: float
 ) -> list[_core.LoopPlant]:
-    """Take a stage for small motions: at its lowest, a middle and its highest gain."""
-    low, high = (float(volts) for volts in limits)
+    """Linearise a stage for small motions: at its lowest, a middle and its highest gain."""
+    low, high = (float(limit) for limit in limits)
     if isinstance(stage, VirtualStage):
         mode = (stage.frequency, stage.damping_ratio, stage.bandwidth, delay)
         return [_core.LoopPlant.mode(gain, *mode) for gain in stage.core().gains()]
@@ -82,7 +82,7 @@ def linearised_plants(
         return _core.LoopPlant.first_order_dahl(stage.theta, low, high, delay)
     if isinstance(stage, PrandtlIshlinskiiStage):
         return stage.core.loop_plants(low, high, delay)
-    ends = [stage.piezo_coefficient * volts / stage.stiffness for volts in (low, high)]
+    ends = [stage.piezo_coefficient * limit / stage.stiffness for limit in (low, high)]
     soft, stiff = _core.LoopPlant.dahl(stage.theta, min(ends), max(ends), delay)
     half = 0.5 * sum(ends)
     return [stiff, _core.LoopPlant.dahl(stage.theta, half, half, delay)[0], soft]

@@ -35,7 +35,7 @@ def plot_motion(run: Tracking, ax: Axes | None = None) -> Axes:
     run : Tracking
         A tracked motion.
     ax : matplotlib.axes.Axes, optional
-        Where to.
+        Axes to draw in; default a new figure.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def plot_error(run: Tracking, ax: Axes | None = None) -> Axes:
     run : Tracking
         A tracked motion.
     ax : matplotlib.axes.Axes, optional
-        Where to.
+        Axes to draw in; default a new figure.
 
     Returns
     -------
@@ -87,14 +87,14 @@ def plot_error(run: Tracking, ax: Axes | None = None) -> Axes:
 
 
 def plot_following(run: Tracking, ax: Axes | None = None) -> Axes:
-    """Plot actual against desired displacement, from where the run has settled.
+    """Plot actual against desired displacement, from the settled time on.
 
     Parameters
     ----------
     run : Tracking
         A tracked motion.
     ax : matplotlib.axes.Axes, optional
-        Where to.
+        Axes to draw in; default a new figure.
 
     Returns
     -------
@@ -118,7 +118,7 @@ def plot_effort(run: Tracking, ax: Axes | None = None) -> Axes:
     run : Tracking
         A tracked motion.
     ax : matplotlib.axes.Axes, optional
-        Where to.
+        Axes to draw in; default a new figure.
 
     Returns
     -------

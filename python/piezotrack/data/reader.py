@@ -351,7 +351,7 @@ class _TextLog:
         return table
 
     def _table_by_line(self, main: Sequence[Column], shape: tuple[int, int], swap: bool) -> Array:
-        """Do the same line by line, to name the first fault, or because a further column has text."""
+        """Do the same line by line, to name a fault, or for further columns with text."""
         table = np.empty(shape)
         for row, (line, text) in enumerate(self._rows()):
             fields = self._fields(text)

@@ -284,7 +284,7 @@ def spiral(
 
 @dataclass(frozen=True)
 class _Trace:
-    """Fast axis: a line of length `width` at constant speed, and back within `back` of each `line`."""
+    """Fast axis: a line of length `width` at constant speed, back within `back` of each `line`."""
 
     low: float
     width: float
