@@ -32,7 +32,7 @@ def demo_log(seed: int = 1) -> Dataset:
     Parameters
     ----------
     seed : int, optional
-        Of the noise of the virtual stage's sensor.
+        Seed of the sensor noise of the virtual stage.
 
     Returns
     -------
@@ -52,14 +52,14 @@ def identify_demo(
     progress: bool | None = None,
     callback: Callable[[Progress], object] | None = None,
 ) -> Identification:
-    """Identify as the paper does: four parameters on the first 4 s, between its bounds.
+    """Identify as in the paper: four parameters from the first 4 s, between its bounds.
 
     Parameters
     ----------
     log : Dataset
-        As `demo_log` makes it.
+        As of `demo_log`.
     seed : int, optional
-        Of the search.
+        Seed of the search.
     progress : bool, optional
         As in `identify`.
     callback : callable, optional
@@ -68,7 +68,7 @@ def identify_demo(
     Returns
     -------
     Identification
-        The hysteresis parameters, which fix the scale, are held at their published values.
+        The hysteresis parameters, which set the scale, are held at their published values.
     """
     published = DahlStage.xu_li_2010()
     return identify(
@@ -87,9 +87,9 @@ def track_demo(fit: Identification, seed: int = 1) -> dict[str, Tracking]:
     Parameters
     ----------
     fit : Identification
-        The model, whose inverse is the feedforward.
+        The model; its inverse is the feedforward.
     seed : int, optional
-        Of the noise of the virtual stage's sensor.
+        Seed of the sensor noise of the virtual stage.
 
     Returns
     -------
@@ -111,7 +111,7 @@ def track_demo(fit: Identification, seed: int = 1) -> dict[str, Tracking]:
 
 
 def write_log(log: Dataset, path: Path) -> Path:
-    """Write a log as a CSV file that `read` takes.
+    """Write a log as a CSV file for `read`.
 
     Parameters
     ----------
