@@ -53,5 +53,5 @@ def test_page_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert run.metrics.max_error < 1.5e-6
     assert len(run.plot().axes) == 4
     session = loop.start()
-    volts = session.step(10e-6, 9.8e-6)
-    assert 0.0 <= volts <= 75.0
+    voltage = session.step(10e-6, 9.8e-6)
+    assert 0.0 <= voltage <= 75.0

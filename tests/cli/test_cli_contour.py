@@ -141,5 +141,5 @@ def test_a_path_of_two_columns_needs_an_interval() -> None:
     assert "--path-dt" in words
     printed = ran("contour", "dahl.json", "--path", "path.csv", "--path-dt", "0.05")
     assert "XYReference(path.csv, 40 to 60 by 40 to 60 um, 10" in printed
-    assert "note  the path begins 78 um from where the stage is" in printed
+    assert "note  the path begins 78 um from the stage" in printed
     assert "expected none" in refusal("contour", "--path", "circle:1Hz,10um", "--path-dt", "0.05")

@@ -196,12 +196,12 @@ def test_antiwindup_helps_once_the_limits_clip() -> None:
         strict=True,
     )
     assert max(free) < 1.5
-    # Within the limits nothing is clipped, and antiwindup makes no difference.
-    assert without[0] == guarded[0] < 1.5
-    # The further the reference goes beyond the limits, the larger the error without it.
-    clipped = [error for error in without if error >= 1.5]
-    assert len(clipped) >= 2
-    assert clipped == sorted(clipped) == list(without[-len(clipped) :])
+    # 28 V reach 39 um on this stage: the first two ranges, up to 37 um, are not clipped.
+    assert without[:2] == pytest.approx(free[:2], abs=0.05)
+    assert guarded[:2] == pytest.approx(free[:2], abs=0.05)
+    # The further a range goes beyond that, the larger the error; antiwindup lowers it.
+    assert np.all(np.diff(without[2:]) > 0.0)
+    assert np.all(np.array(guarded[2:]) < np.array(without[2:]))
     assert without[-1] > 1.5 * guarded[-1] > 1.5 * free[-1]
 
 

@@ -60,12 +60,23 @@ class Apparatus:
         return {"delay": self.delay, "jitter": self.jitter}
 
     def seeded(self, seed: int) -> Apparatus:
-        """Return the same apparatus with other seeds of both sensors."""
+        """Return the same apparatus with other seeds of both sensors.
+
+        Parameters
+        ----------
+        seed : int
+            0 or above.
+
+        Returns
+        -------
+        Apparatus
+            With different noise on x and y.
+        """
         x, y = replace(self.x, seed=seed), replace(self.y, seed=seed + Y_SEEDS)
         return replace(self, stage=replace(self.stage, x=x, y=y))
 
     def document(self) -> dict[str, Any]:
-        """Numbers of the apparatus for a file, SI."""
+        """Return the numbers of the apparatus for a file, SI."""
         return {
             "x": _numbers(self.x),
             "y": _numbers(self.y),
@@ -77,14 +88,25 @@ class Apparatus:
 
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> Apparatus:
-        """Make the apparatus from its `document`."""
+        """Make the apparatus from its `document`.
+
+        Parameters
+        ----------
+        document : mapping
+            As `Apparatus.document` returns it.
+
+        Returns
+        -------
+        Apparatus
+            With seed 0.
+        """
         x, y = (VirtualStage(**document[axis], seed=0) for axis in "xy")
         stage = XYStage(x=x, y=y, cross_talk=document["cross_talk"], lag=document["lag"])
         return cls(stage=stage, delay=document["delay"], jitter=document["jitter"]).seeded(0)
 
     @classmethod
     def calibrated(cls) -> Apparatus:
-        """Load the calibrated apparatus of the package."""
+        """Return the calibrated apparatus of the package."""
         return cls.of(calibration_file()["apparatus"])
 
 
