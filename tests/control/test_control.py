@@ -304,104 +304,115 @@ def test_antiwindup_goes_by_what_the_amplifier_gave() -> None:
 # What it refuses.
 
 BAD: dict[str, tuple[Callable[[], Any], str]] = {
-    "dt": (lambda: loop(dt=0.0), "dt is 0: expected a finite number above 0"),
-    "limits crossed": (lambda: loop(limits=(75, 0)), r"\(75, 0\) V: expected the lower one first"),
-    "limits equal": (lambda: loop(limits=(5, 5)), "the lower one first"),
-    "limits not finite": (lambda: loop(limits=(0.0, math.inf)), r"limits\[1\] is inf"),
-    "three limits": (lambda: loop(limits=(0, 1, 2)), r"expected \(low, high\) in V"),
-    "limits text": (lambda: loop(limits="07"), r"expected \(low, high\) in V"),
+    "dt": (lambda: loop(dt=0.0), "dt"),
+    "limits crossed": (lambda: loop(limits=(75, 0)), "limits"),
+    "limits equal": (lambda: loop(limits=(5, 5)), "limits"),
+    "limits not finite": (lambda: loop(limits=(0.0, math.inf)), "limits[1]"),
+    "three limits": (lambda: loop(limits=(0, 1, 2)), "limits"),
+    "limits text": (lambda: loop(limits="07"), "limits"),
     "feedforward": (
         lambda: loop(feedforward=pt.DahlStage.xu_li_2010()),
-        "feedforward is DahlStage: expected pt.Inverse",
+        "feedforward",
     ),
     "feedback": (
         lambda: loop(feedback=5),
-        "feedback is int: expected pt.Pid or pt.control.StateSpace",
+        "feedback",
     ),
-    "repetitive": (lambda: loop(repetitive=PID), "repetitive is Pid: expected pt.Repetitive"),
-    "one filter": (lambda: loop(filters=pt.LowPass(5.0)), "expected a list of filters"),
-    "no filter": (lambda: loop(filters=[PID]), "expected pt.LowPass or pt.Notch"),
-    "three filters": (lambda: loop(filters=[pt.LowPass(5.0)] * 3), "filters is 3: expected 2"),
-    "cutoff": (lambda: pt.LowPass(0.0), "cutoff is 0"),
-    "notch too fast": (lambda: loop(filters=[pt.Notch(25.0)]), "half the sampling rate"),
-    "notch text": (lambda: pt.Notch("10"), "frequency is '10'"),  # type: ignore[arg-type]
-    "notch width": (lambda: pt.Notch(10.0, 0.0), "width is 0"),
-    "notch depth": (lambda: pt.Notch(10.0, 0.5, 2.0), "depth is 2"),
-    "kp": (lambda: pt.Pid(kp=math.nan, ti=1.0), "kp is nan: expected a finite number, in V/m"),
-    "kp text": (lambda: pt.Pid.from_um(kp="1", ti=1.0), "kp is '1'"),  # type: ignore[arg-type]
-    "ti = 0": (lambda: pt.Pid(kp=1e5, ti=0.0), "ti is 0.0 s: expected a time above 0"),
-    "ti not a number": (lambda: pt.Pid(kp=1e5, ti=math.nan), "ti is nan s"),
-    "td": (lambda: pt.Pid(kp=1e5, ti=1.0, td=-1.0), "td is -1"),
-    "td not finite": (lambda: pt.Pid(kp=1e5, ti=1.0, td=math.inf), "td is inf"),
-    "tt = 0": (lambda: pt.Pid(kp=1e5, ti=1.0, tt=0.0), "tt is 0.0 s"),
+    "repetitive": (lambda: loop(repetitive=PID), "repetitive"),
+    "one filter": (lambda: loop(filters=pt.LowPass(5.0)), "filters"),
+    "no filter": (lambda: loop(filters=[PID]), "filters"),
+    "three filters": (lambda: loop(filters=[pt.LowPass(5.0)] * 3), "filters"),
+    "cutoff": (lambda: pt.LowPass(0.0), "cutoff"),
+    "notch too fast": (lambda: loop(filters=[pt.Notch(25.0)]), "frequency"),
+    "notch text": (lambda: pt.Notch("10"), "frequency"),  # type: ignore[arg-type]
+    "notch width": (lambda: pt.Notch(10.0, 0.0), "width"),
+    "notch depth": (lambda: pt.Notch(10.0, 0.5, 2.0), "depth"),
+    "kp": (lambda: pt.Pid(kp=math.nan, ti=1.0), "kp"),
+    "kp text": (lambda: pt.Pid.from_um(kp="1", ti=1.0), "kp"),  # type: ignore[arg-type]
+    "ti = 0": (lambda: pt.Pid(kp=1e5, ti=0.0), "ti"),
+    "ti not a number": (lambda: pt.Pid(kp=1e5, ti=math.nan), "ti"),
+    "td": (lambda: pt.Pid(kp=1e5, ti=1.0, td=-1.0), "td"),
+    "td not finite": (lambda: pt.Pid(kp=1e5, ti=1.0, td=math.inf), "td"),
+    "tt = 0": (lambda: pt.Pid(kp=1e5, ti=1.0, tt=0.0), "tt"),
     "tt = dt/2": (
         lambda: loop(feedback=dataclasses.replace(PID, tt=0.01)),
-        "tt is 0.01 s: expected more than half a sampling interval",
+        "tt",
     ),
     "nothing to unwind": (
         lambda: loop(feedback=pt.Pid(kp=1e5, ti=math.inf, tt=1.0)),
-        "with ti infinite there is nothing to unwind",
+        "tt",
     ),
-    "period": (lambda: pt.Repetitive(period=0.0), "period is 0"),
+    "period": (lambda: pt.Repetitive(period=0.0), "period"),
     "period under two samples": (
         lambda: loop(repetitive=pt.Repetitive(period=0.03)),
-        "period is 0.03 s: expected from 2 to 1e9 sampling intervals",
+        "period",
     ),
-    "kq = 0": (lambda: pt.Repetitive(period=2.0, kq=0.0), "above 0 and below 2e6 V/m"),
-    "kq = 2": (lambda: pt.Repetitive(period=2.0, kq=2e6), "kq is 2e.06 V/m"),
-    "kq negative": (lambda: pt.Repetitive(period=2.0, kq=-1.0), "kq is -1 V/m"),
-    "kq in V/um": (lambda: pt.Repetitive.from_um(period=2.0, kq=2.0), "kq is 2.0 V/um"),
+    "kq = 0": (lambda: pt.Repetitive(period=2.0, kq=0.0), "kq"),
+    "kq = 2": (lambda: pt.Repetitive(period=2.0, kq=2e6), "kq"),
+    "kq negative": (lambda: pt.Repetitive(period=2.0, kq=-1.0), "kq"),
+    "kq in V/um": (lambda: pt.Repetitive.from_um(period=2.0, kq=2.0), "kq"),
     "kq without its unit": (
         lambda: loop(repetitive=pt.Repetitive(period=2.0, kq=1.0)),
-        r"kq is 1 V/m: .* write pt\.Repetitive\.from_um\(kq=1, \.\.\.\)",
+        "kq",
     ),
-    "kq not a number": (lambda: pt.Repetitive(period=2.0, kq=math.nan), "kq is nan"),
-    "tq": (lambda: pt.Repetitive.from_um(period=2.0, tq=0.0), "tq is 0"),
+    "kq not a number": (lambda: pt.Repetitive(period=2.0, kq=math.nan), "kq"),
+    "tq": (lambda: pt.Repetitive.from_um(period=2.0, tq=0.0), "tq"),
     "tq beside a filter": (
         lambda: pt.Repetitive.from_um(period=2.0, tq=0.2, smoothing=pt.control.ZeroPhase()),
-        "tq is 0.2 s beside smoothing",
+        "tq",
     ),
-    "compensated": (lambda: pt.control.Lag(compensated=1), "compensated is 1"),  # type: ignore[arg-type]
-    "smoothing": (lambda: pt.Repetitive(period=2.0, smoothing="some"), "smoothing is 'some'"),  # type: ignore[arg-type]
-    "order": (lambda: pt.control.ZeroPhase(order=5), "order is 5: expected 1 to 4"),
+    "compensated": (lambda: pt.control.Lag(compensated=1), "compensated"),  # type: ignore[arg-type]
+    "smoothing": (lambda: pt.Repetitive(period=2.0, smoothing="some"), "smoothing"),  # type: ignore[arg-type]
+    "order": (lambda: pt.control.ZeroPhase(order=5), "order"),
     "forgetting": (
         lambda: pt.Repetitive(period=2.0, forgetting_factor=0.0),
-        "forgetting_factor is 0: ",
+        "forgetting_factor",
     ),
     "forgetting above 1": (
         lambda: pt.Repetitive(period=2.0, forgetting_factor=1.1),
-        "forgetting_factor is 1.1",
+        "forgetting_factor",
     ),
-    "lead": (lambda: loop(repetitive=pt.Repetitive(period=2.0, lead=500)), "lead is 500 samples"),
-    "lead beyond all": (lambda: pt.Repetitive(period=2.0, lead=2**40), "lead is 1099511627776"),
-    "pause": (lambda: pt.Repetitive(period=2.0, pause="no"), "pause is 'no'"),  # type: ignore[arg-type]
-    "matrix": (lambda: pt.control.StateSpace([[math.nan]], [1.0], [1.0]), "a has .nan."),
+    "lead": (lambda: loop(repetitive=pt.Repetitive(period=2.0, lead=500)), "lead"),
+    "lead beyond all": (lambda: pt.Repetitive(period=2.0, lead=2**40), "lead"),
+    "pause": (lambda: pt.Repetitive(period=2.0, pause="no"), "pause"),  # type: ignore[arg-type]
+    "matrix": (lambda: pt.control.StateSpace([[math.nan]], [1.0], [1.0]), "a"),
     "matrix of text": (
         lambda: pt.control.StateSpace([["x"]], [1.0], [1.0]),
-        "expected an array of numb",
+        "a",
     ),
     "many states": (
         lambda: loop(feedback=pt.control.StateSpace(np.eye(17), np.ones(17), np.ones(17))),
-        "b is 17 entries",
+        "b",
     ),
     "back": (
         lambda: loop(feedback=pt.control.StateSpace([[1]], [1], [1], 0, [1, 2])),
-        "back is 2 ent",
+        "back",
     ),
-    "present": (lambda: loop().start(present=80.0), "present is 80 V: expected a voltage within"),
-    "present not finite": (lambda: loop().start(present=math.nan), "present is NaN V"),
-    "measured": (lambda: loop().start().step(0.0, None), "measured is None"),  # type: ignore[arg-type]
-    "reference": (lambda: FULL.start().step("0", 0.0), "reference is '0'"),  # type: ignore[arg-type]
-    "applied": (lambda: loop().start().applied(math.nan), "voltage is nan"),
+    "present": (lambda: loop().start(present=80.0), "present"),
+    "present not finite": (lambda: loop().start(present=math.nan), "present"),
+    "measured": (lambda: loop().start().step(0.0, None), "measured"),  # type: ignore[arg-type]
+    "reference": (lambda: FULL.start().step("0", 0.0), "reference"),  # type: ignore[arg-type]
+    "applied": (lambda: loop().start().applied(math.nan), "voltage"),
 }
 
 
 @pytest.mark.parametrize("name", BAD)
 def test_refuses(name: str) -> None:
     call, message = BAD[name]
-    with pytest.raises(pt.ParameterError, match=message) as caught:
+    with pytest.raises(pt.ParameterError) as caught:
         call()
+    assert re.match(rf"{re.escape(message)}(?!\w)", str(caught.value))
     assert "\n" not in str(caught.value)
+
+
+def test_a_refusal_names_argument_value_unit_and_expectation() -> None:
+    with pytest.raises(pt.ParameterError) as caught:
+        pt.Pid(kp=math.nan, ti=1.0)
+    assert str(caught.value) == "kp is nan: expected a finite number, in V/m"
+    with pytest.raises(
+        pt.ParameterError, match=r"kq is 1 V/m: .*write pt\.Repetitive\.from_um\(kq=1"
+    ):
+        loop(repetitive=pt.Repetitive(period=2.0, kq=1.0))
 
 
 @pytest.mark.parametrize(

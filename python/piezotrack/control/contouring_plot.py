@@ -48,9 +48,9 @@ def plot_path(run: Contour, ax: Axes | None = None) -> Axes:
     (ax,) = axes_or_new(ax, 1)
     x, y = run.path.outline
     ax.plot(1e6 * x, 1e6 * y, **{**DESIRED, "linewidth": 2.6, "color": "0.72"})
-    way, part = run.t < run.settled, last_turn(run)
+    start, part = run.t < run.settled, last_turn(run)
     ax.plot(
-        1e6 * run.x.measured[way], 1e6 * run.y.measured[way], color="0.5", linewidth=0.6, ls=":"
+        1e6 * run.x.measured[start], 1e6 * run.y.measured[start], color="0.5", linewidth=0.6, ls=":"
     )
     ax.plot(1e6 * run.x.measured[part], 1e6 * run.y.measured[part], **{**ACTUAL, "linewidth": 0.9})
     _plane(ax, run)

@@ -86,12 +86,12 @@ def blended(
         return x, v, a
     s, slope, curvature = s_curve(t / ramp)
     start = motion(np.zeros(1))[0][0] if origin is None else origin
-    way = x - start
+    travel = x - start
     at_start = t < ramp
     return (
-        np.where(at_start, start + s * way, x),
-        np.where(at_start, slope * way / ramp + s * v, v),
-        np.where(at_start, curvature * way / ramp**2 + 2.0 * slope * v / ramp + s * a, a),
+        np.where(at_start, start + s * travel, x),
+        np.where(at_start, slope * travel / ramp + s * v, v),
+        np.where(at_start, curvature * travel / ramp**2 + 2.0 * slope * v / ramp + s * a, a),
     )
 
 
@@ -161,14 +161,14 @@ class Triangle:
         if corner > 0.0:
             u = np.clip(s / corner, -1.0, 1.0)
             beyond = np.maximum(np.abs(s) - corner, 0.0)
-            way = speed * (corner * (0.75 - 0.125 * u**2) * u**2 + beyond)
+            travel = speed * (corner * (0.75 - 0.125 * u**2) * u**2 + beyond)
             v = speed * (1.5 - 0.5 * u**2) * u
             a = 1.5 * speed / corner * (1.0 - u**2)
         else:
-            way, v, a = speed * np.abs(s), np.where(s < 0.0, -speed, speed), np.zeros(t.shape)
+            travel, v, a = speed * np.abs(s), np.where(s < 0.0, -speed, speed), np.zeros(t.shape)
         is_low = np.mod(number, 2.0) == 0.0
         return (
-            np.where(is_low, self.low + way, self.high - way),
+            np.where(is_low, self.low + travel, self.high - travel),
             np.where(is_low, v, -v),
             np.where(is_low, a, -a),
         )
@@ -197,9 +197,9 @@ class Steps:
             following[-1] = levels[-1]
         number = np.clip(np.floor(t / step), 0, levels.size - 1).astype(np.intp)
         s, slope, curvature = s_curve((t - number * step - self.dwell) / self.rise)
-        way = (following - levels)[number]
-        x = levels[number] + way * s
-        return x, way * slope / self.rise, way * curvature / self.rise**2
+        travel = (following - levels)[number]
+        x = levels[number] + travel * s
+        return x, travel * slope / self.rise, travel * curvature / self.rise**2
 
 
 @dataclass(frozen=True, eq=False)

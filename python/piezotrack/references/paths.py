@@ -296,12 +296,12 @@ class _Trace:
         forth = self.line - self.back
         speed = self.width / forth
         # The flyback is an S-curve added to the constant speed.
-        way = self.width + speed * self.back
+        travel = self.width + speed * self.back
         s, slope, curvature = s_curve((along - forth) / self.back)
         return (
-            self.low + speed * along - way * s,
-            speed - way * slope / self.back,
-            -way * curvature / self.back**2,
+            self.low + speed * along - travel * s,
+            speed - travel * slope / self.back,
+            -travel * curvature / self.back**2,
         )
 
 
@@ -321,13 +321,13 @@ class _Lines:
         number = np.minimum(np.floor(along / self.line), last)
         step = self.height / last
         returns = number == last
-        way = np.where(returns, -self.height, step)
+        travel = np.where(returns, -self.height, step)
         time = np.where(returns, self.back + self.line, self.back)
         s, slope, curvature = s_curve((along - (number + 1.0) * self.line + self.back) / time)
         return (
-            self.low + number * step + way * s,
-            way * slope / time,
-            way * curvature / time**2,
+            self.low + number * step + travel * s,
+            travel * slope / time,
+            travel * curvature / time**2,
         )
 
 
