@@ -57,13 +57,12 @@ def test_identify_writes_what_python_finds() -> None:
 
 @pytest.mark.usefixtures("_no_pictures")
 def test_every_option_of_a_fit_reaches_it() -> None:
-    ran(
-        *("identify", "log.csv", "--window", "1:3", "--model", "dahl", "--out", "a/b"),
-        *("--fix", "a1=121.9874", "--fix", "a2=1177300", "--fix", "mass=0.1828"),
-        *("--bound", "damping=1000:5000", "--free", "damping,piezo_coefficient, b1"),
-        *("--stiffness", "26065", "--no-offset", "--swarm", "xu-li-2010", "--seed", "7"),
-        *("--runs", "2", "--threads", "1", "--hold", "zoh"),
+    options = (
+        "--window 1:3 --model dahl --out a/b --fix a1=121.9874 --fix a2=1177300 --fix mass=0.1828 "
+        "--bound damping=1000:5000 --stiffness 26065 --no-offset --swarm xu-li-2010 --seed 7 "
+        "--runs 2 --threads 1 --hold zoh"
     )
+    ran("identify", "log.csv", *options.split(), "--free", "damping,piezo_coefficient, b1")
     fit = pt.identify(
         pt.read("log.csv", hold="zoh")[1.0:3.0],
         fixed={"a1": 121.9874, "a2": 1177300.0, "mass": 0.1828},

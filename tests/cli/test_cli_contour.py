@@ -40,11 +40,11 @@ def test_contour_writes_what_python_finds() -> None:
 
 
 def test_the_options_reach_the_stage_and_the_loops() -> None:
-    printed = ran(
-        *("contour", "--path", "lissajous:0.5/1Hz,5/5um", "--lag", "0.04"),
-        *("--cross-talk", "0.1:-0.08", "--decouple", "--kp", "0.1", "--duration", "4"),
-        *("--out", "a/b", "--seed", "3"),
+    options = (
+        "--path lissajous:0.5/1Hz,5/5um --lag 0.04 --cross-talk 0.1:-0.08 --decouple --kp 0.1 "
+        "--duration 4 --out a/b --seed 3"
     )
+    printed = ran("contour", *options.split())
     assert "y lags by 0.04 s, 10 % of y in x, -8 % of x in y; feedforward" in printed
     assert "cross-talk identified: 10." in printed or "cross-talk identified: 9.9" in printed
     assert table("a/b/contour.csv").size == 200

@@ -407,10 +407,6 @@ BAD: dict[str, tuple[Callable[[], object], str]] = {
         lambda: pt.contour(STAGE, led(), PATH, decoupling=np.ones((2, 2))),
         "decoupling",
     ),
-    "reach": (
-        lambda: pt.contour(STAGE, led(), pt.circle(frequency=0.1, radius=70 * UM)),
-        "x: reference",
-    ),
     "unstable": (
         lambda: pt.contour(STAGE, both(feedback=pt.Pid.from_um(kp=0.5, ti=0.009, td=0.044)), PATH),
         "x: the loop",

@@ -94,7 +94,7 @@ def _write(step: StepResult, folder: Path) -> Path:
 
 
 def _level(text: str) -> tuple[float, float]:
-    volts, colon, um = text.partition(":")
+    voltage, colon, um = text.partition(":")
     if not colon:
         raise ParameterError(f"--second-level is '{text}': expected V:UM, as 37.5:60.2")
-    return number("--second-level", volts), number("--second-level", um) / 1e6
+    return number("--second-level", voltage), number("--second-level", um) / 1e6

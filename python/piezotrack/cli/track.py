@@ -153,16 +153,18 @@ def feedforward_command(
     interval = 0.02 if dt is None else dt
     can_be_folder(out)
     samples = desired.sample(interval)
-    volts, how = known.inverse(playback="online" if online else "table").played(
+    voltage, how = known.inverse(playback="online" if online else "table").played(
         desired, interval, samples=samples
     )
     folder = make_folder(out)
-    table = {"time_s": samples.t, "voltage_V": volts, "displacement_um": 1e6 * samples.x}
+    table = {"time_s": samples.t, "voltage_V": voltage, "displacement_um": 1e6 * samples.x}
     written = [write_columns(folder / "feedforward.csv", table)]
-    written += save_figures({"feedforward": plot_feedforward(samples.t, volts, samples.x)}, folder)
+    written += save_figures(
+        {"feedforward": plot_feedforward(samples.t, voltage, samples.x)}, folder
+    )
     print(f"{desired!r} at {1.0 / interval:g} Hz; {how}")
-    print(f"{volts.size} samples, voltage from {volts.min():.4g} to {volts.max():.4g} V")
-    _note_range(known, volts)
+    print(f"{voltage.size} samples, voltage from {voltage.min():.4g} to {voltage.max():.4g} V")
+    _note_range(known, voltage)
     list_files(written)
 
 
@@ -182,11 +184,11 @@ def _refuse_without_effect(
         refuse_without_effect(context, ["seed"], "with --stage model, which has no sensor noise")
 
 
-def _note_range(known: Identified[Any], volts: NDArray[np.float64]) -> None:
+def _note_range(known: Identified[Any], voltage: NDArray[np.float64]) -> None:
     """Print a note where a model is used outside the voltages of its identification."""
     if fitted := known.drive_range:
         margin = 0.01 * (fitted[1] - fitted[0])
-        if volts.min() < fitted[0] - margin or volts.max() > fitted[1] + margin:
+        if voltage.min() < fitted[0] - margin or voltage.max() > fitted[1] + margin:
             print(f"note  the model was fitted from {fitted[0]:.4g} to {fitted[1]:.4g} V only")
 
 

@@ -230,7 +230,9 @@ class DrivenStage(LumpedStage, Generic[State]):
         """
         start: Any = self._state() if initial is None else initial
         if not isinstance(start, self._state):
-            raise ParameterError(f"initial is {start!r}: expected a pt.stages.{self._state.__name__}")
+            raise ParameterError(
+                f"initial is {start!r}: expected a pt.stages.{self._state.__name__}"
+            )
         dt = _core.as_number("dt", dt)
         accuracy = _core.as_number("accuracy", accuracy)
         run = _core.stage_simulate(self._kind, self.theta, u, dt, hold, start.values, accuracy)

@@ -73,8 +73,8 @@ class Drives:
         span = float(np.ptp(self.measured))
         off = _rms(self.line - self.measured)
         rows = [("no compensation", "", f"{1e3 * off:.1f}", f"{100 * off / span:.2f}", "", "")]
-        for name, volts in self.computed.items():
-            away = _rms(volts - self.measured)
+        for name, voltage in self.computed.items():
+            away = _rms(voltage - self.measured)
             rows.append(
                 (
                     name,
@@ -116,8 +116,8 @@ class Drives:
         wide = {"color": "0.68", "linewidth": 3.2, "label": "measured"}
         left.plot(um, (self.measured - self.line)[part], **wide)
         right.plot(t, (self.measured - self.line)[part], **wide)
-        for (name, volts), line in zip(self.computed.items(), LINES, strict=False):
-            added = (volts - self.line)[part]
+        for (name, voltage), line in zip(self.computed.items(), LINES, strict=False):
+            added = (voltage - self.line)[part]
             left.plot(um, added, linewidth=1.1, label=name, **line)
             right.plot(t, added, linewidth=1.1, label=name, **line)
         left.set(xlabel="reference [um]", ylabel="drive less a straight line [V]")
@@ -168,9 +168,9 @@ def drives(folder: str | os.PathLike[str]) -> Drives:
     dahl = identify(training, seed=1, runs=2, progress=False)
     found: dict[str, Any] = {"Dahl": dahl, **rivals(training)}
     for name, fit in found.items():
-        volts = fit.inverse().voltage(reference, log.dt)[part]
-        shifts[name] = float(np.mean(volts - measured))
-        computed[name], fits[name] = volts - shifts[name], fit.cost / training.stroke
+        voltage = fit.inverse().voltage(reference, log.dt)[part]
+        shifts[name] = float(np.mean(voltage - measured))
+        computed[name], fits[name] = voltage - shifts[name], fit.cost / training.stroke
     return Drives(
         t=log.t[part],
         desired=desired,
