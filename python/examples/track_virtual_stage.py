@@ -1,6 +1,6 @@
-"""The situations of Figs. 12 to 14 of Xu and Li 2010 on the virtual stage.
+"""The experiments of Figs. 12 to 14 of Xu and Li 2010 on the virtual stage.
 
-Identifies a Dahl model in the paper's experiments, runs each situation, prints a table and writes a
+Identifies a Dahl model as in the paper, runs each experiment, prints a table and writes a
 picture of each: ``python track_virtual_stage.py [FOLDER]``.
 """
 

@@ -1,4 +1,4 @@
-"""Stages beside Dahl's as the stage that is led and checked."""
+"""Closed loops and margins of the stage models beside Dahl's."""
 
 from __future__ import annotations
 

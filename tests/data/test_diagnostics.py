@@ -1,4 +1,4 @@
-"""What is said of a record that is odd, and that nothing is said of one that is not."""
+"""Diagnostics: warnings of an unsound record, none of a sound one."""
 
 from __future__ import annotations
 
