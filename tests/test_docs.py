@@ -12,13 +12,16 @@ import re
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 import piezotrack as pt
 from folders import ROOT
+
+if TYPE_CHECKING:
+    from types import ModuleType
 
 MODULES = sorted(
     {"piezotrack"}
@@ -41,11 +44,6 @@ def test_the_examples_in_docstrings_run(
     monkeypatch.chdir(tmp_path)
     result = doctest.testmod(importlib.import_module(name))
     assert result.failed == 0
-
-
-@pytest.mark.parametrize("name", ["identify", "read", "load", "Dataset", "DahlStage"])
-def test_what_one_begins_with_has_an_example(name: str) -> None:
-    assert doctest.DocTestFinder(recurse=False).find(getattr(pt, name))[0].examples
 
 
 FENCED = re.compile(r"^```python[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -87,10 +85,6 @@ def test_the_examples_on_the_pages_run(
     assert done.returncode == 0, done.stderr
 
 
-def test_the_readme_has_an_example_that_runs() -> None:
-    assert any(ROOT / "README.md" in block.values for block in BLOCKS)
-
-
 @pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
 def test_the_pages_link_to_what_is_there(page: Path) -> None:
     for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text(encoding="utf-8")):
@@ -100,15 +94,27 @@ def test_the_pages_link_to_what_is_there(page: Path) -> None:
 
 # Docstrings.
 
-STUB = Path(pt.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
-LISTED = [
-    (imported.name, imported.asname)
-    for line in ast.parse(STUB).body
-    if isinstance(line, ast.ImportFrom)
-    for imported in line.names
-]
-NAMES = [name for name, _ in LISTED]
-PUBLIC = {name: getattr(pt, name) for name in NAMES if name != "__version__"}
+ROOMS = [pt, pt.control, pt.data, pt.identification, pt.references, pt.stages, pt.xu_li_2010]
+
+
+def listed(room: ModuleType) -> list[tuple[str, str | None]]:
+    """The names that the stub of a package exports, each with the name behind "as"."""
+    assert room.__file__ is not None
+    stub = Path(room.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+    return [
+        (imported.name, imported.asname)
+        for line in ast.parse(stub).body
+        if isinstance(line, ast.ImportFrom)
+        for imported in line.names
+    ]
+
+
+PUBLIC = {
+    name: value
+    for room in ROOMS
+    for name, _ in listed(room)
+    if name != "__version__" and not inspect.ismodule(value := getattr(room, name))
+}
 CLASSES = {name: value for name, value in PUBLIC.items() if inspect.isclass(value)}
 
 
@@ -206,14 +212,23 @@ def test_the_examples_run(example: Path, tmp_path: Path) -> None:
             assert np.isfinite(pt.load(path).model.simulate([0.0, 1.0], 0.01).x).all()
 
 
-def test_every_public_name_is_there_and_listed() -> None:
+@pytest.mark.parametrize("room", ROOMS, ids=lambda room: room.__name__)
+def test_every_public_name_is_there_and_listed(room: ModuleType) -> None:
+    names = [name for name, _ in listed(room)]
     # A name is exported to type checkers only where it is repeated behind "as".
-    assert [shown for _, shown in LISTED] == NAMES
+    assert [shown for _, shown in listed(room)] == names
     # What runs and what type checkers see.
-    assert vars(pt)["__all__"] == sorted(NAMES)
-    assert len(set(NAMES)) == len(NAMES)
-    for name in NAMES:
-        assert getattr(pt, name) is not None
-    assert set(NAMES) <= set(dir(pt))
+    assert vars(room)["__all__"] == sorted(names)
+    assert len(set(names)) == len(names)
+    for name in names:
+        assert getattr(room, name) is not None
+    assert set(names) <= set(dir(room))
     with pytest.raises(AttributeError, match="'Bogus'"):
-        pt.Bogus  # type: ignore[attr-defined]  # noqa: B018
+        room.Bogus  # noqa: B018
+
+
+def test_a_name_at_the_top_is_that_of_its_room() -> None:
+    for name, _ in listed(pt):
+        homes = [room for room in ROOMS[1:] if name in vars(room)["__all__"]]
+        for room in homes:
+            assert getattr(room, name) is getattr(pt, name)

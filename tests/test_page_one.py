@@ -43,7 +43,7 @@ def test_page_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         limits=(0.0, 75.0),
         feedforward=fit.inverse(),
         feedback=pt.Pid.from_um(kp=0.120, ti=0.009, td=0.044),
-        addon=pt.Repetitive(period=5.0, tq=0.2, kq=1.0),
+        repetitive=pt.Repetitive.from_um(period=5.0, tq=0.2, kq=1.0),
     )
     run = pt.track(
         pt.VirtualStage.xu_li_2010(seed=1),
@@ -53,5 +53,5 @@ def test_page_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert run.metrics.max_error < 1.5e-6
     assert len(run.plot().axes) == 4
     session = loop.start()
-    volts = session.step(10e-6, 9.8e-6)
-    assert 0.0 <= volts <= 75.0
+    voltage = session.step(10e-6, 9.8e-6)
+    assert 0.0 <= voltage <= 75.0

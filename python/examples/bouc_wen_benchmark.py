@@ -1,7 +1,7 @@
 """The Bouc-Wen benchmark: simulated, and its parameters found again from noisy data.
 
 Noel and Schoukens 2016, doi 10.4121/12967592: a multisine of 5 to 150 Hz and 50 N rms, data made at
-15 kHz and handed out at 750 Hz; noise of 7 um rms is added here. Run as
+15 kHz and sampled at 750 Hz; noise of 7 um rms is added here. Run as
 
     python python/examples/bouc_wen_benchmark.py
 

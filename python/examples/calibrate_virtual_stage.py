@@ -2,8 +2,8 @@
 
 ``python calibrate_virtual_stage.py [FILE [PARTICLES [ITERATIONS [RUNS]]]]`` writes what
 ``piezotrack reproduce`` loads, which is kept as ``python/piezotrack/xu_li_2010/calibrated.json``:
-40 particles, 40 iterations and 2 runs, half an hour on two cores. Without arguments it does a
-small search, to show the way.
+40 particles, 40 iterations and 2 runs, half an hour on two cores. Without arguments it runs a
+small search as a demonstration.
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""All kinds of stage on measured logs: fitted on a part of one, judged on its rest and on another.
+"""All models on measured logs: fitted to a part of one, validated on its rest and on another.
 
 Run as ``python compare_models.py FOLDER [OUT]``, with training.csv and tracking.csv of Aye and
 Ang's piezo stack in the folder (github.com/yan9a/DiscreteBacklashOperator, columns time_s,

@@ -1,6 +1,6 @@
-"""From a CSV log to an identified stage: reads, identifies, judges on the rest, saves.
+"""From a CSV log to an identified stage: reads, identifies, validates on the rest, saves.
 
-Run as ``python identify_log.py stage.csv``; without a file it makes a log of the built-in stage.
+Run as ``python identify_log.py stage.csv``; without a file it makes a log of the virtual stage.
 """
 
 from __future__ import annotations

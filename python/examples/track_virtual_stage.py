@@ -1,6 +1,6 @@
-"""The situations of Figs. 12 to 14 of Xu and Li 2010 on the virtual stage.
+"""The experiments of Figs. 12 to 14 of Xu and Li 2010 on the virtual stage.
 
-Identifies a Dahl model in the paper's way, runs each situation, prints a table and writes a
+Identifies a Dahl model as in the paper, runs each experiment, prints a table and writes a
 picture of each: ``python track_virtual_stage.py [FOLDER]``.
 """
 
@@ -61,7 +61,10 @@ runs = {
     "Fig. 13, 6 to 28 V, antiwindup": run("fig13_antiwindup", small, (6.0, 28.0), **both),
     "Fig. 14, 0.5 Hz": run("fig14_both", fast, **both),
     "Fig. 14, repetitive": run(
-        "fig14_repetitive", fast, **both, addon=pt.Repetitive(period=2.0, tq=0.2, kq=1.0)
+        "fig14_repetitive",
+        fast,
+        **both,
+        repetitive=pt.Repetitive.from_um(period=2.0, tq=0.2, kq=1.0),
     ),
 }
 published = {

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import typer
 
 import piezotrack as pt
 from commands import (
@@ -23,10 +24,12 @@ from commands import (
     log_text,
     names,
     ran,
+    refusal,
     run,
     write,
     write_model,
 )
+from piezotrack.cli import app
 from piezotrack.xu_li_2010.demo import write_log
 from records import BOX, HELD, quick
 
@@ -54,13 +57,12 @@ def test_identify_writes_what_python_finds() -> None:
 
 @pytest.mark.usefixtures("_no_pictures")
 def test_every_option_of_a_fit_reaches_it() -> None:
-    ran(
-        *("identify", "log.csv", "--window", "1:3", "--model", "dahl", "--out", "a/b"),
-        *("--fix", "a1=121.9874", "--fix", "a2=1177300", "--fix", "mass=0.1828"),
-        *("--bound", "damping=1000:5000", "--free", "damping,piezo_coefficient, b1"),
-        *("--stiffness", "26065", "--no-offset", "--swarm", "xu-li-2010", "--seed", "7"),
-        *("--runs", "2", "--threads", "1", "--hold", "zoh"),
+    options = (
+        "--window 1:3 --model dahl --out a/b --fix a1=121.9874 --fix a2=1177300 --fix mass=0.1828 "
+        "--bound damping=1000:5000 --stiffness 26065 --no-offset --swarm xu-li-2010 --seed 7 "
+        "--runs 2 --threads 1 --hold zoh"
     )
+    ran("identify", "log.csv", *options.split(), "--free", "damping,piezo_coefficient, b1")
     fit = pt.identify(
         pt.read("log.csv", hold="zoh")[1.0:3.0],
         fixed={"a1": 121.9874, "a2": 1177300.0, "mass": 0.1828},
@@ -147,7 +149,7 @@ def test_simulate_writes_the_displacement() -> None:
     assert names("run") == ["simulated.csv", "simulated.png", "simulated.svg"]
     assert "1001 samples" in printed
     back = pt.read("run/simulated.csv", hold="zoh")
-    t, u = pt.read_drive("drive.csv")
+    t, u = pt.data.read_drive("drive.csv")
     assert np.array_equal(back.u, u)
     assert np.allclose(back.t, t, atol=1e-12)
     x = pt.DahlStage.xu_li_2010().simulate(u, 0.004, hold="zoh").x + 1e-6
@@ -171,7 +173,7 @@ def test_the_demonstration_tells_the_whole_story() -> None:
         score = model.score(part)
         assert 0.098e-6 < score.rms < 2e-6
         assert score.max_error < 5e-6
-    assert "the other 8 s, not fitted: rms 1." in printed
+    assert "validation on the other 8 s: rms 1." in printed
     largest = {
         name: float(found)
         for name, found in re.findall(r"  (\S.*?) +max (\d+\.\d+) um, rms", printed)
@@ -188,10 +190,46 @@ def test_the_version_is_printed() -> None:
     assert ran("--version") == f"piezotrack {pt.__version__}\n"
 
 
-def test_help_names_every_option() -> None:
-    printed = ran("identify", "--help")
-    for option in ("window", "fix", "bound", "free", "stiffness", "validate", "swarm", "seed"):
-        assert f"--{option} " in printed
+# The options that `ran(command, "--help")` has to name, of every command.
+OPTIONS = {
+    name: [
+        option
+        for parameter in command.params
+        if parameter.param_type_name == "option"
+        for option in (*parameter.opts, *parameter.secondary_opts)
+    ]
+    for name, command in vars(typer.main.get_command(app))["commands"].items()
+}
+
+
+@pytest.mark.parametrize("command", OPTIONS)
+def test_help_names_every_option(command: str) -> None:
+    printed = ran(command, "--help")
+    assert OPTIONS[command]
+    for option in OPTIONS[command]:
+        assert re.search(rf"{option}\b", printed), option
+
+
+NO_EFFECT = {
+    "identify log.csv --model prandtl-ishlinskii --seed 1": "--seed",
+    "identify log.csv --model prandtl-ishlinskii --runs 4": "--runs",
+    "identify log.csv --model prandtl-ishlinskii --threads 2": "--threads",
+    "compare log.csv --model prandtl-ishlinskii --seed 1": "--seed",
+    "reproduce --quick --seeds 3": "--seeds",
+    "track m.json --reference sine:1Hz,0..9um --no-feedforward --online": "--online",
+    "track m.json --reference sine:1Hz,0..9um --no-feedback --kp 0.1": "--kp",
+    "track m.json --reference sine:1Hz,0..9um --kq 1": "--kq",
+    "track m.json --reference sine:1Hz,0..9um --tq 0.1": "--tq",
+    "track m.json --reference sine:1Hz,0..9um --stage model --seed 2": "--seed",
+    "contour --path circle:1Hz,1um --no-feedforward --decouple": "--decouple",
+    "contour --path circle:1Hz,1um --no-feedback --ti 0.1": "--ti",
+    "contour --table-2 --duration 4": "--duration",
+}
+
+
+@pytest.mark.parametrize("command", NO_EFFECT)
+def test_an_option_without_effect_is_refused_by_name(command: str) -> None:
+    assert refusal(*command.split()).startswith(f"{NO_EFFECT[command]} has no effect with")
 
 
 def test_the_installed_command_works_and_repeats_itself() -> None:

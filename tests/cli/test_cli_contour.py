@@ -40,12 +40,12 @@ def test_contour_writes_what_python_finds() -> None:
 
 
 def test_the_options_reach_the_stage_and_the_loops() -> None:
-    printed = ran(
-        *("contour", "--path", "lissajous:0.5/1Hz,5/5um", "--no-feedforward", "--lag", "0.04"),
-        *("--cross-talk", "0.1:-0.08", "--decouple", "--kp", "0.1", "--duration", "4"),
-        *("--out", "a/b", "--seed", "3"),
+    options = (
+        "--path lissajous:0.5/1Hz,5/5um --lag 0.04 --cross-talk 0.1:-0.08 --decouple --kp 0.1 "
+        "--duration 4 --out a/b --seed 3"
     )
-    assert "y lags by 0.04 s, 10 % of y in x, -8 % of x in y; no feedforward" in printed
+    printed = ran("contour", *options.split())
+    assert "y lags by 0.04 s, 10 % of y in x, -8 % of x in y; feedforward" in printed
     assert "cross-talk identified: 10." in printed or "cross-talk identified: 9.9" in printed
     assert table("a/b/contour.csv").size == 200
 
@@ -111,7 +111,9 @@ def test_noise_needs_no_drive() -> None:
 def test_what_cannot_be_done_is_refused_in_one_sentence() -> None:
     assert "--path and --table-2: expected one of them, neither" in refusal("contour", "dahl.json")
     assert "both are" in refusal("contour", "--table-2", "--path", "circle:0.1Hz,10um")
-    assert "expected none with --table-2" in refusal("contour", "--table-2", "--unstable")
+    assert "--unstable has no effect with --table-2" in refusal(
+        "contour", "--table-2", "--unstable"
+    )
     assert "neither a file nor a known kind" in refusal("contour", "--path", "square:1Hz")
     assert "--beyond-reach" in refusal("contour", "dahl.json", "--path", "circle:0.1Hz,80um")
     assert "LOW:HIGH" in refusal("contour", "--path", "circle:0.1Hz,1um", "--cross-talk", "3")
@@ -139,5 +141,5 @@ def test_a_path_of_two_columns_needs_an_interval() -> None:
     assert "--path-dt" in words
     printed = ran("contour", "dahl.json", "--path", "path.csv", "--path-dt", "0.05")
     assert "XYReference(path.csv, 40 to 60 by 40 to 60 um, 10" in printed
-    assert "note  the path begins 78 um from where the stage is" in printed
+    assert "note  the path begins 78 um from the stage" in printed
     assert "expected none" in refusal("contour", "--path", "circle:1Hz,10um", "--path-dt", "0.05")

@@ -60,13 +60,16 @@ def test_track_writes_what_python_finds() -> None:
     assert document["limits"] == {"value": [0.0, 75.0], "unit": "V"}
 
 
+LOOP = (
+    "--dt 0.01 --limits -5:60 --online --kp 0.05 --ti 0.02 --td 0.01 --tt inf "
+    "--repetitive --kq 0.5 --tq 0.1 --delay 0.001 --seed 7"
+)
+
+
 @pytest.mark.usefixtures("_no_pictures")
 def test_every_option_of_a_loop_reaches_it() -> None:
     ran(
-        *("track", "dahl.json", "--reference", "sine:0.5Hz,10..60um,6s", "--out", "a/b"),
-        *("--dt", "0.01", "--limits", "-5:60", "--online", "--kp", "0.05", "--ti", "0.02"),
-        *("--td", "0.01", "--tt", "inf", "--repetitive", "--kq", "0.5", "--tq", "0.1"),
-        *("--delay", "0.001", "--seed", "7"),
+        "track", "dahl.json", "--reference", "sine:0.5Hz,10..60um,6s", "--out", "a/b", *LOOP.split()
     )
     expected = pt.track(
         pt.VirtualStage.xu_li_2010(seed=7),
@@ -75,7 +78,7 @@ def test_every_option_of_a_loop_reaches_it() -> None:
             limits=(-5.0, 60.0),
             feedforward=fitted().inverse(playback="online"),
             feedback=pt.Pid.from_um(kp=0.05, ti=0.02, td=0.01, tt=float("inf")),
-            addon=pt.Repetitive(period=2.0, kq=0.5, tq=0.1),
+            repetitive=pt.Repetitive.from_um(period=2.0, kq=0.5, tq=0.1),
         ),
         sine(0.5, 6.0, 10e-6, 60e-6),
         delay=0.001,

@@ -162,16 +162,16 @@ def test_dt_takes_the_place_of_the_time_column(tmp_path: Path) -> None:
 
 def test_read_drive_needs_no_displacement(tmp_path: Path) -> None:
     text = "\n".join(line.rpartition(",")[0] for line in TEXT.splitlines())
-    t, u = pt.read_drive(write(tmp_path, text))
+    t, u = pt.data.read_drive(write(tmp_path, text))
     assert t.tolist() == T
     assert u.tolist() == U
-    t, u = pt.read_drive(write(tmp_path, TEXT.replace("11.5", "lost")), dt=0.5)
+    t, u = pt.data.read_drive(write(tmp_path, TEXT.replace("11.5", "lost")), dt=0.5)
     assert t.tolist() == [0.0, 0.5, 1.0, 1.5]
     assert u.tolist() == U
     with pytest.raises(pt.DataError, match=r"stage\.csv:3: '-' in column 'voltage_V'"):
-        pt.read_drive(write(tmp_path, TEXT.replace("2.5,", "-,")))
+        pt.data.read_drive(write(tmp_path, TEXT.replace("2.5,", "-,")))
     with pytest.raises(pt.DataError, match=r"stage\.csv:4: column 'time_s': t goes from 0\.1 s"):
-        pt.read_drive(write(tmp_path, TEXT.replace("0.2,", "0.05,")))
+        pt.data.read_drive(write(tmp_path, TEXT.replace("0.2,", "0.05,")))
 
 
 def test_numbers_round_once(tmp_path: Path) -> None:

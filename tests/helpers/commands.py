@@ -59,7 +59,7 @@ def refusal(*arguments: str) -> str:
 
 
 def write_model() -> None:
-    pt.IdentifiedModel(
+    pt.identification.IdentifiedModel(
         model=pt.DahlStage.xu_li_2010(),
         offset=1e-6,
         offset_fitted=True,

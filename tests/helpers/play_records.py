@@ -35,7 +35,9 @@ def record(stage: pt.PrandtlIshlinskiiStage, dt: float = 1e-3, **keywords: Any) 
     return pt.Dataset(u=u, y=stage.simulate(u, dt).x - 4e-6, dt=dt)
 
 
-def fit_plays(data: pt.Dataset, *, offset: bool = True, **settings: Any) -> pt.Identification:
+def fit_plays(
+    data: pt.Dataset, *, offset: bool = True, **settings: Any
+) -> pt.identification.Identification:
     """Identify a Prandtl-Ishlinskii stage with these settings of the least squares."""
     least_squares = pt.identification.LeastSquares(**settings)
     return pt.identify(data, "prandtl-ishlinskii", offset=offset, least_squares=least_squares)

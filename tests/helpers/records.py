@@ -95,7 +95,7 @@ def quick(seed: int = 0) -> pt.Dataset:
     return pt.Dataset(u=u, y=x + noise, dt=1 / 250.0, source="quick.csv")
 
 
-def quick_fit(**arguments: Any) -> pt.Identification:
+def quick_fit(**arguments: Any) -> pt.identification.Identification:
     """Search the paper's box on the quick record with a small swarm."""
     wanted: dict[str, Any] = {
         "fixed": HELD,
@@ -104,11 +104,11 @@ def quick_fit(**arguments: Any) -> pt.Identification:
         "seed": 1,
     }
     wanted.update(arguments)
-    fit: pt.Identification = pt.identify(wanted.pop("data", quick()), **wanted)
+    fit: pt.identification.Identification = pt.identify(wanted.pop("data", quick()), **wanted)
     return fit
 
 
-def bits(fit: pt.Identification) -> dict[str, Any]:
+def bits(fit: pt.identification.Identification) -> dict[str, Any]:
     """All numbers of a result, down to the last bit."""
     return {
         "model": [value.hex() for value in asdict(fit.model).values()],

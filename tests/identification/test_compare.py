@@ -40,11 +40,11 @@ def log(seed: int = 1, shift: float = 3e-6) -> pt.Dataset:
 
 
 @cache
-def found() -> pt.Comparison:
+def found() -> pt.identification.Comparison:
     return pt.compare(log(), PAIR, train=(1.0, 5.0), seed=1, runs=1)
 
 
-def row(name: str, of: pt.Comparison | None = None) -> pt.ModelScore:
+def row(name: str, of: pt.identification.Comparison | None = None) -> pt.identification.ModelScore:
     return {one.name: one for one in (of or found()).rows}[name]
 
 
@@ -101,7 +101,7 @@ def test_the_criteria_are_burnham_and_andersons() -> None:
         assert one.autocorrelation == pytest.approx(lagged, rel=1e-9)
 
 
-def windows(comparison: pt.Comparison) -> list[tuple[float, float, int]]:
+def windows(comparison: pt.identification.Comparison) -> list[tuple[float, float, int]]:
     parts = (comparison.train, comparison.test)
     return [(round(float(p.t[0]), 6), round(float(p.t[-1]), 6), p.warmup) for p in parts]
 
@@ -211,7 +211,9 @@ def test_the_table_marks_the_best() -> None:
 def test_an_exact_fit_can_be_told_and_drawn() -> None:
     u = 37.5 - 37.5 * np.cos(np.arange(800) / 50.0)
     exact = pt.Dataset(u=u, y=PLAYS.simulate(u, 0.005).x, dt=0.005)
-    model = pt.IdentifiedModel(model=PLAYS, offset=0.0, offset_fitted=False, stroke=exact.stroke)
+    model = pt.identification.IdentifiedModel(
+        model=PLAYS, offset=0.0, offset_fitted=False, stroke=exact.stroke
+    )
     comparison = pt.compare(exact, [model])
     assert comparison.best.test.rms == 0.0
     assert "Prandtl-Ishlinskii" in comparison.summary()

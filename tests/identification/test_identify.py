@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 NAMES = ("mass", "damping", "stiffness", "piezo_coefficient", "a1", "a2", "b1", "b0", "up")
 
 
-def off(fit: pt.Identification) -> dict[str, float]:
+def off(fit: pt.identification.Identification) -> dict[str, float]:
     """How far the ratios that a record fixes are from the true ones, as fractions."""
     found = fit.model
     return {
@@ -203,7 +203,7 @@ def test_the_drive_before_the_window_is_remembered() -> None:
     assert run.x[rest] < -20e-6
     log = pt.Dataset(u=u, y=run.x + np.random.default_rng(7).normal(0.0, 5e-8, t.size), dt=1 / rate)
 
-    def wrong(data: pt.Dataset) -> tuple[pt.Identification, float]:
+    def wrong(data: pt.Dataset) -> tuple[pt.identification.Identification, float]:
         fit = pt.identify(data, stiffness=1e5, fixed={"mass": 0.25}, seed=1)
         names = ("damping", "piezo_coefficient", "a1", "a2", "b1")
         return fit, max(abs(getattr(fit.model, n) / getattr(stage, n) - 1.0) for n in names)

@@ -32,7 +32,7 @@ def tracking() -> pt.Dataset:
 
 
 @cache
-def fit(seed: int) -> pt.Identification:
+def fit(seed: int) -> pt.identification.Identification:
     return pt.identify(training(), seed=seed)
 
 

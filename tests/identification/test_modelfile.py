@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 NAMES = ("mass", "damping", "stiffness", "piezo_coefficient", "a1", "a2", "b1", "b0", "up")
 
 
-def published(**changes: Any) -> pt.IdentifiedModel:
+def published(**changes: Any) -> pt.identification.IdentifiedModel:
     content: dict[str, Any] = {
         "model": pt.DahlStage.xu_li_2010(),
         "offset": 1e-6,
@@ -33,14 +33,14 @@ def published(**changes: Any) -> pt.IdentifiedModel:
         "scale_assumed": False,
         "stroke": 119e-6,
     }
-    return pt.IdentifiedModel(**(content | changes))
+    return pt.identification.IdentifiedModel(**(content | changes))
 
 
 FILES = ROOT / "tests" / "files"
 
 
 @cache
-def fitted() -> pt.Identification:
+def fitted() -> pt.identification.Identification:
     return quick_fit(data=quick()[1.0:3.0])
 
 
@@ -55,7 +55,7 @@ def content_of(path: Path) -> dict[str, Any]:
     return content
 
 
-def in_bits(model: pt.IdentifiedModel) -> list[str]:
+def in_bits(model: pt.identification.IdentifiedModel) -> list[str]:
     stage = asdict(model.model)
     return [stage[name].hex() for name in NAMES] + [model.offset.hex(), model.stroke.hex()]
 
@@ -66,7 +66,7 @@ SMALLEST, LARGEST = 5e-324, 1.7976931348623157e308
 ODD = [SMALLEST, 2.2250738585072014e-308, LARGEST, 0.1, 1 / 3, 1e22, 9007199254740993.0, 5e-7]
 
 
-def any_model(draw: np.random.Generator) -> pt.IdentifiedModel:
+def any_model(draw: np.random.Generator) -> pt.identification.IdentifiedModel:
     """Numbers of any size, from their bits, and some that printing gets wrong easily."""
     numbers = draw.integers(0, 2**63, 40, dtype=np.uint64).view(np.float64)
     sizes = [*numbers[np.isfinite(numbers) & (numbers > 0.0)].tolist(), *draw.choice(ODD, 10)]
@@ -99,7 +99,7 @@ def test_there_and_back_bit_for_bit(tmp_path: Path, seed: int) -> None:
     back = pt.load(path)
     assert in_bits(back) == in_bits(model)
     assert back.offset_fitted == model.offset_fitted
-    assert isinstance(back, pt.IdentifiedModel)
+    assert isinstance(back, pt.identification.IdentifiedModel)
     assert back.scale_assumed == model.scale_assumed
 
 
@@ -112,7 +112,7 @@ def test_zeros_keep_their_sign(tmp_path: Path) -> None:
 def test_a_loaded_model_scores_the_same(tmp_path: Path) -> None:
     fit = fitted()
     back = pt.load(str(fit.save(str(tmp_path / "dahl.json"))))
-    assert type(back) is pt.IdentifiedModel
+    assert type(back) is pt.identification.IdentifiedModel
     assert back.model == fit.model
     for log in (fit.data, quick(5), quick()[2.0:]):
         assert back.score(log) == fit.score(log)
@@ -206,7 +206,9 @@ def test_the_file_says_where_the_numbers_come_from(tmp_path: Path) -> None:
     assert provenance["package"] == "piezotrack"
     assert provenance["version"] == pt.__version__ == version("piezotrack")
     assert provenance["seed"] == 1
-    assert provenance["swarm"] == asdict(fitted().swarm)
+    swarm = fitted().swarm
+    assert swarm is not None
+    assert provenance["swarm"] == asdict(swarm)
     data = provenance["data"]
     # The hash as the documentation has it: dt, the drive and displacement kept, the warm-up.
     kept = quick()[:3.0]

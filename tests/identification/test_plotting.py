@@ -32,16 +32,16 @@ if TYPE_CHECKING:
 
 
 @cache
-def fitted() -> pt.Identification:
+def fitted() -> pt.identification.Identification:
     return quick_fit()
 
 
 @cache
-def response() -> pt.Response:
+def response() -> pt.stages.Response:
     return fitted().simulate(quick())
 
 
-def scaled(factor: float) -> tuple[pt.Dataset, pt.Response]:
+def scaled(factor: float) -> tuple[pt.Dataset, pt.stages.Response]:
     """The same record with another stroke."""
     log, run = quick(), response()
     return pt.Dataset(u=log.u, y=factor * log.y, dt=log.dt), replace(run, x=factor * run.x)

@@ -75,7 +75,7 @@ def step_log(
 
 def test_the_published_readings_give_the_published_values() -> None:
     path = SHARED / "published.json"
-    step = pt.identify_step(pt.StepReadings.from_um(**TYPED))
+    step = pt.identify_step(pt.identification.StepReadings.from_um(**TYPED))
     for name, value in PUBLISHED.items():
         assert step.hysteresis[name] == pytest.approx(value, rel=1e-4, abs=1e-4), name
     assert step.hysteresis["a1"] == pytest.approx(121.9874, abs=1e-4)
@@ -95,9 +95,11 @@ def test_the_published_readings_give_the_published_values() -> None:
 
 
 def test_the_published_readings_are_at_hand() -> None:
-    assert pt.StepReadings.xu_li_2010() == pt.StepReadings.from_um(**TYPED)
+    assert pt.identification.StepReadings.xu_li_2010() == pt.identification.StepReadings.from_um(
+        **TYPED
+    )
     # Of the published peaks: zeta by the decrement 0.056, the first overshoot 63 %.
-    step = pt.identify_step(pt.StepReadings.xu_li_2010())
+    step = pt.identify_step(pt.identification.StepReadings.xu_li_2010())
     assert step.damping_by_decrement == pytest.approx(0.056, abs=5e-4)
     assert step.overshoot_ratio == pytest.approx(0.635, abs=5e-4)
 
@@ -106,7 +108,7 @@ def test_the_published_readings_are_at_hand() -> None:
 
 
 def test_one_step_tells_ratios_only() -> None:
-    step = pt.identify_step(pt.StepReadings.xu_li_2010())
+    step = pt.identify_step(pt.identification.StepReadings.xu_li_2010())
     assert step.ratios["T/K"] == pytest.approx(117.7622e-6 / 75.0)
     # At M = 0.1828 kg, D is about 24 N s/m and K about 1.85e5 N/m.
     assert 0.1828 * step.ratios["K/M"] == pytest.approx(1.85e5, rel=2e-3)
@@ -116,20 +118,24 @@ def test_one_step_tells_ratios_only() -> None:
 
 
 def test_a_known_mass_or_stiffness_fixes_the_rest() -> None:
-    by_mass = pt.identify_step(pt.StepReadings.xu_li_2010(), mass=0.1828)
+    by_mass = pt.identify_step(pt.identification.StepReadings.xu_li_2010(), mass=0.1828)
     assert by_mass.mass == pytest.approx(0.1828)
     assert by_mass.stiffness is not None
     assert by_mass.stiffness == pytest.approx(0.1828 * by_mass.ratios["K/M"])
     assert by_mass.damping == pytest.approx(0.1828 * by_mass.ratios["D/M"])
-    again = pt.identify_step(pt.StepReadings.xu_li_2010(), stiffness=by_mass.stiffness)
+    again = pt.identify_step(
+        pt.identification.StepReadings.xu_li_2010(), stiffness=by_mass.stiffness
+    )
     assert again.model == by_mass.model
     # With Table 1's K the static level needs about Table 1's T, 0.0468 N/V.
-    table = pt.identify_step(pt.StepReadings.xu_li_2010(), stiffness=TABLE_1.stiffness)
+    table = pt.identify_step(
+        pt.identification.StepReadings.xu_li_2010(), stiffness=TABLE_1.stiffness
+    )
     assert table.piezo_coefficient == pytest.approx(TABLE_1.piezo_coefficient, rel=0.02)
 
 
 def test_a_stage_made_of_a_step_stands_where_the_step_ended() -> None:
-    model = pt.identify_step(pt.StepReadings.xu_li_2010(), stiffness=3e5).model
+    model = pt.identify_step(pt.identification.StepReadings.xu_li_2010(), stiffness=3e5).model
     assert model is not None
     # Slowly, so that the displacement goes straight from rest to the level.
     u = np.minimum(np.arange(6000) / 4000.0, 1.0) * 75.0
@@ -138,7 +144,7 @@ def test_a_stage_made_of_a_step_stands_where_the_step_ended() -> None:
 
 @pytest.mark.parametrize("stiffness", [1e4, 26065.0, 5e4])
 def test_a_second_level_tells_stiffness_and_piezo_coefficient(stiffness: float) -> None:
-    known = pt.identify_step(pt.StepReadings.xu_li_2010(), stiffness=stiffness)
+    known = pt.identify_step(pt.identification.StepReadings.xu_li_2010(), stiffness=stiffness)
     assert known.model is not None
     # Creeping up to 40 V, the model says where another step would end.
     u = np.minimum(np.arange(9000) / 6000.0, 1.0) * 40.0
@@ -160,7 +166,7 @@ def test_a_second_level_may_be_a_step_of_its_own() -> None:
 def test_levels_that_are_proportional_tell_no_stiffness() -> None:
     for level in [(37.5, STEADY / 2), (37.5, 55e-6), (75.0, STEADY)]:
         with pytest.raises(pt.DataError, match="cannot tell the stiffness"):
-            pt.identify_step(pt.StepReadings.xu_li_2010(), second_level=level)
+            pt.identify_step(pt.identification.StepReadings.xu_li_2010(), second_level=level)
 
 
 # Steps in a record.
@@ -278,7 +284,7 @@ def test_notes(log: pt.Dataset, note: str) -> None:
 
 
 def test_advice_on_sampling() -> None:
-    step = pt.identify_step(pt.StepReadings.xu_li_2010())
+    step = pt.identify_step(pt.identification.StepReadings.xu_li_2010())
     assert step.lowest_sampling_rate == pytest.approx(1600.0)
     for piece in ("1600 Hz", "10 x the natural frequency", "20 x its bandwidth"):
         assert piece in step.advice
@@ -355,7 +361,7 @@ def test_refuses_a_record_in_words(log: pt.Dataset, message: str) -> None:
 )
 def test_refuses_readings_in_words(change: dict[str, Any], pieces: tuple[str, ...]) -> None:
     with pytest.raises(pt.ParameterError) as caught:
-        pt.StepReadings.from_um(**{**TYPED, **change})
+        pt.identification.StepReadings.from_um(**{**TYPED, **change})
     for piece in pieces:
         assert piece in str(caught.value)
 
@@ -386,7 +392,7 @@ SMALL = pt.ParticleSwarm(particles=6, iterations=5, polish=False)
 
 
 def test_a_step_carries_its_hysteresis_into_a_search() -> None:
-    step = pt.identify_step(pt.StepReadings.xu_li_2010())
+    step = pt.identify_step(pt.identification.StepReadings.xu_li_2010())
     fit = pt.identify(quick(), initial=step, bounds=BOX, swarm=SMALL, seed=1)
     for name, value in step.hysteresis.items():
         assert getattr(fit.model, name) == value
@@ -398,7 +404,7 @@ def test_a_step_carries_its_hysteresis_into_a_search() -> None:
 
 
 def test_what_is_said_of_a_parameter_goes_before_the_step() -> None:
-    step = pt.identify_step(pt.StepReadings.xu_li_2010())
+    step = pt.identify_step(pt.identification.StepReadings.xu_li_2010())
     fit = pt.identify(
         quick(),
         initial=step,
@@ -422,7 +428,7 @@ def test_initial_is_a_step() -> None:
 
 def test_the_papers_way_from_a_step_to_a_fit() -> None:
     # The step's parameters, then four searched in the paper's box.
-    step = pt.identify_step(pt.StepReadings.xu_li_2010())
+    step = pt.identify_step(pt.identification.StepReadings.xu_li_2010())
     fit = pt.identify(quick(), initial=step, bounds=BOX, seed=1)
     assert fit.cost_percent < 0.1
     assert fit.model.stiffness == pytest.approx(TABLE_1.stiffness, rel=0.01)
@@ -432,7 +438,7 @@ def test_the_papers_way_from_a_step_to_a_fit() -> None:
 
 
 def test_the_summary_says_what_is_known() -> None:
-    text = pt.identify_step(pt.StepReadings.xu_li_2010()).summary()
+    text = pt.identify_step(pt.identification.StepReadings.xu_li_2010()).summary()
     for piece in ("readings typed in", "117.7622", "192.5302, 170.2524", "um/V", "121.9874"):
         assert piece in text
     assert "not fixed by one step" in text
@@ -456,7 +462,7 @@ def test_the_picture_has_peaks_and_units() -> None:
     assert list(np.asarray(marks.get_ydata())) == [1e6 * peak for peak in step.readings.peaks]
     plt.close(figure)
     with pytest.raises(pt.ParameterError, match="typed in"):
-        pt.identify_step(pt.StepReadings.xu_li_2010()).plot()
+        pt.identify_step(pt.identification.StepReadings.xu_li_2010()).plot()
 
 
 # The command.

@@ -22,7 +22,7 @@ NAMES = ("mass", "damping", "stiffness", "piezo_coefficient", "a1", "a2", "b1", 
 
 
 def test_the_callback_is_told_of_every_iteration_in_order() -> None:
-    seen: list[pt.Progress] = []
+    seen: list[pt.identification.Progress] = []
     swarm = pt.ParticleSwarm(particles=12, iterations=30)
     fit = quick_fit(callback=seen.append, swarm=swarm, runs=1)
     assert [progress.nit for progress in seen] == list(range(31))
@@ -31,7 +31,7 @@ def test_the_callback_is_told_of_every_iteration_in_order() -> None:
     assert [progress.cost for progress in seen] == fit.history.tolist()
     last = seen[-1].parameters
     assert tuple(last) == NAMES
-    score = pt.IdentifiedModel(
+    score = pt.identification.IdentifiedModel(
         model=pt.DahlStage(**last),
         offset=0.0,
         offset_fitted=True,
@@ -44,9 +44,9 @@ def test_the_callback_is_told_of_every_iteration_in_order() -> None:
 
 
 def test_a_true_answer_stops_with_the_best_so_far() -> None:
-    seen: list[pt.Progress] = []
+    seen: list[pt.identification.Progress] = []
 
-    def enough(progress: pt.Progress) -> bool:
+    def enough(progress: pt.identification.Progress) -> bool:
         seen.append(progress)
         return progress.nit == 7
 
@@ -54,7 +54,7 @@ def test_a_true_answer_stops_with_the_best_so_far() -> None:
         quick_fit(callback=enough)
     assert type(caught.value) is pt.Interrupted
     partial = caught.value.partial
-    assert isinstance(partial, pt.Identification)
+    assert isinstance(partial, pt.identification.Identification)
     assert len(seen) == 8
     assert partial.cost == seen[-1].cost
     assert partial.model == pt.DahlStage(**seen[-1].parameters)
@@ -68,7 +68,7 @@ def test_a_true_answer_stops_with_the_best_so_far() -> None:
 
 @pytest.mark.parametrize("error", [StopIteration, KeyboardInterrupt])
 def test_stop_iteration_and_ctrl_c_in_a_callback_stop(error: type[BaseException]) -> None:
-    def stop(progress: pt.Progress) -> None:
+    def stop(progress: pt.identification.Progress) -> None:
         if progress.nit == 3:
             raise error
 
@@ -79,7 +79,7 @@ def test_stop_iteration_and_ctrl_c_in_a_callback_stop(error: type[BaseException]
 
 @pytest.mark.parametrize("error", [LookupError("mine"), SystemExit(3), pt.DataError("also mine")])
 def test_an_exception_in_a_callback_comes_out_as_it_is(error: BaseException) -> None:
-    def fail(progress: pt.Progress) -> None:
+    def fail(progress: pt.identification.Progress) -> None:
         if progress.nit == 2:
             raise error
 
@@ -96,7 +96,7 @@ def test_an_answer_without_truth_is_an_error() -> None:
 def test_a_callback_may_itself_identify() -> None:
     inner: list[float] = []
 
-    def nested(progress: pt.Progress) -> None:
+    def nested(progress: pt.identification.Progress) -> None:
         if progress.nit == 1:
             inner.append(quick_fit(seed=5).cost)
 

@@ -40,7 +40,7 @@ Y = 10.0 + 5.0 * np.sin(3.0 * T)
 
 def test_reads_a_file(tmp_path: Path) -> None:
     path = write(tmp_path, {"time_ms": np.round(1e3 * T + 700.0), "displacement_um": Y})
-    reference = pt.read_reference(path)
+    reference = pt.references.read_reference(path)
     samples = reference.sample(0.05)
     np.testing.assert_allclose(samples.x, Y * UM, rtol=1e-12)
     np.testing.assert_allclose(samples.v[5:-5], 15e-6 * np.cos(3.0 * T[5:-5]), atol=1e-10)
@@ -50,8 +50,10 @@ def test_reads_a_file(tmp_path: Path) -> None:
 def test_a_column_called_reference_goes_first(tmp_path: Path) -> None:
     columns = {"time_s": T, "voltage_V": T, "displacement_um": 0.0 * T, "Reference (um)": Y}
     path = write(tmp_path, columns)
-    np.testing.assert_allclose(pt.read_reference(path).sample(0.05).x, Y * UM, rtol=1e-12)
-    named = pt.read_reference(path, displacement="displacement", dt=0.1)
+    np.testing.assert_allclose(
+        pt.references.read_reference(path).sample(0.05).x, Y * UM, rtol=1e-12
+    )
+    named = pt.references.read_reference(path, displacement="displacement", dt=0.1)
     assert named.duration == pytest.approx(4.1)
     assert not named.sample(0.1).x.any()
 
@@ -59,7 +61,7 @@ def test_a_column_called_reference_goes_first(tmp_path: Path) -> None:
 def test_a_file_repeats_if_it_is_told_to(tmp_path: Path) -> None:
     turn = 2.0 * np.pi * np.arange(40) / 40
     path = write(tmp_path, {"time_s": 0.05 * np.arange(40.0), "x_um": 10.0 * np.cos(turn)})
-    reference = pt.read_reference(path, period=2.0, duration=10.0, ramp=1.0)
+    reference = pt.references.read_reference(path, period=2.0, duration=10.0, ramp=1.0)
     assert (reference.period, reference.duration, reference.ramp) == (2.0, 10.0, 1.0)
     assert reference.at(8.0)[0] == pytest.approx(10e-6)
 
@@ -85,7 +87,7 @@ def test_a_file_that_cannot_be_used_is_named(
     path = tmp_path / "target.csv"
     path.write_text(text)
     with pytest.raises((pt.DataError, pt.ParameterError), match=message):
-        pt.read_reference(path, **more)
+        pt.references.read_reference(path, **more)
 
 
 # References as text.

@@ -196,7 +196,7 @@ def test_a_run_can_be_carried_on(hold: Literal["foh", "zoh"]) -> None:
 def test_refusals_name_the_parameter(name: str, value: object) -> None:
     values = asdict(CORRECTED)
     with pytest.raises(pt.ParameterError, match=name):
-        pt.BoucWenStage(**(values | {name: value}))  # type: ignore[arg-type]
+        pt.BoucWenStage(**(values | {name: value}))
 
 
 @pytest.mark.parametrize("exponent", [1.0, 2.0])
@@ -269,7 +269,7 @@ def log(noise: float = 0.0, exponent: float = 1.0) -> pt.Dataset:
     return pt.Dataset(u=u, y=y, dt=dt, source="made-up")
 
 
-def identified(noise: float = 0.05e-6) -> pt.Identification:
+def identified(noise: float = 0.05e-6) -> pt.identification.Identification:
     swarm = pt.ParticleSwarm(particles=40, iterations=150)
     return pt.identify(log(noise), model="bouc-wen", stiffness=19567.0, seed=2, runs=2, swarm=swarm)
 

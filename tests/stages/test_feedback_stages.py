@@ -283,8 +283,8 @@ def test_a_run_can_be_carried_on(stage: pt.FirstOrderDahlStage | pt.BoucWenOscil
     first = stage.simulate(u[:201], dt, accuracy=1e-13)
     second = stage.simulate(u[200:], dt, initial=first.final, accuracy=1e-13)
     np.testing.assert_allclose(second.x, whole.x[200:], rtol=0, atol=1e-12)
-    with pytest.raises(pt.ParameterError, match=r"initial is .*expected a pt\.ForceState"):
-        stage.simulate(u, dt, initial=pt.DahlState())
+    with pytest.raises(pt.ParameterError, match=r"initial is .*expected a pt\.stages\.ForceState"):
+        stage.simulate(u, dt, initial=pt.stages.DahlState())
 
 
 @pytest.mark.parametrize(

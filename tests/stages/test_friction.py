@@ -93,7 +93,7 @@ def test_without_b1_the_operator_is_remembered() -> None:
 @pytest.mark.parametrize(("volts", "unique"), [(0.0, False), (10.0, False), (30.0, True)])
 def test_rest_that_is_not_unique_is_flagged(volts: float, unique: bool) -> None:
     stage = stage_of(replace(TABLE_1, b0=100.0))
-    start = pt.DahlState(q2=-0.01)
+    start = pt.stages.DahlState(q2=-0.01)
     run = stage.simulate(np.full(50, volts), 1e-3, initial=start)
     assert run.unique is unique
     assert np.all(np.isfinite(run.x))

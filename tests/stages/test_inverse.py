@@ -261,7 +261,7 @@ def test_sessions_of_an_inverse_know_nothing_of_each_other() -> None:
 
 @pytest.mark.parametrize("delay", [0.0, 3e-3])
 def test_offset_and_delay_of_what_measured_it(delay: float) -> None:
-    known = pt.IdentifiedModel(
+    known = pt.identification.IdentifiedModel(
         model=TABLE_1,
         offset=-2.5e-6,
         offset_fitted=True,

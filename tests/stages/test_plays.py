@@ -198,7 +198,7 @@ def test_the_inverse_can_begin_on_a_settled_loop() -> None:
 
 
 @cache
-def fitted() -> pt.Identification:
+def fitted() -> pt.identification.Identification:
     stage = replace(CREEPING, time_constant=4e-3)
     return fit_plays(record(stage), creep=(0.1, 1.0))
 

@@ -1,4 +1,4 @@
-"""Numbers that come in as arguments: what they have to be, and the words when they are not."""
+"""Checks of numeric arguments, with error messages that name argument, value and unit."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = [
     "positive",
 ]
 
-# A displacement [m] that only a mistaken unit explains.
+# A displacement [m] that only a wrong unit explains.
 TOO_FAR = 1.0
 
 
@@ -117,7 +117,7 @@ def plain(number: float) -> str:
 
 
 def bounds(low: object, high: object) -> tuple[float, float]:
-    """Return the lowest and the highest displacement [m] of a motion that moves, checked.
+    """Return the lowest and the highest displacement [m] of a motion, checked.
 
     Examples
     --------

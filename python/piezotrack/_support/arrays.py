@@ -1,4 +1,4 @@
-"""What an array of samples and its times must be."""
+"""Checks of arrays of samples and of their times."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["check_dt", "real", "signal_of", "time_axis", "time_fault"]
 
-# How far, in sampling intervals, a time may be off before the record counts as uneven.
+# Largest departure of a time from the even grid, in sampling intervals.
 UNEVEN = 0.05
 USE_DT = (
     "an evenly sampled record whose times are coarse or jittery can be given with dt=, "
@@ -34,9 +34,9 @@ def check_dt(dt: float) -> float:
 
 
 def time_fault(t: Array) -> tuple[int, str] | None:
-    """Return the first sample at which times [s] are not increasing or even, and a sentence.
+    """Return the first sample at which times [s] are not increasing or even, with a message.
 
-    Return None where all is well.
+    Return None if there is none.
     """
     with np.errstate(all="ignore"):
         steps = np.diff(t)
@@ -71,7 +71,7 @@ def _first(mask: NDArray[np.bool_]) -> int | None:
 
 
 def real(value: object) -> float:
-    """Return a real number as a float, and NaN for anything else (a truth value, a text)."""
+    """Return a real number as a float, and NaN for anything else (a bool, a str)."""
     if isinstance(value, bool) or not isinstance(value, Real):
         return math.nan
     try:
@@ -99,7 +99,7 @@ def signal_of(
 ) -> Array:
     """Return a read-only float64 copy of one-dimensional `values`, as long as `like`."""
     if isinstance(values, np.ma.MaskedArray) and values.dtype.kind in "biuf":
-        # A masked sample is a missing one; asarray would bring its number back.
+        # A masked sample is missing; asarray would restore its value.
         values = np.ma.filled(values.astype(np.float64), np.nan)
     try:
         array = np.asarray(values)

@@ -1,4 +1,4 @@
-"""Writing files whole or not at all: CSV, JSON, pictures, and the folder for them."""
+"""Atomic writing of files (CSV, JSON, pictures), and their folder."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = ["make_folder", "replacing", "save_figures", "write_columns", "write_d
 
 @contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Write to a temporary file beside `path`, which is renamed when all went well.
+    """Write to a temporary file beside `path`, which is renamed on success.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         temporary = Path(name)
         try:
             yield temporary
-            # mkstemp makes files that only their owner can read.
+            # mkstemp makes files readable by their owner only.
             mask = os.umask(0)
             os.umask(mask)
             temporary.chmod(0o666 & ~mask)
@@ -133,7 +133,7 @@ def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
     figures : mapping of str to matplotlib.figure.Figure
         By the name of the file, without its ending.
     folder : pathlib.Path
-        Where to.
+        Folder of the files.
 
     Returns
     -------
@@ -160,7 +160,7 @@ def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
 
 
 def _finite(value: Any) -> Any:
-    """Replace what JSON cannot say, NaN and infinity, by null."""
+    """Replace NaN and infinity, which JSON does not have, by null."""
     if isinstance(value, Mapping):
         return {key: _finite(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):

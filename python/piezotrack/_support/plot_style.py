@@ -1,4 +1,4 @@
-"""What pictures share: axes, line styles, legends, and the samples of a long signal to draw."""
+"""Common style of pictures: axes, lines, legends, and thinning of long signals."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ if TYPE_CHECKING:
 
 __all__ = ["ACTUAL", "DESIRED", "MEASURED", "above", "axes_or_new", "plain_log_ticks", "thinned"]
 
-# Told apart in black and white as well, also where many cycles lie on each other.
+# Distinct in black and white too, also where many cycles overlap.
 MEASURED: dict[str, Any] = {"color": "0.68", "linewidth": 3.2, "label": "measured"}
 DESIRED: dict[str, Any] = {"color": "0.35", "linewidth": 1.6, "label": "desired"}
 ACTUAL: dict[str, Any] = {"color": "C0", "linewidth": 1.1, "label": "actual"}
-# More points than a picture has columns of pixels, yet few enough for a light SVG.
+# More points than columns of pixels, yet few enough for a small SVG.
 MOST_POINTS = 6000
 
 
 def axes_or_new(given: Axes | Sequence[Axes] | None, count: int) -> list[Axes]:
-    """Take the axes given, or make a figure with some."""
+    """Return the axes given, or make a figure with new ones."""
     if given is None:
         import matplotlib.pyplot as plt
 
@@ -38,9 +38,9 @@ def axes_or_new(given: Axes | Sequence[Axes] | None, count: int) -> list[Axes]:
 
 
 def thinned(values: Array) -> NDArray[np.intp]:
-    """Choose the samples to draw: of a long signal, the extremes of each stretch.
+    """Choose the samples to draw: of a long signal, the extrema of each part.
 
-    A glitch of one sample is just what one looks for.
+    So a glitch of one sample stays visible.
     """
     stretch = max(1, values.size // (MOST_POINTS // 2))
     if stretch < 3:
@@ -69,7 +69,7 @@ def plain_log_ticks(ax: Axes) -> None:
 
 
 def above(ax: Axes) -> None:
-    """Put the legend above the axes, where it hides nothing."""
+    """Put the legend above the axes, where it covers no data."""
     ax.legend(
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, frameon=False, borderaxespad=0.2
     )

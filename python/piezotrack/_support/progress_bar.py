@@ -16,7 +16,7 @@ class ProgressBar:
     Parameters
     ----------
     show : bool or None
-        None: only where a person looks on, in a terminal or notebook.
+        None: in a terminal or notebook only.
     """
 
     def __init__(self, show: bool | None) -> None:
@@ -41,7 +41,7 @@ class ProgressBar:
 
     @property
     def update(self) -> Updater | None:
-        """What the core calls now and then; None where nothing is shown."""
+        """Callback for the core; None where nothing is shown."""
         return None if self._bar is None else self._update
 
     def _update(self, nit: int, most: int, nfev: int, cost: float, theta: list[float]) -> None:

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["FIGURES", "ErrorStatistics", "Spread"]
+__all__ = ["FIGURES", "ErrorStatistics"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ErrorStatistics:
-    """How a signed error is spread.
+    """Statistics of a signed error.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class ErrorStatistics:
 
     @classmethod
     def of(cls, figures: Sequence[float]) -> ErrorStatistics:
-        """Name the core's figures.
+        """Make the statistics from the tuple of the core.
 
         Parameters
         ----------
@@ -43,13 +43,9 @@ class ErrorStatistics:
         Returns
         -------
         ErrorStatistics
-            The same with names.
+            With named fields.
         """
         return cls(**dict(zip(FIGURES, figures, strict=True)))
 
 
 FIGURES = tuple(field.name for field in fields(ErrorStatistics))
-
-
-# Its public name up to now.
-Spread = ErrorStatistics

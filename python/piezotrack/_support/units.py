@@ -1,7 +1,7 @@
-"""The units that logs are written in and plots are drawn in.
+"""Units of logs and plots.
 
 Everything inside piezotrack is in seconds, volts and metres. The table here is the one place
-where other units are turned into these.
+where other units are converted.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit and the way from it to SI: ``value * factor / divisor``.
+    """A unit and its conversion to SI: ``value * factor / divisor``.
 
     One of `factor` and `divisor` is 1 and the other a number that float64 holds exactly, so a
     conversion rounds once. (1e-6 is not exact: multiplying by it rounds twice.)
@@ -43,7 +43,7 @@ class Unit:
     si : str
         The SI unit of the quantity: ``"s"``, ``"V"`` or ``"m"``.
     factor, divisor : float
-        What to multiply with and to divide by.
+        Multiplier and divisor.
     """
 
     name: str
@@ -87,7 +87,7 @@ _BY_NAME = {unit.name: unit for unit in _TABLE} | {
 }
 _BY_LOWER = {name.lower(): unit for name, unit in _BY_NAME.items()}
 
-# The micro sign and the Greek letter look the same and are different characters.
+# The micro sign and the Greek letter mu are different characters.
 _MICRO = str.maketrans({"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u"})
 
 
@@ -122,7 +122,7 @@ def require(text: str, quantity: str | None = None) -> Unit:
     text : str
         The unit, e.g. ``"um"``.
     quantity : {"time", "voltage", "displacement"}, optional
-        What the unit has to measure; any quantity where left out.
+        Quantity of the unit; any by default.
 
     Raises
     ------
@@ -202,7 +202,7 @@ def best_length_unit(stroke_m: float) -> tuple[str, float]:
         ``"nm"`` below 1 um, ``"mm"`` from 1 mm on, ``"um"`` between them and where `stroke_m`
         is zero or not finite.
     scale : float
-        What to multiply metres with to get this unit.
+        Factor from metres to this unit.
 
     Examples
     --------

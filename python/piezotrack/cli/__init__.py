@@ -22,7 +22,7 @@ from .track import feedforward_command, track_command
 __all__ = ["app", "main"]
 
 app = typer.Typer(
-    help="From a log of a piezo nanopositioner to a hysteresis model and a tracked reference.",
+    help="Hysteresis identification and tracking control of piezo nanopositioners.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -34,17 +34,17 @@ def main() -> None:
     """Run the command with the arguments of the process."""
     import matplotlib as mpl
 
-    # No window is ever opened, so none is needed.
+    # No window is ever opened.
     mpl.use("Agg")
-    # The name of a file may have letters that the terminal has not.
+    # The name of a file may have characters that the terminal cannot print.
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     app()
 
 
-def _version(asked: bool) -> None:
-    if asked:
+def _version(requested: bool) -> None:
+    if requested:
         print(f"piezotrack {__version__}")
         raise typer.Exit
 
@@ -55,7 +55,7 @@ def _options(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    """Take the options of the command as such."""
+    """Declare the options of the command itself."""
 
 
 app.command("identify")(identify_command)

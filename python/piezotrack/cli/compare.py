@@ -1,4 +1,4 @@
-"""``piezotrack compare``: several models of one log, judged where they were not fitted."""
+"""``piezotrack compare``: several models fitted to one log and validated on another part."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from .options import (
     can_be_folder,
     list_files,
     of_file,
+    refuse_without_effect,
     seconds,
     windowed,
 )
@@ -29,23 +30,24 @@ __all__ = ["compare_command"]
 
 @in_words
 def compare_command(
+    context: typer.Context,
     file: Annotated[Path, typer.Argument(help="Log in CSV, with units in its header.")],
     model: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="KIND|FILE",
-            help="Kind of stage, as dahl, or a model file in JSON; else all kinds. Repeatable.",
+            metavar="MODEL|FILE",
+            help="Stage model, as dahl, or a model file in JSON; default all models. Repeatable.",
         ),
     ] = None,
     train: Annotated[
-        str | None, typer.Option(metavar="A:B", help="Seconds to fit; else the first half.")
+        str | None, typer.Option(metavar="A:B", help="Seconds to fit; default the first half.")
     ] = None,
     test: Annotated[
         str | None,
-        typer.Option(metavar="A:B", help="Seconds to judge on; else what follows --train."),
+        typer.Option(metavar="A:B", help="Seconds for validation; default the rest after --train."),
     ] = None,
     test_log: Annotated[
-        Path | None, typer.Option(help="Another log, to judge on in place of this one.")
+        Path | None, typer.Option(help="Another log for validation, in place of this one.")
     ] = None,
     out: Out = Path("results"),
     time: TimeColumn = None,
@@ -54,12 +56,21 @@ def compare_command(
     unit: Units = None,
     dt: Interval = None,
     hold: HoldOption = "foh",
-    seed: Annotated[int, typer.Option(help="Same seed, same result.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
     runs: Annotated[int, typer.Option(help="Number of independent restarts.")] = 4,
-    threads: Annotated[int | None, typer.Option(help="Up to 256; else all cores.")] = None,
+    threads: Annotated[
+        int | None, typer.Option(help="Number of threads, up to 256; default all cores.")
+    ] = None,
 ) -> None:
-    """Fit several models on a part of a log and judge them on the rest: a table, a picture."""
+    """Fit several models to a part of a log and validate them on the rest: a table, a picture."""
     from ..identification.comparison import compare
+    from ..stages.registry import MODELS
+
+    searched = {one.name for one in MODELS if one.searched}
+    if model and searched.isdisjoint(model):
+        refuse_without_effect(
+            context, ("seed", "runs", "threads"), f"with {', '.join(model)}: none is searched"
+        )
 
     columns = Columns(time, drive, displacement, unit, dt)
     log = columns.read(file, hold)

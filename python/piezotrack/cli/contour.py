@@ -1,4 +1,4 @@
-"""``piezotrack contour``: an XY stage along a path, or the nine circles of Table 2."""
+"""``piezotrack contour``: contouring with an XY stage, or the nine circles of Table 2."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from .options import (
     can_be_folder,
     list_files,
     number_range,
+    refuse_without_effect,
 )
 
 if TYPE_CHECKING:
@@ -34,12 +35,13 @@ __all__ = ["contour_command"]
 
 @in_words
 def contour_command(
+    context: typer.Context,
     model: Annotated[
         Path | None,
         typer.Argument(
             metavar="[MODEL]",
-            help="Model file in JSON, for the feedforward of both axes; where it is not given one "
-            "is identified from a log of x.",
+            help="Model file in JSON for the feedforward of both axes; default a model identified "
+            "from a simulated log of x.",
         ),
     ] = None,
     path: Annotated[
@@ -50,43 +52,48 @@ def contour_command(
         ),
     ] = None,
     table_2: Annotated[
-        bool, typer.Option("--table-2", help="The nine circles of Xu and Li 2010 instead.")
+        bool, typer.Option("--table-2", help="The nine circles of Table 2 of Xu and Li 2010.")
     ] = False,
     out: Out = Path("results"),
     lag: Annotated[
-        float | None, typer.Option(help="Time in s from serving x to serving y.")
+        float | None, typer.Option(help="Time in s between the samples of x and y.")
     ] = None,
     cross_talk: Annotated[
-        str | None, typer.Option(metavar="XY:YX", help="Shares of y in x and of x in y.")
+        str | None, typer.Option(metavar="XY:YX", help="Cross-talk: share of y in x and of x in y.")
     ] = None,
     decouple: Annotated[
-        bool, typer.Option("--decouple", help="Identify the cross-talk, and feed it forward.")
+        bool,
+        typer.Option("--decouple", help="Identify the cross-talk and decouple the feedforward."),
     ] = False,
     dt: ControlInterval = 0.02,
     limits: Annotated[
-        str, typer.Option(metavar="LOW:HIGH", help="Voltage limits of the amplifiers.")
+        str, typer.Option(metavar="LOW:HIGH", help="Voltage limits of the amplifiers in V.")
     ] = "0:75",
-    feedforward: Annotated[bool, typer.Option(help="Feedforward by the model's inverse.")] = True,
+    feedforward: Annotated[
+        bool, typer.Option(help="Feedforward by the inverse of the model.")
+    ] = True,
     feedback: Annotated[bool, typer.Option(help="PID feedback.")] = True,
     kp: Annotated[float, typer.Option(help="Proportional gain in V/um.")] = 0.120,
     ti: Annotated[float, typer.Option(help="Integral time in s.")] = 0.009,
     td: Annotated[float, typer.Option(help="Derivative time in s.")] = 0.044,
-    delay: Annotated[float, typer.Option(help="Delay in the loops in s, besides the hold.")] = 0.0,
+    delay: Annotated[
+        float, typer.Option(help="Delay in the loops in s, in addition to the hold.")
+    ] = 0.0,
     jitter: Jitter = 0.0,
     duration: Duration = None,
     period: Period = None,
     path_dt: Annotated[
         float | None, typer.Option(help="Sampling interval in s of a path file without times.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of the sensors' noise.")] = 1,
+    seed: Annotated[int, typer.Option(help="Seed of the sensors' noise.")] = 1,
     beyond_reach: Annotated[
-        bool, typer.Option("--beyond-reach", help="Let the path leave the stage's reach.")
+        bool, typer.Option("--beyond-reach", help="Allow a path beyond the reach of the stage.")
     ] = False,
     unstable: Annotated[
-        bool, typer.Option("--unstable", help="Run loops that are unstable for small motions.")
+        bool, typer.Option("--unstable", help="Allow loops that are unstable for small motions.")
     ] = False,
 ) -> None:
-    """Let two controllers lead the virtual XY stage along a path: figures, a table, pictures."""
+    """Simulate contouring of a path with the virtual XY stage: errors, CSV, pictures."""
     from ..control.components import Pid
     from ..control.contouring import contour
     from ..control.controller import Controller
@@ -95,12 +102,18 @@ def contour_command(
     if table_2 == (path is not None):
         given = "both are" if table_2 else "neither is"
         raise ParameterError(f"--path and --table-2: expected one of them, {given} given")
-    if table_2 and (duration or period or path_dt or beyond_reach or unstable):
-        raise ParameterError(
-            "--duration, --period, --path-dt, --beyond-reach, --unstable: expected none with "
-            "--table-2"
-        )
-    course = None if path is None else _path(path, duration, period, path_dt)
+    if table_2:
+        of_a_path = ["duration", "period", "path_dt", "beyond_reach", "unstable"]
+        refuse_without_effect(context, of_a_path, "with --table-2")
+    if not feedforward:
+        refuse_without_effect(context, ["decouple"], "with --no-feedforward")
+        if model is not None:
+            raise ParameterError(
+                f"MODEL is {model}: expected none with --no-feedforward, where it has no effect"
+            )
+    if not feedback:
+        refuse_without_effect(context, ["kp", "ti", "td"], "with --no-feedback")
+    desired = None if path is None else _path(path, duration, period, path_dt)
     stage = _stage(seed, lag, cross_talk)
     can_be_folder(out)
     inverse, how = _inverse(model, seed) if feedforward else (None, "no feedforward")
@@ -117,11 +130,11 @@ def contour_command(
         how += f"\ncross-talk identified: {found}"
     loops = (loop, loop)
     free = {"beyond_reach": beyond_reach, "unstable": unstable}
-    if course is None:
+    if desired is None:
         table = run_table_2(stage, loops, **mixing)
         written, words = _write_table(table, out), str(table)
     else:
-        run = contour(stage, loops, course, **mixing, **free)
+        run = contour(stage, loops, desired, **mixing, **free)
         written, words = _write(run, out), run.summary()
     xy, yx = (f"{100 * share:g} %" for share in stage.cross_talk)
     print(f"the virtual XY stage: y lags by {stage.lag:g} s, {xy} of y in x, {yx} of x in y; {how}")
@@ -130,7 +143,7 @@ def contour_command(
 
 
 def _path(text: str, duration: float | None, period: float | None, dt: float | None) -> XYReference:
-    """Read a file where the text names one, else a description."""
+    """Read the path from a file if the text names one, else parse the text."""
     from ..references.parse import parse_path
     from ..references.xy_reference import read_path
 
@@ -138,7 +151,7 @@ def _path(text: str, duration: float | None, period: float | None, dt: float | N
         try:
             return read_path(text, duration=duration, period=period, dt=dt)
         except DataError as error:
-            # --time and --dt are not about the path here.
+            # Here --time and --dt do not belong to the path.
             words = str(error).replace("name it with time=, or give the", "expected time_s, or the")
             raise DataError(words.replace("interval with dt=", "interval with --path-dt")) from None
     for option, value in (("--period", period), ("--path-dt", dt)):
@@ -148,7 +161,7 @@ def _path(text: str, duration: float | None, period: float | None, dt: float | N
 
 
 def _stage(seed: int, lag: float | None, cross_talk: str | None) -> XYStage:
-    """Take the virtual stage with what the options change of it."""
+    """Make the virtual stage with the changes of the options."""
     from ..stages.xy import XYStage
 
     stage = XYStage.xu_li_2010(seed=seed)
@@ -160,7 +173,7 @@ def _stage(seed: int, lag: float | None, cross_talk: str | None) -> XYStage:
 
 
 def _inverse(model: Path | None, seed: int) -> tuple[Inverse, str]:
-    """Invert the model, or identify one as the paper does."""
+    """Invert the model, or one identified as in the paper."""
     from ..identification.identified import load
     from ..xu_li_2010.demo import demo_log, identify_demo
 
@@ -172,7 +185,7 @@ def _inverse(model: Path | None, seed: int) -> tuple[Inverse, str]:
 
 
 def _cross_talk(stage: XYStage) -> CrossTalk:
-    """Drive one axis after the other, as an experimenter does, and find the cross-talk."""
+    """Identify the cross-talk from records with one axis driven at a time."""
     import numpy as np
 
     from ..identification.cross_talk import identify_cross_talk
@@ -183,7 +196,7 @@ def _cross_talk(stage: XYStage) -> CrossTalk:
 
 
 def _write(run: Contour, out: Path) -> list[Path]:
-    """Write the samples, the figures as JSON, and the picture."""
+    """Write the samples as CSV, the metrics as JSON, and the picture."""
     from .. import __version__
     from .._support.files import make_folder, save_figures, write_columns, write_document
 
@@ -215,7 +228,7 @@ def _write(run: Contour, out: Path) -> list[Path]:
 
 
 def _write_table(table: Table2, out: Path) -> list[Path]:
-    """Write the table, published beside obtained, and pictures of it and of each circle."""
+    """Write the table with published and obtained values, and the pictures."""
     import numpy as np
 
     from .._support.files import make_folder, save_figures, write_columns

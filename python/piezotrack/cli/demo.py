@@ -1,4 +1,4 @@
-"""``piezotrack demo``: the whole story without any file."""
+"""``piezotrack demo``: identification and tracking on the virtual stage, without a log."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ __all__ = ["demo_command"]
 @in_words
 def demo_command(
     out: Out = Path("demo"),
-    seed: Annotated[int, typer.Option(help="Same seed, same result.")] = 1,
+    seed: Annotated[int, typer.Option(help="Seed of the noise and of the search.")] = 1,
 ) -> None:
-    """Show the way from a log to a model to a tracked reference, on the virtual stage."""
+    """Identify a model from a simulated log, and track a reference with it."""
     from .._support.files import make_folder, save_figures
     from ..identification.report import save_identification
     from ..xu_li_2010.demo import demo_log, identify_demo, track_demo, write_log
@@ -31,12 +31,14 @@ def demo_command(
     folder = make_folder(out)
     written = [write_log(log, folder / "log.csv"), *save_identification(fit, folder, shown=log)]
     written += save_figures({f"track_{name}": run.plot() for name, run in runs.items()}, folder)
-    print("The virtual stage, richer than any model of it, is driven 12 s with 0.25 Hz, 0 to 75 V.")
-    print("Mass, damping, stiffness and piezo coefficient are searched on the first 4 s;")
-    print("the hysteresis is held, and with it the scale of the forces.\n")
+    print(
+        "The virtual stage, which no model matches exactly, is driven 12 s with 0.25 Hz, 0 to 75 V."
+    )
+    print("Mass, damping, stiffness and piezo coefficient are identified from the first 4 s;")
+    print("the hysteresis parameters are held fixed, which sets the scale of the forces.\n")
     print(fit.summary())
-    print(f"\nthe other 8 s, not fitted: {rest}")
-    print("\nThen it follows a sine of 0.2 Hz over 110 um, the loop at 50 Hz:")
+    print(f"\nvalidation on the other 8 s: {rest}")
+    print("\nTracking of a 0.2 Hz sine over 110 um, sampled at 50 Hz:")
     names = {"feedforward": "feedforward alone", "pid": "PID alone", "all": "both, repetitive"}
     for name, run in runs.items():
         print(f"  {names[name]:<18} {run.metrics}")

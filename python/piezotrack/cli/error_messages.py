@@ -1,4 +1,4 @@
-"""What a person reads when something goes wrong: one sentence, and an exit code."""
+"""Errors as a person reads them: one sentence on stderr, and an exit code."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ P = ParamSpec("P")
 
 
 def in_words(command: Callable[P, None]) -> Callable[P, None]:
-    """Turn what piezotrack raises into one sentence and an exit code."""
+    """Turn the exceptions of piezotrack into one sentence and an exit code."""
 
     @wraps(command)
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
@@ -39,17 +39,17 @@ def in_words(command: Callable[P, None]) -> Callable[P, None]:
             print(f"piezotrack: {str(error) or 'interrupted'}", file=sys.stderr)
             raise typer.Exit(INTERRUPTED) from None
         except OSError as error:
-            # What there is to keep has been written before anything is printed.
+            # All results have been written before anything is printed.
             if not isinstance(error, BrokenPipeError):
                 print(f"piezotrack: cannot print: {error.strerror}", file=sys.stderr)
-            # The rest of the output is given up, or Python would complain at its end.
+            # Discard the rest of the output, or Python would report an error when it exits.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise typer.Exit(NOT_PRINTED) from None
 
     return run
 
 
-# Advice that the library gives in Python, and what to type instead.
+# Advice of the library in Python, and the option that does the same.
 ADVICE = [
     (
         re.compile(r"time=0, drive=1, displacement=2, units=\{0: 's', 1: 'V', 2: 'um'\}"),
@@ -59,7 +59,7 @@ ADVICE = [
     (re.compile(r"\bfixed="), "--fix"),
     (re.compile(r"\bbeyond_reach=True"), "--beyond-reach"),
     (re.compile(r"\bunstable=True"), "--unstable"),
-    (re.compile(r"pt\.Pid\.from_um\(kp=.*\)"), "a value in V/um"),
+    (re.compile(r"pt\.\w+\.from_um\(k[pq]=.*\)"), "a value in V/um"),
     (
         re.compile(r"(?<!--unit )\b(time|drive|displacement|dt|stiffness|runs|train|test)=(?!\d)"),
         r"--\1",

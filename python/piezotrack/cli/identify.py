@@ -26,6 +26,7 @@ from .options import (
     number_range,
     of_file,
     pairs,
+    refuse_without_effect,
     windowed,
 )
 
@@ -40,11 +41,12 @@ __all__ = ["identify_command"]
 
 @in_words
 def identify_command(
+    context: typer.Context,
     file: Annotated[Path, typer.Argument(help="Log in CSV, with units in its header.")],
     window: Seconds = None,
     model: Annotated[
         list[str] | None,
-        typer.Option(metavar="KIND", help="Kind of stage, as dahl or bouc-wen. Repeatable."),
+        typer.Option(metavar="MODEL", help="Stage model, as dahl or bouc-wen. Repeatable."),
     ] = None,
     out: Out = Path("results"),
     time: TimeColumn = None,
@@ -54,37 +56,52 @@ def identify_command(
     dt: Interval = None,
     hold: HoldOption = "foh",
     free: Annotated[
-        str | None, typer.Option(metavar="A,B,...", help="Parameters to search; else all.")
+        str | None, typer.Option(metavar="A,B,...", help="Parameters to identify; default all.")
     ] = None,
     fix: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME=VALUE", help="Parameter to hold, SI. Repeatable."),
+        typer.Option(
+            metavar="NAME=VALUE", help="Parameter to hold fixed, in SI units. Repeatable."
+        ),
     ] = None,
     bound: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME=LOW:HIGH", help="Bounds of a parameter, SI. Repeatable."),
+        typer.Option(
+            metavar="NAME=LOW:HIGH", help="Bounds of a parameter, in SI units. Repeatable."
+        ),
     ] = None,
     stiffness: Annotated[float | None, typer.Option(help="Stiffness in N/m, if known.")] = None,
-    offset: Annotated[bool, typer.Option(help="Fit a constant offset of the sensor.")] = True,
+    offset: Annotated[bool, typer.Option(help="Fit a constant sensor offset.")] = True,
     delay: Annotated[
         str | None,
-        typer.Option(metavar="fit|S|LOW:HIGH", help="Delay of the displacement in s: fit it?"),
+        typer.Option(
+            metavar="fit|S|LOW:HIGH",
+            help="Delay of the displacement in s: fitted, known, or bounds.",
+        ),
     ] = None,
     swarm: Annotated[
-        str | None, typer.Option(help="Settings: default, xu-li-2010 or spso-2011.")
+        str | None, typer.Option(help="Swarm settings: default, xu-li-2010 or spso-2011.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Same seed, same result; else 0.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the random numbers; default 0.")] = None,
     runs: Annotated[
-        int | None, typer.Option(help="Number of independent restarts; else 4.")
+        int | None, typer.Option(help="Number of independent restarts; default 4.")
     ] = None,
-    threads: Annotated[int | None, typer.Option(help="Up to 256; else all cores.")] = None,
-    validate: Annotated[
-        Path | None, typer.Option(help="A second log, to judge the model on; not fitted.")
+    threads: Annotated[
+        int | None, typer.Option(help="Number of threads, up to 256; default all cores.")
     ] = None,
+    validate: Annotated[Path | None, typer.Option(help="Second log, for validation only.")] = None,
     validate_window: Seconds = None,
 ) -> None:
-    """Identify a stage from a log, as each kind named: a table, a JSON model, pictures."""
+    """Identify stage models from a log: a table, the model as JSON, pictures."""
+    from ..stages.registry import model_named
+
     kinds = _kinds(model)
+    if not any(model_named(kind).searched for kind in kinds):
+        refuse_without_effect(
+            context,
+            ("seed", "runs", "threads"),
+            f"with the model {', '.join(kinds)}, whose parameters follow by least squares",
+        )
     columns = Columns(time, drive, displacement, unit, dt)
     if validate is None and validate_window is not None:
         raise ParameterError("--validate-window is given without --validate")
@@ -108,23 +125,24 @@ def identify_command(
         "threads": threads,
     }
     arguments = {name: value for name, value in options.items() if value is not None}
-    told, written = [], []
+    printed: list[str] = []
+    written: list[Path] = []
     for kind in kinds:
         with of_file(file):
             fit = _search(log, out, kind, **_of_model(kind, kinds, arguments))
         score = None if second is None else fit.score(second)
         written += _write(fit, out, second, score)
-        told.append(fit.summary())
+        printed.append(fit.summary())
         if second is not None and score is not None:
             own = ", with an offset of its own" if offset else ""
             span = f"from {second.t[0]:.6g} to {second.t[-1]:.6g} s"
-            told.append(f"on {second.source} {span}, not fitted{own}: {score}")
-    print("\n\n".join(told))
+            printed.append(f"on {second.source} {span}, not fitted{own}: {score}")
+    print("\n\n".join(printed))
     list_files(written)
 
 
 def _kinds(given: list[str] | None) -> list[str]:
-    """Check the kinds named before anything is searched."""
+    """Check the names of the models before the first is identified."""
     from ..stages.registry import model_named
 
     kinds = given or ["dahl"]
@@ -150,7 +168,7 @@ def _partial(model: str) -> str:
 
 
 def _search(log: Dataset, out: Path, kind: str, **arguments: Any) -> Identification:
-    """Identify; on Ctrl-C keep the best so far as a file."""
+    """Identify; on Ctrl-C save the best model found so far."""
     from .._support.files import make_folder
     from ..identification.identify import identify
 
@@ -166,7 +184,7 @@ def _search(log: Dataset, out: Path, kind: str, **arguments: Any) -> Identificat
 def _write(
     fit: Identification, out: Path, second: Dataset | None, score: Score | None
 ) -> list[Path]:
-    """Write the model, with what it is worth on a second log, and the pictures."""
+    """Write the model, with its validation on a second log, and the pictures."""
     from .._support.files import save_figures
     from ..identification.plot import plot_loop, plot_time
     from ..identification.report import save_identification
@@ -191,7 +209,7 @@ def _write(
             f"{kind.name}_validation_time": plot_time(second, run, stroke=fit.stroke)[0].figure,
         }
         written += save_figures(figures, out)  # type: ignore[arg-type]
-    # The result is whole now; what an interrupted search left is not needed.
+    # The result is complete: remove the file of an interrupted search.
     (out / _partial(kind.name)).unlink(missing_ok=True)
     return written
 

@@ -1,4 +1,4 @@
-"""``piezotrack noise``: what a sensor shows at rest."""
+"""``piezotrack noise``: noise of a sensor at rest."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ __all__ = ["noise_command"]
 def noise_command(
     file: Annotated[Path, typer.Argument(help="Log in CSV, of a sensor at rest.")],
     window: Annotated[
-        str | None, typer.Option(metavar="A:B", help="Seconds in which nothing moves.")
+        str | None, typer.Option(metavar="A:B", help="Seconds in which the stage is at rest.")
     ] = None,
     out: Out = Path("results"),
     time: TimeColumn = None,
@@ -40,7 +40,7 @@ def noise_command(
     unit: Units = None,
     dt: Interval = None,
 ) -> None:
-    """Read a record at rest: rms, steps, spectrum and a model of the noise."""
+    """Analyse a record at rest: rms, resolution, spectrum and a model of the noise."""
     from .._support.files import make_folder, save_figures
     from ..data.reader import read_displacement
     from ..identification.sensor_noise import identify_noise

@@ -1,4 +1,4 @@
-"""Options that several commands share, and how their texts are read."""
+"""Options that several commands share, and the parsing of their values."""
 
 from __future__ import annotations
 
@@ -37,13 +37,14 @@ __all__ = [
     "number_range",
     "of_file",
     "pairs",
+    "refuse_without_effect",
     "seconds",
     "windowed",
 ]
 
 Seconds = Annotated[
     str | None,
-    typer.Option(metavar="A:B", help="Seconds that count; the drive before A is warm-up."),
+    typer.Option(metavar="A:B", help="Seconds to use; the drive before A is warm-up."),
 ]
 TimeColumn = Annotated[str | None, typer.Option(help="Column of the time.")]
 DriveColumn = Annotated[str | None, typer.Option(help="Column of the drive voltage.")]
@@ -61,12 +62,10 @@ Interval = Annotated[
 ]
 HoldOption = Annotated[
     Literal["foh", "zoh"],
-    typer.Option(help="Between samples the drive is a line (foh) or constant (zoh)."),
+    typer.Option(help="Drive between samples: linear (foh) or constant (zoh)."),
 ]
 ControlInterval = Annotated[float, typer.Option(help="Sampling interval of the controller in s.")]
-Jitter = Annotated[
-    float, typer.Option(help="How late a sample comes on average in s, each by chance.")
-]
+Jitter = Annotated[float, typer.Option(help="Mean sampling jitter in s (truncated exponential).")]
 Duration = Annotated[float | None, typer.Option(help="Length of the reference in s.")]
 Period = Annotated[
     float | None, typer.Option(help="Time in s after which a reference from a file repeats.")
@@ -75,7 +74,7 @@ Out = Annotated[Path, typer.Option(help="Folder for the results.")]
 
 
 class Columns:
-    """The columns of a log as options name them; a number counts them from 0."""
+    """Columns of a log by the options that name them; a number counts from 0."""
 
     def __init__(
         self,
@@ -105,13 +104,22 @@ class Columns:
 
 
 def column(text: str | None) -> str | int | None:
-    """Take a number for a place, anything else for a name."""
+    """Parse a column: a number is an index, anything else a name."""
     return int(text) if text is not None and text.isdecimal() else text
+
+
+def refuse_without_effect(context: typer.Context, options: Iterable[str], reason: str) -> None:
+    """Refuse options that were given although they have no effect; `reason` says beside what."""
+    for name in options:
+        source = context.get_parameter_source(name)
+        if source is not None and source.name != "DEFAULT":
+            option = f"--{name.replace('_', '-')}"
+            raise ParameterError(f"{option} has no effect {reason}: expected it left out")
 
 
 @contextmanager
 def of_file(file: Path) -> Iterator[None]:
-    """Say which file an error is about."""
+    """Put the name of the file before the message of an error."""
     try:
         yield
     except PiezotrackError as error:
@@ -119,7 +127,7 @@ def of_file(file: Path) -> Iterator[None]:
 
 
 def can_be_folder(out: Path) -> None:
-    """Refuse a folder that cannot be written to, before a search and not after it."""
+    """Refuse a folder that cannot be written to before the computation begins."""
     there = out
     while not there.exists() and there != there.parent:
         there = there.parent
@@ -137,7 +145,7 @@ def list_files(written: Iterable[Path]) -> None:
 
 
 def seconds(option: str, text: str) -> tuple[float | None, float | None]:
-    """Take A:B in seconds from a text; either end may be open."""
+    """Parse A:B in seconds; either end may be left out."""
     start, colon, stop = text.partition(":")
     if not colon:
         raise ParameterError(f"{option} is '{text}': expected A:B in seconds, as 3:23")
@@ -146,7 +154,7 @@ def seconds(option: str, text: str) -> tuple[float | None, float | None]:
 
 
 def windowed(log: Dataset, file: Path, option: str, window: str | None) -> Dataset:
-    """Take the window of a log that an option names; all of it where there is none."""
+    """Cut a log to the window of an option; without one the whole log is used."""
     if window is None:
         return log
     start, stop = seconds(option, window)
@@ -157,7 +165,7 @@ def windowed(log: Dataset, file: Path, option: str, window: str | None) -> Datas
 
 
 def pairs(option: str, given: list[str] | None) -> list[tuple[str, str]]:
-    """Split NAME=VALUE texts."""
+    """Parse options of the form NAME=VALUE."""
     pairs: list[tuple[str, str]] = []
     for text in given or []:
         name, equals, value = text.partition("=")
@@ -170,7 +178,7 @@ def pairs(option: str, given: list[str] | None) -> list[tuple[str, str]]:
 
 
 def number(option: str, text: str) -> float:
-    """Take a number from a text."""
+    """Parse a number."""
     try:
         return float(text)
     except ValueError:
@@ -178,7 +186,7 @@ def number(option: str, text: str) -> float:
 
 
 def number_range(option: str, text: str) -> tuple[float, float]:
-    """Take LOW:HIGH from a text."""
+    """Parse LOW:HIGH."""
     low, colon, high = text.partition(":")
     if not colon:
         raise ParameterError(f"{option} has '{text}': expected LOW:HIGH")

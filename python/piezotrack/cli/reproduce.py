@@ -1,4 +1,4 @@
-"""``piezotrack reproduce``: the paper's figures and tables, published beside obtained."""
+"""``piezotrack reproduce``: figures and tables of the paper, published and obtained."""
 
 from __future__ import annotations
 
@@ -8,31 +8,37 @@ from typing import Annotated
 import typer
 
 from .error_messages import in_words
-from .options import Out, can_be_folder, list_files
+from .options import Out, can_be_folder, list_files, refuse_without_effect
 
 __all__ = ["reproduce_command"]
 
 
 @in_words
 def reproduce_command(
+    context: typer.Context,
     out: Out = Path("report"),
     seeds: Annotated[
-        int, typer.Option(help="Seeds of the sensors' noise; the table has medians over them.")
+        int,
+        typer.Option(
+            help="Number of seeds of the sensor noise; the table shows medians over them."
+        ),
     ] = 20,
     quick: Annotated[bool, typer.Option("--quick", help="Two seeds, for a first look.")] = False,
     dbo: Annotated[
         Path | None,
         typer.Option(
             metavar="FOLDER",
-            help="With training.csv and tracking.csv of the measured DBO log: the same way on it.",
+            help="Folder of the measured DBO log, with training.csv and tracking.csv.",
         ),
     ] = None,
 ) -> None:
-    """Go the way of Xu and Li 2010 on the virtual stage: a report as HTML, PDF and JSON."""
-    from ..xu_li_2010.reproduction import reproduce_xu_li_2010
+    """Repeat the experiments of Xu and Li 2010 on a simulated stage: HTML, PDF and JSON."""
+    from ..xu_li_2010.reproduction import reproduce
 
+    if quick:
+        refuse_without_effect(context, ("seeds",), "with --quick")
     can_be_folder(out)
-    found = reproduce_xu_li_2010(seeds=2 if quick else seeds, dbo=dbo)
+    found = reproduce(seeds=2 if quick else seeds, dbo=dbo)
     written = found.save(out)
     print(found.summary())
     list_files(written)

@@ -1,4 +1,4 @@
-"""``piezotrack simulate``: a model under a drive."""
+"""``piezotrack simulate``: response of a model to a drive."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def simulate_command(
     dt: Interval = None,
     hold: HoldOption = "foh",
 ) -> None:
-    """Simulate a model under a drive: a CSV with the displacement, and a picture."""
+    """Simulate the response of a model to a drive: a CSV with the displacement, and a picture."""
     from .._support.files import make_folder, save_figures, write_columns
     from ..data.reader import read_drive
     from ..identification.identified import load

@@ -1,4 +1,4 @@
-"""``piezotrack step``: the conventional identification from a step response."""
+"""``piezotrack step``: identification from a step response."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ __all__ = ["step_command"]
 
 @in_words
 def step_command(
-    file: Annotated[Path, typer.Argument(help="Log in CSV, with a step and its response.")],
+    file: Annotated[Path, typer.Argument(help="Log in CSV of a step response.")],
     window: Annotated[
-        str | None, typer.Option(metavar="A:B", help="Seconds with the step to read.")
+        str | None, typer.Option(metavar="A:B", help="Seconds with the step.")
     ] = None,
     out: Out = Path("results"),
     time: TimeColumn = None,
@@ -50,11 +50,11 @@ def step_command(
     second_level: Annotated[
         str | None,
         typer.Option(
-            metavar="V:UM", help="Voltage and displacement, in um, where another step ends."
+            metavar="V:UM", help="Voltage in V and displacement in um at the end of another step."
         ),
     ] = None,
 ) -> None:
-    """Read a step response: frequency, damping, and the hysteresis parameters, as a table."""
+    """Identify frequency, damping and hysteresis parameters from a step response."""
     from .._support.files import make_folder, save_figures
     from ..identification.step_response import identify_step
 
@@ -68,7 +68,7 @@ def step_command(
     written = [_write(step, folder), *save_figures({"step": step.plot()}, folder)]
     print(step.summary())
     options = " ".join(f"--fix {name}={value:.8g}" for name, value in step.hysteresis.items())
-    print(f"\nto go on with these: piezotrack identify LOG {options}")
+    print(f"\nto hold these in a search: piezotrack identify LOG {options}")
     list_files(written)
 
 
@@ -94,7 +94,7 @@ def _write(step: StepResult, folder: Path) -> Path:
 
 
 def _level(text: str) -> tuple[float, float]:
-    volts, colon, um = text.partition(":")
+    voltage, colon, um = text.partition(":")
     if not colon:
         raise ParameterError(f"--second-level is '{text}': expected V:UM, as 37.5:60.2")
-    return number("--second-level", volts), number("--second-level", um) / 1e6
+    return number("--second-level", voltage), number("--second-level", um) / 1e6

@@ -1,4 +1,4 @@
-"""``piezotrack track`` and ``piezotrack feedforward``: from a model to a tracked reference."""
+"""``piezotrack track`` and ``piezotrack feedforward``: tracking with an identified model."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from .options import (
     can_be_folder,
     list_files,
     number_range,
+    refuse_without_effect,
 )
 
 if TYPE_CHECKING:
@@ -34,12 +35,17 @@ __all__ = ["feedforward_command", "track_command"]
 
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file in JSON.")]
 Online = Annotated[
-    bool, typer.Option("--online", help="Compute all of the feedforward; else a table repeats.")
+    bool,
+    typer.Option(
+        "--online",
+        help="Compute the feedforward along the whole run; default a table of one period.",
+    ),
 ]
 
 
 @in_words
 def track_command(
+    context: typer.Context,
     model: ModelFile,
     reference: Annotated[
         str,
@@ -48,67 +54,80 @@ def track_command(
         ),
     ],
     stage: Annotated[
-        str, typer.Option(help="What is led: virtual, or model for the model itself.")
+        str, typer.Option(help="Plant: virtual, or model for the model itself.")
     ] = "virtual",
     out: Out = Path("results"),
     dt: ControlInterval = 0.02,
     limits: Annotated[
-        str, typer.Option(metavar="LOW:HIGH", help="Voltage limits of the amplifier.")
+        str, typer.Option(metavar="LOW:HIGH", help="Voltage limits of the amplifier in V.")
     ] = "0:75",
-    feedforward: Annotated[bool, typer.Option(help="Feedforward by the model's inverse.")] = True,
+    feedforward: Annotated[
+        bool, typer.Option(help="Feedforward by the inverse of the model.")
+    ] = True,
     online: Online = False,
     feedback: Annotated[bool, typer.Option(help="PID feedback.")] = True,
     kp: Annotated[float, typer.Option(help="Proportional gain in V/um.")] = 0.120,
     ti: Annotated[float, typer.Option(help="Integral time in s.")] = 0.009,
     td: Annotated[float, typer.Option(help="Derivative time in s.")] = 0.044,
-    tt: Annotated[float | None, typer.Option(help="Antiwindup time in s; inf for none.")] = None,
-    repetitive: Annotated[bool, typer.Option(help="Learn from period to period.")] = False,
-    kq: Annotated[float, typer.Option(help="Learning gain in V/um.")] = 1.0,
-    tq: Annotated[float, typer.Option(help="Time constant of the learning's filter in s.")] = 0.2,
-    delay: Annotated[float, typer.Option(help="Delay in the loop in s, besides the hold.")] = 0.0,
+    tt: Annotated[
+        float | None, typer.Option(help="Tracking time of the antiwindup in s; inf for none.")
+    ] = None,
+    repetitive: Annotated[bool, typer.Option(help="Repetitive control.")] = False,
+    kq: Annotated[
+        float, typer.Option(help="Learning gain of the repetitive control in V/um.")
+    ] = 1.0,
+    tq: Annotated[
+        float, typer.Option(help="Time constant of the repetitive control's filter in s.")
+    ] = 0.2,
+    delay: Annotated[
+        float, typer.Option(help="Delay in the loop in s, in addition to the hold.")
+    ] = 0.0,
     jitter: Jitter = 0.0,
     duration: Duration = None,
     period: Period = None,
-    seed: Annotated[int, typer.Option(help="Of the virtual stage's noise.")] = 1,
+    seed: Annotated[int, typer.Option(help="Seed of the virtual stage's sensor noise.")] = 1,
     beyond_reach: Annotated[
-        bool, typer.Option("--beyond-reach", help="Let the reference leave the stage's reach.")
+        bool,
+        typer.Option("--beyond-reach", help="Allow a reference beyond the reach of the stage."),
     ] = False,
     unstable: Annotated[
-        bool, typer.Option("--unstable", help="Run a loop that is unstable for small motions.")
+        bool, typer.Option("--unstable", help="Allow a loop that is unstable for small motions.")
     ] = False,
 ) -> None:
-    """Let a controller lead the virtual stage along a reference: figures, a table, pictures."""
+    """Simulate closed-loop tracking of a reference: errors, samples as CSV, pictures."""
     from ..control.components import Pid, Repetitive
     from ..control.controller import Controller
+    from ..control.stability import check_loop
     from ..control.tracking import track
     from ..identification.identified import load
     from ..stages.virtual import VirtualStage
 
+    _refuse_without_effect(context, feedforward, feedback, repetitive, stage)
     known = load(model)
-    course = _reference(reference, duration, period)
-    if repetitive and course.period is None:
-        raise ParameterError(f"--repetitive: the reference ({course.name}) does not repeat")
+    desired = _reference(reference, duration, period)
+    if repetitive and desired.period is None:
+        raise ParameterError(f"--repetitive: the reference ({desired.name}) does not repeat")
     playback: Literal["table", "online"] = "online" if online else "table"
     loop = Controller(
         dt=dt,
         limits=number_range("--limits", limits),
         feedforward=known.inverse(playback=playback) if feedforward else None,
         feedback=Pid.from_um(kp=kp, ti=ti, td=td, tt=tt) if feedback else None,
-        addon=Repetitive(period=course.period or 0.0, tq=tq, kq=kq) if repetitive else None,
+        repetitive=Repetitive.from_um(period=desired.period or 0.0, tq=tq, kq=kq)
+        if repetitive
+        else None,
     )
-    if stage not in ("virtual", "model"):
-        raise ParameterError(f"--stage is '{stage}': expected virtual or model")
-    led = VirtualStage.xu_li_2010(seed=seed) if stage == "virtual" else known
+    plant = VirtualStage.xu_li_2010(seed=seed) if stage == "virtual" else known
     can_be_folder(out)
     free = {"beyond_reach": beyond_reach, "unstable": unstable}
-    run = track(led, loop, course, delay=delay, jitter=jitter, **free)
+    run = track(plant, loop, desired, delay=delay, jitter=jitter, **free)
     written = _write(run, known, loop, out)
     print(f"the {stage} stage" if stage == "virtual" else "the model itself", end=", ")
     print(run.summary())
     if feedforward:
         _note_range(known, run.voltage)
-    if loop.feedback is not None or loop.addon is not None:
-        print(f"loop at {loop.check(led, delay=delay).middle}")
+    if loop.feedback is not None or loop.repetitive is not None:
+        print(f"loop at {check_loop(plant, loop, delay=delay).middle}")
     list_files(written)
 
 
@@ -124,37 +143,57 @@ def feedforward_command(
     duration: Duration = None,
     period: Period = None,
 ) -> None:
-    """Write the voltage table that leads a stage along a reference."""
+    """Compute the feedforward voltage for a reference: a CSV and a picture."""
     from .._support.files import make_folder, save_figures, write_columns
     from ..control.tracking_plot import plot_feedforward
     from ..identification.identified import load
 
     known = load(model)
-    course = _reference(reference, duration, period)
+    desired = _reference(reference, duration, period)
     interval = 0.02 if dt is None else dt
     can_be_folder(out)
-    volts, how = known.inverse(playback="online" if online else "table").played(course, interval)
-    samples = course.sample(interval)
+    samples = desired.sample(interval)
+    voltage, how = known.inverse(playback="online" if online else "table").played(
+        desired, interval, samples=samples
+    )
     folder = make_folder(out)
-    table = {"time_s": samples.t, "voltage_V": volts, "displacement_um": 1e6 * samples.x}
+    table = {"time_s": samples.t, "voltage_V": voltage, "displacement_um": 1e6 * samples.x}
     written = [write_columns(folder / "feedforward.csv", table)]
-    written += save_figures({"feedforward": plot_feedforward(samples.t, volts, samples.x)}, folder)
-    print(f"{course!r} at {1.0 / interval:g} Hz; {how}")
-    print(f"{volts.size} samples, voltage from {volts.min():.4g} to {volts.max():.4g} V")
-    _note_range(known, volts)
+    written += save_figures(
+        {"feedforward": plot_feedforward(samples.t, voltage, samples.x)}, folder
+    )
+    print(f"{desired!r} at {1.0 / interval:g} Hz; {how}")
+    print(f"{voltage.size} samples, voltage from {voltage.min():.4g} to {voltage.max():.4g} V")
+    _note_range(known, voltage)
     list_files(written)
 
 
-def _note_range(known: IdentifiedModel, volts: NDArray[np.float64]) -> None:
-    """Say where a model is used outside of the voltages that it was fitted at."""
+def _refuse_without_effect(
+    context: typer.Context, feedforward: bool, feedback: bool, repetitive: bool, stage: str
+) -> None:
+    """Refuse an unknown stage, and options of parts that are left out."""
+    if stage not in ("virtual", "model"):
+        raise ParameterError(f"--stage is '{stage}': expected virtual or model")
+    if not feedforward:
+        refuse_without_effect(context, ["online"], "with --no-feedforward")
+    if not feedback:
+        refuse_without_effect(context, ["kp", "ti", "td", "tt"], "with --no-feedback")
+    if not repetitive:
+        refuse_without_effect(context, ["kq", "tq"], "without --repetitive")
+    if stage == "model":
+        refuse_without_effect(context, ["seed"], "with --stage model, which has no sensor noise")
+
+
+def _note_range(known: IdentifiedModel, voltage: NDArray[np.float64]) -> None:
+    """Print a note where a model is used outside the voltages of its identification."""
     if fitted := known.drive_range:
         margin = 0.01 * (fitted[1] - fitted[0])
-        if volts.min() < fitted[0] - margin or volts.max() > fitted[1] + margin:
+        if voltage.min() < fitted[0] - margin or voltage.max() > fitted[1] + margin:
             print(f"note  the model was fitted from {fitted[0]:.4g} to {fitted[1]:.4g} V only")
 
 
 def _reference(text: str, duration: float | None, period: float | None) -> Reference:
-    """Read a file where the text names one, else a description."""
+    """Read the reference from a file if the text names one, else parse the text."""
     from ..references.parse import parse_reference
     from ..references.reference import read_reference
 
@@ -166,7 +205,7 @@ def _reference(text: str, duration: float | None, period: float | None) -> Refer
 
 
 def _write(run: Tracking, known: IdentifiedModel, loop: Controller, out: Path) -> list[Path]:
-    """Write the samples, the figures as JSON, and the pictures."""
+    """Write the samples as CSV, the metrics as JSON, and the pictures."""
     from .. import __version__
     from .._support.files import make_folder, save_figures, write_columns, write_document
 
@@ -188,7 +227,7 @@ def _write(run: Tracking, known: IdentifiedModel, loop: Controller, out: Path) -
         "dt": {"value": loop.dt, "unit": "s"},
         "limits": {"value": list(loop.limits), "unit": "V"},
         "feedback": None if loop.feedback is None else repr(loop.feedback),
-        "repetitive": None if loop.addon is None else repr(loop.addon),
+        "repetitive": None if loop.repetitive is None else repr(loop.repetitive),
         "feedforward": run.note,
         "unit": "errors in m, phase lag in rad, widest loop as a part of the travel",
         "from_s": run.settled,

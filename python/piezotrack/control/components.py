@@ -1,9 +1,9 @@
-"""What a controller is made of besides feedforward: PID, state space, repetitive part, filters."""
+"""Components of a controller: PID, state space, repetitive part, filters of the measurement."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from ..errors import ParameterError, ShapeError
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["LowPass", "Notch", "Pid", "Repetitive", "StateSpace"]
+__all__ = ["Lag", "LowPass", "Notch", "Pid", "Repetitive", "StateSpace", "ZeroPhase"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,8 +27,8 @@ class Pid:
         + \frac{K_p T_d}{T_s} (e_k - 2 e_{k-1} + e_{k-2}) + \frac{T_s}{T_t} (v - u)_{k-1}
 
     Xu and Li 2010, equations (22) to (25), doi 10.1115/1.4001712, corrected: the recursion is
-    that of the feedback part alone, while `v - u` is what the amplifier gave less what all parts
-    together asked for.
+    that of the feedback part alone, while `v - u` is the voltage of the amplifier less the sum of
+    all parts of the command.
 
     Parameters
     ----------
@@ -111,14 +111,14 @@ class StateSpace:
     d : float, optional
         D [V/m].
     back : array_like, shape (n,), optional
-        Gain of back-calculation, with which what the amplifier gave less what was asked for [V]
-        enters the state. Without it the state stays while the command is clipped and would go
-        further out.
+        Gain of back-calculation: the voltage of the amplifier less the command [V] enters the
+        state with it. Without it the state is held while the command is clipped and would move
+        further into saturation.
 
     Examples
     --------
     >>> import piezotrack as pt
-    >>> integrator = pt.StateSpace([[1.0]], [2000.0], [1.0])
+    >>> integrator = pt.control.StateSpace([[1.0]], [2000.0], [1.0])
     """
 
     a: ArrayLike
@@ -128,10 +128,10 @@ class StateSpace:
     back: ArrayLike | None = None
 
     def __post_init__(self) -> None:
-        _ = self.matrices
+        _ = self._matrices
 
     @property
-    def matrices(self) -> tuple[list[float], list[float], list[float], float, list[float] | None]:
+    def _matrices(self) -> tuple[list[float], list[float], list[float], float, list[float] | None]:
         """A row by row, B, C, D and the gain of back-calculation."""
         a, b, c = (_matrix(name, getattr(self, name)) for name in ("a", "b", "c"))
         n = b.size
@@ -155,12 +155,59 @@ def _matrix(name: str, value: ArrayLike) -> NDArray[np.float64]:
     return entries
 
 
-Smoothing = Literal["lag", "zero phase", "none"]
+@dataclass(frozen=True, kw_only=True)
+class Lag:
+    """First-order lag as the filter Q of a repetitive controller: the form of Xu and Li 2010.
+
+    At 0.2 s it passes half of a 0.5 Hz error.
+
+    Parameters
+    ----------
+    tq : float, optional
+        Time constant [s].
+    compensated : bool, optional
+        Whether the delay line is shortened by the delay of the filter, so that the learnt signal
+        is in phase.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> pt.Repetitive(period=5.0, kq=6e5, smoothing=pt.control.Lag(tq=0.05)).smoothing.tq
+    0.05
+    """
+
+    tq: float = 0.2
+    compensated: bool = False
+
+    def __post_init__(self) -> None:
+        positive("tq", self.tq, "s")
+        _core.as_truth("compensated", self.compensated)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ZeroPhase:
+    """Symmetric low-pass without delay as the filter Q of a repetitive controller.
+
+    Parameters
+    ----------
+    order : int, optional
+        Order, 1 to 4: the higher, the lower its cutoff.
+    """
+
+    order: int = 2
+
+    def __post_init__(self) -> None:
+        if not 1 <= _core.as_count("order", self.order) <= 4:
+            raise ParameterError(f"order is {self.order}: expected 1 to 4")
+
+
+# The filter of the paper, and the default.
+LAG = Lag()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Repetitive:
-    r"""Repetitive controller, plugged in beside the feedback: it learns what each period needs.
+    r"""Repetitive controller, plugged in beside the feedback: it learns a periodic voltage.
 
     .. math::
 
@@ -174,67 +221,120 @@ class Repetitive:
     ----------
     period : float
         L [s], of the reference; no whole number of samples is needed, two at least.
-    tq : float, optional
-        Time constant of the filter Q [s].
     kq : float, optional
-        Learning gain [V/um], above 0 and below 2; that is necessary, not sufficient.
-    smoothing : {"lag", "zero phase", "none"}, optional
-        The filter Q: the paper's first-order lag, which at 0.2 s passes half of a 0.5 Hz error;
-        a symmetric one of `order`, which delays nothing; or none.
-    order : int, optional
-        Order of the symmetric filter, 1 to 4.
-    compensated : bool, optional
-        Whether the delay line is shorter by the filter's lag, so that what was learnt comes in
-        time.
+        Learning gain [V/m], above 0 and below 2e6 (2 V/um); that is necessary, not sufficient.
+        `from_um` takes it in V/um.
+    smoothing : Lag or ZeroPhase or None, optional
+        The filter Q; None for no filter.
     lead : int, optional
-        Samples by which what was learnt from the error comes earlier, against the lag of the
-        stage.
-    leak : float, optional
-        What is kept of a constant from period to period, above 0, at most 1. Below 1 it ends
+        Samples by which the learnt signal is advanced, to compensate the lag of the stage.
+    forgetting_factor : float, optional
+        Share of the learnt signal kept from period to period, above 0, at most 1. Below 1 it ends
         the drift of uRC against uFB, whose difference the error does not show.
     pause : bool, optional
-        Whether nothing is learnt while the voltage is clipped.
+        Whether learning pauses while the voltage is clipped.
+
+    Raises
+    ------
+    ParameterError
+        A number is out of its range, or `smoothing` is no filter.
 
     Examples
     --------
     >>> import piezotrack as pt
-    >>> pt.Repetitive(period=5.0, tq=0.2, kq=1.0).leak
-    0.99
+    >>> part = pt.Repetitive.from_um(period=5.0, tq=0.2, kq=1.0)
+    >>> part.kq, part.smoothing, part.forgetting_factor
+    (1000000.0, Lag(tq=0.2, compensated=False), 0.99)
     """
 
     period: float
-    tq: float = 0.2
-    kq: float = 1.0
-    smoothing: Smoothing = "lag"
-    order: int = 2
-    compensated: bool = False
+    kq: float = 1e6
+    smoothing: Lag | ZeroPhase | None = LAG
     lead: int = 0
-    leak: float = 0.99
+    forgetting_factor: float = 0.99
     pause: bool = True
 
     def __post_init__(self) -> None:
         positive("period", self.period, "s")
-        positive("tq", self.tq, "s")
-        if not 0.0 < _core.as_number("kq", self.kq) < 2.0:
+        if not 0.0 < _core.as_number("kq", self.kq) < 2e6:
             raise ParameterError(
-                f"kq is {self.kq} V/um: expected above 0 and below 2, equation (28)"
+                f"kq is {self.kq:g} V/m: expected above 0 and below 2e6 V/m (2 V/um), equation (28)"
             )
-        if self.smoothing not in ("lag", "zero phase", "none"):
+        if not (self.smoothing is None or isinstance(self.smoothing, (Lag, ZeroPhase))):
             raise ParameterError(
-                f"smoothing is {self.smoothing!r}: expected 'lag', 'zero phase' or 'none'"
+                f"smoothing is {self.smoothing!r}: expected pt.control.Lag, pt.control.ZeroPhase "
+                "or None"
             )
-        if not 1 <= _core.as_count("order", self.order) <= 4:
-            raise ParameterError(f"order is {self.order}: expected 1 to 4")
         if _core.as_count("lead", self.lead) >= 2**32:
             raise ParameterError(f"lead is {self.lead}: expected less than the period allows")
-        if in_range("leak", self.leak, 1.0, "parts of 1") == 0.0:
-            raise ParameterError("leak is 0: expected above 0, at most 1")
-        _core.as_truth("compensated", self.compensated)
+        if in_range("forgetting_factor", self.forgetting_factor, 1.0, "parts of 1") == 0.0:
+            raise ParameterError("forgetting_factor is 0: expected above 0, at most 1")
         _core.as_truth("pause", self.pause)
 
     @classmethod
+    def from_um(
+        cls,
+        *,
+        period: float,
+        kq: float = 1.0,
+        tq: float | None = None,
+        smoothing: Lag | ZeroPhase | None = LAG,
+        lead: int = 0,
+        forgetting_factor: float = 0.99,
+        pause: bool = True,
+    ) -> Repetitive:
+        """Make a controller from a learning gain in V/um.
+
+        Parameters
+        ----------
+        period : float
+            L [s].
+        kq : float, optional
+            Learning gain [V/um], above 0 and below 2.
+        tq : float, optional
+            Time constant of the filter [s], short for ``smoothing=Lag(tq=...)``.
+        smoothing : Lag or ZeroPhase or None, optional
+            The filter, in place of `tq`.
+        lead, forgetting_factor, pause : optional
+            As in the class.
+
+        Returns
+        -------
+        Repetitive
+            The controller.
+
+        Raises
+        ------
+        ParameterError
+            A number is out of its range, or both `tq` and `smoothing` are given.
+
+        Examples
+        --------
+        >>> import piezotrack as pt
+        >>> pt.Repetitive.from_um(period=5.0, kq=0.6, smoothing=pt.control.ZeroPhase()).kq
+        600000.0
+        """
+        gain = _core.as_number("kq", kq)
+        if not 0.0 < gain < 2.0:
+            raise ParameterError(f"kq is {kq} V/um: expected above 0 and below 2, equation (28)")
+        if tq is not None:
+            if smoothing is not LAG:
+                raise ParameterError(
+                    f"tq is {tq} s beside smoothing, which is {smoothing!r}: expected one of them"
+                )
+            smoothing = Lag(tq=tq)
+        return cls(
+            period=period,
+            kq=1e6 * gain,
+            smoothing=smoothing,
+            lead=lead,
+            forgetting_factor=forgetting_factor,
+            pause=pause,
+        )
+
+    @classmethod
     def xu_li_2010(cls, period: float) -> Repetitive:
-        """Form of Xu and Li 2010: Tq = 0.2 s, Kq = 1.0 V/um, no leak, learning while clipped.
+        """Form of Xu and Li 2010: Tq = 0.2 s, Kq = 1.0 V/um, nothing forgotten, never paused.
 
         Parameters
         ----------
@@ -246,16 +346,20 @@ class Repetitive:
         Repetitive
             The controller.
         """
-        return cls(period=period, leak=1.0, pause=False)
+        return cls(period=period, forgetting_factor=1.0, pause=False)
 
     @property
-    def settings(self) -> tuple[float, float, str, float, float, int, bool]:
-        """The numbers as the core takes them."""
-        lag = "compensated lag" if self.compensated else "lag"
-        kind, number = (
-            (lag, self.tq) if self.smoothing == "lag" else (self.smoothing, float(self.order))
-        )
-        return self.period, self.kq, kind, number, self.leak, self.lead, self.pause
+    def _settings(self) -> tuple[float, float, str, float, float, int, bool]:
+        """The numbers as the core takes them, the gain in V/um."""
+        match self.smoothing:
+            case Lag(tq=tq, compensated=compensated):
+                kind, number = ("compensated lag" if compensated else "lag"), tq
+            case ZeroPhase(order=order):
+                kind, number = "zero phase", float(order)
+            case None:
+                kind, number = "none", 0.0
+        gain = self.kq / 1e6
+        return self.period, gain, kind, number, self.forgetting_factor, self.lead, self.pause
 
 
 @dataclass(frozen=True)
@@ -274,7 +378,7 @@ class LowPass:
         positive("cutoff", self.cutoff, "Hz")
 
     @property
-    def settings(self) -> tuple[str, float, float, float]:
+    def _settings(self) -> tuple[str, float, float, float]:
         """The numbers as the core takes them."""
         return "low pass", self.cutoff, 0.0, 0.0
 
@@ -303,6 +407,6 @@ class Notch:
         in_range("depth", self.depth, 1.0, "parts of 1")
 
     @property
-    def settings(self) -> tuple[str, float, float, float]:
+    def _settings(self) -> tuple[str, float, float, float]:
         """The numbers as the core takes them."""
         return "notch", self.frequency, self.width, self.depth

@@ -1,4 +1,4 @@
-"""Contouring: two controllers lead an XY stage along a path, and how far it is off."""
+"""Contouring: closed-loop simulation of an XY stage along a path, and its contour error."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from .tracking import (
     check_period,
     check_stable,
     check_within_reach,
+    collected,
     feedforward_of,
-    followed,
 )
 
 if TYPE_CHECKING:
@@ -34,21 +34,21 @@ if TYPE_CHECKING:
 
 __all__ = ["Contour", "contour"]
 
-# A start so far from the stage, as a part of the path's size, is worth a note.
+# Distance of the path's start from the stage that is noted, as a part of the path's size.
 JUMP = 0.05
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Contour:
-    """A path that was run.
+    """A contouring run.
 
     Attributes
     ----------
     path : XYReference
-        What was to be followed.
+        The path.
     x, y : Tracking
-        Each axis as `track` has it, with its own metrics: desired, measured and true
-        displacement, voltage and its parts. Both sensors are read at once at the instants ``t``.
+        Each axis as of `track`, with its own metrics: desired, measured and true
+        displacement, voltage and its parts. Both sensors are read at the instants ``t``.
     """
 
     path: XYReference
@@ -65,14 +65,14 @@ class Contour:
 
     @property
     def settled(self) -> float:
-        """Time from which on `metrics` counts [s].
+        """Time from which `metrics` are computed [s].
 
-        As for `Tracking`, but never before the path itself has begun: on the smooth way to it
-        there is no path to be compared with.
+        As for `Tracking`, but never before the path itself begins: the smooth start has no path
+        to compare with.
         """
         ramp = max(self.path.x.ramp, self.path.y.ramp)
-        late = ramp if ramp < self.t[-1] - 1e-9 else 0.0
-        return max(self.x.settled, late)
+        begin = ramp if ramp < self.t[-1] - 1e-9 else 0.0
+        return max(self.x.settled, begin)
 
     @cached_property
     def error(self) -> Array:
@@ -86,21 +86,21 @@ class Contour:
 
     @cached_property
     def metrics(self) -> ErrorStatistics:
-        """Figures of the measured contour error, from `settled` on."""
+        """Statistics of the measured contour error, from `settled` on."""
         return self.score()
 
     def score(
         self, start: float | None = None, stop: float | None = None, *, true: bool = False
     ) -> ErrorStatistics:
-        """Figures of the contour error in a part of the run.
+        """Statistics of the contour error in a part of the run.
 
         Parameters
         ----------
         start, stop : float, optional
-            The part [s]; from `settled` to the end where not given.
+            The part [s]; default from `settled` to the end.
         true : bool, optional
-            Whether the true positions are scored, between the samples too and without noise and
-            steps of the sensors.
+            Whether to use the true positions, between the samples too and without noise and
+            quantisation of the sensors.
 
         Returns
         -------
@@ -110,14 +110,14 @@ class Contour:
         Raises
         ------
         ParameterError
-            There are less than two samples in it.
+            It has fewer than two samples.
         """
         t, errors = (self.x.fine_t, self.fine_error) if true else (self.t, self.error)
         first = self.settled if start is None else start
         return ErrorStatistics.of(_core.spread(errors[self.x.part(t, first, stop)]))
 
     def plot(self) -> Figure:
-        """Path and positions, the error magnified along the path, and the errors over time.
+        """Plot path and positions, the error magnified along the path, and the errors over time.
 
         Returns
         -------
@@ -130,14 +130,14 @@ class Contour:
 
     @property
     def notes(self) -> list[str]:
-        """What a careful reader should know of the run."""
+        """Notes on the run, such as a path that begins away from the stage."""
         jump = float(np.hypot(self.x.error[0], self.y.error[0]))
         reach = max(float(np.ptp(axis.desired)) for axis in (self.x, self.y))
         if jump <= JUMP * reach:
             return []
         return [
-            f"the path begins {1e6 * jump:.3g} um from where the stage is, which has to jump "
-            "there: let it begin at home, (0, 0), or give it a smooth start"
+            f"the path begins {1e6 * jump:.3g} um from the stage, which has to jump "
+            "there: let the path begin at the origin, (0, 0), or with a smooth start"
         ]
 
     def summary(self) -> str:
@@ -181,28 +181,28 @@ def contour(
     beyond_reach: bool = False,
     unstable: bool = False,
 ) -> Contour:
-    """Let two controllers lead an XY stage along a path.
+    """Simulate closed-loop contouring of a path with an XY stage.
 
-    Both axes move in one continuous time. At each sampling instant x is read and its voltage goes
-    out; the stage's lag later the same is done for y, with the same point of the path. Cross-talk
+    Both axes move in continuous time. At each sampling instant x is read and its voltage applied;
+    after the lag of the stage the same is done for y, with the same point of the path. Cross-talk
     couples the loops through their sensors.
 
     Parameters
     ----------
     stage : XYStage
-        What is led.
+        The plant.
     controllers : (Controller, Controller)
-        Those of x and y, with one sampling interval.
+        Of x and y, with the same sampling interval.
     path : XYReference
-        What is to be followed, as ``pt.circle(...)``.
+        The path, as ``pt.circle(...)``.
     decoupling : array_like, shape (2, 2), optional
-        Cross-talk as `identify_cross_talk` finds it: the feedforward follows the path times its
-        inverse, so that what each axis adds to the other is what the other leaves out.
+        Cross-talk as of `identification.identify_cross_talk`: the feedforward follows the path
+        times its inverse, which cancels the cross-talk.
     delay : float, optional
-        Time from a reading to the effect of its voltage [s], besides the hold.
+        Time from a reading to the effect of its voltage [s], in addition to the hold.
     jitter : float, optional
-        How late a sample comes on average [s], as for `track`: of each axis by its own time, but
-        the same for two models, which have no sensor with a seed.
+        Mean sampling jitter [s], as for `track`: drawn for each axis separately, but the same for
+        two models, whose sensors have no seed.
     substeps : int, optional
         Instants kept in each sampling interval.
     beyond_reach, unstable : bool, optional
@@ -211,14 +211,14 @@ def contour(
     Returns
     -------
     Contour
-        The motion, its metrics and pictures.
+        The motion and its metrics.
 
     Raises
     ------
     ParameterError
-        A number is out of its range, the path leaves the reach of a stage, or a loop is unstable.
+        A number is out of its range, the path exceeds the reach of a stage, or a loop is unstable.
     NumericalError
-        A loop runs away.
+        A loop diverges.
 
     Examples
     --------
@@ -244,7 +244,7 @@ def contour(
     substeps = _core.as_count("substeps", substeps)
     forward = path if decoupling is None else path.transformed(_inverse(decoupling))
     free = (_core.as_truth("unstable", unstable), _core.as_truth("beyond_reach", beyond_reach))
-    samples, volts = [], []
+    samples, voltages = [], []
     parts = zip("xy", (stage.x, stage.y), both, path.axes, forward.axes, strict=True)
     for name, axis, controller, reference, ahead in parts:
         samples.append(reference.sample(controller.dt))
@@ -256,22 +256,25 @@ def contour(
                 check_within_reach(axis, controller, samples[-1], 0.0)
         except ParameterError as error:
             raise ParameterError(f"{name}: {error}") from None
-        volts.append(feedforward_of(controller, ahead))
+        along = samples[-1] if ahead is reference else ahead.sample(controller.dt)
+        voltages.append(feedforward_of(controller, ahead, along))
     runs = stage._core.track(
-        (both[0].core, both[1].core),
+        (both[0]._core, both[1]._core),
         (samples[0].x, samples[1].x),
-        (volts[0][0], volts[1][0]),
+        (voltages[0][0], voltages[1][0]),
         (delay, jitter, substeps),
     )
     x, y = (
-        followed(run, controller, reference, note, substeps)
-        for run, controller, reference, (_, note) in zip(runs, both, path.axes, volts, strict=True)
+        collected(run, controller, reference, sampled, note, substeps)
+        for run, controller, reference, sampled, (_, note) in zip(
+            runs, both, path.axes, samples, voltages, strict=True
+        )
     )
     return Contour(path=path, x=x, y=y)
 
 
 def _two(controllers: Sequence[Controller]) -> tuple[Controller, Controller]:
-    """Return the controllers of x and y, which have one interval."""
+    """Return the controllers of x and y, checked to have the same interval."""
     given = list(controllers) if isinstance(controllers, (tuple, list)) else []
     both = [one for one in given if isinstance(one, Controller)]
     if not len(given) == len(both) == 2:

@@ -1,4 +1,4 @@
-"""Pictures of a path that was run."""
+"""Pictures of a contouring run."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ __all__ = [
     "plot_path",
 ]
 
-# How large the largest error is drawn, as a part of the path's smaller side.
+# Size of the largest error in the picture, as a part of the path's smaller side.
 SHOWN = 0.12
 
 
 def plot_path(run: Contour, ax: Axes | None = None) -> Axes:
-    """Plot the path and the measured positions in the plane, with the way to the path.
+    """Plot the path and the measured positions in the plane, with the smooth start.
 
     Parameters
     ----------
     run : Contour
-        A path that was run.
+        The run.
     ax : matplotlib.axes.Axes, optional
-        Where to.
+        Axes to draw in; default a new figure.
 
     Returns
     -------
@@ -48,9 +48,9 @@ def plot_path(run: Contour, ax: Axes | None = None) -> Axes:
     (ax,) = axes_or_new(ax, 1)
     x, y = run.path.outline
     ax.plot(1e6 * x, 1e6 * y, **{**DESIRED, "linewidth": 2.6, "color": "0.72"})
-    way, part = run.t < run.settled, last_turn(run)
+    start, part = run.t < run.settled, last_turn(run)
     ax.plot(
-        1e6 * run.x.measured[way], 1e6 * run.y.measured[way], color="0.5", linewidth=0.6, ls=":"
+        1e6 * run.x.measured[start], 1e6 * run.y.measured[start], color="0.5", linewidth=0.6, ls=":"
     )
     ax.plot(1e6 * run.x.measured[part], 1e6 * run.y.measured[part], **{**ACTUAL, "linewidth": 0.9})
     _plane(ax, run)
@@ -64,11 +64,11 @@ def plot_magnified(run: Contour, ax: Axes | None = None, factor: float | None = 
     Parameters
     ----------
     run : Contour
-        A path that was run.
+        The run.
     ax : matplotlib.axes.Axes, optional
-        Where to.
+        Axes to draw in; default a new figure.
     factor : float, optional
-        By how much; a round number that keeps the errors readable where it is not given.
+        Magnification; default a round number that keeps the errors readable.
 
     Returns
     -------
@@ -82,7 +82,7 @@ def plot_magnified(run: Contour, ax: Axes | None = None, factor: float | None = 
         factor = _round_down(SHOWN * side / run.metrics.max_error)
     x, y = run.path.outline
     ax.plot(1e6 * x, 1e6 * y, color="0.72", linewidth=1.6, label="path")
-    # The place on the path where the motion should be, and to the left of its direction.
+    # The point of the path where the motion should be, and the normal to the left.
     (px, vx, _), (py, vy, _) = (axis.at(run.t[part]) for axis in run.path.axes)
     speed = np.maximum(np.hypot(vx, vy), 1e-30)
     off = factor * run.error[part]
@@ -104,9 +104,9 @@ def plot_contour_error(run: Contour, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     run : Contour
-        A path that was run.
+        The run.
     ax : matplotlib.axes.Axes, optional
-        Where to.
+        Axes to draw in; default a new figure.
 
     Returns
     -------
@@ -132,7 +132,7 @@ def plot_contour(run: Contour) -> Figure:
     Parameters
     ----------
     run : Contour
-        A path that was run.
+        The run.
 
     Returns
     -------
@@ -165,7 +165,7 @@ def plot_contour(run: Contour) -> Figure:
 
 
 def last_turn(run: Contour) -> NDArray[np.bool_]:
-    """Tell the samples of the last turn; all that count where the path is run once."""
+    """Return the samples of the last turn; all settled ones where the path is run once."""
     turn = run.path.period
     start = run.settled
     if turn is not None:
@@ -175,7 +175,7 @@ def last_turn(run: Contour) -> NDArray[np.bool_]:
 
 
 def _plane(ax: Axes, run: Contour) -> None:
-    """Label a picture in the plane, and cut away most of the way from home."""
+    """Label a picture in the plane, and crop most of the smooth start."""
     ax.set(xlabel="x [um]", ylabel="y [um]", aspect="equal")
     edges = [(1e6 * float(axis.min()), 1e6 * float(axis.max())) for axis in run.path.outline]
     room = 0.2 * max(high - low for low, high in edges)

@@ -1,11 +1,11 @@
-"""Controllers: feedforward, feedback and repetitive part together, and sessions of them."""
+"""Controllers of feedforward, feedback and repetitive control, and their sessions."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from .. import _core
 from .._support.arguments import finite, positive
@@ -13,51 +13,46 @@ from ..errors import ParameterError
 from ..stages.inverse import Inverse, InverseSession
 from .components import LowPass, Notch, Pid, Repetitive, StateSpace
 
-if TYPE_CHECKING:
-    from ..identification.identified import IdentifiedModel
-    from .plant import Plant
-    from .stability import LoopReport
-
 __all__ = ["Command", "Controller", "Session"]
 
 
 class Command(NamedTuple):
-    """What a controller asked for at one sample.
+    """Command of a controller at one sample, with its parts.
 
     Attributes
     ----------
-    volts : float
-        The voltage for the amplifier, within the limits [V].
+    voltage : float
+        Command to the amplifier, within the limits [V].
     unclipped : float
         The same before it was clipped [V].
     feedforward, feedback, repetitive : float
         Its parts [V].
     error : float
-        The tracking error that was used [m].
+        Tracking error of the sample [m].
     saturated : bool
         Whether it was clipped.
-    measured_well : bool
-        False where the measurement was not a number, and feedback and learning paused.
-    reference_well : bool
-        False where the reference or the feedforward was not a number; the last one is kept.
+    measurement_valid : bool
+        False where the measurement was not finite: feedback and learning pause.
+    reference_valid : bool
+        False where the reference or the feedforward was not finite: the last one is held.
     """
 
-    volts: float
+    voltage: float
     unclipped: float
     feedforward: float
     feedback: float
     repetitive: float
     error: float
     saturated: bool
-    measured_well: bool
-    reference_well: bool
+    measurement_valid: bool
+    reference_valid: bool
 
 
 @dataclass(frozen=True, kw_only=True)
 class Controller:
     """Feedforward, feedback and repetitive part, clipped to the limits of the amplifier.
 
-    ``u = uFB + uFF + uRC``, and ``v = clip(u)`` goes out.
+    ``u = uFB + uFF + uRC``, and the command is ``v = clip(u)``.
 
     Parameters
     ----------
@@ -69,15 +64,15 @@ class Controller:
         From ``fit.inverse()`` or ``stage.inverse()``.
     feedback : Pid or StateSpace, optional
         The feedback law.
-    addon : Repetitive, optional
-        For a reference that repeats.
+    repetitive : Repetitive, optional
+        Repetitive control, for a reference that repeats.
     filters : sequence of LowPass or Notch, optional
         Up to two, on the measurement, one after the other.
 
     Raises
     ------
     ParameterError
-        A number is out of its range; `kp` is so large or so small that its unit must be wrong.
+        A number is out of its range; `kp` or `kq` is so large or small that its unit must be wrong.
 
     Examples
     --------
@@ -94,74 +89,56 @@ class Controller:
     limits: tuple[float, float]
     feedforward: Inverse | None = None
     feedback: Pid | StateSpace | None = None
-    addon: Repetitive | None = None
+    repetitive: Repetitive | None = None
     filters: Sequence[LowPass | Notch] = ()
-    core: _core.Controller = field(init=False, repr=False, compare=False)
+    _core: _core.Controller = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         dt = positive("dt", self.dt, "s")
         low, high = _limits(self.limits)
-        kinds: dict[str, tuple[object, tuple[type, ...]]] = {
-            "feedforward": (self.feedforward, (Inverse,)),
-            "feedback": (self.feedback, (Pid, StateSpace)),
-            "addon": (self.addon, (Repetitive,)),
-        }
-        for name, (part, kind) in kinds.items():
-            if part is not None and not isinstance(part, kind):
-                expected = " or ".join(f"pt.{one.__name__}" for one in kind)
-                raise ParameterError(f"{name} is {type(part).__name__}: expected {expected}")
+        _check_part("feedforward", self.feedforward, Inverse, "pt.Inverse")
+        _check_part("feedback", self.feedback, (Pid, StateSpace), "pt.Pid or pt.control.StateSpace")
+        _check_part("repetitive", self.repetitive, Repetitive, "pt.Repetitive")
         if not isinstance(self.filters, Sequence):
             raise ParameterError(f"filters is {self.filters!r}: expected a list of filters")
         for one in self.filters:
             if not isinstance(one, (LowPass, Notch)):
                 raise ParameterError(f"filters has {one!r}: expected pt.LowPass or pt.Notch")
         if isinstance(self.feedback, Pid):
-            _check_unit(self.feedback.kp, high - low)
+            _check_unit("kp", self.feedback.kp, high - low, "Pid")
+        if isinstance(self.repetitive, Repetitive):
+            _check_unit("kq", self.repetitive.kq, high - low, "Repetitive")
         pid, law = self.feedback, self.feedback
         core = _core.Controller(
             dt=dt,
             limits=(low, high),
             pid=(pid.kp, pid.ti, pid.td, pid.tt) if isinstance(pid, Pid) else None,
-            state_space=law.matrices if isinstance(law, StateSpace) else None,
-            repetitive=None if self.addon is None else self.addon.settings,
-            filters=[one.settings for one in self.filters],
+            state_space=law._matrices if isinstance(law, StateSpace) else None,
+            repetitive=None if self.repetitive is None else self.repetitive._settings,
+            filters=[one._settings for one in self.filters],
         )
-        object.__setattr__(self, "core", core)
-
-    def check(self, stage: Plant | IdentifiedModel, *, delay: float = 0.0) -> LoopReport:
-        """Gain and phase margins on a stage, and whether the loop is stable: see `check_loop`.
-
-        Parameters
-        ----------
-        stage : VirtualStage, DahlStage, BoucWenStage or PrandtlIshlinskiiStage
-            The stage, or an identified one.
-        delay : float, optional
-            Delay in the loop besides the hold [s].
-
-        Returns
-        -------
-        LoopReport
-            At the lowest, a middle and the highest gain of the stage.
-        """
-        from .stability import check_loop
-
-        return check_loop(self, stage, delay=delay)
+        object.__setattr__(self, "_core", core)
 
     def start(self, *, present: float | None = None) -> Session:
-        """Begin to control, with a memory of its own.
+        """Start a session with its own state.
 
         Parameters
         ----------
         present : float, optional
-            Voltage that the stage has now [V], to go on from without a bump. Where it is not
-            given the feedback part begins at 0 V.
+            Voltage at the stage now [V], for a bumpless start. By default the feedback part begins
+            at 0 V.
 
         Returns
         -------
         Session
-            To be asked once a sampling interval.
+            To be stepped once in each sampling interval.
         """
         return Session(self, present)
+
+
+def _check_part(name: str, part: object, kinds: type | tuple[type, ...], expected: str) -> None:
+    if part is not None and not isinstance(part, kinds):
+        raise ParameterError(f"{name} is {type(part).__name__}: expected {expected}")
 
 
 def _limits(limits: object) -> tuple[float, float]:
@@ -176,34 +153,35 @@ def _limits(limits: object) -> tuple[float, float]:
     return low, high
 
 
-def _check_unit(kp: float, span: float) -> None:
+def _check_unit(name: str, gain: float, span: float, owner: str) -> None:
     """Refuse a gain that no nanopositioner can have: full span for 10 nm, or a trace for 1 mm."""
-    if abs(kp) * 1e-8 > span:
+    if abs(gain) * 1e-8 > span:
         raise ParameterError(
-            f"kp is {kp:g} V/m: expected a gain with which 10 nm of error does not ask for the "
-            f"whole range of {span:g} V; {1e-6 * kp:g} V/m is {1e-12 * kp:g} V/um"
+            f"{name} is {gain:g} V/m: expected a gain with which 10 nm of error asks for less "
+            f"than the whole range of {span:g} V; {1e-6 * gain:g} V/m is {1e-12 * gain:g} V/um"
         )
-    if 0.0 < abs(kp) * 1e-3 < 1e-3 * span:
+    if 0.0 < abs(gain) * 1e-3 < 1e-3 * span:
         raise ParameterError(
-            f"kp is {kp:g} V/m: expected a gain with which 1 mm of error asks for more than a "
-            f"thousandth of the range; if it is in V/um, write pt.Pid.from_um(kp={kp:g}, ...)"
+            f"{name} is {gain:g} V/m: expected a gain with which 1 mm of error asks for more than "
+            "a thousandth of the range; if it is in V/um, write "
+            f"pt.{owner}.from_um({name}={gain:g}, ...)"
         )
 
 
 class Session:
-    """A controller at work: one call in each sampling interval.
+    """A running controller: one call of `step` in each sampling interval.
 
     Parameters
     ----------
     controller : Controller
         The configuration.
     present : float or None
-        Voltage to go on from [V].
+        Voltage for a bumpless start [V].
     """
 
     def __init__(self, controller: Controller, present: float | None = None) -> None:
         self._controller = controller
-        self._core = controller.core.start(
+        self._core = controller._core.start(
             None if present is None else _core.as_number("present", present)
         )
         inverse = controller.feedforward
@@ -226,13 +204,13 @@ class Session:
         Parameters
         ----------
         reference : float
-            Displacement to be followed [m].
+            Desired displacement [m].
         measured : float
-            Displacement measured [m]. NaN is not passed on: feedback and learning hold.
+            Measured displacement [m]. Feedback and learning pause where it is NaN.
         velocity, acceleration, preview : float, optional
             For the inverse, as in `InverseSession.step`.
         feedforward : float, optional
-            Voltage of a table of one's own [V], in place of the inverse's.
+            Voltage of your own table [V], in place of the inverse.
 
         Returns
         -------
@@ -248,15 +226,15 @@ class Session:
             raise ParameterError(
                 f"reference is {reference:g} m: expected metres, and no piezo stage goes so far"
             )
-        volts = 0.0 if feedforward is None else feedforward
+        voltage = 0.0 if feedforward is None else feedforward
         if feedforward is None and self._inverse is not None:
-            volts = self._inverse.step(
+            voltage = self._inverse.step(
                 reference, velocity=velocity, acceleration=acceleration, preview=preview
             )
         try:
-            return self._core.step(reference, measured, volts)
+            return self._core.step(reference, measured, voltage)
         except TypeError:
-            given = {"reference": reference, "measured": measured, "feedforward": volts}
+            given = {"reference": reference, "measured": measured, "feedforward": voltage}
             for name, value in given.items():
                 _core.as_number(name, value)
             raise
@@ -266,18 +244,23 @@ class Session:
         """The last command with its parts."""
         return Command(*self._core.last())
 
-    def applied(self, volts: float) -> None:
-        """Tell what the amplifier really gave for the last command, where it was something else.
+    def applied(self, voltage: float) -> None:
+        """Report the voltage that the amplifier applied, where it differs from the last command.
 
         Parameters
         ----------
-        volts : float
-            Voltage [V]. The antiwindup goes by it.
+        voltage : float
+            Voltage [V], which the antiwindup uses in place of the command.
+
+        Raises
+        ------
+        ParameterError
+            It is not a finite number.
         """
-        self._core.applied(_core.as_number("volts", volts))
+        self._core.applied(finite("voltage", voltage, "V"))
 
     def retune(self, controller: Controller) -> None:
-        """Go on with other gains, without a bump.
+        """Change the gains without a bump.
 
         Parameters
         ----------
@@ -301,11 +284,11 @@ class Session:
             )
         if controller.feedforward != self._controller.feedforward:
             raise ParameterError("feedforward is another: expected that of the session")
-        self._core.retune(controller.core)
+        self._core.retune(controller._core)
         self._controller = controller
 
     def reset(self) -> None:
-        """Forget errors, learning and path."""
+        """Reset the state: errors, learnt signal and hysteresis."""
         self._core.reset()
         if self._inverse is not None:
             self._inverse.reset()

@@ -1,4 +1,4 @@
-"""Plants that a controller can drive: closed-loop simulation and linearisation of a stage."""
+"""Plants that a controller can drive: closed-loop simulation and linearisation of each stage."""
 
 from __future__ import annotations
 
@@ -29,41 +29,41 @@ def unwrap(stage: Plant | IdentifiedModel) -> tuple[Plant, float, float]:
     Raises
     ------
     ParameterError
-        It is nothing that can be led.
+        It is neither a stage model nor an identified one.
     """
-    offset = late = 0.0
+    offset = delay = 0.0
     if isinstance(stage, IdentifiedModel):
-        offset, late, stage = stage.offset, stage.delay, stage.model
+        offset, delay, stage = stage.offset, stage.delay, stage.model
     if not isinstance(stage, Plant):
         raise ParameterError(
             f"stage is {type(stage).__name__}: expected a pt.VirtualStage, a stage of a model, as "
             "a pt.DahlStage, or an identified one"
         )
-    return stage, offset, late
+    return stage, offset, delay
 
 
 def run_closed_loop(
     stage: Plant,
     controller: Controller,
     reference: Array,
-    volts: Array,
-    pace: tuple[float, float, int],
+    feedforward: Array,
+    sampling: tuple[float, float, int],
 ) -> _core.Tracked:
-    """Let a controller lead a stage from rest along a reference [m], with a feedforward [V].
+    """Simulate a closed loop from rest, with reference [m] and feedforward [V] at the samples.
 
-    `pace` is delay and jitter [s], and the instants kept in each control interval.
+    `sampling` is delay and jitter [s], and the substeps kept in each sampling interval.
     """
-    course = (controller.core, reference, volts, pace)
+    run = (controller._core, reference, feedforward, sampling)
     if isinstance(stage, VirtualStage):
-        return stage._core.track(*course)
-    return stage._core.track(min(MODEL_STEP, controller.dt / 4), *course)
+        return stage._core.track(*run)
+    return stage._core.track(min(MODEL_STEP, controller.dt / 4), *run)
 
 
 def linearised_plants(
     stage: Plant, limits: tuple[float, float], delay: float
 ) -> list[_core.LoopPlant]:
-    """Take a stage for small motions: at its lowest, a middle and its highest gain."""
-    low, high = (float(volts) for volts in limits)
+    """Linearise a stage for small motions: at its lowest, a middle and its highest gain."""
+    low, high = (float(limit) for limit in limits)
     if isinstance(stage, VirtualStage):
         mode = (stage.frequency, stage.damping_ratio, stage.bandwidth, delay)
         return [_core.LoopPlant.mode(gain, *mode) for gain in stage._core.gains()]

@@ -1,4 +1,4 @@
-"""Is a controller stable on a stage, and by how much: design of the sampled loop."""
+"""Stability and margins of the sampled loop of a controller and a stage."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = ["LoopCheck", "LoopReport", "LoopResponse", "check_loop"]
 
 @dataclass(frozen=True, kw_only=True)
 class LoopCheck:
-    """The loop at one gain of the stage.
+    """Stability of the loop at one gain of the stage.
 
     Attributes
     ----------
@@ -37,17 +37,18 @@ class LoopCheck:
     stable : bool
         Whether the loop is stable.
     exact : bool
-        Whether that was decided by counting roots; of periods above 10 000 samples the
-        small-gain bound decides, which is enough and not necessary.
+        Whether that was decided by counting roots; for periods above 10 000 samples it is decided
+        by the small-gain bound, which is sufficient but not necessary.
     gain_margin : float or None
-        Factor by which the gain may rise until the feedback is unstable; of an unstable one,
-        that which would make it stable; None where no gain would.
+        Factor on the gain at the stability limit of the feedback; below 1 for an unstable loop;
+        None where there is no such gain.
     phase_margin : float or None
-        Of the feedback without the repetitive part [rad]; None where its gain is never 1.
+        Phase margin of the feedback without the repetitive part [rad]; None where its gain is
+        never 1.
     delay_margin : float or None
-        Delay that makes it unstable [s], counted in whole samples. A part of a sample also
-        moves the samples along the ringing of a fast mode, which can do it much sooner: ask
-        `check_loop` with that delay.
+        Delay that makes the feedback unstable [s], in whole samples. A fraction of a sample also
+        shifts the samples along the ringing of a fast mode, which can destabilise the loop much
+        sooner: use `check_loop` with that delay.
     crossover : float or None
         Highest frequency at which its gain is 1 [Hz].
     sensitivity : float
@@ -55,12 +56,13 @@ class LoopCheck:
     slowest_root : float or None
         Largest radius of a root of the whole loop.
     periods : float or None
-        Periods until 1/e of an error is left; None without a repetitive part.
+        Periods after which 1/e of an error remains; None without a repetitive part.
     small_gain : float or None
-        Largest share of an error that a period leaves, by the small-gain bound: below 1 is
-        enough for stability at any period, and not necessary.
+        Largest share of an error that remains after a period, by the small-gain bound: below 1 is
+        sufficient for stability at any period, but not necessary.
     hidden_roots : int
-        Roots at exactly 1 that show in no error: uRC and uFB moving against each other.
+        Roots at exactly 1 that are not observable in the error: uRC and uFB drift against each
+        other.
     hint : str or None
         What may be wrong with the gain.
     """
@@ -94,7 +96,7 @@ class LoopCheck:
 
 @dataclass(frozen=True, kw_only=True)
 class LoopResponse:
-    """The loop over frequency.
+    """Frequency response of the loop.
 
     Attributes
     ----------
@@ -103,7 +105,7 @@ class LoopResponse:
     open_loop, sensitivity, complementary : ndarray of complex, shape (n,)
         L, 1/(1 + L) and L/(1 + L) of the whole loop.
     learning : ndarray, shape (n,)
-        What a period leaves of an error; 0 without a repetitive part.
+        Share of an error that remains after a period; 0 without a repetitive part.
     """
 
     frequency: Array
@@ -115,18 +117,18 @@ class LoopResponse:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoopReport:
-    """The loop at the lowest, a middle and the highest gain that a stage has for small motions.
+    """Stability of the loop at the lowest, a middle and the highest small-signal gain of a stage.
 
-    Hysteresis makes the gain depend on the way: least just after a reversal.
+    With hysteresis the gain depends on the path: it is least just after a reversal.
 
     Attributes
     ----------
     controller : Controller
         The controller.
     low, middle, high : LoopCheck
-        The loop at these gains.
+        Stability at these gains.
     plant : LoopPlant
-        The stage at the middle gain, as the core has it.
+        The stage linearised at the middle gain, as an object of the core.
     """
 
     controller: Controller
@@ -173,7 +175,7 @@ class LoopReport:
         if count > 100_000:
             raise ParameterError(f"count is {count}: expected 100000 at most")
         frequency = np.geomspace(1e-3 * highest, highest, count)
-        curves = _core.loop_response(self.controller.core, self.plant, frequency.tolist())
+        curves = _core.loop_response(self.controller._core, self.plant, frequency.tolist())
         *pairs, learning = curves
         loop, sensitivity, complementary = (
             np.asarray(pair) @ np.array([1.0, 1.0j]) for pair in pairs
@@ -187,7 +189,7 @@ class LoopReport:
         )
 
     def plot(self) -> Figure:
-        """Open loop, sensitivity and, with a repetitive part, what a period leaves.
+        """Plot open loop, sensitivity and, with a repetitive part, the error left by a period.
 
         Returns
         -------
@@ -200,25 +202,25 @@ class LoopReport:
 
 
 def check_loop(
-    controller: Controller,
     stage: Plant | IdentifiedModel,
+    controller: Controller,
     *,
     delay: float = 0.0,
 ) -> LoopReport:
-    """Tell whether a controller is stable on a stage, and by how much.
+    """Stability and margins of a controller on a stage.
 
-    The stage is taken for small motions: the mode of a virtual stage with its amplifier, a Dahl
-    stage with the slope of its hysteresis force for a spring, or a stage with its hysteresis at
+    The stage is linearised for small motions: a virtual stage as its mode with the amplifier, a
+    Dahl stage with the slope of its hysteresis force as a spring, a stage with its hysteresis at
     the input with the slope of that on the settled loop between the limits, without creep. The
-    voltage is held from sample to sample, and the repetitive part is that which really runs, taps
-    and all.
+    voltage is held from sample to sample, and the repetitive part is taken as implemented, with
+    all its taps.
 
     Parameters
     ----------
+    stage : stage model, VirtualStage or identified model
+        The plant; the delay of an identified one counts.
     controller : Controller
         The controller.
-    stage : VirtualStage, DahlStage, BoucWenStage or PrandtlIshlinskiiStage
-        The stage, or an identified one, whose own delay counts.
     delay : float, optional
         Time from a reading to the effect of its voltage [s], besides the hold.
 
@@ -231,12 +233,14 @@ def check_loop(
     --------
     >>> import piezotrack as pt
     >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
-    >>> report = pt.check_loop(loop, pt.VirtualStage.xu_li_2010())
+    >>> report = pt.check_loop(pt.VirtualStage.xu_li_2010(), loop)
     >>> report.stable
     True
     """
-    led, _, late = unwrap(stage)
-    plants = linearised_plants(led, controller.limits, not_negative("delay", delay, "s") + late)
+    bare, _, plant_delay = unwrap(stage)
+    plants = linearised_plants(
+        bare, controller.limits, not_negative("delay", delay, "s") + plant_delay
+    )
     cases = [_check(controller, plant) for plant in plants]
     return LoopReport(
         controller=controller, low=cases[0], middle=cases[1], high=cases[2], plant=plants[1]
@@ -244,7 +248,7 @@ def check_loop(
 
 
 def _check(controller: Controller, plant: _core.LoopPlant) -> LoopCheck:
-    found = _core.check_loop(controller.core, plant)
+    found = _core.check_loop(controller._core, plant)
     slowest, margin = found["slowest"], found["gain_margin"]
     return LoopCheck(
         gain=plant.static_gain,

@@ -19,12 +19,12 @@ __all__ = ["plot_loop_report"]
 
 
 def plot_loop_report(report: LoopReport) -> Figure:
-    """Plot open loop, sensitivity and, with a repetitive part, what a period leaves of an error.
+    """Plot open loop, sensitivity and, with a repetitive part, the error left by a period.
 
     Parameters
     ----------
     report : LoopReport
-        What is known of a loop.
+        The report.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Tracking: a controller leads a stage along a reference, and how well it does."""
+"""Tracking: closed-loop simulation of a stage along a reference, and its metrics."""
 
 from __future__ import annotations
 
@@ -32,14 +32,15 @@ __all__ = ["Metrics", "Tracking", "track"]
 
 @dataclass(frozen=True, kw_only=True)
 class Metrics(ErrorStatistics):
-    """How well a motion follows its reference; errors are desired less actual.
+    """Metrics of a tracked motion; errors are desired less actual.
 
     Attributes
     ----------
     phase_lag : float or None
-        Of the fundamental [rad]; None where the reference does not repeat.
+        Phase lag of the fundamental [rad]; None where the reference does not repeat.
     widest_loop : float or None
-        Of actual against desired, as a part of the travel; None where it never turns.
+        Widest loop of actual against desired, as a part of the travel; None where the reference
+        never reverses.
     """
 
     phase_lag: float | None
@@ -61,28 +62,28 @@ class Tracking:
     Attributes
     ----------
     reference : Reference
-        What was to be followed.
+        The reference.
     controller : Controller
-        What led the stage.
+        The controller.
     t : ndarray, shape (n,)
         Time of the control samples [s].
     desired, measured, displacement : ndarray, shape (n,)
-        Reference, reading of the sensor, true displacement [m]; the reading is that which the
-        voltage of the same sample was computed from.
+        Reference, sensor reading and true displacement [m]; the voltage of a sample is computed
+        from the reading of the same sample.
     loop_error : ndarray, shape (n,)
-        Error that the controller computed last [m]: of its own reading, after its filters. Of an
-        axis that is served later than the other it is of the point of the path that it was served
-        with, and 0 before.
+        Last error computed by the controller [m], from its filtered reading. For an axis that is
+        sampled after the other it belongs to the point of the path of that sample, and is 0
+        before the first.
     voltage : ndarray, shape (n,)
         Command to the amplifier [V].
     feedforward, feedback, repetitive : ndarray, shape (n,)
         Its parts before it was clipped [V].
     saturated : ndarray of bool, shape (n,)
-        Whether it was clipped.
+        Whether the command was clipped.
     fine_t, fine_displacement, fine_voltage : ndarray, shape (m,)
         Time [s], true displacement [m] and applied voltage [V] between the samples too.
     note : str
-        How the feedforward was computed.
+        Description of the feedforward.
     """
 
     reference: Reference
@@ -112,10 +113,10 @@ class Tracking:
 
     @property
     def settled(self) -> float:
-        """Time from which on `metrics` counts [s].
+        """Time from which `metrics` are computed [s].
 
         After the smooth start; of a reference that repeats, from the first whole period after it
-        where there is one. 0 where the smooth start is all there is.
+        if there is one. 0 where the smooth start lasts to the end.
         """
         period = self.reference.period
         if period is None:
@@ -125,25 +126,25 @@ class Tracking:
 
     @cached_property
     def metrics(self) -> Metrics:
-        """Figures of the measured motion, from `settled` on."""
+        """Metrics of the measured motion, from `settled` on."""
         return self.score()
 
     def score(
         self, start: float | None = None, stop: float | None = None, *, true: bool = False
     ) -> Metrics:
-        """Figures of a part of the run.
+        """Metrics of a part of the run.
 
         Parameters
         ----------
         start, stop : float, optional
-            The part [s]; from `settled` to the end where not given.
+            The part [s]; default from `settled` to the end.
         true : bool, optional
-            Whether the true displacement is scored, without noise and steps of the sensor.
+            Whether to use the true displacement, without noise and quantisation of the sensor.
 
         Returns
         -------
         Metrics
-            The figures.
+            Of that part.
         """
         part = self.part(self.t, start, stop)
         actual = self.displacement if true else self.measured
@@ -155,7 +156,7 @@ class Tracking:
         return _metrics(_core.tracking_metrics(self.desired[part], actual[part], dt, frequency))
 
     def part(self, t: Array, start: float | None, stop: float | None) -> NDArray[np.bool_]:
-        """Tell which instants lie in a part of the run.
+        """Return which instants lie in a part of the run.
 
         Parameters
         ----------
@@ -172,7 +173,7 @@ class Tracking:
         Raises
         ------
         ParameterError
-            There are less.
+            There are fewer.
         """
         first = self.settled if start is None else not_negative("start", start, "s")
         last = math.inf if stop is None else _core.as_number("stop", stop)
@@ -186,9 +187,9 @@ class Tracking:
 
     @cached_property
     def periods(self) -> list[Metrics]:
-        """Figures of each whole period, the first with the smooth start in it.
+        """Metrics of each whole period, the first including the smooth start.
 
-        Empty where the reference does not repeat, ends before its first period does, or has less
+        Empty where the reference does not repeat, ends within its first period, or has fewer
         than four samples in one.
         """
         dt, period = self.controller.dt, self.reference.period
@@ -250,46 +251,46 @@ def track(
     beyond_reach: bool = False,
     unstable: bool = False,
 ) -> Tracking:
-    """Let a controller lead a stage along a reference.
+    """Simulate closed-loop tracking of a reference.
 
-    The stage moves in continuous time; at each sampling instant the sensor is read and the
-    voltage computed from the reading goes out, held until the next.
+    The stage moves in continuous time; at each sampling instant the sensor is read, and the
+    voltage computed from the reading is applied and held until the next.
 
     Parameters
     ----------
-    stage : VirtualStage, DahlStage, BoucWenStage or PrandtlIshlinskiiStage
-        What is led, or an identified one. A model is without noise and amplifier, and starts at
-        rest; with an identified one its offset and delay are in the displacement.
+    stage : stage model, VirtualStage or identified model
+        The plant. A model has no noise and no amplifier, and starts at rest; offset and delay of
+        an identified one are included in the displacement.
     controller : Controller
-        What leads it.
+        The controller.
     reference : Reference
-        What is to be followed, as ``pt.sine(...)``.
+        The reference, as ``pt.sine(...)``.
     delay : float, optional
-        Time from a reading to the effect of its voltage [s], besides the hold.
+        Time from a reading to the effect of its voltage [s], in addition to the hold.
     jitter : float, optional
-        How late a sample comes on average [s], as on a computer that has other things to do: each
-        by its own time, drawn from an exponential distribution that ends at nine tenths of the
-        sampling interval. The draws follow from the seed of the stage's sensor.
+        Mean sampling jitter [s], as on a computer without real-time scheduling: the delay of each
+        sample is drawn from an exponential distribution, truncated at nine tenths of the sampling
+        interval. The draws depend on the seed of the stage's sensor.
     substeps : int, optional
-        Instants kept for plots in each sampling interval.
+        Instants kept in each sampling interval, for plots.
     beyond_reach : bool, optional
-        Whether a reference may leave what the stage can reach within the limits, as to study
-        saturation.
+        Whether the reference may exceed the reach of the stage within the voltage limits, as to
+        study saturation.
     unstable : bool, optional
-        Whether a loop that is unstable for small motions may run.
+        Whether a loop may be unstable for small motions.
 
     Returns
     -------
     Tracking
-        The motion, its metrics and pictures.
+        The motion and its metrics.
 
     Raises
     ------
     ParameterError
-        A number is out of its range, the reference leaves the reach of the stage, or the loop
-        is unstable on it.
+        A number is out of its range, the reference exceeds the reach of the stage, or the loop
+        is unstable.
     NumericalError
-        The loop runs away.
+        The loop diverges.
 
     Examples
     --------
@@ -300,45 +301,47 @@ def track(
     >>> print(f"{run.metrics.phase_lag:.2f} rad")
     0.06 rad
     """
-    led, offset, late = unwrap(stage)
+    plant, offset, plant_delay = unwrap(stage)
     for name, value, kind in (
         ("controller", controller, Controller),
         ("reference", reference, Reference),
     ):
         if not isinstance(value, kind):
             raise ParameterError(f"{name} is {type(value).__name__}: expected pt.{kind.__name__}")
-    # A displacement that is late shows the same as a voltage that is late.
-    delay = not_negative("delay", delay, "s") + late
+    # A delayed displacement and a delayed voltage have the same effect.
+    delay = not_negative("delay", delay, "s") + plant_delay
     substeps = _core.as_count("substeps", substeps)
     samples = reference.sample(controller.dt)
     check_period(controller, reference)
     if not _core.as_truth("unstable", unstable):
-        check_stable(led, controller, delay)
+        check_stable(plant, controller, delay)
     if not _core.as_truth("beyond_reach", beyond_reach):
-        check_within_reach(led, controller, samples, offset)
-    volts, note = feedforward_of(controller, reference)
-    pace = (delay, not_negative("jitter", jitter, "s"), substeps)
-    run = run_closed_loop(led, controller, samples.x - offset, volts, pace)
-    return followed(run, controller, reference, note, substeps, offset)
+        check_within_reach(plant, controller, samples, offset)
+    voltage, note = feedforward_of(controller, reference, samples)
+    sampling = (delay, not_negative("jitter", jitter, "s"), substeps)
+    run = run_closed_loop(plant, controller, samples.x - offset, voltage, sampling)
+    return collected(run, controller, reference, samples, note, substeps, offset)
 
 
-def feedforward_of(controller: Controller, reference: Reference) -> tuple[Array, str]:
-    """Compute the feedforward of a whole run [V], and say how."""
+def feedforward_of(
+    controller: Controller, reference: Reference, samples: SampledReference
+) -> tuple[Array, str]:
+    """Compute the feedforward of a whole run [V], and a note of how."""
     if controller.feedforward is None:
-        return np.zeros(len(reference.sample(controller.dt))), "no feedforward"
-    return controller.feedforward.played(reference, controller.dt)
+        return np.zeros(len(samples)), "no feedforward"
+    return controller.feedforward.played(reference, controller.dt, samples=samples)
 
 
-def followed(
+def collected(
     run: _core.Tracked,
     controller: Controller,
     reference: Reference,
+    samples: SampledReference,
     note: str,
     substeps: int,
     offset: float = 0.0,
 ) -> Tracking:
-    """Put together what the core returns of one axis, its sensor `offset` [m] off."""
-    samples = reference.sample(controller.dt)
+    """Collect the results of one axis, whose sensor has an `offset` [m]."""
     fine_t, fine_displacement, fine_voltage = run.motion()
     fine_displacement = fine_displacement + offset
     return Tracking(
@@ -362,27 +365,27 @@ def followed(
 
 
 def check_period(controller: Controller, reference: Reference) -> None:
-    """Refuse a repetitive part that learns another period than that of the reference."""
-    if controller.addon is None:
+    """Refuse a repetitive part whose period is not that of the reference."""
+    if controller.repetitive is None:
         return
     if reference.period is None:
         raise ParameterError(
             f"reference ({reference.name}) does not repeat: expected one that does, for the "
             "repetitive part"
         )
-    turns = controller.addon.period / reference.period
+    turns = controller.repetitive.period / reference.period
     if abs(turns - max(1, round(turns))) > 1e-6 * turns:
         raise ParameterError(
-            f"addon has a period of {controller.addon.period:g} s: expected that of the "
+            f"repetitive has a period of {controller.repetitive.period:g} s: expected that of the "
             f"reference ({reference.name}), {reference.period:g} s, or a multiple"
         )
 
 
 def check_stable(stage: Plant, controller: Controller, delay: float) -> None:
     """Refuse a loop that is unstable at the middle gain of the stage."""
-    if controller.feedback is None and controller.addon is None:
+    if controller.feedback is None and controller.repetitive is None:
         return
-    report = check_loop(controller, stage, delay=delay)
+    report = check_loop(stage, controller, delay=delay)
     if report.stable:
         return
     one = report.middle
@@ -391,7 +394,7 @@ def check_stable(stage: Plant, controller: Controller, delay: float) -> None:
         found += f": its largest root is {one.slowest_root:.5g}"
     if one.gain_margin is not None and one.gain_margin < 1.0:
         found += f", and {one.gain_margin:.3g} times the gain would be at the limit"
-    elif controller.addon is not None:
+    elif controller.repetitive is not None:
         found += "; without the repetitive part it is stable, so lower kq or take another filter"
     hint = f" ({one.hint})" if one.hint else ""
     raise ParameterError(f"{found}{hint}: expected a stable one, or unstable=True")
@@ -403,9 +406,9 @@ def check_within_reach(
     samples: SampledReference,
     offset: float,
 ) -> None:
-    """Refuse a reference that leaves what the stage reaches between the limits."""
+    """Refuse a reference that exceeds the reach of the stage between the limits."""
     low, high = controller.limits
-    # To the lower limit, and then slowly to the upper one and back: 4 s each way, with rests.
+    # To the lower limit, then slowly to the upper one and back: 4 s each way, with rests.
     t = np.arange(0.0, 11.0, 1e-3)
     u = np.interp(t, [0, 0.5, 1, 5, 6, 10], [0.0, low, low, high, high, low])
     x = stage.simulate(u, 1e-3).x[t >= 1.0] + offset

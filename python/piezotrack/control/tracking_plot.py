@@ -35,7 +35,7 @@ def plot_motion(run: Tracking, ax: Axes | None = None) -> Axes:
     run : Tracking
         A tracked motion.
     ax : matplotlib.axes.Axes, optional
-        Where to.
+        Axes to draw in; default a new figure.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def plot_error(run: Tracking, ax: Axes | None = None) -> Axes:
     run : Tracking
         A tracked motion.
     ax : matplotlib.axes.Axes, optional
-        Where to.
+        Axes to draw in; default a new figure.
 
     Returns
     -------
@@ -87,14 +87,14 @@ def plot_error(run: Tracking, ax: Axes | None = None) -> Axes:
 
 
 def plot_following(run: Tracking, ax: Axes | None = None) -> Axes:
-    """Plot actual against desired displacement, from where the run has settled.
+    """Plot actual against desired displacement, from the settled time on.
 
     Parameters
     ----------
     run : Tracking
         A tracked motion.
     ax : matplotlib.axes.Axes, optional
-        Where to.
+        Axes to draw in; default a new figure.
 
     Returns
     -------
@@ -118,7 +118,7 @@ def plot_effort(run: Tracking, ax: Axes | None = None) -> Axes:
     run : Tracking
         A tracked motion.
     ax : matplotlib.axes.Axes, optional
-        Where to.
+        Axes to draw in; default a new figure.
 
     Returns
     -------
@@ -132,21 +132,21 @@ def plot_effort(run: Tracking, ax: Axes | None = None) -> Axes:
         "feedback": (run.feedback, "C1"),
         "repetitive": (run.repetitive, "C2"),
     }
-    for name, (volts, colour) in parts.items():
-        if np.any(volts):
-            ax.step(run.t, volts, where="post", color=colour, linewidth=1.0, label=name)
+    for name, (voltage, colour) in parts.items():
+        if np.any(voltage):
+            ax.step(run.t, voltage, where="post", color=colour, linewidth=1.0, label=name)
     ax.set(xlabel="time [s]", ylabel="voltage [V]")
     above(ax)
     ax.margins(x=0)
     return ax
 
 
-def plot_feedforward(t: Array, volts: Array, x: Array) -> Figure:
+def plot_feedforward(t: Array, voltage: Array, x: Array) -> Figure:
     """Plot a voltage table over time and over the reference.
 
     Parameters
     ----------
-    t, volts, x : ndarray, shape (n,)
+    t, voltage, x : ndarray, shape (n,)
         Time [s], voltage [V], reference [m].
 
     Returns
@@ -155,10 +155,10 @@ def plot_feedforward(t: Array, volts: Array, x: Array) -> Figure:
         Two panels.
     """
     figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.2), layout="constrained")
-    left.step(t, volts, where="post", color="C0", linewidth=1.1)
+    left.step(t, voltage, where="post", color="C0", linewidth=1.1)
     left.set(xlabel="time [s]", ylabel="feedforward [V]", title="Voltage over time")
     left.margins(x=0)
-    right.plot(1e6 * x, volts, color="C0", linewidth=1.0)
+    right.plot(1e6 * x, voltage, color="C0", linewidth=1.0)
     right.set(xlabel="reference [um]", ylabel="feedforward [V]", title="Voltage over reference")
     return figure
 

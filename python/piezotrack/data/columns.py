@@ -1,6 +1,6 @@
-"""The columns of a log: which one is the time, the drive, the displacement, and in which unit.
+"""Columns of a log: time, drive and displacement, and their units.
 
-A column says so by its title; where it does not, or not clearly, the caller has to.
+A column is found by its title; where that is missing or ambiguous, the caller names it.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 __all__ = ["Column", "Columns"]
 
-# The roles of columns: what they measure, and what they are usually called.
+# The roles of columns: their quantity and usual titles.
 QUANTITIES = {"time": "time", "drive": "voltage", "displacement": "displacement"}
 NAMES = {
     "time": ("time", "t", "timestamp"),
     "drive": ("voltage", "drive", "u", "v", "command", "input", "control", "drive voltage"),
     "displacement": ("displacement", "position", "pos", "x", "y", "output", "sensor", "measured"),
 }
-# What a displacement is called that is to be followed.
+# Usual titles of a reference.
 TO_FOLLOW = ("reference", "desired", "target", "setpoint")
 BY_NUMBER = (
     "there is no header line: name the columns by number and give their units, as in "
@@ -51,7 +51,7 @@ class Column:
 class Columns(list[Column]):
     """The columns of a log in order, made from their titles.
 
-    Its errors say nothing of the file, which it does not know.
+    Its errors do not name the file, which it does not know.
     """
 
     def __init__(self, titles: Sequence[str], *, has_titles: bool) -> None:
@@ -73,8 +73,8 @@ class Columns(list[Column]):
         ParameterError
             `wanted` or `units` name a column that is not there, or a unit that does not fit.
         DataError
-            A role that the caller leaves open has no column or several, or a title has no unit
-            or one that does not fit.
+            A role that the caller does not name has no column or several, or a title has no unit
+            or one of another quantity.
         """
         units = {} if units is None else units
         if not isinstance(units, Mapping):

@@ -1,4 +1,4 @@
-"""A record of one axis of a stage: the drive that went in, the displacement that came out."""
+"""Record of one axis of a stage: drive voltage and displacement."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ class Dataset:
     dt : float, optional
         Sampling interval [s]; the first sample is then at 0 s.
     hold : {"foh", "zoh"}, optional
-        What the drive does between two samples: ``"foh"`` runs straight from one to the next,
-        ``"zoh"`` stays where it is, as the output of a digital controller does.
+        Drive between two samples: ``"foh"`` is linear, ``"zoh"`` is constant, as the output of a
+        digital controller.
     drive_unit : str, optional
         Unit of `u`, for labels.
     columns : mapping of str to array_like, shape (n,), optional
@@ -67,8 +67,8 @@ class Dataset:
     Notes
     -----
     A slice in seconds is a window: ``log[3.0:23.0]`` has the samples with 3 s <= t < 23 s. The
-    drive before the window is kept as warm-up, because hysteresis remembers it; what comes after
-    the window is dropped. The bounds are times on the record's own axis and have to lie in it. A
+    drive before the window is kept as warm-up, because hysteresis has memory; the samples after
+    the window are dropped. The bounds are times on the record's own axis and have to lie in it. A
     window of a window narrows it. `cut` makes a window without warm-up.
 
     A dataset does not change, and its arrays are read-only. It unpacks as ``u, y = log``.
@@ -138,7 +138,7 @@ class Dataset:
 
     @property
     def hold(self) -> Hold:
-        """What the drive does between two samples: ``"foh"`` or ``"zoh"``."""
+        """Drive between two samples: ``"foh"`` (linear) or ``"zoh"`` (constant)."""
         return self._hold
 
     @property
@@ -227,10 +227,10 @@ class Dataset:
         return self._part(first, end, start=0)
 
     def decimate(self, factor: int) -> Dataset:
-        """Return the record at a lower sampling rate, without what that rate cannot show.
+        """Return the record at a lower sampling rate, low-pass filtered before.
 
         Drive, displacement and further columns go through the same low-pass filter, which
-        shifts nothing in time: a finite impulse response with 80 dB from 1.2 times the new
+        has no phase lag: a finite impulse response with 80 dB from 1.2 times the new
         Nyquist frequency on, flat up to 0.8 times. The drive then goes straight from sample to
         sample.
 
@@ -279,7 +279,7 @@ class Dataset:
         return less
 
     def interpolate(self, factor: int) -> Dataset:
-        """Return the record at a higher sampling rate, with what was between the samples.
+        """Return the record at a higher sampling rate, interpolated between the samples.
 
         For a drive whose highest frequencies are near half the sampling rate, where a line from
         sample to sample falls short: at a tenth of the sampling rate by 3 %. Drive, displacement
@@ -302,7 +302,7 @@ class Dataset:
         ------
         ParameterError
             `factor` is not a whole number of 2 or more, or the record's hold is "zoh", which
-            says what was between the samples.
+            already defines the drive between the samples.
 
         Examples
         --------
@@ -334,7 +334,7 @@ class Dataset:
         return fine
 
     def _samples(self, start: float | None, stop: float | None) -> tuple[int, int]:
-        """Turn the bounds of a window [s] into sample numbers of the arrays kept."""
+        """Turn the bounds of a window [s] into indices of the arrays."""
         t = self.t
         # Times and bounds are decimal numbers rounded to binary: equal ones may differ a little.
         slack = max(1e-6 * self._dt, 4.0 * float(np.spacing(np.abs(t).max())))
@@ -396,7 +396,7 @@ def _seconds(name: str, value: object) -> float:
 def _further(
     columns: Mapping[str, ArrayLike] | None, units: Mapping[str, str] | None, u: Array
 ) -> tuple[dict[str, Array], dict[str, str]]:
-    """Check the further columns and their units; every column gets a unit, if an empty one."""
+    """Check the further columns and their units; a missing unit becomes an empty text."""
     columns, units = columns or {}, units or {}
     for argument, mapping in (("columns", columns), ("column_units", units)):
         if not isinstance(mapping, Mapping):

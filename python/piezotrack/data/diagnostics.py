@@ -20,23 +20,23 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["of_fit", "of_record", "refuse"]
+__all__ = ["check_record", "fit_warnings", "record_warnings"]
 
-# A signal turns where it goes back by this share of its range.
+# A signal reverses where it goes back by this share of its range.
 TURN = 0.05
-# A drive that does so much of its range between two samples steps.
+# A change between two samples that counts as a step, as a share of the range.
 JUMP = 0.2
-# How near the window's end has to come to its beginning to close a period, of the range.
+# Largest distance of the window's ends in a closed period, as a share of the range.
 CLOSED = 0.1
-# Held at its end for this share of the window, a drive counts as clipped.
+# A drive held at its extreme for this share of the window counts as clipped.
 CLIPPED = 0.1
-# Voltage [V] that no piezo is driven with, and gains [m/V] and strokes [m] that none has.
+# Voltages [V], gains [m/V] and strokes [m] beyond which a piezo stage is implausible.
 TOO_MANY_VOLTS = 1500.0
 HIGHEST_GAIN, LONGEST = 2e-4, 5e-3
 LOWEST_GAIN, LOWEST_GAIN_OF_COMMAND, COMMAND_VOLTS, SHORTEST = 3e-9, 2e-8, 20.0, 1e-9
-# A stroke in the middle of what there is [m], to tell a factor of 1e3 from one of 1e6.
+# A typical stroke [m], to distinguish a factor of 1e3 from one of 1e6.
 USUAL = 30e-6
-# A remainder [% of stroke] worth a remark, and the share of it that has to follow the loop.
+# Residual [% of stroke] from which a warning is due, and its systematic share.
 REMAINS, FOLLOWS = 1.5, 0.6
 BINS = 16
 FEWEST = 10
@@ -44,23 +44,23 @@ FEWEST = 10
 LOPSIDED = 0.05
 
 
-def refuse(data: Dataset, *, searches_hysteresis: bool) -> None:
-    """Refuse a record on which a search makes no sense.
+def check_record(data: Dataset, *, searches_hysteresis: bool) -> None:
+    """Refuse a record from which hysteresis parameters cannot be identified.
 
     Parameters
     ----------
     data : Dataset
         The record.
     searches_hysteresis : bool
-        Whether a parameter of the hysteresis is searched.
+        Whether a hysteresis parameter is to be identified.
 
     Raises
     ------
     DataError
-        Neither drive nor displacement turns back, and hysteresis is searched.
+        Neither drive nor displacement reverses, and a hysteresis parameter is to be identified.
     """
     whole = data.full
-    # What is constant or too short is refused by the core, in its own words.
+    # Constant or too short records are refused by the core.
     if len(data) < FEWEST or not searches_hysteresis or _steps(whole.u) or np.ptp(whole.u) == 0.0:
         return
     if not _turns(whole.u) and not _turns(whole.y):
@@ -71,8 +71,8 @@ def refuse(data: Dataset, *, searches_hysteresis: bool) -> None:
         )
 
 
-def of_record(data: Dataset) -> list[str]:
-    """Say what is odd about a record, whatever the model.
+def record_warnings(data: Dataset) -> list[str]:
+    """Warnings about a record that do not depend on the model.
 
     Parameters
     ----------
@@ -82,16 +82,16 @@ def of_record(data: Dataset) -> list[str]:
     Returns
     -------
     list of str
-        Sentences, none for a good record.
+        Sentences, none for a sound record.
 
     Examples
     --------
     >>> import numpy as np
     >>> import piezotrack as pt
     >>> u = 5.0 * np.sin(np.arange(5000) / 500.0)
-    >>> of_record(pt.Dataset(u=u, y=4e-6 * u, dt=0.005))
+    >>> record_warnings(pt.Dataset(u=u, y=4e-6 * u, dt=0.005))
     []
-    >>> print(of_record(pt.Dataset(u=u, y=4.0 * u, dt=0.005))[0])
+    >>> print(record_warnings(pt.Dataset(u=u, y=4.0 * u, dt=0.005))[0])
     a stroke of 40 m is not that of a nanopositioner: is the unit of the displacement right? It \
 would be 40 um if it is 1e6 too large, as um taken as m
     """
@@ -100,14 +100,14 @@ would be 40 um if it is 1e6 too large, as um taken as m
     return [*_units(data), *_periods(data), *_clipping(data)]
 
 
-def of_fit(
+def fit_warnings(
     data: Dataset,
     x: Array,
     cost_percent: float,
     hysteresis: Sequence[str],
     held: Collection[str],
 ) -> list[str]:
-    """Say where what a fit leaves is the loop's shape and not noise.
+    """Warning that the residual of a fit is systematic, not noise.
 
     Parameters
     ----------
@@ -116,11 +116,11 @@ def of_fit(
     x : ndarray, shape (n,)
         Displacement of the model in the window, with the offset [m].
     cost_percent : float
-        What remains, in per cent of the stroke.
+        Residual rms, in per cent of the stroke.
     hysteresis : sequence of str
         The parameters of the model's hysteresis.
     held : collection of str
-        The parameters that were not searched.
+        The parameters that were held fixed.
 
     Returns
     -------
@@ -131,25 +131,25 @@ def of_fit(
     if cost_percent <= REMAINS or rest.size < 10 * BINS or _steps(u):
         return []
     rest = rest - rest.mean()
-    # What remains as one function of drive and direction.
+    # The residual as a function of drive and direction.
     means, counts = _branches(u, rest)
     share = float(np.sum(counts * means**2) / np.sum(rest**2))
     if share <= FOLLOWS:
         return []
-    way, place = np.unravel_index(int(np.argmax(np.abs(means))), means.shape)
+    direction, place = np.unravel_index(int(np.argmax(np.abs(means))), means.shape)
     volts = float(u.min() + np.ptp(u) * (place + 0.5) / BINS)
     unit, scale = best_length_unit(data.stroke)
     where = (
-        f"{100 * share:.0f} % of what remains follows drive and direction, "
-        f"{scale * means[way, place]:+.3g} {unit} near {volts:.3g} {data.drive_unit} on the way "
-        f"{('up', 'down')[way]}"
+        f"{100 * share:.0f} % of the residual is a function of drive and direction, "
+        f"{scale * means[direction, place]:+.3g} {unit} near {volts:.3g} {data.drive_unit} with "
+        f"the drive going {('up', 'down')[direction]}"
     )
     kept = [name for name in hysteresis if name in held]
     if kept:
         *first, last = hysteresis
         return [
-            f"the loop is not of the model's shape: {where}; {', '.join(kept)} "
-            f"{'were' if len(kept) > 1 else 'was'} held: search all of "
+            f"the loop does not have the shape of the model: {where}; {', '.join(kept)} "
+            f"{'were' if len(kept) > 1 else 'was'} held fixed: identify all of "
             f"{', '.join(first)} and {last}"
         ]
     what = "is asymmetric, which" if _lopsided(data) else "has a shape that"
@@ -157,7 +157,7 @@ def of_fit(
 
 
 def _branches(u: Array, values: Array) -> tuple[Array, Array]:
-    """Return means of values over drive and direction, up then down, and their counts."""
+    """Return means of values by drive and direction, up then down, and their counts."""
     place = np.minimum((BINS * (u - u.min()) / np.ptp(u)).astype(np.intp), BINS - 1)
     group = place + BINS * (np.gradient(u) < 0.0)
     counts = np.bincount(group, minlength=2 * BINS).astype(np.float64)
@@ -179,7 +179,7 @@ def _turns(signal: Array) -> list[int]:
 
 
 def _steps(u: Array) -> bool:
-    """Whether a drive jumps, or stands still but for jumps."""
+    """Whether a drive has steps, or is constant between steps."""
     if u.size < 2:
         return False
     moves = np.abs(np.diff(u))
@@ -188,7 +188,7 @@ def _steps(u: Array) -> bool:
 
 
 def _units(data: Dataset) -> list[str]:
-    """Remark on voltages, strokes and gains that only a mistaken unit explains."""
+    """Warn of voltages, strokes and gains that only a wrong unit explains."""
     if data.drive_unit == "N":
         return []
     most, swing, stroke = float(np.abs(data.u).max()), float(np.ptp(data.u)), data.stroke
@@ -225,7 +225,7 @@ def _units(data: Dataset) -> list[str]:
 
 
 def _periods(data: Dataset) -> list[str]:
-    """Remark on a drive that does not go round once."""
+    """Warn of a drive with less than one period."""
     u = data.u
     if _steps(u):
         return []
@@ -233,7 +233,7 @@ def _periods(data: Dataset) -> list[str]:
     if turning == 0 and not _turns(data.full.u):
         if _turns(data.y):
             return []
-        return ["the drive never reverses: this record says nothing of hysteresis"]
+        return ["the drive never reverses: this record does not determine the hysteresis"]
     open_end = abs(float(u[-1] - u[0])) > CLOSED * np.ptp(u)
     if turning <= 1 and open_end:
         return [
@@ -245,13 +245,13 @@ def _periods(data: Dataset) -> list[str]:
 
 
 def _clipping(data: Dataset) -> list[str]:
-    """Remark on a drive or a displacement that is cut off at its end."""
+    """Warn of a drive or a displacement that is clipped."""
     u, y = data.u, data.y
-    remarks = []
+    warnings = []
     swing, moves = float(np.ptp(u)), np.abs(np.diff(u))
     quick = float(np.quantile(moves, 0.9))
     still = moves <= 1e-4 * swing
-    # A drive that rests in between as well, as a staircase does, rests on purpose.
+    # A drive that rests elsewhere too, as a staircase does, is not clipped.
     rests = float(
         np.mean(
             still
@@ -267,10 +267,10 @@ def _clipping(data: Dataset) -> list[str]:
         ]
         share = sum(last - first for first, last in runs) / u.size
         if share >= CLIPPED and rests < 0.1 * share:
-            remarks.append(
+            warnings.append(
                 f"the drive is cut off at {level:.4g} {data.drive_unit}, its {end}, for "
-                f"{100 * share:.0f} % of the window: was it clipped? While it stands still, "
-                "it tells nothing of hysteresis"
+                f"{100 * share:.0f} % of the window: was it clipped? A constant drive "
+                "does not determine the hysteresis"
             )
     for level in (float(y.max()), float(y.min())):
         for first, last in _runs(np.abs(y - level) <= 1e-3 * data.stroke):
@@ -278,17 +278,17 @@ def _clipping(data: Dataset) -> list[str]:
             ends = part[[0, -1]]
             further = max(float(part.max() - ends.max()), float(ends.min() - part.min()))
             if last - first >= 10 and further > TURN * swing:
-                remarks.append(
+                warnings.append(
                     f"the displacement stays at {_length(level)} while the drive goes "
                     f"{further:.3g} {data.drive_unit} further and back: is the sensor or the "
                     "stage at its end?"
                 )
                 break
-    return remarks
+    return warnings
 
 
 def _cut_off(moves: Array, first: int, last: int, quick: float, swing: float) -> bool:
-    """Whether a drive that stands still from `first` to `last` was moving up to there."""
+    """Whether a drive that is constant from `first` to `last` was moving before."""
     if first < 4:
         return False
     into = moves[first - 4 : first]
@@ -296,7 +296,7 @@ def _cut_off(moves: Array, first: int, last: int, quick: float, swing: float) ->
 
 
 def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and behind-the-last sample of each stretch where a mask holds."""
+    """Return the first sample, and that after the last, of each run of true entries."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 

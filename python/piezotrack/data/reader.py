@@ -1,7 +1,7 @@
-"""Reading text logs: any usual delimiter, encoding and unit in, seconds, volts and metres out.
+"""Reading text logs of any usual delimiter, encoding and units, in seconds, volts and metres.
 
 A log is never guessed at: a missing unit, two columns that could both be the drive, or a sample
-that is not a number is an error that names the file, the line and what was found there.
+that is not a number is an error that names the file, the line and the entry.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def read(
     dt : float, optional
         Sampling interval [s]. The time column is then ignored and the first sample is at 0 s.
     hold : {"foh", "zoh"}, optional
-        What the drive does between two samples; see `Dataset`.
+        Drive between two samples; see `Dataset`.
 
     Returns
     -------
@@ -109,7 +109,7 @@ def read_drive(
     units: Mapping[str | int, str] | None = None,
     dt: float | None = None,
 ) -> tuple[Array, Array]:
-    r"""Read a drive, to simulate with, from a text file that need not have a displacement.
+    r"""Read a drive from a text file that need not have a displacement.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def read_drive(
     >>> folder = tempfile.TemporaryDirectory()
     >>> path = pathlib.Path(folder.name, "drive.csv")
     >>> _ = path.write_text("t (s);u (V)\n0,0;1,5\n0,1;2,5\n0,2;3,5\n")
-    >>> t, u = pt.read_drive(path)
+    >>> t, u = pt.data.read_drive(path)
     >>> u
     array([1.5, 2.5, 3.5])
     >>> folder.cleanup()
@@ -153,14 +153,14 @@ def read_displacement(
     units: Mapping[str | int, str] | None = None,
     dt: float | None = None,
 ) -> Dataset:
-    r"""Read a displacement, to be followed, from a text file that need not have a drive.
+    r"""Read a displacement from a text file that need not have a drive.
 
     Parameters
     ----------
     path, time, units, dt
         As in `read`.
     displacement : str or int, optional
-        As in `read`; a column called reference, desired, target or setpoint goes first.
+        As in `read`; a column called reference, desired, target or setpoint has priority.
 
     Returns
     -------
@@ -211,12 +211,12 @@ class _TextLog:
             raise self.error("holds a header and no samples", self.header)
 
     def error(self, sentence: str, line: int | None = None) -> DataError:
-        """Make an error about what is in the file."""
+        """Make an error about the content of the file."""
         return DataError(f"{self.name}:{line}: {sentence}" if line else f"{self.name}: {sentence}")
 
     @contextmanager
     def named(self, line: int | None = None) -> Iterator[None]:
-        """Put the name of the file, and the line if what is in it is at fault, before a message."""
+        """Put the name of the file, and the line of a fault, before a message."""
         try:
             yield
         except DataError as error:
@@ -251,7 +251,7 @@ class _TextLog:
         except UnicodeDecodeError:
             if is_utf16:
                 raise self.error("is not a text log: it is cut off or not UTF-16") from None
-            # Latin-1 is what older instruments write for the micro sign.
+            # Older instruments write the micro sign in Latin-1.
             text = data.decode("latin-1")
         if "\r" in text:
             text = text.replace("\r\n", "\n").replace("\r", "\n")
@@ -304,7 +304,7 @@ class _TextLog:
             line = next(islice(self._rows(), fault[0], None))[0]
             raise self.error(f"{roles['time']}: {fault[1]}", line)
         columns, units = self._further(table, {column.index for column in roles.values()})
-        # A drive alone is a record whose displacement nobody looks at, and the other way round.
+        # A drive alone is a record with an unused displacement, and vice versa.
         nothing = np.zeros(len(table))
         with self.named():
             return Dataset(
@@ -351,7 +351,7 @@ class _TextLog:
         return table
 
     def _table_by_line(self, main: Sequence[Column], shape: tuple[int, int], swap: bool) -> Array:
-        """Do the same slowly: to name the first offender, or because a further column has text."""
+        """Do the same line by line, to name a fault, or for further columns with text."""
         table = np.empty(shape)
         for row, (line, text) in enumerate(self._rows()):
             fields = self._fields(text)
@@ -375,7 +375,7 @@ class _TextLog:
         return fields[:-1] if len(fields) > len(self.columns) and not fields[-1] else fields
 
     def _has_decimal_commas(self, main: Sequence[Column]) -> bool:
-        """Tell the decimal mark by the first sample in `main` that has one."""
+        """Find the decimal mark in the first sample of `main` that has one."""
         if self.delimiter == "," or not any("," in line for _, line in self._rows()):
             return False
         for _, line in self._rows():
@@ -387,7 +387,7 @@ class _TextLog:
 
 
 def _are_titles(fields: Sequence[str]) -> bool:
-    """Tell titles from samples: a title may well hold a number, and a sample be a text."""
+    """Whether a line has titles: a title may contain a number, and a sample a text."""
     numbers = sum(not math.isnan(_number(field.replace(",", "."))) for field in fields)
     return 2 * numbers < len(fields)
 
@@ -423,7 +423,7 @@ def _number(text: str) -> float:
 
 
 def _fault(text: str, column: Column, swap: bool) -> str:
-    """Say what is wrong with a field that does not hold a finite number."""
+    """Describe the fault of a field without a finite number."""
     if not text:
         return f"{column} is empty: expected a number"
     if text.lower().lstrip("+-") in ("nan", "inf", "infinity") or math.isinf(_number(text)):

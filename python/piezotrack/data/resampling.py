@@ -19,7 +19,7 @@ TRANSITION = 0.2
 
 
 def low_passed(signal: Array, factor: int) -> Array:
-    """Take off what a rate lower by `factor` cannot show, without a shift in time.
+    """Filter out the frequencies that a rate lower by `factor` cannot represent, without lag.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def low_passed(signal: Array, factor: int) -> Array:
 
 
 def interpolated(signal: Array, factor: int) -> Array:
-    """Fill in samples between the given ones, band-limited.
+    """Insert samples between the given ones, band-limited.
 
     Parameters
     ----------

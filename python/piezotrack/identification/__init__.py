@@ -4,7 +4,8 @@ Swarm search, least squares, step response, sensor noise, cross-talk, the compar
 the model files; tables and pictures stand beside their results.
 """
 
-from .estimates import Estimate
-from .least_squares import LeastSquares
+from __future__ import annotations
 
-__all__ = ["Estimate", "LeastSquares"]
+from .._support.lazy import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, globals())

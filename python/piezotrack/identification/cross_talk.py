@@ -85,7 +85,8 @@ def identify_cross_talk(x_driven: Sequence[Dataset], y_driven: Sequence[Dataset]
     >>> stage = pt.XYStage.xu_li_2010(seed=1)
     >>> u = 37.5 * (1.0 - np.cos(2.0 * np.pi * 0.25 * np.arange(4000) / 1000.0))
     >>> held = np.zeros(4000)
-    >>> found = pt.identify_cross_talk(stage.record(u, held, 1e-3), stage.record(held, u, 1e-3))
+    >>> records = stage.record(u, held, 1e-3), stage.record(held, u, 1e-3)
+    >>> found = pt.identification.identify_cross_talk(*records)
     >>> print(f"{100.0 * found.matrix[0, 1]:.1f} % of y in x")
     1.5 % of y in x
     """

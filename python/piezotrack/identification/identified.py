@@ -351,7 +351,7 @@ def load(path: str | os.PathLike[str]) -> IdentifiedModel:
     Examples
     --------
     >>> import piezotrack as pt
-    >>> model = pt.IdentifiedModel(
+    >>> model = pt.identification.IdentifiedModel(
     ...     model=pt.DahlStage.xu_li_2010(), offset=0.0, offset_fitted=False, stroke=119e-6
     ... )
     >>> import os, tempfile

@@ -122,14 +122,14 @@ class Identification(IdentifiedModel):
     def notes(self) -> list[str]:
         """Remarks on the record and on the fit that limit the use of the result."""
         info, data = self.model.info, self.data
-        notes = diagnostics.of_record(data)
+        notes = diagnostics.record_warnings(data)
         if self.cost_percent > 5.0:
             notes.append(
                 f"the model does not follow this record: {self.cost_percent:.3g} % of stroke remain"
             )
         if self.cost_percent > diagnostics.REMAINS:
             held = [name for name, estimate in self.parameters.items() if not estimate.free]
-            notes += diagnostics.of_fit(
+            notes += diagnostics.fit_warnings(
                 data, self._response.x, self.cost_percent, info.hysteresis, held
             )
         if info.drive_unit == "N" and data.drive_unit != "N":

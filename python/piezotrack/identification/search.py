@@ -75,7 +75,7 @@ def search(
     seed = 0 if seed is None else _core.as_count("seed", seed)
     searched_delay = _delay(False if delay is None else delay)
     held = _held(initial, fixed, free, bounds)
-    diagnostics.refuse(data, searches_hysteresis=bool(set(info.hysteresis) - set(held)))
+    diagnostics.check_record(data, searches_hysteresis=bool(set(info.hysteresis) - set(held)))
     full = data.full
     with ProgressBar(progress) as bar:
         found = _core.identify(

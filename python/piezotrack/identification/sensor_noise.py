@@ -209,7 +209,7 @@ def identify_noise(log: Dataset) -> Noise:
     >>> import numpy as np
     >>> import piezotrack as pt
     >>> stage = pt.VirtualStage.xu_li_2010(seed=1)
-    >>> found = pt.identify_noise(stage.record(np.zeros(20000), 1 / 5000.0))
+    >>> found = pt.identification.identify_noise(stage.record(np.zeros(20000), 1 / 5000.0))
     >>> print(f"{1e6 * found.rms:.3f} um rms in steps of {1e6 * found.resolution:.3f} um")
     0.097 um rms in steps of 0.038 um
     """

@@ -44,11 +44,11 @@ class StepReadings:
     Examples
     --------
     >>> import piezotrack as pt
-    >>> published = pt.StepReadings.from_um(
+    >>> published = pt.identification.StepReadings.from_um(
     ...     voltage=75.0, steady_state=117.7622, peaks=(192.5302, 170.2524), period=0.0058,
     ...     frequency=160.0, static_gain=1.5759, resonance_gain=12.0806,
     ... )
-    >>> published == pt.StepReadings.xu_li_2010()
+    >>> published == pt.identification.StepReadings.xu_li_2010()
     True
     """
 

@@ -328,7 +328,7 @@ def identify_step(
     >>> step = pt.identify_step(stage.record([0.0] * 100 + [75.0] * 1500, 1 / 5000.0))
     >>> print(f"{step.readings.frequency:.0f} Hz, zeta {step.damping_by_decrement:.3f}")
     159 Hz, zeta 0.065
-    >>> published = pt.identify_step(pt.StepReadings.xu_li_2010())
+    >>> published = pt.identify_step(pt.identification.StepReadings.xu_li_2010())
     >>> print(f"a1 = {published.hysteresis['a1']:.4f} 1/m")
     a1 = 121.9874 1/m
     """

@@ -1,4 +1,4 @@
-"""The mathematics of references: motions as functions of time, with their derivatives.
+"""Motions as functions of time with their derivatives.
 
 A motion takes times [s], an array of any shape, and returns the displacement [m], the velocity
 [m/s] and the acceleration [m/s^2] at each.
@@ -35,15 +35,15 @@ __all__ = [
     "schroeder_phases",
 ]
 
-# Points in the shortest period that locate an extreme, and Newton's steps that sharpen it.
+# Grid points in the shortest period to bracket an extremum, and Newton steps to refine it.
 POINTS, NEWTON = 64, 5
 
 
 def s_curve(u: Array) -> tuple[Array, Array, Array]:
-    """Go from 0 to 1 in unit time, from rest to rest, and return value, slope and curvature.
+    """S-curve from 0 to 1 in unit time: value, slope and curvature.
 
     The quintic ``10 u^3 - 15 u^4 + 6 u^5``, whose first two derivatives vanish at both ends; it
-    stays where it is before and after.
+    is constant before and after.
 
     Examples
     --------
@@ -63,7 +63,7 @@ def s_curve(u: Array) -> tuple[Array, Array, Array]:
 def blended(
     motion: Motion, t: Array, ramp: float, origin: float | None = None
 ) -> tuple[Array, Array, Array]:
-    """Evaluate a motion that leaves a place from rest and is itself from `ramp` on.
+    """Evaluate a motion with a smooth start from rest, which ends at `ramp`.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def blended(
     ramp : float
         Length of the start [s]; 0 for none.
     origin : float, optional
-        The place o that is left [m]; the motion's own at time 0 where it is not given.
+        Start o [m]; default the position of the motion at time 0.
 
     Returns
     -------
@@ -86,18 +86,18 @@ def blended(
         return x, v, a
     s, slope, curvature = s_curve(t / ramp)
     start = motion(np.zeros(1))[0][0] if origin is None else origin
-    way = x - start
+    travel = x - start
     at_start = t < ramp
     return (
-        np.where(at_start, start + s * way, x),
-        np.where(at_start, slope * way / ramp + s * v, v),
-        np.where(at_start, curvature * way / ramp**2 + 2.0 * slope * v / ramp + s * a, a),
+        np.where(at_start, start + s * travel, x),
+        np.where(at_start, slope * travel / ramp + s * v, v),
+        np.where(at_start, curvature * travel / ramp**2 + 2.0 * slope * v / ramp + s * a, a),
     )
 
 
 @dataclass(frozen=True)
 class Cosines:
-    """``offset + sum of amplitudes cos(2 pi frequencies t + phases)``: a sine, or several."""
+    """``offset + sum of amplitudes cos(2 pi frequencies t + phases)``: a sum of cosines."""
 
     offset: float
     amplitudes: tuple[float, ...]
@@ -120,7 +120,7 @@ class Cosines:
 
 @dataclass(frozen=True)
 class Chirp:
-    """``mid - amplitude cos(phase)``, the frequency going evenly from `start` to `stop`."""
+    """``mid - amplitude cos(phase)``, the frequency linear in time from `start` to `stop`."""
 
     mid: float
     amplitude: float
@@ -139,7 +139,7 @@ class Chirp:
 
 @dataclass(frozen=True)
 class Triangle:
-    """From `low` to `high` and back at one speed, but for rounded corners.
+    """Triangle wave from `low` to `high` with rounded corners.
 
     In a corner the velocity follows ``1.5 u - 0.5 u^3`` from one speed to the other, u from -1 to
     1, so that the acceleration has no jump.
@@ -153,7 +153,7 @@ class Triangle:
     def __call__(self, t: Array) -> tuple[Array, Array, Array]:
         """Return displacement, velocity and acceleration at the times `t`."""
         half = 0.5 * self.period
-        # Half the time that a corner takes, and the speed that still reaches both ends.
+        # Half the duration of a corner, and the speed with which both ends are still reached.
         corner = 0.25 * self.rounding * self.period
         speed = (self.high - self.low) / (half - 0.75 * corner)
         number = np.round(t / half)
@@ -161,14 +161,14 @@ class Triangle:
         if corner > 0.0:
             u = np.clip(s / corner, -1.0, 1.0)
             beyond = np.maximum(np.abs(s) - corner, 0.0)
-            way = speed * (corner * (0.75 - 0.125 * u**2) * u**2 + beyond)
+            travel = speed * (corner * (0.75 - 0.125 * u**2) * u**2 + beyond)
             v = speed * (1.5 - 0.5 * u**2) * u
             a = 1.5 * speed / corner * (1.0 - u**2)
         else:
-            way, v, a = speed * np.abs(s), np.where(s < 0.0, -speed, speed), np.zeros(t.shape)
+            travel, v, a = speed * np.abs(s), np.where(s < 0.0, -speed, speed), np.zeros(t.shape)
         is_low = np.mod(number, 2.0) == 0.0
         return (
-            np.where(is_low, self.low + way, self.high - way),
+            np.where(is_low, self.low + travel, self.high - travel),
             np.where(is_low, v, -v),
             np.where(is_low, a, -a),
         )
@@ -176,9 +176,9 @@ class Triangle:
 
 @dataclass(frozen=True)
 class Steps:
-    """Levels one after the other, each held for `dwell` and left along an S-curve.
+    """Levels in sequence, each held for `dwell`, with S-curves between them.
 
-    After the last level comes the first again where `cyclic`, and else it is held for ever.
+    If `cyclic`, the first level follows the last; else the last level is held.
     """
 
     levels: tuple[float, ...]
@@ -197,17 +197,17 @@ class Steps:
             following[-1] = levels[-1]
         number = np.clip(np.floor(t / step), 0, levels.size - 1).astype(np.intp)
         s, slope, curvature = s_curve((t - number * step - self.dwell) / self.rise)
-        way = (following - levels)[number]
-        x = levels[number] + way * s
-        return x, way * slope / self.rise, way * curvature / self.rise**2
+        travel = (following - levels)[number]
+        x = levels[number] + travel * s
+        return x, travel * slope / self.rise, travel * curvature / self.rise**2
 
 
 @dataclass(frozen=True, eq=False)
 class Spline:
     """The quintic spline through samples `x`, at interval `dt`.
 
-    It repeats where `cyclic`; else it goes on after the last sample at that sample's
-    acceleration, for the one interval that belongs to it.
+    It repeats if `cyclic`; else it continues for one interval after the last sample with the
+    acceleration of that sample.
     """
 
     x: Array
@@ -218,10 +218,10 @@ class Spline:
     def _splines(self) -> tuple[Any, Any, Any]:
         from scipy.interpolate import make_interp_spline
 
-        # The samples' own numbers as knots keep the system well scaled at any interval.
+        # Sample indices as knots keep the system well scaled at any interval.
         values = np.append(self.x, self.x[0]) if self.cyclic else self.x
         kind = "periodic" if self.cyclic else None
-        # Taken from the first sample, a flat record stays flat.
+        # Relative to the first sample, a constant record stays exactly constant.
         spline = make_interp_spline(np.arange(values.size), values - values[0], 5, bc_type=kind)
         return spline, spline.derivative(1), spline.derivative(2)
 
@@ -246,14 +246,14 @@ def extremes(motion: Motion, duration: float, shortest: float) -> tuple[float, f
     motion : callable
         A smooth motion.
     duration : float
-        How long to look at it [s].
+        Interval to search, from 0 on [s].
     shortest : float
         The shortest period in it [s].
 
     Returns
     -------
     low, high : float
-        Located on a grid and sharpened by Newton's method [m].
+        Bracketed on a grid and refined by Newton's method [m].
 
     Examples
     --------
@@ -277,7 +277,7 @@ def extremes(motion: Motion, duration: float, shortest: float) -> tuple[float, f
 
 
 def schroeder_phases(amplitudes: Array) -> Array:
-    """Return phases [rad] that keep a sum of cosines at neighbouring harmonics low.
+    """Return phases [rad] that give a sum of neighbouring harmonics a low crest factor.
 
     Schroeder 1970, doi 10.1109/TIT.1970.1054411, equation (11): with the relative powers p_l the
     phase of the n-th is ``-2 pi`` times the sum of ``(n - l) p_l`` over l < n.
@@ -304,7 +304,7 @@ def schroeder_phases(amplitudes: Array) -> Array:
 
 
 def common_period(frequencies: tuple[float, ...]) -> float:
-    """Return the time after which all frequencies [Hz] have made whole turns [s], or infinity.
+    """Return the common period of frequencies [Hz] in s, or infinity.
 
     Examples
     --------
@@ -312,7 +312,7 @@ def common_period(frequencies: tuple[float, ...]) -> float:
     (10.0, inf)
     """
     exact = [Fraction(frequency).limit_denominator(10**6) for frequency in frequencies]
-    # A frequency is a decimal or a ratio of small numbers to the last digit, or it is neither.
+    # Frequencies are taken as decimals or ratios of small integers, exact to the last digit.
     if any(
         abs(float(ratio) - frequency) > 1e-14 * frequency
         for ratio, frequency in zip(exact, frequencies, strict=True)

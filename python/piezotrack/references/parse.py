@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["parse_path", "parse_reference"]
 
-# How long a reference is that repeats and says nothing of its length.
+# Length of a periodic reference where none is given, in periods.
 PERIODS = 4.0
 
 HERTZ = Unit("Hz", "frequency", "Hz")
@@ -43,9 +43,9 @@ PLAIN = Unit("", "number", "")
 
 @dataclass(frozen=True)
 class Kind:
-    """How a kind of reference is written, and what its items are for.
+    """Text form of a kind of reference, and the meaning of its items.
 
-    An item without keyword is told by what it measures and how its values are joined.
+    An item without keyword is identified by its quantity and by the separator of its values.
     """
 
     make: Callable[..., Any]
@@ -106,7 +106,7 @@ KINDS = {
         ("frequencies", "low", "duration"),
     ),
 }
-# Arguments that take a list, and what the rest is called where it is missing.
+# Arguments that take a list, and the names of missing items in messages.
 LISTS = ("levels", "frequencies", "sizes", "centre")
 MISSING = {"low": "range", "start_frequency": "frequencies"}
 
@@ -132,8 +132,8 @@ def parse_reference(text: str, *, duration: float | None = None) -> Reference:
     Parameters
     ----------
     text : str
-        The kind and what is to be known of it. A length of time on its own is the duration; the
-        last of several values joined by ``..`` or ``/`` gives its unit to those without one.
+        The kind and its items. A time without keyword is the duration; of several values joined
+        by ``..`` or ``/`` the unit of the last applies to those without one.
     duration : float, optional
         Length [s], where `text` has none. Without either, a sine or a triangle lasts four
         periods, a staircase and a file as long as they are, and the others need one.
@@ -146,8 +146,8 @@ def parse_reference(text: str, *, duration: float | None = None) -> Reference:
     Raises
     ------
     ParameterError
-        The text cannot be understood, or a value cannot be used. The message shows what was
-        expected.
+        The text cannot be parsed, or a value cannot be used. The message shows the expected
+        form.
     DataError
         The file cannot be read or used.
 
@@ -170,7 +170,7 @@ def made_from_text(
     read: Callable[..., Any],
     duration: float | None,
 ) -> Any:
-    """Make what a text describes, or read it where the text is a file's name."""
+    """Parse a text, or read the file that it names."""
     examples = ", ".join(kind.example for kind in kinds.values())
     if not isinstance(text, str) or not text.strip():
         raise ParameterError(f"{what} is {text!r}: expected a file or one of {examples}")
@@ -178,7 +178,7 @@ def made_from_text(
     kind = kinds.get(name.lower())
     is_there = os.path.exists(text)
     if kind is None or (is_there and not colon):
-        # A colon after one letter is that of a drive.
+        # A colon after one letter belongs to a drive of Windows.
         is_path = not colon or len(name) == 1
         if is_there or (is_path and Path(text).suffix):
             return read(text, duration=duration)
@@ -201,7 +201,7 @@ def made_from_text(
 
 
 def _values(kind: Kind, text: str) -> dict[str, Any]:
-    """Return the values in a text by the arguments that they are for."""
+    """Return the values of a text by argument."""
     values: dict[str, Any] = {}
     for item in filter(None, (part.strip() for part in text.split(","))):
         keyword, equals, written = (part.strip() for part in item.rpartition("="))
@@ -226,7 +226,7 @@ def _values(kind: Kind, text: str) -> dict[str, Any]:
 
 
 def _item(text: str) -> tuple[list[float], str, str]:
-    """Read one value or several: the numbers in SI, what they measure and how they are joined."""
+    """Parse one value or several: the numbers in SI, their quantity and their separator."""
     if "..." in text:
         raise ParameterError(f"{text!r} has three dots: expected two, as in 0..110um")
     join = next((mark for mark in ("..", "/") if mark in text), "")
@@ -326,7 +326,7 @@ def parse_path(text: str, *, duration: float | None = None) -> XYReference:
     Parameters
     ----------
     text : str
-        The kind and what is to be known of it, as for `parse_reference`.
+        The kind and its items, as for `parse_reference`.
     duration : float, optional
         Length [s], where `text` has none; not for a spiral, which has its own.
 
@@ -338,15 +338,15 @@ def parse_path(text: str, *, duration: float | None = None) -> XYReference:
     Raises
     ------
     ParameterError
-        The text cannot be understood, or a value cannot be used. The message shows what was
-        expected.
+        The text cannot be parsed, or a value cannot be used. The message shows the expected
+        form.
     DataError
         The file cannot be read or used.
 
     Examples
     --------
     >>> import piezotrack as pt
-    >>> pt.parse_path("circle:0.1Hz,10um,centre=50/50um")
+    >>> pt.references.parse_path("circle:0.1Hz,10um,centre=50/50um")
     XYReference(circle 10 um, 0.1 Hz, 40 to 60 by 40 to 60 um, 30 s)
     """
     if duration is not None and str(text).strip().lower().startswith("spiral:"):

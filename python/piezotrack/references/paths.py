@@ -24,7 +24,7 @@ __all__ = ["circle", "lissajous", "raster", "spiral"]
 
 # The middle of the workspace of Xu and Li 2010, 117 um by 117 um [m].
 MIDDLE = (58.5e-6, 58.5e-6)
-# Times that a closed path is run: the first has the start in it.
+# Default number of turns of a closed path: the first includes the smooth start.
 PERIODS = 3.0
 # Most turns of a spiral.
 MOST_TURNS = 10000
@@ -40,7 +40,7 @@ def circle(
     ramp: float | None = None,
     origin: Sequence[float] | None = HOME,
 ) -> XYReference:
-    r"""Run a circle counter-clockwise.
+    r"""Make a circle, counter-clockwise.
 
     .. math:: x = c_x + R \cos(2 \pi f t + \varphi), \quad y = c_y + R \sin(2 \pi f t + \varphi)
 
@@ -51,15 +51,15 @@ def circle(
     radius : float
         R [m], above 0.
     centre : (float, float), optional
-        Centre [m]; the middle of the workspace of Xu and Li 2010 where it is not given.
+        Centre [m]; default the middle of the workspace of Xu and Li 2010.
     duration : float, optional
-        Length [s]; three turns where it is not given.
+        Length [s]; default three turns.
     phase : float, optional
-        Where on the circle it would begin [rad].
+        Phase at time 0 [rad].
     ramp : float, optional
-        Length of the smooth start [s], see `Reference`; 2 s where it is not given, 0 for none.
+        Length of the smooth start [s], see `Reference`; default 2 s, 0 for none.
     origin : (float, float) or None, optional
-        Where the smooth start leaves from [m]; None for the path's own beginning.
+        Position from which the smooth start begins [m]; None for the first point of the path.
 
     Returns
     -------
@@ -102,7 +102,7 @@ def lissajous(
     ramp: float | None = None,
     origin: Sequence[float] | None = HOME,
 ) -> XYReference:
-    r"""Run a Lissajous figure, as for a scan without turning points.
+    r"""Make a Lissajous figure, as for a scan without reversals at constant speed.
 
     .. math:: x = c_x + A \sin(2 \pi f_x t + \varphi), \quad y = c_y + B \sin(2 \pi f_y t)
 
@@ -113,9 +113,9 @@ def lissajous(
     sizes : (float, float)
         Amplitudes A and B [m], above 0.
     centre, duration, ramp, origin
-        As in `circle`; three common periods where no duration is given.
+        As in `circle`; the default duration is three common periods.
     phase : float, optional
-        Lead of x [rad].
+        Phase of x ahead of y [rad].
 
     Returns
     -------
@@ -159,11 +159,12 @@ def raster(
     ramp: float | None = None,
     origin: Sequence[float] | None = HOME,
 ) -> XYReference:
-    r"""Scan line by line, as a scanning probe microscope does.
+    r"""Make a raster scan, line by line, as in a scanning probe microscope.
 
-    x traces each line at one speed and flies back along a quintic that joins speed and
-    acceleration, beyond both ends of the line; y stands still along a line, goes on to the next
-    during the flyback and returns to the first during one further line, along S-curves.
+    x traces each line at constant speed and returns (flyback) along a quintic with continuous
+    speed and acceleration, which overshoots both ends of the line; y is constant along a line,
+    moves to the next during the flyback and returns to the first during one further line, along
+    S-curves.
 
     Parameters
     ----------
@@ -176,9 +177,9 @@ def raster(
     centre, ramp, origin
         As in `circle`.
     flyback : float, optional
-        Share of a line's time that is spent flying back, from 0.05 to 0.9.
+        Flyback as a share of the line's time, from 0.05 to 0.9.
     duration : float, optional
-        Length [s]; two frames where it is not given.
+        Length [s]; default two frames.
 
     Returns
     -------
@@ -214,7 +215,7 @@ def raster(
     period = (count + 1) * line
     name = f"raster of {count} lines at {rate:g} Hz"
     length = 2.0 * period if duration is None else duration
-    # Two samples in each half of a flyback show its course.
+    # Two samples in each half of a flyback resolve it.
     shortest = (share * line, share * line)
     return _path(name, motions, period, length, ramp, origin, shortest)
 
@@ -228,23 +229,23 @@ def spiral(
     ramp: float | None = None,
     origin: Sequence[float] | None = HOME,
 ) -> XYReference:
-    r"""Run an Archimedean spiral from its centre at a constant angular speed.
+    r"""Make an Archimedean spiral from its centre at constant angular speed.
 
     .. math:: r = p f t, \quad x = c_x + r \cos(2 \pi f t), \quad y = c_y + r \sin(2 \pi f t)
 
-    Mahmood and Moheimani 2009, doi 10.1088/0957-4484/20/36/365503: a scan that asks each axis for
-    one frequency only.
+    Mahmood and Moheimani 2009, doi 10.1088/0957-4484/20/36/365503: a scan with a single
+    frequency on each axis.
 
     Parameters
     ----------
     frequency : float
         Turns in a second f [Hz], above 0.
     radius : float
-        Where it ends [m], above 0.
+        Final radius [m], above 0.
     pitch : float
-        Distance p of one turn from the next [m], above 0 and below `radius`.
+        Distance p between turns [m], above 0 and below `radius`.
     centre, ramp, origin
-        As in `circle`. What the smooth start takes of the time, it takes of the inner turns.
+        As in `circle`. The smooth start replaces a part of the inner turns.
 
     Returns
     -------
@@ -283,7 +284,7 @@ def spiral(
 
 @dataclass(frozen=True)
 class _Trace:
-    """Along a line of the length `width` at one speed, and back within `back` of each `line`."""
+    """Fast axis: a line of length `width` at constant speed, back within `back` of each `line`."""
 
     low: float
     width: float
@@ -294,19 +295,19 @@ class _Trace:
         along = np.mod(t, self.line)
         forth = self.line - self.back
         speed = self.width / forth
-        # The way back is that of an S-curve on top of the speed that goes on.
-        way = self.width + speed * self.back
+        # The flyback is an S-curve added to the constant speed.
+        travel = self.width + speed * self.back
         s, slope, curvature = s_curve((along - forth) / self.back)
         return (
-            self.low + speed * along - way * s,
-            speed - way * slope / self.back,
-            -way * curvature / self.back**2,
+            self.low + speed * along - travel * s,
+            speed - travel * slope / self.back,
+            -travel * curvature / self.back**2,
         )
 
 
 @dataclass(frozen=True)
 class _Lines:
-    """From line to line within `back`, and to the first again within `back` and one `line`."""
+    """Slow axis: to the next line within `back`, to the first within `back` and one `line`."""
 
     low: float
     height: float
@@ -320,13 +321,13 @@ class _Lines:
         number = np.minimum(np.floor(along / self.line), last)
         step = self.height / last
         returns = number == last
-        way = np.where(returns, -self.height, step)
+        travel = np.where(returns, -self.height, step)
         time = np.where(returns, self.back + self.line, self.back)
         s, slope, curvature = s_curve((along - (number + 1.0) * self.line + self.back) / time)
         return (
-            self.low + number * step + way * s,
-            way * slope / time,
-            way * curvature / time**2,
+            self.low + number * step + travel * s,
+            travel * slope / time,
+            travel * curvature / time**2,
         )
 
 
@@ -393,7 +394,7 @@ def _pair(name: str, values: Sequence[float]) -> tuple[float, float]:
 
 
 def _size(name: str, value: float) -> float:
-    """Return a length above 0 that is no other unit's."""
+    """Return a length above 0 that is plausible in metres."""
     size = positive(name, value, "m")
     check_length(name, size)
     return size

@@ -1,4 +1,4 @@
-"""References: what a stage is to follow, as functions of time with exact derivatives."""
+"""References as functions of time with exact derivatives."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = ["Reference", "SampledReference", "read_reference"]
 
 MIN_SAMPLES = 6
 MOST_SAMPLES = 10**7
-# What a quotient of two decimal numbers may be off, in samples.
+# Rounding error of a quotient of two decimal numbers, in samples.
 ROUNDING = 1e-3
 
 
@@ -65,15 +65,15 @@ class SampledReference:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Reference:
-    r"""What a stage is to follow: displacement, velocity and acceleration as functions of time.
+    r"""Reference: displacement, velocity and acceleration as functions of time.
 
     `sine`, `triangle`, `staircase`, `chirp`, `multisine`, `read_reference` and
-    `Reference.from_samples` make them; a function of one's own does as well.
+    `Reference.from_samples` make them; so can your own function as `motion`.
 
     Parameters
     ----------
     name : str
-        What it is, for titles.
+        Name for titles.
     duration : float
         Length [s], above 0.
     low, high : float
@@ -88,8 +88,8 @@ class Reference:
     shortest : float, optional
         The shortest period in `motion` [s]; a sampling interval above half of it is refused.
     origin : float, optional
-        Where the smooth start leaves from [m]; the first displacement of `motion` where it is
-        not given. Without a smooth start it has no effect.
+        Displacement from which the smooth start begins [m]; default the first displacement of
+        `motion`. Used with a smooth start only.
 
     Raises
     ------
@@ -98,16 +98,16 @@ class Reference:
 
     Notes
     -----
-    The smooth start leaves the first displacement from rest, and is the motion itself, in phase,
-    from `ramp` on:
+    The smooth start begins at the first displacement at rest, and is identical to the motion,
+    in phase, from `ramp` on:
 
     .. math::
 
         x(t) = o + s(t / r) \, (m(t) - o), \qquad s(u) = 10 u^3 - 15 u^4 + 6 u^5
 
     for t < r, with o = `origin`, or else m(0). Displacement, velocity and acceleration have no
-    jump, the first displacement is kept at velocity and acceleration 0, and the range is not
-    left. A motion that itself begins at full velocity is up to 1.8 times as fast meanwhile.
+    jump, velocity and acceleration are 0 at the start, and the range is not
+    left. A motion that begins at full velocity is up to 1.8 times as fast meanwhile.
 
     Examples
     --------
@@ -251,7 +251,7 @@ class Reference:
         ramp: float = 0.0,
         name: str = "samples",
     ) -> Reference:
-        """Make a reference that goes through samples, its derivatives from a quintic spline.
+        """Make a reference through samples, with derivatives of a quintic spline.
 
         Parameters
         ----------
@@ -269,7 +269,7 @@ class Reference:
             Length of the smooth start [s], see `Reference`. By default the samples are followed
             from the first on, even if that asks for a jump of the velocity.
         name : str, optional
-            What it is, for titles.
+            Name for titles.
 
         Returns
         -------
@@ -390,7 +390,7 @@ def read_reference(
     >>> path = pathlib.Path(folder.name, "target.csv")
     >>> lines = [f"{k / 50},{k * k / 100}" for k in range(101)]
     >>> _ = path.write_text("\n".join(["time_s,displacement_um", *lines]))
-    >>> pt.read_reference(path)
+    >>> pt.references.read_reference(path)
     Reference(target.csv, 0 to 102.01 um, 2.02 s)
     >>> folder.cleanup()
     """

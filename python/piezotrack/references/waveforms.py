@@ -168,7 +168,7 @@ def staircase(
     rise: float | None = None,
     duration: float | None = None,
 ) -> Reference:
-    r"""Hold one level after the other, with an S-curve between them.
+    r"""Make a staircase: levels held in sequence, with S-curves between them.
 
     Give either `steps` with `low` and `high`, for a staircase of equal steps up and down again,
     or `levels`.
@@ -176,9 +176,9 @@ def staircase(
     Parameters
     ----------
     dwell : float
-        How long each level is held [s], 0 or above.
+        Hold time of each level [s], 0 or above.
     steps : int, optional
-        Number of steps from `low` to `high`, 1 or more; as many lead back.
+        Number of steps from `low` to `high`, 1 or more, and as many back.
     low, high : float, optional
         Lowest and highest level [m].
     levels : array_like, shape (n,), optional
@@ -253,7 +253,7 @@ def chirp(
     duration: float,
     ramp: float | None = None,
 ) -> Reference:
-    r"""Go up and down at a frequency that changes evenly with time, from `low` at rest.
+    r"""Make a chirp: a sine whose frequency changes linearly with time, from `low` at rest.
 
     .. math::
 
@@ -314,7 +314,7 @@ def multisine(
     seed: int | None = None,
     ramp: float | None = None,
 ) -> Reference:
-    r"""Follow a sum of cosines, ``offset + sum of A_k cos(2 pi f_k t + phi_k)``.
+    r"""Make a sum of cosines, ``offset + sum of A_k cos(2 pi f_k t + phi_k)``.
 
     Give either `low` and `high`, between which the sum is fitted, or `offset` and `amplitudes`.
 
@@ -344,7 +344,7 @@ def multisine(
     -------
     Reference
         With its exact derivatives. Its period is the shortest time in which all cosines make
-        whole turns, and None where `duration` does not hold one.
+        whole turns, and None where `duration` is shorter than one.
 
     Raises
     ------

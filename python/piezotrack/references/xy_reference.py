@@ -1,4 +1,4 @@
-"""References in the plane: what an XY stage is to follow, one reference for each axis."""
+"""References in the plane for an XY stage: one reference for each axis."""
 
 from __future__ import annotations
 
@@ -26,29 +26,29 @@ if TYPE_CHECKING:
 
 __all__ = ["XYReference", "read_path"]
 
-# How far a chord of the outline may be off the curve [m]: far below any sensor.
+# Tolerance of the outline [m], far below the resolution of any sensor.
 SAGITTA = 1e-10
 COARSE, FINEST = 2000, 400_000
-# Where a stage is before a path, and the time from there to the path [s]: 100 um at 94 um/s at
-# most, for a stage of 0.1 s.
+# Position of a stage before a path, and the time from there to the path [s]: 100 um at 94 um/s
+# at most, for a stage with a time constant of 0.1 s.
 HOME = (0.0, 0.0)
 START = 2.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class XYReference:
-    """A path in the plane, run in time: one `Reference` for each axis.
+    """A path in the plane as a function of time: one `Reference` for each axis.
 
     `circle`, `lissajous`, `raster`, `spiral` and `read_path` make them.
 
     Parameters
     ----------
     name : str
-        What it is, for titles.
+        Name for titles.
     x, y : Reference
         The motion of each axis, of the same duration, period and smooth start.
     radius : float, optional
-        Of a circle that is run counter-clockwise [m]; its contour error is then radial.
+        Of a counter-clockwise circle [m]; its contour error is then radial.
     centre : (float, float), optional
         Centre of that circle [m].
 
@@ -101,7 +101,7 @@ class XYReference:
 
     @property
     def period(self) -> float | None:
-        """Time after which the path is run again [s]; None where it is not."""
+        """Time after which the path repeats [s]; None where it does not."""
         return self.x.period
 
     @cached_property
@@ -125,7 +125,7 @@ class XYReference:
         Returns
         -------
         ndarray, shape (n,)
-            Distance from the nearest place on the path [m], positive to the left of its
+            Distance from the nearest point of the path [m], positive to the left of its
             direction. Of a circle it is R - r, as in Table 2 of Xu and Li 2010, doi
             10.1115/1.4001712.
 
@@ -141,7 +141,7 @@ class XYReference:
         return _core.path_errors(x, y, *self.outline)
 
     def transformed(self, matrix: ArrayLike) -> XYReference:
-        """Mix the axes, as a decoupled feedforward has it.
+        """Multiply the axes by a matrix, as for a decoupled feedforward.
 
         Parameters
         ----------
@@ -174,7 +174,7 @@ class XYReference:
         edges = np.array([[axis.low, axis.high] for axis in self.axes])
         mixed = []
         for row, axis in zip(rows, self.axes, strict=True):
-            # The range of a sum is within the sum of the ranges.
+            # The range of a sum lies within the sum of the ranges.
             reach = np.sort(row[:, None] * edges, axis=1).sum(axis=0)
             mixed.append(
                 replace(
@@ -234,15 +234,15 @@ def read_path(
     period, duration
         As in `Reference.from_samples`.
     ramp : float, optional
-        Length of the smooth start [s]. Where it is not given, 2 s of a path that repeats, and 0
-        of one that does not, which would lose its beginning: let it begin at home.
+        Length of the smooth start [s]. The default is 2 s for a path that repeats, and 0 for one
+        that does not, which would lose its beginning: let it begin at the origin.
     origin : (float, float) or None, optional
-        Where a smooth start leaves from [m]; None for the first point.
+        Position from which a smooth start begins [m]; None for the first point.
 
     Returns
     -------
     XYReference
-        Through all samples; called like the file.
+        Through all samples, with the name of the file.
 
     Raises
     ------
@@ -259,7 +259,7 @@ def read_path(
     >>> file = pathlib.Path(folder.name, "parabola.csv")
     >>> lines = [f"{k / 50},{k / 4},{k * k / 100}" for k in range(101)]
     >>> _ = file.write_text("\n".join(["time_s,x_um,y_um", *lines]))
-    >>> pt.read_path(file)
+    >>> pt.references.read_path(file)
     XYReference(parabola.csv, 0 to 25.25 by 0 to 102 um, 2.02 s)
     >>> folder.cleanup()
     """

@@ -17,6 +17,7 @@ from ..references.reference import Reference
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..references.reference import SampledReference
     from .base import Stage, StageState
 
     Array = NDArray[np.float64]
@@ -105,7 +106,9 @@ class Inverse:
         initial = None if self.initial is None else self.stage._checked(self.initial)._named
         return self.stage._core.inverse(dt, offset=self.offset, delay=self.delay, initial=initial)
 
-    def voltage(self, reference: Reference, dt: float) -> Array:
+    def voltage(
+        self, reference: Reference, dt: float, *, samples: SampledReference | None = None
+    ) -> Array:
         """Voltage along the whole path of a reference, the stage being at rest before.
 
         Parameters
@@ -114,6 +117,8 @@ class Inverse:
             What is to be followed.
         dt : float
             Sampling interval [s].
+        samples : SampledReference, optional
+            ``reference.sample(dt)``, where it is known already.
 
         Returns
         -------
@@ -128,9 +133,11 @@ class Inverse:
             The reference asks for a voltage that is not finite.
         """
         _check(reference)
-        samples = reference.sample(dt)
+        samples = reference.sample(dt) if samples is None else samples
         t = samples.t + self.delay
-        if not _goes_on(reference):
+        if self.delay == 0.0:
+            x, v, a = samples.x, samples.v, samples.a
+        elif not _goes_on(reference):
             x, v, a = reference.at(np.minimum(t, reference.duration))
         else:
             longer = replace(reference, duration=reference.duration + self.delay + samples.dt)
@@ -176,8 +183,10 @@ class Inverse:
             )
         return self.voltage(replace(reference, duration=length), dt)[-count:]
 
-    def played(self, reference: Reference, dt: float) -> tuple[Array, str]:
-        """Feedforward of an experiment as `playback` says.
+    def played(
+        self, reference: Reference, dt: float, *, samples: SampledReference | None = None
+    ) -> tuple[Array, str]:
+        """Feedforward of a run as `playback` says.
 
         Parameters
         ----------
@@ -185,6 +194,8 @@ class Inverse:
             What is to be followed.
         dt : float
             Sampling interval [s].
+        samples : SampledReference, optional
+            ``reference.sample(dt)``, where it is known already.
 
         Returns
         -------
@@ -193,7 +204,7 @@ class Inverse:
         how : str
             How it was computed, in words.
         """
-        volts = self.voltage(reference, dt)
+        volts = self.voltage(reference, dt, samples=samples)
         period = reference.period
         before = 0 if period is None else self._settled(reference, period)
         head = 0 if period is None else round((before + 1) * period / dt)

@@ -1,4 +1,4 @@
-"""The stage that stands in for the paper's, and the settings of its controllers."""
+"""The virtual stage in place of the paper's, and the settings of its controllers."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ if TYPE_CHECKING:
 
 __all__ = ["DT", "LIMITS", "Apparatus", "loop"]
 
-# The loop of the paper runs at 50 Hz, its amplifiers give 0 to 75 V.
+# The loop of the paper: 50 Hz, amplifiers of 0 to 75 V.
 DT, LIMITS = 0.02, (0.0, 75.0)
-# A y with the seed of x would have the noise of x.
+# With the seed of x, y would have the same noise.
 Y_SEEDS = 1 << 32
 
 
 @dataclass(frozen=True, kw_only=True)
 class Apparatus:
-    """An XY stage with its computer.
+    """An XY stage with the timing of its controller.
 
     Attributes
     ----------
     stage : XYStage
         Both axes, their cross-talk and the lag between them.
     delay : float
-        From a reading to the effect of its voltage [s].
+        Time from a reading to the effect of its voltage [s].
     jitter : float
-        How late a sample comes on average [s].
+        Mean sampling jitter [s].
     """
 
     stage: XYStage
@@ -44,28 +44,39 @@ class Apparatus:
 
     @property
     def x(self) -> VirtualStage:
-        """The axis of Figs. 3 to 14."""
+        """Axis of Figs. 3 to 14."""
         assert isinstance(self.stage.x, VirtualStage)
         return self.stage.x
 
     @property
     def y(self) -> VirtualStage:
-        """The other one."""
+        """Second axis."""
         assert isinstance(self.stage.y, VirtualStage)
         return self.stage.y
 
     @property
-    def pace(self) -> dict[str, Any]:
-        """Delay and jitter, as `track` and `contour` take them."""
+    def timing(self) -> dict[str, Any]:
+        """Delay and jitter as arguments of `track` and `contour`."""
         return {"delay": self.delay, "jitter": self.jitter}
 
     def seeded(self, seed: int) -> Apparatus:
-        """Return the same apparatus with other noise of both sensors."""
+        """Return the same apparatus with other seeds of both sensors.
+
+        Parameters
+        ----------
+        seed : int
+            0 or above.
+
+        Returns
+        -------
+        Apparatus
+            With different noise on x and y.
+        """
         x, y = replace(self.x, seed=seed), replace(self.y, seed=seed + Y_SEEDS)
         return replace(self, stage=replace(self.stage, x=x, y=y))
 
     def document(self) -> dict[str, Any]:
-        """Numbers of the apparatus for a file, SI."""
+        """Return the numbers of the apparatus for a file, SI."""
         return {
             "x": _numbers(self.x),
             "y": _numbers(self.y),
@@ -77,26 +88,37 @@ class Apparatus:
 
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> Apparatus:
-        """Make the apparatus that `document` describes."""
+        """Make the apparatus from its `document`.
+
+        Parameters
+        ----------
+        document : mapping
+            As `Apparatus.document` returns it.
+
+        Returns
+        -------
+        Apparatus
+            With seed 0.
+        """
         x, y = (VirtualStage(**document[axis], seed=0) for axis in "xy")
         stage = XYStage(x=x, y=y, cross_talk=document["cross_talk"], lag=document["lag"])
         return cls(stage=stage, delay=document["delay"], jitter=document["jitter"]).seeded(0)
 
     @classmethod
     def calibrated(cls) -> Apparatus:
-        """Load the apparatus that `calibration` found, as it is in the package."""
+        """Return the calibrated apparatus of the package."""
         return cls.of(calibration_file()["apparatus"])
 
 
 def calibration_file() -> dict[str, Any]:
-    """Read what the calibration found, with its provenance."""
+    """Read the result of the calibration, with its provenance."""
     text = files(__package__).joinpath("calibrated.json").read_text(encoding="utf-8")
     document: dict[str, Any] = json.loads(text)
     return document
 
 
 def _numbers(stage: VirtualStage) -> dict[str, Any]:
-    """All settings but the seed, which is not one of the stage."""
+    """Return all settings except the seed."""
     return {one.name: getattr(stage, one.name) for one in fields(stage) if one.name != "seed"}
 
 
@@ -107,5 +129,5 @@ def loop(
     dt: float = DT,
     **parts: Any,
 ) -> Controller:
-    """Make a controller at 50 Hz between 0 and 75 V, as the paper's."""
+    """Make a controller with the paper's sampling and limits: 50 Hz, 0 to 75 V."""
     return Controller(dt=dt, limits=limits, feedforward=inverse, **parts)

@@ -1,4 +1,4 @@
-"""Figs. 5 and 8 to 11: what is connected with what, as it is built here."""
+"""Figs. 5 and 8 to 11: block diagrams of the controllers as implemented here."""
 
 from __future__ import annotations
 
@@ -116,7 +116,9 @@ def _draw(diagram: Diagram, ax: Axes) -> None:
     for name, block in diagram.blocks.items():
         frame = {"boxstyle": "round,pad=0.35", "facecolor": "white", "edgecolor": "0.2"}
         shown[name] = ax.text(
-            *(block.x, block.y, block.text),
+            block.x,
+            block.y,
+            block.text,
             ha="center",
             va="center",
             fontsize="small",
@@ -144,6 +146,5 @@ def _draw(diagram: Diagram, ax: Axes) -> None:
         below = diagram.blocks["back"]
         e = diagram.blocks["e"]
         ax.plot([below.x, below.x, e.x], [0.75, below.y, below.y], color="0.2", linewidth=1.0)
-        ax.annotate("", (e.x, e.y), (e.x, below.y), arrowprops={
-            "arrowstyle": "-|>", "color": "0.2", "patchB": shown["e"].get_bbox_patch(),
-        })  # fmt: skip
+        arrow = {"arrowstyle": "-|>", "color": "0.2", "patchB": shown["e"].get_bbox_patch()}
+        ax.annotate("", (e.x, e.y), (e.x, below.y), arrowprops=arrow)

@@ -1,4 +1,4 @@
-"""Calibration: a swarm finds the virtual stage that agrees best with what is published."""
+"""Calibration: a particle swarm fits the virtual stage to the published numbers."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ RADIUS = 20e-6
 
 
 def values_of(apparatus: Apparatus) -> dict[str, float]:
-    """Go the part of the way that the calibrated observables need, SI.
+    """Compute the calibrated observables of an apparatus, SI.
 
     Raises
     ------
     PiezotrackError
-        A loop is unstable or runs away, or the step has no overshoot.
+        A loop is unstable or diverges, or the step has no overshoot.
     """
     log = fig_06_identification.record(apparatus)
     thin = fig_06_identification.thinned(log, THINNED)
@@ -73,10 +73,10 @@ def values_of(apparatus: Apparatus) -> dict[str, float]:
 
 
 def cost(values: Mapping[str, float]) -> float:
-    """Mean over the observables of r^4 / (1 + r^4), r what is off in units of the goal.
+    """Mean over the observables of r^4 / (1 + r^4), with r the error in units of the tolerance.
 
-    Nearly the share of the numbers that are not reached, so that one that cannot be reached does
-    not outweigh the others. A bound costs nothing within.
+    This is nearly the share of the numbers outside their tolerance, so that a single one that
+    cannot be reached does not dominate. A number within a bound costs nothing.
     """
     terms = []
     for one in observables():
@@ -89,7 +89,7 @@ def cost(values: Mapping[str, float]) -> float:
 
 
 def medians(theta: Mapping[str, float], seeds: Sequence[int]) -> dict[str, float]:
-    """Give the medians of `values_of` over seeds of the sensors, SI.
+    """Return the medians of `values_of` over seeds of the sensors, SI.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def medians(theta: Mapping[str, float], seeds: Sequence[int]) -> dict[str, float
 
 
 def _cost_at(theta: Mapping[str, float] | None, seeds: Sequence[int]) -> float:
-    """Cost of a place; infinite where the stage cannot be led, or outside the box."""
+    """Cost of a candidate; infinite where a loop is unstable, or outside the box."""
     if theta is None:
         return math.inf
     try:
@@ -121,7 +121,7 @@ def _round(
     seed: int,
     progress: Progress | None,
 ) -> tuple[float, dict[str, float]]:
-    """Search a box by the swarm of the core: best cost, and where it is."""
+    """Search a box with the swarm of the core: best cost and candidate."""
     swarm = _core.Swarm(settings._core, len(box), seed)
     with ThreadPoolExecutor(max_workers=2) as pool:
         for iteration in range(settings.iterations + 1):
@@ -134,9 +134,9 @@ def _round(
     return least, theta_at(place, box)
 
 
-# The later rounds: share of the first box, about the best place so far, and seeds of the sensors.
-# The last one takes medians, or the result would be fitted to the noise of one seed, for half as
-# many iterations.
+# The later rounds: share of the first box, centred on the best candidate so far, and seeds of the
+# sensors. The last one takes medians, so that the result is not fitted to the noise of one seed,
+# with half as many iterations.
 LATER = ((0.4, (SEED,)), (0.15, (SEED, SEED + 1, SEED + 2)))
 
 
@@ -148,10 +148,10 @@ def calibrate(
     seed: int = SEED,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Search the free parameters, and describe what was found.
+    """Search the free parameters, and document the result.
 
-    Several swarms search the whole box apart; about the best place of them all another searches a
-    smaller box, and one more a smaller one still, there with medians over three seeds of the
+    Several independent swarms search the whole box; another searches a smaller box about the best
+    candidate of them, and one more a still smaller box, with medians over three seeds of the
     sensors.
 
     Parameters
@@ -161,7 +161,7 @@ def calibrate(
     runs : int, optional
         Swarms in the whole box.
     progress : callable, optional
-        Called with iteration, best cost of its swarm and where that is.
+        Called with iteration, best cost of its swarm and the candidate.
 
     Returns
     -------
@@ -192,16 +192,16 @@ def calibrate(
     return _document(theta, how, provenance)
 
 
-# A parameter is moved by this part of its range, to see what it acts on.
+# Change of a parameter for its sensitivities, as a part of its range.
 NUDGE = 0.05
 
 
 def _moved(
     theta: dict[str, float], free: Free, values: Mapping[str, float], seeds: Sequence[int]
 ) -> dict[str, float]:
-    """Tell which three observables a parameter moves most, by how many goals in 5 % of its range.
+    """Return the three observables most sensitive to a parameter, with their changes.
 
-    Empty where the stage cannot be led there.
+    In units of the tolerance for 5 % of the range; empty where a loop is unstable there.
     """
     part = free.part(theta[free.name])
     step = NUDGE if part + NUDGE <= 1.0 else -NUDGE
@@ -219,7 +219,7 @@ def _moved(
 
 
 def _document(theta: dict[str, float], how: str, provenance: dict[str, Any]) -> dict[str, Any]:
-    """Content of the file: the apparatus, and how it was found."""
+    """Content of the file: the apparatus and its provenance."""
     seeds = provenance["sensor_seeds"]
     values = medians(theta, seeds)
     used = [one for one in observables() if one.calibrated and one.key in values]

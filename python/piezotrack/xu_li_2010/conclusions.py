@@ -1,4 +1,4 @@
-"""What the paper concludes, checked on what was obtained."""
+"""Conclusions of the paper, checked on the obtained values."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ Values = dict[str, float]
 
 @dataclass(frozen=True, kw_only=True)
 class Conclusion:
-    """A sentence of the paper, and whether it is seen.
+    """A conclusion of the paper, and whether it is confirmed.
 
     Attributes
     ----------
     text : str
-        What the paper says.
+        The conclusion.
     seeds, seen : int
-        Runs, and those in which it is so.
+        Runs, and those in which it is confirmed.
     words : str
-        What is seen, in numbers.
+        The obtained numbers.
     """
 
     text: str
@@ -38,12 +38,12 @@ class Conclusion:
 
     @property
     def holds(self) -> bool:
-        """Whether it is seen in more than half of the runs."""
+        """Whether it is confirmed in more than half of the runs."""
         return 2 * self.seen > self.seeds
 
 
 def conclusions(runs: Sequence[Values]) -> tuple[Conclusion, ...]:
-    """Check each conclusion on the values that `Way.values` has, one dict a seed."""
+    """Check each conclusion on `Experiments.values`, one dict for each seed."""
     return tuple(
         Conclusion(
             text=text,
@@ -56,7 +56,7 @@ def conclusions(runs: Sequence[Values]) -> tuple[Conclusion, ...]:
 
 
 def _medians(runs: Sequence[Values]) -> dict[str, str]:
-    """Medians in um, by keys that a format string takes."""
+    """Return medians in um, by the keys of the format strings."""
     return {
         key.replace(".", "_").replace(
             "-", "_"
@@ -74,14 +74,14 @@ def _antiwindup(run: Values) -> bool:
 
 
 def _learns(run: Values) -> bool:
-    # From the fourth period on there is nothing left to gain but what noise changes.
+    # From the fourth period on the error changes by noise only.
     return run["repetitive.with"] < run["repetitive.without"] and (
         run["repetitive.fourth"] <= 1.15 * run["repetitive.last"]
     )
 
 
 def _keys(figure: str) -> list[list[str]]:
-    """Keys of Table 2, a row for each radius."""
+    """Return the keys of Table 2, a row for each radius."""
     keys = [f"circle.{1e6 * case.radius:g}um.{case.frequency:g}Hz.{figure}" for case in PUBLISHED]
     return [keys[i : i + 3] for i in range(0, 9, 3)]
 
@@ -101,7 +101,7 @@ def _dahl(run: Values) -> bool:
 
 CHECKS: tuple[tuple[str, Callable[[Values], bool], str], ...] = (
     (
-        "Feedforward with feedback beats either alone (Fig. 12).",
+        "Feedforward with feedback is better than either alone (Fig. 12).",
         _forward_and_back,
         "largest error {forward_max} um, {back_max} um, both {both_max} um",
     ),
@@ -130,7 +130,7 @@ CHECKS: tuple[tuple[str, Callable[[Values], bool], str], ...] = (
     (
         "The Dahl model is better than the Bouc-Wen model (Fig. 7).",
         _dahl,
-        "largest error {models_dahl} um, Bouc-Wen {models_bouc_wen} um; below, on what stages it "
-        "is so",
+        "largest error {models_dahl} um, Bouc-Wen {models_bouc_wen} um; below, for which stages it "
+        "holds",
     ),
 )

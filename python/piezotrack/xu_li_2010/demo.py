@@ -33,7 +33,7 @@ def demo_log(seed: int = 1) -> Dataset:
     Parameters
     ----------
     seed : int, optional
-        Of the noise of the virtual stage's sensor.
+        Seed of the sensor noise of the virtual stage.
 
     Returns
     -------
@@ -53,14 +53,14 @@ def identify_demo(
     progress: bool | None = None,
     callback: Callable[[Progress], object] | None = None,
 ) -> Identification:
-    """Identify as the paper does: four parameters on the first 4 s, between its bounds.
+    """Identify as in the paper: four parameters from the first 4 s, between its bounds.
 
     Parameters
     ----------
     log : Dataset
-        As `demo_log` makes it.
+        As of `demo_log`.
     seed : int, optional
-        Of the search.
+        Seed of the search.
     progress : bool, optional
         As in `identify`.
     callback : callable, optional
@@ -69,7 +69,7 @@ def identify_demo(
     Returns
     -------
     Identification
-        The hysteresis parameters, which fix the scale, are held at their published values.
+        The hysteresis parameters, which set the scale, are held at their published values.
     """
     published = DahlStage.xu_li_2010()
     return identify(
@@ -88,9 +88,9 @@ def track_demo(fit: Identification, seed: int = 1) -> dict[str, Tracking]:
     Parameters
     ----------
     fit : Identification
-        The model, whose inverse is the feedforward.
+        The model; its inverse is the feedforward.
     seed : int, optional
-        Of the noise of the virtual stage's sensor.
+        Seed of the sensor noise of the virtual stage.
 
     Returns
     -------
@@ -100,19 +100,19 @@ def track_demo(fit: Identification, seed: int = 1) -> dict[str, Tracking]:
     stage = VirtualStage.xu_li_2010(seed=seed)
     reference = sine(frequency=0.2, low=0.0, high=110e-6, duration=20.0)
     inverse, pid = fit.inverse(), Pid.xu_li_2010()
-    learning = Repetitive(period=5.0, tq=0.2, kq=1.0)
+    learning = Repetitive.from_um(period=5.0, tq=0.2, kq=1.0)
     loops = {
         "feedforward": Controller(dt=0.02, limits=(0.0, 75.0), feedforward=inverse),
         "pid": Controller(dt=0.02, limits=(0.0, 75.0), feedback=pid),
         "all": Controller(
-            dt=0.02, limits=(0.0, 75.0), feedforward=inverse, feedback=pid, addon=learning
+            dt=0.02, limits=(0.0, 75.0), feedforward=inverse, feedback=pid, repetitive=learning
         ),
     }
     return {name: track(stage, loop, reference) for name, loop in loops.items()}
 
 
 def write_log(log: Dataset, path: Path) -> Path:
-    """Write a log as a CSV file that `read` takes.
+    """Write a log as a CSV file for `read`.
 
     Parameters
     ----------

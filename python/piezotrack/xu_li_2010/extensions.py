@@ -1,11 +1,11 @@
-"""Beyond the paper, on the same stage: filters, a faster loop, other models, other references."""
+"""Beyond the paper, on the same stage: filters, faster loops, other models and references."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from ..control.components import LowPass, Notch, Pid, Repetitive
+from ..control.components import Lag, LowPass, Notch, Pid, Repetitive, ZeroPhase
 from ..control.tracking import Tracking, track
 from ..data.dataset import Dataset
 from ..errors import NumericalError, ParameterError
@@ -23,33 +23,33 @@ if TYPE_CHECKING:
     from ..references.reference import Reference
     from ..stages.inverse import Inverse
     from .apparatus import Apparatus
-    from .run import Way
+    from .run import Experiments
 
 __all__ = ["rivals", "sections"]
 
 
-def sections(apparatus: Apparatus, way: Way) -> list[Section]:
-    """Compute all of them, with the noise of one seed.
+def sections(apparatus: Apparatus, experiments: Experiments) -> list[Section]:
+    """Compute all sections, with one seed of the sensors.
 
     Parameters
     ----------
     apparatus : Apparatus
         The stage, with that seed.
-    way : Way
-        What was found on the paper's way with it.
+    experiments : Experiments
+        The experiments of the paper with it.
 
     Returns
     -------
     list of Section
         In the order of the report.
     """
-    inverse = way.fit.inverse()
+    inverse = experiments.fit.inverse()
     return [
         _amplitudes(apparatus, inverse),
-        _which_model(apparatus, way),
+        _which_model(apparatus, experiments),
         _learning(apparatus, inverse),
-        _faster(apparatus, inverse, way.step.readings.frequency),
-        _feedforwards(apparatus, way),
+        _faster(apparatus, inverse, experiments.step.readings.frequency),
+        _feedforwards(apparatus, experiments),
     ]
 
 
@@ -58,7 +58,7 @@ def _um(value: float) -> str:
 
 
 def _amplitudes(apparatus: Apparatus, inverse: Inverse) -> Section:
-    """Show what Figs. 13 and 14 owe to the ranges that the paper does not state."""
+    """Vary the ranges of Figs. 13 and 14, which the paper does not state."""
     rows = []
     for part in (0.7, 0.8, 0.9, 1.0, 1.1):
         runs = fig_12_14_tracking.antiwindup(apparatus, inverse, part)
@@ -72,7 +72,7 @@ def _amplitudes(apparatus: Apparatus, inverse: Inverse) -> Section:
         rows.append((f"14: 0.0 to {1e6 * part * RANGE:.1f}", "", *map(_um, errors)))
     rows.append(("published", "", "2.29", "within 1.5"))
     return Section(
-        title="What Figs. 13 and 14 owe to ranges that are not published",
+        title="Sensitivity of Figs. 13 and 14 to ranges that are not published",
         text="Largest error in um. Fig. 13: within the limits, clipped, clipped with antiwindup; "
         "Fig. 14: without repetitive control, and with it from the fourth period on.",
         heads=("figure and range, um", "within limits", "without", "with"),
@@ -85,14 +85,14 @@ def _learnt(run: Tracking) -> float:
     return max(one.max_error for one in run.periods[fig_12_14_tracking.LEARNT :])
 
 
-def _which_model(apparatus: Apparatus, way: Way) -> Section:
-    """Find on what kind of stage Dahl would beat Bouc-Wen."""
+def _which_model(apparatus: Apparatus, experiments: Experiments) -> Section:
+    """Find the kind of stage on which the Dahl model is better than Bouc-Wen."""
     x = apparatus.x
     still = replace(x, preconditioned=False)
     even = replace(x, bends=tuple(0.0 for _ in x.bends))
     bent = replace(x, bends=tuple(0.6 for _ in x.bends))
     table_1 = DahlStage.xu_li_2010()
-    log_of_12_s = way.judged.test.full
+    log_of_12_s = experiments.judged.test.full
     u, dt = log_of_12_s.u, log_of_12_s.dt
     logs: dict[str, Dataset | None] = {
         "the calibrated stage": None,
@@ -104,7 +104,7 @@ def _which_model(apparatus: Apparatus, way: Way) -> Section:
     }
     rows = []
     for name, log in logs.items():
-        judged = way.judged
+        judged = experiments.judged
         if log is not None:
             thin = fig_06_identification.thinned(log, THINNED)
             judged = fig_07_model_comparison.judge(
@@ -120,29 +120,32 @@ def _which_model(apparatus: Apparatus, way: Way) -> Section:
         f"stiffness corrected, is {_um(printed)} um off."
     )
     return Section(
-        title="On what kind of stage Dahl beats Bouc-Wen",
+        title="Stages on which the Dahl model is better than Bouc-Wen",
         text=text,
         heads=("stage", "Dahl", "Bouc-Wen", "better"),
         rows=tuple(rows),
     )
 
 
-# A quarter of a kHz is plenty for 0.25 Hz.
+# 250 Hz is sufficient for a drive of 0.25 Hz.
 THINNED = 20
-# Of the record of Fig. 7 [s].
+# Period of the drive of Fig. 7 [s].
 PERIOD = 4.0
 
 
 def _tried(
-    apparatus: Apparatus, controllers: Mapping[str, Controller], reference: Reference,
-    figures: Callable[[Tracking], Sequence[str]], columns: int,
-) -> tuple[tuple[str, ...], ...]:  # fmt: skip
-    """Run controllers; one that is unstable has a row that says so."""
+    apparatus: Apparatus,
+    controllers: Mapping[str, Controller],
+    reference: Reference,
+    figures: Callable[[Tracking], Sequence[str]],
+    columns: int,
+) -> tuple[tuple[str, ...], ...]:
+    """Run controllers, a row for each; that of an unstable one says so."""
     rows = []
     for name, controller in controllers.items():
         try:
-            pace = apparatus.pace if controller.dt == DT else {"delay": controller.dt}
-            run = track(apparatus.x, controller, reference, **pace)
+            timing = apparatus.timing if controller.dt == DT else {"delay": controller.dt}
+            run = track(apparatus.x, controller, reference, **timing)
             cells = tuple(figures(run))
         except (ParameterError, NumericalError):
             cells = ("unstable", *[""] * (columns - 1))
@@ -151,25 +154,27 @@ def _tried(
 
 
 def _learning(apparatus: Apparatus, inverse: Inverse) -> Section:
-    """Try other filters in the repetitive part."""
+    """Compare other filters of the repetitive part."""
     period = fast().period
     assert period is not None
     forms = {
         "none": None,
-        "as published: lag of 0.2 s, no leak": Repetitive.xu_li_2010(period),
-        "lag of 0.2 s, its delay made up for": Repetitive(period=period, compensated=True),
-        "lag of 0.05 s, its delay made up for, Kq 0.6": Repetitive(
-            period=period, tq=0.05, kq=0.6, compensated=True
+        "as published: lag of 0.2 s, nothing forgotten": Repetitive.xu_li_2010(period),
+        "lag of 0.2 s, its delay compensated": Repetitive(
+            period=period, smoothing=Lag(compensated=True)
         ),
-        "zero phase, second order, Kq 0.6": Repetitive(
-            period=period, smoothing="zero phase", kq=0.6
+        "lag of 0.05 s, its delay compensated, Kq 0.6": Repetitive.from_um(
+            period=period, kq=0.6, smoothing=Lag(tq=0.05, compensated=True)
         ),
-        "the same, one sample ahead": Repetitive(
-            period=period, smoothing="zero phase", kq=0.6, lead=1
+        "zero phase, second order, Kq 0.6": Repetitive.from_um(
+            period=period, kq=0.6, smoothing=ZeroPhase()
+        ),
+        "the same, one sample ahead": Repetitive.from_um(
+            period=period, kq=0.6, smoothing=ZeroPhase(), lead=1
         ),
     }
     loops = {
-        name: loop(inverse, feedback=fig_12_14_tracking.PID, addon=one)
+        name: loop(inverse, feedback=fig_12_14_tracking.PID, repetitive=one)
         for name, one in forms.items()
     }
 
@@ -188,7 +193,7 @@ def _learning(apparatus: Apparatus, inverse: Inverse) -> Section:
 
 
 def _faster(apparatus: Apparatus, inverse: Inverse, mode: float) -> Section:
-    """Try a filter on the sensor, and loops at 1 and 5 kHz with a notch at the mode [Hz]."""
+    """Compare filters of the measurement, and faster loops with a notch at the mode [Hz]."""
     both: dict[str, Any] = {"feedback": fig_12_14_tracking.PID}
     notch = Notch(mode, width=0.5)
     soft = Pid.from_um(kp=0.12, ti=0.012, td=0.02)
@@ -213,33 +218,33 @@ def _faster(apparatus: Apparatus, inverse: Inverse, mode: float) -> Section:
 
     def figures(run: Tracking) -> list[str]:
         true = run.score(true=True)
-        return [_um(run.metrics.max_error), _um(run.metrics.rms_error), _um(true.max_error),
-                _um(true.rms_error)]  # fmt: skip
+        errors = [run.metrics.max_error, run.metrics.rms_error, true.max_error, true.rms_error]
+        return [_um(error) for error in errors]
 
     return Section(
         title="A filter on the sensor, and loops at 1 and 5 kHz",
         text="Fig. 12, feedforward and feedback, errors in um. Above 50 Hz the readings have more "
         "samples for their extremes, so compare the true errors. The faster loops run on a "
-        "computer of their own: late by one interval, without jitter.",
+        "computer of their own, with a delay of one interval and without jitter.",
         heads=("loop", "max", "rms", "true max", "true rms"),
         rows=_tried(apparatus, loops, slow(), figures, 4),
     )
 
 
-def _feedforwards(apparatus: Apparatus, way: Way) -> Section:
-    """Lead by three kinds of inverse, fitted to one period each."""
-    # The record begins on the settled loop, a model at rest: the first period is warm-up.
-    second = fig_06_identification.thinned(way.judged.test.full, THINNED)[PERIOD : 2.0 * PERIOD]
-    fits: dict[str, Any] = {"Dahl": way.fit, **rivals(second)}
+def _feedforwards(apparatus: Apparatus, experiments: Experiments) -> Section:
+    """Compare the feedforward of three models, fitted to one period each."""
+    # The record begins on the settled loop, a model at rest, so the first period is warm-up.
+    thin = fig_06_identification.thinned(experiments.judged.test.full, THINNED)
+    second = thin[PERIOD : 2.0 * PERIOD]
+    fits: dict[str, Any] = {"Dahl": experiments.fit, **rivals(second)}
     rows: list[tuple[str, ...]] = []
     for name, fit in fits.items():
         inverse = fit.inverse()
         cells = []
         for reference in (slow(), fast()):
             loops = {"alone": loop(inverse), "with": loop(inverse, feedback=fig_12_14_tracking.PID)}
-            cells += [row[1] for row in _tried(
-                apparatus, loops, reference, lambda run: [_um(run.metrics.max_error)], 1
-            )]  # fmt: skip
+            tried = _tried(apparatus, loops, reference, _largest_error, 1)
+            cells += [row[1] for row in tried]
         rows.append((name, *cells))
     return Section(
         title="Feedforward from other models",
@@ -250,13 +255,17 @@ def _feedforwards(apparatus: Apparatus, way: Way) -> Section:
     )
 
 
+def _largest_error(run: Tracking) -> list[str]:
+    return [_um(run.metrics.max_error)]
+
+
 def rivals(data: Dataset) -> dict[str, Any]:
-    """Fit the other kinds that have an inverse, one at least of Bouc-Wen's forms."""
+    """Fit the other models that have an inverse: a Bouc-Wen model and Prandtl-Ishlinskii."""
     plays = identify(data, "prandtl-ishlinskii")
     free: dict[str, Any] = {"seed": 1, "runs": 1, "threads": 1, "progress": False}
     name, bouc_wen = "Bouc-Wen", identify(data, "bouc-wen", **free)
     if abs(bouc_wen.model.gamma) > bouc_wen.model.beta:
-        # Not passive, and so without an inverse.
+        # Not passive, and therefore without an inverse.
         name = "Bouc-Wen, gamma held at 0 to have an inverse"
         bouc_wen = identify(data, "bouc-wen", fixed={"gamma": 0.0}, **free)
     return {name: bouc_wen, "Prandtl-Ishlinskii": plays}

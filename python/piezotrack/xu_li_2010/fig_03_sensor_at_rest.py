@@ -19,12 +19,12 @@ RATE, SECONDS = 5000.0, 10.0
 
 
 def at_rest(apparatus: Apparatus) -> Noise:
-    """Record the sensor while nothing moves."""
+    """Record the sensor with the stage at rest."""
     return identify_noise(apparatus.x.record(np.zeros(int(RATE * SECONDS)), 1.0 / RATE))
 
 
 def observe(noise: Noise) -> dict[str, float]:
-    """Read off what the paper publishes, SI."""
+    """Compute the published quantities, SI."""
     return {"rest.rms": noise.rms, "rest.step": noise.resolution}
 
 

@@ -1,4 +1,4 @@
-"""Fig. 4 and equations (4) to (13): the step test and the conventional identification."""
+"""Fig. 4 and equations (4) to (13): the step test and the identification from it."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ if TYPE_CHECKING:
 __all__ = ["draw", "observe", "step_test"]
 
 RATE, VOLTS = 5000.0, 75.0
-# What the ringing needs to die out, and no more: creep goes on behind it.
+# Long enough for the ringing to decay, and not longer because of creep.
 BEFORE, AFTER = 0.02, 0.3
 
 
 def step_test(apparatus: Apparatus) -> StepResult:
-    """Step to the full voltage, and read the response."""
+    """Step to the full voltage, and identify from the response."""
     u = np.concatenate([np.zeros(int(RATE * BEFORE)), np.full(int(RATE * AFTER), VOLTS)])
     return identify_step(apparatus.x.record(u, 1.0 / RATE, hold="zoh"))
 
 
 def observe(step: StepResult) -> dict[str, float]:
-    """Read off what the paper publishes, SI."""
+    """Compute the published quantities, SI."""
     read = step.readings
     # A step that does not overshoot twice has no second peak.
     peaks = (*read.peaks, read.steady_state, read.steady_state)

@@ -31,16 +31,16 @@ def record(apparatus: Apparatus) -> Dataset:
 
 
 def thinned(log: Dataset, every: int) -> Dataset:
-    """Keep one sample of so many: 0.25 Hz needs no 5 kHz."""
+    """Keep one sample of `every`: 0.25 Hz does not need 5 kHz."""
     return Dataset(u=log.u[::every], y=log.y[::every], dt=every * log.dt)
 
 
 def search(log: Dataset, seed: int) -> Identification:
-    """Search mass, damping, stiffness and piezo coefficient as the paper does.
+    """Identify mass, damping, stiffness and piezo coefficient as in the paper.
 
-    Its swarm, its box, the first 4 s, and its hysteresis parameters, which with their b1 fix the
-    scale of the forces. Three of its swarms search apart and the best counts: one alone does not
-    always reach the bottom.
+    With its swarm, its bounds, the first 4 s, and its hysteresis parameters, of which b1 sets the
+    scale of the forces. The best of three restarts is taken: a single swarm does not always reach
+    the minimum.
     """
     published = DahlStage.xu_li_2010()
     return identify(
@@ -56,7 +56,7 @@ def search(log: Dataset, seed: int) -> Identification:
 
 
 def observe(fit: Identification) -> dict[str, float]:
-    """Read off the parameters of Table 1 that are searched, SI."""
+    """Return the parameters of Table 1 that are identified, SI."""
     assert isinstance(fit.model, DahlStage)
     return {
         "table_1.mass": fit.model.mass,
@@ -67,7 +67,7 @@ def observe(fit: Identification) -> dict[str, float]:
 
 
 def draw(fit: Identification) -> Figure:
-    """Draw the convergence."""
+    """Draw the convergence of the swarm."""
     import matplotlib.pyplot as plt
 
     from ..identification.plot import plot_convergence

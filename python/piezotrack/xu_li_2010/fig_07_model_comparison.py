@@ -20,11 +20,11 @@ __all__ = ["draw", "judge", "largest", "observe"]
 
 
 def judge(log: Dataset, fit: Identification, seed: int, *, every: int = 10) -> Comparison:
-    """Put the Dahl model beside a Bouc-Wen model that was fitted to the same 4 s.
+    """Compare the Dahl model with a Bouc-Wen model fitted to the same 4 s.
 
     The paper takes its Bouc-Wen model from an earlier identification of its own stage; printed,
-    it is 50 um off (see `BoucWenStage.xu_li_2010`). Its form and exponent are kept here, all its
-    parameters are searched, on one sample of `every`: at 0.25 Hz the others tell nothing new.
+    it is 50 um off (see `BoucWenStage.xu_li_2010`). Its form and exponent are kept here; all its
+    parameters are identified, from one sample of `every`, which is sufficient at 0.25 Hz.
     """
     bouc_wen = identify(
         thinned(log, every)[:FITTED_SECONDS],
@@ -40,12 +40,12 @@ def judge(log: Dataset, fit: Identification, seed: int, *, every: int = 10) -> C
 
 
 def largest(judged: Comparison) -> dict[str, float]:
-    """Give the largest error of each model over the 12 s [m]."""
+    """Return the largest error of each model over the 12 s [m]."""
     return {row.name: max(row.train.max_error, row.test.max_error) for row in judged.rows}
 
 
 def observe(judged: Comparison) -> dict[str, float]:
-    """Read off what the paper publishes, SI, and the same of the other model."""
+    """Compute the published quantities, SI, and the same of the other model."""
     found = largest(judged)
     return {"models.dahl": found["dahl"], "models.bouc-wen": found["bouc-wen"]}
 

@@ -18,9 +18,9 @@ __all__ = ["antiwindup", "compensation", "observe", "observe_compensation", "rep
 
 Runs = dict[str, Tracking]
 PID = Pid.xu_li_2010()
-# Without antiwindup: nothing tracks what the amplifier gave.
+# Without antiwindup.
 UNGUARDED = Pid.from_um(kp=0.120, ti=0.009, td=0.044, tt=math.inf)
-# The paper sees the error settle after three periods.
+# In the paper the error settles after three periods.
 LEARNT = 3
 
 
@@ -32,7 +32,7 @@ def compensation(apparatus: Apparatus, inverse: Inverse) -> Runs:
         "both": loop(inverse, feedback=PID),
     }
     return {
-        name: track(apparatus.x, one, slow(), **apparatus.pace, unstable=True)
+        name: track(apparatus.x, one, slow(), **apparatus.timing, unstable=True)
         for name, one in loops.items()
     }
 
@@ -46,8 +46,10 @@ def antiwindup(apparatus: Apparatus, inverse: Inverse, part: float = 1.0) -> Run
     }
     return {
         name: track(
-            *(apparatus.x, one, shrunk(part)),
-            **apparatus.pace,
+            apparatus.x,
+            one,
+            shrunk(part),
+            **apparatus.timing,
             beyond_reach=True,
             unstable=True,
         )
@@ -62,16 +64,16 @@ def repetitive(apparatus: Apparatus, inverse: Inverse, part: float = 1.0) -> Run
     learning = Repetitive.xu_li_2010(reference.period)
     loops = {
         "without": loop(inverse, feedback=PID),
-        "with": loop(inverse, feedback=PID, addon=learning),
+        "with": loop(inverse, feedback=PID, repetitive=learning),
     }
     return {
-        name: track(apparatus.x, one, reference, **apparatus.pace, unstable=True)
+        name: track(apparatus.x, one, reference, **apparatus.timing, unstable=True)
         for name, one in loops.items()
     }
 
 
 def observe_compensation(twelve: Runs, *, true: bool = False) -> dict[str, float]:
-    """Read off what the paper publishes of Fig. 12, SI; `true` as for `observe`."""
+    """Compute the published quantities of Fig. 12, SI; `true` as for `observe`."""
     found = {f"{name}.max": run.score(true=true).max_error for name, run in twelve.items()}
     for name in ("back", "both"):
         metrics = twelve[name].score(true=true)
@@ -83,9 +85,9 @@ def observe_compensation(twelve: Runs, *, true: bool = False) -> dict[str, float
 def observe(
     twelve: Runs, thirteen: Runs, fourteen: Runs, *, true: bool = False
 ) -> dict[str, float]:
-    """Read off what the paper publishes, SI, and what its conclusions rest on.
+    """Compute the published quantities, SI, and those of its conclusions.
 
-    Of the samples that the controller saw, as the paper's; with `true`, of the true displacement
+    From the samples of the controller, as in the paper; with `true`, from the true displacement
     at the same instants.
     """
     found = observe_compensation(twelve, true=true)

@@ -26,15 +26,15 @@ def circles(
     """Run the nine circles, up to a radius [m], with the feedforward of x on both axes."""
     one = loop(inverse, feedback=PID)
     return run_table_2(
-        apparatus.stage, (one, one), **apparatus.pace, largest=largest, checked=checked
+        apparatus.stage, (one, one), **apparatus.timing, largest=largest, checked=checked
     )
 
 
 def observe(table: Table2, lag: float, *, true: bool = False) -> dict[str, float]:
-    """Read off what the paper publishes, SI.
+    """Compute the published quantities, SI.
 
-    Of the readings at 50 Hz, as the paper's; with `true`, of the true positions between them too.
-    The errors of an axis are those that its controller saw, y's `lag` [s] after x's.
+    From the readings at 50 Hz, as in the paper; with `true`, from the true positions between them
+    too. The errors of an axis are those of its controller, which samples y `lag` [s] after x.
     """
     found = {}
     for case, run in table.cases:
@@ -50,7 +50,7 @@ def observe(table: Table2, lag: float, *, true: bool = False) -> dict[str, float
 
 
 def _largest(axis: Tracking, settled: float, lag: float, true: bool) -> float:
-    """Largest error that a controller saw, or the true one when it looked [m]."""
+    """Largest error of a controller, or the true error at its samples [m]."""
     if not true:
         return float(np.abs(axis.loop_error[axis.t >= settled + lag]).max())
     seen = np.interp(axis.t + lag, axis.fine_t, axis.fine_displacement)

@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from ..control.tracking import Tracking
     from .fig_12_14_tracking import Runs
     from .measured_log import Drives
-    from .run import Way
+    from .run import Experiments
 
 __all__ = ["Drawn", "drawn"]
 
 
 class Drawn(NamedTuple):
-    """A figure: by what name it is filed, its title, what to look at, and the picture."""
+    """A figure: name of its file, title, caption and picture."""
 
     name: str
     title: str
@@ -37,67 +37,80 @@ class Drawn(NamedTuple):
     figure: Figure
 
 
-def drawn(way: Way, drives: Drives | None) -> list[Drawn]:
+def drawn(experiments: Experiments, drives: Drives | None) -> list[Drawn]:
     """Draw all figures of the paper from 3 on, and the measured log where there is one."""
-    measured = [] if drives is None else [
-        Drawn(
-            *("measured", "A measured log: drive of our inverse and of its authors'"),
-            "Both less the straight line through the latter, over two periods.",
-            drives.plot(),
-        )
-    ]  # fmt: skip
+    measured = []
+    if drives is not None:
+        measured = [
+            Drawn(
+                "measured",
+                "A measured log: drive of our inverse and of the authors' inverse",
+                "Both less the straight line fitted to the latter, over two periods.",
+                drives.plot(),
+            )
+        ]
     return [
         Drawn(
-            *("fig_03", "Fig. 3: the sensor at rest"),
+            "fig_03",
+            "Fig. 3: the sensor at rest",
             "Left the first 80 ms, in steps of the sensor; right the spectrum: not white.",
-            fig_03_sensor_at_rest.draw(way.noise),
+            fig_03_sensor_at_rest.draw(experiments.noise),
         ),
         Drawn(
-            *("fig_04", "Fig. 4: step of 75 V"),
-            "What is read off it gives equations (4) to (13).",
-            fig_04_step_test.draw(way.step),
+            "fig_04",
+            "Fig. 4: step of 75 V",
+            "The readings of equations (4) to (13).",
+            fig_04_step_test.draw(experiments.step),
         ),
         Drawn(
-            *("fig_05", "Figs. 5 and 8 to 11: block diagrams"),
-            "What is connected with what, as it is built here.",
+            "fig_05",
+            "Figs. 5 and 8 to 11: block diagrams",
+            "As implemented here.",
             block_diagrams.draw(),
         ),
         Drawn(
-            *("fig_06", "Fig. 6: convergence of the swarm"),
+            "fig_06",
+            "Fig. 6: convergence of the swarm",
             "Four parameters between the paper's bounds, on the first 4 s of Fig. 7.",
-            fig_06_identification.draw(way.fit),
+            fig_06_identification.draw(experiments.fit),
         ),
         Drawn(
-            *("fig_07", "Fig. 7: the identified models"),
-            "0.25 Hz, 0 to 75 V; what is right of the dotted line was not fitted.",
-            fig_07_model_comparison.draw(way.judged),
+            "fig_07",
+            "Fig. 7: the identified models",
+            "0.25 Hz, 0 to 75 V; the part to the right of the dotted line was not fitted.",
+            fig_07_model_comparison.draw(experiments.judged),
         ),
         Drawn(
-            *("fig_12", "Fig. 12: feedforward, PID, both"),
+            "fig_12",
+            "Fig. 12: feedforward, PID, both",
             "0.2 Hz, 0 to 110 um. Left the motion, in the middle the error, right actual over "
-            "desired. The first period, with the smooth start, does not count.",
-            _grid(way.compensation, TWELVE, ("motion", "error", "following")),
+            "desired. The first period, with the smooth start, is excluded.",
+            _grid(experiments.compensation, TWELVE, ("motion", "error", "following")),
         ),
         Drawn(
-            *("fig_13", "Fig. 13: saturation"),
+            "fig_13",
+            "Fig. 13: saturation",
             f"The reference is a rule: {RULES['13']} Grey where the voltage is clipped.",
-            _grid(way.antiwindup, THIRTEEN, ("motion", "error", "effort")),
+            _grid(experiments.antiwindup, THIRTEEN, ("motion", "error", "effort")),
         ),
         Drawn(
-            *("fig_14", "Fig. 14: repetitive control at 0.5 Hz"),
+            "fig_14",
+            "Fig. 14: repetitive control at 0.5 Hz",
             f"The reference is a rule: {RULES['14']} Dashed the largest error of each period.",
-            _grid(way.repetitive, FOURTEEN, ("motion", "error", "effort")),
+            _grid(experiments.repetitive, FOURTEEN, ("motion", "error", "effort")),
         ),
         Drawn(
-            *("fig_15", "Fig. 15: a circle of 10 um at 0.1 Hz"),
+            "fig_15",
+            "Fig. 15: a circle of 10 um at 0.1 Hz",
             "The last turn: path, contour error magnified along it, errors of the axes, contour "
-            "error; all at the instants of x. The table above has what each controller saw.",
-            way.table.runs[0].plot(),
+            "error; all at the instants of x. The table above has the errors of each controller.",
+            experiments.table.runs[0].plot(),
         ),
         Drawn(
-            *("table_2", "Fig. 15a and Table 2: circles of 10, 20 and 40 um"),
-            "Bars: published beside obtained.",
-            fig_15_circles.draw(way.table),
+            "table_2",
+            "Fig. 15a and Table 2: circles of 10, 20 and 40 um",
+            "Bars: published and obtained.",
+            fig_15_circles.draw(experiments.table),
         ),
         *measured,
     ]
@@ -132,11 +145,11 @@ def _grid(runs: Runs, names: dict[str, str], columns: tuple[str, ...]) -> Figure
         for panel, ax in zip(columns, row.subplots(1, len(columns)), strict=True):
             panels[panel](run, ax)
             if panel == "error":
-                # What counts fills the panel; the way from home is cut off.
+                # Scaled to the settled error; the smooth start is cropped.
                 reach = 1.25e6 * run.metrics.max_error
                 ax.set_ylim(-reach, reach)
             if panel == "effort":
-                # Two lines, or it would be wider than the panel.
+                # In two lines, to fit the panel.
                 place = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "frameon": False}
                 ax.legend(ncols=2, fontsize="small", borderaxespad=0.2, **place)
     return figure

@@ -1,4 +1,4 @@
-"""What of the virtual stage is free to agree with what is published, and the stage it makes."""
+"""Free parameters of the calibration, and the virtual stage that they make."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = ["FREE", "SEED", "Free", "apparatus_at", "theta_at"]
 class Free:
     """A free parameter and its bounds, SI.
 
-    One that is `scaled` is searched by its logarithm.
+    If `scaled`, the search is on a logarithmic scale.
     """
 
     name: str
@@ -39,20 +39,20 @@ class Free:
         return self.low + part * (self.high - self.low)
 
     def part(self, value: float) -> float:
-        """Where in the range a value is: the inverse of `at`."""
+        """Position of a value in the range, 0 to 1: the inverse of `at`."""
         if self.scaled:
             return float(np.log(value / self.low) / np.log(self.high / self.low))
         return (value - self.low) / (self.high - self.low)
 
     def about(self, value: float, share: float) -> Free:
-        """Bounds of a later round: this share of the range, about what was found before."""
+        """Bounds of a later round: this share of the range, about the value found before."""
         middle = self.part(value)
         low, high = max(middle - 0.5 * share, 0.0), min(middle + 0.5 * share, 1.0)
         return replace(self, low=self.at(low), high=self.at(high))
 
 
 def _of_each_axis() -> list[Free]:
-    """List the parameters that x and y have apart."""
+    """List the parameters of each axis."""
     return [
         Free(f"{one.name}_{axis}", one.low, one.high, f"{axis}: {one.meaning}", one.scaled)
         for axis in "xy"
@@ -63,43 +63,45 @@ def _of_each_axis() -> list[Free]:
             Free("bend", -0.25, 0.1, "asymmetry: above 25 V the slope grows by this"),
             Free("top", -0.25, 0.1, "asymmetry: above 50 V the slope grows by this"),
             Free("creep_fast", 0.0, 0.04, "share of the fastest creep"),
-            Free("creep_fast_time", 0.02, 0.2, "its time constant [s]", scaled=True),
+            Free(
+                "creep_fast_time", 0.02, 0.2, "time constant of the fastest creep [s]", scaled=True
+            ),
             Free("creep_1s", 0.0, 0.015, "share of the creep of 1 s"),
             Free("creep_10s", 0.0, 0.015, "share of the creep of 10 s"),
-            Free("frequency", 158.0, 172.0, "mode [Hz]"),
-            Free("damping_ratio", 0.05, 0.08, "its zeta"),
+            Free("frequency", 158.0, 172.0, "frequency of the mode [Hz]"),
+            Free("damping_ratio", 0.05, 0.08, "damping ratio of the mode"),
         )
     ]
 
 
 FREE = (
     *_of_each_axis(),
-    Free("end_y", 105e-6, 122e-6, "y: where it ends under 75 V [m]"),
-    Free("bandwidth", 200.0, 2000.0, "amplifier [Hz]", scaled=True),
-    Free("slew", 3e4, 3e5, "its fastest change [V/s]", scaled=True),
-    Free("delay", 0.0, 1.5e-3, "from a reading to the effect of its voltage [s]"),
-    Free("jitter", 0.0, 0.5e-3, "how late a sample comes on average [s]"),
-    Free("lag", 0.0, 0.06, "from serving x to serving y [s]"),
-    Free("noise_bandwidth", 20.0, 500.0, "spectrum of the sensor's noise [Hz]", scaled=True),
+    Free("end_y", 105e-6, 122e-6, "y: displacement at 75 V [m]"),
+    Free("bandwidth", 200.0, 2000.0, "bandwidth of the amplifier [Hz]", scaled=True),
+    Free("slew", 3e4, 3e5, "slew rate of the amplifier [V/s]", scaled=True),
+    Free("delay", 0.0, 1.5e-3, "delay from a reading to the effect of its voltage [s]"),
+    Free("jitter", 0.0, 0.5e-3, "mean sampling jitter [s]"),
+    Free("lag", 0.0, 0.06, "lag from sampling x to sampling y [s]"),
+    Free("noise_bandwidth", 20.0, 500.0, "bandwidth of the sensor noise [Hz]", scaled=True),
     Free("cross_xy", -0.015, 0.015, "share of y in x; at most 1.5 % is published"),
     Free("cross_yx", -0.015, 0.015, "share of x in y"),
 )
-# 2e-4 s in place of 2e-5: no number is off by more than 0.04 um, but for a peak of noise, the
-# largest error of feedforward and PID: 0.11 of 2.1 um.
+# 2e-4 s in place of 2e-5: no number changes by more than 0.04 um, except a peak of noise, the
+# largest error of feedforward and PID: by 0.11 of 2.1 um.
 STEP = 2e-4
-# Of sensors and searches.
+# Seed of sensors and searches.
 SEED = 1
 
 
 def theta_at(place: Sequence[float], box: Sequence[Free] = FREE) -> dict[str, float]:
-    """Parameters, SI, of a place in the unit box."""
+    """Return the parameters, SI, of a candidate in the unit box."""
     return {free.name: free.at(part) for free, part in zip(box, place, strict=True)}
 
 
 def apparatus_at(theta: Mapping[str, float]) -> Apparatus:
     """Make the apparatus with these free parameters.
 
-    The gain of each axis follows from where it ends under 75 V, which for x is published.
+    The gain of each axis follows from its displacement at 75 V, which is published for x.
     """
     end_x = StepReadings.xu_li_2010().steady_state
     x = _axis(theta, "x", end_x)
@@ -114,8 +116,8 @@ def _axis(theta: Mapping[str, float], axis: str, end: float) -> VirtualStage:
     own = {key.removesuffix(f"_{axis}"): value for key, value in theta.items()}
     swing = known.swing
     places = own["reach"] * np.array(known.thresholds)
-    # In the middle of a settled swing the two ways of a play are min(2 r, swing - 2 r) apart, and
-    # over the swing it passes swing - 2 r: the widest loop is `share`, the mean slope 1.
+    # In the middle of a settled swing the branches of a play are min(2 r, swing - 2 r) apart, and
+    # its output travels swing - 2 r: the widest loop is `share`, the mean slope 1.
     shape = (places / places.max()) ** own["slope"]
     weights = (
         own["share"]
@@ -144,6 +146,6 @@ def _axis(theta: Mapping[str, float], axis: str, end: float) -> VirtualStage:
 
 
 def _end(stage: VirtualStage) -> float:
-    """Where the stage is 0.3 s after a step to 75 V [m], as the step test reads it."""
+    """Return the displacement 0.3 s after a step to 75 V [m], as in the step test."""
     u = np.full(300, fig_04_step_test.VOLTS)
     return float(stage.simulate(u, 1e-3, hold="zoh").x[-100:].mean())

@@ -1,9 +1,9 @@
-"""The same way on a measured log, up to the feedforward.
+"""The same experiments on a measured log, up to the feedforward.
 
 The log is that of Y. N. Aye and W. T. Ang, "A Discrete Backlash Operator for Identification and
 Compensation of Hysteresis and Non-linearity for Piezoelectric Micromanipulator", ICSTSD 2018: a
 piezo stack under 1 Hz. In its second part the drive is the feedforward of its authors' own inverse
-model, which is what ours is compared with.
+model, with which ours is compared.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ if TYPE_CHECKING:
 
 __all__ = ["Drives", "drives"]
 
-# Of training.csv: behind the transient of an unknown history [s].
+# Part of training.csv after the transient of an unknown history [s].
 FITTED = (3.0, 23.0)
-# Of tracking.csv: the row from which on the drive is the authors' feedforward, and the rows after
-# it that are left to the change of drive.
+# Row of tracking.csv from which on the drive is the authors' feedforward, and the number of rows
+# after it to skip as a transient.
 COMPENSATED, CHANGE = 7432, 200
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Drives:
-    """Drive that was measured, and those computed for the same reference.
+    """Measured drive, and drives computed for the same reference.
 
     Attributes
     ----------
@@ -51,13 +51,13 @@ class Drives:
     measured : ndarray, shape (n,)
         Drive of the authors' inverse [V].
     line : ndarray, shape (n,)
-        Best line of the reference through it [V]: what a drive without compensation is.
+        Straight line in the reference fitted to it [V]: a drive without compensation.
     computed : dict of str to ndarray, shape (n,)
-        Drive of each of our inverses [V], its mean that of the measured one.
+        Drive of each of our inverses [V], shifted to the mean of the measured one.
     fits : dict of str to float
-        RMS of each model on what it was fitted to, in parts of the stroke.
+        Residual rms of each model, in parts of the stroke.
     shifts : dict of str to float
-        What the means were apart [V].
+        Differences of the means before the shift [V].
     """
 
     t: Array
@@ -69,12 +69,12 @@ class Drives:
     shifts: dict[str, float]
 
     def section(self) -> Section:
-        """Table of how far the drives are apart."""
+        """Table of the differences of the drives."""
         span = float(np.ptp(self.measured))
         off = _rms(self.line - self.measured)
         rows = [("no compensation", "", f"{1e3 * off:.1f}", f"{100 * off / span:.2f}", "", "")]
-        for name, volts in self.computed.items():
-            away = _rms(volts - self.measured)
+        for name, voltage in self.computed.items():
+            away = _rms(voltage - self.measured)
             rows.append(
                 (
                     name,
@@ -86,15 +86,19 @@ class Drives:
                 )
             )
         return Section(
-            title="On a measured log: our inverse beside the drive that its authors measured",
+            title="A measured log: drive of our inverse and of the authors' inverse",
             text="Models fitted to 20 s of training.csv; their inverse along the reference of "
-            f"tracking.csv, compared from row {COMPENSATED + CHANGE} on with the drive that is "
-            "there, the feedforward of another group's inverse of another model. Means are taken "
-            "off, as the two records have different offsets. Explained: of the variance of what "
-            "that feedforward adds to a straight line.",
+            f"tracking.csv, compared from row {COMPENSATED + CHANGE} on with the recorded "
+            "drive, the feedforward of another group's inverse of another model. Means are "
+            "removed, as the two records have different offsets. Explained: of the variance of "
+            "the difference between that feedforward and a straight line.",
             heads=(
-                *("inverse of", "fit, % of stroke", "rms apart, mV", "% of range"),
-                *("explained, %", "means apart, mV"),
+                "inverse of",
+                "fit, % of stroke",
+                "rms difference, mV",
+                "% of range",
+                "explained, %",
+                "mean difference, mV",
             ),
             rows=tuple(rows),
         )
@@ -112,8 +116,8 @@ class Drives:
         wide = {"color": "0.68", "linewidth": 3.2, "label": "measured"}
         left.plot(um, (self.measured - self.line)[part], **wide)
         right.plot(t, (self.measured - self.line)[part], **wide)
-        for (name, volts), line in zip(self.computed.items(), LINES, strict=False):
-            added = (volts - self.line)[part]
+        for (name, voltage), line in zip(self.computed.items(), LINES, strict=False):
+            added = (voltage - self.line)[part]
             left.plot(um, added, linewidth=1.1, label=name, **line)
             right.plot(t, added, linewidth=1.1, label=name, **line)
         left.set(xlabel="reference [um]", ylabel="drive less a straight line [V]")
@@ -126,12 +130,12 @@ class Drives:
 
 
 def drives(folder: str | os.PathLike[str]) -> Drives:
-    """Identify on ``training.csv`` and lead along the reference of ``tracking.csv``.
+    """Identify from ``training.csv`` and invert for the reference of ``tracking.csv``.
 
     Parameters
     ----------
     folder : path-like
-        With both files.
+        Folder of both files.
 
     Returns
     -------
@@ -154,7 +158,7 @@ def drives(folder: str | os.PathLike[str]) -> Drives:
             f"{COMPENSATED + 2 * CHANGE}, each with a reference"
         )
     part = slice(COMPENSATED + CHANGE, None)
-    # The reference is from its own zero; the sensor's is wherever it is.
+    # Reference and sensor have different zeros.
     asked = asked + float(np.mean((log.y - asked)[part]))
     reference = Reference.from_samples(asked, log.dt, name=file.name)
     desired, measured = asked[part], log.u[part]
@@ -164,13 +168,18 @@ def drives(folder: str | os.PathLike[str]) -> Drives:
     dahl = identify(training, seed=1, runs=2, progress=False)
     found: dict[str, Any] = {"Dahl": dahl, **rivals(training)}
     for name, fit in found.items():
-        volts = fit.inverse().voltage(reference, log.dt)[part]
-        shifts[name] = float(np.mean(volts - measured))
-        computed[name], fits[name] = volts - shifts[name], fit.cost / training.stroke
+        voltage = fit.inverse().voltage(reference, log.dt)[part]
+        shifts[name] = float(np.mean(voltage - measured))
+        computed[name], fits[name] = voltage - shifts[name], fit.cost / training.stroke
     return Drives(
-        t=log.t[part], desired=desired, measured=measured, line=line,
-        computed=computed, fits=fits, shifts=shifts,
-    )  # fmt: skip
+        t=log.t[part],
+        desired=desired,
+        measured=measured,
+        line=line,
+        computed=computed,
+        fits=fits,
+        shifts=shifts,
+    )
 
 
 def _rms(values: Array) -> float:

@@ -1,8 +1,8 @@
-"""How Xu and Li 2010, section 3.3, identify: what they search, between which bounds, on what."""
+"""Identification in Xu and Li 2010, section 3.3: free parameters, bounds and record."""
 
 __all__ = ["FITTED_SECONDS", "SEARCH_BOX"]
 
-# The box of Xu and Li 2010, section 3.3, SI.
+# Bounds of the free parameters, SI.
 SEARCH_BOX = {
     "mass": (0.1, 0.2),
     "damping": (1000.0, 5000.0),

@@ -1,4 +1,4 @@
-"""What the paper publishes as numbers: name, unit, value or bound, how it is obtained."""
+"""Published numbers: name, unit, value or bound, and how each is obtained here."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SI", "Observable", "Obtained", "gathered", "observables"]
 
-# What one of the unit is in SI.
+# The units in SI.
 SI = {
     "um": 1e-6,
     "um/V": 1e-6,
@@ -29,7 +29,7 @@ SI = {
     "%": 0.01,
     "": 1.0,
 } | dict.fromkeys(("kg", "N s/m", "N/m", "N/V"), 1.0)
-# Where agreement ends: a share of the published value, or a length if that is more.
+# Tolerances: a share of the published value, or a length [m] if that is more.
 CALIBRATED, LEFT_OUT = (0.15, 0.04e-6), (0.30, 0.08e-6)
 
 
@@ -40,17 +40,17 @@ class Observable:
     Attributes
     ----------
     key : str
-        By which it is found in files.
+        Its key in files.
     figure : str
-        Where the paper has it.
+        Figure or table of the paper.
     name : str
-        In words.
+        Description.
     unit : str
-        In which a person reads it.
+        Unit for display.
     published : float
-        The number, SI.
+        Published value, SI.
     kind : {"value", "about", "bound"}
-        ``"about"``: printed as such, or derived; ``"bound"``: what is obtained must be below.
+        ``"about"``: printed as such, or derived; ``"bound"``: the obtained value must be below.
     calibrated : bool
         Whether the stage's free parameters were chosen to agree with it.
     how : str
@@ -68,27 +68,27 @@ class Observable:
 
     @property
     def slack(self) -> float:
-        """How far off still counts as agreement, SI."""
+        """Tolerance, SI."""
         share, length = CALIBRATED if self.calibrated else LEFT_OUT
         part = share * abs(self.published)
         return max(part, length) if self.unit == "um" else part
 
     def agrees(self, value: float) -> bool:
-        """Tell whether a value reaches the goal, SI."""
+        """Whether a value [SI] is within the tolerance."""
         off = value - self.published
         return bool(off <= 0.0 if self.kind == "bound" else abs(off) <= self.slack)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Obtained:
-    """A published number and what was obtained, over several seeds of the sensor.
+    """A published number and the obtained values, over several seeds of the sensor.
 
     Attributes
     ----------
     observable : Observable
-        What was published.
+        The published number.
     values : tuple of float
-        One a seed, SI.
+        One for each seed, SI.
     """
 
     observable: Observable
@@ -96,18 +96,18 @@ class Obtained:
 
     @property
     def median(self) -> float:
-        """Middle of the values, SI."""
+        """Median of the values, SI."""
         return float(np.median(self.values))
 
     @property
     def quartiles(self) -> tuple[float, float]:
-        """Between them lie half of the values, SI."""
+        """Quartiles of the values, SI."""
         low, high = np.quantile(self.values, (0.25, 0.75))
         return float(low), float(high)
 
     @property
     def ratio(self) -> float:
-        """Median over published."""
+        """Median divided by the published value."""
         return self.median / self.observable.published
 
     @property
@@ -116,7 +116,7 @@ class Obtained:
         return self.observable.agrees(self.median)
 
     def document(self) -> dict[str, Any]:
-        """Content of the JSON file, in the unit that the name tells."""
+        """Content of the JSON file, in the unit of the observable."""
         one, unit = self.observable, SI[self.observable.unit]
         low, high = self.quartiles
         return {
@@ -139,7 +139,7 @@ class Obtained:
 
 @cache
 def observables() -> tuple[Observable, ...]:
-    """List what is published, in the order of the paper."""
+    """Return the published numbers, in the order of the paper."""
     text = files(__package__).joinpath("published.json").read_text(encoding="utf-8")
     read = [
         Observable(**{**entry, "published": entry["published"] * SI[entry["unit"]]})
@@ -149,7 +149,7 @@ def observables() -> tuple[Observable, ...]:
 
 
 def _of_the_step() -> list[Observable]:
-    """Take Fig. 4 from where the step response has it."""
+    """Fig. 4, from the readings of the step response."""
     step = StepReadings.xu_li_2010()
     first, second = step.peaks
     zeta = step._core.mode()[2]
@@ -178,11 +178,17 @@ def _of_the_step() -> list[Observable]:
 
 
 def _of_table_1() -> list[Observable]:
-    """Take the dynamic parameters of Table 1; its mass is in the box of the search, and no more."""
+    """Dynamic parameters of Table 1; its mass is only within the bounds of the search."""
     stage = DahlStage.xu_li_2010()
-    fitted = "swarm on the first 4 s of Fig. 7a, the hysteresis parameters held"
+    fitted = "swarm on the first 4 s of Fig. 7a, hysteresis parameters held fixed"
     rows = [
-        ("mass", "mass M", "kg", stage.mass, "the record does not fix it: at 0.25 Hz it is idle"),
+        (
+            "mass",
+            "mass M",
+            "kg",
+            stage.mass,
+            "not determined by the record: at 0.25 Hz the inertia has no effect",
+        ),
         ("damping", "damping D", "N s/m", stage.damping, fitted),
         ("stiffness", "stiffness K", "N/m", stage.stiffness, fitted),
         ("piezo", "piezo coefficient T", "N/V", stage.piezo_coefficient, fitted),
@@ -203,7 +209,7 @@ def _of_table_1() -> list[Observable]:
 
 
 def _of_table_2() -> list[Observable]:
-    """Take Table 2 from where it is; the row of 40 um was left out of the calibration."""
+    """Table 2; the row of 40 um was left out of the calibration."""
     return [
         Observable(
             key=f"circle.{1e6 * case.radius:g}um.{case.frequency:g}Hz.{key}",
@@ -225,7 +231,7 @@ def _of_table_2() -> list[Observable]:
 
 
 def gathered(runs: Sequence[dict[str, float]]) -> tuple[Obtained, ...]:
-    """Put what several seeds gave beside what is published.
+    """Combine the published numbers with the values of several seeds.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The sines that Figs. 12 to 14 follow, and the rules for what the paper does not state."""
+"""References of Figs. 12 to 14, and the rules for ranges that the paper does not state."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ __all__ = ["RULES", "SHRUNK", "fast", "shrunk", "slow"]
 SHRUNK = (6.0, 28.0)
 RANGE = 110e-6
 
-# That of Fig. 13 was the first to be written down; docs/reproduction.md tells of the other.
+# The rule of Fig. 13 is the first one written down; docs/reproduction.md has the other.
 RULES = {
     "13": "0.2 Hz as in Fig. 12; the limits times the published static gain, 9.4 to 44 um. The "
-    "first rule written down, taken back after the calibration: with the one in between, 8 to "
+    "first rule written down, restored after the calibration: with the rule in between, 8 to "
     "39 um, nothing is clipped on this stage.",
     "14": "0 to 110 um as in Fig. 12, ten periods.",
 }
@@ -31,7 +31,7 @@ def slow() -> Reference:
 
 
 def shrunk(part: float = 1.0) -> Reference:
-    """Fig. 13: 0.2 Hz over a range that leaves the shrunk limits, times `part`."""
+    """Fig. 13: 0.2 Hz over a range that exceeds the shrunk limits, times `part`."""
     return sine(frequency=0.2, low=LOW, high=LOW + part * (HIGH - LOW), duration=20.0)
 
 

@@ -1,4 +1,4 @@
-"""Writing the report: HTML, PDF and JSON, each whole or not at all."""
+"""Writing the report as HTML, PDF and JSON files."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def save_report(found: Reproduction, folder: str | os.PathLike[str]) -> list[Pat
     import matplotlib.pyplot as plt
 
     path = make_folder(folder)
-    figures = drawn(found.way, found.drives)
+    figures = drawn(found.experiments, found.drives)
     try:
         page = html_text(found, figures)
         with replacing(path / "report.html") as temporary:

@@ -1,4 +1,4 @@
-"""The report as one HTML file that needs nothing else: tables, inline SVG, a script to zoom."""
+"""The report as one self-contained HTML file: tables, inline SVG, a script to zoom."""
 
 from __future__ import annotations
 
@@ -34,18 +34,18 @@ def html_text(found: Reproduction, figures: Sequence[Drawn]) -> str:
     Returns
     -------
     str
-        HTML with style, pictures and script in it.
+        HTML including style, pictures and script.
     """
     package = files(__package__)
     style = package.joinpath("report.css").read_text(encoding="utf-8")
     script = package.joinpath("report.js").read_text(encoding="utf-8")
     body = [
-        "<h1>Xu and Li 2010, published beside obtained</h1>",
+        "<h1>Xu and Li 2010: published and obtained</h1>",
         "<p>Dahl model-based hysteresis compensation of an XY micromanipulator, doi "
         '<a href="https://doi.org/10.1115/1.4001712">10.1115/1.4001712</a>, on a virtual stage: '
         "no measured data of the paper's stage is public. The controllers see readings at 50 Hz "
-        "with noise and steps, and errors are of these, as the paper's were; the true ones are "
-        "beside.</p>",
+        "with noise and quantisation, and errors are computed from these, as in the paper; the "
+        "true errors are listed too.</p>",
         *_numbers(found),
         *_conclusions(found),
         "<h2>Figures</h2>",
@@ -81,7 +81,17 @@ def _numbers(found: Reproduction) -> list[str]:
             f"{'' if known.figure.startswith('Table') else 'Fig. '}{escape(known.figure)}",
         ]
         rows.append(cells)
-    heads = ("what", "published", "obtained", "ratio", "reached", "use", "quartiles", "true", "in")
+    heads = (
+        "quantity",
+        "published",
+        "obtained",
+        "ratio",
+        "reached",
+        "use",
+        "quartiles",
+        "true",
+        "in",
+    )
     return [
         "<h2>Numbers</h2>",
         f"<p>{escape(tally(found).replace(' * marks the others.', ''))}</p>",
@@ -91,15 +101,22 @@ def _numbers(found: Reproduction) -> list[str]:
 
 def _conclusions(found: Reproduction) -> list[str]:
     rows = [
-        [escape(one.text), f"<b>{seen(one.holds)}</b>", f"{one.seen} of {one.seeds}",
-         escape(one.words)]
+        [
+            escape(one.text),
+            f"<b>{seen(one.holds)}</b>",
+            f"{one.seen} of {one.seeds}",
+            escape(one.words),
+        ]
         for one in found.conclusions
-    ]  # fmt: skip
-    return ["<h2>Conclusions</h2>", table(("the paper says", "", "runs", "what is seen"), rows)]
+    ]
+    return [
+        "<h2>Conclusions</h2>",
+        table(("conclusion of the paper", "", "runs", "obtained"), rows),
+    ]
 
 
 def _beyond(found: Reproduction) -> list[str]:
-    parts = ["<h2>Beyond the paper</h2>", "<p>On the same stage, with the noise of one seed.</p>"]
+    parts = ["<h2>Beyond the paper</h2>", "<p>On the same stage, with one seed of the sensors.</p>"]
     for one in found.sections:
         rows = [[escape(cell) for cell in row] for row in one.rows]
         parts += [
@@ -122,17 +139,17 @@ def _stage(found: Reproduction) -> list[str]:
         "<h2>The stage</h2>",
         f"<p>{escape(calibration_file()['provenance']['how'])}</p>",
         f"<p>Lag of y {1e3 * parts['lag']:.3g} ms, delay {1e3 * parts['delay']:.3g} ms, "
-        f"samples late by {1e3 * parts['jitter']:.2g} ms on average, cross-talk "
+        f"mean sampling jitter {1e3 * parts['jitter']:.2g} ms, cross-talk "
         f"{100 * xy:.3g} % and {100 * yx:.3g} %. SI units:</p>",
         table(("parameter", "x", "y"), rows),
         *_calibration(),
-        "<p>What the paper does not state, and the rule in its place, written down before any "
+        "<p>Rules for quantities that the paper does not state, written down before any "
         f"calibration:</p><ul>{rules}</ul>",
     ]
 
 
 def _calibration() -> list[str]:
-    """Table of the free parameters against the observables that they move most."""
+    """Table of the free parameters and the observables most sensitive to them."""
     named = {one.key: one.name for one in observables()}
     rows = [
         [
@@ -147,9 +164,9 @@ def _calibration() -> list[str]:
     ]
     return [
         "<h3>Free parameters against observables</h3>",
-        "<p>Right the three numbers that each moves most, in units of the goal, 15 % or 0.04 um, "
-        "for a step of 5 % of its range. SI units.</p>",
-        table(("parameter", "found", "searched in", "what it moves"), rows),
+        "<p>Last column: the three numbers most sensitive to each parameter, and their change in "
+        "units of the tolerance, 15 % or 0.04 um, for 5 % of its range. SI units.</p>",
+        table(("parameter", "found", "bounds", "sensitivities"), rows),
     ]
 
 
@@ -165,7 +182,7 @@ def _short(value: object) -> str:
 
 
 def table(heads: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
-    """Write a table that scrolls sideways where the page is narrow; cells are HTML."""
+    """Write a table that scrolls horizontally on a narrow page; cells are HTML."""
     head = "".join(f"<th>{one}</th>" for one in heads)
     body = "\n".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
     return f'<div class="wide"><table><thead><tr>{head}</tr></thead>\n{body}</table></div>'
@@ -180,11 +197,11 @@ def _figure(one: Drawn) -> str:
 
 
 def svg_text(one: Drawn) -> str:
-    """Write a picture as an SVG element, the same for the same picture."""
+    """Write a picture as an SVG element, reproducibly."""
     import matplotlib as mpl
 
     buffer = io.StringIO()
-    # Ids that differ from picture to picture, as all of them are on one page.
+    # All pictures are on one page, so their ids have to differ.
     with mpl.rc_context({"svg.hashsalt": one.name}):
         one.figure.savefig(buffer, format="svg", metadata={"Date": None})
     text = buffer.getvalue()

@@ -18,7 +18,7 @@ SIGNS = {"value": "", "about": "about ", "bound": "within "}
 
 
 def summary_text(found: Reproduction) -> str:
-    """Write table and conclusions; arguments and result as of `Reproduction.summary`."""
+    """Write table and conclusions, as of `Reproduction.summary`."""
     lines = [
         f"{'figure':<9}{'':<50}{'published':>14}  {'obtained':>9}  {'quartiles':<17}"
         f"{'true':>8}  {'ratio':>5}"
@@ -33,29 +33,31 @@ def summary_text(found: Reproduction) -> str:
             f"{number(one, one.median):>8}{mark}  {low + ' to ' + high:<17}"
             f"{'' if true is None else number(one, true):>8}  {one.ratio:>5.2f}  {use}".rstrip()
         )
-    lines += ["", tally(found), "", "What the paper concludes"]
-    lines += [f"  {'seen    ' if one.holds else 'NOT SEEN'}  {one.text}\n            {one.words} "
-              f"({one.seen} of {one.seeds} runs)" for one in found.conclusions]  # fmt: skip
+    lines += ["", tally(found), "", "Conclusions of the paper"]
+    for conclusion in found.conclusions:
+        lines += [
+            f"  {'confirmed    ' if conclusion.holds else 'NOT CONFIRMED'}  {conclusion.text}",
+            f"                 {conclusion.words} ({conclusion.seen} of {conclusion.seeds} runs)",
+        ]
     for part in found.sections:
         lines += ["", part.title, *wrap(part.text, 118), *_columns(part)]
     return "\n".join(lines)
 
 
 def _columns(part: Section) -> list[str]:
-    """Write a table in columns, the first to the left."""
+    """Write a table in columns, the first left-aligned."""
     table = [part.heads, *part.rows]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    return [
-        "  " + "  ".join(
-            cell.rjust(width) if i else cell.ljust(width)
-            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in table
-    ]  # fmt: skip
+    lines = []
+    for row in table:
+        first, *others = zip(row, widths, strict=True)
+        cells = [first[0].ljust(first[1]), *(cell.rjust(width) for cell, width in others)]
+        lines.append(("  " + "  ".join(cells)).rstrip())
+    return lines
 
 
 def tally(found: Reproduction) -> str:
-    """Count what reached its goal."""
+    """Count the numbers within their tolerances."""
     parts = []
     for name, used in (("calibrated", True), ("left out", False)):
         rows = [one for one in found.obtained if one.observable.calibrated == used]
@@ -65,7 +67,7 @@ def tally(found: Reproduction) -> str:
 
 
 def number(one: Obtained, value: float) -> str:
-    """Write a value of an observable in its unit, without it."""
+    """Write the number of a value in the unit of its observable."""
     shown = value / SI[one.observable.unit]
     if one.observable.unit in ("rad", ""):
         return f"{shown:.4f}"
@@ -74,13 +76,13 @@ def number(one: Obtained, value: float) -> str:
 
 
 def reading(one: Obtained) -> str:
-    """Write what is published, with its kind."""
+    """Write the published value with its kind."""
     return SIGNS[one.observable.kind] + number(one, one.observable.published)
 
 
 def seen(holds: bool) -> str:
-    """Say whether a conclusion is seen."""
-    return "seen" if holds else "not seen"
+    """Write whether a conclusion is confirmed."""
+    return "confirmed" if holds else "not confirmed"
 
 
 def _name(one: Obtained) -> str:

@@ -1,4 +1,4 @@
-"""The paper's way over many seeds, and what came of it."""
+"""Reproduction of the paper over several seeds."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .extensions import sections
 from .measured_log import Drives, drives
 from .published import SI, Obtained, gathered
 from .references import RULES
-from .run import Way, go
+from .run import Experiments, run_experiments
 
 if TYPE_CHECKING:
     import os
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from .section import Section
 
-__all__ = ["Reproduction", "reproduce_xu_li_2010"]
+__all__ = ["Reproduction", "reproduce"]
 
 SEEDS = 20
 # The calibration uses seeds below this, and no report does.
@@ -35,25 +35,25 @@ FORMAT, SCHEMA_VERSION = "piezotrack-reproduction", 1
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Reproduction:
-    """The paper's numbers and figures, published beside obtained; see `reproduce_xu_li_2010`.
+    """Published and obtained numbers and figures of the paper; see `reproduce`.
 
     Attributes
     ----------
-    way : Way
-        What the first seed gave, of which the figures are.
+    experiments : Experiments
+        Experiments of the first seed, shown in the figures.
     values, true_values : tuple of dict
-        For each seed what was obtained, SI, from the readings and from the true displacement.
+        Obtained values for each seed, SI, from the readings and from the true displacement.
     seeds : tuple of int
         Seeds of the sensors and searches.
     apparatus : Apparatus
-        The stage and its computer.
+        The stage and the timing of its controller.
     sections : tuple of Section
-        What goes beyond the paper.
+        Results beyond the paper.
     drives : Drives or None
-        Of a measured log, where one was given.
+        Drives of a measured log, if one was given.
     """
 
-    way: Way
+    experiments: Experiments
     values: tuple[dict[str, float], ...]
     true_values: tuple[dict[str, float], ...]
     seeds: tuple[int, ...]
@@ -67,33 +67,33 @@ class Reproduction:
 
     @property
     def obtained(self) -> tuple[Obtained, ...]:
-        """Every published number with what was obtained, in the order of the paper."""
+        """Every published number with the obtained values, in the order of the paper."""
         return gathered(self.values)
 
     @property
     def conclusions(self) -> tuple[Conclusion, ...]:
-        """What the paper concludes, checked."""
+        """Conclusions of the paper, checked."""
         return conclusions(self.values)
 
     def true_median(self, key: str) -> float | None:
-        """Give the median of the true values of an observable.
+        """Median of the true values of an observable.
 
         Parameters
         ----------
         key : str
-            Of the observable.
+            Key of the observable.
 
         Returns
         -------
         float or None
-            SI; None where the paper's number is not of a motion under control.
+            SI; None where the observable is not one of closed-loop motion.
         """
         if key not in self.true_values[0]:
             return None
         return float(np.median([one[key] for one in self.true_values]))
 
     def summary(self) -> str:
-        """Table of published beside obtained, and the conclusions.
+        """Table of published and obtained numbers, and the conclusions.
 
         Returns
         -------
@@ -110,7 +110,7 @@ class Reproduction:
         Returns
         -------
         dict
-            Of numbers, texts, lists and dicts only.
+            Numbers, strings, lists and dicts only.
         """
         entries = []
         for one in self.obtained:
@@ -124,8 +124,12 @@ class Reproduction:
             "rules": RULES,
             "observables": entries,
             "conclusions": [
-                {"text": one.text, "holds": one.holds, "seeds": [one.seen, one.seeds],
-                 "seen": one.words}
+                {
+                    "text": one.text,
+                    "holds": one.holds,
+                    "seeds": [one.seen, one.seeds],
+                    "seen": one.words,
+                }
                 for one in self.conclusions
             ],
             "beyond": [one.document() for one in self.sections],
@@ -136,7 +140,7 @@ class Reproduction:
                 "version": _core.__version__,
                 "seeds": list(self.seeds),
             },
-        }  # fmt: skip
+        }
 
     def save(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write the report as HTML and PDF, and the same as JSON.
@@ -144,7 +148,7 @@ class Reproduction:
         Parameters
         ----------
         folder : path-like
-            Where to; made where it is missing.
+            Folder; made where it is missing.
 
         Returns
         -------
@@ -161,37 +165,37 @@ class Reproduction:
         return save_report(self, folder)
 
 
-def reproduce_xu_li_2010(
+def reproduce(
     *,
     seeds: int = SEEDS,
     apparatus: Apparatus | None = None,
     dbo: str | os.PathLike[str] | None = None,
     progress: bool | None = None,
 ) -> Reproduction:
-    """Go the way of Xu and Li 2010, doi 10.1115/1.4001712, on the calibrated virtual stage.
+    """Repeat the experiments of Xu and Li 2010, doi 10.1115/1.4001712, on a simulated stage.
 
     Sensor at rest, step test, particle swarm, comparison with a Bouc-Wen model, feedforward, PID,
     antiwindup, repetitive control, circles: each once for every seed of the sensors' noise. The
-    controllers see samples at 50 Hz with noise and steps, and errors are computed from these, as
-    the paper's were.
+    controllers see samples at 50 Hz with noise and quantisation, and errors are computed from
+    these, as in the paper. The stage is calibrated to the published numbers.
 
     Parameters
     ----------
     seeds : int, optional
-        How many, 1 to 1000; none of them was used in the calibration.
+        Number of seeds, 1 to 1000; none of them was used in the calibration.
     apparatus : Apparatus, optional
         Another stage in place of the calibrated one.
     dbo : path-like, optional
         Folder with ``training.csv`` and ``tracking.csv`` of the measured log of a piezo stack of
-        github.com/yan9a/DiscreteBacklashOperator, with times and units added: the same way on it,
-        up to the feedforward.
+        github.com/yan9a/DiscreteBacklashOperator, with times and units added: analysed in the
+        same way, up to the feedforward.
     progress : bool, optional
         Whether a progress bar is shown; where not given, in a terminal only.
 
     Returns
     -------
     Reproduction
-        Published beside obtained, conclusions, figures.
+        Published and obtained numbers, conclusions, figures.
 
     Raises
     ------
@@ -203,7 +207,7 @@ def reproduce_xu_li_2010(
     Examples
     --------
     >>> import piezotrack as pt
-    >>> found = pt.reproduce_xu_li_2010(seeds=1)
+    >>> found = pt.xu_li_2010.reproduce(seeds=1)
     >>> by_key = {one.observable.key: one for one in found.obtained}
     >>> one = by_key["back.lag"]
     >>> print(f"{one.observable.published} rad published, {one.median:.2f} obtained")
@@ -215,18 +219,16 @@ def reproduce_xu_li_2010(
     apparatus = Apparatus.calibrated() if apparatus is None else apparatus
     if not isinstance(apparatus, Apparatus):
         kind = type(apparatus).__name__
-        raise ParameterError(
-            f"apparatus is {kind}: expected a piezotrack.xu_li_2010.apparatus.Apparatus"
-        )
+        raise ParameterError(f"apparatus is {kind}: expected a pt.xu_li_2010.Apparatus")
     chosen = tuple(range(FIRST_SEED, FIRST_SEED + count))
-    # What may be missing is looked at first.
+    # A missing file is reported before the computation.
     log = None if dbo is None else drives(dbo)
-    way = go(apparatus, chosen[0])
-    more = sections(apparatus.seeded(chosen[0]), way)
+    experiments = run_experiments(apparatus, chosen[0])
+    more = sections(apparatus.seeded(chosen[0]), experiments)
     rest = _scored(apparatus, chosen[1:], progress)
-    values, true = zip((way.values, way.true_values), *rest, strict=True)
+    values, true = zip((experiments.values, experiments.true_values), *rest, strict=True)
     return Reproduction(
-        way=way,
+        experiments=experiments,
         values=values,
         true_values=true,
         seeds=chosen,
@@ -239,18 +241,18 @@ def reproduce_xu_li_2010(
 def _scored(
     apparatus: Apparatus, seeds: Sequence[int], progress: bool | None
 ) -> list[tuple[dict[str, float], dict[str, float]]]:
-    """Go the way with other seeds, and keep the numbers only."""
+    """Repeat the experiments with other seeds, and keep the numbers only."""
 
     def score(seed: int) -> tuple[dict[str, float], dict[str, float]]:
-        way = go(apparatus, seed)
-        return way.values, way.true_values
+        experiments = run_experiments(apparatus, seed)
+        return experiments.values, experiments.true_values
 
     from rich.console import Console
     from rich.progress import track
 
     console = Console(stderr=True)
     shown = console.is_terminal if progress is None else progress
-    # The core releases Python's lock, so threads do.
+    # The core releases the GIL, so threads suffice.
     pool = ThreadPoolExecutor(max_workers=2)
     try:
         return list(
@@ -264,5 +266,5 @@ def _scored(
             )
         )
     finally:
-        # After Ctrl-C those that have not begun are given up.
+        # After Ctrl-C the seeds that have not begun are cancelled.
         pool.shutdown(cancel_futures=True)

@@ -1,4 +1,4 @@
-"""The paper's way from one end to the other, with one seed of the sensor."""
+"""All experiments of the paper, with one seed of the sensors."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from .fig_12_14_tracking import Runs
     from .table_2 import Table2
 
-__all__ = ["Way", "go"]
+__all__ = ["Experiments", "run_experiments"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Way:
-    """All that one seed gave.
+class Experiments:
+    """Results of all experiments with one seed.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Way:
     table : Table2
         Fig. 15 and Table 2.
     lag : float
-        From serving x to serving y [s].
+        Time from sampling x to sampling y [s].
     """
 
     noise: Noise
@@ -54,7 +54,7 @@ class Way:
 
     @property
     def values(self) -> dict[str, float]:
-        """What it gave for each observable, SI, and for the conclusions."""
+        """Values of the observables, SI, and of the conclusions."""
         return {
             **fig_03_sensor_at_rest.observe(self.noise),
             **fig_04_step_test.observe(self.step),
@@ -66,7 +66,7 @@ class Way:
 
     @property
     def true_values(self) -> dict[str, float]:
-        """The same of the true displacement, for what is followed under control."""
+        """The same from the true displacement, for closed-loop motion."""
         return {
             **fig_12_14_tracking.observe(
                 self.compensation, self.antiwindup, self.repetitive, true=True
@@ -75,26 +75,26 @@ class Way:
         }
 
 
-def go(apparatus: Apparatus, seed: int) -> Way:
-    """Go the whole way with one seed, of the sensors and of the searches.
+def run_experiments(apparatus: Apparatus, seed: int) -> Experiments:
+    """Run all experiments with one seed of the sensors and of the searches.
 
     Parameters
     ----------
     apparatus : Apparatus
-        The stage and its computer.
+        The stage and the timing of its controller.
     seed : int
         0 or above.
 
     Returns
     -------
-    Way
-        Every stage of it.
+    Experiments
+        The results.
     """
     apparatus = apparatus.seeded(seed)
     log = fig_06_identification.record(apparatus)
     fit = fig_06_identification.search(log, seed)
     inverse = fit.inverse()
-    return Way(
+    return Experiments(
         noise=fig_03_sensor_at_rest.at_rest(apparatus),
         step=fig_04_step_test.step_test(apparatus),
         fit=fit,

@@ -1,4 +1,4 @@
-"""A section of the report: a table with a heading and a few words."""
+"""A section of the report: a table with a heading and a text."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ __all__ = ["Section"]
 
 @dataclass(frozen=True, kw_only=True)
 class Section:
-    """A table with a heading and a few words.
+    """A table with a heading and a text.
 
     Attributes
     ----------
     title, text : str
-        Heading, and what to read from the table.
+        Heading, and explanation of the table.
     heads : tuple of str
         Titles of the columns, with units.
     rows : tuple of tuple of str

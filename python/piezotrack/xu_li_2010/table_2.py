@@ -32,8 +32,8 @@ class Published(NamedTuple):
 
 # Doi 10.1115/1.4001712; printed in um. "Max" is of the peak-to-peak error.
 PUBLISHED = tuple(
-    Published(radius / 1e6, frequency, *(value / 1e6 for value in errors))
-    for radius, frequency, *errors in (
+    Published(radius / 1e6, frequency, peak_to_peak / 1e6, mean / 1e6, sd / 1e6)
+    for radius, frequency, peak_to_peak, mean, sd in (
         (10.0, 0.1, 0.957, 0.021, 0.184),
         (10.0, 0.2, 1.406, 0.095, 0.311),
         (10.0, 0.5, 2.606, 0.570, 0.485),
@@ -61,7 +61,7 @@ class Table2:
 
     @property
     def cases(self) -> list[tuple[Published, Contour]]:
-        """What is published of each circle, and its run."""
+        """Published values and run of each circle."""
         return list(zip(PUBLISHED, self.runs, strict=False))
 
     def __str__(self) -> str:
@@ -81,7 +81,7 @@ class Table2:
         return "\n".join(lines)
 
     def plot(self) -> Figure:
-        """Circles at 0.1 Hz as in Fig. 15, errors magnified, and the table as bars.
+        """Plot the circles at 0.1 Hz as in Fig. 15, their errors, and the table as bars.
 
         Returns
         -------
@@ -105,15 +105,15 @@ def run_table_2(
 ) -> Table2:
     """Run the nine circles of Table 2 of Xu and Li 2010, doi 10.1115/1.4001712.
 
-    Three turns each, about the middle of the workspace; the turns after the smooth start count,
-    which the paper does not tell. A circle at 0.5 Hz so has fewer samples for its extremes.
+    Three turns each, about the middle of the workspace, scored after the smooth start; the paper
+    does not state this. A circle at 0.5 Hz therefore has fewer samples for its extremes.
 
     Parameters
     ----------
     stage : XYStage
-        What is led.
+        The plant.
     controllers : (Controller, Controller)
-        Those of x and y.
+        Of x and y.
     decoupling, delay, jitter
         As for `contour`.
     largest : float, optional
@@ -124,7 +124,7 @@ def run_table_2(
     Returns
     -------
     Table2
-        The runs; printed, they are a table beside the published one.
+        The runs; printed, a table of published and obtained values.
 
     Raises
     ------
@@ -135,7 +135,7 @@ def run_table_2(
     --------
     >>> import piezotrack as pt
     >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
-    >>> table = pt.run_table_2(pt.XYStage.xu_li_2010(seed=1), (loop, loop))
+    >>> table = pt.xu_li_2010.run_table_2(pt.XYStage.xu_li_2010(seed=1), (loop, loop))
     >>> run = table.runs[0]
     >>> print(f"{run.path.name}: SD {1e6 * run.metrics.sd_error:.2f} um, published 0.18 um")
     circle 10 um, 0.1 Hz: SD 0.16 um, published 0.18 um

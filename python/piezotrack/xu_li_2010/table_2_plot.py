@@ -1,4 +1,4 @@
-"""Picture of Table 2: the circles at 0.1 Hz, and published beside obtained."""
+"""Picture of Table 2: the circles at 0.1 Hz, and published and obtained values."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = ["plot_table_2"]
 
 
 def plot_table_2(table: Table2) -> Figure:
-    """Plot the circles at 0.1 Hz, their errors over an angle, and published beside obtained.
+    """Plot the circles at 0.1 Hz, their errors over an angle, and published and obtained values.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def plot_table_2(table: Table2) -> Figure:
 
 
 def _over_angle(runs: Sequence[Contour], ax: Axes) -> None:
-    """Plot the last turn of circles, one above the other, each about a line of its own."""
+    """Plot the error of the last turn of each circle, offset from each other."""
     apart = 1.15 * max(1e6 * run.metrics.peak_to_peak for run in runs)
     for row, run in enumerate(runs):
         part = last_turn(run)
@@ -65,7 +65,7 @@ def _over_angle(runs: Sequence[Contour], ax: Axes) -> None:
 
 
 def _bars(table: Table2, name: str, ax: Axes) -> None:
-    """Plot one figure of the nine cases, published beside obtained."""
+    """Plot one statistic of the nine cases, published and obtained."""
     column, attribute = {
         "max": (2, "peak_to_peak"),
         "mean": (3, "mean_error"),

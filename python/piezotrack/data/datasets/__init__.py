@@ -1,4 +1,4 @@
-"""Measured logs that come with the package, to try things on.
+"""Measured logs that come with the package.
 
 They are text in the layout of the README's own example, compressed; see the README beside them.
 """
@@ -18,20 +18,20 @@ __all__ = ["dbo_tracking", "dbo_training"]
 def dbo_training() -> Dataset:
     """Load a piezo stack under a sine of 1 Hz: a record to fit a model to.
 
-    A PI PICMA P-885.91 stack, driven through a voltage amplifier with 0 to 3.6 V in front of it
-    and watched by a capacitive sensor: 8027 samples at 200 Hz, 40 cycles, stroke 45 um in
+    A PI PICMA P-885.91 stack, driven through a voltage amplifier with a command of 0 to 3.6 V
+    and measured by a capacitive sensor: 8027 samples at 200 Hz, 40 cycles, stroke 45 um in
     ``[3.0:]``.
 
     Returns
     -------
     Dataset
-        `Dataset.u` is the command in front of the amplifier. The displacement is not zeroed.
+        `Dataset.u` is the command to the amplifier. The displacement is not zeroed.
 
     Notes
     -----
     - The first 3 s are a transient from an unknown history: use them as warm-up, as
       ``dbo_training()[3.0:23.0]`` does, and not in a fit.
-    - The sensor is about one sample late.
+    - The sensor is delayed by about one sample.
 
     References
     ----------
@@ -50,7 +50,7 @@ def dbo_training() -> Dataset:
 
 
 def dbo_tracking() -> Dataset:
-    """Load the same piezo stack under a sine of varying amplitude: a record to judge a model on.
+    """Load the same piezo stack under a sine of varying amplitude: a record for validation.
 
     14155 samples at 200 Hz of a 1 Hz sine whose amplitude grows and shrinks again. In the first
     7432 samples the drive is a straight line of the reference (no compensation), in the rest the

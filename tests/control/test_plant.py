@@ -1,4 +1,4 @@
-"""Stages beside Dahl's as the stage that is led and checked."""
+"""Closed loops and margins of the stage models beside Dahl's."""
 
 from __future__ import annotations
 
@@ -126,7 +126,9 @@ def test_a_part_of_a_sample_of_delay_shifts_the_motion(name: str) -> None:
 
 
 def test_an_identified_one_has_its_offset() -> None:
-    model = pt.IdentifiedModel(model=PLAYS, offset=-5e-6, offset_fitted=True, stroke=90e-6)
+    model = pt.identification.IdentifiedModel(
+        model=PLAYS, offset=-5e-6, offset_fitted=True, stroke=90e-6
+    )
     run = pt.track(
         model, pt.Controller(dt=0.02, limits=WIDE, feedforward=model.inverse()), sine(0.5, 6.0)
     )
@@ -149,7 +151,7 @@ def test_a_reference_out_of_reach_is_refused() -> None:
 
 
 def gains(stage: Plant, limits: tuple[float, float] = (0.0, 75.0)) -> list[float]:
-    report = pt.check_loop(loop(limits=limits, feedback=pt.Pid.xu_li_2010()), stage)
+    report = pt.check_loop(stage, loop(limits=limits, feedback=pt.Pid.xu_li_2010()))
     return [one.gain for one in (report.low, report.middle, report.high)]
 
 
@@ -195,7 +197,7 @@ def test_gains_of_a_stage_that_pulls_are_negative() -> None:
 def test_the_published_gains_hold_a_static_stage_up_to_128(gain: float, stable: bool) -> None:
     static = pt.PrandtlIshlinskiiStage(linear=gain, thresholds=(), weights=())
     controller = loop(limits=(-75.0, 75.0), feedback=pt.Pid.xu_li_2010())
-    assert pt.check_loop(controller, static).stable is stable
+    assert pt.check_loop(static, controller).stable is stable
     # And so it moves: what the start stirs up decays or grows, in 1000 samples.
     run = pt.track(static, controller, sine(0.1, 20.0), unstable=True)
     ripple = np.abs(np.diff(run.error, 3))
@@ -206,8 +208,8 @@ def test_the_published_gains_hold_a_static_stage_up_to_128(gain: float, stable: 
 def test_the_time_constant_counts_as_a_lag() -> None:
     """1/(T s + 1) behind a hold has the pole exp(-Ts/T), so a P controller holds up to a gain."""
     lagging = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(), weights=(), time_constant=0.05)
-    law = pt.StateSpace(a=[[0.0]], b=[0.0], c=[0.0], d=1e6)
-    margin = pt.check_loop(loop(feedback=law), lagging).middle.gain_margin
+    law = pt.control.StateSpace(a=[[0.0]], b=[0.0], c=[0.0], d=1e6)
+    margin = pt.check_loop(lagging, loop(feedback=law)).middle.gain_margin
     pole = math.exp(-0.02 / 0.05)
     # z = -1 is on the circle: 1 + k (1 - pole)/(z - pole) = 0.
     assert margin == pytest.approx((1.0 + pole) / (1.0 - pole), rel=1e-6)
@@ -218,13 +220,13 @@ def test_an_unstable_loop_is_refused() -> None:
         pt.track(PLAYS, loop(feedback=pt.Pid.from_um(kp=0.2, ti=0.009, td=0.044)), sine(0.2, 5.0))
 
 
-@pytest.mark.parametrize("stage", [5, None, "dahl", pt.DahlState()])
+@pytest.mark.parametrize("stage", [5, None, "dahl", pt.stages.DahlState()])
 def test_what_cannot_be_led_is_refused(stage: Any) -> None:
     words = r"expected a pt\.VirtualStage, a stage of a model"
     with pytest.raises(pt.ParameterError, match=f"stage is {type(stage).__name__}: {words}"):
         pt.track(stage, loop(), sine(0.5, 2.0))
     with pytest.raises(pt.ParameterError, match=words):
-        pt.check_loop(loop(feedback=pt.Pid.xu_li_2010()), stage)
+        pt.check_loop(stage, loop(feedback=pt.Pid.xu_li_2010()))
 
 
 def test_a_hysteresis_that_grows_without_bound_has_no_gain() -> None:
@@ -241,7 +243,9 @@ def test_the_command_leads_the_model_itself(
     stage: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    model = pt.IdentifiedModel(model=stage, offset=2e-6, offset_fitted=True, stroke=90e-6)
+    model = pt.identification.IdentifiedModel(
+        model=stage, offset=2e-6, offset_fitted=True, stroke=90e-6
+    )
     model.save("model.json")
     course = ("--reference", "sine:0.5Hz,20..60um,6s", "--stage", "model")
     printed = ran("track", "model.json", *course, "--no-feedback", "--online", "--dt", "0.002")

@@ -1,4 +1,4 @@
-"""What is said of a record that is odd, and that nothing is said of one that is not."""
+"""Diagnostics: warnings of an unsound record, none of a sound one."""
 
 from __future__ import annotations
 
@@ -54,15 +54,15 @@ GOOD = {
 @pytest.mark.parametrize("name", GOOD)
 def test_nothing_is_said_of_a_good_record(name: str) -> None:
     record = log(np.asarray(GOOD[name], dtype=np.float64))
-    diagnostics.refuse(record, searches_hysteresis=True)
-    assert diagnostics.of_record(record) == []
+    diagnostics.check_record(record, searches_hysteresis=True)
+    assert diagnostics.record_warnings(record) == []
 
 
 @pytest.mark.parametrize("seconds", [4.0, 12.0])
 def test_nothing_is_said_of_the_demonstration(seconds: float) -> None:
     record = demo_log()[:seconds]
-    diagnostics.refuse(record, searches_hysteresis=True)
-    assert diagnostics.of_record(record) == []
+    diagnostics.check_record(record, searches_hysteresis=True)
+    assert diagnostics.record_warnings(record) == []
 
 
 @pytest.mark.skipif(not MEASURED.is_dir(), reason=f"the measured logs are not in {MEASURED}")
@@ -70,8 +70,8 @@ def test_nothing_is_said_of_measured_logs() -> None:
     for name in ("training", "tracking"):
         whole = pt.read(MEASURED / f"{name}.csv")
         for record in (whole, whole[3.0:], whole[3.0:23.0]):
-            diagnostics.refuse(record, searches_hysteresis=True)
-            assert diagnostics.of_record(record) == []
+            diagnostics.check_record(record, searches_hysteresis=True)
+            assert diagnostics.record_warnings(record) == []
     assert pt.identify(pt.read(MEASURED / "training.csv")[3.0:23.0], seed=1).notes == []
 
 
@@ -88,16 +88,16 @@ def test_a_drive_that_never_reverses_is_refused(u: NDArray[np.float64]) -> None:
 
 def test_unless_hysteresis_is_held() -> None:
     fit = pt.identify(log(75.0 * T / 4.0), fixed=HELD, bounds=BOX, swarm=SMALL)
-    assert "the drive never reverses: this record says nothing of hysteresis" in fit.notes
-    step = pt.identify_step(pt.StepReadings.xu_li_2010())
+    assert "the drive never reverses: this record does not determine the hysteresis" in fit.notes
+    step = pt.identify_step(pt.identification.StepReadings.xu_li_2010())
     pt.identify(log(75.0 * T / 4.0), initial=step, bounds=BOX, swarm=SMALL)
 
 
 def test_the_drive_before_the_window_counts() -> None:
     # The window only rises, but remembers cycles before.
     record = log(np.r_[SINE[:-1], SINE])[4.0:5.9]
-    diagnostics.refuse(record, searches_hysteresis=True)
-    (note,) = diagnostics.of_record(record)
+    diagnostics.check_record(record, searches_hysteresis=True)
+    (note,) = diagnostics.record_warnings(record)
     assert "shorter than a period of the drive" in note
 
 
@@ -126,14 +126,14 @@ def test_the_core_refuses_first_what_tells_nothing() -> None:
     ],
 )
 def test_a_wrong_unit_is_named(drive: float, displacement: float, pieces: tuple[str, ...]) -> None:
-    (note,) = diagnostics.of_record(in_units(drive, displacement))
+    (note,) = diagnostics.record_warnings(in_units(drive, displacement))
     for piece in pieces:
         assert piece in note
 
 
 def test_a_wrong_unit_of_a_command_of_a_few_volts_is_named() -> None:
     # The measured stack gives 12.5 um/V; a thousandth of it is no stage's.
-    (note,) = diagnostics.of_record(in_units(3.6 / 75.0, 45.0 / 119.0 * 1e-3))
+    (note,) = diagnostics.record_warnings(in_units(3.6 / 75.0, 45.0 / 119.0 * 1e-3))
     assert "1e3 too small" in note
 
 
@@ -141,7 +141,7 @@ def test_a_wrong_unit_of_a_command_of_a_few_volts_is_named() -> None:
     "u", [SINE[:2400], 30.0 + 20.0 * np.sin(0.5 * np.pi * T[:2400]), 75.0 - SINE[:3000]]
 )
 def test_less_than_a_period_is_named(u: NDArray[np.float64]) -> None:
-    (note,) = diagnostics.of_record(log(u))
+    (note,) = diagnostics.record_warnings(log(u))
     assert "shorter than a period of the drive" in note
 
 
@@ -155,7 +155,7 @@ def test_less_than_a_period_is_named(u: NDArray[np.float64]) -> None:
 )
 def test_a_clipped_drive_is_named(u: NDArray[np.float64], levels: list[str]) -> None:
     # A record that begins at its lowest has no cut there at the beginning.
-    found = diagnostics.of_record(log(np.r_[u[:-1], u]))
+    found = diagnostics.record_warnings(log(np.r_[u[:-1], u]))
     assert len(found) == len(levels)
     for note, level in zip(found, levels, strict=True):
         assert f"the drive is cut off at {level}" in note
@@ -164,7 +164,7 @@ def test_a_clipped_drive_is_named(u: NDArray[np.float64], levels: list[str]) -> 
 def test_a_sensor_at_its_end_is_named() -> None:
     good = log(SINE)
     for y in (np.minimum(good.y, 90e-6), np.maximum(-good.y, -90e-6)):
-        (note,) = diagnostics.of_record(pt.Dataset(u=good.u, y=y, dt=good.dt))
+        (note,) = diagnostics.record_warnings(pt.Dataset(u=good.u, y=y, dt=good.dt))
         assert "90 um while the drive goes" in note
         assert "is the sensor or the stage at its end?" in note
 
@@ -189,7 +189,7 @@ def lopsided() -> pt.Dataset:
 def test_a_loop_that_the_model_cannot_describe_is_named() -> None:
     fit = pt.identify(lopsided(), seed=1, runs=2)
     (note,) = [note for note in fit.notes if note.startswith("the loop")]
-    for piece in ("is asymmetric", "this model cannot describe", "um near", "V on the way"):
+    for piece in ("is asymmetric", "this model cannot describe", "um near", "the drive going"):
         assert piece in note
     assert note in fit.summary()
 
@@ -197,7 +197,7 @@ def test_a_loop_that_the_model_cannot_describe_is_named() -> None:
 def test_where_hysteresis_was_held_it_says_so() -> None:
     fit = pt.identify(lopsided(), fixed=HELD, seed=1, runs=2)
     (note,) = [note for note in fit.notes if note.startswith("the loop")]
-    assert "a1, a2, b1 were held: search all" in note
+    assert "a1, a2, b1 were held fixed: identify all" in note
 
 
 @pytest.mark.parametrize("kind", ["noise", "drift", "a late displacement of a chirp"])
@@ -211,4 +211,4 @@ def test_what_does_not_follow_the_loop_is_no_loops_fault(kind: str) -> None:
     record = pt.Dataset(u=good.u, y=good.y + rest[kind], dt=good.dt)
     percent = 100.0 * float(np.std(rest[kind])) / record.stroke
     assert percent > diagnostics.REMAINS
-    assert diagnostics.of_fit(record, good.y, percent, ("a1", "a2"), ()) == []
+    assert diagnostics.fit_warnings(record, good.y, percent, ("a1", "a2"), ()) == []

@@ -1,0 +1,6 @@
+# The public names and their homes, each written once: type checkers read them here, and
+# _support/lazy.py does at run time. One name a line, as `ruff format` keeps it.
+from . import datasets as datasets
+from .dataset import Dataset as Dataset
+from .reader import read as read
+from .reader import read_drive as read_drive

@@ -1,0 +1,19 @@
+# The public names and their homes, each written once: type checkers read them here, and
+# _support/lazy.py does at run time. One name a line, as `ruff format` keeps it.
+from .base import ForceState as ForceState
+from .base import Response as Response
+from .base import Stage as Stage
+from .base import StageState as StageState
+from .bouc_wen import BoucWenStage as BoucWenStage
+from .bouc_wen import BoucWenState as BoucWenState
+from .bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
+from .dahl import DahlStage as DahlStage
+from .dahl import DahlState as DahlState
+from .first_order_dahl import FirstOrderDahlStage as FirstOrderDahlStage
+from .inverse import Inverse as Inverse
+from .inverse import InverseSession as InverseSession
+from .prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage
+from .prandtl_ishlinskii import PrandtlIshlinskiiState as PrandtlIshlinskiiState
+from .virtual import VirtualResponse as VirtualResponse
+from .virtual import VirtualStage as VirtualStage
+from .xy import XYStage as XYStage
