@@ -27,7 +27,7 @@ from .errors import PiezotrackError as PiezotrackError
 from .errors import ShapeError as ShapeError
 from .identification.comparison import compare as compare
 from .identification.identified import load as load
-from .identification.identify import identify as identify
+from .identification.fit import identify as identify
 from .identification.step_response import identify_step as identify_step
 from .identification.swarm import ParticleSwarm as ParticleSwarm
 from .references.parse import parse_reference as parse_reference

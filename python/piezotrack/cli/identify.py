@@ -170,7 +170,7 @@ def _partial(model: str) -> str:
 def _search(log: Dataset, out: Path, kind: str, **arguments: Any) -> Identification:
     """Identify; on Ctrl-C save the best model found so far."""
     from .._support.files import make_folder
-    from ..identification.identify import identify
+    from ..identification.fit import identify
 
     try:
         return identify(log, kind, **arguments)

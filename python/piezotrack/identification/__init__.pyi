@@ -11,7 +11,7 @@ from .estimates import SwarmRun as SwarmRun
 from .identified import IdentifiedModel as IdentifiedModel
 from .identified import Score as Score
 from .identified import load as load
-from .identify import identify as identify
+from .fit import identify as identify
 from .least_squares import LeastSquares as LeastSquares
 from .result import Identification as Identification
 from .sensor_noise import Noise as Noise

@@ -16,7 +16,7 @@ from ..data.dataset import Dataset
 from ..errors import ParameterError
 from ..stages.registry import MODELS, ModelInfo
 from .identified import IdentifiedModel, Score, load
-from .identify import identify
+from .fit import identify
 from .model_file import provenance
 
 if TYPE_CHECKING:

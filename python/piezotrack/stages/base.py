@@ -374,7 +374,7 @@ class Stage:
         if isinstance(initial, self._state):
             return initial
         raise ParameterError(
-            f"initial is {type(initial).__name__}: expected a pt.{self._state.__name__}, as the "
+            f"initial is {type(initial).__name__}: expected a pt.stages.{self._state.__name__}, as the "
             "final of a response"
         )
 

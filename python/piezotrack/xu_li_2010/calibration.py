@@ -13,7 +13,7 @@ import numpy as np
 from .. import _core
 from ..control.tracking import check_stable
 from ..errors import PiezotrackError
-from ..identification.identify import identify
+from ..identification.fit import identify
 from ..identification.swarm import ParticleSwarm
 from ..stages.dahl import DahlStage
 from . import fig_04_step_test, fig_06_identification, fig_12_14_tracking, fig_15_circles

@@ -10,7 +10,7 @@ from .._support.files import write_columns
 from ..control.components import Pid, Repetitive
 from ..control.controller import Controller
 from ..control.tracking import Tracking, track
-from ..identification.identify import identify
+from ..identification.fit import identify
 from ..references.waveforms import sine
 from ..stages.dahl import DahlStage
 from ..stages.virtual import VirtualStage

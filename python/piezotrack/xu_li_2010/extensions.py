@@ -9,7 +9,7 @@ from ..control.components import Lag, LowPass, Notch, Pid, Repetitive, ZeroPhase
 from ..control.tracking import Tracking, track
 from ..data.dataset import Dataset
 from ..errors import NumericalError, ParameterError
-from ..identification.identify import identify
+from ..identification.fit import identify
 from ..stages.dahl import DahlStage
 from . import fig_06_identification, fig_07_model_comparison, fig_12_14_tracking
 from .apparatus import DT, loop

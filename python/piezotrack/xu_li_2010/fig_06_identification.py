@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..data.dataset import Dataset
-from ..identification.identify import identify
+from ..identification.fit import identify
 from ..identification.swarm import ParticleSwarm
 from ..stages.dahl import DahlStage
 from .procedure import FITTED_SECONDS, SEARCH_BOX

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..identification.comparison import Comparison, compare
-from ..identification.identify import identify
+from ..identification.fit import identify
 from ..stages.bouc_wen import BoucWenStage
 from .fig_06_identification import thinned
 from .procedure import FITTED_SECONDS

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..data.reader import read
 from ..errors import DataError
-from ..identification.identify import identify
+from ..identification.fit import identify
 from ..references.reference import Reference, read_reference
 from .extensions import rivals
 from .section import Section
