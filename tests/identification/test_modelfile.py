@@ -206,7 +206,9 @@ def test_the_file_says_where_the_numbers_come_from(tmp_path: Path) -> None:
     assert provenance["package"] == "piezotrack"
     assert provenance["version"] == pt.__version__ == version("piezotrack")
     assert provenance["seed"] == 1
-    assert provenance["swarm"] == asdict(fitted().swarm)
+    swarm = fitted().swarm
+    assert swarm is not None
+    assert provenance["swarm"] == asdict(swarm)
     data = provenance["data"]
     # The hash as the documentation has it: dt, the drive and displacement kept, the warm-up.
     kept = quick()[:3.0]

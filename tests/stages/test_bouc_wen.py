@@ -196,7 +196,7 @@ def test_a_run_can_be_carried_on(hold: Literal["foh", "zoh"]) -> None:
 def test_refusals_name_the_parameter(name: str, value: object) -> None:
     values = asdict(CORRECTED)
     with pytest.raises(pt.ParameterError, match=name):
-        pt.BoucWenStage(**(values | {name: value}))  # type: ignore[arg-type]
+        pt.BoucWenStage(**(values | {name: value}))
 
 
 @pytest.mark.parametrize("exponent", [1.0, 2.0])
