@@ -24,7 +24,7 @@ def test_page_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
     log = pt.read("stage.csv")
     fit = pt.identify(log[3.0:23.0], model="dahl", seed=1)
-    assert re.search(r"Dahl stage identified from .*stage\.csv", fit.summary())
+    assert re.search(r"Dahl, second order: stage identified from .*stage\.csv", fit.summary())
     assert len(fit.plot().axes) >= 4
     fit.save("dahl.json")
     assert pt.load("dahl.json").model == fit.model

@@ -11,6 +11,7 @@ It writes what it finds to oscillator.json.
 from __future__ import annotations
 
 import time
+from dataclasses import asdict
 
 import numpy as np
 

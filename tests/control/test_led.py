@@ -24,8 +24,8 @@ PLAYS = pt.PrandtlIshlinskiiStage(
     linear=0.9e-6,
     thresholds=(3.0, 8.0, 15.0, 25.0),
     weights=(0.1e-6, 0.2e-6, 0.15e-6, 0.12e-6),
-    corners=(20e-6, 50e-6),
-    bends=(0.08, -0.05),
+    dead_zone_thresholds=(20e-6, 50e-6),
+    dead_zone_weights=(0.08, -0.05),
 )
 FRICTION = pt.FirstOrderDahlStage(
     mass=0.1828,
@@ -41,7 +41,7 @@ STAGES: dict[str, Plant] = {
     "plays": PLAYS,
     "plays with a lag": replace(PLAYS, time_constant=5e-3),
     "plays with a mode": replace(PLAYS, frequency=160.0, damping_ratio=0.5),
-    "creeping plays": replace(PLAYS, creep_shares=(0.004, 0.01), creep_times=(0.1, 1.0)),
+    "creeping plays": replace(PLAYS, creep_weights=(0.004, 0.01), creep_times=(0.1, 1.0)),
 }
 # Where no voltage of the inverse is clipped.
 WIDE = (-20.0, 95.0)
@@ -126,7 +126,7 @@ def test_a_part_of_a_sample_of_delay_shifts_the_motion(name: str) -> None:
 
 
 def test_an_identified_one_has_its_offset() -> None:
-    model = pt.IdentifiedPlays(model=PLAYS, offset=-5e-6, offset_fitted=True, stroke=90e-6)
+    model = pt.IdentifiedModel(model=PLAYS, offset=-5e-6, offset_fitted=True, stroke=90e-6)
     run = pt.track(
         model, pt.Controller(dt=0.02, limits=WIDE, feedforward=model.inverse()), sine(0.5, 6.0)
     )
@@ -218,9 +218,9 @@ def test_an_unstable_loop_is_refused() -> None:
         pt.track(PLAYS, loop(feedback=pt.Pid.from_um(kp=0.2, ti=0.009, td=0.044)), sine(0.2, 5.0))
 
 
-@pytest.mark.parametrize("stage", [5, None, "dahl", pt.StageState()])
+@pytest.mark.parametrize("stage", [5, None, "dahl", pt.DahlState()])
 def test_what_cannot_be_led_is_refused(stage: Any) -> None:
-    words = r"expected pt\.VirtualStage, pt\.DahlStage, pt\.BoucWenStage, pt\.Prandtl"
+    words = r"expected a pt\.VirtualStage, a stage of a model"
     with pytest.raises(pt.ParameterError, match=f"stage is {type(stage).__name__}: {words}"):
         pt.track(stage, loop(), sine(0.5, 2.0))
     with pytest.raises(pt.ParameterError, match=words):
@@ -241,11 +241,8 @@ def test_the_command_leads_the_model_itself(
     stage: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    common = {"model": stage, "offset": 2e-6, "offset_fitted": True, "stroke": 90e-6}
-    if isinstance(stage, pt.BoucWenStage):
-        pt.IdentifiedModel(**common, scale_assumed=False).save("model.json")
-    else:
-        pt.IdentifiedPlays(**common).save("model.json")
+    model = pt.IdentifiedModel(model=stage, offset=2e-6, offset_fitted=True, stroke=90e-6)
+    model.save("model.json")
     course = ("--reference", "sine:0.5Hz,20..60um,6s", "--stage", "model")
     printed = ran("track", "model.json", *course, "--no-feedback", "--online", "--dt", "0.002")
     found = float(printed.partition("from 2 s on: max ")[2].partition(" um")[0])

@@ -211,4 +211,4 @@ def test_what_does_not_follow_the_loop_is_no_loops_fault(kind: str) -> None:
     record = pt.Dataset(u=good.u, y=good.y + rest[kind], dt=good.dt)
     percent = 100.0 * float(np.std(rest[kind])) / record.stroke
     assert percent > diagnostics.REMAINS
-    assert diagnostics.of_fit(record, good.y, percent, ()) == []
+    assert diagnostics.of_fit(record, good.y, percent, ("a1", "a2"), ()) == []

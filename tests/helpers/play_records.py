@@ -16,10 +16,10 @@ STAGE = pt.PrandtlIshlinskiiStage(
     linear=0.9e-6,
     thresholds=(3.0, 8.0, 15.0, 25.0),
     weights=(0.1e-6, 0.2e-6, 0.15e-6, 0.12e-6),
-    corners=(20e-6, 50e-6),
-    bends=(0.08, -0.05),
+    dead_zone_thresholds=(20e-6, 50e-6),
+    dead_zone_weights=(0.08, -0.05),
 )
-PLAIN = replace(STAGE, corners=(), bends=())
+PLAIN = replace(STAGE, dead_zone_thresholds=(), dead_zone_weights=())
 
 
 def drive(cycles: float = 6.0, samples: int = 3000) -> NDArray[np.float64]:
@@ -33,3 +33,9 @@ def drive(cycles: float = 6.0, samples: int = 3000) -> NDArray[np.float64]:
 def record(stage: pt.PrandtlIshlinskiiStage, dt: float = 1e-3, **keywords: Any) -> pt.Dataset:
     u = drive(**keywords)
     return pt.Dataset(u=u, y=stage.simulate(u, dt).x - 4e-6, dt=dt)
+
+
+def fit_plays(data: pt.Dataset, *, offset: bool = True, **settings: Any) -> pt.Identification:
+    """Identify a Prandtl-Ishlinskii stage with these settings of the least squares."""
+    least_squares = pt.identification.LeastSquares(**settings)
+    return pt.identify(data, "prandtl-ishlinskii", offset=offset, least_squares=least_squares)

@@ -15,8 +15,9 @@ from matplotlib.patches import Rectangle
 import piezotrack as pt
 from commands import names, ran, refusal
 from folders import MEASURED
-from piezotrack.stages.registry import KINDS
+from piezotrack.stages.registry import MODELS as LISTED
 from piezotrack.xu_li_2010.demo import write_log
+from play_records import fit_plays
 
 TIMES = np.arange(1600) / 200.0
 DRIVE = 37.5 - 25.0 * np.cos(np.pi * TIMES) - 12.0 * np.cos(1.5 * np.pi * TIMES)
@@ -43,20 +44,19 @@ def found() -> pt.Comparison:
     return pt.compare(log(), PAIR, train=(1.0, 5.0), seed=1, runs=1)
 
 
-def row(name: str, of: pt.Comparison | None = None) -> pt.Compared:
+def row(name: str, of: pt.Comparison | None = None) -> pt.ModelScore:
     return {one.name: one for one in (of or found()).rows}[name]
 
 
 # What is fitted and what is judged.
 
 
-def test_each_model_is_what_identify_finds_on_the_fitted_part() -> None:
-    part = log()[1.0:5.0]
-    for one in found().rows:
-        alone = pt.identify(part, one.name, seed=1, runs=1)
-        assert one.fit.document() == alone.document()
-        assert one.train.rms == pytest.approx(alone.cost, rel=1e-9)
-        assert one.title == ("Bouc-Wen" if one.name == "bouc-wen" else "Prandtl-Ishlinskii")
+def test_a_model_is_what_identify_finds_on_the_fitted_part() -> None:
+    one = row("bouc-wen")
+    alone = pt.identify(log()[1.0:5.0], "bouc-wen", seed=1, runs=1)
+    assert one.fit.document() == alone.document()
+    assert one.train.rms == pytest.approx(alone.cost, rel=1e-9)
+    assert one.title == "Bouc-Wen"
     assert found().fits == {one.name: one.fit for one in found().rows}
 
 
@@ -138,16 +138,16 @@ def test_another_record_has_an_offset_of_its_own() -> None:
 def test_all_kinds_are_compared_where_none_is_named() -> None:
     comparison = pt.compare(log()[:4.0], seed=1, runs=1)
     # A voltage is no force: the oscillator is for records whose drive is in newtons.
-    kinds = [kind.name for kind in KINDS if kind.drive_unit == "V"]
+    kinds = [info.name for info in LISTED if info.drive_unit == "V"]
     assert [one.name for one in comparison.rows] == kinds
-    assert len(kinds) == len(KINDS) - 1
+    assert len(kinds) == len(LISTED) - 1
 
 
 # Models that are there already.
 
 
 def test_a_model_and_a_file_are_taken_as_they_are(tmp_path: Path) -> None:
-    elsewhere = pt.identify_plays(log()[2.0:6.0], asymmetry=False)
+    elsewhere = fit_plays(log()[2.0:6.0], dead_zones=False)
     file = elsewhere.save(tmp_path / "mine.json")
     comparison = pt.compare(log(), [file, elsewhere, str(file)], train=(1.0, 5.0))
     assert [one.name for one in comparison.rows] == ["mine", "prandtl-ishlinskii", "mine-2"]
@@ -166,7 +166,7 @@ def test_a_model_and_a_file_are_taken_as_they_are(tmp_path: Path) -> None:
 
 
 def test_a_model_fitted_on_this_very_part_is_counted(tmp_path: Path) -> None:
-    finer = pt.identify_plays(log()[1.0:5.0], count=20, asymmetry=False, dynamics=None)
+    finer = fit_plays(log()[1.0:5.0], count=20, dead_zones=False, dynamics=None)
     file = finer.save(tmp_path / "finer.json")
     comparison = pt.compare(log(), [finer, file, "prandtl-ishlinskii"], train=(1.0, 5.0))
     assert [one.parameters for one in comparison.rows] == [22, 22, 15]
@@ -175,7 +175,7 @@ def test_a_model_fitted_on_this_very_part_is_counted(tmp_path: Path) -> None:
 
 
 def test_a_file_keeps_its_name_when_all_are_saved_beside_it(tmp_path: Path) -> None:
-    old = pt.identify_plays(log()[2.0:6.0], count=3)
+    old = fit_plays(log()[2.0:6.0], count=3)
     file = old.save(tmp_path / "prandtl-ishlinskii.json")
     before = file.read_bytes()
     comparison = pt.compare(log(), ["prandtl-ishlinskii", file])
@@ -211,7 +211,7 @@ def test_the_table_marks_the_best() -> None:
 def test_an_exact_fit_can_be_told_and_drawn() -> None:
     u = 37.5 - 37.5 * np.cos(np.arange(800) / 50.0)
     exact = pt.Dataset(u=u, y=PLAYS.simulate(u, 0.005).x, dt=0.005)
-    model = pt.IdentifiedPlays(model=PLAYS, offset=0.0, offset_fitted=False, stroke=exact.stroke)
+    model = pt.IdentifiedModel(model=PLAYS, offset=0.0, offset_fitted=False, stroke=exact.stroke)
     comparison = pt.compare(exact, [model])
     assert comparison.best.test.rms == 0.0
     assert "Prandtl-Ishlinskii" in comparison.summary()
@@ -278,34 +278,43 @@ def test_it_is_saved_with_its_models(tmp_path: Path) -> None:
 
 # What is refused.
 
+# The arguments, and what the message begins with.
 REFUSED: dict[str, tuple[dict[str, Any], str]] = {
-    "one name": ({"models": "dahl"}, r"models is 'dahl': expected several in a list"),
+    "one name": ({"models": "dahl"}, "models is"),
     "no model": ({"models": []}, "models is empty"),
-    "unknown": ({"models": ["preisach"]}, "models has 'preisach': expected 'dahl', 'bouc-wen'"),
-    "a stage": ({"models": [PLAYS]}, "models has 'PrandtlIshlinskiiStage': expected"),
-    "no file": ({"models": ["gone.json"]}, "gone.json: no such file"),
-    "train": ({"train": 3.0}, "train is float: expected"),
-    "train of three": ({"train": (1.0, 2.0, 3.0)}, r"train is \(1.0, 2.0, 3.0\): expected"),
-    "train outside": ({"train": (1.0, 30.0)}, "train: the window from 1 s to 30 s reaches out"),
-    "train of words": ({"train": ("a", 3.0)}, "train: start is 'a'"),
-    "train to the end": ({"train": (1.0, None)}, "leaves nothing to judge on: expected an end"),
-    "all fitted": ({"train": (1.0, 8.0)}, "test: the window from 8 s to 8 s is empty"),
-    "test": ({"test": "5:8"}, r"test is '5:8': expected \(start, stop\) in seconds or a Dataset"),
-    "test from the start": ({"test": (None, 4.0)}, "leaves nothing to fit"),
-    "overlap": ({"train": (1.0, 5.0), "test": (4.0, 6.0)}, "windows that do not overlap"),
-    "seed": ({"models": ["dahl"], "seed": -1}, "seed is -1"),
+    "unknown": ({"models": ["preisach"]}, "models has 'preisach'"),
+    "a stage": ({"models": [PLAYS]}, "models has 'PrandtlIshlinskiiStage'"),
+    "no file": ({"models": ["gone.json"]}, "gone.json"),
+    "train": ({"train": 3.0}, "train is"),
+    "train of three": ({"train": (1.0, 2.0, 3.0)}, "train is"),
+    "train outside": ({"train": (1.0, 30.0)}, "train: "),
+    "train of words": ({"train": ("a", 3.0)}, "train: "),
+    "train to the end": ({"train": (1.0, None)}, "train goes"),
+    "all fitted": ({"train": (1.0, 8.0)}, "test: "),
+    "test": ({"test": "5:8"}, "test is"),
+    "test from the start": ({"test": (None, 4.0)}, "test begins"),
+    "overlap": ({"train": (1.0, 5.0), "test": (4.0, 6.0)}, "test goes"),
+    "seed": ({"models": ["dahl"], "seed": -1}, "seed is"),
 }
 
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_refuses(name: str) -> None:
-    arguments, words = REFUSED[name]
-    with pytest.raises(pt.PiezotrackError, match=words):
+    arguments, begin = REFUSED[name]
+    error = pt.DataError if name == "no file" else pt.ParameterError
+    with pytest.raises(error) as caught:
         pt.compare(log(), **({"models": ["prandtl-ishlinskii"]} | arguments))
+    assert str(caught.value).startswith(begin)
+
+
+def test_the_wording_of_a_refusal() -> None:
+    with pytest.raises(pt.ParameterError) as caught:
+        pt.compare(log(), "dahl")
+    assert str(caught.value) == "models is 'dahl': expected several in a list, as ['dahl']"
 
 
 def test_refuses_what_is_no_record() -> None:
-    with pytest.raises(pt.ParameterError, match="log is ndarray: expected a Dataset"):
+    with pytest.raises(pt.ParameterError, match="data is ndarray: expected a Dataset"):
         pt.compare(log().u, ["dahl"])  # type: ignore[arg-type]
 
 

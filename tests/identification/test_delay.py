@@ -87,5 +87,6 @@ def test_a_file_without_a_delay_is_read(tmp_path: Path) -> None:
     fit = pt.identify(pt.Dataset(u=u, y=y, dt=DT), fixed=HELD, seed=1, runs=1)
     document = json.loads(fit.save(tmp_path / "dahl.json").read_text())
     del document["delay"]
+    document["schema_version"] = 1
     (tmp_path / "old.json").write_text(json.dumps(document))
     assert pt.load(tmp_path / "old.json").delay == 0.0

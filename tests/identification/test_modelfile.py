@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
+from folders import ROOT
 from records import HELD, quick, quick_fit
 
 if TYPE_CHECKING:
@@ -35,6 +36,9 @@ def published(**changes: Any) -> pt.IdentifiedModel:
     return pt.IdentifiedModel(**(content | changes))
 
 
+FILES = ROOT / "tests" / "files"
+
+
 @cache
 def fitted() -> pt.Identification:
     return quick_fit(data=quick()[1.0:3.0])
@@ -51,7 +55,7 @@ def content_of(path: Path) -> dict[str, Any]:
     return content
 
 
-def in_bits(model: pt.IdentifiedModel | pt.IdentifiedPlays) -> list[str]:
+def in_bits(model: pt.IdentifiedModel) -> list[str]:
     stage = asdict(model.model)
     return [stage[name].hex() for name in NAMES] + [model.offset.hex(), model.stroke.hex()]
 
@@ -125,6 +129,42 @@ def test_same_result_same_file(tmp_path: Path) -> None:
     assert back.save(tmp_path / "first.json").read_bytes() == first
 
 
+# Files of earlier versions.
+
+
+def test_a_file_of_version_1_is_read_with_the_names_of_today(tmp_path: Path) -> None:
+    file = FILES / "prandtl_ishlinskii_version_1.json"
+    old = json.loads(file.read_text())["parameters"]
+    known = pt.load(file)
+    assert isinstance(known.model, pt.PrandtlIshlinskiiStage)
+    names = {
+        "dead_zone_thresholds": "corners",
+        "dead_zone_weights": "bends",
+        "creep_weights": "creep_shares",
+    }
+    for name in known.model.parameter_names():
+        value = old[names.get(name, name)]["value"]
+        assert getattr(known.model, name) == (tuple(value) if isinstance(value, list) else value)
+    assert known.offset == json.loads(file.read_text())["offset"]["value"]
+    assert (known.delay, known.scale_assumed) == (0.0, False)
+    # w0, two weights, two dead zones, one relaxation, a lag, the offset.
+    assert known.free_count == 8
+    path = known.save(tmp_path / "new.json")
+    content = content_of(path)
+    assert content["schema_version"] == 2
+    assert set(names) < set(content["parameters"])
+    assert not set(names.values()) & set(content["parameters"])
+    assert pt.load(path) == known
+
+
+def test_a_searched_model_of_version_1_is_the_same_in_version_2(tmp_path: Path) -> None:
+    known = pt.load(FILES / "dahl_version_1.json")
+    assert known.model == pt.DahlStage.xu_li_2010()
+    assert (known.offset, known.stroke, known.delay) == (1e-6, 119e-6, 0.002)
+    assert known.free_count is None
+    assert pt.load(known.save(tmp_path / "new.json")) == known
+
+
 # What the file says.
 
 
@@ -132,7 +172,7 @@ def test_the_file_has_units_and_a_schema_version(tmp_path: Path) -> None:
     fit = fitted()
     content = content_of(fit.save(tmp_path / "dahl.json"))
     assert content["format"] == "piezotrack-model"
-    assert content["schema_version"] == 1
+    assert content["schema_version"] == 2
     assert content["model"] == "dahl"
     assert content["scale_assumed"] is False
     assert content["offset"] == {"value": fit.offset, "unit": "m", "fitted": True}
@@ -166,7 +206,9 @@ def test_the_file_says_where_the_numbers_come_from(tmp_path: Path) -> None:
     assert provenance["package"] == "piezotrack"
     assert provenance["version"] == pt.__version__ == version("piezotrack")
     assert provenance["seed"] == 1
-    assert provenance["swarm"] == asdict(fitted().swarm)
+    swarm = fitted().swarm
+    assert swarm is not None
+    assert provenance["swarm"] == asdict(swarm)
     data = provenance["data"]
     # The hash as the documentation has it: dt, the drive and displacement kept, the warm-up.
     kept = quick()[:3.0]
@@ -292,8 +334,8 @@ BAD: dict[str, tuple[bytes, str]] = {
     "deep lists": (b"[" * 100_000, "dahl.json"),
     "a number of 5000 digits": ((HEAD + f'"x": {"9" * 5000}}}').encode(), "dahl.json"),
     "a newer version": (
-        changed("schema_version", to=2),
-        "dahl.json has schema_version 2: this version of piezotrack reads 1",
+        changed("schema_version", to=3),
+        "dahl.json has schema_version 3: this version of piezotrack reads 1 to 2",
     ),
     "no version": (changed("schema_version", drop=True), "dahl.json has schema_version None"),
     "another model": (changed("model", to="maxwell"), "dahl.json holds a model 'maxwell'"),

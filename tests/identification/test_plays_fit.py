@@ -12,7 +12,7 @@ from scipy.optimize import nnls
 import piezotrack as pt
 from folders import MEASURED
 from piezotrack import _core
-from play_records import PLAIN, STAGE, drive, record
+from play_records import PLAIN, STAGE, drive, fit_plays, record
 
 measured = pytest.mark.skipif(
     not MEASURED.is_dir(), reason=f"the measured logs are not in {MEASURED}"
@@ -53,9 +53,7 @@ def test_nnls_leaves_out_what_depends_on_others() -> None:
 
 
 def test_it_finds_the_weights_it_was_made_with() -> None:
-    fit = pt.identify_plays(
-        record(PLAIN), thresholds=PLAIN.thresholds, asymmetry=False, dynamics=None
-    )
+    fit = fit_plays(record(PLAIN), thresholds=PLAIN.thresholds, dead_zones=False, dynamics=None)
     assert fit.model.linear == pytest.approx(PLAIN.linear, rel=1e-9)
     assert fit.model.weights == pytest.approx(PLAIN.weights, rel=1e-9)
     assert fit.offset == pytest.approx(-4e-6, rel=1e-9)
@@ -63,21 +61,21 @@ def test_it_finds_the_weights_it_was_made_with() -> None:
 
 
 def test_plays_that_are_not_there_get_no_weight() -> None:
-    fit = pt.identify_plays(
-        record(PLAIN), thresholds=[3.0, 5.0, 8.0, 15.0, 20.0, 25.0], asymmetry=0, dynamics=None
+    fit = fit_plays(
+        record(PLAIN), thresholds=[3.0, 5.0, 8.0, 15.0, 20.0, 25.0], dead_zones=0, dynamics=None
     )
     w = PLAIN.weights
     assert fit.model.weights == pytest.approx([w[0], 0.0, w[1], w[2], 0.0, w[3]], abs=1e-14)
 
 
 def test_it_finds_creep_and_lag() -> None:
-    stage = replace(PLAIN, creep_shares=(0.01, 0.02), creep_times=(0.1, 1.0), time_constant=4e-3)
+    stage = replace(PLAIN, creep_weights=(0.01, 0.02), creep_times=(0.1, 1.0), time_constant=4e-3)
     log = record(stage, samples=20000)
-    fit = pt.identify_plays(
-        log, thresholds=stage.thresholds, asymmetry=False, creep=(0.1, 1.0), dynamics="first"
+    fit = fit_plays(
+        log, thresholds=stage.thresholds, dead_zones=False, creep=(0.1, 1.0), dynamics="first"
     )
     assert fit.model.time_constant == pytest.approx(4e-3, rel=1e-3)
-    assert fit.model.creep_shares == pytest.approx(stage.creep_shares, rel=1e-2)
+    assert fit.model.creep_weights == pytest.approx(stage.creep_weights, rel=1e-2)
     assert fit.model.weights == pytest.approx(stage.weights, rel=1e-2)
     assert not fit.at_bound
 
@@ -88,8 +86,8 @@ def test_it_finds_a_mode() -> None:
     t = np.arange(6000) * dt
     u = drive(samples=6000) + 2.0 * np.sin(2.0 * np.pi * (2.0 * t + 10.0 * t**2))
     log = pt.Dataset(u=u, y=stage.simulate(u, dt).x, dt=dt)
-    fit = pt.identify_plays(
-        log, thresholds=stage.thresholds, asymmetry=False, dynamics="second", offset=False
+    fit = fit_plays(
+        log, thresholds=stage.thresholds, dead_zones=False, dynamics="second", offset=False
     )
     assert fit.model.frequency == pytest.approx(80.0, rel=1e-2)
     assert fit.model.damping_ratio == pytest.approx(0.2, rel=2e-2)
@@ -97,31 +95,31 @@ def test_it_finds_a_mode() -> None:
 
 
 def test_an_asymmetric_loop_needs_dead_zones() -> None:
-    log = record(replace(STAGE, bends=(0.08, 0.08)))
-    without = pt.identify_plays(log, asymmetry=False, dynamics=None)
-    two = pt.identify_plays(log, asymmetry=True, dynamics=None)
+    log = record(replace(STAGE, dead_zone_weights=(0.08, 0.08)))
+    without = fit_plays(log, dead_zones=False, dynamics=None)
+    two = fit_plays(log, dead_zones=True, dynamics=None)
     assert two.cost < 0.6 * without.cost
-    assert pt.identify_plays(log, asymmetry=4, dynamics=None).cost < 0.5 * without.cost
-    assert not without.model.corners
-    assert len(two.model.corners) == 2
+    assert fit_plays(log, dead_zones=4, dynamics=None).cost < 0.5 * without.cost
+    assert not without.model.dead_zone_thresholds
+    assert len(two.model.dead_zone_thresholds) == 2
     # A symmetric one does not.
     log = record(PLAIN)
-    fit = pt.identify_plays(log, thresholds=PLAIN.thresholds, dynamics=None)
-    assert fit.model.bends == pytest.approx([0.0, 0.0], abs=1e-9)
+    fit = fit_plays(log, thresholds=PLAIN.thresholds, dynamics=None)
+    assert fit.model.dead_zone_weights == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
 def test_noise_moves_the_weights_by_little() -> None:
     log = record(PLAIN, samples=10000)
     rng = np.random.default_rng(1)
     noisy = pt.Dataset(u=log.u, y=log.y + 20e-9 * rng.normal(size=10000), dt=log.dt)
-    fit = pt.identify_plays(noisy, thresholds=PLAIN.thresholds, asymmetry=False, dynamics=None)
+    fit = fit_plays(noisy, thresholds=PLAIN.thresholds, dead_zones=False, dynamics=None)
     assert fit.cost == pytest.approx(20e-9, rel=0.03)
     assert fit.model.weights == pytest.approx(PLAIN.weights, rel=0.02)
 
 
 def test_the_state_is_carried_on_to_the_next_part() -> None:
     log = record(STAGE, samples=6000)
-    fit = pt.identify_plays(log[0.0:3.0], asymmetry=3, dynamics=None)
+    fit = fit_plays(log[0.0:3.0], dead_zones=3, dynamics=None)
     run = fit.simulate(log[0.0:3.0])
     rest = log.cut(3.0)
     carried = fit.score(rest, initial=run.final, offset=fit.offset)
@@ -142,7 +140,7 @@ def logs() -> tuple[pt.Dataset, pt.Dataset]:
 @measured
 def test_the_measured_log_and_another_one() -> None:
     training, tracking = logs()
-    fit = pt.identify_plays(training)
+    fit = fit_plays(training)
     assert fit.cost_percent <= 0.6
     assert fit.fitted.rms == pytest.approx(fit.cost, rel=1e-9)
     assert fit.score(tracking).rms_percent <= 1.1
@@ -152,9 +150,9 @@ def test_the_measured_log_and_another_one() -> None:
 @measured
 def test_each_part_of_the_model_earns_its_place() -> None:
     training, tracking = logs()
-    alone = pt.identify_plays(training, asymmetry=False, dynamics=None)
-    late = pt.identify_plays(training, asymmetry=False)
-    bent = pt.identify_plays(training)
-    crept = pt.identify_plays(training, creep=True)
+    alone = fit_plays(training, dead_zones=False, dynamics=None)
+    late = fit_plays(training, dead_zones=False)
+    bent = fit_plays(training)
+    crept = fit_plays(training, creep=True)
     assert crept.cost < bent.cost < late.cost < alone.cost
     assert alone.score(tracking).rms > late.score(tracking).rms > bent.score(tracking).rms

@@ -81,11 +81,11 @@ def test_the_published_readings_give_the_published_values() -> None:
     assert step.hysteresis["a1"] == pytest.approx(121.9874, abs=1e-4)
     # As printed, to their last digit.
     assert step.damping_ratio == pytest.approx(0.065, abs=5e-4)
-    assert step.natural_frequency == pytest.approx(1005.0, abs=0.5)
+    assert step.natural_angular_frequency == pytest.approx(1005.0, abs=0.5)
     assert step.time_constant == pytest.approx(0.0153, abs=1e-4)
     # What they are in full.
     assert step.damping_ratio == pytest.approx(1.5759 / (2 * 12.0806), rel=1e-12)
-    assert step.natural_frequency == pytest.approx(2 * np.pi * 160.0, rel=1e-12)
+    assert step.natural_angular_frequency == pytest.approx(2 * np.pi * 160.0, rel=1e-12)
     assert step.notes == ["the ringing, 172.4 Hz, and the resonance, 160 Hz, differ"]
     assert step.trace is None
     if path.is_file():
@@ -369,13 +369,13 @@ def test_refuses_readings_in_words(change: dict[str, Any], pieces: tuple[str, ..
         ({"mass": 1.0, "stiffness": 1e4}, ("stiffness and mass are given", "expected one")),
         ({"second_level": 60e-6}, ("second_level is 6e-05", "(voltage in V, displacement in m)")),
         ({"second_level": (37.5, None)}, ("displacement of second_level is None", "a number")),
-        ({"log": "step.csv"}, ("log is str", "expected a Dataset", "pt.read")),
+        ({"data": "step.csv"}, ("data is str", "expected a Dataset", "pt.read")),
     ],
 )
 def test_refuses_arguments_in_words(arguments: dict[str, Any], pieces: tuple[str, ...]) -> None:
-    given: dict[str, Any] = {"log": step_log(), **arguments}
+    given: dict[str, Any] = {"data": step_log(), **arguments}
     with pytest.raises(pt.ParameterError) as caught:
-        pt.identify_step(given.pop("log"), **given)
+        pt.identify_step(given.pop("data"), **given)
     for piece in pieces:
         assert piece in str(caught.value)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -193,9 +194,9 @@ def test_a_run_can_be_carried_on(hold: Literal["foh", "zoh"]) -> None:
     ],
 )
 def test_refusals_name_the_parameter(name: str, value: object) -> None:
-    values = dict(zip(CORRECTED.parameter_names(), CORRECTED.theta, strict=True))
+    values = asdict(CORRECTED)
     with pytest.raises(pt.ParameterError, match=name):
-        pt.BoucWenStage(**(values | {name: value}))  # type: ignore[arg-type]
+        pt.BoucWenStage(**(values | {name: value}))
 
 
 @pytest.mark.parametrize("exponent", [1.0, 2.0])
@@ -239,7 +240,7 @@ def test_inverse_sample_by_sample_gives_the_same_voltage() -> None:
 
 
 def test_a_hysteresis_that_turns_back_has_no_inverse() -> None:
-    values = dict(zip(CORRECTED.parameter_names(), CORRECTED.theta, strict=True))
+    values = asdict(CORRECTED)
     with pytest.raises(pt.ParameterError, match="alpha"):
         pt.BoucWenStage(**(values | {"alpha": 0.95})).inverse()
 
@@ -299,7 +300,7 @@ def test_identification_with_another_exponent() -> None:
 def test_a_result_can_be_read_saved_and_loaded(tmp_path: Path) -> None:
     fit = identified()
     text = fit.summary()
-    assert text.startswith("Bouc-Wen stage identified from made-up")
+    assert text.startswith("Bouc-Wen: stage identified from made-up")
     assert "b/k" in text
     assert "gamma" in text
     assert "a1" not in text
@@ -343,6 +344,6 @@ def test_the_command_line_names_files_after_the_model(
     line = f"{given} --stiffness 19567 --out results {' '.join(held)}"
     result = CliRunner().invoke(app, line.split())
     assert result.exit_code == 0, result.stderr
-    assert "Bouc-Wen stage identified" in result.stdout
+    assert "Bouc-Wen: stage identified" in result.stdout
     fit = pt.load(tmp_path / "results" / "bouc-wen.json")
     assert fit.model.alpha == pytest.approx(TRUE["alpha"], rel=1e-3)

@@ -37,7 +37,7 @@ def test_against_scipy(name: str) -> None:
     run = stage_of(parameters).simulate(u, dt)
     assert np.abs(run.x - x).max() <= 1e-10
     assert np.abs(run.v - v).max() <= 1e-4 * np.abs(v).max()
-    assert run.well_posed
+    assert run.unique
     if parameters.b0 > 0.0:
         assert np.array_equal(run.v == 0.0, v == 0.0)
         assert np.count_nonzero(v == 0.0) > 10
@@ -93,9 +93,9 @@ def test_without_b1_the_operator_is_remembered() -> None:
 @pytest.mark.parametrize(("volts", "unique"), [(0.0, False), (10.0, False), (30.0, True)])
 def test_rest_that_is_not_unique_is_flagged(volts: float, unique: bool) -> None:
     stage = stage_of(replace(TABLE_1, b0=100.0))
-    start = pt.StageState(q2=-0.01)
+    start = pt.DahlState(q2=-0.01)
     run = stage.simulate(np.full(50, volts), 1e-3, initial=start)
-    assert run.well_posed is unique
+    assert run.unique is unique
     assert np.all(np.isfinite(run.x))
     # Under no force at all it stays; else it goes along the force.
     assert bool(run.x[-1] > 0.0) is (volts > 0.0)

@@ -13,14 +13,15 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from play_records import PLAIN, STAGE, record
+from play_records import PLAIN, STAGE, fit_plays, record
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-CREEPING = replace(STAGE, creep_shares=(0.004, 0.01), creep_times=(0.1, 1.0))
+ZONES = list(zip(STAGE.dead_zone_thresholds, STAGE.dead_zone_weights, strict=True))
+CREEPING = replace(STAGE, creep_weights=(0.004, 0.01), creep_times=(0.1, 1.0))
 
 
 def wandering(samples: int = 20000, seed: int = 1) -> NDArray[np.float64]:
@@ -43,7 +44,7 @@ def test_it_is_the_sum_that_kuhnen_writes() -> None:
     for k, volts in enumerate(u):
         z = np.maximum(volts - r, np.minimum(volts + r, z))
         p[k] = STAGE.linear * volts + w @ z
-    h = p + sum(s * np.maximum(p - d, 0.0) for d, s in zip(STAGE.corners, STAGE.bends, strict=True))
+    h = p + sum(s * np.maximum(p - d, 0.0) for d, s in ZONES)
     np.testing.assert_allclose(STAGE.simulate(u, 0.01).x, h, rtol=0.0, atol=1e-18)
 
 
@@ -87,7 +88,7 @@ def test_a_held_drive_acts_one_sample_later() -> None:
 def test_creep_grows_with_the_logarithm_of_time() -> None:
     times = (0.1, 1.0, 10.0, 100.0)
     stage = pt.PrandtlIshlinskiiStage(
-        linear=1e-6, thresholds=(), weights=(), creep_shares=(0.01,) * 4, creep_times=times
+        linear=1e-6, thresholds=(), weights=(), creep_weights=(0.01,) * 4, creep_times=times
     )
     dt = 0.01
     x = stage.simulate(np.full(5001, 50.0), dt).x
@@ -118,7 +119,7 @@ def test_the_inverse_undoes_the_stage_along_any_path(stage: pt.PrandtlIshlinskii
     u = wandering()
     x = stage.simulate(u, 0.01).x
     none = np.zeros_like(x)
-    back = stage.core.feedforward(0.01, x, none, none)
+    back = stage.inverse()._begun(0.01).along(x, none, none)
     np.testing.assert_allclose(back, u, rtol=0.0, atol=1e-11)
     # And in metres, well below what is asked: 1e-12 m.
     np.testing.assert_allclose(stage.simulate(back, 0.01).x, x, rtol=0.0, atol=1e-17)
@@ -157,7 +158,7 @@ def test_it_is_a_feedforward_for_a_controller() -> None:
     virtual = pt.VirtualStage.xu_li_2010(seed=1)
     u = 37.5 * (1.0 - np.cos(2.0 * np.pi * np.arange(8000) * 1e-3))
     log = virtual.record(u, 1e-3)
-    fit = pt.identify_plays(log[1.0:8.0])
+    fit = fit_plays(log[1.0:8.0])
     worst = {}
     for name, inverse in {"inverse": fit.inverse(), "none": None}.items():
         pid = pt.Pid.from_um(kp=0.01, ti=0.009, td=0.0)
@@ -180,31 +181,33 @@ def test_the_inverse_can_begin_on_a_settled_loop() -> None:
     before = CREEPING.simulate(u[:10000], 0.01)
     x = CREEPING.simulate(u[9999:], 0.01, initial=before.final).x
     none = np.zeros_like(x)
-    back = CREEPING.core.feedforward(0.01, x, none, none, before.final.values)
+    inverse = CREEPING.inverse(initial=before.final)
+    back = inverse._begun(0.01).along(x, none, none)
     np.testing.assert_allclose(back, u[9999:], rtol=0.0, atol=1e-11)
-    session = CREEPING.core.inverse(0.01, before.final.values)
-    assert session.step(x[0], 0.0, 0.0) == back[0]
+    session, still = inverse.start(0.01), {"velocity": 0.0, "acceleration": 0.0}
+    assert session.step(x[0], **still) == back[0]
     session.reset()
-    assert session.step(x[0], 0.0, 0.0) == back[0]
-    with pytest.raises(pt.ParameterError, match="initial is int: expected the final"):
+    assert session.step(x[0], **still) == back[0]
+    with pytest.raises(pt.ParameterError, match=r"initial is int: expected a pt\.Prandtl.*State"):
         CREEPING.inverse(initial=5)  # type: ignore[arg-type]
     with pytest.raises(pt.ShapeError, match="initial has 4 plays and 2 relaxations"):
-        PLAIN.inverse(initial=before.final).start(0.01)
+        PLAIN.inverse(initial=before.final)
 
 
 # Files and words.
 
 
 @cache
-def fitted() -> pt.PlaysIdentification:
+def fitted() -> pt.Identification:
     stage = replace(CREEPING, time_constant=4e-3)
-    return pt.identify_plays(record(stage), creep=(0.1, 1.0))
+    return fit_plays(record(stage), creep=(0.1, 1.0))
 
 
-def test_identify_finds_the_same() -> None:
+def test_the_settings_have_defaults() -> None:
     log = record(PLAIN, samples=1000)
-    fit = pt.identify(log, model="prandtl-ishlinskii", seed=3, threads=1)
-    assert fit.document() == pt.identify_plays(log).document()
+    fit = pt.identify(log, model="prandtl-ishlinskii")
+    assert fit.document() == fit_plays(log).document()
+    assert (fit.success, fit.stop_reason, fit.swarm) == (True, "solved", None)
     bare = pt.identify(log, model="prandtl-ishlinskii", offset=False)
     assert bare.offset == 0.0
     assert not bare.offset_fitted
@@ -219,6 +222,10 @@ REFUSED_BY_NAME: dict[str, Any] = {
     "swarm": pt.ParticleSwarm(),
     "callback": print,
     "initial": 5,
+    "seed": 0,
+    "runs": 4,
+    "threads": 1,
+    "progress": False,
 }
 
 
@@ -242,7 +249,7 @@ def test_a_file_gives_back_the_same_bits(tmp_path: Path) -> None:
     again = found.save(tmp_path / "again.json")
     assert again.read_bytes() == (tmp_path / "pi.json").read_bytes()
     document = json.loads(again.read_text())
-    assert document["schema_version"] == 1
+    assert document["schema_version"] == 2
     assert document["parameters"]["weights"]["unit"] == "m/V"
     assert pickle.loads(pickle.dumps(found)) == found
 
@@ -255,7 +262,7 @@ BROKEN: dict[str, tuple[Any, str]] = {
     "stroke": (lambda d: d["stroke"].update(value=0.0), "stroke is 0.0 m"),
     "model": (lambda d: d.update(model="dahl"), "the entry 'mass' is missing"),
     "no model": (lambda d: d.update(model="plays"), "holds a model 'plays': expected 'dahl'"),
-    "version": (lambda d: d.update(schema_version=2), "has schema_version 2"),
+    "version": (lambda d: d.update(schema_version=3), "has schema_version 3"),
 }
 
 
@@ -272,7 +279,13 @@ def test_a_broken_file_is_refused(name: str, tmp_path: Path) -> None:
 
 def test_the_summary_names_every_part() -> None:
     text = fitted().summary()
-    for word in ("Prandtl-Ishlinskii", "% of stroke", "dead zones", "creep", "time_constant"):
+    for word in (
+        "Prandtl-Ishlinskii",
+        "% of stroke",
+        "dead_zone_weights s",
+        "creep_times",
+        "time_constant",
+    ):
         assert word in text
     assert "0.0001" not in repr(fitted())
 
@@ -283,30 +296,36 @@ def test_the_picture_shows_the_record() -> None:
     plt.close(figure)
 
 
+# What makes a stage impossible, and the name that the message begins with.
 STAGES: dict[str, tuple[dict[str, Any], str]] = {
-    "linear": ({"linear": 0.0}, "linear is 0 m/V: expected a finite number above 0"),
-    "negative": ({"weights": (0.1, -0.2, 0.0, 0.0)}, r"weights\[1\] is -0.2 m/V"),
-    "order": ({"thresholds": (3.0, 2.0, 5.0, 8.0)}, r"thresholds\[1\] is 2 V: expected 3 V"),
-    "length": ({"weights": (0.1,)}, "weights has 1 entries: expected as many as thresholds"),
-    "bends": ({"bends": (-0.5, -0.6)}, r"bends\[1\] is -0.6: expected bends whose sums"),
-    "corners": ({"corners": (2e-6, 1e-6)}, r"corners\[1\] is"),
-    "text": ({"weights": "abcd"}, "weights is 'abcd': expected numbers in a list"),
-    "creep": ({"creep_shares": (0.1,)}, "creep_shares has 1 entries"),
-    "time": ({"time_constant": -1.0}, "time_constant is -1 s"),
-    "half": ({"frequency": 10.0}, "expected both or neither"),
-    "both": (
-        {"frequency": 10.0, "damping_ratio": 0.1, "time_constant": 1.0},
-        "expected None beside a frequency",
-    ),
-    "many": ({"thresholds": range(40), "weights": [0.0] * 40}, "32 at most"),
+    "linear": ({"linear": 0.0}, "linear"),
+    "negative": ({"weights": (0.1, -0.2, 0.0, 0.0)}, "weights[1]"),
+    "order": ({"thresholds": (3.0, 2.0, 5.0, 8.0)}, "thresholds[1]"),
+    "length": ({"weights": (0.1,)}, "weights"),
+    "zones": ({"dead_zone_weights": (-0.5, -0.6)}, "dead_zone_weights[1]"),
+    "zones turned": ({"dead_zone_thresholds": (2e-6, 1e-6)}, "dead_zone_thresholds[1]"),
+    "text": ({"weights": "abcd"}, "weights"),
+    "creep": ({"creep_weights": (0.1,)}, "creep_weights"),
+    "time": ({"time_constant": -1.0}, "time_constant"),
+    "half": ({"frequency": 10.0}, "frequency and damping_ratio"),
+    "both": ({"frequency": 10.0, "damping_ratio": 0.1, "time_constant": 1.0}, "time_constant"),
+    "many": ({"thresholds": range(40), "weights": [0.0] * 40}, "weights"),
 }
 
 
 @pytest.mark.parametrize("name", STAGES)
 def test_a_stage_that_cannot_be_is_refused(name: str) -> None:
-    changes, words = STAGES[name]
-    with pytest.raises(pt.PiezotrackError, match=words):
+    changes, begin = STAGES[name]
+    with pytest.raises(pt.PiezotrackError) as caught:
         replace(STAGE, **changes)
+    assert isinstance(caught.value, (pt.ParameterError, pt.ShapeError))
+    assert str(caught.value).startswith((f"{begin} is ", f"{begin} has "))
+
+
+def test_the_wording_of_a_refusal() -> None:
+    with pytest.raises(pt.ParameterError) as caught:
+        replace(STAGE, thresholds=(3.0, 2.0, 5.0, 8.0))
+    assert str(caught.value) == "thresholds[1] is 2 V: expected 3 V or above: they ascend"
 
 
 LOGS: dict[str, tuple[Any, Any, str]] = {
@@ -322,26 +341,32 @@ def test_a_record_that_tells_nothing_is_refused(name: str) -> None:
     volts, metres, words = LOGS[name]
     log = record(PLAIN)
     with pytest.raises(pt.DataError, match=words):
-        pt.identify_plays(pt.Dataset(u=volts(log.u), y=metres(log.y), dt=1e-3))
+        fit_plays(pt.Dataset(u=volts(log.u), y=metres(log.y), dt=1e-3))
 
 
 ARGUMENTS: dict[str, tuple[dict[str, Any], str]] = {
-    "count": ({"count": 0}, "count is 0: expected 1 to 32 plays"),
-    "asymmetry": ({"asymmetry": 9}, "asymmetry is 9: expected up to 8"),
-    "dynamics": ({"dynamics": "third"}, "expected None, 'first' or 'second'"),
-    "creep": ({"creep": [-1.0]}, r"creep_times\[0\] is -1 s"),
-    "thresholds": ({"thresholds": [2.0, 1.0]}, r"thresholds\[1\] is 1 V"),
-    "offset": ({"offset": 1}, "offset is 1: expected True or False"),
+    "count": ({"count": 0}, "count is"),
+    "dead_zones": ({"dead_zones": 9}, "dead_zones is"),
+    "dynamics": ({"dynamics": "third"}, "dynamics is"),
+    "creep": ({"creep": [-1.0]}, "creep_times[0] is"),
+    "thresholds": ({"thresholds": [2.0, 1.0]}, "thresholds[1] is"),
+    "offset": ({"offset": 1}, "offset is"),
 }
 
 
 @pytest.mark.parametrize("name", ARGUMENTS)
 def test_an_argument_that_cannot_be_is_refused(name: str) -> None:
-    keywords, words = ARGUMENTS[name]
-    with pytest.raises(pt.PiezotrackError, match=words):
-        pt.identify_plays(record(PLAIN), **keywords)
+    keywords, begin = ARGUMENTS[name]
+    with pytest.raises(pt.ParameterError) as caught:
+        fit_plays(record(PLAIN), **keywords)
+    assert str(caught.value).startswith(begin)
+
+
+def test_settings_of_another_kind_are_refused() -> None:
+    with pytest.raises(pt.ParameterError, match=r"^least_squares is 5: expected a pt"):
+        pt.identify(record(PLAIN), "prandtl-ishlinskii", least_squares=5)  # type: ignore[arg-type]
 
 
 def test_a_short_window_is_refused() -> None:
     with pytest.raises(pt.DataError, match="twice the number of unknowns"):
-        pt.identify_plays(record(PLAIN)[1.0:1.01])
+        fit_plays(record(PLAIN)[1.0:1.01])

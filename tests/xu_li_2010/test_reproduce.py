@@ -337,7 +337,7 @@ def test_a_calibration_goes_from_end_to_end() -> None:
 
 def test_the_swarm_finds_the_bottom_of_a_bowl() -> None:
     settings = pt.ParticleSwarm(particles=20, iterations=80, stall_iterations=80)
-    swarm = _core.Swarm(settings.checked(), 3, 1)
+    swarm = _core.Swarm(settings._core, 3, 1)
     bottom = np.array([0.2, 0.5, 0.9])
     while not swarm.done:
         places = swarm.ask()
@@ -349,7 +349,7 @@ def test_the_swarm_finds_the_bottom_of_a_bowl() -> None:
 
 def test_the_swarm_refuses_no_coordinates() -> None:
     with pytest.raises(pt.ParameterError, match="coordinates"):
-        _core.Swarm(pt.ParticleSwarm().checked(), 0, 1)
+        _core.Swarm(pt.ParticleSwarm()._core, 0, 1)
 
 
 # The report.

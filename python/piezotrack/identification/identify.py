@@ -52,11 +52,11 @@ def identify(
     model is linear in its weights, by least squares. The warm-up before the window is simulated,
     from rest, and not counted.
 
-    Voltage and displacement determine ratios only: mass, damping, stiffness, piezo coefficient, b1 and
-    b0 of a Dahl stage, or mass, damping and stiffness of a Bouc-Wen stage, can all be multiplied
-    by one number without changing the motion. Where nothing in the call fixes a force, a nominal
-    stiffness of 1e6 N/m is held, and the result says "scale assumed". The drive of a Bouc-Wen
-    oscillator is a force itself; of one that is given in volts, forces come out in volts too.
+    Voltage and displacement determine ratios only: all parameters that carry force, as mass,
+    damping and stiffness, can be multiplied by one number without changing the motion. Where
+    nothing in the call fixes a force, a nominal stiffness of 1e6 N/m is held, and the result says
+    "scale assumed". The drive of a Bouc-Wen oscillator is a force itself; of one that is given in
+    volts, forces come out in volts too.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def identify(
     free : iterable of str, optional
         Parameters to search: all that are not fixed, where not given. `b0`, dry friction at
         reversals, is held at 0 unless it is named here or in `fixed`; exponents, and the beta of
-        an oscillator, of which the data tell the products with gamma and delta only, at 1 unless
+        an oscillator, of which the data determine the products with gamma and delta only, at 1 unless
         they are in `fixed`.
     fixed : mapping of str to float, optional
         Parameters to hold, SI.

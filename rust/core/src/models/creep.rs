@@ -84,7 +84,7 @@ impl Relaxation {
     pub fn new(shares: &[f64], times: &[f64], dynamics: Dynamics) -> Result<Self> {
         if shares.len() != times.len() || shares.len() > MOST_RELAXATIONS {
             return Err(Error::Shape {
-                name: "creep_shares".into(),
+                name: "creep_weights".into(),
                 found: format!("{} entries", shares.len()),
                 expected: format!(
                     "as many as creep_times, which has {}, and {MOST_RELAXATIONS} at most",
@@ -94,7 +94,7 @@ impl Relaxation {
         }
         let mut creep = [Creep { share: 0.0, time: 1.0 }; MOST_RELAXATIONS];
         for (j, slot) in creep.iter_mut().take(shares.len()).enumerate() {
-            slot.share = not_negative(&format!("creep_shares[{j}]"), shares[j], "")?;
+            slot.share = not_negative(&format!("creep_weights[{j}]"), shares[j], "")?;
             slot.time = positive(&format!("creep_times[{j}]"), times[j], "s")?;
         }
         dynamics.validate()?;
