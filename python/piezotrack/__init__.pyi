@@ -75,6 +75,9 @@ from .stages.bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
 from .stages.dahl import DahlStage as DahlStage
 from .stages.dahl import DahlState as DahlState
 from .stages.first_order_dahl import FirstOrderDahlStage as FirstOrderDahlStage
+from .stages.generalised_prandtl_ishlinskii import (
+    GeneralisedPrandtlIshlinskiiStage as GeneralisedPrandtlIshlinskiiStage,
+)
 from .stages.inverse import Inverse as Inverse
 from .stages.inverse import InverseSession as InverseSession
 from .stages.prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage

@@ -37,6 +37,16 @@ STAGES: dict[str, pt.Stage] = {
         frequency=160.0,
         damping_ratio=0.5,
     ),
+    "generalised-prandtl-ishlinskii": pt.GeneralisedPrandtlIshlinskiiStage(
+        linear=1e-6,
+        thresholds=(10.0, 20.0),
+        weights=(0.2e-6, 0.1e-6),
+        scale=100.0,
+        slope=0.01,
+        shift=0.2,
+        level=-10.0,
+        time_constant=0.002,
+    ),
 }
 
 
