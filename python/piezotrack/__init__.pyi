@@ -46,6 +46,9 @@ from .stages.bouc_wen import BoucWenStage as BoucWenStage
 from .stages.bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
 from .stages.dahl import DahlStage as DahlStage
 from .stages.first_order_dahl import FirstOrderDahlStage as FirstOrderDahlStage
+from .stages.generalised_prandtl_ishlinskii import (
+    GeneralisedPrandtlIshlinskiiStage as GeneralisedPrandtlIshlinskiiStage,
+)
 from .stages.inverse import Inverse as Inverse
 from .stages.prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage
 from .stages.virtual import VirtualStage as VirtualStage

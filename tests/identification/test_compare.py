@@ -280,30 +280,39 @@ def test_it_is_saved_with_its_models(tmp_path: Path) -> None:
 
 # What is refused.
 
+# The arguments, and what the message begins with.
 REFUSED: dict[str, tuple[dict[str, Any], str]] = {
-    "one name": ({"models": "dahl"}, r"models is 'dahl': expected several in a list"),
+    "one name": ({"models": "dahl"}, "models is"),
     "no model": ({"models": []}, "models is empty"),
-    "unknown": ({"models": ["preisach"]}, "models has 'preisach': expected 'dahl', 'bouc-wen'"),
-    "a stage": ({"models": [PLAYS]}, "models has 'PrandtlIshlinskiiStage': expected"),
-    "no file": ({"models": ["gone.json"]}, "gone.json: no such file"),
-    "train": ({"train": 3.0}, "train is float: expected"),
-    "train of three": ({"train": (1.0, 2.0, 3.0)}, r"train is \(1.0, 2.0, 3.0\): expected"),
-    "train outside": ({"train": (1.0, 30.0)}, "train: the window from 1 s to 30 s reaches out"),
-    "train of words": ({"train": ("a", 3.0)}, "train: start is 'a'"),
-    "train to the end": ({"train": (1.0, None)}, "leaves nothing to judge on: expected an end"),
-    "all fitted": ({"train": (1.0, 8.0)}, "test: the window from 8 s to 8 s is empty"),
-    "test": ({"test": "5:8"}, r"test is '5:8': expected \(start, stop\) in seconds or a Dataset"),
-    "test from the start": ({"test": (None, 4.0)}, "leaves nothing to fit"),
-    "overlap": ({"train": (1.0, 5.0), "test": (4.0, 6.0)}, "windows that do not overlap"),
-    "seed": ({"models": ["dahl"], "seed": -1}, "seed is -1"),
+    "unknown": ({"models": ["preisach"]}, "models has 'preisach'"),
+    "a stage": ({"models": [PLAYS]}, "models has 'PrandtlIshlinskiiStage'"),
+    "no file": ({"models": ["gone.json"]}, "gone.json"),
+    "train": ({"train": 3.0}, "train is"),
+    "train of three": ({"train": (1.0, 2.0, 3.0)}, "train is"),
+    "train outside": ({"train": (1.0, 30.0)}, "train: "),
+    "train of words": ({"train": ("a", 3.0)}, "train: "),
+    "train to the end": ({"train": (1.0, None)}, "train goes"),
+    "all fitted": ({"train": (1.0, 8.0)}, "test: "),
+    "test": ({"test": "5:8"}, "test is"),
+    "test from the start": ({"test": (None, 4.0)}, "test begins"),
+    "overlap": ({"train": (1.0, 5.0), "test": (4.0, 6.0)}, "test goes"),
+    "seed": ({"models": ["dahl"], "seed": -1}, "seed is"),
 }
 
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_refuses(name: str) -> None:
-    arguments, words = REFUSED[name]
-    with pytest.raises(pt.PiezotrackError, match=words):
+    arguments, begin = REFUSED[name]
+    error = pt.DataError if name == "no file" else pt.ParameterError
+    with pytest.raises(error) as caught:
         pt.compare(log(), **({"models": ["prandtl-ishlinskii"]} | arguments))
+    assert str(caught.value).startswith(begin)
+
+
+def test_the_wording_of_a_refusal() -> None:
+    with pytest.raises(pt.ParameterError) as caught:
+        pt.compare(log(), "dahl")
+    assert str(caught.value) == "models is 'dahl': expected several in a list, as ['dahl']"
 
 
 def test_refuses_what_is_no_record() -> None:

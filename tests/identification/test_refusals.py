@@ -58,137 +58,147 @@ def test_refuses_a_record_that_tells_nothing(name: str) -> None:
 
 FORCES = ["mass", "damping", "stiffness", "piezo_coefficient", "b1"]
 
-# The arguments, and what the message has to contain.
-BAD_ARGUMENTS: list[tuple[dict[str, Any], tuple[str, ...]]] = [
-    ({"data": (quick().u, quick().y)}, ("data is tuple", "expected a Dataset")),
-    ({"data": "stage.csv"}, ("data is str", "expected a Dataset", "pt.read")),
-    ({"data": None}, ("data is NoneType", "expected a Dataset")),
-    ({"model": "unknown"}, ("model is 'unknown'", "'dahl'")),
-    ({"model": None}, ("model is None", "'dahl'")),
+# The arguments, and the name that the message begins with.
+BAD_ARGUMENTS: list[tuple[dict[str, Any], str]] = [
+    ({"data": (quick().u, quick().y)}, "data"),
+    ({"data": "stage.csv"}, "data"),
+    ({"data": None}, "data"),
+    ({"model": "unknown"}, "model"),
+    ({"model": None}, "model"),
     # Bounds.
-    ({"bounds": {"mass": (0.2, 0.1)}}, ("bounds of mass", "(0.2, 0.1)", "lower one first")),
-    ({"bounds": {"mass": (0.2, 0.2)}}, ("bounds of mass", "(0.2, 0.2)", "lower one first")),
-    ({"bounds": {"mass": (0.1, math.inf)}}, ("bounds of mass", "inf", "finite")),
-    ({"bounds": {"mass": (math.nan, 0.2)}}, ("bounds of mass", "finite")),
-    ({"bounds": {"mass": (-0.1, 0.2)}}, ("mass", "-0.1", "above 0")),
-    ({"bounds": {"damping": (-5.0, 10.0)}}, ("damping", "-5", "0 or above")),
-    ({"bounds": {"mass": 0.1}}, ("bounds of mass", "0.1", "(low, high)")),
-    ({"bounds": {"mass": "ab"}}, ("bounds of mass", "'ab'", "(low, high)")),
-    ({"bounds": {"mass": (1.0, 2.0, 3.0)}}, ("bounds of mass", "(low, high)")),
-    ({"bounds": {"mass": (None, 2.0)}}, ("bound of mass", "None", "a number")),
-    ({"bounds": {"weight": (0.1, 0.2)}}, ("bounds", "'weight'", "one of mass, damping")),
-    ({"bounds": {"a1": (1.0, 2.0)}, "fixed": HELD}, ("bounds of a1", "not free")),
-    ({"bounds": {"up": (1.0, 2.0)}}, ("bounds of up", "not free")),
-    ({"bounds": {"stiffness": (1e4, 5e4)}}, ("bounds of stiffness", "stiffness=", "fixed=")),
+    ({"bounds": {"mass": (0.2, 0.1)}}, "bounds of mass"),
+    ({"bounds": {"mass": (0.2, 0.2)}}, "bounds of mass"),
+    ({"bounds": {"mass": (0.1, math.inf)}}, "bounds of mass"),
+    ({"bounds": {"mass": (math.nan, 0.2)}}, "bounds of mass"),
+    ({"bounds": {"mass": (-0.1, 0.2)}}, "mass"),
+    ({"bounds": {"damping": (-5.0, 10.0)}}, "damping"),
+    ({"bounds": {"mass": 0.1}}, "bounds of mass"),
+    ({"bounds": {"mass": "ab"}}, "bounds of mass"),
+    ({"bounds": {"mass": (1.0, 2.0, 3.0)}}, "bounds of mass"),
+    ({"bounds": {"mass": (None, 2.0)}}, "lower bound of mass"),
+    ({"bounds": {"weight": (0.1, 0.2)}}, "bounds"),
+    ({"bounds": {"a1": (1.0, 2.0)}, "fixed": HELD}, "bounds of a1"),
+    ({"bounds": {"up": (1.0, 2.0)}}, "bounds of up"),
+    ({"bounds": {"stiffness": (1e4, 5e4)}}, "bounds of stiffness"),
     # What is held.
-    ({"fixed": {"weight": 1.0}}, ("fixed", "'weight'", "one of mass, damping")),
-    ({"fixed": {"mass": -1.0}}, ("mass", "-1", "above 0")),
-    ({"fixed": {"mass": 0.0}}, ("mass", "0", "above 0")),
-    ({"fixed": {"damping": -1.0}}, ("damping", "-1", "0 or above")),
-    ({"fixed": {"stiffness": -1.0}}, ("stiffness", "-1", "above 0")),
-    ({"fixed": {"piezo_coefficient": 0.0}}, ("piezo_coefficient", "0", "other than 0")),
-    ({"fixed": {"a1": -1.0}}, ("a1", "-1", "0 or above")),
-    ({"fixed": {"a2": -1.0}}, ("a2", "-1", "0 or above")),
-    ({"fixed": {"mass": math.nan}}, ("mass", "NaN", "finite")),
-    ({"fixed": {"b1": math.inf}}, ("b1", "inf", "finite")),
-    ({"fixed": {"mass": "1"}}, ("mass", "'1'", "a number")),
-    ({"fixed": {"mass": True}}, ("mass", "True", "a number")),
-    ({"fixed": {"b0": math.inf}}, ("b0", "inf", "finite")),
+    ({"fixed": {"weight": 1.0}}, "fixed"),
+    ({"fixed": {"mass": -1.0}}, "mass"),
+    ({"fixed": {"mass": 0.0}}, "mass"),
+    ({"fixed": {"damping": -1.0}}, "damping"),
+    ({"fixed": {"stiffness": -1.0}}, "stiffness"),
+    ({"fixed": {"piezo_coefficient": 0.0}}, "piezo_coefficient"),
+    ({"fixed": {"a1": -1.0}}, "a1"),
+    ({"fixed": {"a2": -1.0}}, "a2"),
+    ({"fixed": {"mass": math.nan}}, "fixed mass"),
+    ({"fixed": {"b1": math.inf}}, "fixed b1"),
+    ({"fixed": {"mass": "1"}}, "mass"),
+    ({"fixed": {"mass": True}}, "mass"),
+    ({"fixed": {"b0": math.inf}}, "fixed b0"),
     # The delay.
-    ({"delay": -1e-3}, ("delay is -0.001 s", "0 s or above")),
-    ({"delay": math.nan}, ("delay is NaN s", "0 s or above")),
-    ({"delay": 1e3}, ("delay is 1000 s", "below the record's")),
-    ({"delay": (0.0, 1e3)}, ("delay is (0, 1000) s", "below the record's")),
-    ({"delay": (2e-3, 1e-3)}, ("bounds of delay", "the lower one first")),
-    ({"delay": (1e-3, 1e-3)}, ("bounds of delay", "the lower first")),
-    ({"delay": "long"}, ("delay is 'long'", "a number")),
-    ({"fixed": {"up": 0.0}}, ("up", "0")),
+    ({"delay": -1e-3}, "delay"),
+    ({"delay": math.nan}, "delay"),
+    ({"delay": 1e3}, "delay"),
+    ({"delay": (0.0, 1e3)}, "delay"),
+    ({"delay": (2e-3, 1e-3)}, "bounds of delay"),
+    ({"delay": (1e-3, 1e-3)}, "bounds of delay"),
+    ({"delay": "long"}, "delay"),
+    ({"fixed": {"up": 0.0}}, "up"),
     # What is free.
-    ({"free": ["weight"]}, ("free", "'weight'", "one of mass, damping")),
-    ({"free": "mass"}, ("free is 'mass'", "a list")),
-    ({"free": [5]}, ("free", "5", "one of mass, damping")),
-    ({"free": ["up"]}, ("free is up", "b1 up")),
-    ({"free": ["mass"], "fixed": {"mass": 0.2}}, ("free is mass", "not fixed as well")),
-    ({"free": ["stiffness"], "stiffness": 1e4}, ("free is stiffness", "not fixed as well")),
-    ({"free": ["mass", "damping"]}, ("free", "piezo_coefficient", "fixed=")),
-    ({"free": []}, ("free is", "mass", "fixed=")),
-    ({"free": [*FORCES, "a1", "a2"]}, ("free is", "carries force", "stiffness=", "fixed=")),
-    ({"fixed": asdict(TABLE_1)}, ("free is empty", "at least one")),
+    ({"free": ["weight"]}, "free"),
+    ({"free": "mass"}, "free"),
+    ({"free": [5]}, "free"),
+    ({"free": ["up"]}, "free"),
+    ({"free": ["mass"], "fixed": {"mass": 0.2}}, "free"),
+    ({"free": ["stiffness"], "stiffness": 1e4}, "free"),
+    ({"free": ["mass", "damping"]}, "free"),
+    ({"free": []}, "free"),
+    ({"free": [*FORCES, "a1", "a2"]}, "free"),
+    ({"fixed": asdict(TABLE_1)}, "free"),
     # The rest.
-    ({"stiffness": 0.0}, ("stiffness is 0 N/m", "above 0")),
-    ({"stiffness": -1.0}, ("stiffness is -1 N/m", "above 0")),
-    ({"stiffness": math.nan}, ("stiffness is NaN", "above 0")),
-    ({"stiffness": "stiff"}, ("stiffness is 'stiff'", "a number")),
-    ({"stiffness": 2.0, "fixed": {"stiffness": 3.0}}, ("stiffness is 2 N/m", "fixed=")),
-    ({"seed": -1}, ("seed is -1", "a whole number, 0 or above")),
-    ({"seed": 1.5}, ("seed is 1.5", "a whole number")),
-    ({"least_squares": pt.identification.LeastSquares()}, ("least_squares is", "a swarm searches")),
-    ({"seed": "1"}, ("seed is '1'", "a whole number")),
-    ({"runs": 0}, ("runs is 0", "1 or more")),
-    ({"runs": "2"}, ("runs is '2'", "a whole number")),
-    ({"threads": "two"}, ("threads is 'two'", "a whole number")),
-    ({"threads": -1}, ("threads is -1", "a whole number")),
+    ({"stiffness": 0.0}, "stiffness"),
+    ({"stiffness": -1.0}, "stiffness"),
+    ({"stiffness": math.nan}, "stiffness"),
+    ({"stiffness": "stiff"}, "stiffness"),
+    ({"stiffness": 2.0, "fixed": {"stiffness": 3.0}}, "stiffness"),
+    ({"seed": -1}, "seed"),
+    ({"seed": 1.5}, "seed"),
+    ({"least_squares": pt.identification.LeastSquares()}, "least_squares"),
+    ({"seed": "1"}, "seed"),
+    ({"runs": 0}, "runs"),
+    ({"runs": "2"}, "runs"),
+    ({"threads": "two"}, "threads"),
+    ({"threads": -1}, "threads"),
 ]
 
 
 # Of another type than asked for.
-WRONG_TYPES: list[tuple[dict[str, Any], tuple[str, ...]]] = [
-    ({"bounds": [("mass", (0.1, 0.2))]}, ("bounds", "mapping")),
-    ({"bounds": {1: (0.1, 0.2)}}, ("bounds", "1", "one of mass, damping")),
-    ({"fixed": ["mass"]}, ("fixed", "mapping")),
-    ({"fixed": {1: 2.0}}, ("fixed", "1", "one of mass, damping")),
-    ({"free": 5}, ("free is 5",)),
-    ({"offset": "no"}, ("offset is 'no'", "True or False")),
-    ({"swarm": "paper"}, ("swarm is", "ParticleSwarm")),
-    ({"swarm": pt.ParticleSwarm}, ("swarm is", "ParticleSwarm")),
-    ({"callback": 5}, ("callback is 5",)),
+WRONG_TYPES: list[tuple[dict[str, Any], str]] = [
+    ({"bounds": [("mass", (0.1, 0.2))]}, "bounds"),
+    ({"bounds": {1: (0.1, 0.2)}}, "bounds"),
+    ({"fixed": ["mass"]}, "fixed"),
+    ({"fixed": {1: 2.0}}, "fixed"),
+    ({"free": 5}, "free"),
+    ({"offset": "no"}, "offset"),
+    ({"swarm": "paper"}, "swarm"),
+    ({"swarm": pt.ParticleSwarm}, "swarm"),
+    ({"callback": 5}, "callback"),
 ]
 BAD = [*BAD_ARGUMENTS, *WRONG_TYPES]
 
 
-@pytest.mark.parametrize(("arguments", "pieces"), BAD, ids=[", ".join(p) for _, p in BAD])
-def test_refuses_a_bad_argument(arguments: dict[str, Any], pieces: tuple[str, ...]) -> None:
+def refused(arguments: dict[str, Any]) -> str:
+    """The message with which arguments of `identify` are refused."""
     arguments = {"data": quick(), "swarm": SMALL, **arguments}
     with pytest.raises(pt.ParameterError) as caught:
         pt.identify(arguments.pop("data"), **arguments)
-    for piece in pieces:
-        assert piece in str(caught.value)
-    assert "\n" not in str(caught.value)
+    return str(caught.value)
 
 
-BAD_SETTINGS: list[tuple[str, Any, str]] = [
-    ("particles", 1, "2 or more"),
-    ("particles", 0, "2 or more"),
-    ("particles", -1, "a whole number"),
-    ("particles", 2.5, "a whole number"),
-    ("iterations", 0, "1 or more"),
-    ("inertia_start", -0.1, "0 or above"),
-    ("inertia_start", math.nan, "0 or above"),
-    ("inertia_end", math.inf, "finite"),
-    ("inertia_iterations", -1, "a whole number"),
-    ("cognitive", -1.0, "0 or above"),
-    ("cognitive", "2", "a number"),
-    ("social", math.nan, "0 or above"),
-    ("update", "bare-bones", "'classic', 'hypersphere' or 'hypersphere-radial'"),
-    ("update", None, "'classic', 'hypersphere' or 'hypersphere-radial'"),
-    ("topology", "star", "'global', 'ring' or 'random'"),
-    ("topology", None, "'ring'"),
-    ("velocity_limit", 0.0, "above 0"),
-    ("velocity_limit", -1.0, "above 0"),
-    ("velocity_limit", math.nan, "above 0"),
-    ("boundary", "bounce", "'absorb', 'rebound', 'reflect' or 'invisible'"),
-    ("boundary", 1, "'absorb', 'rebound', 'reflect' or 'invisible'"),
-    ("min_improvement", -1.0, "0 or above"),
-    ("min_improvement", math.nan, "0 or above"),
-    ("stall_iterations", 0, "1 or more"),
-    ("polish", "yes", "True or False"),
+@pytest.mark.parametrize(
+    ("arguments", "name"), BAD, ids=[f"{row}-{name}" for row, (_, name) in enumerate(BAD)]
+)
+def test_refuses_a_bad_argument(arguments: dict[str, Any], name: str) -> None:
+    message = refused(arguments)
+    assert message.startswith((f"{name} is ", f"{name} are "))
+    assert ": expected " in message
+    assert "\n" not in message
+
+
+def test_the_wording_of_a_refusal() -> None:
+    expected = "bounds of mass is (0.2, 0.1): expected two finite numbers, the lower one first"
+    assert refused({"bounds": {"mass": (0.2, 0.1)}}) == expected
+
+
+BAD_SETTINGS: list[tuple[str, Any]] = [
+    ("particles", 1),
+    ("particles", 0),
+    ("particles", -1),
+    ("particles", 2.5),
+    ("iterations", 0),
+    ("inertia_start", -0.1),
+    ("inertia_start", math.nan),
+    ("inertia_end", math.inf),
+    ("inertia_iterations", -1),
+    ("cognitive", -1.0),
+    ("cognitive", "2"),
+    ("social", math.nan),
+    ("update", "bare-bones"),
+    ("update", None),
+    ("topology", "star"),
+    ("topology", None),
+    ("velocity_limit", 0.0),
+    ("velocity_limit", -1.0),
+    ("velocity_limit", math.nan),
+    ("boundary", "bounce"),
+    ("boundary", 1),
+    ("min_improvement", -1.0),
+    ("min_improvement", math.nan),
+    ("stall_iterations", 0),
+    ("polish", "yes"),
 ]
 
 
-@pytest.mark.parametrize(("name", "value", "expected"), BAD_SETTINGS)
-def test_refuses_a_bad_setting_of_the_swarm(name: str, value: Any, expected: str) -> None:
-    with pytest.raises(pt.ParameterError) as caught:
+@pytest.mark.parametrize(("name", "value"), BAD_SETTINGS)
+def test_refuses_a_bad_setting_of_the_swarm(name: str, value: Any) -> None:
+    with pytest.raises(pt.ParameterError, match=f"^{name} is .*: expected "):
         pt.ParticleSwarm(**{name: value})
-    message = str(caught.value)
-    assert message.startswith(f"{name} is ")
-    assert expected in message

@@ -13,13 +13,16 @@ const CORE: [&str; 8] =
     ["error", "math", "signal", "integrator", "design", "models", "simulate", "identify"];
 
 /// From the bottom up.
-const CONTROL: [&str; 13] = [
+const CONTROL: [&str; 16] = [
     "error",
     "number",
     "unfused",
     "cubic_segment",
     "hysteresis",
+    "creep",
+    "dynamics",
     "inverse",
+    "online_feedforward",
     "limits",
     "filters",
     "feedback_law",

@@ -299,30 +299,30 @@ def test_online_the_delay_leads_too() -> None:
 
 SINE = REFERENCES["sine"]()
 BAD: dict[str, tuple[Callable[[], Any], str]] = {
-    "stage": (lambda: pt.Inverse(stage=5), "stage is int: expected a stage, as a pt.DahlStage"),  # type: ignore[arg-type]
+    "stage": (lambda: pt.Inverse(stage=5), "stage is int"),  # type: ignore[arg-type]
     "offset": (lambda: pt.Inverse(stage=TABLE_1, offset=math.nan), "offset is nan"),
     "delay": (lambda: pt.Inverse(stage=TABLE_1, delay=-1e-3), "delay is -0.001"),
     "playback": (
         lambda: pt.Inverse(stage=TABLE_1, playback="both"),  # type: ignore[arg-type]
-        "playback is 'both': expected 'table' or 'online'",
+        "playback is",
     ),
-    "settle": (lambda: pt.Inverse(stage=TABLE_1, settle=0), "settle is 0: expected 1 period"),
-    "reference": (lambda: TABLE_1.inverse().voltage(5, 0.02), "expected a Reference"),  # type: ignore[arg-type]
-    "of a table": (lambda: TABLE_1.inverse().table(5, 0.02), "expected a Reference"),  # type: ignore[arg-type]
-    "played": (lambda: TABLE_1.inverse().played("x", 0.02), "expected a Reference"),  # type: ignore[arg-type]
+    "settle": (lambda: pt.Inverse(stage=TABLE_1, settle=0), "settle is 0"),
+    "reference": (lambda: TABLE_1.inverse().voltage(5, 0.02), "reference is"),  # type: ignore[arg-type]
+    "of a table": (lambda: TABLE_1.inverse().table(5, 0.02), "reference is"),  # type: ignore[arg-type]
+    "played": (lambda: TABLE_1.inverse().played("x", 0.02), "reference is"),  # type: ignore[arg-type]
     "dt": (lambda: TABLE_1.inverse().voltage(SINE, 0.0), "dt is 0"),
     "dt of a table": (lambda: TABLE_1.inverse().table(SINE, -1.0), "dt is -1"),
     "dt of a session": (lambda: TABLE_1.inverse().start(math.nan), "dt is nan"),
-    "coarse": (lambda: TABLE_1.inverse().voltage(SINE, 1.5), "two samples in the shortest"),
+    "coarse": (lambda: TABLE_1.inverse().voltage(SINE, 1.5), "dt is 1.5"),
     "no period": (
         lambda: TABLE_1.inverse().table(REFERENCES["chirp"](), 0.02),
-        "chirp 0.2 to 3 Hz. does not repeat: it has no table",
+        r"reference \(chirp",
     ),
     "a fraction": (
         lambda: TABLE_1.inverse().table(
             pt.sine(frequency=0.3, low=0.0, high=1e-5, duration=9.0), 0.02
         ),
-        "expected a whole number of samples in the period",
+        "dt is 0.02",
     ),
     "text": (lambda: TABLE_1.inverse().start(0.02).step("1"), "reference is '1'"),  # type: ignore[arg-type]
     "preview": (
@@ -334,9 +334,35 @@ BAD: dict[str, tuple[Callable[[], Any], str]] = {
 
 @pytest.mark.parametrize("name", BAD)
 def test_refuses(name: str) -> None:
-    call, message = BAD[name]
-    with pytest.raises(pt.ParameterError, match=message):
+    call, begin = BAD[name]
+    with pytest.raises(pt.ParameterError, match=f"^{begin}"):
         call()
+
+
+def test_the_wording_of_a_refusal() -> None:
+    with pytest.raises(pt.ParameterError) as caught:
+        pt.Inverse(stage=5)  # type: ignore[arg-type]
+    assert str(caught.value) == "stage is int: expected a stage, as a pt.DahlStage"
+
+
+@pytest.mark.parametrize("model", ["dahl", "bouc-wen", "first-order-dahl", "bouc-wen-oscillator"])
+def test_a_state_is_refused_where_the_inverse_begins_at_rest(model: str) -> None:
+    stage: Any = {
+        "dahl": TABLE_1,
+        "bouc-wen": pt.BoucWenStage.xu_li_2010(),
+        "first-order-dahl": pt.FirstOrderDahlStage(
+            mass=0.18,
+            damping=50.0,
+            stiffness=2.6e4,
+            piezo_coefficient=0.0468,
+            rest_stiffness=1e4,
+            coulomb_force=0.3,
+        ),
+        "bouc-wen-oscillator": pt.BoucWenOscillator.benchmark(),
+    }[model]
+    final = stage.simulate([0.0, 1.0], 0.01).final
+    with pytest.raises(pt.ParameterError, match=r"^initial is a state: expected none"):
+        stage.inverse(initial=final)
 
 
 def test_a_reference_too_far_for_any_piezo_is_told_where() -> None:

@@ -73,7 +73,7 @@ def identify(
     free : iterable of str, optional
         Parameters to search: all that are not fixed, where not given. `b0`, dry friction at
         reversals, is held at 0 unless it is named here or in `fixed`; exponents, and the beta of
-        an oscillator, of which the data tell the products with gamma and delta only, at 1 unless
+        an oscillator, of which the data determine the products with gamma and delta only, at 1 unless
         they are in `fixed`.
     fixed : mapping of str to float, optional
         Parameters to hold, SI.

@@ -100,19 +100,19 @@ class IdentifiedModel:
 
     @property
     def drive_range(self) -> tuple[float, float] | None:
-        """Lowest and highest drive of the record identified, where the file tells them."""
+        """Lowest and highest drive of the record identified, where the file has them."""
         found = self._record.get("drive_range")
         return (float(found[0]), float(found[1])) if found else None
 
     @property
     def _record(self) -> Mapping[str, Any]:
-        """What the file tells of the record identified."""
+        """Entries of the file on the record identified."""
         found: Mapping[str, Any] = self.details.get("provenance", {}).get("data", {})
         return found
 
     @property
     def free_count(self) -> int | None:
-        """Number of values fitted, the offset with them; None where the file does not tell.
+        """Number of values fitted, the offset with them; None where the file does not say.
 
         Thresholds and time constants that are chosen beforehand do not count; a weight that came
         out as 0 does.
@@ -140,7 +140,7 @@ class IdentifiedModel:
         return self._record.get("sha256") == data.sha256
 
     def window_on(self, data: Dataset) -> tuple[float, float] | None:
-        """Tell which seconds of a record were fitted, as far as its name tells.
+        """Tell which seconds of a record were fitted, as far as its name shows.
 
         Parameters
         ----------

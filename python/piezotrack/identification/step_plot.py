@@ -38,7 +38,7 @@ def plot_step(step: StepResult, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     step : StepResult
-        What a step told.
+        Result of a step response.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure where not given.
 
@@ -93,7 +93,7 @@ def plot_spectrum(step: StepResult, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     step : StepResult
-        What a step told.
+        Result of a step response.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure where not given.
 
@@ -157,7 +157,7 @@ def plot_step_result(step: StepResult) -> Figure:
     Parameters
     ----------
     step : StepResult
-        What a step told.
+        Result of a step response.
 
     Returns
     -------

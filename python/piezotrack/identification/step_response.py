@@ -75,7 +75,7 @@ class StepTrace:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class StepResult:
-    r"""What one step tells of a stage.
+    r"""Result of a step response.
 
     .. math::
 

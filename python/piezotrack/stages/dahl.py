@@ -183,7 +183,7 @@ class DahlStage(Stage):
         return self._simulate(u, dt, hold, initial, method, accuracy)
 
     def force_ratios(self) -> list[Ratio]:
-        """Return all but up, which the data do not tell from b1 and b0, over the stiffness."""
+        """Return all but up, which the data do not separate from b1 and b0, over the stiffness."""
         gain = 1e6 * self.piezo_coefficient / self.stiffness
         return [
             ("piezo_coefficient", "T/K", gain, "um/V"),

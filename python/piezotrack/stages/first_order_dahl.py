@@ -40,9 +40,9 @@ class FirstOrderDahlStage(Stage):
     rest_stiffness : float
         sigma [N/m], 0 or above: how fast the force grows at first.
     coulomb_force : float
-        Fc [N], above 0: the force that a long way in one direction leads to.
+        Fc [N], above 0: the force that a long path in one direction ends at.
     exponent : float, optional
-        i, from 0 to 20: shape of the way there; 0 is a spring that slides, 1 an exponential.
+        i, from 0 to 20: shape of the approach; 0 is a spring that slides, 1 an exponential.
 
     Raises
     ------

@@ -211,9 +211,11 @@ class Inverse:
         if self.playback == "online" or period is None or volts.size <= head:
             return volts, "feedforward computed along the whole path"
         # Between samples where a period is no whole number of them.
-        late = np.arange(head, volts.size, dtype=np.float64)
-        turns = np.floor((late - head) * dt / period) + 1.0
-        volts[head:] = np.interp(late - turns * period / dt, np.arange(head + 1), volts[: head + 1])
+        after = np.arange(head, volts.size, dtype=np.float64)
+        turns = np.floor((after - head) * dt / period) + 1.0
+        volts[head:] = np.interp(
+            after - turns * period / dt, np.arange(head + 1), volts[: head + 1]
+        )
         return volts, f"feedforward of period {before + 1} repeated from a table"
 
     def _settled(self, reference: Reference, period: float) -> int:

@@ -106,7 +106,7 @@ class XYStage:
         hysteresis in place of 10 % and reaches 115 um in place of 117.8 um, as two stacks of one
         batch may differ, and noise of its own; 1.5 % of y shows in x and 1 % of x in y; the lag is
         half of the control interval of 0.02 s, as when two axes are served in turn. None of these
-        was fitted to Table 2; docs/contouring.md tells what lag and cross-talk do.
+        was fitted to Table 2; docs/contouring.md shows the effect of lag and cross-talk.
 
         Parameters
         ----------

@@ -15,7 +15,7 @@ use super::{Inverse, PlayInverse};
 use crate::creep::{Creep, CreepInverse, CreepState};
 use crate::dynamics::Dynamics;
 use crate::error::{Result, usable};
-use crate::hysteresis::{Operator, Play};
+use crate::hysteresis::{Operator, Play, PlayState};
 
 /// Inverse of a hysteresis operator: output in, input out.
 pub trait OperatorInverse: Copy {
@@ -28,6 +28,19 @@ pub trait OperatorInverse: Copy {
     /// Takes the output of the operator to `output` and returns its input; NaN, with the state
     /// unchanged, where there is none.
     fn follow(&self, state: &mut Self::State, output: f64) -> f64;
+}
+
+impl<const PLAYS: usize, const ZONES: usize> OperatorInverse for PlayInverse<PLAYS, ZONES> {
+    type State = PlayState<f64, PLAYS>;
+
+    fn rest(&self) -> Self::State {
+        PlayInverse::rest(self)
+    }
+
+    #[inline]
+    fn follow(&self, state: &mut Self::State, output: f64) -> f64 {
+        PlayInverse::follow(self, state, output)
+    }
 }
 
 /// Inverse of a stage with the operator at the input: displacement in, voltage out.

@@ -182,16 +182,3 @@ fn plays<const PLAYS: usize, const ZONES: usize>(
     }
     Ok(inverse)
 }
-
-impl<const PLAYS: usize, const ZONES: usize> super::OperatorInverse for PlayInverse<PLAYS, ZONES> {
-    type State = PlayState<f64, PLAYS>;
-
-    fn rest(&self) -> Self::State {
-        self.rest()
-    }
-
-    #[inline]
-    fn follow(&self, state: &mut Self::State, output: f64) -> f64 {
-        self.follow(state, output)
-    }
-}

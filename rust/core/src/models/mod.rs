@@ -5,6 +5,7 @@ mod bouc_wen_oscillator;
 mod creep;
 pub mod dahl;
 mod first_order_dahl;
+mod generalised_prandtl_ishlinskii;
 mod input_stage;
 mod plant;
 mod prandtl_ishlinskii;
@@ -19,6 +20,10 @@ pub use bouc_wen_oscillator::{BoucWenOscillator, BoucWenOscillatorKernel};
 pub use creep::{Creep, Dynamics, MOST_RELAXATIONS, Relaxation, RelaxationFlow, RelaxationState};
 pub use dahl::{DahlStage, DahlStageState};
 pub use first_order_dahl::{FirstOrderDahlKernel, FirstOrderDahlStage};
+pub use generalised_prandtl_ishlinskii::{
+    GeneralisedPlays, GeneralisedPlaysInverse, GeneralisedPlaysInverseState, GeneralisedPlaysState,
+    GeneralisedPrandtlIshlinskiiStage, TanhEnvelope,
+};
 pub use input_stage::{InputOperator, InputStage, InputStageFlow, InputStageState};
 pub use plant::{KernelFlow, KernelModel, Plant};
 pub use prandtl_ishlinskii::{

@@ -281,6 +281,7 @@ models! {
     FirstOrderDahl: super::FirstOrderDahlStage, swarm;
     BoucWenOscillator: super::BoucWenOscillator, swarm;
     PrandtlIshlinskii: super::PrandtlIshlinskiiStage, least_squares;
+    GeneralisedPrandtlIshlinskii: super::GeneralisedPrandtlIshlinskiiStage, least_squares;
 }
 
 impl Model {

@@ -11,10 +11,10 @@ use crate::signal::{Stop, index, range};
 const LEAST_LINEAR: f64 = 1e-3;
 
 /// Rounds over the numbers of an envelope, at most.
-const SHAPE_ROUNDS: usize = 4;
+const SHAPE_ROUNDS: usize = 20;
 
-/// Least share by which a number of an envelope has to lower the deviation: what a record does not
-/// fix is left alone.
+/// Least share by which a number of an envelope has to lower the deviation before it leaves the
+/// middle of its range: what a record does not fix is left alone.
 const LEAST_GAIN: f64 = 0.1;
 
 /// Least slope of the dead zones while they are searched.
@@ -155,20 +155,22 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
     /// The numbers of the envelope in turn, each from its range.
     fn search_shape(&mut self) -> Option<()> {
         let ranges = M::shapes();
+        let mut released = vec![false; ranges.len()];
         for _ in 0..SHAPE_ROUNDS {
-            let mut moved = false;
+            let round = self.rms;
             for (i, &range) in ranges.iter().enumerate() {
-                let before = (self.rms, self.unknowns.clone(), self.shape[i]);
+                let (before, unknowns, here) = (self.rms, self.unknowns.clone(), self.shape[i]);
                 let place = self.along(range, 1e-4, |fit, place| fit.reshape(i, place))?;
-                if self.rms < (1.0 - LEAST_GAIN) * before.0 {
+                let least = if released[i] { 0.0 } else { LEAST_GAIN };
+                if self.rms < (1.0 - least) * before {
+                    released[i] = true;
                     self.reshape(i, place);
-                    moved = true;
                 } else {
-                    (self.rms, self.unknowns) = (before.0, before.1);
-                    self.reshape(i, before.2);
+                    (self.rms, self.unknowns) = (before, unknowns);
+                    self.reshape(i, here);
                 }
             }
-            if !moved {
+            if self.rms > 0.99 * round {
                 break;
             }
         }

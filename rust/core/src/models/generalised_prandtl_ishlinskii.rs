@@ -1,0 +1,468 @@
+//! The generalised Prandtl-Ishlinskii stage: plays between envelopes at the input, creep, linear
+//! dynamics.
+//!
+//! ```text
+//! z_r = max(gamma_l(u) - r, min(gamma_r(u) + r, z_r))          play of threshold r
+//! H   = w_0 z_0 + sum_i w_i z_(r_i)                            z_0: that of threshold 0
+//! gamma(u) = c0 tanh(c1 u + c2) + c3                           its own four numbers each
+//! ```
+//!
+//! `gamma_l` pushes the plays up as the input rises, `gamma_r` down as it falls. Al Janaideh,
+//! Rakheja and Su 2011, IEEE/ASME Transactions on Mechatronics 16(4), 734-744, doi
+//! 10.1109/TMECH.2010.2052366, with the weights in m/V and `gamma` in V. Envelopes that bend make
+//! loops asymmetric, and saturate, without the dead zones of the modified operator;
+//! [`InputStage`] says what follows the operator.
+//!
+//! The inverse is closed. On a rising stretch all plays follow one number, g = `gamma_l(u)`,
+//!
+//! ```text
+//! H = sum_i w_i max(g - r_i, z_i)
+//! ```
+//!
+//! which rises strictly with g beyond the first play to move, straight between the places where
+//! another play starts to move, and convex: the plays that move are known after a few passes, g
+//! follows, and u = `gamma_l^-1(g)` with artanh. A falling stretch is the same with signs turned.
+//! With equal envelopes this is the inverse of the Prandtl-Ishlinskii operator, then `gamma^-1`.
+//! There is an inverse where `gamma_l <= gamma_r`.
+//!
+//! Operator and inverse use arrays and `libm` only, and could move to the firmware's crate.
+
+use piezotrack_control::hysteresis::{Operator, PlayState};
+use piezotrack_control::{InputInverse, InputInverseState, OperatorInverse};
+
+use super::creep::MOST_RELAXATIONS;
+use super::input_stage::{DYNAMICS, InputOperator, InputStage, PLAYS_STATE, inverse_state};
+use super::prandtl_ishlinskii::{MOST_PLAYS, PlayHysteresis};
+use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
+use super::values::{ParameterInfo, Values};
+use super::weighted_plays::{FittedPlays, WeightedPlays};
+use crate::design::{Gains, LoopPlant};
+use crate::error::{Result, finite, positive};
+
+/// Room for the play of threshold 0 and the others.
+const SLOTS: usize = MOST_PLAYS + 1;
+
+/// Why a fit has neither scale nor level.
+const NORMALISED: &str = "weights and offset could be traded for it";
+
+const PARAMETERS: &[ParameterInfo] = &[
+    ParameterInfo::new("linear", "w0", "m/V"),
+    ParameterInfo::list("thresholds", "r", "V"),
+    ParameterInfo::list("weights", "w", "m/V"),
+    ParameterInfo::new("scale", "c0", "V").never_searched(NORMALISED),
+    ParameterInfo::new("slope", "c1", "1/V"),
+    ParameterInfo::new("shift", "c2", ""),
+    ParameterInfo::new("level", "c3", "V").never_searched(NORMALISED),
+    ParameterInfo::optional("falling_scale", "c0'", "V"),
+    ParameterInfo::optional("falling_slope", "c1'", "1/V"),
+    ParameterInfo::optional("falling_shift", "c2'", ""),
+    ParameterInfo::optional("falling_level", "c3'", "V"),
+    DYNAMICS[0],
+    DYNAMICS[1],
+    DYNAMICS[2],
+    DYNAMICS[3],
+    DYNAMICS[4],
+];
+
+/// An envelope: c0 tanh(c1 u + c2) + c3, V of V.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TanhEnvelope {
+    /// Half of its range, c0, V, above 0.
+    pub scale: f64,
+    /// Its slope relative to c0 where it is steepest, c1, 1/V, above 0.
+    pub slope: f64,
+    /// Its argument at 0 V, c2.
+    pub shift: f64,
+    /// The middle of its range, c3, V.
+    pub level: f64,
+}
+
+impl TanhEnvelope {
+    /// Where it takes an input, V.
+    #[must_use]
+    #[inline]
+    pub fn at(&self, volts: f64) -> f64 {
+        self.with_slope(volts).0
+    }
+
+    /// Where it takes an input, V, and its slope there.
+    #[must_use]
+    #[inline]
+    pub fn with_slope(&self, volts: f64) -> (f64, f64) {
+        let bend = libm::tanh(self.slope * volts + self.shift);
+        let slope = self.scale * self.slope * (1.0 - bend) * (1.0 + bend);
+        (self.scale * bend + self.level, slope)
+    }
+
+    /// The input that it takes to `edge`, V; NaN or infinity beyond its range.
+    #[must_use]
+    #[inline]
+    pub fn inverse(&self, edge: f64) -> f64 {
+        (libm::atanh((edge - self.level) / self.scale) - self.shift) / self.slope
+    }
+
+    /// Of its four numbers, named after `prefix`.
+    fn checked(prefix: &str, [scale, slope, shift, level]: [f64; 4]) -> Result<Self> {
+        Ok(Self {
+            scale: positive(&format!("{prefix}scale"), scale, "V")?,
+            slope: positive(&format!("{prefix}slope"), slope, "1/V")?,
+            shift: finite(&format!("{prefix}shift"), shift, "")?,
+            level: finite(&format!("{prefix}level"), level, "V")?,
+        })
+    }
+}
+
+/// The operator: plays between two envelopes, V to m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GeneralisedPlays {
+    /// What pushes the plays up.
+    rising: TanhEnvelope,
+    /// What pushes them down.
+    falling: TanhEnvelope,
+    /// 0, then r, V; what is not used weighs 0.
+    thresholds: [f64; SLOTS],
+    /// `w_0`, then w, m/V.
+    weights: [f64; SLOTS],
+    /// Plays that are used, that of threshold 0 among them.
+    count: usize,
+}
+
+/// What it remembers: its input, the plays and its slope.
+pub type GeneralisedPlaysState = PlayState<f64, SLOTS>;
+
+/// A stage with such plays at its input.
+///
+/// ```
+/// use piezotrack_core::models::{
+///     Dynamics, Experiment, GeneralisedPlays, GeneralisedPrandtlIshlinskiiStage, Relaxation,
+///     StageModel, TanhEnvelope,
+/// };
+/// use piezotrack_core::signal::{Drive, Hold, NEVER};
+///
+/// # fn main() -> piezotrack_core::Result<()> {
+/// let envelope = TanhEnvelope { scale: 100.0, slope: 0.01, shift: 0.0, level: 0.0 };
+/// let weights = [0.2e-6, 0.1e-6];
+/// let stage = GeneralisedPrandtlIshlinskiiStage {
+///     operator: GeneralisedPlays::new(1e-6, &[10.0, 20.0], &weights, envelope, envelope)?,
+///     relaxation: Relaxation::new(&[], &[], Dynamics::None)?,
+/// };
+/// let drive = Drive::new(&[0.0, 50.0, 0.0], 0.01, Hold::First)?;
+/// let run = stage.simulate(&Experiment::of(&drive, NEVER))?.unwrap();
+/// // The envelope takes 50 V to 100 tanh(0.5) V.
+/// let edge = 46.21171572600098;
+/// assert!((run.x[1] - 1e-6 * (edge + 0.2 * (edge - 10.0) + 0.1 * (edge - 20.0))).abs() < 1e-15);
+/// assert!((run.x[2] - 4e-6).abs() < 1e-15); // the plays stay behind
+/// # Ok(())
+/// # }
+/// ```
+pub type GeneralisedPrandtlIshlinskiiStage = InputStage<GeneralisedPlays>;
+
+impl GeneralisedPlays {
+    /// The operator from its parameters: weights in m/V, thresholds in V.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Shape`] where entries are missing or too many,
+    /// [`crate::error::Error::Parameter`] where one is out of its range.
+    pub fn new(
+        linear: f64,
+        thresholds: &[f64],
+        weights: &[f64],
+        rising: TanhEnvelope,
+        falling: TanhEnvelope,
+    ) -> Result<Self> {
+        let PlayHysteresis { plays, count } =
+            PlayHysteresis::new(linear, thresholds, weights, &[], &[])?;
+        let numbers = |of: TanhEnvelope| [of.scale, of.slope, of.shift, of.level];
+        let mut all = Self {
+            rising: TanhEnvelope::checked("", numbers(rising))?,
+            falling: TanhEnvelope::checked("falling_", numbers(falling))?,
+            thresholds: [0.0; SLOTS],
+            weights: [0.0; SLOTS],
+            count: 1 + count,
+        };
+        all.weights[0] = plays.linear;
+        all.weights[1..].copy_from_slice(&plays.weights);
+        all.thresholds[1..].copy_from_slice(&plays.thresholds);
+        Ok(all)
+    }
+
+    /// Thresholds and weights of the plays, with where those of a state stand, V.
+    fn plays<'a>(
+        &'a self,
+        state: &'a GeneralisedPlaysState,
+    ) -> impl Iterator<Item = (f64, f64, f64)> + 'a {
+        let plays = self.thresholds.iter().zip(&self.weights).zip(&state.plays);
+        plays.take(self.count).map(|((threshold, weight), play)| (*threshold, *weight, *play))
+    }
+
+    /// The state where the input goes from that of `from` to `volts`.
+    #[inline]
+    fn taken(
+        &self,
+        from: &GeneralisedPlaysState,
+        volts: f64,
+        rises: bool,
+    ) -> GeneralisedPlaysState {
+        let (up, slope_up) = self.rising.with_slope(volts);
+        let (down, slope_down) = self.falling.with_slope(volts);
+        let steep = if rises { slope_up } else { slope_down };
+        let mut state = GeneralisedPlaysState { input: volts, plays: from.plays, slope: 0.0 };
+        for (i, play) in state.plays.iter_mut().take(self.count).enumerate() {
+            let (low, high) = (up - self.thresholds[i], down + self.thresholds[i]);
+            *play = low.max(high.min(*play));
+            if if rises { *play <= low } else { *play >= high } {
+                state.slope += self.weights[i] * steep;
+            }
+        }
+        state
+    }
+
+    /// Where the envelope of a direction stands for an output (m) beyond that of the state, V.
+    ///
+    /// `sum_i w_i max(g - r_i, z_i)` is convex in g: Newton's method from above, where all plays
+    /// move, comes down from corner to corner and ends on the straight part that g lies on.
+    #[inline]
+    fn edge(&self, state: &GeneralisedPlaysState, output: f64, rises: bool) -> f64 {
+        // A falling stretch is a rising one of the negative plays.
+        let sign = if rises { 1.0 } else { -1.0 };
+        let mut edge = f64::INFINITY;
+        for _ in 0..=self.count {
+            let (mut slope, mut rest) = (0.0, sign * output);
+            for (threshold, weight, play) in self.plays(state) {
+                if sign * play + threshold < edge {
+                    slope += weight;
+                    rest += weight * threshold;
+                } else {
+                    rest -= weight * sign * play;
+                }
+            }
+            let next = rest / slope;
+            // Not so where nothing moves any more, by a rounding.
+            if !(slope > 0.0 && next < edge) {
+                break;
+            }
+            edge = next;
+        }
+        sign * edge
+    }
+}
+
+impl Operator<f64> for GeneralisedPlays {
+    type State = GeneralisedPlaysState;
+    type Branch = (GeneralisedPlaysState, f64);
+
+    fn rest(&self) -> GeneralisedPlaysState {
+        let start = GeneralisedPlaysState { input: 0.0, plays: [0.0; SLOTS], slope: 0.0 };
+        self.taken(&start, 0.0, true)
+    }
+
+    #[inline]
+    fn output(&self, state: &GeneralisedPlaysState) -> (f64, f64) {
+        (self.plays(state).map(|(_, weight, play)| weight * play).sum(), state.slope)
+    }
+
+    fn branch(&self, state: &GeneralisedPlaysState, direction: f64) -> Self::Branch {
+        (*state, direction)
+    }
+
+    fn along(&self, (from, direction): &Self::Branch, distance: f64) -> GeneralisedPlaysState {
+        self.taken(from, from.input + distance, *direction > 0.0)
+    }
+}
+
+impl InputOperator for GeneralisedPlays {
+    type State = GeneralisedPlaysState;
+
+    fn rest(&self) -> GeneralisedPlaysState {
+        Operator::rest(self)
+    }
+
+    #[inline]
+    fn follow(&self, state: &mut GeneralisedPlaysState, volts: f64) -> f64 {
+        *state = self.taken(state, volts, volts >= state.input);
+        self.output(state).0
+    }
+
+    #[inline]
+    fn input(&self, state: &GeneralisedPlaysState) -> f64 {
+        state.input
+    }
+
+    fn plays<'a>(&self, state: &'a mut GeneralisedPlaysState) -> &'a mut [f64] {
+        &mut state.plays[..self.count]
+    }
+}
+
+/// The inverse: output in, m, input out, V.
+///
+/// Between two envelopes the output stays where it is for a while after a reversal; the inverse
+/// then jumps to where it goes on. It ends where that of a rising input crosses the other one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GeneralisedPlaysInverse(pub GeneralisedPlays);
+
+/// What it remembers: the state of the operator, and the output that was asked for, m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GeneralisedPlaysInverseState {
+    operator: GeneralisedPlaysState,
+    output: f64,
+}
+
+impl GeneralisedPlaysInverse {
+    /// What it remembers of an operator in a state.
+    #[must_use]
+    pub fn memory(&self, operator: &GeneralisedPlaysState) -> GeneralisedPlaysInverseState {
+        let output = self.0.output(operator).0;
+        GeneralisedPlaysInverseState { operator: *operator, output }
+    }
+}
+
+impl OperatorInverse for GeneralisedPlaysInverse {
+    type State = GeneralisedPlaysInverseState;
+
+    fn rest(&self) -> GeneralisedPlaysInverseState {
+        self.memory(&Operator::rest(&self.0))
+    }
+
+    /// Exact for a step of any length, provided that the output is monotone within it.
+    #[inline]
+    fn follow(&self, state: &mut GeneralisedPlaysInverseState, output: f64) -> f64 {
+        let operator = &self.0;
+        let distance = output - state.output;
+        if distance == 0.0 {
+            return state.operator.input;
+        }
+        let rises = distance > 0.0;
+        let edge = operator.edge(&state.operator, output, rises);
+        let envelope = if rises { &operator.rising } else { &operator.falling };
+        let volts = envelope.inverse(edge);
+        // Where the envelopes cross, plays follow the other one than the direction's.
+        let crossed = operator.rising.at(volts) > operator.falling.at(volts);
+        if crossed || !volts.is_finite() {
+            return f64::NAN;
+        }
+        state.operator = operator.taken(&state.operator, volts, rises);
+        state.output = output;
+        volts
+    }
+}
+
+impl StageModel for GeneralisedPrandtlIshlinskiiStage {
+    const INFO: ModelInfo = ModelInfo {
+        name: "generalised-prandtl-ishlinskii",
+        title: "generalised Prandtl-Ishlinskii",
+        drive_unit: "V",
+        parameters: PARAMETERS,
+        state: PLAYS_STATE,
+        published: &[],
+    };
+
+    fn build(values: &Values) -> Result<Self> {
+        let [scale, slope, shift, level] =
+            ["scale", "slope", "shift", "level"].map(|name| values.number(name));
+        let rising = TanhEnvelope { scale, slope, shift, level };
+        // What is left out is as for a rising input.
+        let other = |name, same| values.list(name).first().copied().unwrap_or(same);
+        let falling = TanhEnvelope {
+            scale: other("falling_scale", scale),
+            slope: other("falling_slope", slope),
+            shift: other("falling_shift", shift),
+            level: other("falling_level", level),
+        };
+        let linear = values.number("linear");
+        let (thresholds, weights) = (values.list("thresholds"), values.list("weights"));
+        let operator = GeneralisedPlays::new(linear, thresholds, weights, rising, falling)?;
+        Ok(Self { operator, relaxation: Self::relaxation(values)? })
+    }
+
+    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
+        self.follow(experiment)
+    }
+
+    /// On its settled loop between the two voltages.
+    fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
+        let gains = Gains::of(&self.operator, low, high, |slope| slope)?;
+        gains.plants(|gain| self.relaxation.loop_plant(gain))
+    }
+}
+
+impl Invertible for GeneralisedPrandtlIshlinskiiStage {
+    type Inverse = InputInverse<GeneralisedPlaysInverse, MOST_RELAXATIONS>;
+
+    fn inverse(
+        &self,
+        dt: f64,
+        initial: Option<&Values>,
+    ) -> Result<(Self::Inverse, InputInverseState<GeneralisedPlaysInverseState, MOST_RELAXATIONS>)>
+    {
+        let inverse = self.feedforward(GeneralisedPlaysInverse(self.operator), dt)?;
+        let state = self.state(initial)?;
+        let memory = inverse.operator().memory(&state.operator);
+        let start = inverse_state(&inverse, memory, &state.relaxation);
+        Ok((inverse, start))
+    }
+}
+
+impl WeightedPlays for GeneralisedPrandtlIshlinskiiStage {
+    const DEAD_ZONES: bool = false;
+
+    type Envelope = TanhEnvelope;
+
+    /// Its slope at the top of the drive over that at the bottom, and how much it bends both ways:
+    /// s in `B^2 = artanh(k)^2 + s^2`, where tanh's argument runs over 2 B and
+    /// k = (1 - sqrt(ratio))/(1 + sqrt(ratio)). With s near 0 it bends one way only.
+    fn shapes() -> Vec<(f64, f64)> {
+        vec![(0.25, 4.0), (0.005, 1.6)]
+    }
+
+    /// It passes through 0 at 0 V, where the plays rest, and rises over the drive's range by as
+    /// much as the drive does: thresholds and weights mean what they do without it. Its scale
+    /// could be traded for the weights otherwise.
+    fn envelope(shape: &[f64], (low, high): (f64, f64)) -> TanhEnvelope {
+        let [ratio, bend] = [0, 1].map(|i| shape.get(i).copied().unwrap_or(1.0));
+        // The ratio is cosh^2(A - B)/cosh^2(A + B), A the argument in the middle.
+        let root = libm::sqrt(ratio);
+        let lean = (1.0 - root) / (1.0 + root);
+        let half = libm::hypot(libm::atanh(lean), bend);
+        let middle = libm::atanh(lean / libm::tanh(half));
+        let slope = 2.0 * half / (high - low);
+        let bare = TanhEnvelope {
+            scale: 1.0,
+            slope,
+            shift: middle - 0.5 * slope * (low + high),
+            level: 0.0,
+        };
+        let scale = (high - low) / (bare.at(high) - bare.at(low));
+        TanhEnvelope { scale, level: -scale * bare.at(0.0), ..bare }
+    }
+
+    #[inline(always)]
+    fn edges(envelope: &TanhEnvelope, volts: f64) -> (f64, f64) {
+        let edge = envelope.at(volts);
+        (edge, edge)
+    }
+
+    fn values(fitted: &FittedPlays) -> Values {
+        let of = fitted.clone();
+        let TanhEnvelope { scale, slope, shift, level } = Self::envelope(&of.shape, of.drive);
+        let [creep_weights, creep_times, time, frequency, damping_ratio] = of.relaxation.values();
+        let entries = [
+            vec![of.linear],
+            of.thresholds,
+            of.weights,
+            vec![scale],
+            vec![slope],
+            vec![shift],
+            vec![level],
+            vec![],
+            vec![],
+            vec![],
+            vec![],
+            creep_weights,
+            creep_times,
+            time,
+            frequency,
+            damping_ratio,
+        ];
+        Values::of(PARAMETERS, entries)
+    }
+}

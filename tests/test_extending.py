@@ -1,0 +1,46 @@
+"""The page on extending: its excerpts are those of the files."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from folders import ROOT
+
+PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
+EXCERPTS = re.findall(r"^```(?:rust|py) (\S+)\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+
+
+def test_the_page_has_excerpts() -> None:
+    assert len(EXCERPTS) > 5
+
+
+@pytest.mark.parametrize(("path", "code"), EXCERPTS)
+def test_an_excerpt_is_in_its_file(path: str, code: str) -> None:
+    assert code in (ROOT / path).read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    "path", sorted(set(re.findall(r"`((?:rust|python|tests)/[\w./]+)`", PAGE)))
+)
+def test_a_file_that_is_named_is_there(path: str) -> None:
+    if "NAME" not in path:
+        assert (ROOT / path).exists()
+
+
+@pytest.mark.parametrize(
+    "trait", sorted(set(re.findall(r"^\| `([\w:]+)(?:<f64>)?` \|", PAGE, re.M)))
+)
+def test_a_trait_has_the_methods_that_the_page_lists(trait: str) -> None:
+    row = re.search(rf"^\| `{trait}(?:<f64>)?` \| ([^|]*)\|", PAGE, re.MULTILINE)
+    sources = "\n".join(
+        path.read_text(encoding="utf-8") for path in (ROOT / "rust").glob("*/src/**/*.rs")
+    )
+    name = trait.rpartition("::")[2]
+    body = re.search(rf"^pub trait {name}\b[^{{]*{{\n(.*?)^}}", sources, re.MULTILINE | re.DOTALL)
+    assert row
+    assert body
+    found = re.findall(r"^ {4}(?:const|fn) (\w+)", body[1], re.MULTILINE)
+    assert re.findall(r"`(\w+)`", row[1]) == found
+    assert sum(part.islower() for part in found) <= 4
