@@ -328,7 +328,7 @@ def test_below_the_lower_limit_is_out_of_reach_too(stage: Any) -> None:
 
 
 BAD: dict[str, tuple[Callable[[], Any], str]] = {
-    "stage": (lambda: pt.track(5, loop(), sine(0.5, 2.0)), "stage is int: expected pt.VirtualSt"),  # type: ignore[arg-type]
+    "stage": (lambda: pt.track(5, loop(), sine(0.5, 2.0)), "stage is int: expected a pt.VirtualSt"),  # type: ignore[arg-type]
     "controller": (lambda: pt.track(STAGE, PID, sine(0.5, 2.0)), "controller is Pid"),  # type: ignore[arg-type]
     "reference": (lambda: pt.track(STAGE, loop(), np.zeros(9)), "reference is ndarray"),  # type: ignore[arg-type]
     "jitter": (lambda: pt.track(STAGE, loop(), sine(0.5, 2.0), jitter=-0.1), "jitter is -0.1"),
