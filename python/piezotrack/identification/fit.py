@@ -72,9 +72,9 @@ def identify(
         else to the former only; an argument that does not apply to the model is refused.
     free : iterable of str, optional
         Parameters to search: all that are not fixed, where not given. `b0`, dry friction at
-        reversals, is held at 0 unless it is named here or in `fixed`; exponents, and the beta of
-        an oscillator, of which the data determine the products with gamma and delta only, at 1 unless
-        they are in `fixed`.
+        reversals, is held at 0 unless it is named here or in `fixed`; exponents at 1 unless
+        they are in `fixed`, and so the beta of an oscillator, of which the data determine the
+        products with gamma and delta only.
     fixed : mapping of str to float, optional
         Parameters to hold, SI.
     initial : StepResult, optional
