@@ -116,7 +116,7 @@ def test_the_amplifier_has_its_limits_bandwidth_and_slew() -> None:
 
 def test_the_loop_is_rate_independent_and_a_tenth_wide() -> None:
     """What Table 1 is not: piezo hysteresis does not grow with the frequency."""
-    stage = quiet(creep_shares=(0.0, 0.0, 0.0))
+    stage = quiet(creep_weights=(0.0, 0.0, 0.0))
     widths = []
     for frequency in (0.1, 1.0):
         n = round(2 / frequency / 1e-3)
@@ -145,7 +145,7 @@ def test_creep_goes_on_after_a_step() -> None:
     for t in (0.3, 1.0, 5.0):
         found = run.x[round(1000 * t)] / run.x[20000]
         assert 1.0 - found == pytest.approx(1.0 - crept(t) / crept(20.0), rel=0.02), t
-    rest = quiet(creep_shares=(), creep_times=()).simulate(np.full(20001, 75.0), 1e-3, hold="zoh")
+    rest = quiet(creep_weights=(), creep_times=()).simulate(np.full(20001, 75.0), 1e-3, hold="zoh")
     assert np.ptp(rest.x[2000:]) < 1e-12
 
 
@@ -172,7 +172,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"thresholds": None}, r"thresholds\[0\] is None"),
     ({"thresholds": (-1.0,) * 10}, r"thresholds\[0\] is -1 V"),
     ({"weights": (math.nan,) * 10}, r"weights\[0\] is NaN"),
-    ({"bends": (-2.0, 0.0)}, r"bends\[0\] is -2"),
+    ({"dead_zone_weights": (-2.0, 0.0)}, r"dead_zone_weights\[0\] is -2"),
     ({"thresholds": (1.0,) * 11, "weights": (0.1,) * 11}, "thresholds is 11 numbers: expected 10"),
     ({"gain": 0.0}, "gain is 0 m/V"),
     ({"creep_times": (0.0, 1.0, 10.0)}, r"creep_time\[0\] is 0 s"),
@@ -200,7 +200,7 @@ def test_refuses_a_bad_number(changes: dict[str, Any], message: str) -> None:
         dataclasses.replace(STAGE, **changes)
 
 
-@pytest.mark.parametrize("name", ["weights", "bends", "creep_shares"])
+@pytest.mark.parametrize("name", ["weights", "dead_zone_weights", "creep_weights"])
 def test_refuses_pairs_that_differ_in_length(name: str) -> None:
     with pytest.raises(pt.ShapeError, match=f"{name} has 1 numbers: expected"):
         quiet(**{name: (0.1,)})

@@ -12,7 +12,7 @@ from .. import __version__
 from .compare import compare_command
 from .contour import contour_command
 from .demo import demo_command
-from .fit import identify_command
+from .identify import identify_command
 from .noise import noise_command
 from .reproduce import reproduce_command
 from .simulate import simulate_command

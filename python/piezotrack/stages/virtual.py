@@ -75,11 +75,11 @@ class VirtualStage:
         Share of the voltage that passes without hysteresis.
     thresholds, weights : tuple of float
         Of up to 10 play operators [V, 1].
-    corners, bends : tuple of float
+    dead_zone_thresholds, dead_zone_weights : tuple of float
         Of up to 2 dead zones: above each corner [V] the slope grows by its bend.
     gain : float
         Displacement for one volt out of the hysteresis [m/V].
-    creep_shares, creep_times : tuple of float
+    creep_weights, creep_times : tuple of float
         Up to 3 relaxations: what each adds in the end, as a share, and its time constant [s].
     frequency, damping_ratio : float
         Undamped frequency of the mode [Hz] and its zeta.
@@ -116,10 +116,10 @@ class VirtualStage:
     linear: float
     thresholds: tuple[float, ...]
     weights: tuple[float, ...]
-    corners: tuple[float, ...]
-    bends: tuple[float, ...]
+    dead_zone_thresholds: tuple[float, ...]
+    dead_zone_weights: tuple[float, ...]
     gain: float
-    creep_shares: tuple[float, ...]
+    creep_weights: tuple[float, ...]
     creep_times: tuple[float, ...]
     frequency: float
     damping_ratio: float
@@ -134,9 +134,15 @@ class VirtualStage:
     step: float
 
     def __post_init__(self) -> None:
-        for name in ("limits", "thresholds", "weights", "corners", "bends"):
+        for name in (
+            "limits",
+            "thresholds",
+            "weights",
+            "dead_zone_thresholds",
+            "dead_zone_weights",
+        ):
             object.__setattr__(self, name, one_or_more_numbers(name, getattr(self, name)))
-        for name in ("creep_shares", "creep_times"):
+        for name in ("creep_weights", "creep_times"):
             object.__setattr__(self, name, one_or_more_numbers(name, getattr(self, name)))
         if len(self.limits) != 2:
             raise ParameterError(f"limits are {self.limits}: expected (low, high) in V")

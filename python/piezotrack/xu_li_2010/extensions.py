@@ -89,8 +89,8 @@ def _which_model(apparatus: Apparatus, experiments: Experiments) -> Section:
     """Find the kind of stage on which the Dahl model is better than Bouc-Wen."""
     x = apparatus.x
     still = replace(x, preconditioned=False)
-    even = replace(x, bends=tuple(0.0 for _ in x.bends))
-    bent = replace(x, bends=tuple(0.6 for _ in x.bends))
+    even = replace(x, dead_zone_weights=tuple(0.0 for _ in x.dead_zone_weights))
+    bent = replace(x, dead_zone_weights=tuple(0.6 for _ in x.dead_zone_weights))
     table_1 = DahlStage.xu_li_2010()
     log_of_12_s = experiments.judged.test.full
     u, dt = log_of_12_s.u, log_of_12_s.dt

@@ -188,8 +188,8 @@ impl VirtualSettings {
         self.sensor.validate()?;
         self.validate_play()?;
         for (j, creep) in self.creep.iter().enumerate() {
-            not_negative(&format!("creep_share[{j}]"), creep.share, "")?;
-            positive(&format!("creep_time[{j}]"), creep.time, "s")?;
+            not_negative(&format!("creep_weights[{j}]"), creep.share, "")?;
+            positive(&format!("creep_times[{j}]"), creep.time, "s")?;
         }
         positive("gain", self.gain, "m/V")?;
         positive("frequency", self.frequency, "Hz")?;
