@@ -20,7 +20,7 @@ use super::step_size;
 use crate::integrator::{
     FeedbackState, Kernel, MOST_PARAMETERS, Mechanics, Stepping, SteppingLoop, halvings,
 };
-use crate::math::Lanes;
+use crate::math::{Lanes, dispatch_vectors};
 use crate::models::{Held, KernelVisitor};
 use crate::signal::{Stop, index};
 
@@ -93,20 +93,19 @@ impl<'a> KernelVisitor for All<'a> {
         // Every thread gets vectors to fill before any gets a second one.
         let vectors = candidates.len().div_ceil(width);
         // A delay reads a ring in memory, which several vectors do not make faster.
-        let delayed = of.problem.has_delay();
-        let most = if delayed { 1 } else { K::VECTORS };
+        let several = const { K::VECTORS > 1 } && width > 1 && !of.problem.has_delay();
+        let most = if several { K::VECTORS } else { 1 };
         let each = vectors.div_ceil(rayon::current_num_threads()).clamp(1, most);
         let size = candidates.len().div_ceil(vectors.div_ceil(each).max(1)).max(1);
         let bundle = |chunk: &'a [Candidate]| {
             // Only a kernel that gains by several vectors is compiled for them.
-            if const { K::VECTORS > 1 } && chunk.len() > width {
-                let bundle = Bundle::<K, VECTORS, false> { kernel, of, candidates: chunk, stop };
-                of.arch.dispatch(bundle)
-            } else if delayed {
-                of.arch.dispatch(Bundle::<K, 1, true> { kernel, of, candidates: chunk, stop })
-            } else {
-                of.arch.dispatch(Bundle::<K, 1, false> { kernel, of, candidates: chunk, stop })
+            if const { K::VECTORS > 1 } && several && chunk.len() > width {
+                let bundle = Bundle::<K, VECTORS> { kernel, of, candidates: chunk, stop };
+                if let Some(costs) = dispatch_vectors(of.arch, bundle) {
+                    return costs;
+                }
             }
+            of.arch.dispatch(Bundle::<K, 1> { kernel, of, candidates: chunk, stop })
         };
         candidates.par_chunks(size).flat_map_iter(bundle).collect()
     }
@@ -126,15 +125,15 @@ impl WithSimd for Width {
     }
 }
 
-/// Candidates in one bundle of `V` vectors of lanes, read with a delay where `DELAYED`.
-struct Bundle<'a, K, const V: usize, const DELAYED: bool> {
+/// Candidates in one bundle of `V` vectors of lanes; with a delay of one only.
+struct Bundle<'a, K, const V: usize> {
     kernel: K,
     of: &'a Evaluator<'a>,
     candidates: &'a [Candidate],
     stop: Stop<'a>,
 }
 
-impl<K: Kernel, const V: usize, const DELAYED: bool> WithSimd for Bundle<'_, K, V, DELAYED> {
+impl<K: Kernel, const V: usize> WithSimd for Bundle<'_, K, V> {
     type Output = Vec<Costs>;
 
     #[inline(always)]
@@ -155,13 +154,14 @@ impl<K: Kernel, const V: usize, const DELAYED: bool> WithSimd for Bundle<'_, K, 
         let start = FeedbackState { x: zero, w: zero, memory: kernel.rest(&parameters) };
         let stepping = SteppingLoop { coupling, gain };
         let residuals = &of.residuals;
-        if const { DELAYED } {
-            let reading = Delayed::new(candidates, drive.dt, zero, index(substeps));
-            let mut sums = ResidualSums::new(residuals, candidates, stop, zero, reading);
+        if const { V > 1 } {
+            let mut sums = ResidualSums::new(residuals, candidates, stop, zero, Direct);
             let ended = stepping.run(drive, substeps, start, &mut sums).is_some();
             sums.conclude(ended)
         } else {
-            let mut sums = ResidualSums::new(residuals, candidates, stop, zero, Direct);
+            let delayed = || Delayed::new(candidates, drive.dt, zero, index(substeps));
+            let reading = of.problem.has_delay().then(delayed);
+            let mut sums = ResidualSums::new(residuals, candidates, stop, zero, reading);
             let ended = stepping.run(drive, substeps, start, &mut sums).is_some();
             sums.conclude(ended)
         }

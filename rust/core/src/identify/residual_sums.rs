@@ -68,6 +68,17 @@ impl<N> Reading<N> for Direct {
     }
 }
 
+/// With a delay, or without.
+impl<N, R: Reading<N>> Reading<N> for Option<R> {
+    #[inline(always)]
+    fn read(&mut self, k: usize, x: N, w: N) -> N {
+        match self {
+            None => x,
+            Some(delayed) => delayed.read(k, x, w),
+        }
+    }
+}
+
 /// Sums of the deviation and of its square, in lanes.
 pub(super) struct ResidualSums<'a, const V: usize, S: Simd, R> {
     of: &'a Residuals<'a>,

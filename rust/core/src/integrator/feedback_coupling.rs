@@ -23,6 +23,8 @@ pub struct FeedbackCoupling<N, O, const FOURTH: bool> {
 }
 
 impl<N: Number, O: Operator<N>, const FOURTH: bool> Coupling<N> for FeedbackCoupling<N, O, FOURTH> {
+    const SHORT: bool = true;
+
     type Memory = O::State;
 
     #[inline(always)]

@@ -53,28 +53,28 @@ pub const FEW_TERMS: usize = 3;
 const BLOCK: usize = 1024;
 
 impl<N: Number, C: Coupling<N>> SteppingLoop<N, C> {
-    /// Leads the stage along the drive; `None` where the sink gave up.
+    /// Steps the stage along the drive; `None` where the observer gave up.
     #[inline(always)]
     pub fn run(
         &self,
         drive: &Drive<'_>,
         substeps: usize,
         start: FeedbackState<N, C::Memory>,
-        sink: &mut impl Observer<N, C::Memory>,
+        observer: &mut impl Observer<N, C::Memory>,
     ) -> Option<FeedbackState<N, C::Memory>> {
         let mut state = start;
-        sink.sample(0, &state);
+        observer.sample(0, &state);
         let block = (BLOCK / substeps).max(1);
         let mut from = 1;
         while from < drive.u.len() {
             let to = (from + block).min(drive.u.len());
-            let reached = if substeps == 1 {
-                self.whole(drive, from..to, state, sink)
+            let reached = if const { C::SHORT } && substeps == 1 {
+                self.whole(drive, from..to, state, observer)
             } else {
-                self.parts(drive, substeps, from..to, state, sink)
+                self.parts(drive, substeps, from..to, state, observer)
             };
             state = reached;
-            if sink.give_up(to - 1) {
+            if observer.give_up(to - 1) {
                 return None;
             }
             from = to;
@@ -82,19 +82,20 @@ impl<N: Number, C: Coupling<N>> SteppingLoop<N, C> {
         Some(state)
     }
 
-    /// One step from sample to sample. Written apart: most searches spend their time here.
+    /// One step from sample to sample. Written apart for short steps: most searches spend their
+    /// time here.
     #[inline(always)]
     fn whole(
         &self,
         drive: &Drive<'_>,
         samples: Range<usize>,
         mut state: FeedbackState<N, C::Memory>,
-        sink: &mut impl Observer<N, C::Memory>,
+        observer: &mut impl Observer<N, C::Memory>,
     ) -> FeedbackState<N, C::Memory> {
         for k in samples {
             let (u, change) = drive.interval(k - 1);
             state = self.step(&state, u, change);
-            sink.sample(k, &state);
+            observer.sample(k, &state);
         }
         state
     }
@@ -107,7 +108,7 @@ impl<N: Number, C: Coupling<N>> SteppingLoop<N, C> {
         substeps: usize,
         samples: Range<usize>,
         mut state: FeedbackState<N, C::Memory>,
-        sink: &mut impl Observer<N, C::Memory>,
+        observer: &mut impl Observer<N, C::Memory>,
     ) -> FeedbackState<N, C::Memory> {
         let part = 1.0 / index(substeps);
         for k in samples {
@@ -116,7 +117,7 @@ impl<N: Number, C: Coupling<N>> SteppingLoop<N, C> {
             for j in 0..substeps {
                 state = self.step(&state, index(j).mul_add(change, u), change);
             }
-            sink.sample(k, &state);
+            observer.sample(k, &state);
         }
         state
     }

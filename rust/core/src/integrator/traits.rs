@@ -17,6 +17,9 @@ pub struct FeedbackState<N, M> {
 
 /// A hysteresis coupled with linear mechanics, as one step in time sees it.
 pub trait Coupling<N> {
+    /// Whether a step is so short that a loop around it shows.
+    const SHORT: bool = false;
+
     /// What the hysteresis remembers.
     type Memory: Copy;
 

@@ -1,6 +1,6 @@
 //! Numerical methods: SIMD lanes, random numbers, least squares, line search, transfer functions.
 
-mod fused;
+mod dispatch;
 mod golden_section;
 mod lanes;
 mod nnls;
@@ -10,7 +10,7 @@ mod transfer_function;
 pub use lanes::Lanes;
 pub use nnls::{Rows, nnls};
 
-pub(crate) use fused::dispatch_fused;
+pub(crate) use dispatch::{dispatch_fused, dispatch_vectors};
 pub(crate) use golden_section::least;
 pub(crate) use random::Draws;
 pub(crate) use transfer_function::{C, Jet, Ratio};

@@ -5,6 +5,7 @@ use pulp::{Simd, WithSimd};
 use super::amplifier::{Amplifier, AmplifierFlow};
 use super::sensor::{Sensor, SensorState};
 use crate::error::{Error, Result, positive};
+use crate::math::dispatch_fused;
 use crate::models::Plant;
 use crate::signal::index;
 
@@ -111,7 +112,7 @@ impl<'a, P: Plant> Apparatus<'a, P> {
         from: f64,
         to: f64,
     ) {
-        pulp::Arch::new().dispatch(DriveStretch { apparatus: self, stretch, state, from, to });
+        dispatch_fused(DriveStretch { apparatus: self, stretch, state, from, to });
     }
 }
 

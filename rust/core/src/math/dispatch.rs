@@ -1,0 +1,33 @@
+//! Dispatch of code to instruction sets, without compiling it for those that do not need it.
+
+use pulp::{Arch, WithSimd};
+
+/// Runs scalar code where the processor has fused multiply-add, without wider vectors than that
+/// needs: they would only be compiled for nothing. The bits are those of every other dispatch.
+pub(crate) fn dispatch_fused<W: WithSimd>(code: W) -> W::Output {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    {
+        use pulp::Simd;
+        match pulp::x86::V3::try_new() {
+            Some(simd) => Simd::vectorize(simd, code),
+            None => Simd::vectorize(pulp::Scalar, code),
+        }
+    }
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    Arch::new().dispatch(code)
+}
+
+/// Runs code for several vectors; `None` where the instruction set has none.
+pub(crate) fn dispatch_vectors<W: WithSimd>(arch: Arch, code: W) -> Option<W::Output> {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    {
+        use pulp::Simd;
+        match arch {
+            Arch::V4(simd) => Some(Simd::vectorize(simd, code)),
+            Arch::V3(simd) => Some(Simd::vectorize(simd, code)),
+            _ => None,
+        }
+    }
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    Some(arch.dispatch(code))
+}
