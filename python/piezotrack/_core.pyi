@@ -17,7 +17,7 @@ __all__ = [
     "StepResponse",
     "Swarm",
     "SwarmSettings",
-    "Tracked",
+    "TrackingRun",
     "VirtualStage",
     "XYStage",
     "__version__",
@@ -96,8 +96,8 @@ class Stage:
         controller: Controller,
         reference: ArrayLike,
         feedforward: ArrayLike,
-        pace: _Pace,
-    ) -> Tracked: ...
+        sampling: _Pace,
+    ) -> TrackingRun: ...
     def loop_plants(self, low: float, high: float, delay: float) -> list[LoopPlant]: ...
     def inverse(
         self, dt: float, *, offset: float, delay: float, initial: _Named | None
@@ -268,8 +268,8 @@ class VirtualStage:
         controller: Controller,
         reference: ArrayLike,
         feedforward: ArrayLike,
-        pace: _Pace,
-    ) -> Tracked: ...
+        sampling: _Pace,
+    ) -> TrackingRun: ...
 
 # Delay and jitter [s], and instants kept in each control interval.
 _Pace = tuple[float, float, int]
@@ -290,8 +290,8 @@ class XYStage:
         controllers: tuple[Controller, Controller],
         references: tuple[ArrayLike, ArrayLike],
         feedforwards: tuple[ArrayLike, ArrayLike],
-        pace: _Pace,
-    ) -> tuple[Tracked, Tracked]: ...
+        sampling: _Pace,
+    ) -> tuple[TrackingRun, TrackingRun]: ...
 
 def circle_errors(
     x: ArrayLike, y: ArrayLike, centre: tuple[float, float], radius: float
@@ -306,7 +306,7 @@ def sensor_noise(
 ) -> tuple[_Spread, float, float, int, float, float, float | None]: ...
 
 @final
-class Tracked:
+class TrackingRun:
     @property
     def measured(self) -> NDArray[np.float64]: ...
     @property

@@ -178,8 +178,8 @@ def lopsided() -> pt.Dataset:
     stage = pt.VirtualStage.xu_li_2010(seed=1)
     stage = replace(
         stage,
-        corners=(20.0, 50.0),
-        bends=(0.9, -1.2),
+        dead_zone_thresholds=(20.0, 50.0),
+        dead_zone_weights=(0.9, -1.2),
         weights=tuple(3.0 * weight for weight in stage.weights),
     )
     u = 37.5 * (1.0 - np.cos(0.5 * np.pi * np.arange(8001) / RATE))

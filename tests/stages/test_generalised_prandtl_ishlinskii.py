@@ -152,7 +152,7 @@ def test_dead_zones_are_refused() -> None:
 
 
 @cache
-def measured() -> pt.Comparison:
+def measured() -> pt.identification.Comparison:
     log, other = datasets.dbo_training(), datasets.dbo_tracking()
     return pt.compare(log, ["prandtl-ishlinskii", NAME], train=(3.0, 23.0), test=other[3.0:])
 

@@ -16,7 +16,7 @@ from piezotrack.stages.registry import MODELS, model_named, model_of, stage_clas
 if TYPE_CHECKING:
     from piezotrack.stages.base import ModelInfo
 
-STAGES: dict[str, pt.Stage] = {
+STAGES: dict[str, pt.stages.Stage] = {
     "dahl": replace(pt.DahlStage.xu_li_2010(), b0=40.0),
     "bouc-wen": pt.BoucWenStage.xu_li_2010_corrected(),
     "first-order-dahl": pt.FirstOrderDahlStage(

@@ -48,7 +48,7 @@ def run_closed_loop(
     reference: Array,
     feedforward: Array,
     sampling: tuple[float, float, int],
-) -> _core.Tracked:
+) -> _core.TrackingRun:
     """Simulate a closed loop from rest, with reference [m] and feedforward [V] at the samples.
 
     `sampling` is delay and jitter [s], and the substeps kept in each sampling interval.

@@ -333,7 +333,7 @@ def feedforward_of(
 
 
 def collected(
-    run: _core.Tracked,
+    run: _core.TrackingRun,
     controller: Controller,
     reference: Reference,
     samples: SampledReference,

@@ -8,10 +8,10 @@ from .cross_talk import identify_cross_talk as identify_cross_talk
 from .estimates import Estimate as Estimate
 from .estimates import Progress as Progress
 from .estimates import SwarmRun as SwarmRun
+from .fit import identify as identify
 from .identified import IdentifiedModel as IdentifiedModel
 from .identified import Score as Score
 from .identified import load as load
-from .fit import identify as identify
 from .least_squares import LeastSquares as LeastSquares
 from .result import Identification as Identification
 from .sensor_noise import Noise as Noise

@@ -15,8 +15,8 @@ from .._support.files import write_document
 from ..data.dataset import Dataset
 from ..errors import ParameterError
 from ..stages.registry import MODELS, ModelInfo
-from .identified import IdentifiedModel, Score, load
 from .fit import identify
+from .identified import IdentifiedModel, Score, load
 from .model_file import provenance
 
 if TYPE_CHECKING:
