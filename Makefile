@@ -1,6 +1,6 @@
 # What a person types. Needs a Rust toolchain and Python 3.11 or newer; all else is put in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo reproduce test lint rust-test no-std python-test bench docs clean
+.PHONY: help demo reproduce test soak lint rust-test no-std python-test bench docs clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 WHEELS := target/wheels
 # A Cortex-M4F.
 EMBEDDED := thumbv7em-none-eabihf
-SOURCES := $(shell find rust python/piezotrack -name '*.rs' -o -name '*.py' -o -name '*.pyi' -o -name '*.json' -o -name '*.css' -o -name '*.js' -o -name '*.gz' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
+SOURCES := $(shell find rust python/piezotrack -name '*.rs' -o -name '*.py' -o -name '*.pyi' -o -name '*.json' -o -name '*.css' -o -name '*.js' -o -name '*.gz' -o -name Cargo.toml) benches/Cargo.toml Cargo.toml Cargo.lock pyproject.toml
 
 help: ## What can be typed
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/'
@@ -21,7 +21,10 @@ reproduce: $(VENV)/installed ## Every figure and table of the paper, published b
 
 test: lint rust-test no-std python-test ## Everything that must hold before a change lands
 
-lint: $(VENV)/installed $(VENV)/tools ## Formatting, clippy, ruff, types, stubs
+soak: $(VENV)/installed $(VENV)/tools ## The tests that take long: examples, searches with full budgets
+	$(BIN)/pytest -n auto -m slow
+
+lint: $(VENV)/installed $(VENV)/tools ## Formatting, clippy, ruff, types, layers, stubs
 	cargo fmt --all --check
 	cargo clippy --workspace --all-targets --locked -- -D warnings
 	$(BIN)/ruff format --check
@@ -30,21 +33,23 @@ lint: $(VENV)/installed $(VENV)/tools ## Formatting, clippy, ruff, types, stubs
 	$(BIN)/lint-imports
 	$(BIN)/python -m mypy.stubtest piezotrack._core
 
-rust-test: ## Tests of the crates, the control crate also without std
-	cargo test --locked --release
-	cargo test --locked --release -p piezotrack-control --no-default-features
+# The Python module is named so that features, and with them the compiled crates, are those of the
+# wheel; it has no tests of its own.
+rust-test: $(VENV)/pip ## Tests of the crates, the control crate also without std
+	PYO3_PYTHON=$(abspath $(BIN)/python) cargo test --locked --release -p piezotrack-control -p piezotrack-core -p piezotrack-py
+	cargo test --locked --release -p piezotrack-control
 
 no-std: ## The control crate where there is no std and no allocator
 	cargo build --locked --manifest-path tests/no_std/Cargo.toml --target-dir target/no-std
 	@if [ -d "$$(rustc --print target-libdir --target $(EMBEDDED))" ]; then \
 		set -x; \
-		cargo build --locked --release -p piezotrack-control --no-default-features --target $(EMBEDDED); \
+		cargo build --locked --release -p piezotrack-control --target $(EMBEDDED); \
 	else \
 		echo "not built for $(EMBEDDED), which is not installed; to have it: rustup target add $(EMBEDDED)"; \
 	fi
 
 python-test: $(VENV)/installed $(VENV)/tools ## Tests of the package, its docstrings and pages
-	$(BIN)/pytest
+	$(BIN)/pytest -n auto -m "not slow"
 
 bench: ## Criterion benches: throughput of the swarm, latency of a step
 	cargo bench --locked
@@ -63,7 +68,8 @@ $(VENV)/pip:
 
 # A release wheel, as a user would install it; the package in python/ is never imported.
 $(VENV)/installed: $(VENV)/pip $(SOURCES)
-	rm -rf $(WHEELS)
+	@echo "Compiling: a minute and a half on two cores; after a change, half a minute."
+	@rm -rf $(WHEELS)
 	$(BIN)/maturin build --release --locked --out $(WHEELS) --interpreter $(BIN)/python
 	$(BIN)/python -m pip install --quiet --force-reinstall --no-deps $(WHEELS)/*.whl
 	$(BIN)/python -m pip install --quiet $(WHEELS)/*.whl

@@ -256,7 +256,7 @@ fn settings_out_of_range_are_named() {
         refused(|s| s.play.dead_zone_thresholds[1] = 1.0)
             .starts_with("dead_zone_thresholds[1] is 1 V")
     );
-    assert!(refused(|s| s.creep[2].time = f64::NAN).starts_with("creep_time[2] is NaN s"));
+    assert!(refused(|s| s.creep[2].time = f64::NAN).starts_with("creep_times[2] is NaN s"));
     assert!(refused(|s| s.amplifier.slew = 0.0).starts_with("slew is 0 V/s"));
     assert!(refused(|s| s.amplifier.low = 80.0).starts_with("limits is 80 V to 75 V"));
     assert!(refused(|s| s.sensor.range = 0.0).starts_with("range is 0 m"));
