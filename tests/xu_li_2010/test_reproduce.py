@@ -321,6 +321,7 @@ def test_each_free_parameter_is_one_of_the_apparatus() -> None:
             assert changed, one.name
 
 
+@pytest.mark.slow
 def test_a_calibration_goes_from_end_to_end() -> None:
     seen: list[float] = []
     found = calibrate(

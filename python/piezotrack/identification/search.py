@@ -183,16 +183,16 @@ def _identification(
     seed: int,
     offset: bool,
 ) -> Identification:
-    deviations = {i: (deviation, at_bound) for i, deviation, at_bound in found.sensitivities}
+    facts = {one.name: (one.unit, one.symbol) for one in info.parameters} | {"delay": ("s", "Td")}
     parameters = {}
-    listed = [(one.name, one.symbol, one.unit) for one in info.parameters]
-    for i, (name, symbol, unit) in enumerate([*listed, ("delay", "Td", "s")]):
-        bounds = found.bounds[i]
-        deviation, at_bound = deviations.get(i, (None, False))
-        parameters[name] = Estimate(
-            found.theta[i], unit, symbol, bounds is not None, bounds, deviation, at_bound
+    for one in found.estimates:
+        unit, symbol = facts[one["name"]]
+        bounds, deviation, at_bound = one["bounds"], one["deviation"], one["at_bound"]
+        parameters[one["name"]] = Estimate(
+            one["value"], unit, symbol, bounds is not None, bounds, deviation, at_bound
         )
-    delay = found.theta[-1]
+    values = {name: estimate.value for name, estimate in parameters.items()}
+    delay = values["delay"]
     if delay == 0.0 and not parameters["delay"].free:
         del parameters["delay"]
     details: dict[str, Any] = {
@@ -214,9 +214,7 @@ def _identification(
         "provenance": provenance(data, seed=seed, swarm=asdict(swarm)),
     }
     return Identification(
-        model=stage_class(info)._from(
-            (one.name, [value]) for one, value in zip(info.parameters, found.theta, strict=False)
-        ),
+        model=stage_class(info)._from((one.name, [values[one.name]]) for one in info.parameters),
         delay=delay,
         offset=found.offset,
         offset_fitted=offset,

@@ -1,177 +1,23 @@
-//! The swarm and its settings.
+//! Identification of a stage whose parameters a swarm searches.
 
 use numpy::{PyArray1, ToPyArray};
 use piezotrack_core::identify::{
-    Boundary, Coordinate, DELAY, Delay, Identification, Outcome, Plan, Record, Spec, StopReason,
-    SwarmSettings, Topology, Update, identify as identified,
+    Coordinate, DELAY, Delay, Identification, Outcome, Plan, Record, Spec, StopReason,
+    identify as identified,
 };
 use piezotrack_core::integrator::Order;
 use piezotrack_core::models::Model;
-use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
 use crate::arrays::samples;
 use crate::enter::{Watchers, enter_pool};
 use crate::errors::raise;
 use crate::stage::hold;
+use crate::swarm::PySettings;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<PySettings>()?;
     module.add_class::<PySearch>()?;
     module.add_function(wrap_pyfunction!(identify, module)?)
-}
-
-/// Checked settings of a swarm.
-#[pyclass(name = "SwarmSettings", frozen, module = "piezotrack._core")]
-pub struct PySettings(pub SwarmSettings);
-
-#[pymethods]
-impl PySettings {
-    #[new]
-    #[pyo3(signature = (*, particles, iterations, update, inertia_start, inertia_end,
-        inertia_iterations, cognitive, social, topology, velocity_limit, boundary, min_improvement,
-        stall_iterations, polish))]
-    #[expect(clippy::too_many_arguments, reason = "keyword-only, one for each setting")]
-    fn new(
-        particles: usize,
-        iterations: usize,
-        update: &str,
-        inertia_start: f64,
-        inertia_end: f64,
-        inertia_iterations: usize,
-        cognitive: f64,
-        social: f64,
-        topology: &str,
-        velocity_limit: f64,
-        boundary: &str,
-        min_improvement: f64,
-        stall_iterations: usize,
-        polish: bool,
-    ) -> PyResult<Self> {
-        let update = update_named(update).map_err(|error| raise(&error))?;
-        let boundary = boundary_named(boundary).map_err(|error| raise(&error))?;
-        let topology = topology_named(topology).map_err(|error| raise(&error))?;
-        let settings = SwarmSettings {
-            particles,
-            iterations,
-            update,
-            inertia: (inertia_start, inertia_end),
-            inertia_iterations,
-            cognitive,
-            social,
-            topology,
-            velocity_limit,
-            boundary,
-            min_improvement,
-            stall_iterations,
-            polish,
-        };
-        settings.validate().map_err(|error| raise(&error))?;
-        Ok(Self(settings))
-    }
-
-    /// Settings of Xu and Li 2010, section 3.3, by their names.
-    #[staticmethod]
-    fn xu_li_2010() -> Settings {
-        Settings::of(&SwarmSettings::xu_li_2010())
-    }
-
-    /// Settings of Standard Particle Swarm Optimisation 2011, by their names.
-    #[staticmethod]
-    fn spso_2011() -> Settings {
-        Settings::of(&SwarmSettings::spso_2011())
-    }
-}
-
-/// Settings of a swarm, as a dict in Python.
-#[derive(IntoPyObject)]
-struct Settings {
-    particles: usize,
-    iterations: usize,
-    update: &'static str,
-    inertia_start: f64,
-    inertia_end: f64,
-    inertia_iterations: usize,
-    cognitive: f64,
-    social: f64,
-    topology: &'static str,
-    velocity_limit: f64,
-    boundary: &'static str,
-    min_improvement: f64,
-    stall_iterations: usize,
-    polish: bool,
-}
-
-impl Settings {
-    fn of(settings: &SwarmSettings) -> Self {
-        Self {
-            particles: settings.particles,
-            iterations: settings.iterations,
-            update: match settings.update {
-                Update::Classic => "classic",
-                Update::Hypersphere => "hypersphere",
-                Update::HypersphereRadial => "hypersphere-radial",
-            },
-            inertia_start: settings.inertia.0,
-            inertia_end: settings.inertia.1,
-            inertia_iterations: settings.inertia_iterations,
-            cognitive: settings.cognitive,
-            social: settings.social,
-            topology: match settings.topology {
-                Topology::Global => "global",
-                Topology::Ring => "ring",
-                Topology::Random => "random",
-            },
-            velocity_limit: settings.velocity_limit,
-            boundary: match settings.boundary {
-                Boundary::Absorb => "absorb",
-                Boundary::Rebound => "rebound",
-                Boundary::Reflect => "reflect",
-                Boundary::Invisible => "invisible",
-            },
-            min_improvement: settings.min_improvement,
-            stall_iterations: settings.stall_iterations,
-            polish: settings.polish,
-        }
-    }
-}
-
-fn update_named(name: &str) -> Result<Update> {
-    match name {
-        "classic" => Ok(Update::Classic),
-        "hypersphere" => Ok(Update::Hypersphere),
-        "hypersphere-radial" => Ok(Update::HypersphereRadial),
-        other => Err(Error::parameter(
-            "update",
-            format!("'{other}'"),
-            "'classic', 'hypersphere' or 'hypersphere-radial'",
-        )),
-    }
-}
-
-fn boundary_named(name: &str) -> Result<Boundary> {
-    match name {
-        "absorb" => Ok(Boundary::Absorb),
-        "rebound" => Ok(Boundary::Rebound),
-        "reflect" => Ok(Boundary::Reflect),
-        "invisible" => Ok(Boundary::Invisible),
-        other => Err(Error::parameter(
-            "boundary",
-            format!("'{other}'"),
-            "'absorb', 'rebound', 'reflect' or 'invisible'",
-        )),
-    }
-}
-
-fn topology_named(name: &str) -> Result<Topology> {
-    match name {
-        "global" => Ok(Topology::Global),
-        "ring" => Ok(Topology::Ring),
-        "random" => Ok(Topology::Random),
-        other => {
-            Err(Error::parameter("topology", format!("'{other}'"), "'global', 'ring' or 'random'"))
-        }
-    }
 }
 
 fn reason_name(reason: StopReason) -> &'static str {
@@ -180,6 +26,18 @@ fn reason_name(reason: StopReason) -> &'static str {
         StopReason::Iterations => "iterations",
         StopReason::Interrupted => "interrupted",
     }
+}
+
+/// What a search found of one parameter, as a dict in Python.
+#[derive(IntoPyObject)]
+struct Estimate {
+    name: &'static str,
+    value: f64,
+    /// Bounds of the search; None for a parameter that was held.
+    bounds: Option<(f64, f64)>,
+    /// Standard deviation; None where it was not computed.
+    deviation: Option<f64>,
+    at_bound: bool,
 }
 
 /// What a search found, in plain numbers.
@@ -191,10 +49,27 @@ struct PySearch {
 
 #[pymethods]
 impl PySearch {
-    /// The parameters of the stage, then the delay.
+    /// The parameters of the stage, and the delay under the name "delay".
     #[getter]
-    fn theta(&self) -> Vec<f64> {
-        self.places().map(|i| self.outcome.theta.0[i]).collect()
+    fn estimates(&self) -> Vec<Estimate> {
+        let problem = &self.found.problem;
+        let names = problem.model.info().parameters.iter().map(|info| info.name);
+        let places = names.enumerate().chain([(DELAY, "delay")]);
+        let estimate = |(place, name)| {
+            let bounds = match problem.coordinates[place] {
+                Coordinate::Fixed(_) => None,
+                Coordinate::Free { low, high, .. } => Some((low, high)),
+            };
+            let found = self.found.sensitivities.iter().find(|found| found.parameter == place);
+            Estimate {
+                name,
+                value: self.outcome.theta.0[place],
+                bounds,
+                deviation: found.map(|found| found.deviation),
+                at_bound: found.is_some_and(|found| found.at_bound),
+            }
+        };
+        places.map(estimate).collect()
     }
 
     #[getter]
@@ -261,31 +136,6 @@ impl PySearch {
     #[getter]
     fn scale_assumed(&self) -> bool {
         self.found.problem.scale_assumed
-    }
-
-    /// Bounds of each parameter; None for one that was held.
-    #[getter]
-    fn bounds(&self) -> Vec<Option<(f64, f64)>> {
-        let bound = |i: usize| match self.found.problem.coordinates[i] {
-            Coordinate::Fixed(_) => None,
-            Coordinate::Free { low, high, .. } => Some((low, high)),
-        };
-        self.places().map(bound).collect()
-    }
-
-    /// (index of the parameter, standard deviation, whether it lies on a bound).
-    #[getter]
-    fn sensitivities(&self) -> Vec<(usize, f64, bool)> {
-        let found = self.found.sensitivities.iter();
-        let place = |i: usize| i.min(self.found.problem.model.info().parameters.len());
-        found.map(|s| (place(s.parameter), s.deviation, s.at_bound)).collect()
-    }
-}
-
-impl PySearch {
-    /// Indices of the model's parameters, and of the delay.
-    fn places(&self) -> impl Iterator<Item = usize> {
-        (0..self.found.problem.model.info().parameters.len()).chain([DELAY])
     }
 }
 

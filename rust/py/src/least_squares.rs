@@ -12,7 +12,8 @@ use pyo3::prelude::*;
 use crate::arrays::samples;
 use crate::enter::enter;
 use crate::errors::raise;
-use crate::stage::{Named, hold, named};
+use crate::models::{Named, named};
+use crate::stage::hold;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyLeastSquaresFit>()?;

@@ -1,12 +1,8 @@
-//! Stages of every model: their parameters, their simulation, their inverse and their loop.
+//! Stages of every model: their simulation, their inverse and their loop.
 
 use numpy::{PyArray1, ToPyArray};
-use piezotrack_control::inverse::Inverse;
-use piezotrack_control::{OnlineFeedforward, OnlineFeedforwardState, ReferenceSample};
-use piezotrack_core::models::{
-    Experiment, FoundBy, Method, Model, ParameterInfo, Response, Stage, StageInverse,
-    StageInverseState, Values,
-};
+use piezotrack_control::OnlineFeedforward;
+use piezotrack_core::models::{Experiment, Method, Model, Response, Stage, Values};
 use piezotrack_core::signal::{self, Drive, Hold};
 use piezotrack_core::simulate::Axis;
 use piezotrack_core::{Error, Result};
@@ -17,22 +13,14 @@ use crate::control::PyController;
 use crate::design::PyLoopPlant;
 use crate::enter::enter;
 use crate::errors::raise;
+use crate::inverse::PyInverse;
+use crate::models::{Named, named};
 use crate::tracking::{Arrays, PyTrackingRun, Sampling, stopped};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyStage>()?;
     module.add_class::<PyResponse>()?;
-    module.add_class::<PyInverse>()?;
-    module.add_function(wrap_pyfunction!(models, module)?)?;
-    module.add_function(wrap_pyfunction!(published, module)?)?;
     module.add_function(wrap_pyfunction!(delayed, module)?)
-}
-
-/// Names and numbers, in the order of a model's parameters or of its state.
-pub type Named = Vec<(String, Vec<f64>)>;
-
-pub fn named(values: &Values) -> Named {
-    values.iter().map(|(name, numbers)| (name.into(), numbers.to_vec())).collect()
 }
 
 /// The hold by its name.
@@ -53,80 +41,6 @@ fn method_named(name: &str) -> Result<Method> {
             Err(Error::parameter("method", format!("'{other}'"), "'exponential', 'rk4' or 'rk45'"))
         }
     }
-}
-
-/// One parameter of a model, as a dict in Python.
-#[derive(IntoPyObject)]
-struct Parameter {
-    name: &'static str,
-    symbol: &'static str,
-    unit: &'static str,
-    carries_force: bool,
-    default: Option<f64>,
-    held: Option<&'static str>,
-    is_list: bool,
-    is_optional: bool,
-}
-
-impl Parameter {
-    fn of(info: &ParameterInfo) -> Self {
-        let ParameterInfo {
-            name,
-            symbol,
-            unit,
-            carries_force,
-            default,
-            held,
-            is_list,
-            is_optional,
-        } = *info;
-        Self { name, symbol, unit, carries_force, default, held, is_list, is_optional }
-    }
-}
-
-/// A model of the list, as a dict in Python.
-#[derive(IntoPyObject)]
-struct Listed {
-    name: &'static str,
-    title: &'static str,
-    drive_unit: &'static str,
-    searched: bool,
-    parameters: Vec<Parameter>,
-    state: Vec<Parameter>,
-    published: Vec<&'static str>,
-}
-
-/// The list of models, in its order.
-#[pyfunction]
-fn models() -> Vec<Listed> {
-    let listed = |model: &Model| {
-        let info = model.info();
-        Listed {
-            name: info.name,
-            title: info.title,
-            drive_unit: info.drive_unit,
-            searched: model.found_by() == FoundBy::Swarm,
-            parameters: info.parameters.iter().map(Parameter::of).collect(),
-            state: info.state.iter().map(Parameter::of).collect(),
-            published: info.published.iter().map(|(name, _)| *name).collect(),
-        }
-    };
-    Model::ALL.iter().map(listed).collect()
-}
-
-/// Published parameters of a model, by their name.
-#[pyfunction]
-fn published(model: &str, name: &str) -> PyResult<Named> {
-    let find = || -> Result<Named> {
-        let info = Model::named(model)?.info();
-        let found = info.published.iter().find(|(known, _)| *known == name);
-        let (_, values) = found.ok_or_else(|| {
-            let known: Vec<&str> = info.published.iter().map(|(known, _)| *known).collect();
-            Error::parameter("name", format!("'{name}'"), format!("one of {}", known.join(", ")))
-        })?;
-        Ok(named(&values()))
-    };
-    find().map_err(|error| raise(&error))
 }
 
 /// A stage of a model, by the model's name and the parameters' names.
@@ -210,7 +124,7 @@ impl PyStage {
         let build = || -> Result<PyInverse> {
             let (inverse, start) = self.0.inverse(dt, self.state(initial)?.as_ref())?;
             let online = OnlineFeedforward::new(inverse, dt, offset, delay)?;
-            Ok(PyInverse { state: online.start(start), online, start })
+            Ok(PyInverse::new(online, &start))
         };
         build().map_err(|error| raise(&error))
     }
@@ -257,67 +171,6 @@ impl PyResponse {
     fn unique(&self) -> bool {
         self.0.unique
     }
-}
-
-/// The inverse of a stage, sample by sample or along a whole reference.
-#[pyclass(name = "Inverse", module = "piezotrack._core")]
-struct PyInverse {
-    online: OnlineFeedforward<StageInverse>,
-    start: StageInverseState,
-    state: OnlineFeedforwardState<StageInverseState>,
-}
-
-#[pymethods]
-impl PyInverse {
-    /// The drive for the next sample of a reference; NaN where there is none.
-    fn step(
-        &mut self,
-        reference: f64,
-        velocity: Option<f64>,
-        acceleration: Option<f64>,
-        preview: Option<f64>,
-    ) -> f64 {
-        let sample = ReferenceSample { position: reference, velocity, acceleration, preview };
-        self.online.step(&mut self.state, &sample)
-    }
-
-    /// The drive along a whole path, whose derivatives are known, from the start.
-    fn along<'py>(
-        &self,
-        py: Python<'py>,
-        x: &Bound<'py, PyAny>,
-        v: &Bound<'py, PyAny>,
-        a: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let (x, v, a) = (samples("x", x)?, samples("v", v)?, samples("a", a)?);
-        let drive = along(self.online.inverse(), self.start, &x, &v, &a);
-        drive.map(|drive| drive.to_pyarray(py)).map_err(|error| raise(&error))
-    }
-
-    fn reset(&mut self) {
-        self.state = self.online.start(self.start);
-    }
-}
-
-fn along(
-    inverse: &StageInverse,
-    mut state: StageInverseState,
-    x: &[f64],
-    v: &[f64],
-    a: &[f64],
-) -> Result<Vec<f64>> {
-    let mut drive = Vec::with_capacity(x.len());
-    for (k, ((&x, &v), &a)) in x.iter().zip(v).zip(a).enumerate() {
-        let value = inverse.step(&mut state, x, v, a);
-        if !value.is_finite() {
-            return Err(Error::Numerical(format!(
-                "the inverse has no voltage for sample {k} of the reference ({x:e} m, \
-                 {v:e} m/s, {a:e} m/s^2): check its units and its sampling"
-            )));
-        }
-        drive.push(value);
-    }
-    Ok(drive)
 }
 
 /// The displacement with a delay.
