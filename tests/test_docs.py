@@ -11,6 +11,7 @@ import pkgutil
 import re
 import subprocess
 import sys
+import types
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -109,11 +110,14 @@ def listed(room: ModuleType) -> list[tuple[str, str | None]]:
     ]
 
 
+# A union of types, as pt.control.Plant, cannot have a docstring of its own.
 PUBLIC = {
     name: value
     for room in ROOMS
     for name, _ in listed(room)
-    if name != "__version__" and not inspect.ismodule(value := getattr(room, name))
+    if name != "__version__"
+    and not inspect.ismodule(value := getattr(room, name))
+    and not isinstance(value, types.UnionType)
 }
 CLASSES = {name: value for name, value in PUBLIC.items() if inspect.isclass(value)}
 

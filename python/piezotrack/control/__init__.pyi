@@ -13,6 +13,7 @@ from .contouring import contour as contour
 from .controller import Command as Command
 from .controller import Controller as Controller
 from .controller import Session as Session
+from .plant import Plant as Plant
 from .stability import LoopCheck as LoopCheck
 from .stability import LoopReport as LoopReport
 from .stability import LoopResponse as LoopResponse

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Plant", "linearised_plants", "run_closed_loop", "unwrap"]
 
+# What a controller can drive; an identified model stands for its stage, with offset and delay.
 Plant = VirtualStage | Stage
 
 

@@ -14,6 +14,7 @@ from .._support.arguments import not_negative
 from .._support.statistics import FIGURES, ErrorStatistics
 from ..errors import ParameterError
 from ..references.reference import Reference, SampledReference
+from ..stages.inverse import PlayedVoltage
 from .controller import Controller
 from .plant import run_closed_loop, unwrap
 from .stability import check_loop
@@ -325,10 +326,10 @@ def track(
 
 def feedforward_of(
     controller: Controller, reference: Reference, samples: SampledReference
-) -> tuple[Array, str]:
+) -> PlayedVoltage:
     """Compute the feedforward of a whole run [V], and a note of how."""
     if controller.feedforward is None:
-        return np.zeros(len(samples)), "no feedforward"
+        return PlayedVoltage(np.zeros(len(samples)), "no feedforward")
     return controller.feedforward.played(reference, controller.dt, samples=samples)
 
 

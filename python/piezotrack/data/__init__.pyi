@@ -2,5 +2,6 @@
 # _support/lazy.py does at run time. One name a line, as `ruff format` keeps it.
 from . import datasets as datasets
 from .dataset import Dataset as Dataset
+from .reader import DriveRecord as DriveRecord
 from .reader import read as read
 from .reader import read_drive as read_drive

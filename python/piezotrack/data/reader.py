@@ -14,7 +14,7 @@ from collections import Counter
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["read", "read_displacement", "read_drive"]
+__all__ = ["DriveRecord", "read", "read_displacement", "read_drive"]
 
 NOT_TEXT = {".mat", ".h5", ".hdf5", ".tdms", ".npy", ".npz", ".xls", ".xlsx", ".parquet"}
 
@@ -101,6 +101,21 @@ def read(
     return log.dataset(roles, dt, hold)
 
 
+class DriveRecord(NamedTuple):
+    """A drive read from a file.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n,)
+        Times [s].
+    u : ndarray, shape (n,)
+        Drive [V].
+    """
+
+    t: Array
+    u: Array
+
+
 def read_drive(
     path: str | os.PathLike[str],
     *,
@@ -108,7 +123,7 @@ def read_drive(
     drive: str | int | None = None,
     units: Mapping[str | int, str] | None = None,
     dt: float | None = None,
-) -> tuple[Array, Array]:
+) -> DriveRecord:
     r"""Read a drive from a text file that need not have a displacement.
 
     Parameters
@@ -118,10 +133,8 @@ def read_drive(
 
     Returns
     -------
-    t : ndarray, shape (n,)
-        Times [s], increasing and even; read-only.
-    u : ndarray, shape (n,)
-        Drive [V]; read-only.
+    DriveRecord
+        Times `t` [s], increasing and even, and drive `u` [V]; read-only.
 
     Raises
     ------
@@ -142,7 +155,7 @@ def read_drive(
     """
     log = _TextLog(path)
     record = log.dataset(log.roles({"time": time, "drive": drive}, units, dt), dt, "foh")
-    return record.t, record.u
+    return DriveRecord(record.t, record.u)
 
 
 def read_displacement(

@@ -10,10 +10,16 @@ from .bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
 from .dahl import DahlStage as DahlStage
 from .dahl import DahlState as DahlState
 from .first_order_dahl import FirstOrderDahlStage as FirstOrderDahlStage
+from .generalised_prandtl_ishlinskii import (
+    GeneralisedPrandtlIshlinskiiStage as GeneralisedPrandtlIshlinskiiStage,
+)
 from .inverse import Inverse as Inverse
 from .inverse import InverseSession as InverseSession
+from .inverse import PlayedVoltage as PlayedVoltage
 from .prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage
 from .prandtl_ishlinskii import PrandtlIshlinskiiState as PrandtlIshlinskiiState
 from .virtual import VirtualResponse as VirtualResponse
 from .virtual import VirtualStage as VirtualStage
+from .xy import XYLog as XYLog
+from .xy import XYResponse as XYResponse
 from .xy import XYStage as XYStage

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -22,9 +22,24 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Inverse", "InverseSession"]
+__all__ = ["Inverse", "InverseSession", "PlayedVoltage"]
 
 Playback = Literal["table", "online"]
+
+
+class PlayedVoltage(NamedTuple):
+    """Feedforward of a run.
+
+    Attributes
+    ----------
+    voltage : ndarray, shape (n,)
+        At the samples of the reference [V].
+    note : str
+        How it was computed, in words.
+    """
+
+    voltage: Array
+    note: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,7 +200,7 @@ class Inverse:
 
     def played(
         self, reference: Reference, dt: float, *, samples: SampledReference | None = None
-    ) -> tuple[Array, str]:
+    ) -> PlayedVoltage:
         """Feedforward of a run as `playback` says.
 
         Parameters
@@ -199,24 +214,22 @@ class Inverse:
 
         Returns
         -------
-        volts : ndarray, shape (n,)
-            Voltage at the samples [V].
-        how : str
-            How it was computed, in words.
+        PlayedVoltage
+            Voltage at the samples [V], and how it was computed.
         """
         volts = self.voltage(reference, dt, samples=samples)
         period = reference.period
         before = 0 if period is None else self._settled(reference, period)
         head = 0 if period is None else round((before + 1) * period / dt)
         if self.playback == "online" or period is None or volts.size <= head:
-            return volts, "feedforward computed along the whole path"
+            return PlayedVoltage(volts, "feedforward computed along the whole path")
         # Between samples where a period is no whole number of them.
         after = np.arange(head, volts.size, dtype=np.float64)
         turns = np.floor((after - head) * dt / period) + 1.0
         volts[head:] = np.interp(
             after - turns * period / dt, np.arange(head + 1), volts[: head + 1]
         )
-        return volts, f"feedforward of period {before + 1} repeated from a table"
+        return PlayedVoltage(volts, f"feedforward of period {before + 1} repeated from a table")
 
     def _settled(self, reference: Reference, period: float) -> int:
         """Periods before the one of the table: `settle`, or as many as the smooth start takes."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -23,9 +23,34 @@ if TYPE_CHECKING:
     from ..data.dataset import Hold
 
     Array = NDArray[np.float64]
-    XYLog: TypeAlias = tuple[Dataset, Dataset]
 
-__all__ = ["XYLog", "XYStage"]
+__all__ = ["XYLog", "XYResponse", "XYStage"]
+
+
+class XYResponse(NamedTuple):
+    """Motion of a platform along both axes.
+
+    Attributes
+    ----------
+    x, y : VirtualResponse
+        Motion along each axis; both sensors are read at once.
+    """
+
+    x: VirtualResponse
+    y: VirtualResponse
+
+
+class XYLog(NamedTuple):
+    """Log of both axes.
+
+    Attributes
+    ----------
+    x, y : Dataset
+        Command and measured displacement of each axis.
+    """
+
+    x: Dataset
+    y: Dataset
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,7 +149,7 @@ class XYStage:
 
     def simulate(
         self, ux: ArrayLike, uy: ArrayLike, dt: float, *, hold: Hold = "foh"
-    ) -> tuple[VirtualResponse, VirtualResponse]:
+    ) -> XYResponse:
         """Motion under two sampled drives.
 
         Parameters
@@ -138,8 +163,8 @@ class XYStage:
 
         Returns
         -------
-        x, y : VirtualResponse
-            Motion of the platform along each axis; both sensors are read at once.
+        XYResponse
+            Motion of the platform, `x` and `y`; both sensors are read at once.
 
         Raises
         ------
@@ -159,7 +184,7 @@ class XYStage:
                 (ux, uy), self._core.simulate(ux, uy, dt, hold), strict=True
             )
         )
-        return x, y
+        return XYResponse(x, y)
 
     def record(self, ux: ArrayLike, uy: ArrayLike, dt: float, *, hold: Hold = "foh") -> XYLog:
         """Record a log of both axes.
@@ -171,14 +196,14 @@ class XYStage:
 
         Returns
         -------
-        x, y : Dataset
-            Command and measured displacement of each axis.
+        XYLog
+            Command and measured displacement of each axis, `x` and `y`.
         """
         x, y = (
             Dataset(u=run.u, y=run.y, dt=dt, hold=hold, source=f"{axis} of the virtual stage")
             for axis, run in zip("xy", self.simulate(ux, uy, dt, hold=hold), strict=True)
         )
-        return x, y
+        return XYLog(x, y)
 
 
 def _shares(cross_talk: Sequence[float] | ArrayLike) -> tuple[float, float]:
