@@ -77,8 +77,8 @@ def _loops(comparison: Comparison, ax: Axes) -> None:
     ax.set(xlabel=f"drive [{data.drive_unit}]", ylabel=f"displacement [{unit}]")
     when = f"{data.t[part][0]:.4g} to {data.t[part][-1]:.4g} s"
     where = "" if comparison.carried else f" of {data.source or 'the other record'}"
-    ax.set_title(f"Where one is furthest off: {when}{where}", fontsize="medium")
-    ax.legend(loc="upper left", frameon=False, fontsize="small")
+    ax.set_title(f"Largest error: {when}{where}", fontsize="medium")
+    ax.legend(loc="lower right", frameon=False, fontsize="small")
 
 
 def _cycle(u: Array, off: Array) -> slice:
