@@ -175,7 +175,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"dead_zone_weights": (-2.0, 0.0)}, r"dead_zone_weights\[0\] is -2"),
     ({"thresholds": (1.0,) * 11, "weights": (0.1,) * 11}, "thresholds is 11 numbers: expected 10"),
     ({"gain": 0.0}, "gain is 0 m/V"),
-    ({"creep_times": (0.0, 1.0, 10.0)}, r"creep_time\[0\] is 0 s"),
+    ({"creep_times": (0.0, 1.0, 10.0)}, r"creep_times\[0\] is 0 s"),
     ({"frequency": 0.0}, "frequency is 0 Hz"),
     ({"frequency": None}, "frequency is None: expected a number"),
     ({"damping_ratio": -0.1}, "damping_ratio is -0.1"),

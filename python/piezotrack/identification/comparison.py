@@ -114,7 +114,7 @@ class Comparison:
         ]
 
     def followed(self, row: ModelScore, part: Literal["train", "test"]) -> Array:
-        """Simulated displacement of a model on one of the two parts.
+        """Displacement simulated by a model on one of the two parts.
 
         Parameters
         ----------

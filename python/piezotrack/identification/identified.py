@@ -185,7 +185,7 @@ class IdentifiedModel:
         return replace(inverse, offset=self.offset, delay=self.delay)
 
     def displacement(self, u: ArrayLike, dt: float, *, hold: Hold = "foh") -> Array:
-        """Reading of the sensor under a drive, from rest.
+        """Sensor reading under a drive, from rest.
 
         Parameters
         ----------

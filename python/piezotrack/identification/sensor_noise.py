@@ -183,8 +183,8 @@ def identify_noise(log: Dataset) -> Noise:
 
     A cubic in time is removed as creep and drift. The quantisation step is the largest of which all
     differences of readings are whole multiples; its rounding error is white and adds
-    ``step^2 / 12`` to the variance (Widrow 1956, doi 10.1109/TCT.1956.1086334), which holds for a noise above
-    half a step. The bandwidth follows from the autocorrelation of the rest.
+    ``step^2 / 12`` to the variance (Widrow 1956, doi 10.1109/TCT.1956.1086334), which holds for a
+    noise above half a step. The bandwidth follows from the autocorrelation of the rest.
 
     Parameters
     ----------

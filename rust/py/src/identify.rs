@@ -1,4 +1,4 @@
-//! The swarm and its settings.
+//! Identification by swarm search, and the settings of the swarm.
 
 use numpy::{PyArray1, ToPyArray};
 use piezotrack_core::identify::{

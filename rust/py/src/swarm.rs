@@ -1,4 +1,4 @@
-//! The swarm as ask/tell, for costs that are not a stage's: the caller evaluates.
+//! The swarm with an ask/tell interface, for cost functions that the caller evaluates.
 
 use piezotrack_core::identify::Swarm;
 use pyo3::prelude::*;

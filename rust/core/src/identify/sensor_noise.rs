@@ -1,4 +1,4 @@
-//! What a sensor shows at rest: its smallest step, its noise and how fast that is.
+//! Noise of a sensor at rest: quantisation step, rms and bandwidth.
 
 use crate::error::{Error, Result, positive};
 use crate::signal::metrics::Spread;
@@ -87,7 +87,7 @@ struct Grid {
 
 /// Different readings, and the step of which they all are multiples apart.
 ///
-/// The smallest gap is the first guess; over wider and wider gaps it is sharpened, and refused
+/// The smallest gap is the initial estimate; over wider and wider gaps it is sharpened, and refused
 /// where a reading is a tenth of a step off.
 fn grid(record: &[f64]) -> Grid {
     let mut levels = record.to_vec();

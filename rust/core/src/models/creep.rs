@@ -1,4 +1,4 @@
-//! What follows a hysteresis at the input: creep, then linear dynamics of first or second order.
+//! Creep and linear dynamics of first or second order behind a hysteresis at the input.
 //!
 //! ```text
 //! d = h + sum_j c_j q_j,   tau_j q_j' = h - q_j           creep
@@ -9,7 +9,7 @@
 //!
 //! Relaxations whose time constants are a decade apart, with about equal shares, make a creep
 //! that grows nearly with the logarithm of time, as that of piezoceramics does. Every step is
-//! exact for an `h` that goes straight from its start to its end.
+//! exact for an `h` that is linear over the step.
 
 pub use piezotrack_control::{Creep, Dynamics};
 

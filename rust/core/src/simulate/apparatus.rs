@@ -46,7 +46,7 @@ impl<'a, P: Plant> Apparatus<'a, P> {
     ///
     /// `step` is the longest step of the simulation, s.
     #[must_use]
-    pub fn bare(plant: &'a P, step: f64) -> Self {
+    pub fn ideal(plant: &'a P, step: f64) -> Self {
         Self { plant, amplifier: Amplifier::IDEAL, sensor: Sensor::IDEAL, step }
     }
 
@@ -124,7 +124,7 @@ pub(super) struct Stretch<F> {
     amplifier: AmplifierFlow,
 }
 
-/// One way along a stretch; dispatched for the fused multiply-add instruction.
+/// Steps through a stretch; dispatched for the fused multiply-add instruction.
 struct DriveStretch<'a, P: Plant> {
     apparatus: &'a Apparatus<'a, P>,
     stretch: &'a Stretch<P::Flow>,

@@ -224,7 +224,7 @@ impl<X, Y> Pair<X, Y> {
 /// Each controller is called as in [`super::closed_loop`]; that of y at `lag` after that of x,
 /// with a reading of its own. `timing.delay` counts from each axis's own sampling. The record is of
 /// the instants of x: both `measured` are read at once there, whatever the lag, as a recorder
-/// beside the controllers would; with jitter each comes late by a time of its own. Of two axes
+/// beside the controllers would; with jitter each has its own random delay. Of two axes
 /// without cross-talk, lag and jitter each has the bits of [`super::closed_loop`].
 ///
 /// # Errors

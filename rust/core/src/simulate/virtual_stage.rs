@@ -1,4 +1,4 @@
-//! The virtual stage: what stands in for a piezo stage, richer than the models identified on it.
+//! The virtual stage: a simulated piezo stage, with more effects than the models fitted to it.
 //!
 //! ```text
 //! command -> amplifier -> v -> plays with dead zones -> y -> h = gain y
@@ -107,7 +107,7 @@ const CYCLE_STEP: f64 = 1e-3;
 const LONGEST_REST: f64 = 3600.0;
 
 impl VirtualSettings {
-    /// Xu and Li 2010, doi 10.1115/1.4001712, as far as the paper tells; the rest is chosen.
+    /// Xu and Li 2010, doi 10.1115/1.4001712, as far as published; the rest is chosen.
     ///
     /// Published: 75 V end at 117.7622 um, in a mode of 160 Hz with zeta = 0.065; the sensor's
     /// range of 2.5 mm in 16 bit, so a step of 0.038 um; its noise of 0.097 um rms, which the

@@ -1,4 +1,4 @@
-//! How a particle moves.
+//! Update of a particle's velocity and position.
 
 use super::{Best, Boundary, Particle, SwarmSettings, Update};
 use crate::math::Draws;
