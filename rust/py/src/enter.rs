@@ -131,7 +131,9 @@ pub fn enter_pool<T: Send>(
     }
     match joined {
         Ok(result) => result.map_err(|error| raise(&error)),
-        Err(_) => Err(PyOSError::new_err("a thread of the search died; please report this")),
+        Err(_) => Err(PyOSError::new_err(
+            "a thread of the search ended with an internal error; please report this",
+        )),
     }
 }
 

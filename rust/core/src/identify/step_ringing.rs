@@ -165,7 +165,7 @@ impl Ringing {
     }
 }
 
-/// Largest sample of each stretch above `least`, stretches told apart by one below `-least`.
+/// Largest sample of each stretch above `least`, stretches separated by one below `-least`.
 ///
 /// A stretch that has not turned back is none.
 fn tops(over: &[f64], least: f64) -> Vec<usize> {

@@ -44,7 +44,7 @@ pub(super) const PLAYS_STATE: &[ParameterInfo] = &[
 
 /// A hysteresis operator that is followed from sample to sample, V to m.
 pub trait InputOperator: Copy + Debug {
-    /// What it remembers.
+    /// Its state.
     type State: Copy + Debug;
 
     /// The state before any voltage.

@@ -30,11 +30,11 @@ pub trait KernelModel: Copy {
     /// The kernel with the stage's parameters.
     fn lumped(&self) -> LumpedStage<Self::Kernel>;
 
-    /// What the hysteresis remembers in a state, whose numbers are in the order of the model's
+    /// State of the hysteresis within a stage's state, whose numbers are in the order of the model's
     /// state.
     fn memory(&self, state: &[f64]) -> Memory<Self::Kernel, f64>;
 
-    /// What it remembers as numbers, in the order of the model's state after displacement and
+    /// The state of the hysteresis as numbers, in the order of the model's state after displacement and
     /// velocity.
     fn state(&self, memory: &Memory<Self::Kernel, f64>) -> Vec<f64>;
 }

@@ -244,7 +244,7 @@ macro_rules! models {
             $($variant(<$stage as Invertible>::Inverse),)*
         }
 
-        /// What a [`StageInverse`] remembers.
+        /// State of a [`StageInverse`].
         #[derive(Clone, Copy)]
         #[allow(clippy::large_enum_variant, reason = "one in a controller, whichever models there are")]
         #[expect(missing_docs, missing_debug_implementations, reason = "one for each model")]

@@ -26,7 +26,7 @@ pub struct ModelInfo {
     pub drive_unit: &'static str,
     /// Its parameters; of a model that a swarm searches, mass, damping and stiffness first.
     pub parameters: &'static [ParameterInfo],
-    /// Its state: displacement and velocity, and what the hysteresis remembers.
+    /// Its state: displacement and velocity, and the state of the hysteresis.
     pub state: &'static [ParameterInfo],
     /// Published parameters by a name.
     pub published: &'static [Published],
@@ -147,8 +147,8 @@ pub trait Invertible: StageModel {
     /// The inverse.
     type Inverse: Inverse + Clone;
 
-    /// The inverse for samples every `dt` seconds, and what it remembers of a stage in the state
-    /// `initial`, or of one that never moved.
+    /// The inverse for samples every `dt` seconds, and its state for a stage in the state
+    /// `initial`, or for one that never moved.
     ///
     /// # Errors
     /// Names the parameter, or `dt`, that is out of its range, or `initial` where the model's

@@ -22,7 +22,7 @@ pub struct Apparatus<'a, P> {
     pub step: f64,
 }
 
-/// All that an apparatus remembers: an experiment can go on from it.
+/// State of an apparatus, from which an experiment can continue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ApparatusState<S> {
     /// State of the plant.
@@ -104,7 +104,7 @@ impl<'a, P: Plant> Apparatus<'a, P> {
         Ok(Stretch { steps, plant, amplifier })
     }
 
-    /// Leads the apparatus along a stretch whose command goes straight from `from` to `to`, V.
+    /// Simulates a stretch of time in which the command is linear from `from` to `to`, V.
     pub(super) fn drive(
         &self,
         stretch: &Stretch<P::Flow>,

@@ -122,7 +122,7 @@ impl VirtualSettings {
     ///   5.8 um (published: 5.69).
     /// - Creep of 0.4 % of the displacement with each of 0.1 s, 1 s and 10 s.
     /// - An amplifier of 225 Hz: with zeta = 0.065 the first peak of the step, published at
-    ///   192.53 um, tells its lag. The second, published at 170.25 um, is then at 167 um: the
+    ///   192.53 um, determines its lag. The second, published at 170.25 um, is then at 167 um: the
     ///   published peaks do not decay with the published zeta. Its slew limit hardly acts.
     /// - A noise bandwidth of 200 Hz.
     ///

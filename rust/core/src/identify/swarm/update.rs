@@ -48,7 +48,7 @@ impl Particle {
     ///
     /// ```text
     /// G  = (X + (X + c1 (P - X)) + (X + c2 (L - X))) / 3
-    /// G  = (X + (X + c1 (P - X))) / 2                      where X leads itself
+    /// G  = (X + (X + c1 (P - X))) / 2                      where X is its own best informant
     /// X' = G + |G - X| B                                   B a point of the unit ball
     /// V <- w V + X' - X
     /// X <- X + V
