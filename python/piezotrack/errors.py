@@ -19,7 +19,7 @@ __all__ = [
 
 
 class PiezotrackError(Exception):
-    """What every exception of piezotrack but `Interrupted` has in common."""
+    """Base class of the exceptions of piezotrack, except `Interrupted`."""
 
 
 class ParameterError(PiezotrackError, ValueError):

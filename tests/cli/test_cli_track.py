@@ -156,7 +156,7 @@ def test_feedforward_of_a_file_leads_the_model_along_it() -> None:
     late = rows["time_s"] > 1.2
     assert np.abs(shown - 1e-6 * rows["displacement_um"])[late].max() < 5e-9
     assert np.allclose(rows["displacement_um"][:2001], wanted, atol=1e-9)
-    assert "computed along the whole path" in printed
+    assert "computed for the whole run" in printed
 
 
 @pytest.mark.usefixtures("_no_pictures")

@@ -191,7 +191,7 @@ def test_a_file_keeps_its_name_when_all_are_saved_beside_it(tmp_path: Path) -> N
 def test_the_table_marks_the_best() -> None:
     lines = found().summary().splitlines()
     assert lines[0] == "fitted on 1 to 4.995 s of plays.csv, 800 samples"
-    assert lines[1].endswith("600 samples; state and offset carried on")
+    assert lines[1].endswith("600 samples; state and offset carried over")
     table = {line[2:20].strip(): line for line in lines if line.startswith(("  B", "* P", "  P"))}
     assert table["Prandtl-Ishlinskii"].startswith("*")
     assert table["Bouc-Wen"].startswith(" ")
@@ -364,7 +364,7 @@ REFUSED_COMMANDS: dict[str, tuple[str, ...]] = {
     "compare log.csv --model log.json": ("log.json",),
     "compare log.csv --train 5": ("--train is '5'", "expected A:B"),
     "compare log.csv --train a:b": ("--train has 'a'", "number"),
-    "compare log.csv --train 1:": ("nothing to judge on", "or --test"),
+    "compare log.csv --train 1:": ("nothing to validate on", "or --test"),
     "compare log.csv --test :4": ("nothing to fit", "or --train"),
     "compare log.csv --train 1:30": ("log.csv: train: the window from 1 s to 30 s",),
     "compare log.csv --train 1:5 --test 4:6": ("log.csv: test goes from 4", "do not overlap"),

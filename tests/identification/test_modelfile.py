@@ -223,7 +223,7 @@ def test_the_file_says_where_the_numbers_come_from(tmp_path: Path) -> None:
 
 
 def test_what_is_not_finite_is_saved_as_null(tmp_path: Path) -> None:
-    # Without a hysteresis force, a1 and a2 leave no trace in the data.
+    # Without a hysteresis force, a1 and a2 have no effect on the data.
     fit = quick_fit(
         fixed={"b1": 0.0},
         stiffness=26065.0,
@@ -231,7 +231,7 @@ def test_what_is_not_finite_is_saved_as_null(tmp_path: Path) -> None:
         swarm=pt.ParticleSwarm(particles=12, iterations=30, velocity_limit=math.inf),
     )
     assert fit.parameters["a1"].deviation == math.inf
-    assert "no trace in the data" in fit.summary()
+    assert "no effect on the data" in fit.summary()
     path = fit.save(tmp_path / "dahl.json")
     content = content_of(path)
     assert content["parameters"]["a1"]["standard_deviation"] is None

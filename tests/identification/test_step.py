@@ -250,7 +250,7 @@ def test_the_virtual_stages_amplifier_shows_in_the_gains_only() -> None:
     assert step.readings.frequency == pytest.approx(160.0, rel=0.01)
     assert step.damping_by_decrement == pytest.approx(0.065, rel=0.1)
     assert step.overshoot_ratio == pytest.approx(0.63, abs=0.01)  # as published
-    assert any("amplifier that lags" in note for note in step.notes)
+    assert any("a lag of the amplifier" in note for note in step.notes)
     quick_one = replace(stage, bandwidth=math.inf)
     alone = pt.identify_step(quick_one.record(drive, 1 / 5000.0))
     assert alone.damping_ratio == pytest.approx(0.065, rel=0.1)
@@ -263,7 +263,7 @@ def test_a_pulse_is_read_up_to_its_end() -> None:
     u, y = np.r_[log.u, log.u[: n // 2] * 0.0], np.r_[log.y, np.zeros(n // 2)]
     step = pt.identify_step(pt.Dataset(u=u, y=y, dt=log.dt, hold="zoh"))
     assert step.readings.period == pytest.approx(pt.identify_step(log).readings.period, rel=1e-3)
-    assert any("where the drive moves again" in note for note in step.notes)
+    assert any("where the drive changes again" in note for note in step.notes)
 
 
 # Notes.
@@ -275,8 +275,8 @@ def test_a_pulse_is_read_up_to_its_end() -> None:
         (step_log(1, rate=1000.0), "sampled at 1000 Hz, which is slow: sample such a stage above"),
         (step_log(1, seconds=0.03), "before the ringing has died out"),
         (step_log(1, before=3), "only 3 samples before the step"),
-        (step_log(1, zeta=0.3), "take the damping ratio by the decrement"),
-        (step_log(1, zeta=0.3), "only two peaks stand out"),
+        (step_log(1, zeta=0.3), "use the damping ratio by the decrement"),
+        (step_log(1, zeta=0.3), "only two peaks are above the noise"),
     ],
 )
 def test_notes(log: pt.Dataset, note: str) -> None:
@@ -439,9 +439,9 @@ def test_the_papers_way_from_a_step_to_a_fit() -> None:
 
 def test_the_summary_says_what_is_known() -> None:
     text = pt.identify_step(pt.identification.StepReadings.xu_li_2010()).summary()
-    for piece in ("readings typed in", "117.7622", "192.5302, 170.2524", "um/V", "121.9874"):
+    for piece in ("readings entered by hand", "117.7622", "192.5302, 170.2524", "um/V", "121.9874"):
         assert piece in text
-    assert "not fixed by one step" in text
+    assert "One step does not determine K, T, M and D" in text
     known = pt.identify_step(step_log(1), stiffness=26065.0).summary()
     for piece in ("step.csv", "with the stiffness given", "26065  N/m", "by the logarithmic"):
         assert piece in known
@@ -461,7 +461,7 @@ def test_the_picture_has_peaks_and_units() -> None:
     marks = next(line for line in left.lines if line.get_label() == "overshoot peaks")
     assert list(np.asarray(marks.get_ydata())) == [1e6 * peak for peak in step.readings.peaks]
     plt.close(figure)
-    with pytest.raises(pt.ParameterError, match="typed in"):
+    with pytest.raises(pt.ParameterError, match="entered by hand"):
         pt.identify_step(pt.identification.StepReadings.xu_li_2010()).plot()
 
 

@@ -138,7 +138,7 @@ fn a_delay_shifts_the_response_by_any_fraction_of_a_sample() {
         let delay = TS * f64::from(instants) / 200.0;
         let shift = usize::try_from(instants).unwrap();
         let virtual_stage = stage.apparatus();
-        let dahl_stage = Apparatus::bare(&dahl, 1e-4);
+        let dahl_stage = Apparatus::ideal(&dahl, 1e-4);
         for (prompt, late) in [
             (blind(&virtual_stage, 0.0, substeps), blind(&virtual_stage, delay, substeps)),
             (blind(&dahl_stage, 0.0, substeps), blind(&dahl_stage, delay, substeps)),
@@ -189,7 +189,7 @@ impl Plant for Rolling {
 #[test]
 fn late_samples_read_and_act_late() {
     // The voltage is on in every other interval, from when the sample of that came.
-    let apparatus = Apparatus::bare(&Rolling, 1.0);
+    let apparatus = Apparatus::ideal(&Rolling, 1.0);
     let (samples, jitter, substeps) = (4001, 3e-3, 4);
     for delay in [0.0, 0.3 * TS, 1.95 * TS] {
         let timing = Timing { jitter, ..timing(samples, delay, substeps) };
@@ -277,7 +277,7 @@ fn a_dahl_plant_moves_as_its_own_simulation() {
         .simulate(&Experiment { accuracy: 1e-13, ..Experiment::of(&drive, NEVER) })
         .unwrap()
         .unwrap();
-    let apparatus = Apparatus::bare(&stage, 5e-5);
+    let apparatus = Apparatus::ideal(&stage, 5e-5);
     let run = closed_loop(&apparatus, apparatus.rest(), &timing(60, 0.0, 3), |k, _| u[k], NEVER);
     for (k, x) in run.unwrap().unwrap().displacement.iter().step_by(3).enumerate() {
         assert!((x - exact.x[k]).abs() < 1e-12, "{k}");
@@ -291,7 +291,7 @@ fn a_dahl_plant_moves_as_its_own_simulation() {
 #[test]
 fn an_amplifier_can_stand_before_any_plant() {
     let stage = DahlStage::xu_li_2010();
-    let mut apparatus = Apparatus::bare(&stage, 1e-4);
+    let mut apparatus = Apparatus::ideal(&stage, 1e-4);
     apparatus.amplifier = Amplifier { bandwidth: 200.0, slew: 500.0, low: 0.0, high: 75.0 };
     let run = closed_loop(&apparatus, apparatus.rest(), &timing(20, 0.0, 20), |_, _| 100.0, NEVER);
     let applied = run.unwrap().unwrap().applied;
@@ -320,7 +320,7 @@ fn no_bad_number_gets_through() {
     assert!(refused(&long, |_, _| 0.0).starts_with("step is 2e-5 s"));
 
     let unstable = DahlStage { up: 1e305, ..DahlStage::xu_li_2010() };
-    let bare = Apparatus::bare(&unstable, 1e-4);
+    let bare = Apparatus::ideal(&unstable, 1e-4);
     let run = closed_loop(&bare, bare.rest(), &timing(5000, 0.0, 1), |_, _| 75.0, NEVER);
     assert!(run.unwrap_err().to_string().contains("not finite at"));
 }
@@ -342,7 +342,7 @@ fn a_kernel_led_step_by_step_moves_as_it_does_alone() {
         let experiment = Experiment { accuracy: 1e-12, ..Experiment::of(&drive, NEVER) };
         let alone = stage.simulate(&experiment).unwrap().unwrap();
         let largest = |step: f64| {
-            let apparatus = Apparatus::bare(&stage, step);
+            let apparatus = Apparatus::ideal(&stage, step);
             let run = open_loop(&apparatus, apparatus.rest(), &drive, NEVER).unwrap().unwrap();
             let gaps = run.displacement.iter().zip(&alone.x).map(|(a, b)| (a - b).abs());
             gaps.fold(0.0, f64::max)

@@ -87,7 +87,7 @@ fn timing(delay: f64, substeps: usize) -> Timing {
 fn without_cross_talk_and_lag_each_axis_is_alone() {
     // Bit by bit, whatever the delay, and for different plants.
     let (stage, model) = (VirtualStage::xu_li_2010(3), DahlStage::xu_li_2010());
-    let (x, y) = (stage.apparatus(), Apparatus::bare(&model, 5e-5));
+    let (x, y) = (stage.apparatus(), Apparatus::ideal(&model, 5e-5));
     let (to_x, to_y) =
         (wave(150, 50.0 * UM, 10.0 * UM, 0.5, 0.0), wave(150, 40.0 * UM, 20.0 * UM, 0.5, 1.0));
     let none = vec![0.0; 150];
@@ -116,7 +116,7 @@ fn a_lag_makes_the_ellipse_of_its_angle() {
     // smallest are on the diagonals. A voltage that is held for an interval is late by one.
     let (radius, frequency) = (40.0, 0.1);
     let plant = Rigid;
-    let axis = Apparatus::bare(&plant, 1.0);
+    let axis = Apparatus::ideal(&plant, 1.0);
     let (cosine, sine) =
         (wave(1001, 0.0, radius, frequency, 0.0), wave(1001, 0.0, radius, frequency, TAU / 4.0));
     for (whole, intervals) in [(1, 1.0), (2, 2.0), (5, 5.0)] {
@@ -177,7 +177,7 @@ fn each_axis_is_late_by_its_own_time() {
     let (x, y) = (VirtualStage::xu_li_2010(1), VirtualStage::xu_li_2010_y(1));
     let plant = Rolling;
     let seeded = |stage: &VirtualStage| {
-        let mut apparatus = Apparatus::bare(&plant, 1.0);
+        let mut apparatus = Apparatus::ideal(&plant, 1.0);
         apparatus.sensor.seed = stage.settings().sensor.seed;
         apparatus
     };
@@ -225,7 +225,7 @@ fn each_axis_is_late_by_its_own_time() {
 fn a_lag_of_a_part_of_an_interval_is_kept_to_the_instant() {
     // Seen ten times in an interval, the step of y is 0.3 of it behind that of x.
     let plant = Rigid;
-    let axis = Apparatus::bare(&plant, 1.0);
+    let axis = Apparatus::ideal(&plant, 1.0);
     let steps: Vec<f64> = (0..20).map(|k| f64::from(k % 2)).collect();
     let course = ReferenceSamples { reference: &steps, feedforward: &steps };
     for (lag, delay) in [(3, 0), (0, 3), (2, 1), (3, 4), (13, 0), (9, 22)] {
@@ -251,7 +251,7 @@ fn a_lag_of_a_part_of_an_interval_is_kept_to_the_instant() {
 #[test]
 fn cross_talk_mixes_what_the_sensors_see() {
     let plant = Rigid;
-    let axis = Apparatus::bare(&plant, 1.0);
+    let axis = Apparatus::ideal(&plant, 1.0);
     let [xy, yx] = [0.03, -0.02];
     let axes = TwoAxes { x: axis, y: axis, cross_talk: [xy, yx], lag: 0.0 };
     let (ux, uy) = (vec![3.0, 5.0, -1.0, 2.0], vec![0.0, 7.0, 4.0, -6.0]);
@@ -345,7 +345,7 @@ fn white_noise_and_numbers_on_no_grid_are_told_as_such() {
 #[test]
 fn refusals_name_the_argument() {
     let plant = Rigid;
-    let axis = Apparatus::bare(&plant, 1.0);
+    let axis = Apparatus::ideal(&plant, 1.0);
     let told = |cross_talk, lag| {
         TwoAxes { x: axis, y: axis, cross_talk, lag }.validate().unwrap_err().to_string()
     };
@@ -357,7 +357,7 @@ fn refusals_name_the_argument() {
 #[test]
 fn a_run_stops_when_told() {
     let plant = Rigid;
-    let axis = Apparatus::bare(&plant, 1.0);
+    let axis = Apparatus::ideal(&plant, 1.0);
     let axes = TwoAxes { x: axis, y: axis, cross_talk: [0.0, 0.0], lag: 0.01 };
     let volts = [1.0; 9];
     let course = ReferenceSamples { reference: &volts, feedforward: &volts };

@@ -159,7 +159,7 @@ def test_the_printed_model_drifts_and_its_table_does_not() -> None:
     online, other = dataclasses.replace(TABLE_1.inverse(), playback="online").played(
         reference, LOOP
     )
-    assert how != other == "feedforward computed along the whole path"
+    assert how != other == "feedforward computed for the whole run"
     assert np.ptp(table[200:].reshape(-1, 100), axis=0).max() < 1e-9
     assert np.ptp(online[200:].reshape(-1, 100), axis=0).max() > 1.0
 

@@ -188,9 +188,8 @@ def test_the_inverse_can_begin_on_a_settled_loop() -> None:
     assert session.step(x[0], **still) == back[0]
     session.reset()
     assert session.step(x[0], **still) == back[0]
-    with pytest.raises(
-        pt.ParameterError, match=r"initial is int: expected a pt\.stages\.Prandtl.*State"
-    ):
+    expected = r"initial is int: expected a pt\.stages\.Prandtl.*State"
+    with pytest.raises(pt.ParameterError, match=expected):
         CREEPING.inverse(initial=5)  # type: ignore[arg-type]
     with pytest.raises(pt.ShapeError, match="initial has 4 plays and 2 relaxations"):
         PLAIN.inverse(initial=before.final)

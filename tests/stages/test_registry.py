@@ -77,13 +77,11 @@ def test_a_stage_can_be_copied_and_pickled(name: str) -> None:
 def test_the_state_of_another_model_is_refused(name: str) -> None:
     stage = STAGES[name]
     final = STAGES["dahl" if name != "dahl" else "bouc-wen"].simulate([0.0, 1.0], 0.01).final
-    with pytest.raises(
-        pt.ParameterError, match=r"^initial is \w+State: expected a pt\.stages\.\w+State"
-    ):
+    expected = r"^initial is \w+State: expected a pt\.stages\.\w+State"
+    with pytest.raises(pt.ParameterError, match=expected):
         stage.simulate([0.0, 1.0], 0.01, initial=final)
-    with pytest.raises(
-        pt.ParameterError, match=r"^initial is \w+State: expected a pt\.stages\.\w+State"
-    ):
+    expected = r"^initial is \w+State: expected a pt\.stages\.\w+State"
+    with pytest.raises(pt.ParameterError, match=expected):
         stage.inverse(initial=final)
 
 

@@ -27,7 +27,7 @@ class Pid:
         + \frac{K_p T_d}{T_s} (e_k - 2 e_{k-1} + e_{k-2}) + \frac{T_s}{T_t} (v - u)_{k-1}
 
     Xu and Li 2010, equations (22) to (25), doi 10.1115/1.4001712, corrected: the recursion is
-    that of the feedback part alone, while `v - u` is the voltage of the amplifier less the sum of
+    that of the feedback part only, while `v - u` is the voltage of the amplifier less the sum of
     all parts of the command.
 
     Parameters
@@ -207,7 +207,7 @@ LAG = Lag()
 
 @dataclass(frozen=True, kw_only=True)
 class Repetitive:
-    r"""Repetitive controller, plugged in beside the feedback: it learns a periodic voltage.
+    r"""Plug-in repetitive controller: it learns the voltage that removes a periodic error.
 
     .. math::
 
@@ -215,12 +215,12 @@ class Repetitive:
         \qquad p = e^{-T_s/T_q}, \quad N = L/T_s
 
     Xu and Li 2010, equations (26) to (28), doi 10.1115/1.4001712; the coefficients printed with
-    (29) and (30) are unstable. `xu_li_2010` is the paper's form as it was meant.
+    (29) and (30) are unstable. `xu_li_2010` is the paper's form with corrected coefficients.
 
     Parameters
     ----------
     period : float
-        L [s], of the reference; no whole number of samples is needed, two at least.
+        L [s], of the reference; two samples or more, not necessarily a whole number.
     kq : float, optional
         Learning gain [V/m], above 0 and below 2e6 (2 V/um); that is necessary, not sufficient.
         `from_um` takes it in V/um.
@@ -229,8 +229,8 @@ class Repetitive:
     lead : int, optional
         Samples by which the learnt signal is advanced, to compensate the lag of the stage.
     forgetting_factor : float, optional
-        Share of the learnt signal kept from period to period, above 0, at most 1. Below 1 it ends
-        the drift of uRC against uFB, whose difference the error does not show.
+        Share of the learnt signal kept from period to period, above 0, at most 1. Below 1 it stops
+        the drift of uRC against uFB, which is not observable in the error.
     pause : bool, optional
         Whether learning pauses while the voltage is clipped.
 

@@ -142,7 +142,7 @@ def _check_part(name: str, part: object, kinds: type | tuple[type, ...], expecte
 
 
 def _limits(limits: object) -> tuple[float, float]:
-    # An array counts as well.
+    # An array is accepted too.
     listed = limits.tolist() if hasattr(limits, "tolist") else limits
     pair = list(listed) if isinstance(listed, Sequence) and not isinstance(listed, str) else []
     if len(pair) != 2:

@@ -209,16 +209,17 @@ def check_loop(
 ) -> LoopReport:
     """Stability and margins of a controller on a stage.
 
-    The stage is linearised for small motions: a virtual stage as its mode with the amplifier, a
-    Dahl stage with the slope of its hysteresis force as a spring, a stage with its hysteresis at
-    the input with the slope of that on the settled loop between the limits, without creep. The
-    voltage is held from sample to sample, and the repetitive part is taken as implemented, with
-    all its taps.
+    The stage is linearised for small motions: a virtual stage as its mode with the amplifier; a
+    stage with hysteresis in feedback with the slope of the hysteresis force as a spring; a stage
+    with hysteresis at the input with the slope of its output on the settled loop between the
+    limits, without creep. The voltage is held between samples, and the repetitive part is that of
+    the implementation, with all its taps.
 
     Parameters
     ----------
-    stage : stage model, VirtualStage or identified model
-        The plant; the delay of an identified one counts.
+    stage : Stage, VirtualStage or IdentifiedModel
+        The plant: any stage of ``pt.stages``, a `VirtualStage` or an `IdentifiedModel`, whose
+        delay is included.
     controller : Controller
         The controller.
     delay : float, optional
@@ -237,11 +238,11 @@ def check_loop(
     >>> report.stable
     True
     """
-    bare, _, plant_delay = unwrap(stage)
+    plant, _, plant_delay = unwrap(stage)
     plants = linearised_plants(
-        bare, controller.limits, not_negative("delay", delay, "s") + plant_delay
+        plant, controller.limits, not_negative("delay", delay, "s") + plant_delay
     )
-    cases = [_check(controller, plant) for plant in plants]
+    cases = [_check(controller, linear) for linear in plants]
     return LoopReport(
         controller=controller, low=cases[0], middle=cases[1], high=cases[2], plant=plants[1]
     )

@@ -259,9 +259,10 @@ def track(
 
     Parameters
     ----------
-    stage : stage model, VirtualStage or identified model
-        The plant. A model has no noise and no amplifier, and starts at rest; offset and delay of
-        an identified one are included in the displacement.
+    stage : Stage, VirtualStage or IdentifiedModel
+        The plant: any stage of ``pt.stages``, a `VirtualStage` or an `IdentifiedModel`. A stage
+        model has no noise and no amplifier, and starts at rest; offset and delay of an
+        `IdentifiedModel` are included in the displacement.
     controller : Controller
         The controller.
     reference : Reference

@@ -42,20 +42,19 @@ class ModelScore:
     name : str
         Of its files: the name of the model, or of the file that it comes from.
     title : str
-        As the table has it.
+        Title in the table.
     fit : Identification or IdentifiedModel
-        The model, with what is known of how it was found.
+        The model; with the details of the fit if it was fitted here.
     train, test : Score
-        How far it is from the part that was fitted, and from the one that was not; per cent are
-        of the stroke of the former.
+        Score on the part that was fitted, and on the one that was not; percentages refer to the
+        stroke of the former.
     autocorrelation : float
-        Of the residual on the fitted part, from one sample to the next: near 1 where the model
-        and not the noise is what limits the fit.
+        Correlation of neighbouring residuals on the fitted part: near 1 where the fit is limited by
+        the model, not by noise.
     parameters : int or None
-        Number of values fitted, the offset with them; None where the model was not fitted on
-        this part.
+        Number of values fitted, offset included; None if the model was not fitted on this part.
     aic, bic : float or None
-        Information criteria on the fitted part, with `parameters` and a variance counted.
+        Information criteria on the fitted part, for `parameters` values and a variance.
     """
 
     name: str
@@ -71,17 +70,17 @@ class ModelScore:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Comparison:
-    """Models side by side; see `compare`.
+    """Comparison of models; see `compare`.
 
     Attributes
     ----------
     rows : tuple of ModelScore
-        In the order in which they were asked for.
+        One for each model, in the order given.
     train, test : Dataset
-        What was fitted and what was not.
+        The part that was fitted, and the one that was not.
     carried : bool
-        Whether the test goes on in the same record, with the state and the offset carried on;
-        else it is another one, with an offset of its own.
+        Whether the test part belongs to the same record, with state and offset carried over;
+        otherwise it is another record, with an offset of its own.
     """
 
     rows: tuple[ModelScore, ...]
@@ -95,7 +94,7 @@ class Comparison:
 
     @property
     def best(self) -> ModelScore:
-        """The model with the lowest RMS on what was not fitted."""
+        """The model with the lowest RMS on the part that was not fitted."""
         return min(self.rows, key=lambda row: row.test.rms)
 
     @property
@@ -105,17 +104,17 @@ class Comparison:
 
     @property
     def notes(self) -> list[str]:
-        """Warnings: models that were fitted to a part of what scores them here."""
+        """Warnings: models that were fitted to a part of the test data."""
         seen = ((row, row.fit.window_on(self.test)) for row in self.rows)
         return [
             f"{row.title} was fitted on {window[0]:.6g} to {window[1]:.6g} s of "
-            f"{self.test.source}, a part of what judges it here"
+            f"{self.test.source}, a part of its test data here"
             for row, window in seen
             if window is not None
         ]
 
     def followed(self, row: ModelScore, part: Literal["train", "test"]) -> Array:
-        """Displacement of a model on one of the two parts.
+        """Displacement simulated by a model on one of the two parts.
 
         Parameters
         ----------
@@ -134,7 +133,7 @@ class Comparison:
         return x
 
     def summary(self) -> str:
-        """Table of the comparison, the best one marked.
+        """Table of the comparison, with the best model marked.
 
         Returns
         -------
@@ -146,7 +145,7 @@ class Comparison:
         return comparison_text(self)
 
     def plot(self) -> Figure:
-        """Loops over each other, errors over time with the split marked, and the RMS as bars.
+        """Loops in one panel, errors over time with the split marked, and the RMS as bars.
 
         Returns
         -------
@@ -215,10 +214,10 @@ def compare(
     threads: int | None = None,
     progress: bool | None = None,
 ) -> Comparison:
-    r"""Fit several models on one part of a record and judge them on the rest.
+    r"""Fit several models to one part of a record and validate them on the rest.
 
-    The drive is simulated through from the first sample of the record to the last, and so the
-    state that hysteresis remembers is carried on from what was fitted to what was not. Over the
+    The drive is simulated from the first sample of the record to the last, so that the state of the
+    hysteresis is carried over from the fitted part to the test part. Over the
     n residuals :math:`e_i` of the fitted part,
 
     .. math::
@@ -227,24 +226,24 @@ def compare(
 
     with K the number of values fitted and one for the variance (Burnham and Anderson 2002, Model
     Selection and Multimodel Inference, 2nd edition, sections 2.2 and 6.4, doi 10.1007/b97636).
-    Both take the residuals for independent. Those of a hysteresis model are not: neighbours are
-    correlated (`ModelScore.autocorrelation`), so n samples count for fewer and both criteria favour
-    too many parameters. The error on what was not fitted decides.
+    Both assume independent residuals. Those of a hysteresis model are correlated
+    (`ModelScore.autocorrelation`): the effective number of samples is smaller than n, and both
+    criteria favour too many parameters. Prefer the error on the part that was not fitted.
 
     Parameters
     ----------
     data : Dataset
         The record.
     models : iterable, optional
-        Names of models, as for `identify`, which are fitted; files of models and models that are
-        identified already, which are taken as they are. Where not given, all models for the
-        unit of the drive: a Bouc-Wen oscillator is for forces, ``drive_unit="N"``.
+        Names of models, as for `identify`, which are fitted; model files and identified models,
+        which are used unchanged. By default all models for the unit of the drive: a Bouc-Wen
+        oscillator is for forces, ``drive_unit="N"``.
     train : (float, float), optional
-        Window to fit [s], either end may be None. Where not given, the first half of the record,
-        or all that is before `test`, or all of it where `test` is another record.
+        Window to fit [s]; either end may be None. By default the first half of the record, or the
+        part before `test`, or the whole record if `test` is another one.
     test : (float, float) or Dataset, optional
-        Window of the same record to judge on [s], or another record. What follows `train` where
-        not given.
+        Window of the same record to validate on [s], or another record. By default the part after
+        `train`.
     seed, runs, threads, progress : optional
         As for `identify`, for the models that a swarm searches.
 
@@ -294,9 +293,9 @@ def compare(
 
 
 def _wanted(models: object, drive_unit: str) -> list[tuple[str, str, ModelInfo | IdentifiedModel]]:
-    """Name, title and source of what is compared: models to fit, and identified ones."""
+    """Name, title and source of each model: one to fit, or an identified one."""
     if models is None:
-        # A voltage is no force; a force may be taken for one, in its own scale.
+        # Models driven by a voltage also fit a record driven by a force, but not the reverse.
         suited = [info for info in MODELS if info.drive_unit in ("V", drive_unit)]
         return [(info.name, info.title, info) for info in suited]
     if isinstance(models, (str, os.PathLike, Mapping)) or not isinstance(models, Iterable):
@@ -323,14 +322,14 @@ def _info(model: ModelInfo | IdentifiedModel) -> ModelInfo:
 
 
 def _title(info: ModelInfo, name: str) -> str:
-    """Say of which model a name is, where it does not say so itself."""
+    """Title of a row: that of the model, and the name if it is not that of the model."""
     if name.startswith(info.name):
         return info.title + name.removeprefix(info.name).replace("-", " ")
     return f"{info.title} ({name})"
 
 
 def _unused(name: str, taken: set[str]) -> str:
-    """Give a name a number where it is taken."""
+    """Append a number to a name that is taken."""
     free = (f"{name}-{i}" for i in range(2, len(taken) + 3))
     return next(one for one in (name, *free) if one not in taken)
 
@@ -354,7 +353,7 @@ def _source(model: object) -> tuple[str | None, ModelInfo | IdentifiedModel]:
 
 
 def _parts(log: Dataset, train: object, test: object) -> tuple[Dataset, Dataset, bool]:
-    """Give the parts to fit and to judge on, and whether the second goes on in the same record."""
+    """Return the parts to fit and to test, and whether both are of the same record."""
     first = _bounds("train", train)
     if isinstance(test, Dataset):
         one = _windowed("train", log, first)
@@ -374,8 +373,8 @@ def _parts(log: Dataset, train: object, test: object) -> tuple[Dataset, Dataset,
     elif test is None:
         if first[1] is None:
             raise ParameterError(
-                "train goes to the end of the record, which leaves nothing to judge on: expected "
-                "an end, or test="
+                "train goes to the end of the record, which leaves nothing to validate on: "
+                "expected an end, or test="
             )
         second = (first[1], None)
     one, two = _windowed("train", log, first), _windowed("test", log, second)
@@ -417,19 +416,19 @@ def _windowed(name: str, log: Dataset, window: Window) -> Dataset:
 def _compared(
     name: str, title: str, fit: IdentifiedModel, train: Dataset, test: Dataset, carried: bool
 ) -> ModelScore:
-    """Judge a model on both parts."""
+    """Score a model on both parts."""
     here = fit.fitted_on(train)
     score = fit.score(train, offset=fit.offset if here else "own")
     error = train.y - fit.simulate(train, offset=score.offset).x
     count = fit.free_count if here else None
     _, _, autocorrelation, aic, bic = _core.residual(error, count or 0)
-    judged = fit.score(test, offset=score.offset if carried else "own")
+    tested = fit.score(test, offset=score.offset if carried else "own")
     return ModelScore(
         name=name,
         title=title,
         fit=fit,
         train=replace(score, stroke=train.stroke),
-        test=replace(judged, stroke=train.stroke),
+        test=replace(tested, stroke=train.stroke),
         autocorrelation=autocorrelation,
         parameters=count,
         aic=None if count is None else aic,

@@ -110,7 +110,7 @@ def _bars(comparison: Comparison, ax: Axes) -> None:
 def _errors(comparison: Comparison, axes: list[Axes]) -> None:
     """Draw measured less simulated over time, one model below the other on one scale."""
     first, second = comparison.train, comparison.test
-    # Another record goes on where the first ends.
+    # Another record is drawn after the end of the first.
     gap = 0.0 if comparison.carried else float(first.t[-1] - second.t[0]) + second.dt
     # The test may also come before what was fitted.
     split = max(float(first.t[0]), float(second.t[0]) + gap) - 0.5 * first.dt

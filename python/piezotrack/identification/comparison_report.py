@@ -11,10 +11,10 @@ if TYPE_CHECKING:
 __all__ = ["comparison_text"]
 
 NOTES = """\
-* has the lowest rms where it was not fitted, which decides. K: values fitted, - for a
-model that was given. dAIC and dBIC: above the lowest, of n ln(RSS/n) + 2 (K + 1) and n ln(RSS/n) +
-(K + 1) ln n, for residuals that are independent. These are not: r1 is the correlation of one sample
-with the next, so n counts for less and both ask for too many parameters (Burnham and Anderson 2002,
+* lowest rms on the part not fitted, which is the criterion to use. K: number of values fitted,
+- for a model that was given. dAIC, dBIC: difference from the lowest of n ln(RSS/n) + 2 (K + 1) and
+of n ln(RSS/n) + (K + 1) ln n. Both assume independent residuals; r1 is the correlation of
+neighbouring ones. Where it is near 1 both favour too many parameters (Burnham and Anderson 2002,
 doi 10.1007/b97636)."""
 
 
@@ -31,7 +31,7 @@ def comparison_text(comparison: Comparison) -> str:
     str
         Several lines.
     """
-    rows, how = comparison.rows, "state and offset carried on"
+    rows, how = comparison.rows, "state and offset carried over"
     if not comparison.carried:
         how = "another record, with an offset of its own"
     width = max(len(row.title) for row in rows)
@@ -40,7 +40,7 @@ def comparison_text(comparison: Comparison) -> str:
     one = f"{'rms um':>9}{'rms %':>8}{'max um':>9}"
     lines = [
         f"fitted on {_span(comparison.train)}",
-        f"judged on {_span(comparison.test)}; {how}",
+        f"tested on {_span(comparison.test)}; {how}",
         f"per cent of the stroke fitted, {1e6 * comparison.train.stroke:.4g} um",
         "",
         f"  {'':<{width}}  {'fitted':^26}  {'not fitted':^26}",

@@ -20,22 +20,22 @@ if TYPE_CHECKING:
 
 __all__ = ["CrossTalk", "identify_cross_talk"]
 
-# A drive that moves less than this part of the other's counts as held.
+# A drive whose range is below this share of the other's counts as held.
 HELD = 0.01
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CrossTalk:
-    """Cross-talk of two axes: position = matrix times what each axis makes of its own voltage.
+    """Cross-talk of two axes: position = matrix @ displacements of the axes by their own drives.
 
     Attributes
     ----------
     matrix : ndarray, shape (2, 2)
-        With 1 on its diagonal; ``matrix[0, 1]`` is what of y shows in x.
+        With 1 on its diagonal; ``matrix[0, 1]`` is the share of y in x.
     sd : ndarray, shape (2, 2)
         Standard deviations of its entries, 0 on the diagonal.
     residual : (float, float)
-        Root of the mean square of what the fit leaves in x, while y is driven, and in y [m].
+        Rms residual of the fit in x, while y is driven, and in y [m].
     """
 
     matrix: Array
@@ -51,20 +51,20 @@ class CrossTalk:
 
 
 def identify_cross_talk(x_driven: Sequence[Dataset], y_driven: Sequence[Dataset]) -> CrossTalk:
-    r"""Find the cross-talk from two logs, in each of which one axis is driven.
+    r"""Identify the cross-talk from two logs, in each of which one axis is driven.
 
-    The axis that is held shows a share of the one that moves, beside its own creep:
+    The axis that is held shows a share of the driven one, and its own creep:
 
     .. math:: y = c_{yx} x + o_0 + o_1 t + o_2 t^2 + o_3 t^3
 
-    by least squares, and x over y from the second log. The standard deviation counts residuals
-    that follow each other for less (Bartlett 1935, doi 10.2307/2342284).
+    by least squares, and the same of x on y from the second log. The standard deviation accounts
+    for correlated residuals (Bartlett 1935, doi 10.2307/2342284).
 
     Parameters
     ----------
     x_driven, y_driven : (Dataset, Dataset)
         Logs of x and y of one experiment each, as `XYStage.record` returns them; the drive of the
-        other axis is constant. Their windows count.
+        other axis is constant. Their windows are used.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def identify_cross_talk(x_driven: Sequence[Dataset], y_driven: Sequence[Dataset]
     Raises
     ------
     ParameterError
-        Something else is given.
+        An argument is not a pair of Datasets.
     DataError, ShapeError
         The wrong axis is driven, or the logs of one experiment differ in length.
 

@@ -17,15 +17,15 @@ class Progress(NamedTuple):
     nit : int
         Iterations done; 0 after the first evaluation.
     iterations : int
-        Most iterations.
+        Largest number of iterations.
     nfev : int
         Simulations done.
     cost : float
         Best cost so far [m].
     parameters : dict of str to float
-        The parameters that gave it, SI.
+        Parameters of the best candidate, SI.
     delay : float
-        The delay that gave it [s].
+        Delay of the best candidate [s].
     """
 
     nit: int
@@ -52,8 +52,8 @@ class Estimate(NamedTuple):
     bounds : (float, float) or None
         Of the search.
     deviation : float or None
-        Standard deviation that the residuals and the sensitivity of the model imply, for
-        independent residuals. Where the model is not exact, the residuals are correlated and
+        Standard deviation from the residuals and the sensitivity of the model (Cramer-Rao bound),
+        for independent residuals. Where the model is not exact, the residuals are correlated and
         the true spread is larger.
     at_bound : bool
         Whether the value lies on a bound.
@@ -69,14 +69,14 @@ class Estimate(NamedTuple):
 
     @property
     def precise(self) -> bool:
-        """Whether the standard deviation is below half of the value, or the value held."""
+        """Whether the standard deviation is below half of the value, or the value is held."""
         if not self.free:
             return True
         return self.deviation is not None and self.deviation < 0.5 * abs(self.value)
 
     @property
     def identified(self) -> bool:
-        """Whether the record determines the value: to better than a half, inside its bounds."""
+        """Whether the record determines the value: `precise`, and not on a bound."""
         return self.precise and not self.at_bound
 
 

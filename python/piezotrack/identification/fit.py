@@ -1,4 +1,4 @@
-"""`identify`: the one entry to identification, for every model."""
+"""`identify`: identification of any model, by a swarm or by least squares."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def identify(
     progress: bool | None = None,
     callback: Callable[[Progress], object] | None = None,
 ) -> Identification:
-    r"""Find the parameters with which a stage model follows a record best.
+    r"""Identify the parameters of a stage model from a record.
 
     Minimises the RMS deviation over the record's window,
 
@@ -52,11 +52,11 @@ def identify(
     model is linear in its weights, by least squares. The warm-up before the window is simulated,
     from rest, and not counted.
 
-    Voltage and displacement determine ratios only: all parameters that carry force, as mass,
-    damping and stiffness, can be multiplied by one number without changing the motion. Where
-    nothing in the call fixes a force, a nominal stiffness of 1e6 N/m is held, and the result says
-    "scale assumed". The drive of a Bouc-Wen oscillator is a force itself; of one that is given in
-    volts, forces come out in volts too.
+    Voltage and displacement determine ratios only: all parameters with the dimension of force, such
+    as mass, damping and stiffness, can be multiplied by one number without changing the motion.
+    Where no argument fixes a force, the stiffness is held at a nominal 1e6 N/m, and the result says
+    "scale assumed". The drive of a Bouc-Wen oscillator is a force; if the record's drive is in
+    volts, forces are in volts too.
 
     Parameters
     ----------
@@ -67,14 +67,16 @@ def identify(
         Name of the model. A swarm searches ``"dahl"`` (`DahlStage`), ``"bouc-wen"``
         (`BoucWenStage`), ``"first-order-dahl"`` (`FirstOrderDahlStage`) and
         ``"bouc-wen-oscillator"`` (`BoucWenOscillator`); least squares find
-        ``"prandtl-ishlinskii"`` (`PrandtlIshlinskiiStage`) and other models of weighted plays. Of
-        what follows, `offset` applies to every model, `least_squares` to the latter only and all
-        else to the former only; an argument that does not apply to the model is refused.
+        ``"prandtl-ishlinskii"`` (`PrandtlIshlinskiiStage`) and
+        ``"generalised-prandtl-ishlinskii"`` (`GeneralisedPrandtlIshlinskiiStage`). Of the
+        arguments below, `offset` applies to every model, `least_squares` to the models found by
+        least squares, and all others to the models that a swarm searches; an argument that does
+        not apply to the model is refused.
     free : iterable of str, optional
-        Parameters to search: all that are not fixed, where not given. `b0`, dry friction at
-        reversals, is held at 0 unless it is named here or in `fixed`; exponents at 1 unless
-        they are in `fixed`, and so the beta of an oscillator, of which the data determine the
-        products with gamma and delta only.
+        Parameters to search; by default all that are not fixed. `b0`, dry friction at reversals,
+        is held at 0 unless it is named here or in `fixed`. Exponents are held at 1 unless they
+        are in `fixed`, and so is the beta of an oscillator: the data determine only its products
+        with gamma and delta.
     fixed : mapping of str to float, optional
         Parameters to hold, SI.
     initial : StepResult, optional
@@ -87,11 +89,12 @@ def identify(
     stiffness : float, optional
         K [N/m] where it is known.
     offset : bool, optional
-        Whether a constant offset of the displacement is fitted with the rest.
+        Whether a constant offset of the displacement is fitted too.
     delay : bool, float or (float, float), optional
-        Delay of the displacement behind the drive [s], as amplifiers and slow readings cause
-        it: none (False, the default), fitted (True), known, or fitted between two bounds. Under
-        one slow sine a delay looks like damping; a drive of several frequencies separates them.
+        Delay of the displacement with respect to the drive [s], as amplifiers and slow sensor
+        readings cause it: none (False, the default), fitted (True), known (a number), or fitted
+        between two bounds. Under one slow sine the effect of a delay is that of damping; a drive
+        of several frequencies separates the two.
     swarm : ParticleSwarm, optional
         Settings of the swarm.
     least_squares : LeastSquares, optional
@@ -101,8 +104,8 @@ def identify(
         threads.
     runs : int, optional
         Number of independent restarts, 4 where not given, each with its own random numbers;
-        different costs at their ends show that the cost has other local minima. They share the
-        lanes of the processor.
+        different final costs show that there are several local minima. The restarts are simulated
+        side by side in the processor's SIMD lanes.
     threads : int, optional
         Up to 256; all cores where it is 0 or not given.
     progress : bool, optional
@@ -121,13 +124,13 @@ def identify(
     ParameterError
         An argument has a value that cannot be used, or does not apply to the model.
     DataError
-        The drive or the displacement is constant in the window, or hysteresis is searched
-        where neither ever reverses; for least squares also where the displacement falls as the
-        drive rises, or the window is too short.
+        The drive or the displacement is constant in the window, or parameters of the hysteresis
+        are searched and neither ever reverses; for least squares also: the displacement falls as
+        the drive rises, or the window is too short.
     NumericalError
         No candidate could be simulated.
     Interrupted
-        Ctrl-C or the callback stopped the search; ``.partial`` has the best so far.
+        Ctrl-C or the callback stopped the search; ``.partial`` has the best result so far.
 
     Examples
     --------

@@ -32,7 +32,7 @@ __all__ = ["IdentifiedModel", "Score", "load"]
 
 @dataclass(frozen=True, kw_only=True)
 class Score:
-    """How far a simulated displacement is from a measured one.
+    """Deviation of a simulated displacement from the measured one.
 
     Attributes
     ----------
@@ -68,25 +68,25 @@ class Score:
 
 @dataclass(frozen=True, kw_only=True)
 class IdentifiedModel:
-    """A stage as identified, with what is needed to use it on a record.
+    """An identified stage, with the offset and delay of its sensor.
 
     Attributes
     ----------
     model : Stage
         The stage.
     offset : float
-        Displacement of the sensor where the stage is at rest without drive [m].
+        Reading of the sensor at rest without drive [m].
     offset_fitted : bool
         Whether the offset was fitted; another record then gets an offset of its own.
     stroke : float
         Stroke of the record identified [m]; percentages refer to it.
     scale_assumed : bool
-        Whether the stiffness is nominal: only ratios of the parameters that carry force are then
-        known.
+        Whether the stiffness is nominal: then only ratios of the parameters with the dimension of
+        force are known.
     delay : float
         Delay of the displacement, in the amplifier or the reading of the sensor [s].
     details : mapping
-        Everything else that is kept in the file: fit, provenance.
+        Other entries of the model file: fit, provenance.
     """
 
     # A stage of any model: each has its own parameters.
@@ -100,7 +100,7 @@ class IdentifiedModel:
 
     @property
     def drive_range(self) -> tuple[float, float] | None:
-        """Lowest and highest drive of the record identified, where the file has them."""
+        """Lowest and highest drive of the record identified; None if the file has none."""
         found = self._record.get("drive_range")
         return (float(found[0]), float(found[1])) if found else None
 
@@ -112,10 +112,10 @@ class IdentifiedModel:
 
     @property
     def free_count(self) -> int | None:
-        """Number of values fitted, the offset with them; None where the file does not say.
+        """Number of values fitted, offset included; None if the file does not have it.
 
-        Thresholds and time constants that are chosen beforehand do not count; a weight that came
-        out as 0 does.
+        Thresholds and time constants chosen beforehand are not counted; a weight that was found
+        to be 0 is.
         """
         found = self.details.get("parameters", {})
         if not any("free" in entry for entry in found.values()):
@@ -125,7 +125,7 @@ class IdentifiedModel:
         return sum(_count(getattr(self.model, name)) for name in free) + delay + self.offset_fitted
 
     def fitted_on(self, data: Dataset) -> bool:
-        """Tell whether a record is the one identified, sample by sample.
+        """Return whether a record is the one identified, sample by sample.
 
         Parameters
         ----------
@@ -140,7 +140,7 @@ class IdentifiedModel:
         return self._record.get("sha256") == data.sha256
 
     def window_on(self, data: Dataset) -> tuple[float, float] | None:
-        """Tell which seconds of a record were fitted, as far as its name shows.
+        """Return which window of a record was fitted, judged by the name of its file.
 
         Parameters
         ----------
@@ -150,7 +150,7 @@ class IdentifiedModel:
         Returns
         -------
         (float, float) or None
-            The window [s] where `data` has a part of it; None where not.
+            The window [s] if it overlaps `data`; None otherwise.
         """
         window = self._record.get("window_s")
         same = data.source is not None and self._record.get("source") == data.source
@@ -170,7 +170,7 @@ class IdentifiedModel:
         Parameters
         ----------
         playback : {"table", "online"}, optional
-            Whether one settled period is repeated from a table, or all is computed.
+            Whether one settled period is repeated from a table, or the whole run is computed.
         settle : int, optional
             Periods before the one of the table.
         initial : StageState, optional
@@ -179,13 +179,13 @@ class IdentifiedModel:
         Returns
         -------
         Inverse
-            For `Controller` or on its own. That of the bare stage is ``model.inverse()``.
+            For `Controller` or on its own. ``model.inverse()`` has no offset and no delay.
         """
-        bare: Inverse = self.model.inverse(playback=playback, settle=settle, initial=initial)
-        return replace(bare, offset=self.offset, delay=self.delay)
+        inverse: Inverse = self.model.inverse(playback=playback, settle=settle, initial=initial)
+        return replace(inverse, offset=self.offset, delay=self.delay)
 
     def displacement(self, u: ArrayLike, dt: float, *, hold: Hold = "foh") -> Array:
-        """Displacement that the sensor shows under a drive, from rest.
+        """Sensor reading under a drive, from rest.
 
         Parameters
         ----------
@@ -215,15 +215,15 @@ class IdentifiedModel:
         offset: float | Literal["own"] = "own",
         initial: StageState | None = None,
     ) -> Response:
-        """Displacement that the model gives under the drive of a record.
+        """Response of the model to the drive of a record.
 
         Parameters
         ----------
         data : Dataset
             The record. Its warm-up is simulated too.
         offset : float or "own", optional
-            Added to the displacement [m]. ``"own"``: the one that fits the record's window
-            best where an offset was fitted, none where not.
+            Added to the displacement [m]. ``"own"``: if an offset was fitted, the one that fits
+            this record's window best, otherwise none.
         initial : StageState, optional
             State at the first sample of the record and its warm-up, such as the `final` of the
             record before it; at rest where it is not given.
@@ -306,8 +306,8 @@ class IdentifiedModel:
         Parameters
         ----------
         path : path-like
-            The file. It is written beside and renamed, so a file that was there stays whole
-            until then.
+            The file. A temporary file is written and renamed, so that an existing file is replaced
+            only when the new one is complete.
 
         Returns
         -------
@@ -321,7 +321,7 @@ class IdentifiedModel:
         ParameterError
             Offset, stroke or delay are not finite numbers.
         """
-        # What load would refuse is refused now, while the fit is still there.
+        # Refuse now what `load` would refuse, while the fit still exists.
         numbers = {"offset": self.offset, "stroke": self.stroke, "delay": self.delay}
         for name, value in numbers.items():
             if not math.isfinite(_core.as_number(name, value)):
@@ -363,5 +363,5 @@ def load(path: str | os.PathLike[str]) -> IdentifiedModel:
 
 
 def _count(value: object) -> int:
-    """Numbers in a parameter: several of a list, none of one that is left out."""
+    """Return how many numbers a parameter has: several for a list, 0 for one that is None."""
     return len(value) if isinstance(value, tuple) else int(value is not None)

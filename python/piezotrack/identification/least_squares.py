@@ -1,4 +1,4 @@
-"""Identification by least squares: of models that are linear in the weights of their plays."""
+"""Identification by least squares, for models that are linear in the weights of their plays."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ CHOSEN = ("thresholds", "dead_zone_thresholds", "creep_times")
 class LeastSquares:
     """Settings of an identification by least squares.
 
-    Weights of plays, dead zones and creep and the offset are found by Gauss and Newton's method,
-    whose steps are non-negative least squares (Lawson and Hanson 1974); without dead zones and
-    creep a single step solves the problem, as in Kuhnen 2003, doi 10.3166/ejc.9.407-418. A time
-    constant, or the frequency and damping of a mode, is searched by golden section. Nothing is
-    random.
+    The weights of plays, dead zones and creep and the offset are found by the Gauss-Newton method,
+    each step of which is a non-negative least-squares problem (Lawson and Hanson 1974); without
+    dead zones and creep a single step solves the problem, as in Kuhnen 2003, doi
+    10.3166/ejc.9.407-418. A time constant, or the frequency and damping of a mode, is searched by
+    golden section. Nothing is random.
 
     Parameters
     ----------
@@ -50,8 +50,8 @@ class LeastSquares:
         Time constants of the creep [s]; True stands for the powers of ten between five samples
         and half of the window.
     dynamics : {"first", "second"} or None, optional
-        A first-order lag, which also stands for a delayed reading; a mode, between a fiftieth and
-        a half of the sampling rate; or none.
+        ``"first"``: a first-order lag, which also approximates a delayed reading. ``"second"``: a
+        mode, with a frequency between a fiftieth and a half of the sampling rate. None: neither.
 
     Raises
     ------
@@ -139,14 +139,14 @@ def solve_least_squares(
     info : ModelInfo
         The model.
     settings : LeastSquares
-        Number of weights and kind of dynamics.
+        Settings.
     offset : bool
         Whether an offset of the sensor is fitted.
 
     Returns
     -------
     Identification
-        The stage and how well it follows.
+        The stage, and the residual of the fit.
 
     Raises
     ------

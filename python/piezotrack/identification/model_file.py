@@ -1,4 +1,4 @@
-"""Model files: identified models as JSON, with a sentence for what is wrong in a file."""
+"""Model files: identified models as JSON, and the errors of files that cannot be read."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ OWN = {
     "stroke",
     "delay",
 }
-# What the file keeps of a parameter besides the fit's remarks on it.
+# Entries of a parameter that are not details of the fit.
 FACTS = ("value", "unit", "symbol")
 
 
@@ -127,19 +127,19 @@ def read_model(path: str | os.PathLike[str]) -> dict[str, Any]:
             "stroke": file_number("stroke", document["stroke"], "m", above=0.0),
             "delay": file_number("delay", delay, "s", least=0.0),
             "details": {
-                "parameters": {key: _remarks(entry) for key, entry in parameters.items()},
-                "delay": _remarks(delay),
+                "parameters": {key: _fit_details(entry) for key, entry in parameters.items()},
+                "delay": _fit_details(delay),
                 **{key: value for key, value in document.items() if key not in OWN},
             },
         }
 
 
-def _remarks(entry: Mapping[str, Any]) -> dict[str, Any]:
+def _fit_details(entry: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in entry.items() if key not in FACTS}
 
 
 def _from_version_1(document: dict[str, Any], *, searched: bool) -> None:
-    """Bring the content of a file of version 1 to that of this version."""
+    """Convert the content of a file of version 1 to that of this version."""
     # Files of the first models have no delay.
     document.setdefault("delay", {"value": 0.0, "unit": "s"})
     if searched:
@@ -183,7 +183,7 @@ def read_document(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
     except OSError as error:
         raise DataError(f"{file.name}: {(error.strerror or str(error)).lower()}") from None
     except RecursionError:
-        raise DataError(f"{file.name} is not a piezotrack model: it is nested too deep") from None
+        raise DataError(f"{file.name} is not a piezotrack model: nested too deep") from None
     except UnicodeDecodeError:
         raise DataError(f"{file.name} is not a text file: expected a model in JSON") from None
     except json.JSONDecodeError as error:
@@ -203,7 +203,7 @@ def read_document(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
 
 @contextmanager
 def entries_of(name: str) -> Iterator[None]:
-    """Say of which file an entry is missing or not as `save` writes it."""
+    """Name the file in errors about a missing or malformed entry."""
     try:
         yield
     except KeyError as error:
@@ -215,7 +215,7 @@ def entries_of(name: str) -> Iterator[None]:
 
 
 def provenance(data: Dataset, **settings: Any) -> dict[str, Any]:
-    """Say in a file which version and which record a model comes from, and how."""
+    """Entries of a file on the origin of a model: version, record and settings."""
     return {
         "package": "piezotrack",
         "version": _core.__version__,

@@ -33,7 +33,7 @@ __all__ = [
     "plot_time",
 ]
 
-# Told apart in black and white as well, also where many cycles lie on each other.
+# Distinct in black and white too, also where many cycles overlap.
 SIMULATED: dict[str, Any] = {"color": "#b3400a", "linewidth": 1.0, "label": "simulated"}
 ERROR: dict[str, Any] = {"color": "#1b6ca8", "linewidth": 0.8}
 
@@ -137,7 +137,7 @@ def plot_convergence(fit: Identification, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     fit : Identification
-        What a search found.
+        Result of a search.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure where not given.
 
@@ -147,7 +147,7 @@ def plot_convergence(fit: Identification, ax: Axes | None = None) -> Axes:
         The axes drawn on.
     """
     (ax,) = axes_or_new(ax, 1)
-    # Nothing is left to draw on a logarithmic scale where a fit is exact.
+    # A cost of 0 has no place on a logarithmic scale.
     finite = np.isfinite(fit.history) & (fit.history > 0.0)
     iterations = np.arange(fit.history.size)[finite]
     ax.plot(iterations, 1e6 * fit.history[finite], color="#1b6ca8", linewidth=1.4)
@@ -160,7 +160,7 @@ def plot_convergence(fit: Identification, ax: Axes | None = None) -> Axes:
     caption = f"{1e6 * fit.history[-1]:.4g} um after {fit.nit} iterations,\n{fit.nfev} simulations"
     if fit.npolish and fit.cost > 0.0:
         ax.plot(fit.nit, fit.cost_um, "o", color="#b3400a", markersize=5)
-        caption += f";\npolished to {fit.cost_um:.4g} um"
+        caption += f";\n{fit.cost_um:.4g} um after local refinement"
     ax.annotate(
         caption,
         (0.97, 0.93),
@@ -199,7 +199,7 @@ def plot_response(t: Array, u: Array, x: Array) -> Figure:
 
 
 def plot_identification(fit: Identification, data: Dataset | None = None) -> Figure:
-    """Put loop, displacement and error on one sheet, and convergence where a swarm searched.
+    """Draw loop, displacement, error and, after a swarm search, convergence in one figure.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["save_identification", "summary_text"]
 
-# SI units that a person reads in micrometres, and the factor.
+# SI units that tables show in micrometres, and the factor.
 SHOWN_UNITS = {"m": ("um", 1e6), "m/V": ("um/V", 1e6)}
 
 
@@ -28,7 +28,7 @@ def summary_text(fit: Identification) -> str:
     Parameters
     ----------
     fit : Identification
-        What an identification found.
+        Result of an identification.
 
     Returns
     -------
@@ -59,8 +59,8 @@ def _estimates(fit: Identification) -> list[str]:
     if fit.scale_assumed:
         lines += [
             f"parameters, scale assumed: K = {fit.model.stiffness:g} N/m is nominal. Voltage and",
-            "displacement determine no force; with the true stiffness=, "
-            f"{fit.model.info.force_symbols} scale along.",
+            "displacement do not determine forces; the true stiffness= would scale "
+            f"{fit.model.info.force_symbols}.",
         ]
     else:
         lines.append("parameters")
@@ -70,7 +70,7 @@ def _estimates(fit: Identification) -> list[str]:
     if unclear := [n for n, e in fit.parameters.items() if not e.identified]:
         lines += ["", "Not determined by this record: " + ", ".join(unclear) + "."]
     if fit.nfail:
-        lines += ["", f"{fit.nfail} simulations did not stay finite and counted as infinitely bad."]
+        lines += ["", f"{fit.nfail} simulations diverged; their cost counted as infinite."]
     return lines
 
 
@@ -110,7 +110,9 @@ def _scaled(fit: Identification, one: Parameter) -> list[float]:
 def _runs(fit: Identification) -> list[str]:
     """Say whether several runs agree."""
     if len(fit.runs) == 1:
-        return ["      one run: several, runs=4, would show whether other local minima exist"]
+        return [
+            "      one run: several, as runs=4, would show whether there are other local minima"
+        ]
     costs = ", ".join(f"{1e6 * cost:.4g}" for cost in sorted(run.cost for run in fit.runs)[:4])
     more = ", ..." if len(fit.runs) > 4 else ""
     verdict = f"{fit.agreeing} of {len(fit.runs)} runs end within 0.1 % of the best"
@@ -118,33 +120,33 @@ def _runs(fit: Identification) -> list[str]:
 
 
 def _known(fit: Identification) -> list[str]:
-    """List what the data determine, whatever the scale of the forces, and what they do not."""
+    """List the quantities that the data determine at any scale of the forces, and the others."""
     ratios = _ratios(fit)
     if "delay" in fit.parameters:
         ratios.append(("delay", "delay", 1e3 * fit.delay, "ms"))
-    # A ratio to a stiffness that was searched is known where both are; a stiffness on its bound
-    # makes the others uncertain.
+    # A ratio to a stiffness that was searched is determined where both are; a stiffness on its
+    # bound makes the others uncertain.
     whole = fit.parameters["stiffness"]
     known: list[tuple[str, str]] = []
     unknown: list[tuple[str, str]] = []
     for name, symbol, value, unit in ratios:
         estimate = fit.parameters[name]
-        alone = "/" not in symbol
-        held = not estimate.free and (not whole.free or alone)
-        sure = estimate.identified and (whole.precise or alone)
+        no_ratio = "/" not in symbol
+        held = not estimate.free and (not whole.free or no_ratio)
+        sure = estimate.identified and (whole.precise or no_ratio)
         if not held:
             (known if sure else unknown).append((symbol, f"{value:>12.6g}  {unit}"))
-    lines = ["determined by the data" if known else "nothing is determined by these data"]
+    lines = ["determined by the data" if known else "the data determine no parameter"]
     lines += [f"  {symbol:<10} {text}" for symbol, text in known]
     if unknown:
-        lines.append("not determined by them: " + ", ".join(symbol for symbol, _ in unknown))
+        lines.append("not determined: " + ", ".join(symbol for symbol, _ in unknown))
     return lines
 
 
 def _ratios(fit: Identification) -> list[tuple[str, str, float, str]]:
     """Parameter, symbol, value and unit of what does not depend on the scale of the forces."""
     ratios = fit.model.force_ratios()
-    # Friction that was neither searched nor there is not worth a line.
+    # Friction that is 0 and was not searched is left out.
     return [r for r in ratios if r[0] != "b0" or fit.parameters["b0"].free or r[2]]
 
 
@@ -154,7 +156,7 @@ def _row(name: str, estimate: Estimate, width: int) -> str:
     elif estimate.deviation is None:
         note = "unknown"
     elif not math.isfinite(estimate.deviation):
-        note = "no trace in the data"
+        note = "no effect on the data"
     else:
         share = 100 * estimate.deviation / abs(estimate.value) if estimate.value else math.inf
         digits = f"{share:.2g}" if share < 10 else f"{share:.0f}"
@@ -178,19 +180,19 @@ def save_identification(
     Parameters
     ----------
     fit : Identification
-        What an identification found.
+        Result of an identification.
     folder : path-like
-        Where to; made where it is missing.
+        Folder to write to; created if it does not exist.
     name : str, optional
-        Beginning of the names of the files; that of the model where it is not given.
+        Beginning of the file names; by default the name of the model.
     shown : Dataset, optional
         A longer record that the pictures show, with the end of the fit marked.
 
     Returns
     -------
     list of pathlib.Path
-        ``{name}.json``, and as PNG and SVG ``{name}_loop``, ``{name}_time`` and, where a swarm
-        searched, ``{name}_convergence``.
+        ``{name}.json``, and as PNG and SVG ``{name}_loop``, ``{name}_time`` and, after a swarm
+        search, ``{name}_convergence``.
     """
     from .plot import plot_convergence, plot_loop, plot_time
 

@@ -1,4 +1,4 @@
-"""The result of an identification: the model, the record, and how the fit ended."""
+"""The result of an identification: model, record, cost and settings."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ __all__ = ["Identification"]
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Identification(IdentifiedModel):
-    """What an identification found; see `IdentifiedModel` for its use.
+    """Result of an identification; see `IdentifiedModel` for its use.
 
-    A swarm fills all attributes but `least_squares` and `at_bound`, least squares those two and
-    the first three.
+    After a swarm search all attributes but `least_squares` and `at_bound` are set; after a fit by
+    least squares these two, and the first four.
 
     Attributes
     ----------
@@ -44,20 +44,20 @@ class Identification(IdentifiedModel):
     nfev : int
         Simulations of the record, of all runs.
     stop_reason : {"stalled", "iterations", "interrupted", "solved"}
-        Why the fit ended; the last of least squares.
+        Why the fit ended; ``"solved"`` after least squares.
     parameters : dict of str to Estimate
-        The parameters with units, bounds and standard deviations; the delay with them where it
-        was fitted. Empty of least squares.
+        The parameters with units, bounds and standard deviations; and the delay where it
+        was fitted. Empty after least squares.
     history : ndarray, shape (nit + 1,)
         Best cost after each iteration of the swarm [m].
     nit : int
         Iterations of the swarm that found the best candidate.
     nfail : int
-        Simulations that did not stay finite.
+        Simulations that diverged.
     npolish : int
-        Simulations of the local refinement after that swarm; `history` is the swarm's alone.
+        Simulations of the local refinement after that swarm, which `history` does not include.
     runs : tuple of SwarmRun
-        The independent restarts; the rest is of the best of them.
+        The independent restarts; the other attributes are those of the best one.
     substeps, order : int
         Steps of the integrator in each sampling interval and their order, fixed for the search.
     seed : int or None
@@ -67,7 +67,7 @@ class Identification(IdentifiedModel):
     least_squares : LeastSquares or None
         Settings of the least squares.
     at_bound : bool
-        Whether a time constant or a frequency lies on the edge of the range searched.
+        Whether a time constant or a frequency lies on a bound of its range.
     """
 
     data: Dataset
@@ -110,7 +110,7 @@ class Identification(IdentifiedModel):
 
     @cached_property
     def fitted(self) -> Score:
-        """Score on the record that was identified, converged in the sub-steps."""
+        """Score on the record that was identified, simulated with converged sub-steps."""
         return self.score(self.data, offset=self.offset)
 
     @cached_property
@@ -120,12 +120,13 @@ class Identification(IdentifiedModel):
 
     @property
     def notes(self) -> list[str]:
-        """Remarks on the record and on the fit that limit the use of the result."""
+        """Warnings about the record and the fit, one sentence each."""
         info, data = self.model.info, self.data
         notes = diagnostics.record_warnings(data)
         if self.cost_percent > 5.0:
             notes.append(
-                f"the model does not follow this record: {self.cost_percent:.3g} % of stroke remain"
+                "the model does not fit this record: the residual is "
+                f"{self.cost_percent:.3g} % of stroke"
             )
         if self.cost_percent > diagnostics.REMAINS:
             held = [name for name, estimate in self.parameters.items() if not estimate.free]
@@ -133,14 +134,15 @@ class Identification(IdentifiedModel):
                 data, self._response.x, self.cost_percent, info.hysteresis, held
             )
         if info.drive_unit == "N" and data.drive_unit != "N":
-            notes.append(f"the drive is in {data.drive_unit}: forces are in it too, not in N")
+            unit = data.drive_unit
+            notes.append(f"the drive is in {unit}: forces are in {unit} too, not in N")
         notes += self.model._notes(lambda: self._response)
         if self.at_bound:
             notes.append(
-                "the record does not determine the dynamics: they lie on the edge of the search"
+                "the record does not determine the dynamics: time constant or mode lies on a bound"
             )
         if len(self.runs) > 1 and self.agreeing == 1:
-            notes.append("no other run ended where the best one did: try more, with runs=")
+            notes.append("no other restart ended in the minimum of the best one: increase runs=")
         return notes
 
     @property
@@ -154,7 +156,7 @@ class Identification(IdentifiedModel):
 
     @property
     def success(self) -> bool:
-        """Whether the fit ended by itself."""
+        """Whether the fit was not interrupted."""
         return self.stop_reason != "interrupted"
 
     @property
@@ -175,7 +177,7 @@ class Identification(IdentifiedModel):
         Returns
         -------
         str
-            Several lines: the cost, what the data determine, the parameters.
+            Several lines: the cost, the ratios that the data determine, the parameters.
         """
         from .report import summary_text
 
@@ -187,7 +189,7 @@ class Identification(IdentifiedModel):
         Parameters
         ----------
         data : Dataset, optional
-            Another record to show the model on.
+            Another record, on which the model is shown.
 
         Returns
         -------

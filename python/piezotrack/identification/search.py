@@ -1,4 +1,4 @@
-"""Identification by a particle swarm that searches the parameters of a stage model."""
+"""Identification of a stage model by a particle swarm."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ def search(
     offset : bool
         Whether an offset of the sensor is fitted.
     free, fixed, initial, bounds, stiffness, delay, swarm, seed, runs, threads, progress, callback
-        As for `identify`, not yet checked; the default of each where it is None.
+        As for `identify`, not yet checked; None stands for the default.
 
     Returns
     -------
     Identification
-        The best candidate.
+        Result with the best candidate.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def search(
 
 
 def _reporting(info: ModelInfo, callback: Callable[[Progress], object]) -> Callable[..., bool]:
-    """Call back with a `Progress` where the core has plain numbers."""
+    """Convert the core's plain numbers to a `Progress` for the callback."""
     names = [one.name for one in info.parameters]
 
     def report(nit: int, most: int, nfev: int, cost: float, theta: list[float]) -> bool:
@@ -129,7 +129,7 @@ def _names(free: object) -> list[str] | None:
 
 
 def _held(initial: object, fixed: object, free: object, bounds: object) -> dict[str, float]:
-    """Merge what is held: by a step response, unless the call names the parameter, and by name."""
+    """Return the parameters held: by `fixed`, and by a step response where not named elsewhere."""
     given = {name: _core.as_number(name, value) for name, value in _items("fixed", fixed)}
     if initial is None:
         return given
@@ -142,7 +142,7 @@ def _held(initial: object, fixed: object, free: object, bounds: object) -> dict[
 
 
 def _items(argument: str, mapping: object) -> list[tuple[str, Any]]:
-    """Check that an argument maps names of parameters to something."""
+    """Check that an argument is a mapping, and return its entries."""
     if mapping is None:
         return []
     if not isinstance(mapping, Mapping):
@@ -163,7 +163,7 @@ def _pair(name: str, pair: object) -> tuple[float, float]:
 
 
 def _delay(delay: object) -> tuple[float, float] | None:
-    """Bounds of the delay; none where the core chooses them, equal ones where it is known."""
+    """Bounds of the delay: None if the core chooses them, equal ones if it is known."""
     if isinstance(delay, bool):
         return None if delay else (0.0, 0.0)
     if isinstance(delay, Iterable) and not isinstance(delay, str):

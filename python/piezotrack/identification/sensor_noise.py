@@ -1,4 +1,4 @@
-"""A sensor's noise, from a record at rest."""
+"""Noise of a sensor, from a record at rest."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ if TYPE_CHECKING:
 
 __all__ = ["Noise", "identify_noise"]
 
-# Displacement and drive this alike are no noise.
+# Correlation of displacement and drive above which a record is not one at rest.
 FOLLOWS = 0.5
-# Turns that the noise model's bandwidth must make in a record to be noise [1].
+# Smallest product of bandwidth and duration for which the fluctuations count as noise.
 SLOWEST = 10.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Noise:
-    r"""What a sensor shows at rest, and a model of it.
+    r"""Noise of a sensor at rest, and a model of it.
 
-    White noise through a first-order low-pass, rounded to steps: the one-sided spectral density
-    at interval dt, with :math:`r = e^{-2 \pi f_b \, dt}`, is
+    The model is white noise through a first-order low-pass, quantised: the one-sided spectral
+    density at interval dt, with :math:`r = e^{-2 \pi f_b \, dt}`, is
 
     .. math:: S(f) = 2 \, dt \left(\sigma^2 \frac{1 - r^2}{1 + r^2 - 2 r \cos 2 \pi f \, dt}
         + \frac{q^2}{12}\right)
@@ -44,17 +44,16 @@ class Noise:
     data : Dataset
         The record.
     spread : ErrorStatistics
-        Of the record about its drift [m]; its `sd_error` is what Xu and Li 2010 call the
-        rms of the noise.
+        Statistics of the record about its drift [m]; its `sd_error` is what Xu and Li 2010 call
+        the rms of the noise.
     drift : float
-        How far the cubic goes that is taken for creep and drift [m], highest less lowest.
+        Range of the cubic that is removed as creep and drift [m].
     resolution : float
-        Smallest step q of the readings [m]; 0 where they are on no grid.
+        Quantisation step q of the readings [m]; 0 if none is found.
     levels : int
-        Different readings.
+        Number of distinct readings.
     noise, bandwidth : float
-        The sensor's own sigma, before rounding [m rms], and its bandwidth [Hz]; infinite for
-        white noise.
+        Sigma before quantisation [m rms], and bandwidth [Hz], infinite for white noise.
     bandwidth_sd : float or None
         Standard deviation of the bandwidth [Hz]; None for white noise.
     """
@@ -73,16 +72,16 @@ class Noise:
 
     @property
     def rms(self) -> float:
-        """Of the record about its drift [m], steps included."""
+        """Rms of the record about its drift [m], quantisation included."""
         return self.spread.sd_error
 
     def of_stage(self, stage: VirtualStage) -> VirtualStage:
-        """Give a virtual stage this sensor.
+        """Return a virtual stage with this sensor.
 
         Parameters
         ----------
         stage : VirtualStage
-            Any.
+            The stage.
 
         Returns
         -------
@@ -132,12 +131,12 @@ class Noise:
 
     @property
     def notes(self) -> list[str]:
-        """What a careful reader should know before using the figures."""
+        """Warnings about the record, one sentence each."""
         if self.bandwidth_sd is None or self.bandwidth * self.data.duration >= SLOWEST:
             return []
         return [
-            f"what moves here is slower than noise, {self.bandwidth:.3g} Hz in a record of "
-            f"{self.data.duration:.4g} s: was the stage at rest?"
+            f"the fluctuations are slower than sensor noise, {self.bandwidth:.3g} Hz in a record "
+            f"of {self.data.duration:.4g} s: was the stage at rest?"
         ]
 
     def summary(self) -> str:
@@ -180,17 +179,17 @@ class Noise:
 
 
 def identify_noise(log: Dataset) -> Noise:
-    """Find a sensor's noise in a record at rest.
+    """Identify the noise of a sensor from a record at rest.
 
-    A cubic is taken off, as creep makes it. The step is that of which all readings are whole
-    multiples apart; its rounding is white and adds ``step^2 / 12`` to the variance (Widrow 1956,
-    doi 10.1109/TCT.1956.1086334), which holds for a noise above half a step. The bandwidth follows
-    from the correlation of what is left from sample to sample.
+    A cubic in time is removed as creep and drift. The quantisation step is the largest of which all
+    differences of readings are whole multiples; its rounding error is white and adds
+    ``step^2 / 12`` to the variance (Widrow 1956, doi 10.1109/TCT.1956.1086334), which holds for a
+    noise above half a step. The bandwidth follows from the autocorrelation of the rest.
 
     Parameters
     ----------
     log : Dataset
-        A record in which nothing moves, of 100 samples or more; its window counts.
+        A record at rest, of 100 samples or more; its window is used.
 
     Returns
     -------
@@ -200,9 +199,9 @@ def identify_noise(log: Dataset) -> Noise:
     Raises
     ------
     ParameterError
-        `log` is something else.
+        `log` is not a Dataset.
     ShapeError, DataError
-        The record is too short, or no noise shows in it.
+        The record is too short, or shows no noise.
 
     Examples
     --------

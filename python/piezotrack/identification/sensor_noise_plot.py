@@ -34,7 +34,7 @@ def plot_noise(noise: Noise) -> Figure:
     figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.4), layout="constrained")
     data = noise.data
     unit, scale = best_length_unit(noise.spread.peak_to_peak)
-    # Enough to see the course, few enough to tell the steps.
+    # Long enough for the trend, short enough to resolve the steps.
     shown = slice(0, min(len(data), 400))
     time = data.t[shown] - data.t[0]
     left.step(1e3 * time, scale * (data.y[shown] - data.y[shown].mean()), where="post", color="C0",

@@ -50,7 +50,7 @@ def plot_step(step: StepResult, ax: Axes | None = None) -> Axes:
     Raises
     ------
     ParameterError
-        The readings were typed in.
+        The readings were entered by hand.
     """
     trace, (ax,) = _trace(step), axes_or_new(ax, 1)
     read = step.readings
@@ -88,7 +88,7 @@ def plot_step(step: StepResult, ax: Axes | None = None) -> Axes:
 
 
 def plot_spectrum(step: StepResult, ax: Axes | None = None) -> Axes:
-    """Draw the gain over the frequency, with the resonance and the gain at standstill.
+    """Draw the gain over the frequency, with the resonance and the static gain.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def plot_spectrum(step: StepResult, ax: Axes | None = None) -> Axes:
     Raises
     ------
     ParameterError
-        The readings were typed in.
+        The readings were entered by hand.
     """
     trace, (ax,) = _trace(step), axes_or_new(ax, 1)
     read = step.readings
@@ -167,7 +167,7 @@ def plot_step_result(step: StepResult) -> Figure:
     Raises
     ------
     ParameterError
-        The readings were typed in.
+        The readings were entered by hand.
     """
     import matplotlib.pyplot as plt
 
@@ -180,5 +180,5 @@ def plot_step_result(step: StepResult) -> Figure:
 
 def _trace(step: StepResult) -> StepTrace:
     if step.trace is None:
-        raise ParameterError("the readings were typed in: expected a record, to have what to draw")
+        raise ParameterError("the readings were entered by hand: expected a record to draw")
     return step.trace

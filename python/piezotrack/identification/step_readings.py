@@ -1,4 +1,4 @@
-"""Readings of a step response, found in a record or typed in."""
+"""Readings of a step response, found in a record or entered by hand."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ __all__ = ["StepReadings"]
 
 @dataclass(frozen=True, kw_only=True)
 class StepReadings:
-    """Readings of a step response, typed in or found by `identify_step`.
+    """Readings of a step response, entered by hand or found by `identify_step`.
 
     Parameters
     ----------
     voltage : float
         Height of the step [V].
     steady_state : float
-        Displacement in the end, from rest [m].
+        Steady displacement, from rest [m].
     peaks : sequence of float
-        Displacement at two or more overshoot peaks, one after the other, from rest [m].
+        Displacement at two or more consecutive overshoot peaks, from rest [m].
     period : float
         Td, period of the damped oscillation [s].
     frequency : float
-        Of the resonance in the spectrum [Hz].
+        Resonance frequency in the spectrum [Hz].
     static_gain, resonance_gain : float
-        Gain at standstill and at the resonance [m/V].
+        Static gain, and gain at the resonance [m/V].
     initial_slope : float, optional
-        S0, slope with which the response begins. A stage with mass begins with none.
+        S0, slope at the beginning of the response; 0 for a stage with mass.
 
     Raises
     ------
     ParameterError
-        A number is not one, is out of its range, or the peaks do not fall.
+        A value is not a number or is out of its range, or the peaks do not decrease.
 
     Examples
     --------
@@ -113,13 +113,13 @@ class StepReadings:
         voltage : float
             Height of the step [V].
         steady_state : float
-            Displacement in the end [um].
+            Steady displacement, from rest [um].
         peaks : sequence of float
             Displacement at the overshoot peaks [um].
         period : float
             Period of the damped oscillation [s].
         frequency : float
-            Of the resonance [Hz].
+            Resonance frequency [Hz].
         static_gain, resonance_gain : float
             Gains [um/V].
 

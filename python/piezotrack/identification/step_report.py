@@ -26,7 +26,7 @@ def step_text(step: StepResult) -> str:
     read, trace = step.readings, step.trace
     peaks = ", ".join(f"{1e6 * peak:.4f}" for peak in read.peaks[:4])
     more = f", ... ({len(read.peaks)} of them)" if len(read.peaks) > 4 else ""
-    where = "readings typed in"
+    where = "readings entered by hand"
     if trace is not None:
         where = f"{trace.data.source or 'a record'}, step at {trace.step_time:.4g} s"
     unit = "V" if trace is None else trace.data.drive_unit
@@ -34,7 +34,7 @@ def step_text(step: StepResult) -> str:
         f"Step response of {where}: {read.voltage:.4g} {unit}",
         *(f"note  {note}" for note in step.notes),
         "",
-        "read off",
+        "readings",
         _row("steady state", f"{1e6 * read.steady_state:.4f}", "um"),
         _row("overshoot peaks", peaks + more, "um"),
         _row("overshoot ratio", f"{100 * step.overshoot_ratio:.1f}", "% of the steady state"),
@@ -43,7 +43,7 @@ def step_text(step: StepResult) -> str:
         _row(
             "gains",
             f"{1e6 * read.static_gain:.4f}, {1e6 * read.resonance_gain:.4f}",
-            "um/V, at standstill and at the resonance",
+            "um/V, static and at the resonance",
         ),
         "",
         "the mode",
@@ -60,7 +60,7 @@ def step_text(step: StepResult) -> str:
     ratio = step.ratios
     lines += [
         "",
-        "ratios that any step determines",
+        "ratios that one step determines",
         _row("K/M", f"{ratio['K/M']:.5g}", "1/s^2"),
         _row("D/M", f"{ratio['D/M']:.5g}", "1/s"),
         _row("T/K", f"{1e6 * ratio['T/K']:.5g}", "um/V"),
@@ -73,7 +73,7 @@ def step_text(step: StepResult) -> str:
 
 
 def _absolute(step: StepResult) -> list[str]:
-    """List mass, damping, stiffness and piezo coefficient, or what would fix them."""
+    """List mass, damping, stiffness and piezo coefficient, or how to fix their scale."""
     values = (
         ("K", step.stiffness, "N/m"),
         ("T", step.piezo_coefficient, "N/V"),
@@ -83,8 +83,8 @@ def _absolute(step: StepResult) -> list[str]:
     known = [(name, value, unit) for name, value, unit in values if value is not None]
     if not known:
         return [
-            "K, T, M and D are not fixed by one step: a known stiffness or mass, or a second",
-            "static level with b1 as the scale, would do that.",
+            "One step does not determine K, T, M and D: give a known stiffness or mass, or a",
+            "second static level with b1 as the scale.",
         ]
     return [
         f"with {step.scale}",

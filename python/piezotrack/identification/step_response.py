@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["StepResult", "StepTrace", "identify_step"]
 
-# How far the two damping ratios may be apart before it is worth a note.
+# Relative difference of the two damping ratios above which there is a note.
 APART = 0.15
 # Above this zeta, (4) and (5), which are for small damping, are off by more than 2 %.
 STRONG = 0.15
@@ -31,7 +31,7 @@ SETTLED = 4.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StepTrace:
-    """What a record shows of a step, beside the readings.
+    """Details of a step in a record, besides the readings.
 
     Attributes
     ----------
@@ -40,21 +40,21 @@ class StepTrace:
     step_time : float
         Time of the last sample before the step [s].
     end_time : float
-        Time of the last sample that was read [s].
+        Time of the last sample used [s].
     rest : float
         Displacement before the step [m].
     peak_times : tuple of float
         Times of the peaks [s].
     noise : float
-        Of the displacement [m rms].
+        Noise of the displacement [m rms].
     samples_before : int
         Samples before the step.
     cut : bool
-        Whether the drive moves again behind what was read.
+        Whether the drive changes again after `end_time`.
     decays : float
-        How many time constants of the ringing were read.
+        Length of the part used, in time constants of the ringing.
     creep : float
-        By how much the displacement goes on behind the time of the steady state [m].
+        Change of the displacement after the time of the steady state [m].
     frequencies, gains : ndarray
         Spectrum [Hz], [m/V].
     """
@@ -91,15 +91,15 @@ class StepResult:
     Attributes
     ----------
     readings : StepReadings
-        What the rest follows from.
+        The readings from which all else is computed.
     trace : StepTrace or None
-        Where in a record they were read; None where they were typed in.
+        Details of the record they were read from; None if they were entered by hand.
     stiffness, mass : float or None
-        K [N/m], M [kg]; None where nothing fixes a force.
+        K [N/m], M [kg]; None if no argument fixes the scale of the forces.
     piezo_coefficient, damping : float or None
         T [N/V], D [N s/m], likewise.
     scale : str
-        What fixes the forces, in words.
+        What fixes the scale of the forces, in words.
 
     Notes
     -----
@@ -166,9 +166,9 @@ class StepResult:
 
     @property
     def ratios(self) -> dict[str, float]:
-        """What any step determines: K/M [1/s^2], D/M [1/s] and T/K [m/V], of equation (3).
+        """Ratios that one step determines: K/M [1/s^2], D/M [1/s] and T/K [m/V], of equation (3).
 
-        T/K is the gain at standstill, with what hysteresis takes off in it.
+        T/K is the static gain, reduced by the hysteresis.
         """
         wn = self.natural_angular_frequency
         gain = self.readings.steady_state / self.readings.voltage
@@ -176,7 +176,7 @@ class StepResult:
 
     @property
     def model(self) -> DahlStage | None:
-        """The stage with these parameters; None where nothing fixes a force."""
+        """The stage with these parameters; None if nothing fixes the scale of the forces."""
         parts = (self.mass, self.damping, self.stiffness, self.piezo_coefficient)
         if any(part is None for part in parts):
             return None
@@ -200,17 +200,18 @@ class StepResult:
 
     @property
     def notes(self) -> list[str]:
-        """Remarks on the record and the readings that limit the use of the result."""
+        """Warnings about the record and the readings, one sentence each."""
         notes = [] if self.trace is None else self._of_the_record(self.trace)
         gains, decay = self.damping_ratio, self.damping_by_decrement
         if not abs(gains - decay) <= APART * max(gains, decay):
             notes.append(
                 f"the two damping ratios differ, {gains:.3g} by the gains and {decay:.3g} by the "
-                "decrement: an amplifier that lags, a second mode or a reading is behind that"
+                "decrement: possible causes are a lag of the amplifier, a second mode or a wrong "
+                "reading"
             )
         if max(gains, decay) > STRONG:
             notes.append(
-                "(4) and (5) are for small damping: take the damping ratio by the decrement"
+                "(4) and (5) are for small damping: use the damping ratio by the decrement"
             )
         ringing = 1.0 / self.readings.period
         if not abs(ringing / self.readings.frequency - 1.0) <= 0.05:
@@ -231,16 +232,17 @@ class StepResult:
                 "ringing has died out: the damping ratio by the gains is too high"
             )
         if len(trace.peak_times) < 3:
-            notes.append("only two peaks stand out: the decrement rests on them alone")
+            notes.append("only two peaks are above the noise: the decrement is that of these two")
         if trace.samples_before < 10:
             notes.append(
-                f"only {trace.samples_before} samples before the step tell where it was at rest"
+                "the position at rest is the mean of only "
+                f"{trace.samples_before} samples before the step"
             )
         if trace.cut:
-            notes.append(f"read up to {trace.end_time:.4g} s, where the drive moves again")
+            notes.append(f"read up to {trace.end_time:.4g} s, where the drive changes again")
         if abs(trace.creep) > max(0.005 * abs(self.readings.steady_state), 2.0 * trace.noise):
             notes.append(
-                f"the displacement creeps on by {1e6 * trace.creep:.3g} um after it has settled"
+                f"the displacement creeps by {1e6 * trace.creep:.3g} um after the ringing settled"
             )
         return notes
 
@@ -250,7 +252,7 @@ class StepResult:
         Returns
         -------
         str
-            Several lines: the readings, what follows from them, what they leave open.
+            Several lines: the readings, the parameters, and what remains undetermined.
         """
         from .step_report import step_text
 
@@ -267,7 +269,7 @@ class StepResult:
         Raises
         ------
         ParameterError
-            The readings were typed in: there is no record to draw.
+            The readings were entered by hand: there is no record to draw.
         """
         from .step_plot import plot_step_result
 
@@ -283,36 +285,37 @@ def identify_step(
 ) -> StepResult:
     r"""Identify a stage from its step response, by the conventional method.
 
-    The jump of the drive, the steady state, the overshoot peaks and the period of the ringing
-    are read off the record. The natural frequency is the highest point of the gain, which is the
-    Fourier transform of the displacement's changes over that of the drive's. `StepResult` has
+    The step of the drive, the steady state, the overshoot peaks and the period of the ringing
+    are read from the record. The natural frequency is that of the highest gain: the Fourier
+    transform of the displacement's increments over that of the drive's. `StepResult` has
     the formulas.
 
     One step determines K/M, D/M and T/K only. A force is fixed by one of:
 
     - `stiffness` or `mass`, where it is known;
-    - a second static level: the published method takes b1 as it comes, as the scale, and
+    - a second static level: the published method takes the value of b1 as the scale, and solves
 
       .. math:: K x_i + F_h(x_i) = T u_i, \qquad i = 1, 2
 
-      with the hysteresis force from rest straight to x. This depends on how little the
-      gain falls from one level to the other, so both levels must be good.
+      with the hysteresis force on the monotone path from rest to x. The result is sensitive to
+      the small difference in gain between the two levels, so both must be measured accurately.
 
     Parameters
     ----------
     data : Dataset or StepReadings
-        The record, its window with one step and some samples before it; or readings typed in.
+        The record, its window with one step and some samples before it; or readings entered by
+        hand.
     stiffness : float, optional
         K [N/m].
     mass : float, optional
         M [kg].
     second_level : (float, float) or StepResult, optional
-        Voltage [V] of another step from the same rest, and displacement [m] where it ends.
+        Voltage [V] of another step from the same rest, and steady displacement [m].
 
     Returns
     -------
     StepResult
-        ``pt.identify(other_log, initial=result)`` goes on with its hysteresis parameters.
+        ``pt.identify(other_log, initial=result)`` holds its hysteresis parameters.
 
     Raises
     ------
@@ -348,7 +351,7 @@ def identify_step(
     level = (readings.voltage, readings.steady_state)
     known_stiffness: float | None = None
     coefficient: float | None = None
-    scale = "nothing fixes a force"
+    scale = "nothing fixes the scale of the forces"
     if second_level is not None:
         known_stiffness, coefficient = core.separate(level, _level(second_level))
         scale = "a second static level, with b1 as the scale"

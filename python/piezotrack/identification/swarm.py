@@ -26,7 +26,7 @@ class ParticleSwarm:
     Xu and Li 2010, equations (17) and (18), doi 10.1115/1.4001712. r1 and r2 are drawn anew for
     each particle and coordinate. The hypersphere update takes the centre of gravity of the
     particle, a point beyond its own best position and one beyond that of its best informant, draws
-    a point evenly from the hypersphere about it whose surface holds the particle, and does not
+    a point uniformly from the hypersphere about it whose surface holds the particle, and does not
     depend on the orientation of the coordinates:
 
     .. math::
@@ -39,17 +39,17 @@ class ParticleSwarm:
     Clerc 2012, hal-00764996. A particle that is its own best informant has G half-way between X
     and the point beyond P. The default is a ring of 64 particles with the constriction of Clerc
     and Kennedy 2002, doi 10.1109/4235.985692: it takes more evaluations than the global topology,
-    and ends in the same local minimum from seed to seed where that one does not.
+    but ends more reliably in the same local minimum, whatever the seed.
 
     Parameters
     ----------
     particles : int, optional
         Number of particles, 2 or more.
     iterations : int, optional
-        Most iterations after the first evaluation.
+        Largest number of iterations after the first evaluation.
     update : {"classic", "hypersphere", "hypersphere-radial"}, optional
-        How a particle moves. The last draws the radius of X' about G evenly, not the volume:
-        points are denser about G, and a swarm settles sooner.
+        How a particle moves. ``"hypersphere-radial"`` draws the radius of X' about G from a
+        uniform distribution: points are denser near G, and a swarm converges sooner.
     inertia_start, inertia_end : float, optional
         Inertia w at the first iteration, and from `inertia_iterations` on.
     inertia_iterations : int, optional
@@ -63,13 +63,13 @@ class ParticleSwarm:
     velocity_limit : float, optional
         Largest velocity of a coordinate as a fraction of its range; ``inf`` for none.
     boundary : {"absorb", "rebound", "reflect", "invisible"}, optional
-        A particle that leaves the box stops at the bound with velocity 0, or with half its
-        velocity reversed, or comes back from the bound with all of it reversed, or flies on
-        outside without being evaluated.
+        A particle that leaves the box stops at the bound with velocity 0 (``"absorb"``) or with
+        half its velocity reversed (``"rebound"``), is reflected at the bound (``"reflect"``), or
+        moves on outside without being evaluated (``"invisible"``).
     min_improvement : float, optional
         Improvement of the best cost [m] below which an iteration counts as a stall.
     stall_iterations : int, optional
-        Stalled iterations in a row after which the search stops.
+        Consecutive stalled iterations after which the search stops.
     polish : bool, optional
         Whether the best candidate is then refined to the local minimum, by the method of
         Levenberg and Marquardt: Marquardt 1963, doi 10.1137/0111030.
@@ -118,7 +118,7 @@ class ParticleSwarm:
         The paper gives that number without a unit; in metres it would stop every search after
         500 iterations, so it is taken as micrometres. It says nothing of a velocity limit or
         of what happens at the bounds: a tenth of the range, and absorbing walls, are ours. A
-        single swarm of these does not always reach the bottom of the paper's own search.
+        single swarm with these settings does not always reach the minimum of the paper's search.
 
         Returns
         -------
@@ -160,7 +160,7 @@ class ParticleSwarm:
 
 
 def _text(_name: str, value: object) -> str:
-    # What is no text at all is refused as an unknown word, by the core.
+    # Anything but a string is refused by the core, as an unknown option.
     return value if isinstance(value, str) else repr(value)
 
 

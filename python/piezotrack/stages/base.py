@@ -37,7 +37,7 @@ __all__ = [
     "stage",
 ]
 
-# Longest step in which a model's mechanics are followed under a jumping voltage [s].
+# Longest simulation step of a model's mechanics between the steps of a held voltage [s].
 MODEL_STEP = 5e-5
 # Parameters that do not describe hysteresis.
 MECHANICS = ("mass", "damping", "stiffness", "piezo_coefficient")
@@ -56,13 +56,13 @@ class Parameter(NamedTuple):
     name, symbol, unit : str
         Name in both languages, symbol in the literature, SI unit.
     carries_force : bool
-        Whether it scales with the unit of force.
+        Whether it has the dimension of force: it scales with the stiffness.
     default : float or None
-        Value where the caller gives none.
+        Value if the caller gives none.
     held : str or None
-        Why it is never searched, where that is so.
+        Why it is never searched; None if it can be.
     is_list, is_optional : bool
-        Whether it is a list of numbers, or may be left out.
+        Whether it is a list of numbers; whether it may be None.
     """
 
     name: str
@@ -88,7 +88,7 @@ class ModelInfo:
     drive_unit : str
         Unit of the drive.
     searched : bool
-        Whether a swarm searches the parameters; otherwise they follow by least squares.
+        Whether a swarm searches the parameters; otherwise least squares find them.
     parameters, state : tuple of Parameter
         The parameters, and the parts of the state.
     """
@@ -202,13 +202,13 @@ class Response:
     substeps : int
         Steps of the integrator in each sampling interval.
     error_estimate : float
-        Largest change of `x` from a coarser simulation [m]; the error of `x` is a third of it,
-        and a fifteenth where the drive asked for the scheme's fourth order. 0 where the model is
-        exact from sample to sample.
+        Largest change of `x` from a simulation with half the steps [m]; the error of `x` is about
+        a third of it with the scheme of second order, a fifteenth with that of fourth. 0 if the
+        model is exact from sample to sample.
     unique : bool
-        Whether the solution is unique. False where a `DahlStage` with `b0` other than 0 came to
-        rest with the friction term along the motion and too little force to decide: another
-        motion then satisfies the same drive.
+        Whether the solution is unique. False if a `DahlStage` with `b0` other than 0 was at rest
+        with b0 q2 < 0 and a force smaller than that term: another motion then satisfies the same
+        drive.
     """
 
     t: Array
@@ -244,7 +244,7 @@ class Stage:
         _ = self._core
 
     def __getstate__(self) -> dict[str, Any]:
-        # What is cached stays behind: the core's stage cannot be pickled.
+        # Without the cache: the core's stage cannot be pickled.
         return {one.name: getattr(self, one.name) for one in self.info.parameters}
 
     @classmethod
@@ -260,7 +260,7 @@ class Stage:
 
     @classmethod
     def _from(cls, named: Iterable[tuple[str, list[float]]]) -> Self:
-        """Make a stage of names and numbers as the core gives them."""
+        """Make a stage from names and numbers of the core."""
         parameters = {one.name: one for one in cls.info.parameters}
         given: dict[str, Any] = {}
         for name, numbers in named:
@@ -290,11 +290,11 @@ class Stage:
         initial: StageState | None = None,
         accuracy: float = 1e-10,
     ) -> Response:
-        """Displacement under a sampled drive.
+        """Simulate the response to a sampled drive.
 
-        The linear part is exact, the hysteresis is exact along its input, and the force between
-        two steps is the cubic through its values and slopes; where the displacement leads the
-        hysteresis, a predictor and a corrector find them. The number of steps in a sampling
+        The linear part is exact, the hysteresis is exact along its input, and the force over a step
+        is the cubic through its values and slopes at both ends; where the hysteresis depends on the
+        displacement, a predictor and a corrector compute them. The number of steps in a sampling
         interval is doubled until no sample moves by more than `accuracy`. A model with play
         operators is exact from sample to sample and takes one step.
 
@@ -307,14 +307,14 @@ class Stage:
         hold : {"foh", "zoh"}, optional
             Between two samples the drive goes straight from one to the next (``"foh"``), or
             stays constant until the next (``"zoh"``). With play operators, a sample under
-            ``"zoh"`` shows the stage before the step of the drive at that instant has an effect.
+            ``"zoh"`` is the displacement just before the step of the drive at that instant.
         initial : StageState, optional
             State of this model at the first sample; at rest, never driven, where it is not given.
             To continue a simulation, begin the new drive with the last sample of the one before.
-            A model whose hysteresis is at its input lets the drive jump from the state's `u` to
-            the first sample.
+            If the hysteresis is at the input, the drive steps from the state's `u` to the first
+            sample.
         accuracy : float, optional
-            Largest error of the displacement [m] that is accepted.
+            Largest acceptable error of the displacement [m].
 
         Returns
         -------
@@ -370,7 +370,7 @@ class Stage:
         )
 
     def _checked(self, initial: object) -> StageState:
-        """Refuse what is not a state of this model."""
+        """Return `initial` if it is a state of this model; raise otherwise."""
         if isinstance(initial, self._state):
             return initial
         raise ParameterError(
@@ -385,18 +385,18 @@ class Stage:
         settle: int = 1,
         initial: StageState | None = None,
     ) -> Inverse:
-        """Feedforward of the bare stage, as `Inverse` describes.
+        """Feedforward of the stage without sensor offset and delay, as `Inverse` describes.
 
         Parameters
         ----------
         playback : {"table", "online"}, optional
-            Whether one settled period is repeated from a table, or all is computed.
+            Whether one settled period is repeated from a table, or the whole run is computed.
         settle : int, optional
             Periods before the one of the table.
         initial : StageState, optional
             State of the stage before the reference begins, such as the `final` of a response to
-            the drive that settled it; at rest, never driven, where it is not given. Models whose
-            hysteresis is not at their input begin there always.
+            the drive that settled it; by default at rest, never driven. Only models with the
+            hysteresis at the input accept a state.
 
         Returns
         -------
@@ -419,13 +419,12 @@ class Stage:
         return Inverse(stage=self, playback=playback, settle=settle, initial=initial)
 
     def force_ratios(self) -> list[Ratio]:
-        """Return what a record determines without a force known, as ratios to the stiffness.
+        """Return the quantities that a record determines: forces as ratios to the stiffness.
 
         Returns
         -------
         list of (str, str, float, str)
-            Parameter, symbol, value and unit; each parameter as it is where a model says nothing
-            else.
+            Parameter, symbol, value and unit; by default the parameters themselves.
         """
         return [
             (one.name, one.symbol, getattr(self, one.name), one.unit)
@@ -451,7 +450,7 @@ def stage(name: str, *, state: type[StageState]) -> Callable[[type[S]], type[S]]
     Parameters
     ----------
     name : str
-        Name of the model. The module that has the class is named like it, with underscores.
+        Name of the model. The module of the class has the same name, with underscores.
     state : type
         Its state: a subclass of `StageState` with the fields that the core lists.
 
@@ -470,7 +469,7 @@ def stage(name: str, *, state: type[StageState]) -> Callable[[type[S]], type[S]]
 
 
 def mechanical_ratios(stage: Any, damping: str, mass: str) -> list[Ratio]:
-    """Viscous time and mass over stiffness, with the natural frequency that they mean."""
+    """Return damping and mass over stiffness, with the natural frequency."""
     frequency = math.sqrt(stage.stiffness / stage.mass) / (2 * math.pi)
     hertz = f"s^2, a natural frequency of {frequency:.4g} Hz"
     return [
@@ -480,7 +479,7 @@ def mechanical_ratios(stage: Any, damping: str, mass: str) -> list[Ratio]:
 
 
 def _entries(name: str, value: object) -> list[float]:
-    """Numbers of a parameter as the core takes them: a list of one, of none or of several."""
+    """Return the numbers of a parameter as a list: one, none or several."""
     if value is None:
         return []
     if isinstance(value, (tuple, list)):

@@ -20,7 +20,7 @@ class BoucWenState(StageState):
     Parameters
     ----------
     u : float
-        Drive that the hysteresis has seen last [V].
+        Latest drive at the hysteresis [V].
     h : float
         State of the hysteresis [m].
     """
@@ -49,15 +49,15 @@ class BoucWenStage(Stage):
     damping : float
         b [N s/m], 0 or above.
     stiffness : float
-        k [N/m], above 0. Only m/k and b/k show in the displacement.
+        k [N/m], above 0. The displacement depends on m/k and b/k only.
     piezo_coefficient : float
         d [m/V], not 0. In `DahlStage` it is a force per volt.
     alpha : float
-        Share of d u that the hysteresis takes at first.
+        Initial slope of h over d u.
     beta, gamma : float
         Decay of the hysteresis along the path of the drive [1/V; for another exponent
         1/(V m^(n-1))]. It is passive only for ``abs(gamma) <= beta``. The beta and gamma of the
-        Bouc-Wen *oscillator*, whose hysteresis is driven by the displacement, mean other things.
+        Bouc-Wen *oscillator*, whose hysteresis is driven by the displacement, are other quantities.
     exponent : float, optional
         n, from 1 to 20: the sharpness of the bend. With 1 the hysteresis is exact in closed
         form; with another it is computed in short steps.
@@ -69,8 +69,8 @@ class BoucWenStage(Stage):
 
     Notes
     -----
-    The hysteresis depends on the drive alone: neither the load nor the speed of the stage acts
-    on it. Its loops are the same turned by half a turn, and close after a few cycles.
+    The hysteresis depends only on the drive, not on the load or the speed of the stage. Its loops
+    have point symmetry, and close after a few cycles.
 
     Examples
     --------
@@ -97,8 +97,8 @@ class BoucWenStage(Stage):
     def xu_li_2010(cls) -> BoucWenStage:
         """Parameters below equation (20) of Xu and Li 2010, doi 10.1115/1.4001712, as printed.
 
-        Under 0.25 Hz and 0 to 75 V this stage reaches 99.7 um only, and is 50 um away from the
-        paper's own Dahl model, which its Fig. 7 does not show. See `xu_li_2010_corrected`.
+        Under 0.25 Hz and 0 to 75 V this stage reaches only 99.7 um, and deviates by 50 um from the
+        paper's Dahl model, unlike in its Fig. 7. See `xu_li_2010_corrected`.
 
         Returns
         -------
@@ -109,11 +109,11 @@ class BoucWenStage(Stage):
 
     @classmethod
     def xu_li_2010_corrected(cls) -> BoucWenStage:
-        """Give the printed parameters of Xu and Li 2010 with ten times the stiffness.
+        """Return the printed parameters of Xu and Li 2010 with ten times the stiffness.
 
-        This stage reaches 120.06 um and stays within 9.8 um of the paper's Dahl model. Only
-        m/k and b/k show in the displacement, so b = 158 N s/m would repair it as well; k is the
-        likelier misprint, because its size and the resonance of 62 Hz are then near those of
+        This stage reaches 120.06 um and stays within 9.8 um of the paper's Dahl model. The
+        displacement depends on m/k and b/k only, so b = 158 N s/m would correct it as well; k is
+        the more likely misprint, because k and the resonance of 62 Hz are then near those of
         Table 1.
 
         Returns

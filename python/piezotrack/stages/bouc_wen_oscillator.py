@@ -35,13 +35,13 @@ class BoucWenOscillator(Stage):
     alpha : float
         Stiffness of the hysteresis for small motions [N/m].
     beta : float
-        Factor of gamma and delta, not 0. Only the two products are in the data, so `identify`
-        holds it: at 1, or at what ``fixed=`` says.
+        Factor of gamma and delta, not 0. The data determine only the two products, so `identify`
+        holds it: at 1, or at a value given by ``fixed=``.
     gamma, delta : float
-        Decay of the hysteresis along the path that dissipates, and that does not
+        Coefficients of the decay with abs(y'), which dissipates, and with y', which does not
         [1/m; for another exponent 1/(m N^(nu-1))]. `BoucWenStage` has its hysteresis at the
-        input, driven by the voltage: its beta is what beta gamma is here, and its gamma what beta
-        delta is.
+        input, driven by the voltage: its beta is beta gamma here, and its gamma is beta delta
+        here.
     exponent : float, optional
         nu, from 1 to 20: the sharpness of the bend.
 

@@ -66,10 +66,11 @@ class DahlStage(Stage):
         Gain of the hysteresis force [N/m^2].
     b0 : float, optional
         Gain of the friction force [N/m]. With any value but 0 the hysteresis force jumps by
-        2 b0 q2 at a reversal: the stage sticks where the other forces are smaller than b0 q2.
-        Where b0 q2 is below 0, rest is not unique: see ``Response.unique``.
+        2 b0 q2 at a reversal: the stage sticks while the other forces are smaller than b0 q2.
+        Where b0 q2 is below 0 the motion from rest is not unique: see ``Response.unique``.
     up : float, optional
-        Constant input of the operator. Only the product ``b1 * up`` shows in the motion.
+        Constant input of the operator. The motion depends only on the products of `up` with `b1`
+        and `b0`.
 
     Raises
     ------
@@ -78,8 +79,8 @@ class DahlStage(Stage):
 
     Notes
     -----
-    The operator is neither stationary nor dissipative: under a periodic drive its loops do not
-    close but creep, and the work of Fh over a cycle can be negative. It describes a record of a
+    The operator is neither stationary nor dissipative: under a periodic drive its loops drift
+    instead of closing, and the work of Fh over a cycle can be negative. It describes a record of a
     few cycles well; over hundreds of cycles its mean drifts.
 
     For x < 0 the force is a softening spring, so a large voltage of the sign opposite to the
@@ -128,11 +129,11 @@ class DahlStage(Stage):
         method: Literal["exponential", "rk4", "rk45"] = "exponential",
         accuracy: float = 1e-10,
     ) -> Response:
-        """Displacement under a sampled drive.
+        """Simulate the response to a sampled drive.
 
         The linear part is exact, the hysteresis is exact in the displacement, and the two are
-        coupled by a predictor and a corrector of fourth order (of second order where that
-        does). The number of steps in a sampling interval is doubled until no sample moves by
+        coupled by a predictor-corrector of fourth order (of second order where that is
+        sufficient). The number of steps in a sampling interval is doubled until no sample moves by
         more than `accuracy`.
 
         Parameters
@@ -149,10 +150,10 @@ class DahlStage(Stage):
             begin the new drive with the last sample of the one before.
         method : {"exponential", "rk4", "rk45"}, optional
             The scheme above, or for comparison the classical Runge-Kutta methods: fourth order
-            in equal steps, or Dormand and Prince's adaptive pair, doi
-            10.1016/0771-050X(80)90013-3. They reach the same accuracy in far more steps.
+            in equal steps, or the adaptive Dormand-Prince pair, doi
+            10.1016/0771-050X(80)90013-3. They need far more steps for the same accuracy.
         accuracy : float, optional
-            Largest error of the displacement [m] that is accepted.
+            Largest acceptable error of the displacement [m].
 
         Returns
         -------
@@ -183,7 +184,7 @@ class DahlStage(Stage):
         return self._simulate(u, dt, hold, initial, method, accuracy)
 
     def force_ratios(self) -> list[Ratio]:
-        """Return all but up, which the data do not separate from b1 and b0, over the stiffness."""
+        """Return forces over the stiffness; `up` only in the products that the data determine."""
         gain = 1e6 * self.piezo_coefficient / self.stiffness
         return [
             ("piezo_coefficient", "T/K", gain, "um/V"),
@@ -198,6 +199,6 @@ class DahlStage(Stage):
         if self.b0 == 0.0 or response().unique:
             return []
         return [
-            "b0 q2 falls below 0 at rest: the solution is not unique, another motion satisfies the "
+            "b0 q2 is below 0 at rest: the solution is not unique, another motion satisfies the "
             "same drive"
         ]

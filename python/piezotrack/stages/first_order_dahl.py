@@ -38,11 +38,11 @@ class FirstOrderDahlStage(Stage):
     piezo_coefficient : float
         T [N/V], not 0.
     rest_stiffness : float
-        sigma [N/m], 0 or above: how fast the force grows at first.
+        sigma [N/m], 0 or above: slope of the force at F = 0.
     coulomb_force : float
-        Fc [N], above 0: the force that a long path in one direction ends at.
+        Fc [N], above 0: limit of the force on a long path in one direction.
     exponent : float, optional
-        i, from 0 to 20: shape of the approach; 0 is a spring that slides, 1 an exponential.
+        i, from 0 to 20: shape of the approach to Fc; linear up to sliding for 0, exponential for 1.
 
     Raises
     ------

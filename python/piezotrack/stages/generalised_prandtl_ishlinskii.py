@@ -22,10 +22,10 @@ class GeneralisedPrandtlIshlinskiiStage(Stage):
 
         H = w_0 z_0 + \sum_i w_i z_{r_i}, \qquad h = H(u) - H(0)
 
-    with four numbers for the envelope :math:`\gamma_l` that pushes the plays up as the drive
-    rises, and four for :math:`\gamma_r`, which pushes them down as it falls. Creep and dynamics
-    follow as in a `PrandtlIshlinskiiStage`; where that has dead zones, here the envelopes make
-    loops asymmetric, and can saturate.
+    with four numbers for the envelope :math:`\gamma_l`, which moves the plays up as the drive
+    rises, and four for :math:`\gamma_r`, which moves them down as it falls. Creep and dynamics
+    are those of a `PrandtlIshlinskiiStage`; in place of its dead zones, the envelopes make loops
+    asymmetric and can saturate.
 
     M. Al Janaideh, S. Rakheja, C.-Y. Su, IEEE/ASME Transactions on Mechatronics 16(4), 734-744,
     2011, doi 10.1109/TMECH.2010.2052366.
@@ -42,7 +42,7 @@ class GeneralisedPrandtlIshlinskiiStage(Stage):
     scale, slope, shift, level : float
         c0 [V] and c1 [1/V], above 0, c2 and c3 [V] of the envelope of a rising drive.
     falling_scale, falling_slope, falling_shift, falling_level : float, optional
-        The same of the envelope of a falling drive; each as for a rising one where not given.
+        The same for the envelope of a falling drive; by default those of a rising one.
     creep_weights, creep_times : sequence of float, optional
         c and tau [s] of each relaxation of the creep; 8 at most.
     time_constant : float, optional
@@ -57,13 +57,13 @@ class GeneralisedPrandtlIshlinskiiStage(Stage):
 
     Notes
     -----
-    The state of the plays has that of threshold 0 first.
+    In the state, the play of threshold 0 comes first.
 
-    An identification finds one envelope for both directions, through 0 at 0 V and as high over the
-    drive's range as that is wide, so that thresholds stay in volts. It searches the ratio of the
-    slopes at the two ends, and how much the envelope bends beyond that. Where a number lowers the
-    RMS by less than a tenth it stays at the middle of its range: a record of one amplitude does
-    not tell an envelope that bends to both sides from other weights of the plays.
+    An identification finds one envelope for both directions, which is 0 at 0 V and whose range over
+    the drive is that of the drive, so that thresholds are in volts. It searches the ratio of the
+    slopes at the two ends, and how much the envelope bends beyond that. A number
+    that lowers the RMS by less than a tenth stays at the middle of its range: in a record of one
+    amplitude, an envelope that bends to both sides cannot be distinguished from other weights.
 
     The inverse is in closed form: on a rising stretch all plays follow :math:`\gamma_l(u)`, on a
     falling one :math:`\gamma_r(u)`. With two different envelopes the drive jumps where the

@@ -44,39 +44,37 @@ class PlayedVoltage(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Inverse:
-    r"""Inverse of a stage, with the offset and the delay of what measured it.
+    r"""Inverse of a stage, with the offset and the delay of its sensor.
 
     .. math:: u_{FF} = (M \ddot x_d + D \dot x_d + K x_d + F_h(x_d)) / T
 
-    Xu and Li 2010, equation (21), doi 10.1115/1.4001712. The hysteresis force depends on the
-    path of the reference only, so the inverse is explicit, and exact along it. With a
+    Xu and Li 2010, equation (21), doi 10.1115/1.4001712. The hysteresis force depends only on
+    the path of the reference, so the inverse is explicit, and exact along it. For a
     `BoucWenStage` the hysteresis depends on the voltage, and
 
     .. math:: d u - h(u) = (m \ddot x_d + b \dot x_d + k x_d) / k
 
-    is solved for it sample by sample, taken to be monotone between two of them. Where the
-    hysteresis is at the input, as of a `PrandtlIshlinskiiStage`, it is the inverse of each part in
-    turn.
+    is solved for the voltage sample by sample, assuming that it is monotone between samples. For
+    Prandtl-Ishlinskii models it is the inverse of each part in turn.
 
     Parameters
     ----------
     stage : Stage
         The model, as a `DahlStage`.
     offset : float, optional
-        What the sensor shows where the stage is at rest without drive [m].
+        Reading of the sensor at rest without drive [m].
     delay : float, optional
-        Delay of the displacement beyond the model [s]: the voltage comes that much earlier.
+        Delay of the displacement in addition to the model [s]; the voltage is computed for the
+        reference this much ahead.
     playback : {"table", "online"}, optional
-        ``"table"``, as in the paper: of a reference that repeats one settled period is
-        computed and repeated. ``"online"``: computed along the whole path. The
-        printed model drifts from period to period, its table does not.
+        ``"table"``, as in the paper: one settled period of a periodic reference is computed and
+        repeated. ``"online"``: the whole run is computed. The printed model drifts from period
+        to period, its table does not.
     settle : int, optional
-        Periods before the one that is repeated, 1 or more; those in which the reference
-        starts smoothly are never the one.
+        Periods before the one that is repeated, 1 or more; at least those of the smooth start.
     initial : StageState, optional
-        State of the stage before the reference begins, such as the `final` of a response; at
-        rest, never driven, where it is not given. Models whose hysteresis is not at their input
-        begin there always.
+        State of the stage before the reference begins, such as the `final` of a response; by
+        default at rest, never driven. Only models with the hysteresis at the input accept a state.
 
     Raises
     ------
@@ -113,7 +111,7 @@ class Inverse:
             raise ParameterError(f"playback is {self.playback!r}: expected 'table' or 'online'")
         if not 1 <= _core.as_count("settle", self.settle) <= 1000:
             raise ParameterError(f"settle is {self.settle}: expected 1 period or more, up to 1000")
-        # The core refuses a stage without an inverse, and a state that is none of the stage's.
+        # The core refuses a stage without an inverse, and a state of another model.
         self._begun(1.0)
 
     def _begun(self, dt: float) -> _core.Inverse:
@@ -124,16 +122,16 @@ class Inverse:
     def voltage(
         self, reference: Reference, dt: float, *, samples: SampledReference | None = None
     ) -> Array:
-        """Voltage along the whole path of a reference, the stage being at rest before.
+        """Voltage for a whole reference that begins at rest.
 
         Parameters
         ----------
         reference : Reference
-            What is to be followed.
+            The reference.
         dt : float
             Sampling interval [s].
         samples : SampledReference, optional
-            ``reference.sample(dt)``, where it is known already.
+            ``reference.sample(dt)``, if already computed.
 
         Returns
         -------
@@ -145,14 +143,14 @@ class Inverse:
         ParameterError
             `dt` is out of its range.
         NumericalError
-            The reference asks for a voltage that is not finite.
+            The voltage for the reference is not finite.
         """
         _check(reference)
         samples = reference.sample(dt) if samples is None else samples
         t = samples.t + self.delay
         if self.delay == 0.0:
             x, v, a = samples.x, samples.v, samples.a
-        elif not _goes_on(reference):
+        elif not _continues(reference):
             x, v, a = reference.at(np.minimum(t, reference.duration))
         else:
             longer = replace(reference, duration=reference.duration + self.delay + samples.dt)
@@ -160,12 +158,12 @@ class Inverse:
         return self._begun(samples.dt).along(x - self.offset, v, a)
 
     def table(self, reference: Reference, dt: float) -> Array:
-        """One settled period, as a lookup table to be played at the sampling instants.
+        """One settled period, as a table of the voltages at the sampling instants.
 
         Parameters
         ----------
         reference : Reference
-            One that repeats, after a whole number of samples.
+            A reference whose period is a whole number of samples.
         dt : float
             Sampling interval [s].
 
@@ -177,8 +175,8 @@ class Inverse:
         Raises
         ------
         ParameterError
-            The reference does not repeat, or not after a whole number of samples, or is a record
-            that ends before its period has settled.
+            The reference has no period, or one that is not a whole number of samples, or is a
+            record that ends before a period has settled.
         """
         _check(reference)
         if reference.period is None:
@@ -187,11 +185,11 @@ class Inverse:
         if abs(turn - round(turn)) > 1e-6:
             raise ParameterError(
                 f"dt is {dt:g} s: expected a whole number of samples in the period, "
-                f"{reference.period:g} s; online playback has no such need"
+                f"{reference.period:g} s; online playback takes any period"
             )
         count = round(turn)
         length = (self._settled(reference, reference.period) + 1) * reference.period
-        if not _goes_on(reference) and length > reference.duration + 1e-3 * dt:
+        if not _continues(reference) and length > reference.duration + 1e-3 * dt:
             raise ParameterError(
                 f"reference ({reference.name}) lasts {reference.duration:g} s: expected "
                 f"{length:g} s, until a period has settled"
@@ -201,16 +199,16 @@ class Inverse:
     def played(
         self, reference: Reference, dt: float, *, samples: SampledReference | None = None
     ) -> PlayedVoltage:
-        """Feedforward of a run as `playback` says.
+        """Feedforward of a run, from a table or online as `playback` says.
 
         Parameters
         ----------
         reference : Reference
-            What is to be followed.
+            The reference.
         dt : float
             Sampling interval [s].
         samples : SampledReference, optional
-            ``reference.sample(dt)``, where it is known already.
+            ``reference.sample(dt)``, if already computed.
 
         Returns
         -------
@@ -222,8 +220,8 @@ class Inverse:
         before = 0 if period is None else self._settled(reference, period)
         head = 0 if period is None else round((before + 1) * period / dt)
         if self.playback == "online" or period is None or volts.size <= head:
-            return PlayedVoltage(volts, "feedforward computed along the whole path")
-        # Between samples where a period is no whole number of them.
+            return PlayedVoltage(volts, "feedforward computed for the whole run")
+        # Linear interpolation if a period is not a whole number of samples.
         after = np.arange(head, volts.size, dtype=np.float64)
         turns = np.floor((after - head) * dt / period) + 1.0
         volts[head:] = np.interp(
@@ -232,11 +230,11 @@ class Inverse:
         return PlayedVoltage(volts, f"feedforward of period {before + 1} repeated from a table")
 
     def _settled(self, reference: Reference, period: float) -> int:
-        """Periods before the one of the table: `settle`, or as many as the smooth start takes."""
+        """Periods before the one of the table: `settle`, or those of the smooth start if more."""
         return max(self.settle, math.ceil(reference.ramp / period - 1e-9))
 
     def start(self, dt: float) -> InverseSession:
-        """Begin a computation sample by sample.
+        """Start a session that computes the voltage sample by sample.
 
         Parameters
         ----------
@@ -246,7 +244,7 @@ class Inverse:
         Returns
         -------
         InverseSession
-            With a memory of its own; any number can run at once.
+            With a state of its own; several sessions are independent.
         """
         return InverseSession(self, positive("dt", dt, "s"))
 
@@ -258,8 +256,8 @@ def _check(reference: object) -> None:
         )
 
 
-def _goes_on(reference: Reference) -> bool:
-    """Whether the motion is known after the end: it repeats, and is not a record that stops."""
+def _continues(reference: Reference) -> bool:
+    """Whether the motion continues after the end: it repeats, and is not a finite record."""
     motion = reference.motion
     stops = isinstance(motion, Spline) and not motion.cyclic
     return reference.period is not None and not stops
@@ -299,18 +297,18 @@ class InverseSession:
         Parameters
         ----------
         reference : float
-            Displacement to be followed [m].
+            Reference displacement [m].
         velocity, acceleration : float, optional
-            Its derivatives [m/s, m/s^2]. Where not given they are differences: central ones of
-            the sample before and `preview`, or backward ones, which are delayed by half a sample.
+            Its derivatives [m/s, m/s^2]. By default finite differences: central ones with the
+            previous sample and `preview`, or backward ones, which are delayed by half a sample.
         preview : float, optional
             The reference one sample ahead [m].
 
         Returns
         -------
         float
-            Voltage [V]; NaN, with nothing remembered, where an input is not finite. The
-            differences go on as if the reference had kept its velocity meanwhile.
+            Voltage [V]; NaN, with the state unchanged, if an input is not finite. The differences
+            then continue as if the reference had kept its velocity.
         """
         try:
             return self._core.step(reference, velocity, acceleration, preview)
@@ -323,5 +321,5 @@ class InverseSession:
             raise
 
     def reset(self) -> None:
-        """Forget the path."""
+        """Return to the initial state."""
         self._core.reset()

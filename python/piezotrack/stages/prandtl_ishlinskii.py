@@ -54,18 +54,18 @@ class PrandtlIshlinskiiStage(Stage):
     Parameters
     ----------
     linear : float
-        w0 [m/V], above 0: what passes without memory, the slope just after a reversal.
+        w0 [m/V], above 0: gain without hysteresis, and the slope just after a reversal.
     thresholds : sequence of float
         r [V], half the width of each play's backlash, 0 or above and ascending; 32 at most.
     weights : sequence of float
         w [m/V], as many, 0 or above.
     dead_zone_thresholds : sequence of float, optional
-        d [m], where each one-sided dead zone ends, ascending; 8 at most.
+        d [m], thresholds of the one-sided dead zones, ascending; 8 at most.
     dead_zone_weights : sequence of float, optional
-        s, by how much the slope changes there; sums stay above -1. Plays alone give loops that
-        look the same when turned by half a turn, dead zones make them asymmetric.
+        s, change of the slope there; partial sums stay above -1. The loops of plays have point
+        symmetry, dead zones make them asymmetric.
     creep_weights : sequence of float, optional
-        c, what each relaxation of the creep adds in the end, 0 or above; 8 at most.
+        c, final contribution of each relaxation of the creep as a share, 0 or above; 8 at most.
     creep_times : sequence of float, optional
         tau [s]. A decade apart and with equal weights they make a creep that grows with the
         logarithm of time.
@@ -81,12 +81,11 @@ class PrandtlIshlinskiiStage(Stage):
 
     Notes
     -----
-    The hysteresis is exact from sample to sample. Creep and dynamics are exact for an `h` that
-    goes straight from one sample to the next.
+    The hysteresis is exact from sample to sample. Creep and dynamics are exact for an `h` that is
+    linear between samples.
 
-    The inverse is that of each part in turn: dynamics are undone with the derivatives of the
-    reference, creep by its exact inverse from sample to sample, dead zones and plays in Kuhnen's
-    closed form.
+    The inverse inverts each part in turn: the dynamics with the derivatives of the reference, creep
+    exactly from sample to sample, dead zones and plays in Kuhnen's closed form.
 
     Examples
     --------
@@ -114,4 +113,4 @@ class PrandtlIshlinskiiStage(Stage):
         del response
         if self.linear + sum(self.weights) <= 100.0 * self.linear:
             return []
-        return ["hardly any motion just after a reversal: the inverse is ill-conditioned"]
+        return ["the gain just after a reversal is close to 0: the inverse is ill-conditioned"]

@@ -1,4 +1,4 @@
-"""The list of stage models: their classes by name, and the facts of a stage's model."""
+"""The list of stage models by name, with their classes and what the core lists of them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .base import LISTED, REGISTERED, ModelInfo, Stage
 
 __all__ = ["MODELS", "ModelInfo", "Stage", "model_named", "model_of", "stage_class"]
 
-# What the core knows of each model, in its order.
+# The models as the core lists them, in its order.
 MODELS: tuple[ModelInfo, ...] = tuple(LISTED.values())
 
 
@@ -19,7 +19,7 @@ def model_named(name: object) -> ModelInfo:
     Parameters
     ----------
     name : object
-        What the caller gave as the model.
+        Argument of the caller.
 
     Returns
     -------
@@ -39,7 +39,7 @@ def model_named(name: object) -> ModelInfo:
 
 
 def stage_class(model: ModelInfo) -> type[Stage]:
-    """Find the class of a model, in the module that is named like it.
+    """Find the class of a model, in the module of the same name.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def stage_class(model: ModelInfo) -> type[Stage]:
 
 
 def model_of(stage: object, argument: str = "model") -> ModelInfo:
-    """Find the model of a stage that was given as an argument of this name.
+    """Return the model of a stage; `argument` names it in errors.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def model_of(stage: object, argument: str = "model") -> ModelInfo:
     Raises
     ------
     ParameterError
-        It is no stage.
+        It is not a stage.
     """
     if isinstance(stage, Stage):
         return stage.info

@@ -34,11 +34,11 @@ class VirtualResponse:
     u : ndarray, shape (n,)
         Command to the amplifier [V].
     applied : ndarray, shape (n,)
-        Voltage that it gave [V].
+        Output voltage of the amplifier [V].
     x : ndarray, shape (n,)
         True displacement [m].
     y : ndarray, shape (n,)
-        Displacement that the sensor shows [m].
+        Reading of the sensor [m].
     """
 
     t: Array
@@ -52,8 +52,8 @@ class VirtualResponse:
 class VirtualStage:
     r"""A simulated stage with amplifier, creep and sensor, for experiments.
 
-    Command, amplifier, hysteresis of weighted play operators with dead zones, creep, a mode
-    that rings, sensor:
+    In series: amplifier, hysteresis of weighted play operators with dead zones, creep, an
+    underdamped mode, sensor:
 
     .. math::
 
@@ -61,38 +61,38 @@ class VirtualStage:
         \tau_j \dot q_j = h - q_j
 
     Plays after Kuhnen 2003, doi 10.3166/ejc.9.407-418. `xu_li_2010` is the stage of the paper as
-    far as it is published; ``dataclasses.replace(stage, noise=0.0)`` makes another.
+    far as it is published; ``dataclasses.replace(stage, noise=0.0)`` changes a parameter.
 
     Parameters
     ----------
     bandwidth : float
-        Of the amplifier [Hz]; infinity for none.
+        Bandwidth of the amplifier, a first-order lag [Hz]; infinity for no lag.
     slew : float
-        Its fastest change [V/s]; infinity for none.
+        Slew rate of the amplifier [V/s]; infinity for no limit.
     limits : (float, float)
-        Its lowest and highest voltage [V].
+        Lowest and highest voltage of the amplifier [V].
     linear : float
-        Share of the voltage that passes without hysteresis.
+        Weight of the voltage without hysteresis.
     thresholds, weights : tuple of float
-        Of up to 10 play operators [V, 1].
+        Thresholds and weights of up to 10 play operators [V, 1].
     dead_zone_thresholds, dead_zone_weights : tuple of float
-        Of up to 2 dead zones: above each corner [V] the slope grows by its bend.
+        Of up to 2 dead zones: above each threshold [V] the slope grows by the weight.
     gain : float
-        Displacement for one volt out of the hysteresis [m/V].
+        Displacement per volt at the output of the hysteresis [m/V].
     creep_weights, creep_times : tuple of float
-        Up to 3 relaxations: what each adds in the end, as a share, and its time constant [s].
+        Up to 3 relaxations: final contribution of each as a share, and time constant [s].
     frequency, damping_ratio : float
         Undamped frequency of the mode [Hz] and its zeta.
     noise, noise_bandwidth : float
-        Of the sensor: rms [m] of a white noise through a first-order low-pass [Hz].
+        Noise of the sensor: rms [m] of white noise through a first-order low-pass [Hz].
     resolution, sensor_range : float
-        Its smallest step [m], and how far it reads to either side [m].
+        Quantisation step [m], and range to either side of 0 [m].
     seed : int
-        Of the noise.
+        Seed of the noise.
     preconditioned : bool
         Whether an experiment begins on the settled loop, with the sensor at 0 there.
     swing, rest : float
-        For that it is cycled between 0 V and `swing` [V], and then rests at 0 V [s].
+        Preconditioning: cycles between 0 V and `swing` [V], then a rest at 0 V [s].
     step : float
         Longest step of the simulation [s].
 
@@ -171,7 +171,7 @@ class VirtualStage:
         Parameters
         ----------
         seed : int, optional
-            Of the sensor's noise.
+            Seed of the sensor's noise.
 
         Returns
         -------
@@ -186,7 +186,7 @@ class VirtualStage:
         Parameters
         ----------
         u : array_like, shape (n,)
-            Command to the amplifier [V]; it is there from the first sample on.
+            Command to the amplifier [V], from the first sample on.
         dt : float
             Sampling interval [s].
         hold : {"foh", "zoh"}, optional

@@ -59,18 +59,19 @@ class XYStage:
 
     .. math:: x = d_x + c_{xy} d_y, \qquad y = c_{yx} d_x + d_y
 
-    with :math:`d_x` and :math:`d_y` what each makes of its own voltage, from its sensor's zero.
-    Sensors and true displacement see x and y.
+    with :math:`d_x` and :math:`d_y` the displacement of each stage under its own voltage, from the
+    zero of its sensor. Sensor readings and true displacements are those of x and y.
 
     Parameters
     ----------
     x, y : VirtualStage or Stage
-        The stages, of any models; they may differ. Of an identified one it is its `model`.
+        Any stage of ``pt.stages`` or a `VirtualStage`; the two may differ. Of an `IdentifiedModel`
+        pass its `model`.
     cross_talk : (float, float) or array_like of shape (2, 2), optional
-        What of y shows in x and what of x shows in y, or a matrix with 1 on its diagonal.
+        Share of y in x and of x in y, or a matrix with 1 on its diagonal.
     lag : float, optional
-        In each control interval one computer takes the next point of the path and serves x,
-        and this time later [s] y, with the same point. It may be more than an interval.
+        Time from sampling x to sampling y [s], with the same point of the path; it may exceed a
+        control interval.
 
     Raises
     ------
@@ -127,11 +128,12 @@ class XYStage:
         Published: a workspace of about 117 um by 117 um, and a cross-talk of at most 1.5 %; x is
         `VirtualStage.xu_li_2010`.
 
-        Chosen, because the paper is silent on y and on how one computer serves both: y has 13 %
+        Chosen, because the paper does not describe y nor the order of sampling: y has 13 %
         hysteresis in place of 10 % and reaches 115 um in place of 117.8 um, as two stacks of one
-        batch may differ, and noise of its own; 1.5 % of y shows in x and 1 % of x in y; the lag is
-        half of the control interval of 0.02 s, as when two axes are served in turn. None of these
-        was fitted to Table 2; docs/contouring.md shows the effect of lag and cross-talk.
+        batch may differ, and noise of its own; the cross-talk is 1.5 % of y in x and 1 % of x in y;
+        the lag is half of the control interval of 0.02 s, as when two axes are sampled in turn.
+        None of these was fitted to Table 2; docs/contouring.md shows the effect of lag and
+        cross-talk.
 
         Parameters
         ----------

@@ -19,7 +19,7 @@ pub trait Feedback {
     fn step(&self, state: &mut Self::State, error: f64, excess: f64) -> f64;
 }
 
-/// No feedback: 0 V, for tracking by feedforward alone.
+/// No feedback: 0 V, for tracking by feedforward only.
 impl Feedback for () {
     type State = ();
 

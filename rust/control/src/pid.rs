@@ -7,7 +7,7 @@
 //!
 //! Xu and Li 2010, equations (22) to (25), doi 10.1115/1.4001712, with one correction. As
 //! printed, the recursion starts from the previous *total* command and adds the feedforward
-//! again, which integrates the feedforward and leads to an error of about 100 um. Here the
+//! again, which integrates the feedforward and causes an error of about 100 um. Here the
 //! recursion is that of the feedback part only. The excess `eu` is the applied voltage `v` less
 //! the total command `u = uFB + uFF + uRC`.
 

@@ -1,4 +1,4 @@
-//! The sampled loop of a controller and a linearised stage: is it stable, and by how much.
+//! Stability and margins of the sampled loop of a controller and a linearised stage.
 
 use piezotrack_core::Result;
 use piezotrack_core::design::{GainRange, LoopPlant, SampledLoop, Verdict};

@@ -1,4 +1,4 @@
-//! The one door into the core: the GIL, Ctrl-C, progress and threads.
+//! Entry of all long calls into the core: GIL, Ctrl-C, progress and threads.
 
 use std::ops::ControlFlow;
 use std::sync::Mutex;
@@ -14,15 +14,15 @@ use pyo3::prelude::*;
 
 use crate::errors::raise;
 
-/// Time between two looks at the signals, and between two reports to a progress bar.
+/// Time between two checks for signals, and between two reports to a progress bar.
 const POLL: Duration = Duration::from_millis(50);
 
 /// Most threads that are started: more than any machine of today has use for.
 const MOST_THREADS: usize = 256;
 
-/// Who is told of the progress of a search.
+/// Receivers of the progress of a search.
 pub struct Watchers {
-    /// Called after every iteration, and waited for; may stop the search.
+    /// Called after every iteration, which waits for it; may stop the search.
     pub callback: Option<Py<PyAny>>,
     /// Called now and then.
     pub progress: Option<Py<PyAny>>,
@@ -131,11 +131,13 @@ pub fn enter_pool<T: Send>(
     }
     match joined {
         Ok(result) => result.map_err(|error| raise(&error)),
-        Err(_) => Err(PyOSError::new_err("a thread of the search died; please report this")),
+        Err(_) => Err(PyOSError::new_err(
+            "a thread of the search ended with an internal error; please report this",
+        )),
     }
 }
 
-/// Until the worker hangs up: passes reports on to Python, and signals to the worker.
+/// Passes reports to Python, and signals to the worker, until the worker ends.
 fn watch(
     watchers: &Watchers,
     halt: &Halt,

@@ -1,4 +1,4 @@
-//! From the core's errors to piezotrack's exceptions: one match.
+//! Conversion of the core's errors to piezotrack's exceptions, in one match.
 
 use piezotrack_core::Error;
 use pyo3::PyErr;

@@ -1,4 +1,4 @@
-//! The Python module `piezotrack._core`: this file registers, the others do.
+//! The Python module `piezotrack._core`: this file only registers the contents of the others.
 
 mod arrays;
 mod control;

@@ -103,8 +103,8 @@ impl PyStage {
         feedforward: &Bound<'_, PyAny>,
         sampling: Sampling,
     ) -> PyResult<PyTrackingRun> {
-        let course = Arrays::new(reference, feedforward)?;
-        enter(py, |stop| course.run(&self.axis(step), controller, sampling, stop))
+        let input = Arrays::new(reference, feedforward)?;
+        enter(py, |stop| input.run(&self.axis(step), controller, sampling, stop))
     }
 
     /// The stage for small motions between two voltages: least, middle and largest gain.

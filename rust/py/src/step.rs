@@ -1,4 +1,4 @@
-//! Step responses, and where a signal turns.
+//! Step responses, and turning points of a signal.
 
 use numpy::{PyArray1, ToPyArray};
 use piezotrack_core::identify::{self, Conventional, StepReadings, StepResponse};

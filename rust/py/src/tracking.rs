@@ -1,4 +1,4 @@
-//! A controller on a stage, and the figures of what came out.
+//! Closed-loop simulation of a controller on a stage, and its metrics.
 
 use numpy::{PyArray1, ToPyArray};
 use piezotrack_core::signal::Stop;
@@ -49,7 +49,7 @@ impl Arrays {
         Ok(Self { reference, feedforward })
     }
 
-    pub fn course(&self) -> ReferenceSamples<'_> {
+    pub fn input(&self) -> ReferenceSamples<'_> {
         ReferenceSamples { reference: &self.reference, feedforward: &self.feedforward }
     }
 
@@ -62,8 +62,8 @@ impl Arrays {
         stop: Stop<'_>,
     ) -> Result<PyTrackingRun> {
         let timing = timing(controller, self.reference.len(), sampling);
-        let (apparatus, course) = (axis.apparatus(), self.course());
-        let run = track(&apparatus, axis.start(), &timing, &controller.controller, course, stop)?;
+        let (apparatus, input) = (axis.apparatus(), self.input());
+        let run = track(&apparatus, axis.start(), &timing, &controller.controller, input, stop)?;
         Ok(PyTrackingRun::new(stopped(run)?))
     }
 }

@@ -213,7 +213,7 @@ impl PyVirtualStage {
         ))
     }
 
-    /// Lets a controller lead the stage along a course.
+    /// Simulates closed-loop tracking of a reference.
     fn track(
         &self,
         py: Python<'_>,
@@ -222,7 +222,7 @@ impl PyVirtualStage {
         feedforward: &Bound<'_, PyAny>,
         sampling: Sampling,
     ) -> PyResult<PyTrackingRun> {
-        let course = Arrays::new(reference, feedforward)?;
-        enter(py, |stop| course.run(&Axis::Virtual(self.0), controller, sampling, stop))
+        let input = Arrays::new(reference, feedforward)?;
+        enter(py, |stop| input.run(&Axis::Virtual(self.0), controller, sampling, stop))
     }
 }

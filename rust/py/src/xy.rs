@@ -108,7 +108,7 @@ impl PyXyStage {
         feedforwards: [Bound<'_, PyAny>; 2],
         sampling: Sampling,
     ) -> PyResult<(PyTrackingRun, PyTrackingRun)> {
-        let courses = [
+        let inputs = [
             Arrays::new(&references[0], &feedforwards[0])?,
             Arrays::new(&references[1], &feedforwards[1])?,
         ];
@@ -116,9 +116,9 @@ impl PyXyStage {
         enter(py, |stop| {
             let (axes, start) = self.both();
             let timing = timing(x, 0, sampling);
-            let courses = [courses[0].course(), courses[1].course()];
+            let inputs = [inputs[0].input(), inputs[1].input()];
             let controllers = (&x.controller, &y.controller);
-            let (x, y) = stopped(track_both(&axes, start, &timing, controllers, courses, stop)?)?;
+            let (x, y) = stopped(track_both(&axes, start, &timing, controllers, inputs, stop)?)?;
             Ok((PyTrackingRun::new(x), PyTrackingRun::new(y)))
         })
     }

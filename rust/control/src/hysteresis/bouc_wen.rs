@@ -58,7 +58,7 @@ pub struct BoucWen<N> {
 pub struct BoucWenState<N> {
     /// Output, h.
     pub value: N,
-    /// Slope of the output along the path that led here.
+    /// Slope of the output along the last section of the path.
     pub slope: N,
 }
 

@@ -19,7 +19,7 @@ use crate::Number;
 
 /// A hysteresis operator: configuration in `&self`, memory in `State`.
 pub trait Operator<N: Number> {
-    /// What the operator remembers of the path.
+    /// State of the operator, which depends on the path.
     type State: Copy;
     /// A monotone section of the path that leaves a state in one direction.
     type Branch: Copy;

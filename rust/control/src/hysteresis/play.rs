@@ -66,7 +66,7 @@ pub struct PlayState<N, const PLAYS: usize> {
     pub input: N,
     /// Output of each play operator, V.
     pub plays: [N; PLAYS],
-    /// Slope of the weighted sum along the path that led here.
+    /// Slope of the weighted sum along the last section of the path.
     pub slope: N,
 }
 

@@ -19,7 +19,7 @@ use crate::hysteresis::{Operator, Play, PlayState};
 
 /// Inverse of a hysteresis operator: output in, input out.
 pub trait OperatorInverse: Copy {
-    /// What it remembers of the path.
+    /// Its state, which depends on the path.
     type State: Copy;
 
     /// The state for an operator that never moved.

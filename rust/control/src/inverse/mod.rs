@@ -62,7 +62,7 @@ pub use play::PlayInverse;
 /// # Ok::<(), piezotrack_control::Error>(())
 /// ```
 pub trait Inverse {
-    /// What the inverse remembers of the path of the reference.
+    /// State of the inverse, which depends on the path of the reference.
     type State: Copy;
 
     /// The state for a stage at rest that never moved.

@@ -1,4 +1,4 @@
-//! A walk along half a circle about 0, in steps that follow how fast a function turns.
+//! Adaptive steps along half a circle about 0, for counting roots by the argument principle.
 
 use core::f64::consts::PI;
 
@@ -69,7 +69,7 @@ impl SampledLoop {
     ///
     /// A zero or pole on the circle is approached to 1e-15 rad and stepped over. Where numbers
     /// are not finite the number of places is bounded too; whether it was enough.
-    pub(crate) fn walk(
+    pub(crate) fn sweep(
         &self,
         radius: f64,
         from: f64,
@@ -106,7 +106,7 @@ impl SampledLoop {
     }
 }
 
-/// The highest of a function's values on a walk, and the piece in which it may be higher still.
+/// The highest of a function's values on a sweep, and the piece in which it may be higher still.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Peak {
     pub height: f64,
@@ -116,7 +116,7 @@ pub(crate) struct Peak {
 }
 
 impl Peak {
-    /// Takes in the value at the right end of a piece of the walk.
+    /// Takes in the value at the right end of a piece of the sweep.
     pub fn take(&mut self, left: f64, right: f64, height: f64) {
         if height > self.height {
             *self = Self { height, theta: right, from: left, to: right };

@@ -10,10 +10,10 @@ use super::sampled_loop::{LinearFeedback, SampledLoop};
 use crate::error::{Error, Result};
 use crate::math::C;
 
-/// Where the walk for margins begins, rad: slower than that nothing is looked at.
+/// Lowest angle at which margins are evaluated, rad.
 const SLOWEST: f64 = 1e-9;
 
-/// How far a loop is from instability. They say something for a stable loop only.
+/// Distances of a loop from instability; meaningful for a stable loop only.
 ///
 /// On the unit circle, `z = exp(i w Ts)`, with L the open loop and S = 1/(1 + L); see Franklin,
 /// Powell and Workman, Digital Control of Dynamic Systems, 3rd edition, section 7.4.
@@ -21,7 +21,7 @@ const SLOWEST: f64 = 1e-9;
 pub struct Margins {
     /// Whether the loop is stable.
     pub stable: bool,
-    /// Factor by which the loop gain may rise until instability, infinite where nothing crosses;
+    /// Factor by which the loop gain may rise until instability, infinite where there is none;
     /// of an unstable loop, the factor, below 1, that would make it stable. `None` where no gain
     /// would.
     pub gain: Option<f64>,
@@ -106,7 +106,7 @@ impl SampledLoop {
         let turn = |place: &Place| place.turn_open().norm().max(place.turn_closed().norm()) * 4.0;
         let sensitivity = |place: &Place| place.parts.a.value.norm() / place.closed().value.norm();
         let mut peak = Peak::default();
-        self.walk(1.0, SLOWEST, turn, |left, right| {
+        self.sweep(1.0, SLOWEST, turn, |left, right| {
             self.crossover(&mut out, left, right);
             peak.take(left.theta, right.theta, sensitivity(right));
         });

@@ -1,4 +1,4 @@
-//! The stage as the loop sees it around one point: volts to metres, linear.
+//! The linearised stage in the loop, from volts to metres.
 
 use core::f64::consts::TAU;
 

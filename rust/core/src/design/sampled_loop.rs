@@ -1,4 +1,4 @@
-//! The closed loop as it runs: stage, feedback, filters and repetitive part, put together.
+//! The sampled closed loop: stage, feedback, filters and repetitive part.
 
 use piezotrack_control::{Controller, Feedback, Filter, SampledPid, SampledRepetitive, StateSpace};
 
@@ -17,7 +17,7 @@ pub trait LinearFeedback {
     /// to volts; the denominator monic and not of lower degree.
     fn transfer_function(&self) -> [Vec<f64>; 2];
 
-    /// The gain that a person would name, Kp in V/m, if the law has one.
+    /// The proportional gain Kp in V/m, if the law has one.
     fn named_gain(&self) -> Option<f64> {
         None
     }

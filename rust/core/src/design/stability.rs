@@ -36,7 +36,7 @@ impl SampledLoop {
     /// lies on it. Hidden roots do not count.
     ///
     /// The principle of the argument: `a + b` grows as z^n at infinity and has no pole outside,
-    /// so it turns n times less the number of those roots along the circle. The walk adapts to
+    /// so it turns n times less the number of those roots along the circle. The step length adapts to
     /// `d ln (a + b)/d ln z`, by which a root close to the circle cannot be stepped over.
     #[must_use]
     pub fn roots_outside(&self, radius: f64) -> Option<usize> {
@@ -55,7 +55,7 @@ impl SampledLoop {
         let mut turned = 0.0;
         let mut met = false;
         let mut nearest: Option<(f64, Place)> = None;
-        let complete = self.walk(
+        let complete = self.sweep(
             radius,
             0.0,
             |place| place.turn_closed().norm(),
@@ -239,7 +239,7 @@ impl SampledLoop {
             }
         }
         let side = |place: &Place| (place.parts.b.value * place.parts.a.value.conj()).im;
-        self.walk(
+        self.sweep(
             1.0,
             0.0,
             |place| place.turn_open().norm(),

@@ -1,4 +1,4 @@
-//! The verdict on a controller for a plant.
+//! Stability check of a controller on a plant.
 
 use piezotrack_control::{Controller, Feedback};
 
@@ -84,11 +84,11 @@ impl SampledLoop {
     /// # Errors
     /// [`crate::Error::Numerical`] where its numbers are too large to count roots with.
     pub fn check(&self) -> Result<Verdict> {
-        let alone = self.without_repetitive();
+        let feedback = self.without_repetitive();
         let exact = self.longest_delay() <= EXACT;
         let small_gain = self.small_gain();
         let outside = if exact { self.roots_outside(1.0) } else { None };
-        let bounded = || small_gain.is_none_or(|gain| gain < 1.0) && alone.is_stable();
+        let bounded = || small_gain.is_none_or(|gain| gain < 1.0) && feedback.is_stable();
         let stable = if exact { outside == Some(0) } else { bounded() };
         let slowest = if exact { self.slowest_root()? } else { None };
         let almost_hidden = self.almost_hidden();
@@ -97,7 +97,7 @@ impl SampledLoop {
             _ => slowest,
         };
         let samples = seen.filter(|_| stable).map(|root| root.samples);
-        let feedback_gains = alone.stable_gains();
+        let feedback_gains = feedback.stable_gains();
         Ok(Verdict {
             stable,
             exact,
@@ -113,8 +113,8 @@ impl SampledLoop {
             feedback_gains,
             periods: self.period().and_then(|period| samples.map(|samples| samples / period)),
             small_gain,
-            margins: alone.margins(),
-            hint: alone.hint(feedback_gains),
+            margins: feedback.margins(),
+            hint: feedback.hint(feedback_gains),
         })
     }
 
@@ -129,15 +129,15 @@ impl SampledLoop {
         if !self.repeats() {
             return None;
         }
-        let alone = self.without_repetitive();
-        let size = |theta: f64| self.learning_gain(alone.place(1.0, theta).delta).norm();
+        let feedback = self.without_repetitive();
+        let size = |theta: f64| self.learning_gain(feedback.place(1.0, theta).delta).norm();
         // Q turns too, most where its pole is near
         let turn = |place: &Place| {
             let open = place.turn_open().norm().max(place.turn_closed().norm());
             8.0 * open.max(self.turn_of_filter(place.z()))
         };
         let mut peak = Peak::default();
-        alone.walk(1.0, SLOWEST, turn, |left, right| {
+        feedback.sweep(1.0, SLOWEST, turn, |left, right| {
             peak.take(left.theta, right.theta, size(right.theta));
         });
         Some(peak.refine(size).height)

@@ -15,7 +15,7 @@ pub(super) fn measures(record: &Record<'_>) -> Measures {
 ///
 /// # Errors
 /// [`Error::Data`] where the record's values are absurd; [`Error::Parameter`] where a derived
-/// range is empty, which other records that passed [`Record::new`] do not lead to.
+/// range is empty, which does not happen with other records that passed [`Record::new`].
 pub fn derive(
     record: &Record<'_>,
     model: Model,

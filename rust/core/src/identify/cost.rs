@@ -1,11 +1,11 @@
-//! What a candidate costs: the RMS deviation of the simulated from the measured displacement.
+//! Cost of a candidate: the RMS deviation of the simulated from the measured displacement.
 //!
 //! ```text
 //! f = sqrt(mean((x_i - xhat_i)^2))
 //! ```
 //!
 //! Xu and Li 2010, equation (16), doi 10.1115/1.4001712. Where an offset is fitted, its best
-//! value for each candidate is the mean of the deviation, so it costs the swarm no dimension.
+//! value for each candidate is the mean of the deviation, so the swarm does not search it.
 //! Particles run in lockstep lanes, and no trajectory is stored.
 
 use pulp::{Arch, Simd, WithSimd};

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::signal::contour_error::check;
 use crate::signal::{index, without_drift};
 
-/// Slope of what one axis shows while the other moves, and its standard deviation.
+/// Share of one axis in the reading of the other, and its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CrossTalk {
     /// Least squares of `other = share * driven + drift`, the drift a cubic in time.
@@ -18,7 +18,7 @@ pub struct CrossTalk {
 /// Cross-talk from the displacements of the axis that is driven and of the one that is not, m.
 ///
 /// The axis that is held still creeps, for which a cubic in time is fitted along. Residuals that
-/// follow each other as a first-order process of correlation r count as n (1 - r) / (1 + r)
+/// are correlated as a first-order process of correlation r count as n (1 - r) / (1 + r)
 /// independent ones: Bartlett 1935, doi 10.2307/2342284, for a drive that is slow beside them.
 ///
 /// ```

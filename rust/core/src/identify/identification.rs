@@ -1,4 +1,4 @@
-//! From a record to an identified stage: the steps in their order.
+//! Identification of a stage from a record: bounds, search, local refinement, standard deviations.
 
 use super::cost::Evaluator;
 use super::levenberg_marquardt::{LocalRefinement, Sensitivity};
@@ -21,15 +21,15 @@ pub struct Identification {
     /// Which of the runs has the lowest cost; `None` where the search was stopped before its
     /// first cost.
     pub best: Option<usize>,
-    /// What the record tells of each free parameter; empty where the search was stopped.
+    /// Standard deviation of each free parameter; empty where the search was stopped.
     pub sensitivities: Vec<Sensitivity>,
 }
 
-/// Identifies a stage from a record: swarms, where asked a polish of each, and the spread.
+/// Identifies a stage from a record: swarms, optional local refinement, standard deviations.
 ///
 /// # Errors
 /// [`crate::Error::Parameter`] for a specification or setting that cannot be used,
-/// [`crate::Error::Numerical`] where no guess could be simulated.
+/// [`crate::Error::Numerical`] where no candidate could be simulated.
 pub fn identify(
     record: &Record<'_>,
     spec: &Spec,

@@ -1,12 +1,10 @@
-//! What is close by: the slope of the deviation at a candidate, a polish down it, and what the
-//! record tells of each parameter.
+//! Local refinement: Jacobian, Levenberg-Marquardt, Cramer-Rao standard deviations.
 //!
 //! The polish is the method of Levenberg and Marquardt (Marquardt 1963, doi 10.1137/0111030)
-//! in the unit box, with coordinates held where they press against a bound. The spread is the
-//! Cramer-Rao bound: with the Jacobian J of the simulated displacement, the covariance of the
+//! in the unit box, with coordinates held while the descent would cross their bound. Standard
+//! deviations are the Cramer-Rao bound: with the Jacobian J of the simulated displacement, the covariance of the
 //! parameters is at least s^2 (J^T J)^-1 for independent deviations of variance s^2.
-//! Deviations that hang together, as those of a model that is not quite right do, make the
-//! true spread larger: Ljung 1999, System Identification, section 9.4.
+//! Correlated deviations, such as those of an inexact model, make the true spread larger: Ljung 1999, System Identification, section 9.4.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -19,7 +17,7 @@ use super::record::Record;
 use super::residual_sums::Costs;
 use crate::signal::{Stop, delayed, index};
 
-/// Most samples that enter the Jacobian: more would hardly change what it says.
+/// Most samples in the Jacobian: more would hardly change the result.
 const MOST_ROWS: usize = 200_000;
 
 /// Change of a coordinate of the unit box, for the differences.

@@ -1,4 +1,4 @@
-//! What is searched: the parameters held and the parameters free.
+//! The search problem: the parameters held, and the free ones with their bounds.
 
 use super::bounds;
 use super::candidate::{DELAY, PLACES, Theta};
@@ -9,7 +9,7 @@ use crate::integrator::MOST_PARAMETERS;
 use crate::models::{FoundBy, Held, Model, NOMINAL_STIFFNESS, position};
 use crate::signal::index;
 
-/// What the caller asked for.
+/// Specification by the caller.
 #[derive(Clone, Debug)]
 pub struct Spec {
     /// The kind of stage.
@@ -24,7 +24,7 @@ pub struct Spec {
     pub stiffness: Option<f64>,
     /// Whether a constant offset of the displacement is fitted with the rest.
     pub offset: bool,
-    /// Time by which the displacement is late, s.
+    /// Delay of the displacement, s.
     pub delay: Delay,
 }
 
@@ -88,7 +88,7 @@ impl Delay {
     }
 }
 
-/// A search made definite.
+/// A search with all its coordinates.
 #[derive(Clone, Debug)]
 pub struct Problem {
     /// The kind of stage.

@@ -1,4 +1,4 @@
-//! Sums over the residuals, added up while a bundle of lanes is simulated.
+//! Sums over the residuals, accumulated during the simulation of a bundle of lanes.
 
 use piezotrack_control::Number;
 use pulp::Simd;

@@ -1,4 +1,4 @@
-//! The whole search: a swarm, its costs, its stop criteria.
+//! The search: swarms, costs, stop criteria.
 
 use super::candidate::Candidate;
 use super::candidate::Theta;
@@ -21,7 +21,7 @@ pub enum StopReason {
     Interrupted,
 }
 
-/// Where a search stands after an iteration.
+/// Progress of a search after an iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
     /// Iterations done; 0 after the first evaluation.
@@ -48,7 +48,7 @@ impl<F: FnMut(&Progress) -> ControlFlow<()>> Monitor for F {
     }
 }
 
-/// What one run of a search found.
+/// Result of one restart of a search.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// Parameters of the best candidate, SI.
@@ -142,12 +142,12 @@ impl Run {
             self.offset = best.offset;
         }
         let mut computed = costs.iter();
-        let told: Vec<f64> = self
+        let costs: Vec<f64> = self
             .swarm
             .ask()
             .map(|place| place.and_then(|_| computed.next()).map_or(f64::INFINITY, |c| c.rms))
             .collect();
-        self.swarm.tell(&told);
+        self.swarm.tell(&costs);
         self.history.push(self.swarm.best().1);
         if self.swarm.stalled() {
             self.reason = Some(StopReason::Stalled);

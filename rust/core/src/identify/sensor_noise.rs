@@ -1,4 +1,4 @@
-//! What a sensor shows at rest: its smallest step, its noise and how fast that is.
+//! Noise of a sensor at rest: quantisation step, rms and bandwidth.
 
 use crate::error::{Error, Result, positive};
 use crate::signal::metrics::Spread;
@@ -71,7 +71,7 @@ pub fn noise_at_rest(record: &[f64], dt: f64) -> Result<Noise> {
     let correlation = if power > 0.0 { (covariance / power).min(1.0 - 1.0 / n) } else { 0.0 };
     let rate = core::f64::consts::TAU * dt;
     let sd = ((1.0 - correlation * correlation) / n).sqrt();
-    // Correlations that chance alone makes are none.
+    // Correlations within the statistical error count as 0.
     let coloured = correlation > 3.0 * sd;
     let bandwidth = if coloured { -libm::log(correlation) / rate } else { f64::INFINITY };
     let bandwidth_sd = coloured.then(|| sd / (correlation * rate));
@@ -87,13 +87,13 @@ struct Grid {
 
 /// Different readings, and the step of which they all are multiples apart.
 ///
-/// The smallest gap is the first guess; over wider and wider gaps it is sharpened, and refused
+/// The smallest gap is the initial estimate; over wider and wider gaps it is sharpened, and refused
 /// where a reading is a tenth of a step off.
 fn grid(record: &[f64]) -> Grid {
     let mut levels = record.to_vec();
     levels.sort_by(f64::total_cmp);
     let span = levels[levels.len() - 1] - levels[0];
-    // Readings that went through a text differ in their last digit.
+    // Readings that were printed and parsed differ in their last digit.
     levels.dedup_by(|next, kept| *next - *kept <= 1e-6 * span);
     let gaps = || levels.windows(2).map(|pair| pair[1] - pair[0]);
     let smallest = gaps().fold(f64::INFINITY, f64::min);

@@ -14,7 +14,7 @@ const PLATEAU: usize = 20;
 /// Fewest samples in a period of the ringing: below, its peaks cannot be read.
 const FEWEST_IN_PERIOD: f64 = 5.0;
 
-/// What is read off a step response, in SI.
+/// Readings of a step response, in SI.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepReadings {
     /// Height of the step, V.
@@ -35,7 +35,7 @@ pub struct StepReadings {
     pub initial_slope: f64,
 }
 
-/// What follows from the readings by the paper's formulas.
+/// Parameters from the readings by the paper's formulas.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conventional {
     /// First overshoot over the steady state.
@@ -151,7 +151,7 @@ impl StepReadings {
 
 /// Stiffness and piezo coefficient from two static levels, with the hysteresis as the scale.
 ///
-/// `K x + Fh(x) = T u` at both, where `Fh` is the Dahl force on the way from rest straight to x.
+/// `K x + Fh(x) = T u` at both, where `Fh` is the Dahl force on the monotone path from rest to x.
 ///
 /// # Errors
 /// [`Error::Data`] where the levels do not tell the two apart.
@@ -179,7 +179,7 @@ pub fn separate(hysteresis: &Conventional, one: (f64, f64), two: (f64, f64)) -> 
 }
 
 impl Conventional {
-    /// Hysteresis force of (7)-(8) on the way from rest straight to `x`, N.
+    /// Hysteresis force of (7)-(8) on the monotone path from rest to `x`, N.
     #[must_use]
     pub fn first_force(&self, x: f64) -> f64 {
         let decay = self.a1 / 2.0;
@@ -237,7 +237,7 @@ pub struct StepResponse {
     pub noise: f64,
     /// Time constants of the ringing that the record shows.
     pub decays: f64,
-    /// By how much the displacement goes on behind the time used for the steady state, m.
+    /// Change of the displacement after the time used for the steady state, m.
     pub creep: f64,
     /// Frequencies, Hz, and gains, m/V, of the spectrum.
     pub spectrum: (Vec<f64>, Vec<f64>),

@@ -100,7 +100,7 @@ impl Ringing {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
         let half = half.round() as usize;
         let fine: Vec<(f64, f64)> = tops.iter().map(|&k| vertex(&over, k, half)).collect();
-        // Noise can make a late peak higher than the one before: the row ends there.
+        // Noise can make a peak near the end higher than the one before: the series ends there.
         let falling = 1 + fine.windows(2).take_while(|pair| pair[1].1 < pair[0].1).count();
         let fine = &fine[..falling.min(fine.len())];
         if fine.len() < 2 {
@@ -116,7 +116,7 @@ impl Ringing {
         Ok(())
     }
 
-    /// Takes the level from the whole periods at the end of the time that tells something.
+    /// Takes the level from the whole periods at the end of the usable part.
     fn settle(&mut self, x: &[f64], dt: f64) {
         let period = self.period / dt;
         let most = f64::min(LATEST * period / self.decrement, MOST_PERIODS * period);
@@ -165,7 +165,7 @@ impl Ringing {
     }
 }
 
-/// Largest sample of each stretch above `least`, stretches told apart by one below `-least`.
+/// Largest sample of each stretch above `least`, stretches separated by one below `-least`.
 ///
 /// A stretch that has not turned back is none.
 fn tops(over: &[f64], least: f64) -> Vec<usize> {

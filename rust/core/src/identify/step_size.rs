@@ -1,4 +1,4 @@
-//! How finely a search steps: fixed once, from the bounds, the sampling rate and the drive.
+//! Sub-steps of a search: chosen once, from the bounds, the sampling rate and the drive.
 
 use rayon::prelude::*;
 

@@ -2,9 +2,10 @@
 //!
 //! The exponential scheme. Over a step the force is a polynomial in time; the linear part is
 //! exact for it, and the operator is exact in the displacement. The force is extrapolated along
-//! its slope, which alone gives second order. A corrector then reads the force off the operator
-//! where that leads and takes the cubic through values and slopes at both ends; a reversal
-//! inside the step is located, and the operator led to the turning point and back: fourth order.
+//! its slope, which by itself gives second order. A corrector then evaluates the operator at the
+//! predicted displacement and takes the cubic through values and slopes at both ends; a reversal
+//! inside the step is located, and the operator evaluated to the turning point and back: fourth
+//! order.
 
 use piezotrack_control::Number;
 use piezotrack_control::hysteresis::Operator;
@@ -42,7 +43,7 @@ impl<N: Number, O: Operator<N>, const FOURTH: bool> Coupling<N> for FeedbackCoup
     }
 }
 
-/// Where the force extrapolated along its slope leads.
+/// State at the end of the step with the force extrapolated along its slope.
 pub(super) struct Prediction<N> {
     pub x: N,
     pub w: N,
@@ -51,7 +52,7 @@ pub(super) struct Prediction<N> {
     change: N,
 }
 
-/// The step whose force goes on along the slope that it starts with.
+/// The step with the force extrapolated along its initial slope.
 #[inline(always)]
 pub(super) fn predict<N: Number, O: Operator<N>>(
     linear: &Propagator<N>,
@@ -73,7 +74,7 @@ pub(super) fn predict<N: Number, O: Operator<N>>(
 }
 
 /// Displacement and scaled velocity with the cubic through the forces at both ends, the force
-/// at the end read off the branch where the prediction leads.
+/// at the end being that of the branch at the predicted displacement.
 #[inline(always)]
 pub(super) fn correct<N: Number, O: Operator<N>>(
     linear: &Propagator<N>,
@@ -131,8 +132,8 @@ fn fourth_order<N: Number, O: Operator<N>>(
     FeedbackState { x, w, memory }
 }
 
-/// What has the sign of the motion over the step: at rest the predicted velocity tells the
-/// direction; else it is too small to matter.
+/// A number with the sign of the motion over the step: at rest the predicted velocity decides;
+/// otherwise it is too small to matter.
 #[inline(always)]
 pub(super) fn heading<N: Number, M>(from: &FeedbackState<N, M>, ahead: &Prediction<N>) -> N {
     ahead.w.mul_add(ahead.w.like(1e-12), from.w)

@@ -7,9 +7,9 @@
 //! Xu and Li 2010, equations (2), (7) and (8), doi 10.1115/1.4001712. At a reversal the term
 //! b0 q2 changes sign at once. Where b0 q2 > 0 it is a dry friction, set-valued at rest: the
 //! stage sticks while the other forces are smaller (Filippov 1988, doi
-//! 10.1007/978-94-015-7793-9). Where b0 q2 < 0 it pushes along the motion, and a stage at rest
-//! under less force than that could go either way: it goes on in its present direction or, from
-//! rest, along the force, and the state remembers that this was a choice.
+//! 10.1007/978-94-015-7793-9). Where b0 q2 < 0 it acts along the motion, and from rest under a
+//! smaller force the solution is not unique: the simulation continues in the present direction or,
+//! from rest, along the force, and marks the state as not unique.
 //!
 //! Reversals, sticking and breaking away are located inside the step, each lane by itself.
 
@@ -53,7 +53,7 @@ pub struct FrictionParameters<N> {
 }
 
 impl<N: Number> FrictionParameters<N> {
-    /// What a stage remembers whose velocity has the sign of `w`; it rests where `w` is 0.
+    /// State of the operator for a velocity with the sign of `w`; at rest where `w` is 0.
     #[inline(always)]
     pub fn memory(&self, w: N, operator: DahlState<N>) -> FrictionMemory<N> {
         self.sliding().memory(w, operator)
@@ -67,7 +67,7 @@ impl<N: Number> FrictionParameters<N> {
     }
 }
 
-/// What a stage with friction remembers.
+/// State of the operator with friction.
 #[derive(Clone, Copy, Debug)]
 pub struct FrictionMemory<N> {
     /// q1 and q2.
@@ -133,14 +133,14 @@ impl<N: Number> SlidingOperator<N> {
 
 type State<N> = FeedbackState<N, FrictionMemory<N>>;
 
-/// The way of the lanes through one step, leg by leg.
+/// Progress of the lanes through one step, in legs between reversals.
 struct StepProgress<N> {
     state: State<N>,
-    /// Part of the step that is behind.
+    /// Part of the step that is done.
     passed: N,
 }
 
-/// A leg in motion: where it ends, and the branch that it went along.
+/// A leg in motion: its end, and the branch of the operator.
 struct Slide<N> {
     x: N,
     /// Velocity times the length of the leg, m.
@@ -149,7 +149,7 @@ struct Slide<N> {
 }
 
 impl<N: Number> FrictionCoupling<N> {
-    /// Works out what the parameters alone decide, for steps of `step` seconds.
+    /// Precomputes what depends only on the parameters, for steps of `step` seconds.
     #[inline(always)]
     pub fn new(of: FrictionParameters<N>, step: f64, halvings: u32) -> Self {
         let [mass, damping, stiffness] = of.mechanics;
@@ -182,7 +182,7 @@ impl<N: Number> FrictionCoupling<N> {
         self.sliding.b1.mul_add(operator.force, self.stiffness * x)
     }
 
-    /// What sticking bears, N: b0 q2, below 0 where the operator pushes.
+    /// Largest force without breaking away, N: b0 q2; below 0 where it acts along the motion.
     #[inline(always)]
     fn grip(&self, operator: &DahlState<N>, force: N) -> N {
         let grip = self.sliding.b0 * operator.slope;
@@ -217,15 +217,15 @@ impl<N: Number> FrictionCoupling<N> {
 
     /// The next leg of every lane: to its reversal, to where it breaks away, or to the end.
     #[inline(always)]
-    fn leg(&self, way: &StepProgress<N>, drive: N, rise: N, last: bool) -> StepProgress<N> {
-        let at = &way.state;
+    fn leg(&self, progress: &StepProgress<N>, drive: N, rise: N, last: bool) -> StepProgress<N> {
+        let at = &progress.state;
         let memory = &at.memory;
         let (zero, one) = (drive.like(0.0), drive.like(1.0));
-        let left = one - way.passed;
-        let now = rise.mul_add(way.passed, drive);
+        let left = one - progress.passed;
+        let now = rise.mul_add(progress.passed, drive);
         let held = drive.like(0.5) - memory.direction * memory.direction;
 
-        // Lanes at rest: how long they stick, and which way they go then.
+        // Lanes at rest: how long they stick, and in which direction they break away.
         let pull = now - self.spring(at.x, &memory.operator);
         let grip = self.grip(&memory.operator, now);
         let over = grip - magnitude(pull);
@@ -258,11 +258,11 @@ impl<N: Number> FrictionCoupling<N> {
         let late = (magnitude(late) - length * drive.like(0.1)).where_negative(late, zero);
         let late = turns.where_negative(late, zero);
         let x = (w * late).mul_add(drive.like(0.5), part.x);
-        let stop = way.passed + length + late;
+        let stop = progress.passed + length + late;
         let stop = turns.where_negative((stop - one).where_negative(stop, one), one);
         let there = sliding.along(&part.branch, x - at.x);
 
-        // After a reversal: sticking, the way back or, where both could be, on as before.
+        // After a reversal: sticking, backward motion or, where both are possible, as before.
         let turned_pull = rise.mul_add(stop, drive) - self.spring(x, &there);
         let turned_grip = self.grip(&there, now);
         let turned_over = turned_grip - magnitude(turned_pull);
@@ -285,7 +285,7 @@ impl<N: Number> FrictionCoupling<N> {
         };
         let moving = FeedbackState { x, w: turns.where_negative(zero, end_w), memory: moved };
         let resting = FeedbackState { x: at.x, w: zero, memory: rested };
-        let waited = leaves.where_negative(way.passed + wait, one);
+        let waited = leaves.where_negative(progress.passed + wait, one);
         StepProgress {
             state: choose(held, &moving, &resting),
             passed: held.where_negative(stop, waited),
@@ -315,20 +315,20 @@ impl<N: Number> Coupling<N> for FrictionCoupling<N> {
         let moving = FeedbackState { x: slide.x, w: slide.w, memory: moved };
         let mut end = choose(held, &moving, state);
         if calm.any_negative() {
-            let mut way = StepProgress { state: *state, passed: drive.like(0.0) };
+            let mut progress = StepProgress { state: *state, passed: drive.like(0.0) };
             for leg in 1..=LEGS {
-                let left = way.passed - drive.like(1.0);
+                let left = progress.passed - drive.like(1.0);
                 if !left.any_negative() {
                     break;
                 }
-                let next = self.leg(&way, drive, rise, leg == LEGS);
-                way = StepProgress {
-                    state: choose(left, &next.state, &way.state),
-                    passed: left.where_negative(next.passed, way.passed),
+                let next = self.leg(&progress, drive, rise, leg == LEGS);
+                progress = StepProgress {
+                    state: choose(left, &next.state, &progress.state),
+                    passed: left.where_negative(next.passed, progress.passed),
                 };
             }
-            // Lanes without an event keep what they would have had alone.
-            end = choose(calm, &way.state, &end);
+            // Lanes without an event keep the result that they have on their own.
+            end = choose(calm, &progress.state, &end);
         }
         let memory = &end.memory;
         let pull = drive + rise - self.stiffness * end.x;

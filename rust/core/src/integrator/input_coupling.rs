@@ -1,8 +1,8 @@
 //! An operator at the input: `M x'' + D x' + K x = K (d u - h(u))`.
 //!
-//! The operator sees the drive alone, which goes straight from sample to sample, so its output
-//! is a smooth function of time between two reversals, and known before the stage moves. Over a
-//! step the force is taken as the cubic through its values and slopes at both ends, for which
+//! The input of the operator is the drive, which is linear between samples, so its output is a
+//! smooth function of time between two reversals and does not depend on the motion. Over a step
+//! the force is approximated by the cubic through its values and slopes at both ends, for which
 //! the linear part is exact: fourth order, and no limit on the step, however stiff the stage is.
 
 use piezotrack_control::Number;
@@ -25,12 +25,12 @@ pub struct InputCoupling<N, O> {
     pub gain: N,
 }
 
-/// What an operator at the input remembers.
+/// State of an operator at the input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InputMemory<N, S> {
     /// Memory of the operator.
     pub operator: S,
-    /// Drive that it has seen last, V.
+    /// Latest drive, V.
     pub input: N,
     /// Change of the drive over the last step, V: 0 where the slope there is not known.
     pub rise: N,

@@ -1,10 +1,9 @@
 //! An operator whose slope jumps at a reversal, in feedback on the displacement.
 //!
-//! The scheme of [`super::FeedbackCoupling`] takes the force over a step for a cubic in time.
-//! First-order Dahl and Bouc-Wen hysteresis leave a reversal with another slope than they came
-//! with, so a step begins with the slope of the direction in which it goes, and a reversal inside
-//! it is led through in both predictor and corrector: the cubic is right at both ends, and only
-//! the kink between them is smoothed. Fourth order between reversals, third across them.
+//! The scheme of [`super::FeedbackCoupling`] approximates the force over a step by a cubic in time.
+//! The slope of first-order Dahl and Bouc-Wen hysteresis jumps at a reversal, so a step begins with
+//! the slope for its direction, and both predictor and corrector evaluate the operator through a
+//! reversal inside it: the cubic is exact at both ends, and only the kink between them is smoothed. Fourth order between reversals, third across them.
 
 use piezotrack_control::Number;
 use piezotrack_control::hysteresis::NonsmoothOperator;

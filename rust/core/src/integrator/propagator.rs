@@ -103,8 +103,8 @@ impl<N: Number> Propagator<N> {
     /// Builds the step for lanes of `1/M`, `D/M`, `K/M`.
     ///
     /// The power series of the matrix exponential is summed for `step / 2^halvings` and
-    /// doubled back, which needs only sums and products and so gives the same bits in lanes
-    /// and alone.
+    /// doubled back, which needs only sums and products and so gives the same bits for one
+    /// stage and for lanes.
     #[inline(always)]
     pub fn new(inverse_mass: N, damping: N, stiffness: N, step: f64, halvings: u32) -> Self {
         let part = libm::ldexp(step, -i32::try_from(halvings).unwrap_or(0));

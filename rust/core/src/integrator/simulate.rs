@@ -10,7 +10,7 @@ use crate::error::{Error, Result, positive};
 use crate::math::dispatch_fused;
 use crate::signal::{Drive, Stop, all_finite, index, largest_difference};
 
-/// Share of the displacement below which no steps make it more accurate.
+/// Accuracy, as a share of the displacement, that rounding limits.
 const ROUNDING: f64 = 1e-16;
 
 /// Most steps of one simulation, beyond [`FEW_SUBSTEPS`] in an interval: some ten seconds.
@@ -24,7 +24,7 @@ pub struct Instant<M> {
     pub x: f64,
     /// Velocity, m/s.
     pub v: f64,
-    /// What the hysteresis remembers.
+    /// State of the hysteresis.
     pub memory: M,
 }
 
@@ -176,9 +176,9 @@ impl<K: Kernel> WithSimd for Run<'_, K> {
             step: h,
             stop,
         };
-        let march = SteppingLoop { coupling, gain };
+        let stepping = SteppingLoop { coupling, gain };
         let from = FeedbackState { x: start.x, w: start.v * h, memory: start.memory };
-        let end = march.run(drive, substeps, from, &mut samples)?;
+        let end = stepping.run(drive, substeps, from, &mut samples)?;
         let last = Instant { x: end.x, v: end.w / h, memory: end.memory };
         let Samples { x, v, hysteresis, .. } = samples;
         Some(Motion { x, v, hysteresis, last, substeps, error_estimate: 0.0 })

@@ -1,4 +1,4 @@
-//! The way of a stage along its drive, for one stage or for lanes of them.
+//! Time stepping of a stage under a sampled drive, scalar or vectorised.
 
 use std::ops::Range;
 
@@ -10,13 +10,13 @@ use crate::signal::{Drive, index};
 /// Order of the coupling of hysteresis and linear part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// One look at the operator in a step: for slow drives, whose steps are short anyway.
+    /// One evaluation of the operator per step: for slow drives, whose steps are short anyway.
     Second,
-    /// Predictor, corrector, and reversals located.
+    /// Predictor and corrector, with reversals located.
     Fourth,
 }
 
-/// How finely a sampling interval is stepped through.
+/// Order and number of the steps in a sampling interval.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stepping {
     /// Order of the coupling.
@@ -25,16 +25,16 @@ pub struct Stepping {
     pub substeps: usize,
 }
 
-/// What is done with the states of a stage on its way.
+/// Receives the states of a stage at the samples.
 pub trait Observer<N, M> {
     /// Takes the state at sample `k`.
     fn sample(&mut self, k: usize, state: &FeedbackState<N, M>);
 
-    /// Asked now and then, after sample `k`, whether to give up.
+    /// Whether to give up, asked from time to time, after sample `k`.
     fn give_up(&mut self, k: usize) -> bool;
 }
 
-/// A stage with everything that its parameters alone decide worked out.
+/// A stage with all that depends only on its parameters precomputed.
 #[derive(Clone, Copy, Debug)]
 pub struct SteppingLoop<N, C> {
     /// One sub-step.

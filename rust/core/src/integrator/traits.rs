@@ -20,7 +20,7 @@ pub trait Coupling<N> {
     /// Whether a step is so short that a loop around it shows.
     const SHORT: bool = false;
 
-    /// What the hysteresis remembers.
+    /// State of the hysteresis.
     type Memory: Copy;
 
     /// The state one step on, under a drive force that goes from `drive` to `drive + rise`, N.
@@ -39,7 +39,7 @@ pub type Parameters<N> = [N; MOST_PARAMETERS];
 /// Most scalar parameters that a model has.
 pub const MOST_PARAMETERS: usize = 12;
 
-/// What the hysteresis of a kernel remembers.
+/// State of the hysteresis of a kernel.
 pub type Memory<K, N> = <<K as Kernel>::Coupling<N> as Coupling<N>>::Memory;
 
 /// Builds the step of a model from its parameters, for one stage or for lanes of them.
@@ -66,7 +66,7 @@ pub trait Kernel: Copy + Send + Sync {
     /// Hysteresis force, N.
     fn force(&self, parameters: &Parameters<f64>, memory: &Memory<Self, f64>) -> f64;
 
-    /// Whether each rest on the way to this memory was unique.
+    /// Whether the solution was unique up to this state.
     fn unique(&self, _memory: &Memory<Self, f64>) -> bool {
         true
     }

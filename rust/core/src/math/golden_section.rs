@@ -1,4 +1,4 @@
-//! A minimum along one coordinate: a coarse look, then golden sections.
+//! Minimum along one coordinate: a coarse grid, then golden-section search.
 
 /// Golden section of an interval, (sqrt(5) - 1) / 2.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;

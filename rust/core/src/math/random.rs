@@ -12,7 +12,7 @@ const WORDS: u128 = 128;
 /// Stream of a sensor's noise: no search counts this many runs.
 const SENSOR: u64 = u64::MAX;
 
-/// Stream of how late the samples of a controller come.
+/// Stream of the sampling jitter of a controller.
 const LATENESS: u64 = u64::MAX - 1;
 
 /// Which of a run's streams draws the links between particles.
@@ -54,8 +54,8 @@ impl Draws {
         Self::at(seed, SENSOR, sample, 0, 1).two_normals()[0]
     }
 
-    /// How late one sample of a controller comes, in units of the mean.
-    pub(crate) fn lateness(seed: u64, sample: u64) -> f64 {
+    /// Jitter of one control sample, in units of the mean.
+    pub(crate) fn jitter(seed: u64, sample: u64) -> f64 {
         Self::at(seed, LATENESS, sample, 0, 1).exponential()
     }
 

@@ -1,4 +1,4 @@
-//! What follows a hysteresis at the input: creep, then linear dynamics of first or second order.
+//! Creep and linear dynamics of first or second order behind a hysteresis at the input.
 //!
 //! ```text
 //! d = h + sum_j c_j q_j,   tau_j q_j' = h - q_j           creep
@@ -9,7 +9,7 @@
 //!
 //! Relaxations whose time constants are a decade apart, with about equal shares, make a creep
 //! that grows nearly with the logarithm of time, as that of piezoceramics does. Every step is
-//! exact for an `h` that goes straight from its start to its end.
+//! exact for an `h` that is linear over the step.
 
 pub use piezotrack_control::{Creep, Dynamics};
 
@@ -35,9 +35,9 @@ pub struct Relaxation {
 /// Memory of creep and dynamics.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RelaxationState {
-    /// What comes in, h, m.
+    /// Input h, m.
     pub input: f64,
-    /// What each relaxation has reached, q, m.
+    /// State q of each relaxation, m.
     pub creep: [f64; MOST_RELAXATIONS],
     /// Displacement, m.
     pub x: f64,
@@ -115,13 +115,13 @@ impl Relaxation {
         self.creep.get(..self.count).unwrap_or(&self.creep)
     }
 
-    /// Displacement that the dynamics are drawn to, d, m.
+    /// Input of the dynamics, d, m.
     #[must_use]
     pub fn target(&self, state: &RelaxationState) -> f64 {
         output(self.used(), state.input, &state.creep)
     }
 
-    /// What comes in jumps to `input`, m.
+    /// The input jumps to `input`, m.
     pub fn jump(&self, state: &mut RelaxationState, input: f64) {
         state.input = input;
         if self.dynamics == Dynamics::None {
@@ -129,7 +129,7 @@ impl Relaxation {
         }
     }
 
-    /// One step in which what comes in goes straight to `input`, m.
+    /// One step in which the input is linear and ends at `input`, m.
     #[inline(always)]
     pub fn step(&self, flow: &RelaxationFlow, state: &mut RelaxationState, input: f64) {
         let before = self.target(state);

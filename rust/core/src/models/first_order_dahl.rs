@@ -171,7 +171,7 @@ impl Searchable for FirstOrderDahlStage {
             ("damping", (1e-2 * damping.0, damping.1)),
             ("stiffness", stiffness),
             ("piezo_coefficient", of.piezo(soft * of.gain, hard * of.gain)),
-            // The way to the Coulomb force is a hundredth of the stroke or all of it.
+            // The path to the Coulomb force is between a hundredth of the stroke and all of it.
             ("rest_stiffness", (1e-2 * soft, 10.0 * hard)),
             ("coulomb_force", (1e-3 * soft * of.stroke, hard * of.stroke)),
         ])

@@ -127,7 +127,7 @@ pub struct GeneralisedPlays {
     count: usize,
 }
 
-/// What it remembers: its input, the plays and its slope.
+/// Its state: input, plays and slope.
 pub type GeneralisedPlaysState = PlayState<f64, SLOTS>;
 
 /// A stage with such plays at its input.
@@ -300,7 +300,7 @@ impl InputOperator for GeneralisedPlays {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GeneralisedPlaysInverse(pub GeneralisedPlays);
 
-/// What it remembers: the state of the operator, and the output that was asked for, m.
+/// Its state: that of the operator, and the output requested last, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GeneralisedPlaysInverseState {
     operator: GeneralisedPlaysState,
@@ -308,7 +308,7 @@ pub struct GeneralisedPlaysInverseState {
 }
 
 impl GeneralisedPlaysInverse {
-    /// What it remembers of an operator in a state.
+    /// The state for an operator in a given state.
     #[must_use]
     pub fn memory(&self, operator: &GeneralisedPlaysState) -> GeneralisedPlaysInverseState {
         let output = self.0.output(operator).0;
@@ -409,7 +409,7 @@ impl WeightedPlays for GeneralisedPrandtlIshlinskiiStage {
 
     /// Its slope at the top of the drive over that at the bottom, and how much it bends both ways:
     /// s in `B^2 = artanh(k)^2 + s^2`, where tanh's argument runs over 2 B and
-    /// k = (1 - sqrt(ratio))/(1 + sqrt(ratio)). With s near 0 it bends one way only.
+    /// k = (1 - sqrt(ratio))/(1 + sqrt(ratio)). With s near 0 it bends in one direction only.
     fn shapes() -> Vec<(f64, f64)> {
         vec![(0.25, 4.0), (0.005, 1.6)]
     }

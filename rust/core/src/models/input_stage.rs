@@ -6,8 +6,8 @@
 //! T x' + x = d   or   x'' + 2 zeta wn x' + wn^2 x = wn^2 d   or   x = d
 //! ```
 //!
-//! The hysteresis is exact from sample to sample; between two samples its output is taken to go
-//! straight. A model brings its operator; creep and dynamics are the same for all.
+//! The hysteresis is exact from sample to sample; between samples its output is taken as linear.
+//! A model defines its operator; creep and dynamics are common to all.
 
 use core::fmt::Debug;
 
@@ -44,7 +44,7 @@ pub(super) const PLAYS_STATE: &[ParameterInfo] = &[
 
 /// A hysteresis operator that is followed from sample to sample, V to m.
 pub trait InputOperator: Copy + Debug {
-    /// What it remembers.
+    /// Its state.
     type State: Copy + Debug;
 
     /// The state before any voltage.
@@ -269,7 +269,7 @@ impl<O: InputOperator> InputStage<O> {
     }
 }
 
-/// What an inverse remembers that goes on from a state of its stage.
+/// State of an inverse that continues from a state of its stage.
 pub(super) fn inverse_state<I: OperatorInverse>(
     inverse: &InputInverse<I, MOST_RELAXATIONS>,
     operator: I::State,

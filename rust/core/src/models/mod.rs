@@ -1,4 +1,4 @@
-//! Models of a stage: one file each, what such a file says, and the list of them.
+//! Models of a stage: one file each, the traits that it implements, and the list of models.
 
 mod bouc_wen;
 mod bouc_wen_oscillator;

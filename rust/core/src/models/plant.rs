@@ -1,21 +1,21 @@
-//! What an experiment moves: a voltage goes in, a displacement comes out.
+//! A plant in continuous time: voltage in, displacement out.
 
 use crate::integrator::{Coupling, FeedbackState, Instant, Kernel, LumpedStage, Memory, halvings};
 
 /// A stage from its terminals to its displacement: configuration in `&self`, memory in `State`.
 pub trait Plant {
-    /// What the stage remembers.
+    /// State of the stage.
     type State: Clone;
-    /// All that the length of a step decides.
+    /// All that depends on the length of a step.
     type Flow;
 
     /// The state before any voltage.
     fn rest(&self) -> Self::State;
 
-    /// Works out steps of `step` seconds.
+    /// Precomputes steps of `step` seconds.
     fn flow(&self, step: f64) -> Self::Flow;
 
-    /// One step under a voltage that goes straight from `from` to `to`, V.
+    /// One step under a voltage that is linear from `from` to `to`, V.
     fn advance(&self, flow: &Self::Flow, state: &mut Self::State, from: f64, to: f64);
 
     /// Displacement, m.
@@ -30,11 +30,11 @@ pub trait KernelModel: Copy {
     /// The kernel with the stage's parameters.
     fn lumped(&self) -> LumpedStage<Self::Kernel>;
 
-    /// What the hysteresis remembers in a state, whose numbers are in the order of the model's
+    /// State of the hysteresis within a stage's state, whose numbers are in the order of the model's
     /// state.
     fn memory(&self, state: &[f64]) -> Memory<Self::Kernel, f64>;
 
-    /// What it remembers as numbers, in the order of the model's state after displacement and
+    /// The state of the hysteresis as numbers, in the order of the model's state after displacement and
     /// velocity.
     fn state(&self, memory: &Memory<Self::Kernel, f64>) -> Vec<f64>;
 }

@@ -1,4 +1,4 @@
-//! The list of models, and what is done with a model or a stage whichever it is.
+//! The list of models, and the types that hold any model, stage, state or inverse of it.
 
 use piezotrack_control::inverse::Inverse;
 
@@ -200,7 +200,7 @@ macro_rules! models {
                 match self { $(Self::$variant(_) => Model::$variant,)* }
             }
 
-            /// Motion under a drive; `None` where it was told to stop.
+            /// Motion under a drive; `None` where it was stopped.
             ///
             /// # Errors
             /// Those of [`StageModel::simulate`].
@@ -244,7 +244,7 @@ macro_rules! models {
             $($variant(<$stage as Invertible>::Inverse),)*
         }
 
-        /// What a [`StageInverse`] remembers.
+        /// State of a [`StageInverse`].
         #[derive(Clone, Copy)]
         #[allow(clippy::large_enum_variant, reason = "one in a controller, whichever models there are")]
         #[expect(missing_docs, missing_debug_implementations, reason = "one for each model")]

@@ -1,4 +1,4 @@
-//! What a model's file says of the model.
+//! Traits that the file of a model implements, and the description of a model.
 
 use core::fmt;
 
@@ -26,7 +26,7 @@ pub struct ModelInfo {
     pub drive_unit: &'static str,
     /// Its parameters; of a model that a swarm searches, mass, damping and stiffness first.
     pub parameters: &'static [ParameterInfo],
-    /// Its state: displacement and velocity, and what the hysteresis remembers.
+    /// Its state: displacement and velocity, and the state of the hysteresis.
     pub state: &'static [ParameterInfo],
     /// Published parameters by a name.
     pub published: &'static [Published],
@@ -102,8 +102,8 @@ pub struct Response {
     pub substeps: usize,
     /// Largest difference in displacement from a coarser simulation, m; 0 where there was none.
     pub error_estimate: f64,
-    /// Whether each rest was unique: false once a stage with dry friction could have gone either
-    /// way.
+    /// Whether the solution is unique: false once a stage with b0 other than 0 could have started
+    /// from rest in either direction.
     pub unique: bool,
 }
 
@@ -126,7 +126,7 @@ pub trait StageModel: Plant + Copy {
     /// Names the parameter that is out of its range.
     fn build(values: &Values) -> Result<Self>;
 
-    /// Motion under a drive; `None` where it was told to stop.
+    /// Motion under a drive; `None` where it was stopped.
     ///
     /// # Errors
     /// Names what cannot be used; [`Error::Numerical`] where the motion does not stay finite or
@@ -147,8 +147,8 @@ pub trait Invertible: StageModel {
     /// The inverse.
     type Inverse: Inverse + Clone;
 
-    /// The inverse for samples every `dt` seconds, and what it remembers of a stage in the state
-    /// `initial`, or of one that never moved.
+    /// The inverse for samples every `dt` seconds, and its state for a stage in the state
+    /// `initial`, or for one that never moved.
     ///
     /// # Errors
     /// Names the parameter, or `dt`, that is out of its range, or `initial` where the model's
@@ -160,7 +160,7 @@ pub trait Invertible: StageModel {
     ) -> Result<(Self::Inverse, <Self::Inverse as Inverse>::State)>;
 }
 
-/// Refuses a state for the inverse of a model whose memory cannot be told from one.
+/// Refuses an initial state for the inverse of a model that begins at rest only.
 pub(super) fn from_rest_only(initial: Option<&Values>) -> Result<()> {
     if initial.is_none() {
         return Ok(());
@@ -173,17 +173,17 @@ pub(super) fn from_rest_only(initial: Option<&Values>) -> Result<()> {
 pub trait Searchable: StageModel {
     /// Whether the force has kinks at reversals: the middle of the box of parameters then stands
     /// for all in the choice of the step. At its corners the kinks are a nanometre wide, which
-    /// would make every candidate a dozen times as dear, and an oscillator's hysteresis grows
-    /// without bound, which no steps follow.
+    /// would make every candidate a dozen times as expensive, and the hysteresis of an oscillator
+    /// can grow without bound, which no number of steps resolves.
     const NONSMOOTH: bool = false;
 
     /// Ranges of the parameters that are not held.
     ///
     /// # Errors
-    /// Names a held parameter with which nothing can be searched.
+    /// Names a held parameter with which no range exists.
     fn ranges(measures: &Measures, held: &Held) -> Result<Ranges>;
 
-    /// Hands the kernel of an order to a visitor; what all candidates share is in `held`.
+    /// Calls a visitor with the kernel of an order; `held` has what all candidates share.
     fn kernel<V: KernelVisitor>(held: &Held, order: Order, visitor: V) -> V::Output;
 
     /// Whether there is a kernel of second order too.
@@ -193,12 +193,12 @@ pub trait Searchable: StageModel {
     }
 }
 
-/// What is done with a kernel, whichever it is.
+/// An operation on a kernel of any type.
 pub trait KernelVisitor {
-    /// What comes of it.
+    /// Its result.
     type Output;
 
-    /// Does it.
+    /// Performs it.
     fn visit<K: Kernel>(self, kernel: K) -> Self::Output;
 }
 

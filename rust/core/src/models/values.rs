@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::integrator::{MOST_PARAMETERS, Parameters};
 
-/// Name, symbol and unit of one parameter, and what a search has to know of it.
+/// Name, symbol and unit of one parameter, and whether it is searched.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterInfo {
     /// The name that both languages use.
@@ -12,11 +12,11 @@ pub struct ParameterInfo {
     pub symbol: &'static str,
     /// SI unit, empty where there is none.
     pub unit: &'static str,
-    /// Whether it carries force: all that do can be multiplied by one number.
+    /// Whether it has the dimension of force: all such parameters can be scaled by one number.
     pub carries_force: bool,
-    /// Value that is held where the caller says nothing.
+    /// Value that is held by default.
     pub default: Option<f64>,
-    /// Why it is never searched, where that is so.
+    /// Why it is never searched, if so.
     pub held: Option<&'static str>,
     /// Whether it is a list of numbers, as weights are.
     pub is_list: bool,

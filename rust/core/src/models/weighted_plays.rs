@@ -1,13 +1,13 @@
-//! Models whose weights least squares find: plays of given thresholds, weighted and added up.
+//! Models identified by least squares: weighted sums of plays with given thresholds.
 
 use super::creep::Relaxation;
 use super::traits::StageModel;
 use super::values::Values;
 
-/// What least squares found.
+/// Result of the least squares.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FittedPlays {
-    /// Weight of what passes without memory, w0.
+    /// Weight of the drive without hysteresis, w0.
     pub linear: f64,
     /// Thresholds of the plays, V.
     pub thresholds: Vec<f64>,
@@ -54,11 +54,11 @@ pub trait WeightedPlays: StageModel {
     fn values(fitted: &FittedPlays) -> Values;
 }
 
-/// What is done with a model of weighted plays, whichever it is.
+/// An operation on any model of weighted plays.
 pub trait WeightedVisitor {
-    /// What comes of it.
+    /// Its result.
     type Output;
 
-    /// Does it.
+    /// Performs it.
     fn visit<M: WeightedPlays>(self) -> Self::Output;
 }

@@ -1,4 +1,4 @@
-//! Contour error: how far a motion in the plane is from the path that it was to follow.
+//! Contour error: signed distance of a motion in the plane from its reference path.
 //!
 //! Positive is to the left of the direction of travel: on a circle that is run counter-clockwise,
 //! to the inside, R - r.

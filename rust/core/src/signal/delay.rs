@@ -1,8 +1,8 @@
-//! A displacement that is read late.
+//! Fractional delay of a displacement.
 
 use piezotrack_control::Number;
 
-/// Displacement that is late by `delay` seconds, between the samples on the cubic through
+/// Displacement delayed by `delay` seconds, between the samples on the cubic through
 /// displacements and velocities, m; before the first sample the stage is where it starts.
 #[must_use]
 pub fn delayed(x: &[f64], v: &[f64], dt: f64, delay: f64) -> Vec<f64> {

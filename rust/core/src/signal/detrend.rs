@@ -1,4 +1,4 @@
-//! Slow drift, as creep makes it, taken off a record.
+//! Removal of slow drift, such as creep, from a record.
 
 use super::drive::index;
 
@@ -7,7 +7,7 @@ const DRIFT: usize = 3;
 
 /// A record less the polynomial that fits it best, and how far that goes, highest less lowest.
 ///
-/// Powers of time are made orthogonal to the lower ones sample by sample, so each is fitted alone.
+/// Powers of time are made orthogonal to the lower ones sample by sample, so each is fitted separately.
 pub(crate) fn without_drift(record: &[f64]) -> (Vec<f64>, f64) {
     let n = record.len();
     let mean = record.iter().sum::<f64>() / index(n);

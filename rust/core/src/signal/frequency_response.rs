@@ -1,4 +1,4 @@
-//! The frequency response that a step response holds, at any frequency.
+//! Frequency response from a step response, at any frequency.
 
 use core::f64::consts::{PI, TAU};
 

@@ -1,6 +1,6 @@
-//! How well a motion follows its reference: figures of the error, phase lag, widest loop.
+//! Metrics of tracking: statistics of the error, phase lag, widest loop.
 //!
-//! The error is desired less actual, so it is positive where the stage is behind on its way up.
+//! The error is desired less actual: positive where the stage lags while it rises.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -241,7 +241,7 @@ pub fn fundamental(signal: &[f64], dt: f64, frequency: f64) -> Result<Fundamenta
         right += row * value;
     }
     let fit = matrix.cholesky().map(|cholesky| cholesky.solve(&right)).ok_or_else(|| {
-        Error::Numerical(format!("no sine of {frequency} Hz can be told from the samples"))
+        Error::Numerical(format!("no sine of {frequency} Hz can be fitted to the samples"))
     })?;
     let (cosine, sine) = (fit[1], fit[2]);
     Ok(Fundamental {

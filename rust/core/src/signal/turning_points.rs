@@ -1,4 +1,4 @@
-//! Where a signal turns back.
+//! Turning points of a signal.
 
 /// Samples at which a signal turns, small turns apart.
 ///

@@ -91,7 +91,7 @@ impl Amplifier {
         }
     }
 
-    /// Output at both ends of a step, V, whose command goes straight from `from` to `to`.
+    /// Output at both ends of a step, V, whose command is linear from `from` to `to`.
     ///
     /// The lag is exact; the slew limit is applied to the step as a whole.
     #[inline(always)]

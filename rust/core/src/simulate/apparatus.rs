@@ -22,7 +22,7 @@ pub struct Apparatus<'a, P> {
     pub step: f64,
 }
 
-/// All that an apparatus remembers: an experiment can go on from it.
+/// State of an apparatus, from which an experiment can continue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ApparatusState<S> {
     /// State of the plant.
@@ -46,7 +46,7 @@ impl<'a, P: Plant> Apparatus<'a, P> {
     ///
     /// `step` is the longest step of the simulation, s.
     #[must_use]
-    pub fn bare(plant: &'a P, step: f64) -> Self {
+    pub fn ideal(plant: &'a P, step: f64) -> Self {
         Self { plant, amplifier: Amplifier::IDEAL, sensor: Sensor::IDEAL, step }
     }
 
@@ -104,7 +104,7 @@ impl<'a, P: Plant> Apparatus<'a, P> {
         Ok(Stretch { steps, plant, amplifier })
     }
 
-    /// Leads the apparatus along a stretch whose command goes straight from `from` to `to`, V.
+    /// Simulates a stretch of time in which the command is linear from `from` to `to`, V.
     pub(super) fn drive(
         &self,
         stretch: &Stretch<P::Flow>,
@@ -124,7 +124,7 @@ pub(super) struct Stretch<F> {
     amplifier: AmplifierFlow,
 }
 
-/// One way along a stretch; dispatched for the fused multiply-add instruction.
+/// Steps through a stretch; dispatched for the fused multiply-add instruction.
 struct DriveStretch<'a, P: Plant> {
     apparatus: &'a Apparatus<'a, P>,
     stretch: &'a Stretch<P::Flow>,

@@ -1,4 +1,4 @@
-//! One axis of a stage, whatever stands for it: a model, or a virtual stage.
+//! One axis of a stage: a model, or a virtual stage.
 
 use super::virtual_stage::{VirtualStage, VirtualState};
 use super::{Apparatus, ApparatusState};
@@ -42,7 +42,7 @@ impl Axis {
     #[must_use]
     pub fn apparatus(&self) -> Apparatus<'_, Self> {
         match self {
-            Self::Model { step, .. } => Apparatus::bare(self, *step),
+            Self::Model { step, .. } => Apparatus::ideal(self, *step),
             Self::Virtual(stage) => {
                 let Apparatus { amplifier, sensor, step, .. } = stage.apparatus();
                 Apparatus { plant: self, amplifier, sensor, step }

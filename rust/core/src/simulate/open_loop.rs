@@ -1,4 +1,4 @@
-//! A drive without feedback: what a log is made of.
+//! Open-loop simulation of a drive, as in the recording of a log.
 
 use super::apparatus::{Apparatus, ApparatusState, Stretch, instants, still_finite};
 use crate::error::{Result, finite};

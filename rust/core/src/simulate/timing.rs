@@ -1,4 +1,4 @@
-//! When a sampled controller looks and acts: delays, and samples that come late by chance.
+//! Timing of a sampled controller: delays and random sampling jitter.
 
 use crate::error::{Error, Result, not_negative, positive};
 use crate::math::Draws;
@@ -14,8 +14,8 @@ pub struct Timing {
     /// Time from a reading to the effect of the command computed from it, s; any fraction of
     /// the interval, and more than one too.
     pub delay: f64,
-    /// How late a control sample comes on average, s, as on a computer that has other things to
-    /// do. Each comes late by its own time, drawn from an exponential distribution that ends at
+    /// Mean sampling jitter, s, as on a computer without real-time scheduling: each control
+    /// sample is delayed by a time drawn from an exponential distribution that ends at
     /// nine tenths of the interval; the draws follow from the seed of the sensor.
     pub jitter: f64,
     /// Instants kept in each control interval, 1 or more.
@@ -64,7 +64,7 @@ impl Delay {
 /// beginning, and as much later as chance has it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Clock {
-    /// Mean lateness, as a part of the interval.
+    /// Mean jitter, as a part of the interval.
     mean: f64,
     seed: u64,
     phase: f64,
@@ -84,18 +84,18 @@ impl Clock {
         Self { phase, ..self }
     }
 
-    /// How late the sample in control interval `k` comes, as a part of the interval.
-    fn late(&self, k: usize) -> f64 {
+    /// Jitter of the sample in control interval `k`, as a part of the interval.
+    fn jitter_of(&self, k: usize) -> f64 {
         if self.mean == 0.0 {
             return 0.0;
         }
-        let drawn = self.mean * Draws::lateness(self.seed, k as u64);
+        let drawn = self.mean * Draws::jitter(self.seed, k as u64);
         drawn.min(LATEST * (1.0 - self.phase))
     }
 
     /// Where in control interval `k` its sample comes: 0 to below 1.
     pub(super) fn at(&self, k: usize) -> f64 {
-        self.phase + self.late(k)
+        self.phase + self.jitter_of(k)
     }
 }
 
@@ -104,7 +104,7 @@ pub(super) struct Commands {
     issued: Vec<f64>,
     /// What the amplifier follows before the first.
     held: f64,
-    /// From the control interval that a command is for to its effect, were no sample late.
+    /// From the control interval that a command is for to its effect, without jitter.
     delay: Delay,
     clock: Clock,
     /// Intervals from the one that a command is for to the one in which it is computed.
@@ -113,7 +113,7 @@ pub(super) struct Commands {
 
 impl Commands {
     /// Commands computed `behind` intervals after theirs, by the clock, that act `delay` after the
-    /// beginning of theirs when none is late.
+    /// beginning of theirs without jitter.
     pub(super) fn new(
         samples: usize,
         held: f64,
@@ -137,7 +137,7 @@ impl Commands {
     /// When command `j` takes effect.
     fn effect(&self, j: usize) -> Delay {
         let Delay { whole, fraction } = self.delay;
-        let fraction = fraction + self.clock.late(j.saturating_add(self.behind));
+        let fraction = fraction + self.clock.jitter_of(j.saturating_add(self.behind));
         if fraction > 1.0 - SAME {
             return Delay { whole: j + whole + 1, fraction: (fraction - 1.0).max(0.0) };
         }
@@ -146,7 +146,7 @@ impl Commands {
 
     /// Where in control interval `k` commands take effect, as parts of it.
     ///
-    /// Before the first command the interval is cut all the same, as if none were late.
+    /// Before the first command the interval is divided all the same, as without jitter.
     pub(super) fn effects(&self, k: usize) -> Vec<f64> {
         let whole = self.delay.whole;
         let Some(newest) = k.checked_sub(whole) else { return vec![self.delay.fraction] };

@@ -1,4 +1,4 @@
-//! A controller in the loop: reference and feedforward in, motion and commands out.
+//! Closed-loop tracking: reference and feedforward in, motion and commands out.
 
 use piezotrack_control::{
     Command, Controller, ControllerState, Feedback, PidState, SampledPid, StateSpace,
@@ -20,7 +20,7 @@ pub const MOST_STATES: usize = 16;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "one in a controller, and no allocation in it")]
 pub enum Law {
-    /// None: feedforward alone.
+    /// None: feedforward without feedback.
     None,
     /// Incremental PID.
     Pid(SampledPid),
@@ -102,52 +102,52 @@ pub struct TrackingRun<S> {
     pub commands: Vec<Command>,
 }
 
-/// Leads an apparatus along a course; `None` where `stop` said so meanwhile.
+/// Simulates a controller on an apparatus; `None` where `stop` said so meanwhile.
 ///
 /// # Errors
-/// [`Error::Shape`] where the course's parts differ in length; otherwise as [`closed_loop`].
+/// [`Error::Shape`] where reference and feedforward differ in length; otherwise as [`closed_loop`].
 pub fn track<P: Plant, F: Feedback>(
     apparatus: &Apparatus<'_, P>,
     start: ApparatusState<P::State>,
     timing: &Timing,
     controller: &Controller<F>,
-    course: ReferenceSamples<'_>,
+    samples: ReferenceSamples<'_>,
     stop: Stop<'_>,
 ) -> Result<Option<TrackingRun<P::State>>> {
-    let mut run = ControllerRun::new(controller, course)?;
-    let timing = Timing { samples: course.reference.len(), ..*timing };
+    let mut run = ControllerRun::new(controller, samples)?;
+    let timing = Timing { samples: samples.reference.len(), ..*timing };
     let command = |k, measured| run.command(k, measured);
     let motion = closed_loop(apparatus, start, &timing, command, stop)?;
     Ok(motion.map(|motion| TrackingRun { motion, commands: run.commands }))
 }
 
-/// A controller on its course.
+/// A running controller with its reference and feedforward.
 pub(super) struct ControllerRun<'a, F: Feedback> {
     controller: &'a Controller<F>,
-    course: ReferenceSamples<'a>,
+    input: ReferenceSamples<'a>,
     state: ControllerState<F::State, Vec<f64>>,
     /// The commands so far.
     pub(super) commands: Vec<Command>,
 }
 
 impl<'a, F: Feedback> ControllerRun<'a, F> {
-    pub(super) fn new(controller: &'a Controller<F>, course: ReferenceSamples<'a>) -> Result<Self> {
-        let samples = course.reference.len();
-        if course.feedforward.len() != samples {
+    pub(super) fn new(controller: &'a Controller<F>, input: ReferenceSamples<'a>) -> Result<Self> {
+        let samples = input.reference.len();
+        if input.feedforward.len() != samples {
             return Err(Error::Shape {
                 name: "feedforward".into(),
-                found: format!("{} samples", course.feedforward.len()),
+                found: format!("{} samples", input.feedforward.len()),
                 expected: format!("{samples}, as many as the reference"),
             });
         }
         let length = controller.repetitive.map_or(0, |part| part.length());
         let state = controller.rest(vec![0.0; length])?;
-        Ok(Self { controller, course, state, commands: Vec::with_capacity(samples) })
+        Ok(Self { controller, input, state, commands: Vec::with_capacity(samples) })
     }
 
     /// The command at sample `k`, V.
     pub(super) fn command(&mut self, k: usize, measured: f64) -> f64 {
-        let (reference, feedforward) = (self.course.reference[k], self.course.feedforward[k]);
+        let (reference, feedforward) = (self.input.reference[k], self.input.feedforward[k]);
         let command = self.controller.step(&mut self.state, reference, measured, feedforward);
         self.commands.push(command);
         command.volts

@@ -224,7 +224,7 @@ impl<X, Y> Pair<X, Y> {
 /// Each controller is called as in [`super::closed_loop`]; that of y at `lag` after that of x,
 /// with a reading of its own. `timing.delay` counts from each axis's own sampling. The record is of
 /// the instants of x: both `measured` are read at once there, whatever the lag, as a recorder
-/// beside the controllers would; with jitter each comes late by a time of its own. Of two axes
+/// beside the controllers would; with jitter each has its own random delay. Of two axes
 /// without cross-talk, lag and jitter each has the bits of [`super::closed_loop`].
 ///
 /// # Errors
@@ -276,32 +276,32 @@ pub fn closed_loops<X: Plant, Y: Plant>(
     Ok(Some((run.x.run, run.y.run)))
 }
 
-/// Leads two axes along two courses; `None` where `stop` said so meanwhile.
+/// Simulates closed-loop tracking of two axes; `None` where `stop` said so meanwhile.
 ///
 /// The command of y beside an instant is the last one computed by then: before `lag` has passed,
 /// the voltage that is there, with no parts.
 ///
 /// # Errors
-/// [`Error::Shape`] where the courses differ in length; otherwise as [`super::track`].
+/// [`Error::Shape`] where the references differ in length; otherwise as [`super::track`].
 pub fn track_both<X: Plant, Y: Plant, F: Feedback, G: Feedback>(
     axes: &TwoAxes<'_, X, Y>,
     start: TwoStates<X::State, Y::State>,
     timing: &Timing,
     controllers: (&Controller<F>, &Controller<G>),
-    courses: [ReferenceSamples<'_>; 2],
+    inputs: [ReferenceSamples<'_>; 2],
     stop: Stop<'_>,
 ) -> Result<Option<TwoTracked<X, Y>>> {
-    let samples = courses[0].reference.len();
-    if courses[1].reference.len() != samples {
+    let samples = inputs[0].reference.len();
+    if inputs[1].reference.len() != samples {
         return Err(Error::Shape {
             name: "reference of y".into(),
-            found: format!("{} samples", courses[1].reference.len()),
+            found: format!("{} samples", inputs[1].reference.len()),
             expected: format!("{samples}, as many as that of x"),
         });
     }
     let (mut x, mut y) = (
-        ControllerRun::new(controllers.0, courses[0])?,
-        ControllerRun::new(controllers.1, courses[1])?,
+        ControllerRun::new(controllers.0, inputs[0])?,
+        ControllerRun::new(controllers.1, inputs[1])?,
     );
     let timing = Timing { samples, ..*timing };
     let waiting = Command { volts: start.1.command, ..Command::default() };

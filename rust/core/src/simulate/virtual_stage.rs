@@ -1,4 +1,4 @@
-//! The virtual stage: what stands in for a piezo stage, richer than the models identified on it.
+//! The virtual stage: a simulated piezo stage, with more effects than the models fitted to it.
 //!
 //! ```text
 //! command -> amplifier -> v -> plays with dead zones -> y -> h = gain y
@@ -107,7 +107,7 @@ const CYCLE_STEP: f64 = 1e-3;
 const LONGEST_REST: f64 = 3600.0;
 
 impl VirtualSettings {
-    /// Xu and Li 2010, doi 10.1115/1.4001712, as far as the paper tells; the rest is chosen.
+    /// Xu and Li 2010, doi 10.1115/1.4001712, as far as published; the rest is chosen.
     ///
     /// Published: 75 V end at 117.7622 um, in a mode of 160 Hz with zeta = 0.065; the sensor's
     /// range of 2.5 mm in 16 bit, so a step of 0.038 um; its noise of 0.097 um rms, which the
@@ -122,7 +122,7 @@ impl VirtualSettings {
     ///   5.8 um (published: 5.69).
     /// - Creep of 0.4 % of the displacement with each of 0.1 s, 1 s and 10 s.
     /// - An amplifier of 225 Hz: with zeta = 0.065 the first peak of the step, published at
-    ///   192.53 um, tells its lag. The second, published at 170.25 um, is then at 167 um: the
+    ///   192.53 um, determines its lag. The second, published at 170.25 um, is then at 167 um: the
     ///   published peaks do not decay with the published zeta. Its slew limit hardly acts.
     /// - A noise bandwidth of 200 Hz.
     ///

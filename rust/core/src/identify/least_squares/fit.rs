@@ -1,4 +1,4 @@
-//! Gauss and Newton's method around non-negative least squares.
+//! Gauss-Newton method with non-negative least squares in each step.
 
 use super::follower::{Follower, crept};
 use super::{DynamicsKind, LeastSquaresFit, Settings, WeightsRecord};
@@ -14,7 +14,7 @@ const LEAST_LINEAR: f64 = 1e-3;
 const SHAPE_ROUNDS: usize = 20;
 
 /// Least share by which a number of an envelope has to lower the deviation before it leaves the
-/// middle of its range: what a record does not fix is left alone.
+/// middle of its range: what a record does not determine is not changed.
 const LEAST_GAIN: f64 = 0.1;
 
 /// Least slope of the dead zones while they are searched.
@@ -31,7 +31,7 @@ struct Unknowns {
 }
 
 impl Unknowns {
-    /// The way from `self` to `goal`, gone by a part.
+    /// Interpolates from `self` to `goal` by a share.
     fn towards(&self, goal: &Self, part: f64) -> Self {
         let mix = |a: &[f64], b: &[f64]| -> Vec<f64> {
             a.iter().zip(b).map(|(a, b)| a + part * (b - a)).collect()
@@ -53,7 +53,7 @@ impl Unknowns {
     }
 }
 
-/// A fit under way.
+/// State of a fit.
 pub(super) struct Fit<'a, M: WeightedPlays> {
     record: &'a WeightsRecord<'a>,
     settings: &'a Settings,

@@ -1,8 +1,8 @@
 //! Identification by least squares: weights of plays, dead zones, creep and linear dynamics.
 //!
-//! Weights, dead zones, shares of the creep and the offset are found by Gauss and Newton's
-//! method, whose linear step is a non-negative least squares problem and, without dead zones and
-//! creep, all there is to it (Kuhnen 2003, doi 10.3166/ejc.9.407-418, has the linear problem;
+//! Weights, dead zones, weights of the creep and the offset are found by the Gauss-Newton method,
+//! each step of which is a non-negative least-squares problem; without dead zones and creep one
+//! step is sufficient (Kuhnen 2003, doi 10.3166/ejc.9.407-418, has the linear problem;
 //! he identifies the dead zones of the inverse, which here would amplify the sensor's noise).
 //! The time constant, frequency and lag of a mode, and the numbers of an envelope, are searched
 //! along one line at a time.

@@ -1,4 +1,4 @@
-//! Particle swarm optimisation as ask/tell: no threads, no clock, no data inside.
+//! Particle swarm optimisation with an ask/tell interface: no threads, no clock, no data.
 //!
 //! The classic update is
 //!
@@ -147,7 +147,7 @@ impl Swarm {
         (&self.best.place, self.best.cost)
     }
 
-    /// Whether the last iteration allowed has been told.
+    /// Whether all iterations allowed are done.
     #[must_use]
     pub fn exhausted(&self) -> bool {
         self.iteration > self.settings.iterations

@@ -1,8 +1,8 @@
-//! Settings of a swarm: how it moves, who tells whom, what the walls do, when it ends.
+//! Settings of a swarm: update, topology, boundary, stop criteria.
 
 use crate::error::{Error, Result, not_negative};
 
-/// What becomes of a particle that leaves the box.
+/// Treatment of a particle that leaves the box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Boundary {
     /// It stops at the wall: coordinate on the bound, its velocity 0.
@@ -18,13 +18,13 @@ pub enum Boundary {
 /// Most particles of a swarm: far beyond any use, far below what memory holds.
 const MOST_PARTICLES: usize = 100_000;
 
-/// Whose best place draws a particle besides its own.
+/// Whose best position attracts a particle besides its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Topology {
     /// The best of all particles.
     Global,
     /// The best of the particle and its two neighbours on a ring: news travels slowly, so the
-    /// swarm looks into several valleys before it settles.
+    /// swarm explores several local minima before it converges.
     Ring,
     /// The best of the particle and those that inform it: each informs three drawn at random,
     /// drawn anew after every iteration that did not improve the swarm's best.
@@ -73,7 +73,7 @@ pub struct SwarmSettings {
     pub min_improvement: f64,
     /// Stalled iterations in a row after which the search stops.
     pub stall_iterations: usize,
-    /// Whether the best guess is polished by a descent after the search.
+    /// Whether a descent refines the best candidate after the search.
     pub polish: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Who tells whom: the best place that draws a particle besides its own.
+//! Topology: whose best position attracts a particle besides its own.
 
 use super::{Best, Particle, Topology};
 use crate::math::Draws;
@@ -34,7 +34,7 @@ impl Links {
     }
 }
 
-/// `P_g` of each particle: the best place that it knows of.
+/// `P_g` of each particle: the best position among its informants.
 pub(super) fn leaders(
     topology: Topology,
     particles: &[Particle],

@@ -1,4 +1,4 @@
-//! How a particle moves.
+//! Update of a particle's velocity and position.
 
 use super::{Best, Boundary, Particle, SwarmSettings, Update};
 use crate::math::Draws;
@@ -48,7 +48,7 @@ impl Particle {
     ///
     /// ```text
     /// G  = (X + (X + c1 (P - X)) + (X + c2 (L - X))) / 3
-    /// G  = (X + (X + c1 (P - X))) / 2                      where X leads itself
+    /// G  = (X + (X + c1 (P - X))) / 2                      where X is its own best informant
     /// X' = G + |G - X| B                                   B a point of the unit ball
     /// V <- w V + X' - X
     /// X <- X + V

@@ -1,4 +1,4 @@
-//! How a Dahl stage steps: smooth to second or fourth order, or with dry friction.
+//! Kernels of the Dahl stage: smooth, of second or fourth order, or with dry friction.
 
 use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{Dahl, DahlState, Operator};

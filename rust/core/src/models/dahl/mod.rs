@@ -271,7 +271,7 @@ impl Searchable for DahlStage {
         ];
         let (soft, hard) = of.stiffness(held, held.value("piezo_coefficient"), &hints);
         let [mass, damping, stiffness] = of.mechanical((soft, hard));
-        // A force of half the elastic one at full stroke, either way.
+        // A force of half the elastic one at full stroke, of either sign.
         let curvature = hard / (up.abs().max(f64::MIN_POSITIVE) * of.stroke);
         Ok(vec![
             ("mass", mass),

@@ -39,7 +39,7 @@ fn moved(state: &State, h: f64, weights: &[f64], slopes: &[State]) -> State {
     out
 }
 
-/// How an interval of the drive is crossed.
+/// A method that integrates over an interval of the drive.
 trait IntervalSolver {
     /// The state at the end of an interval of length `dt` with the drive from `u` to
     /// `u + change`; `None` where it does not stay finite.
@@ -170,7 +170,7 @@ impl IntervalSolver for Rk45<'_> {
 const DIGITS: (usize, usize) = (6, 14);
 
 /// Simulates so that half the step, or a tenth of the tolerance, moves no sample by more than the
-/// accuracy; `None` where it was told to stop.
+/// accuracy; `None` where it was stopped.
 pub(super) fn simulate(
     stage: &DahlStage,
     experiment: &Experiment<'_>,

@@ -1,4 +1,4 @@
-//! The Dahl stage for small motions: its stiffness along the virgin branch.
+//! Linearisation of the Dahl stage: its stiffness along the virgin branch.
 
 use core::ops::RangeInclusive;
 
