@@ -72,7 +72,7 @@ def test_it_predicts_cycles_that_were_not_fitted() -> None:
     assert fit(1).score(rest).rms_percent <= 2.0 * fit(1).cost_percent
 
 
-def test_three_seeds_end_in_the_same_valley() -> None:
+def test_three_seeds_end_in_the_same_minimum() -> None:
     first, *others = (fit(seed) for seed in (1, 2, 3))
     for other in others:
         assert other.cost == pytest.approx(first.cost, rel=1e-3)

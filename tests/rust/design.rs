@@ -12,8 +12,7 @@ use piezotrack_control::{
 use piezotrack_core::Error;
 use piezotrack_core::design::{LinearFeedback, LoopPlant, SampledLoop, check_loop, margins};
 use piezotrack_core::integrator::Mechanics;
-use piezotrack_core::models::DahlStage;
-use piezotrack_core::models::dahl::{extremes, linearised};
+use piezotrack_core::models::dahl::{DahlStage, extremes, linearised};
 
 const DT: f64 = 0.02;
 
@@ -484,8 +483,7 @@ fn bad_input_is_named() {
     let stage = DahlStage::xu_li_2010();
     named(linearised(&stage, f64::NAN).unwrap_err(), "at");
     named(linearised(&stage, -2e-3).unwrap_err(), "K + dFh/dx");
-    let empty = extremes(&stage, 1.0..=0.0);
-    named(empty.unwrap_err(), "range");
+    named(extremes(&stage, 1.0..=0.0).unwrap_err(), "range");
     close(LoopPlant::fixed_gain(2.0).unwrap().static_gain(), 2.0, 0.0);
     let law = published();
     let new = |plant: &LoopPlant, dt| SampledLoop::new(plant, &law, &[], None, dt);

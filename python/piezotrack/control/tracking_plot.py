@@ -107,6 +107,8 @@ def plot_following(run: Tracking, ax: Axes | None = None) -> Axes:
     ends = np.array([run.desired.min(), run.desired.max()]) * 1e6
     ax.plot(ends, ends, color="0.35", linewidth=0.8, linestyle="--")
     ax.set(xlabel="desired displacement [um]", ylabel="actual displacement [um]")
+    # Fewer numbers than chosen by itself, which touch where they are long.
+    ax.locator_params(axis="x", nbins=6)
     return ax
 
 
