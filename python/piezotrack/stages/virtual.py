@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,19 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 __all__ = ["VirtualResponse", "VirtualStage"]
+
+# Fields that are several numbers.
+LISTS = frozenset(
+    {
+        "limits",
+        "thresholds",
+        "weights",
+        "dead_zone_thresholds",
+        "dead_zone_weights",
+        "creep_weights",
+        "creep_times",
+    }
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -134,22 +147,15 @@ class VirtualStage:
     step: float
 
     def __post_init__(self) -> None:
-        for name in (
-            "limits",
-            "thresholds",
-            "weights",
-            "dead_zone_thresholds",
-            "dead_zone_weights",
-        ):
-            object.__setattr__(self, name, one_or_more_numbers(name, getattr(self, name)))
-        for name in ("creep_weights", "creep_times"):
-            object.__setattr__(self, name, one_or_more_numbers(name, getattr(self, name)))
+        for one in fields(self):
+            value: Any = getattr(self, one.name)
+            if one.name in LISTS:
+                value = one_or_more_numbers(one.name, value)
+            elif one.name not in ("preconditioned", "seed"):
+                value = _core.as_number(one.name, value)
+            object.__setattr__(self, one.name, value)
         if len(self.limits) != 2:
             raise ParameterError(f"limits are {self.limits}: expected (low, high) in V")
-        for one in fields(self):
-            if one.type == "float":
-                value = _core.as_number(one.name, getattr(self, one.name))
-                object.__setattr__(self, one.name, value)
         _core.as_truth("preconditioned", self.preconditioned)
         object.__setattr__(self, "seed", _core.as_count("seed", self.seed))
         _ = self._core
