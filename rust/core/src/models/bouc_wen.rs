@@ -15,7 +15,7 @@ use super::plant::KernelModel;
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
     Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
-    from_rest_only, leading, parameters, simulate_kernel,
+    from_rest_only, leading, simulate_kernel,
 };
 use super::values::{Held, ParameterInfo, Values};
 use crate::design::{Gains, LoopPlant};
@@ -143,7 +143,7 @@ impl KernelModel for BoucWenStage {
 
     fn lumped(&self) -> LumpedStage<BoucWenKernel> {
         let kernel = BoucWenKernel { exponent: self.exponent };
-        LumpedStage { kernel, parameters: parameters(&self.values()) }
+        LumpedStage { kernel, parameters: leading(&self.values()) }
     }
 
     fn memory(&self, state: &[f64]) -> InputMemory<f64, BoucWenState<f64>> {

@@ -17,7 +17,7 @@ use super::plant::KernelModel;
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
     Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
-    from_rest_only, leading, parameters, simulate_kernel,
+    from_rest_only, leading, simulate_kernel,
 };
 use super::values::{Held, ParameterInfo, Values};
 use crate::design::{Gains, LoopPlant};
@@ -110,7 +110,7 @@ impl KernelModel for FirstOrderDahlStage {
         let values =
             [mass, damping, stiffness, piezo_coefficient, rest_stiffness, coulomb_force, exponent];
         let kernel = FirstOrderDahlKernel { exponent };
-        LumpedStage { kernel, parameters: parameters(&values) }
+        LumpedStage { kernel, parameters: leading(&values) }
     }
 
     fn memory(&self, state: &[f64]) -> BoucWenState<f64> {

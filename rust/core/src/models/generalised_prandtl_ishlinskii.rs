@@ -30,7 +30,7 @@
 use piezotrack_control::hysteresis::{Operator, PlayState};
 use piezotrack_control::{InputInverse, InputInverseState, OperatorInverse};
 
-use super::creep::MOST_RELAXATIONS;
+use super::creep::{MOST_RELAXATIONS, Relaxation};
 use super::input_stage::{DYNAMICS, InputOperator, InputStage, PLAYS_STATE, inverse_state};
 use super::prandtl_ishlinskii::{MOST_PLAYS, PlayHysteresis};
 use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
@@ -371,7 +371,7 @@ impl StageModel for GeneralisedPrandtlIshlinskiiStage {
         let linear = values.number("linear");
         let (thresholds, weights) = (values.list("thresholds"), values.list("weights"));
         let operator = GeneralisedPlays::new(linear, thresholds, weights, rising, falling)?;
-        Ok(Self { operator, relaxation: Self::relaxation(values)? })
+        Ok(Self { operator, relaxation: Relaxation::build(values)? })
     }
 
     fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {

@@ -139,11 +139,6 @@ impl Relaxation {
 }
 
 impl<O: InputOperator> InputStage<O> {
-    /// Creep and dynamics from the values of a stage.
-    pub(super) fn relaxation(values: &Values) -> Result<Relaxation> {
-        Relaxation::build(values)
-    }
-
     /// The state before any voltage.
     #[must_use]
     pub fn at_rest(&self) -> InputStageState<O::State> {

@@ -11,7 +11,7 @@
 use piezotrack_control::hysteresis::{Operator, Play, PlayState};
 use piezotrack_control::{InputInverseState, PlayInverse, PrandtlIshlinskiiInverse};
 
-use super::creep::MOST_RELAXATIONS;
+use super::creep::{MOST_RELAXATIONS, Relaxation};
 use super::input_stage::{DYNAMICS, InputOperator, InputStage, PLAYS_STATE, inverse_state};
 use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
 use super::values::{ParameterInfo, Values};
@@ -205,7 +205,7 @@ impl StageModel for PrandtlIshlinskiiStage {
             list("dead_zone_thresholds"),
             list("dead_zone_weights"),
         )?;
-        Ok(Self { operator, relaxation: Self::relaxation(values)? })
+        Ok(Self { operator, relaxation: Relaxation::build(values)? })
     }
 
     fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {

@@ -9,7 +9,7 @@ use super::search_ranges::{Measures, Ranges};
 use super::values::{Held, ParameterInfo, Values};
 use crate::design::LoopPlant;
 use crate::error::{Error, Result};
-use crate::integrator::{Instant, Kernel, Motion, Order, Parameters};
+use crate::integrator::{Instant, Kernel, Motion, Order};
 use crate::signal::{Drive, Stop};
 
 /// Published parameters: their name, and what makes them.
@@ -205,11 +205,6 @@ pub trait KernelVisitor {
 /// The first of some numbers; zeros where there are fewer.
 pub(super) fn leading<const N: usize>(numbers: &[f64]) -> [f64; N] {
     core::array::from_fn(|i| numbers.get(i).copied().unwrap_or(0.0))
-}
-
-/// Values of the scalar parameters as a kernel takes them.
-pub(super) fn parameters(values: &[f64]) -> Parameters<f64> {
-    leading(values)
 }
 
 /// Motion of a model that one kernel describes.

@@ -167,7 +167,7 @@ impl DahlStage {
     /// The stage as a kernel steps it.
     #[must_use]
     pub fn lumped<K: Kernel>(&self, kernel: K) -> LumpedStage<K> {
-        LumpedStage { kernel, parameters: super::traits::parameters(&self.values()) }
+        LumpedStage { kernel, parameters: super::traits::leading(&self.values()) }
     }
 
     /// Motion to fourth order, or to second where that is accurate enough: for slow drives it is,
