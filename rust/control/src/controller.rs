@@ -11,7 +11,9 @@ use crate::error::{Error, Result, check, usable};
 use crate::feedback_law::Feedback;
 use crate::filters::{Filter, FilterState};
 use crate::limits::Limits;
-use crate::repetitive::{RepetitiveState, SampledRepetitive};
+use crate::measurement::{LONGEST, Readings, Refused, Span};
+use crate::repetitive::{Outcome, RepetitiveState, SampledRepetitive};
+use crate::snapshot::Snapshot;
 
 /// A controller for one sampling interval: limits, feedback, repetitive part and filters.
 ///
@@ -31,6 +33,8 @@ use crate::repetitive::{RepetitiveState, SampledRepetitive};
 pub struct Controller<F> {
     /// Range of the actuator.
     pub limits: Limits,
+    /// Displacements that the stage can have: what is beyond is no measurement.
+    pub span: Span,
     /// The feedback law; `()` for none.
     pub feedback: F,
     /// The repetitive part.
@@ -46,15 +50,47 @@ pub struct ControllerState<S, L> {
     feedback: S,
     repetitive: Option<RepetitiveState<L>>,
     filters: [FilterState; 2],
-    /// Voltage to continue from at the first step, V.
+    /// Voltage to continue from at the next step, V.
     present: Option<f64>,
+    /// Whether there was a step since the start.
+    stepped: bool,
     /// The last command.
     last: Command,
     /// Applied voltage less the unclipped command, eu, V.
     excess: f64,
     /// Tracking error of the last sample, which the repetitive part has yet to store, m.
     unlearnt: f64,
+    readings: Readings,
 }
+
+/// A state without a repetitive part must have been one when it was saved too.
+impl<S: Snapshot, L: AsRef<[f64]> + AsMut<[f64]>> Snapshot for ControllerState<S, L> {
+    fn save(&self, write: &mut dyn FnMut(f64)) {
+        self.feedback.save(write);
+        self.repetitive.is_some().save(write);
+        self.repetitive.iter().for_each(|memory| memory.save(write));
+        (self.filters.save(write), self.present.save(write), self.stepped.save(write));
+        (self.last.save(write), self.excess.save(write), self.unlearnt.save(write));
+        self.readings.save(write);
+    }
+
+    fn load(&mut self, read: &mut dyn FnMut() -> Option<f64>) -> Option<()> {
+        self.feedback.load(read)?;
+        let mut repeats = false;
+        repeats.load(read)?;
+        if repeats != self.repetitive.is_some() {
+            return None;
+        }
+        self.repetitive.iter_mut().try_for_each(|memory| memory.load(read))?;
+        (self.filters.load(read)?, self.present.load(read)?, self.stepped.load(read)?);
+        (self.last.load(read)?, self.excess.load(read)?, self.unlearnt.load(read)?);
+        self.readings.load(read)
+    }
+}
+
+/// Share of the limits' range by which a reported voltage may differ from the command without
+/// counting as saturated: accuracy of its reading.
+const READING: f64 = 0.01;
 
 /// The command of a controller at one sample, with its parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -73,17 +109,30 @@ pub struct Command {
     pub error: f64,
     /// Whether the voltage was clipped.
     pub saturated: bool,
-    /// False where the measurement was not finite (or beyond 1e100).
+    /// False where the measurement was not finite, outside the span, or a jump too far.
     pub measurement_ok: bool,
-    /// False where the reference or the feedforward was not finite (or beyond 1e100).
+    /// False where the reference was not finite or beyond a metre, or the feedforward was not
+    /// finite.
     pub reference_ok: bool,
 }
+
+crate::snapshot!(Command {
+    volts,
+    unclipped,
+    feedforward,
+    feedback,
+    repetitive,
+    error,
+    saturated,
+    measurement_ok,
+    reference_ok
+});
 
 impl<F: Feedback> Controller<F> {
     /// A controller of limits and feedback only; set the public fields for more.
     #[must_use]
     pub fn new(limits: Limits, feedback: F) -> Self {
-        Self { limits, feedback, repetitive: None, filters: [None; 2] }
+        Self { limits, span: Span::default(), feedback, repetitive: None, filters: [None; 2] }
     }
 
     /// The initial state, with the feedback part at 0 V.
@@ -102,9 +151,11 @@ impl<F: Feedback> Controller<F> {
             repetitive,
             filters: [None; 2],
             present: None,
+            stepped: false,
             last: Command { volts: self.limits.clip(0.0), ..Command::default() },
             excess: 0.0,
             unlearnt: 0.0,
+            readings: Readings::default(),
         })
     }
 
@@ -126,25 +177,71 @@ impl<F: Feedback> Controller<F> {
         Ok(state)
     }
 
-    /// Resets the state to that of [`Self::rest`]; the delay line is cleared and kept.
+    /// Forgets errors, readings and everything learnt, and goes on from the voltage that is there,
+    /// without a bump, as after [`Self::start`]; before the first step as after [`Self::rest`].
+    ///
+    /// Without feedback there is nothing that could hold the voltage: it is the feedforward then.
     pub fn reset<L: AsMut<[f64]>>(&self, state: &mut ControllerState<F::State, L>) {
         if let (Some(part), Some(memory)) = (&self.repetitive, &mut state.repetitive) {
             part.reset(memory);
         }
+        let present = state.voltage();
+        if state.stepped {
+            state.present = Some(present);
+        }
         state.feedback = self.feedback.rest();
         state.filters = [None; 2];
-        state.present = None;
-        state.last = Command { volts: self.limits.clip(0.0), ..Command::default() };
+        state.last = Command { volts: self.limits.clip(present), ..Command::default() };
+        state.stepped = false;
         state.excess = 0.0;
         state.unlearnt = 0.0;
+        state.readings = Readings::default();
+    }
+
+    /// Goes on with the settings of `next` in place of these, without a bump; the limits and the
+    /// span are those of `next` at once.
+    ///
+    /// Where only the gains of a [`crate::Pid`] change, its state is kept. Otherwise the feedback
+    /// starts anew from the voltage that is there, as in [`Self::start`], and changed filters start
+    /// from the next measurement. What was learnt is kept.
+    ///
+    /// # Errors
+    /// Names `repetitive` where the two have not the same period and lines; nothing is changed.
+    pub fn retune<L: AsMut<[f64]>>(
+        &self,
+        next: &Self,
+        state: &mut ControllerState<F::State, L>,
+    ) -> Result<()> {
+        let mine = self.repetitive.as_ref().map(SampledRepetitive::memory);
+        let others = next.repetitive.as_ref().map(SampledRepetitive::memory);
+        if mine != others {
+            let value = others.map_or(0.0, |(period, _)| period);
+            let expected = "the period of the controller that runs, and lines as long";
+            return Err(Error { name: "repetitive", value, unit: "samples", expected });
+        }
+        let kept = next.feedback.adopt(&self.feedback, &mut state.feedback);
+        for ((filter, other), memory) in
+            self.filters.iter().zip(&next.filters).zip(&mut state.filters)
+        {
+            if filter != other {
+                *memory = None;
+            }
+        }
+        let same = self.filters == next.filters && self.repetitive == next.repetitive;
+        if state.stepped && !(kept && same) {
+            state.present = Some(state.voltage());
+        }
+        Ok(())
     }
 
     /// One sample: `reference` and `measured` displacement in m, `feedforward` in V.
     ///
-    /// Inputs that are not finite (or beyond 1e100) affect neither the actuator nor any state, and
-    /// are reported by the flags of the command. Without a valid measurement or reference the
-    /// feedback part holds its output, and the repetitive part continues its output without
-    /// learning. Without a valid feedforward the last one is held.
+    /// Inputs that are not finite affect neither the actuator nor any state, and are reported by
+    /// the flags of the command; so do measurements outside the span (or jumps that it excludes)
+    /// and references beyond a metre. Without a valid measurement or reference the feedback part
+    /// holds its output, and the repetitive part continues its output without learning. Without a
+    /// valid feedforward the last one is held; of one far outside the limits, as much is used as
+    /// reaches from one limit beyond the other by the range between them.
     #[inline]
     pub fn step<L: AsMut<[f64]>>(
         &self,
@@ -153,24 +250,35 @@ impl<F: Feedback> Controller<F> {
         measured: f64,
         feedforward: f64,
     ) -> Command {
-        let measurement_ok = usable(measured);
+        let measurement_ok = self.span.accepts(&mut state.readings, measured);
+        let reference_fits = reference.abs() <= LONGEST;
         let feedforward_ok = usable(feedforward);
-        let error_ok = measurement_ok && usable(reference);
-        let reference_ok = feedforward_ok && usable(reference);
         let last = state.last;
-        let feedforward = if feedforward_ok { feedforward } else { last.feedforward };
+        let range = self.limits.high() - self.limits.low();
+        let feedforward = if feedforward_ok {
+            feedforward.max(self.limits.low() - range).min(self.limits.high() + range)
+        } else {
+            last.feedforward
+        };
         let repetitive = match (&self.repetitive, &mut state.repetitive) {
-            (Some(part), Some(memory)) => part.step(memory, state.unlearnt, last.saturated),
+            (Some(part), Some(memory)) => {
+                let saturated = last.saturated || state.excess.abs() > READING * range;
+                let excess = if saturated { state.excess } else { 0.0 };
+                part.step(memory, Outcome { error: state.unlearnt, excess }, range)
+            }
             _ => 0.0,
         };
         let mut feedback = last.feedback;
-        if let Some(present) = state.present.take() {
+        if let Some(present) = state.present.take()
+            && self.feedback.holds()
+        {
             feedback = present - feedforward - repetitive;
             state.feedback = self.feedback.start(feedback);
+            state.excess = 0.0;
         }
         let mut error = last.error;
         state.unlearnt = 0.0;
-        if error_ok {
+        if measurement_ok && reference_fits {
             error = reference - self.filtered(&mut state.filters, measured);
             let volts = self.feedback.step(&mut state.feedback, error, state.excess);
             feedback = if volts.is_finite() { volts } else { feedback };
@@ -181,6 +289,7 @@ impl<F: Feedback> Controller<F> {
         let unclipped = if unclipped.is_finite() { unclipped } else { last.volts };
         let volts = self.limits.clip(unclipped);
         state.excess = volts - unclipped;
+        state.stepped = true;
         state.last = Command {
             volts,
             unclipped,
@@ -190,7 +299,7 @@ impl<F: Feedback> Controller<F> {
             error,
             saturated: state.excess.abs() > 0.0,
             measurement_ok,
-            reference_ok,
+            reference_ok: reference_fits && feedforward_ok,
         };
         state.last
     }
@@ -211,7 +320,9 @@ impl<S, L> ControllerState<S, L> {
     /// Reports the voltage (V) applied for the last command, where it differs from the clipped
     /// command because of a slew rate or of the amplifier's own limits.
     ///
-    /// Antiwindup uses it; without this call, it uses the clipped command.
+    /// Antiwindup uses it; without this call, it uses the clipped command. Where it differs from
+    /// the command by more than 1 % of the limits' range, the sample counts as saturated for the
+    /// repetitive part.
     ///
     /// # Errors
     /// Names `volts` where it is not finite; nothing is changed then.
@@ -228,5 +339,22 @@ impl<S, L> ControllerState<S, L> {
     #[must_use]
     pub fn last(&self) -> &Command {
         &self.last
+    }
+
+    /// Number of readings that were no measurements since the start.
+    #[must_use]
+    pub fn refused(&self) -> Refused {
+        self.readings.refused
+    }
+
+    /// The last valid measurement, m, if there was one.
+    #[must_use]
+    pub fn measured(&self) -> Option<f64> {
+        self.readings.last
+    }
+
+    /// The voltage at the actuator: the last command, or what was reported as applied, V.
+    fn voltage(&self) -> f64 {
+        if self.stepped { self.last.unclipped + self.excess } else { self.last.volts }
     }
 }

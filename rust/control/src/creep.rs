@@ -67,6 +67,8 @@ pub struct CreepState<const N: usize> {
     pub reached: [f64; N],
 }
 
+crate::snapshot!([const N: usize] CreepState<N> { input, reached });
+
 impl<const N: usize> Default for CreepState<N> {
     fn default() -> Self {
         Self { input: 0.0, reached: [0.0; N] }

@@ -15,6 +15,17 @@ pub trait Feedback {
     /// The initial state for an output that continues from `volts` (V): a bumpless start.
     fn start(&self, volts: f64) -> Self::State;
 
+    /// Whether the law can hold a voltage at which it is started.
+    fn holds(&self) -> bool {
+        true
+    }
+
+    /// Whether the law can go on without a bump from a state of the law `before`, whose gains were
+    /// others. Where it cannot, the controller starts it anew from the voltage that is there.
+    fn adopt(&self, _before: &Self, _state: &mut Self::State) -> bool {
+        false
+    }
+
     /// The voltage (V) for the tracking error `error` (reference less displacement, m).
     fn step(&self, state: &mut Self::State, error: f64, excess: f64) -> f64;
 }
@@ -26,6 +37,10 @@ impl Feedback for () {
     fn rest(&self) {}
 
     fn start(&self, _volts: f64) {}
+
+    fn holds(&self) -> bool {
+        false
+    }
 
     fn step(&self, _state: &mut (), _error: f64, _excess: f64) -> f64 {
         0.0

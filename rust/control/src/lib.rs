@@ -36,6 +36,7 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 #![forbid(unsafe_code)]
 
+mod back_calculation;
 pub mod controller;
 pub mod creep;
 mod cubic_segment;
@@ -46,10 +47,12 @@ pub mod filters;
 pub mod hysteresis;
 pub mod inverse;
 pub mod limits;
+pub mod measurement;
 mod number;
 pub mod online_feedforward;
 pub mod pid;
 pub mod repetitive;
+pub mod snapshot;
 pub mod state_space;
 pub mod unfused;
 
@@ -65,8 +68,12 @@ pub use inverse::{
     OscillatorInverse, PlayInverse, PrandtlIshlinskiiInverse, SampledDahlInverse,
 };
 pub use limits::Limits;
+pub use measurement::{Refused, Span};
 pub use number::Number;
 pub use online_feedforward::{OnlineFeedforward, OnlineFeedforwardState, ReferenceSample};
 pub use pid::{Pid, PidState, SampledPid};
-pub use repetitive::{Recursion, Repetitive, RepetitiveState, SampledRepetitive, Smoothing};
+pub use repetitive::{
+    Outcome, Recursion, Repetitive, RepetitiveState, SampledRepetitive, Smoothing,
+};
+pub use snapshot::Snapshot;
 pub use state_space::{StateSpace, StateSpaceState};

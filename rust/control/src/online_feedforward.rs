@@ -91,6 +91,8 @@ pub struct OnlineFeedforwardState<S> {
     inverse: S,
 }
 
+crate::snapshot!([S: crate::Snapshot] OnlineFeedforwardState<S> { past, inverse });
+
 impl<I: Inverse> OnlineFeedforward<I> {
     /// Feedforward through `inverse` for samples every `dt` seconds.
     ///

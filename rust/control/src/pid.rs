@@ -149,6 +149,8 @@ pub struct PidState {
     errors: Option<[f64; 2]>,
 }
 
+crate::snapshot!(PidState { volts, errors });
+
 impl SampledPid {
     /// Kp, Kp Ts/Ti and Kp Td/Ts, V/m: the weights of `e[k] - e[k-1]`, `e[k]` and
     /// `e[k] - 2 e[k-1] + e[k-2]`.
@@ -167,6 +169,11 @@ impl Feedback for SampledPid {
 
     fn start(&self, volts: f64) -> PidState {
         PidState { volts, errors: None }
+    }
+
+    /// Always: no coefficient multiplies the output.
+    fn adopt(&self, _before: &Self, _state: &mut PidState) -> bool {
+        true
     }
 
     #[inline]

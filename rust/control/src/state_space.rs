@@ -4,15 +4,18 @@
 //! x[k+1] = A x[k] + B e[k],   u[k] = C x[k] + D e[k]
 //! ```
 
+use crate::back_calculation::gain;
 use crate::error::{Error, Result, check, finite};
 use crate::feedback_law::Feedback;
 
 /// A linear controller with up to `N` states: tracking error (m) in, voltage (V) out.
 ///
-/// **Antiwindup.** With a gain vector `l`, back-calculation: the applied voltage less the
-/// unclipped command, `eu[k]` in V, enters as `x[k+1] = A x[k] + B e[k] + l eu[k]`; `A - l C`
-/// should be stable. Without one, conditional integration: while the command is clipped, a step
-/// of the state that would move the command further beyond the limit is omitted.
+/// **Antiwindup** is back-calculation: the applied voltage less the unclipped command, `eu[k]` in
+/// V, enters as `x[k+1] = A x[k] + B e[k] + l eu[k]`. Where no gain `l` is given, it is that of an
+/// observer of the law, which makes `A - l C` stable (see [`StateSpace::antiwindup`]); zeros turn
+/// antiwindup off. A law of which an unstable part does not show in the output has no such gain;
+/// then, while the command is clipped, a step of the state that would move the command further
+/// beyond the limit is omitted.
 ///
 /// ```
 /// use piezotrack_control::{Feedback, StateSpace};
@@ -36,7 +39,8 @@ pub struct StateSpace<const N: usize> {
 impl<const N: usize> StateSpace<N> {
     /// Matrices for `b.len()` states, `a` row by row; they are padded with zeros to `N` states.
     ///
-    /// `d` and the product of `b` and `c` are in V/m; `back` is the vector `l`, if any.
+    /// `d` and the product of `b` and `c` are in V/m; `back` is the vector `l`, by default one that
+    /// fits the law.
     ///
     /// # Errors
     /// Names the matrix that has the wrong number of entries or one that is not finite.
@@ -53,9 +57,12 @@ impl<const N: usize> StateSpace<N> {
         }
         fill(&mut out.b, b);
         fill(&mut out.c, c);
-        if let (Some(to), Some(from)) = (&mut out.back, back) {
-            entries("back", from, n, from.len() == n, "as many entries as b")?;
-            fill(to, from);
+        match (&mut out.back, back) {
+            (Some(to), Some(from)) => {
+                entries("back", from, n, from.len() == n, "as many entries as b")?;
+                fill(to, from);
+            }
+            _ => out.back = gain(&out.a, &out.b, &out.c, d, n),
         }
         Ok(out)
     }
@@ -66,6 +73,12 @@ impl<const N: usize> StateSpace<N> {
     #[must_use]
     pub fn matrices(&self) -> (&[[f64; N]; N], &[f64; N], &[f64; N], f64) {
         (&self.a, &self.b, &self.c, self.d)
+    }
+
+    /// The gain `l` of back-calculation; `None` where the state is held under saturation instead.
+    #[must_use]
+    pub fn antiwindup(&self) -> Option<&[f64; N]> {
+        self.back.as_ref()
     }
 }
 
@@ -103,6 +116,8 @@ pub struct StateSpaceState<const N: usize> {
     offset: f64,
 }
 
+crate::snapshot!([const N: usize] StateSpaceState<N> { x, error, first, offset });
+
 impl<const N: usize> Feedback for StateSpace<N> {
     type State = StateSpaceState<N>;
 
@@ -112,6 +127,10 @@ impl<const N: usize> Feedback for StateSpace<N> {
 
     fn start(&self, volts: f64) -> Self::State {
         StateSpaceState { first: Some(volts), ..self.rest() }
+    }
+
+    fn adopt(&self, before: &Self, _state: &mut Self::State) -> bool {
+        self == before
     }
 
     #[inline]

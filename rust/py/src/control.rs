@@ -1,7 +1,8 @@
 //! Controllers, as configuration and as sessions.
 
 use piezotrack_control::{
-    Command, Controller, ControllerState, Filter, Limits, Pid, Repetitive, Smoothing, StateSpace,
+    Command, Controller, ControllerState, Filter, Limits, Pid, Repetitive, Smoothing, Snapshot,
+    Span, StateSpace,
 };
 use piezotrack_core::simulate::{Law, LawState};
 use piezotrack_core::{Error, Result};
@@ -33,10 +34,13 @@ pub struct PyController {
 #[pymethods]
 impl PyController {
     #[new]
-    #[pyo3(signature = (*, dt, limits, pid, state_space, repetitive, filters))]
+    #[pyo3(signature = (*, dt, limits, span, max_jump, pid, state_space, repetitive, filters))]
+    #[expect(clippy::too_many_arguments, reason = "all named in Python")]
     fn new(
         dt: f64,
         limits: (f64, f64),
+        span: Option<(f64, f64)>,
+        max_jump: Option<f64>,
         pid: Option<PidGains>,
         state_space: Option<Matrices>,
         repetitive: Option<RepetitiveSettings>,
@@ -46,6 +50,12 @@ impl PyController {
             piezotrack_core::error::positive("dt", dt, "s")?;
             let law = law(dt, pid, state_space)?;
             let mut controller = Controller::new(Limits::new(limits.0, limits.1)?, law);
+            if let Some((low, high)) = span {
+                controller.span = Span::new(low, high)?;
+            }
+            if let Some(jump) = max_jump {
+                controller.span = controller.span.with_max_jump(jump)?;
+            }
             controller.repetitive = match repetitive {
                 Some(settings) => Some(repetitive_from(settings)?.at(dt)?),
                 None => None,
@@ -130,10 +140,59 @@ struct PySession {
 /// well.
 type CommandParts = (f64, f64, f64, f64, f64, f64, bool, bool, bool);
 
+/// A state as numbers.
+pub fn saved(state: &impl Snapshot) -> Vec<f64> {
+    let mut numbers = Vec::new();
+    state.save(&mut |number| numbers.push(number));
+    numbers
+}
+
+/// Takes a state from the numbers that `saved` gave.
+pub fn load<S: Snapshot + Clone>(state: &mut S, numbers: Vec<f64>) -> PyResult<()> {
+    let mut restored = state.clone();
+    let mut left = numbers.into_iter();
+    if restored.load(&mut || left.next()).is_none() || left.next().is_some() {
+        let expected = "the numbers of a state of the same configuration";
+        return Err(raise(&Error::parameter("state", "another", expected)));
+    }
+    *state = restored;
+    Ok(())
+}
+
+/// Names and scales of units of length that are taken for metres by mistake.
+const UNITS: [(&str, f64); 3] = [("um", 1e-6), ("nm", 1e-9), ("mm", 1e-3)];
+
+/// The error for a displacement outside of the span.
+fn outside(name: &str, value: f64, span: Span) -> PyErr {
+    let found = format!("{value} m");
+    let mut expected =
+        format!("metres, from {:.4e} to {:.4e} as the stage can have", span.low(), span.high());
+    let fits = |(_, scale): &&(&str, f64)| span.contains(value * scale);
+    if let Some((unit, scale)) = UNITS.iter().find(fits) {
+        expected += &format!("; {value} {unit} is {:e} m", value * scale);
+        if *unit == "um" {
+            expected += ", which step_um takes as it is";
+        }
+    }
+    raise(&Error::parameter(name, found, expected + "; span= sets another range"))
+}
+
 #[pymethods]
 impl PySession {
-    fn step(&mut self, reference: f64, measured: f64, feedforward: f64) -> f64 {
-        self.controller.step(&mut self.state, reference, measured, feedforward).volts
+    /// The voltage of a sample. A reference outside of the span is refused, and so is the first
+    /// measurement where another unit would explain it: nothing has been moved by then.
+    fn step(&mut self, reference: f64, measured: f64, feedforward: f64) -> PyResult<f64> {
+        let span = self.controller.span;
+        if reference.is_finite() && !span.contains(reference) {
+            return Err(outside("reference", reference, span));
+        }
+        if self.state.measured().is_none()
+            && !span.contains(measured)
+            && UNITS.iter().any(|(_, scale)| span.contains(measured * scale))
+        {
+            return Err(outside("measured", measured, span));
+        }
+        Ok(self.controller.step(&mut self.state, reference, measured, feedforward).volts)
     }
 
     fn last(&self) -> CommandParts {
@@ -152,6 +211,21 @@ impl PySession {
         (volts, unclipped, feedforward, feedback, repetitive, error, saturated, well.0, well.1)
     }
 
+    /// Readings that were refused: not finite, outside of the span, jumps.
+    fn refused(&self) -> (u32, u32, u32) {
+        let refused = self.state.refused();
+        (refused.not_finite, refused.outside, refused.jumps)
+    }
+
+    /// The state as numbers, for `load` of a session of the same controller.
+    fn save(&self) -> Vec<f64> {
+        saved(&self.state)
+    }
+
+    fn load(&mut self, numbers: Vec<f64>) -> PyResult<()> {
+        load(&mut self.state, numbers)
+    }
+
     fn applied(&mut self, volts: f64) -> PyResult<()> {
         self.state.applied(volts).map_err(|error| raise(&error.into()))
     }
@@ -163,13 +237,12 @@ impl PySession {
     /// Goes on with the settings of another controller for the same interval.
     fn retune(&mut self, other: &PyController) -> PyResult<()> {
         let (mine, others) = (&self.controller.feedback, &other.controller.feedback);
-        let same = core::mem::discriminant(mine) == core::mem::discriminant(others);
-        let repetitive = self.controller.repetitive.map(|part| part.length())
-            == other.controller.repetitive.map(|part| part.length());
-        if !(same && repetitive) {
-            let expected = "a feedback of the same kind, and a repetitive part of the same period";
+        if core::mem::discriminant(mine) != core::mem::discriminant(others) {
+            let expected = "a feedback of the same kind";
             return Err(raise(&Error::parameter("controller", "another", expected)));
         }
+        let done = self.controller.retune(&other.controller, &mut self.state);
+        done.map_err(|error| raise(&error.into()))?;
         self.controller = other.controller;
         Ok(())
     }

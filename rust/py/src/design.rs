@@ -14,6 +14,9 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(loop_response, module)?)
 }
 
+/// A row by row, B, C, D and the delay, s.
+type Matrices = (Vec<f64>, Vec<f64>, Vec<f64>, f64, f64);
+
 /// A stage for small motions, from the controller's voltage to displacement.
 #[pyclass(name = "LoopPlant", frozen, module = "piezotrack._core")]
 #[derive(Clone)]
@@ -35,6 +38,19 @@ impl PyLoopPlant {
             if bandwidth.is_finite() { plant.with_amplifier(bandwidth) } else { Ok(plant) }
         };
         build().map(Self).map_err(|error| raise(&error))
+    }
+
+    /// A row by row, B, C, D and the delay, s: what `from_matrices` takes.
+    fn matrices(&self) -> Matrices {
+        let (a, b, c, d, delay) = self.0.matrices();
+        (a, b.to_vec(), c.to_vec(), d, delay)
+    }
+
+    #[staticmethod]
+    #[expect(clippy::needless_pass_by_value, reason = "as Python gives them")]
+    fn from_matrices(a: Vec<f64>, b: Vec<f64>, c: Vec<f64>, d: f64, delay: f64) -> PyResult<Self> {
+        let plant = LoopPlant::state_space(&a, &b, &c, d).and_then(|one| one.with_delay(delay));
+        plant.map(Self).map_err(|error| raise(&error))
     }
 
     #[getter]

@@ -8,6 +8,7 @@ use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
 use crate::arrays::samples;
+use crate::control::{load, saved};
 use crate::errors::raise;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -54,6 +55,15 @@ impl PyInverse {
         let (x, v, a) = (samples("x", x)?, samples("v", v)?, samples("a", a)?);
         let drive = along(self.online.inverse(), self.start, &x, &v, &a);
         drive.map(|drive| drive.to_pyarray(py)).map_err(|error| raise(&error))
+    }
+
+    /// The state as numbers, for `load` of the same inverse.
+    fn save(&self) -> Vec<f64> {
+        saved(&self.state)
+    }
+
+    fn load(&mut self, numbers: Vec<f64>) -> PyResult<()> {
+        load(&mut self.state, numbers)
     }
 
     fn reset(&mut self) {

@@ -62,6 +62,8 @@ pub struct BoucWenState<N> {
     pub slope: N,
 }
 
+crate::snapshot!([N: crate::Snapshot] BoucWenState<N> { value, slope });
+
 /// A state about to be left in one direction.
 #[derive(Clone, Copy, Debug)]
 pub struct BoucWenBranch<N> {

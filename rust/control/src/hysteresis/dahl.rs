@@ -43,6 +43,8 @@ pub struct DahlState<N> {
     pub slope: N,
 }
 
+crate::snapshot!([N: crate::Snapshot] DahlState<N> { force, slope });
+
 /// Taylor coefficients of the force about the state where the branch begins.
 #[derive(Clone, Copy, Debug)]
 pub struct DahlBranch<N, const TERMS: usize> {

@@ -70,6 +70,8 @@ pub struct PlayState<N, const PLAYS: usize> {
     pub slope: N,
 }
 
+crate::snapshot!([N: crate::Snapshot, const PLAYS: usize] PlayState<N, PLAYS> { input, plays, slope });
+
 /// A state about to be left in one direction.
 #[derive(Clone, Copy, Debug)]
 pub struct PlayBranch<N, const PLAYS: usize> {

@@ -133,6 +133,8 @@ pub struct BoucWenInverseState {
     memory: BoucWenState<f64>,
 }
 
+crate::snapshot!(BoucWenInverseState { u, memory });
+
 impl Inverse for BoucWenInverse {
     type State = BoucWenInverseState;
 

@@ -154,6 +154,8 @@ pub struct InverseState {
     memory: DahlState<Unfused>,
 }
 
+crate::snapshot!(InverseState { x, w, memory });
+
 impl SampledDahlInverse {
     /// The state for a stage at rest at 0 that never moved.
     #[must_use]

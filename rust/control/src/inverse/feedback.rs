@@ -52,6 +52,8 @@ pub struct FeedbackInverseState {
     memory: BoucWenState<Unfused>,
 }
 
+crate::snapshot!(FeedbackInverseState { x, w, memory });
+
 impl FirstOrderDahlInverse {
     /// The inverse of the stage with this mass (kg), damping (N s/m), stiffness (N/m) and piezo
     /// coefficient (N/V), and with rest stiffness (N/m), Coulomb force (N) and exponent of the

@@ -90,6 +90,11 @@ pub struct InputInverseState<S, const RELAXATIONS: usize> {
     begun: bool,
 }
 
+crate::snapshot!(
+    [S: crate::Snapshot, const RELAXATIONS: usize]
+    InputInverseState<S, RELAXATIONS> { operator, creep, begun }
+);
+
 impl<const PLAYS: usize, const ZONES: usize, const RELAXATIONS: usize>
     PrandtlIshlinskiiInverse<PLAYS, ZONES, RELAXATIONS>
 {

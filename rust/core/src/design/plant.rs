@@ -126,6 +126,13 @@ impl LoopPlant {
         Ok(Self { a, b, c, d: 0.0, delay: self.delay })
     }
 
+    /// A row by row, B, C and D as [`Self::state_space`] takes them, and the delay, s.
+    #[must_use]
+    pub fn matrices(&self) -> (Vec<f64>, &[f64], &[f64], f64, f64) {
+        let rows = self.a.transpose().as_slice().to_vec();
+        (rows, self.b.as_slice(), self.c.as_slice(), self.d, self.delay)
+    }
+
     /// Gain at frequency 0, m/V; infinite for a plant that integrates.
     #[must_use]
     pub fn static_gain(&self) -> f64 {

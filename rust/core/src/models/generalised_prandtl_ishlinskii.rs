@@ -307,6 +307,8 @@ pub struct GeneralisedPlaysInverseState {
     output: f64,
 }
 
+piezotrack_control::snapshot!(GeneralisedPlaysInverseState { operator, output });
+
 impl GeneralisedPlaysInverse {
     /// The state for an operator in a given state.
     #[must_use]

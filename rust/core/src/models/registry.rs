@@ -1,5 +1,6 @@
 //! The list of models, and the types that hold any model, stage, state or inverse of it.
 
+use piezotrack_control::Snapshot;
 use piezotrack_control::inverse::Inverse;
 
 use super::plant::Plant;
@@ -250,6 +251,20 @@ macro_rules! models {
         #[expect(missing_docs, missing_debug_implementations, reason = "one for each model")]
         pub enum StageInverseState {
             $($variant(<<$stage as Invertible>::Inverse as Inverse>::State),)*
+        }
+
+        impl Snapshot for StageInverseState {
+            fn save(&self, write: &mut dyn FnMut(f64)) {
+                match self {
+                    $(Self::$variant(state) => state.save(write),)*
+                }
+            }
+
+            fn load(&mut self, read: &mut dyn FnMut() -> Option<f64>) -> Option<()> {
+                match self {
+                    $(Self::$variant(state) => state.load(read),)*
+                }
+            }
         }
 
         impl Inverse for StageInverse {

@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use piezotrack_control::Snapshot;
 use piezotrack_control::inverse::Inverse;
 
 use super::plant::{KernelModel, Plant};
@@ -144,8 +145,8 @@ pub trait StageModel: Plant + Copy {
 
 /// A model with an inverse that runs at the sample rate.
 pub trait Invertible: StageModel {
-    /// The inverse.
-    type Inverse: Inverse + Clone;
+    /// The inverse, whose state can be kept as numbers.
+    type Inverse: Inverse<State: Snapshot> + Clone;
 
     /// The inverse for samples every `dt` seconds, and its state for a stage in the state
     /// `initial`, or for one that never moved.

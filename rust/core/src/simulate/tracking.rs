@@ -1,7 +1,7 @@
 //! Closed-loop tracking: reference and feedforward in, motion and commands out.
 
 use piezotrack_control::{
-    Command, Controller, ControllerState, Feedback, PidState, SampledPid, StateSpace,
+    Command, Controller, ControllerState, Feedback, PidState, SampledPid, Snapshot, StateSpace,
     StateSpaceState,
 };
 
@@ -39,6 +39,24 @@ pub enum LawState {
     StateSpace(StateSpaceState<MOST_STATES>),
 }
 
+impl Snapshot for LawState {
+    fn save(&self, write: &mut dyn FnMut(f64)) {
+        match self {
+            Self::None => {}
+            Self::Pid(state) => state.save(write),
+            Self::StateSpace(state) => state.save(write),
+        }
+    }
+
+    fn load(&mut self, read: &mut dyn FnMut() -> Option<f64>) -> Option<()> {
+        match self {
+            Self::None => Some(()),
+            Self::Pid(state) => state.load(read),
+            Self::StateSpace(state) => state.load(read),
+        }
+    }
+}
+
 impl Feedback for Law {
     type State = LawState;
 
@@ -55,6 +73,21 @@ impl Feedback for Law {
             Self::None => LawState::None,
             Self::Pid(law) => LawState::Pid(law.start(volts)),
             Self::StateSpace(law) => LawState::StateSpace(law.start(volts)),
+        }
+    }
+
+    fn holds(&self) -> bool {
+        !matches!(self, Self::None)
+    }
+
+    fn adopt(&self, before: &Self, state: &mut LawState) -> bool {
+        match (self, before, state) {
+            (Self::Pid(law), Self::Pid(before), LawState::Pid(state)) => law.adopt(before, state),
+            (Self::StateSpace(law), Self::StateSpace(before), LawState::StateSpace(state)) => {
+                law.adopt(before, state)
+            }
+            (Self::None, Self::None, _) => true,
+            _ => false,
         }
     }
 

@@ -8,8 +8,15 @@
 //! (30), has a common factor that is not cancelled and coefficients of four digits: its pole at
 //! 1.000172 grows by 4.4 % in a period. Here the delay line stores the sum `uRC + Kq e`, so that
 //! one line is enough; the filter Q, the forgetting factor and a fractional delay are taps on it.
+//! A second line keeps uRC alone, as what was learnt before saturation: see
+//! [`SampledRepetitive::step`].
 
-use crate::error::{Error, Result, check, positive};
+mod sampled;
+mod saturation;
+
+pub use sampled::{Outcome, Recursion, RepetitiveState, SampledRepetitive};
+
+use crate::error::{Result, check, positive};
 
 /// Taps of the cubic interpolation between two samples.
 const CUBIC: usize = 4;
@@ -62,14 +69,17 @@ pub enum Smoothing {
 /// With an integrator in the feedback the loop has a root at exactly 1: constant parts of uRC and
 /// uFB that cancel each other are not observable, and they drift under saturation.
 /// `forgetting_factor` below 1 and `pause` (no learning from saturated samples) prevent this.
+/// With `pause`, learning also stops as a whole, and what was learnt is held, while more than a
+/// quarter of a period is saturated: such a reference is beyond the reach of the stage.
 ///
 /// ```
-/// use piezotrack_control::{Repetitive, Smoothing};
+/// use piezotrack_control::{Outcome, Repetitive, Smoothing};
 ///
 /// let smoothing = Smoothing::Lag { tq: 0.2, compensated: true };
 /// let learner = Repetitive::new(5.0, smoothing, 1.0)?.at(0.02)?;
-/// let mut state = learner.rest([0.0; 256])?;
-/// let volts = learner.step(&mut state, 1e-6, false);
+/// let mut state = learner.rest([0.0; Repetitive::room(250)])?;
+/// let before = Outcome { error: 1e-6, excess: 0.0 };
+/// let volts = learner.step(&mut state, before, 75.0);
 /// assert_eq!(volts, 0.0); // there is no period to learn from yet
 /// # Ok::<(), piezotrack_control::Error>(())
 /// ```
@@ -86,7 +96,7 @@ pub struct Repetitive {
     /// Number of samples by which an error is stored earlier, to compensate the delay of the
     /// plant. The voltage stored beside it is not shifted: that would change the period.
     pub lead: u32,
-    /// Whether the error of a saturated sample is stored as 0.
+    /// Whether learning pauses under saturation.
     pub pause: bool,
 }
 
@@ -115,7 +125,7 @@ impl Repetitive {
     /// Entries that suffice for a period of `period` samples (rounded up), for a fixed-size array.
     #[must_use]
     pub const fn room(period: usize) -> usize {
-        period.saturating_add(HALF + CUBIC)
+        period.saturating_add(HALF + CUBIC).saturating_mul(2)
     }
 
     fn check(&self) -> Result<()> {
@@ -164,7 +174,7 @@ impl Repetitive {
         let right = samples >= shortest;
         let expected = "longer than the filter's lag and one sample together";
         check("period", self.period, "s", right, expected)?;
-        let sampled = SampledRepetitive { period: samples, ..self.taps(delay, pole, &q, half) };
+        let sampled = self.taps(delay, pole, &q, half).for_period(samples);
         let right = sampled.lead < sampled.nearest;
         check("lead", f64::from(self.lead), "samples", right, "less than the period allows")?;
         Ok(sampled)
@@ -210,6 +220,7 @@ impl Repetitive {
             nearest: samples(floor - before) - half,
             taps,
             reads,
+            entries: 0,
         }
     }
 }
@@ -250,147 +261,4 @@ fn count(n: usize) -> f64 {
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
 fn samples(value: f64) -> usize {
     value as usize
-}
-
-/// Coefficients of a repetitive controller for one sampling interval; see [`Repetitive::at`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SampledRepetitive {
-    /// L/Ts.
-    period: f64,
-    /// p, 0 for a filter without memory.
-    pole: f64,
-    /// Kq, V/m.
-    gain: f64,
-    pause: bool,
-    /// Number of entries by which an error is stored earlier.
-    lead: usize,
-    /// Delay of the first tap, in samples, 1 or more.
-    nearest: usize,
-    /// Weights of the samples, the oldest first; 0 where not in use.
-    taps: [f64; TAPS],
-    /// Number of taps in use.
-    reads: usize,
-}
-
-/// Coefficients of a repetitive controller: see [`SampledRepetitive::recursion`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Recursion<'a> {
-    /// Period of the reference, in samples.
-    pub period: f64,
-    /// Pole p of the filter, 0 for a filter without memory.
-    pub pole: f64,
-    /// Learning gain Kq, V/m.
-    pub gain: f64,
-    /// Number of samples by which errors are stored earlier than voltages.
-    pub lead: usize,
-    /// Delay of the first tap, in samples, more than `lead`.
-    pub nearest: usize,
-    /// Weights of the samples, the oldest first; the last one has the delay `nearest`.
-    pub taps: &'a [f64],
-}
-
-/// Sum of products in two independent sums, which the processor can compute in parallel.
-#[inline]
-fn weighted(entries: &[f64], taps: &[f64]) -> f64 {
-    let (mut even, mut odd) = (0.0, 0.0);
-    let mut pairs = entries.iter().zip(taps);
-    while let Some((entry, tap)) = pairs.next() {
-        even += entry * tap;
-        if let Some((entry, tap)) = pairs.next() {
-            odd += entry * tap;
-        }
-    }
-    even + odd
-}
-
-/// State of a repetitive controller, with a delay line provided by the caller: `&mut [f64]`,
-/// `[f64; N]` or `Vec<f64>`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RepetitiveState<L> {
-    line: L,
-    /// Index of the next entry to be written.
-    next: usize,
-    /// The last output, V.
-    volts: f64,
-}
-
-impl SampledRepetitive {
-    /// Least number of entries of the delay line.
-    #[must_use]
-    pub fn length(&self) -> usize {
-        self.nearest + self.reads - 1
-    }
-
-    /// Coefficients of the recursion, for a stability analysis:
-    /// `uRC[k] = pole uRC[k-1] + sum of tap (uRC[k-n] + gain e[k-n+lead])`, n the delay of a tap.
-    #[must_use]
-    pub fn recursion(&self) -> Recursion<'_> {
-        Recursion {
-            period: self.period,
-            pole: self.pole,
-            gain: self.gain,
-            lead: self.lead,
-            nearest: self.nearest,
-            taps: self.taps.get(..self.reads).unwrap_or_default(),
-        }
-    }
-
-    /// The state before any learning. `line` is filled with zeros.
-    ///
-    /// # Errors
-    /// Names `line` where it is shorter than [`Self::length`].
-    pub fn rest<L: AsMut<[f64]>>(&self, mut line: L) -> Result<RepetitiveState<L>> {
-        let entries = line.as_mut();
-        if entries.len() < self.length() {
-            let value = count(entries.len());
-            let expected = "at least as many as the controller's length()";
-            return Err(Error { name: "line", value, unit: "entries", expected });
-        }
-        entries.fill(0.0);
-        Ok(RepetitiveState { line, next: 0, volts: 0.0 })
-    }
-
-    /// The voltage for this sample, from the tracking error (m) of the sample *before*.
-    ///
-    /// An error affects the voltage of the next sample at the earliest, so it is passed one sample
-    /// later, when it is also known whether that command was clipped (`saturated`). At the first
-    /// sample there is no error yet: pass 0.
-    #[inline]
-    pub fn step<L: AsMut<[f64]>>(
-        &self,
-        state: &mut RepetitiveState<L>,
-        error: f64,
-        saturated: bool,
-    ) -> f64 {
-        let error = if (saturated && self.pause) || !error.is_finite() { 0.0 } else { error };
-        let line = state.line.as_mut();
-        let length = self.length();
-        let Some(line) = line.get_mut(..length) else { return 0.0 };
-        if let Some(entry) = line.get_mut(state.next) {
-            *entry = state.volts;
-        }
-        let back = if state.next >= self.lead { state.next } else { state.next + length };
-        if let Some(entry) = line.get_mut(back - self.lead) {
-            *entry += self.gain * error;
-        }
-        state.next = if state.next + 1 < length { state.next + 1 } else { 0 };
-        // The oldest entry is the one to be written next.
-        let (newer, older) = line.split_at(state.next);
-        let (first, rest) = self.taps.split_at(self.reads.min(older.len()).min(TAPS));
-        let mut learnt = weighted(older, first);
-        if first.len() < self.reads {
-            learnt += weighted(newer, rest);
-        }
-        let volts = self.pole * state.volts + learnt;
-        // Overflow: start again from 0 V.
-        state.volts = if volts.is_finite() { volts } else { 0.0 };
-        state.volts
-    }
-
-    /// Clears everything learnt.
-    pub fn reset<L: AsMut<[f64]>>(&self, state: &mut RepetitiveState<L>) {
-        state.line.as_mut().fill(0.0);
-        state.next = 0;
-        state.volts = 0.0;
-    }
 }

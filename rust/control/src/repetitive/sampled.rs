@@ -1,0 +1,241 @@
+//! The recursion of a repetitive controller for one sampling interval, and its delay line.
+
+use super::saturation::{Learning, Saturation};
+use super::{TAPS, count, samples};
+use crate::error::{Error, Result};
+use crate::snapshot::Snapshot;
+
+/// Coefficients of a repetitive controller for one sampling interval; see [`Repetitive::at`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SampledRepetitive {
+    /// L/Ts.
+    pub(super) period: f64,
+    /// p, 0 for a filter without memory.
+    pub(super) pole: f64,
+    /// Kq, V/m.
+    pub(super) gain: f64,
+    pub(super) pause: bool,
+    /// Number of entries by which an error is stored earlier.
+    pub(super) lead: usize,
+    /// Delay of the first tap, in samples, 1 or more.
+    pub(super) nearest: usize,
+    /// Weights of the samples, the oldest first; 0 where not in use.
+    pub(super) taps: [f64; TAPS],
+    /// Number of taps in use.
+    pub(super) reads: usize,
+    /// Entries of each of the two lines.
+    pub(super) entries: usize,
+}
+
+/// Coefficients of a repetitive controller: see [`SampledRepetitive::recursion`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Recursion<'a> {
+    /// Period of the reference, in samples.
+    pub period: f64,
+    /// Pole p of the filter, 0 for a filter without memory.
+    pub pole: f64,
+    /// Learning gain Kq, V/m.
+    pub gain: f64,
+    /// Number of samples by which errors are stored earlier than voltages.
+    pub lead: usize,
+    /// Delay of the first tap, in samples, more than `lead`.
+    pub nearest: usize,
+    /// Weights of the samples, the oldest first; the last one has the delay `nearest`.
+    pub taps: &'a [f64],
+}
+
+/// Sum of products in two independent sums, which the processor can compute in parallel.
+#[inline]
+fn weighted(entries: &[f64], taps: &[f64]) -> f64 {
+    let (mut even, mut odd) = (0.0, 0.0);
+    let mut pairs = entries.iter().zip(taps);
+    while let Some((entry, tap)) = pairs.next() {
+        even += entry * tap;
+        if let Some((entry, tap)) = pairs.next() {
+            odd += entry * tap;
+        }
+    }
+    even + odd
+}
+
+/// State of a repetitive controller, with a delay line provided by the caller: `&mut [f64]`,
+/// `[f64; N]` or `Vec<f64>`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RepetitiveState<L> {
+    /// First what is learnt, uRC + Kq e, then what was put out, uRC: a ring of each.
+    line: L,
+    /// Index of the next entry to be written.
+    next: usize,
+    /// The last output, V.
+    volts: f64,
+    saturation: Saturation,
+}
+
+/// The line is written with its length, and read into one of the same length.
+impl<L: AsRef<[f64]> + AsMut<[f64]>> Snapshot for RepetitiveState<L> {
+    fn save(&self, write: &mut dyn FnMut(f64)) {
+        let line = self.line.as_ref();
+        length(line).save(write);
+        line.iter().for_each(|entry| write(*entry));
+        (length(line.get(..self.next).unwrap_or_default()).save(write), write(self.volts));
+        self.saturation.save(write);
+    }
+
+    fn load(&mut self, read: &mut dyn FnMut() -> Option<f64>) -> Option<()> {
+        let line = self.line.as_mut();
+        let (mut entries, mut next) = (0_u32, 0_u32);
+        entries.load(read)?;
+        if entries != length(line) {
+            return None;
+        }
+        line.iter_mut().try_for_each(|entry| entry.load(read))?;
+        (next.load(read)?, self.volts.load(read)?);
+        self.next = (2 * next < entries.max(1)).then_some(next as usize)?;
+        self.saturation.load(read)
+    }
+}
+
+/// Number of entries, of which a line has fewer than 2^32.
+fn length(line: &[f64]) -> u32 {
+    u32::try_from(line.len()).unwrap_or(u32::MAX)
+}
+
+/// What came of the command of the sample before: what a repetitive part learns from.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Outcome {
+    /// Its tracking error, m.
+    pub error: f64,
+    /// Applied voltage less the unclipped command, V; 0 where it was not saturated.
+    pub excess: f64,
+}
+
+impl SampledRepetitive {
+    /// The same coefficients for a reference of `period` samples, with the lines' length.
+    pub(super) fn for_period(self, period: f64) -> Self {
+        let reach = self.nearest + self.reads - 1;
+        Self { period, entries: reach.max(samples(libm::ceil(period - 1e-9))), ..self }
+    }
+
+    /// Least number of entries of the delay line.
+    #[must_use]
+    pub fn length(&self) -> usize {
+        self.entries.saturating_mul(2)
+    }
+
+    /// Period in samples and entries of a line: what a controller must share to use the memory of
+    /// this one.
+    pub(crate) fn memory(&self) -> (f64, usize) {
+        (self.period, self.entries)
+    }
+
+    /// Coefficients of the recursion, for a stability analysis:
+    /// `uRC[k] = pole uRC[k-1] + sum of tap (uRC[k-n] + gain e[k-n+lead])`, n the delay of a tap.
+    #[must_use]
+    pub fn recursion(&self) -> Recursion<'_> {
+        Recursion {
+            period: self.period,
+            pole: self.pole,
+            gain: self.gain,
+            lead: self.lead,
+            nearest: self.nearest,
+            taps: self.taps.get(..self.reads).unwrap_or_default(),
+        }
+    }
+
+    /// The state before any learning. `line` is filled with zeros.
+    ///
+    /// # Errors
+    /// Names `line` where it is shorter than [`Self::length`].
+    pub fn rest<L: AsMut<[f64]>>(&self, mut line: L) -> Result<RepetitiveState<L>> {
+        let entries = line.as_mut();
+        if entries.len() < self.length() {
+            let value = count(entries.len());
+            let expected = "at least as many as the controller's length()";
+            return Err(Error { name: "line", value, unit: "entries", expected });
+        }
+        entries.fill(0.0);
+        Ok(RepetitiveState { line, next: 0, volts: 0.0, saturation: Saturation::NONE })
+    }
+
+    /// The voltage for this sample, from what came of the sample *before*; within `most` (V) of 0.
+    ///
+    /// An error affects the voltage of the next sample at the earliest, so it is passed one sample
+    /// later, when it is also known whether that command was clipped. At the first sample there is
+    /// no error yet: pass `Outcome::default()`.
+    ///
+    /// With `pause`, a saturated sample learns no error and keeps no more voltage than pushes the
+    /// command to the limit. Where more than a quarter of a period is saturated, the period before
+    /// the saturation is repeated unchanged until it ends.
+    #[inline]
+    pub fn step<L: AsMut<[f64]>>(
+        &self,
+        state: &mut RepetitiveState<L>,
+        before: Outcome,
+        most: f64,
+    ) -> f64 {
+        let entries = self.entries;
+        let Some(lines) = state.line.as_mut().get_mut(..2 * entries) else { return 0.0 };
+        let (learnt, given) = lines.split_at_mut(entries);
+        let clipped = self.pause && before.excess.abs() > 0.0;
+        let was_held = matches!(state.saturation.learning, Learning::Held { .. });
+        state.saturation.follow(clipped, self.period, length(learnt));
+        if !was_held {
+            let (learns, gives) = self.stored(state.volts, before, clipped);
+            if let (Some(sum), Some(volts)) =
+                (learnt.get_mut(state.next), given.get_mut(state.next))
+            {
+                (*sum, *volts) = (gives, state.volts);
+            }
+            let back = if state.next >= self.lead { state.next } else { state.next + entries };
+            if let Some(sum) = learnt.get_mut(back - self.lead) {
+                *sum += learns;
+            }
+            state.next = if state.next + 1 < entries { state.next + 1 } else { 0 };
+        }
+        let volts = match state.saturation.learning {
+            Learning::On => self.pole * state.volts + self.filtered(learnt, state.next),
+            Learning::Held { phase } => repeated(given, state.next, self.period - phase),
+            Learning::Resuming { .. } => repeated(given, state.next, self.period),
+        };
+        // An overflow starts again from 0 V.
+        state.volts = if volts.is_nan() { 0.0 } else { volts.max(-most).min(most) };
+        state.volts
+    }
+
+    /// What the sample before adds to the lines: Kq e, and uRC as far as it was of use.
+    #[inline]
+    fn stored(&self, volts: f64, before: Outcome, clipped: bool) -> (f64, f64) {
+        if clipped {
+            let used = volts + before.excess;
+            return (0.0, used.max(volts.min(0.0)).min(volts.max(0.0)));
+        }
+        let error = if before.error.is_finite() { before.error } else { 0.0 };
+        (self.gain * error, volts)
+    }
+
+    /// The filter Q of what is learnt, without its memory; the entry at `next` is the oldest.
+    #[inline]
+    fn filtered(&self, learnt: &[f64], next: usize) -> f64 {
+        let first = next + (self.entries - (self.nearest + self.reads - 1));
+        let first = if first < self.entries { first } else { first - self.entries };
+        let (newer, older) = learnt.split_at(first.min(learnt.len()));
+        let (taps, rest) = self.taps.split_at(self.reads.min(older.len()).min(TAPS));
+        let sum = weighted(older, taps);
+        if taps.len() < self.reads { sum + weighted(newer, rest) } else { sum }
+    }
+
+    /// Clears everything learnt.
+    pub fn reset<L: AsMut<[f64]>>(&self, state: &mut RepetitiveState<L>) {
+        state.line.as_mut().fill(0.0);
+        state.next = 0;
+        state.volts = 0.0;
+        state.saturation = Saturation::NONE;
+    }
+}
+
+/// The entry of a ring that was written `age` samples ago, to the nearest; `next` is the oldest.
+fn repeated(ring: &[f64], next: usize, age: f64) -> f64 {
+    let age = samples(libm::round(age)).clamp(1, ring.len().max(1));
+    let place = if next >= age { next - age } else { next + ring.len() - age };
+    ring.get(place).copied().unwrap_or(0.0)
+}
