@@ -161,14 +161,24 @@ def test_sessions_know_nothing_of_each_other() -> None:
         x += 0.7 * (GAIN * volts - x)
 
 
-def test_reset_is_a_fresh_start() -> None:
-    reference = sine(250)
+def test_reset_goes_on_from_the_voltage_that_is_there() -> None:
     session = FULL.start()
-    fresh = drive(session, reference)[1]
-    session.step(1e-3, math.nan)
+    drive(session, sine(250))
+    for _ in range(100):
+        session.step(60e-6, 60e-6)
+    before = session.last.voltage
+    assert before > 10.0
     session.reset()
-    assert drive(session, reference)[1] == fresh
-    assert drive(FULL.start(), reference)[1] == fresh
+    # The first sample of an error of 0 leaves it, whatever was learnt and wherever the plays were.
+    assert session.step(60e-6, 60e-6) == pytest.approx(before, abs=1e-9)
+    assert session.last.repetitive == 0.0
+    session.applied(before - 5.0)
+    session.reset()
+    assert session.step(60e-6, 60e-6) == pytest.approx(before - 5.0, abs=1e-9)
+    # Before its first step a session has nothing to go on from.
+    reference, unused = sine(250), FULL.start()
+    unused.reset()
+    assert drive(unused, reference)[1] == drive(FULL.start(), reference)[1]
 
 
 def test_it_starts_without_a_bump() -> None:

@@ -10,10 +10,11 @@ from .components import StateSpace as StateSpace
 from .components import ZeroPhase as ZeroPhase
 from .contouring import Contour as Contour
 from .contouring import contour as contour
-from .controller import Command as Command
 from .controller import Controller as Controller
-from .controller import Session as Session
 from .plant import Plant as Plant
+from .session import Command as Command
+from .session import RefusedReadings as RefusedReadings
+from .session import Session as Session
 from .stability import LoopCheck as LoopCheck
 from .stability import LoopReport as LoopReport
 from .stability import LoopResponse as LoopResponse

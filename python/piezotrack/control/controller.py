@@ -1,51 +1,25 @@
-"""Controllers of feedforward, feedback and repetitive control, and their sessions."""
+"""Controllers of feedforward, feedback and repetitive control."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass, field, fields
+from typing import Any
 
 from .. import _core
 from .._support.arguments import finite, positive
-from ..errors import ParameterError
-from ..stages.inverse import Inverse, InverseSession
+from ..errors import NumericalError, ParameterError
+from ..stages.inverse import Inverse
 from .components import LowPass, Notch, Pid, Repetitive, StateSpace
+from .plant import reach
+from .session import Session
 
-__all__ = ["Command", "Controller", "Session"]
+__all__ = ["Controller"]
 
-
-class Command(NamedTuple):
-    """Command of a controller at one sample, with its parts.
-
-    Attributes
-    ----------
-    voltage : float
-        Command to the amplifier, within the limits [V].
-    unclipped : float
-        The same before it was clipped [V].
-    feedforward, feedback, repetitive : float
-        Its parts [V].
-    error : float
-        Tracking error of the sample [m].
-    saturated : bool
-        Whether it was clipped.
-    measurement_valid : bool
-        False where the measurement was not finite: feedback and learning pause.
-    reference_valid : bool
-        False where the reference or the feedforward was not finite: the last one is held.
-    """
-
-    voltage: float
-    unclipped: float
-    feedforward: float
-    feedback: float
-    repetitive: float
-    error: float
-    saturated: bool
-    measurement_valid: bool
-    reference_valid: bool
+# Longest displacement [m] that any range may have.
+LONGEST = 1.0
+# Sampling interval for the reach of a stage [s]: its drive takes seconds.
+REACH_STEP = 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +42,14 @@ class Controller:
         Repetitive control, for a reference that repeats.
     filters : sequence of LowPass or Notch, optional
         Up to two, on the measurement, one after the other.
+    span : (float, float), optional
+        Lowest and highest displacement that the sensor can show [m], at most a metre from 0. A
+        reading outside is no measurement and is treated as NaN: instruments report overload as
+        9.9e37. By default what the stage of `feedforward` reaches between the limits, with as much
+        again at each end; without feedforward -10 to 10 mm.
+    max_jump : float, optional
+        Largest displacement in a sampling interval [m]. A reading further from the last valid one
+        is no measurement either; the distance allowed grows with each sample without one.
 
     Raises
     ------
@@ -91,11 +73,13 @@ class Controller:
     feedback: Pid | StateSpace | None = None
     repetitive: Repetitive | None = None
     filters: Sequence[LowPass | Notch] = ()
+    span: tuple[float, float] | None = None
+    max_jump: float | None = None
     _core: _core.Controller = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         dt = positive("dt", self.dt, "s")
-        low, high = _limits(self.limits)
+        low, high = _pair("limits", self.limits, "V")
         _check_part("feedforward", self.feedforward, Inverse, "pt.Inverse")
         _check_part("feedback", self.feedback, (Pid, StateSpace), "pt.Pid or pt.control.StateSpace")
         _check_part("repetitive", self.repetitive, Repetitive, "pt.Repetitive")
@@ -112,12 +96,33 @@ class Controller:
         core = _core.Controller(
             dt=dt,
             limits=(low, high),
+            span=self._span(low, high),
+            max_jump=None if self.max_jump is None else _core.as_number("max_jump", self.max_jump),
             pid=(pid.kp, pid.ti, pid.td, pid.tt) if isinstance(pid, Pid) else None,
             state_space=law._matrices if isinstance(law, StateSpace) else None,
             repetitive=None if self.repetitive is None else self.repetitive._settings,
             filters=[one._settings for one in self.filters],
         )
         object.__setattr__(self, "_core", core)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # The core's controller is made again.
+        return _made, ({one.name: getattr(self, one.name) for one in fields(self) if one.init},)
+
+    def _span(self, low: float, high: float) -> tuple[float, float] | None:
+        """Range of valid readings [m] for limits [V]; None for that of the core."""
+        if self.span is not None:
+            return _pair("span", self.span, "m")
+        if self.feedforward is None:
+            return None
+        try:
+            bottom, top = reach(self.feedforward.stage, (low, high), REACH_STEP)
+        except NumericalError:
+            return None
+        bottom, top = bottom + self.feedforward.offset, top + self.feedforward.offset
+        wide = top - bottom
+        span = max(bottom - wide, -LONGEST), min(top + wide, LONGEST)
+        return span if span[0] < span[1] else None
 
     def start(self, *, present: float | None = None) -> Session:
         """Start a session with its own state.
@@ -141,15 +146,19 @@ def _check_part(name: str, part: object, kinds: type | tuple[type, ...], expecte
         raise ParameterError(f"{name} is {type(part).__name__}: expected {expected}")
 
 
-def _limits(limits: object) -> tuple[float, float]:
+def _made(settings: dict[str, Any]) -> Controller:
+    return Controller(**settings)
+
+
+def _pair(name: str, ends: object, unit: str) -> tuple[float, float]:
     # An array is accepted too.
-    listed = limits.tolist() if hasattr(limits, "tolist") else limits
+    listed = ends.tolist() if hasattr(ends, "tolist") else ends
     pair = list(listed) if isinstance(listed, Sequence) and not isinstance(listed, str) else []
     if len(pair) != 2:
-        raise ParameterError(f"limits are {limits!r}: expected (low, high) in V")
-    low, high = (finite(f"limits[{i}]", value, "V") for i, value in enumerate(pair))
+        raise ParameterError(f"{name} are {ends!r}: expected (low, high) in {unit}")
+    low, high = (finite(f"{name}[{i}]", value, unit) for i, value in enumerate(pair))
     if not low < high:
-        raise ParameterError(f"limits are ({low:g}, {high:g}) V: expected the lower one first")
+        raise ParameterError(f"{name} are ({low:g}, {high:g}) {unit}: expected the lower one first")
     return low, high
 
 
@@ -166,129 +175,3 @@ def _check_unit(name: str, gain: float, span: float, owner: str) -> None:
             "a thousandth of the range; if it is in V/um, write "
             f"pt.{owner}.from_um({name}={gain:g}, ...)"
         )
-
-
-class Session:
-    """A running controller: one call of `step` in each sampling interval.
-
-    Parameters
-    ----------
-    controller : Controller
-        The configuration.
-    present : float or None
-        Voltage for a bumpless start [V].
-    """
-
-    def __init__(self, controller: Controller, present: float | None = None) -> None:
-        self._controller = controller
-        self._core = controller._core.start(
-            None if present is None else _core.as_number("present", present)
-        )
-        inverse = controller.feedforward
-        self._inverse: InverseSession | None = (
-            None if inverse is None else inverse.start(controller.dt)
-        )
-
-    def step(
-        self,
-        reference: float,
-        measured: float,
-        *,
-        velocity: float | None = None,
-        acceleration: float | None = None,
-        preview: float | None = None,
-        feedforward: float | None = None,
-    ) -> float:
-        """Voltage for this sample.
-
-        Parameters
-        ----------
-        reference : float
-            Desired displacement [m].
-        measured : float
-            Measured displacement [m]. Feedback and learning pause where it is NaN.
-        velocity, acceleration, preview : float, optional
-            For the inverse, as in `InverseSession.step`.
-        feedforward : float, optional
-            Voltage of your own table [V], in place of the inverse.
-
-        Returns
-        -------
-        float
-            Voltage within the limits [V].
-
-        Raises
-        ------
-        ParameterError
-            `reference` is a metre or more: it must be in another unit.
-        """
-        if isinstance(reference, float) and 1.0 <= abs(reference) < math.inf:
-            raise ParameterError(
-                f"reference is {reference:g} m: expected metres, and no piezo stage goes so far"
-            )
-        voltage = 0.0 if feedforward is None else feedforward
-        if feedforward is None and self._inverse is not None:
-            voltage = self._inverse.step(
-                reference, velocity=velocity, acceleration=acceleration, preview=preview
-            )
-        try:
-            return self._core.step(reference, measured, voltage)
-        except TypeError:
-            given = {"reference": reference, "measured": measured, "feedforward": voltage}
-            for name, value in given.items():
-                _core.as_number(name, value)
-            raise
-
-    @property
-    def last(self) -> Command:
-        """The last command with its parts."""
-        return Command(*self._core.last())
-
-    def applied(self, voltage: float) -> None:
-        """Report the voltage that the amplifier applied, where it differs from the last command.
-
-        Parameters
-        ----------
-        voltage : float
-            Voltage [V], which the antiwindup uses in place of the command.
-
-        Raises
-        ------
-        ParameterError
-            It is not a finite number.
-        """
-        self._core.applied(finite("voltage", voltage, "V"))
-
-    def retune(self, controller: Controller) -> None:
-        """Change the gains without a bump.
-
-        Parameters
-        ----------
-        controller : Controller
-            With the same interval, feedforward, kind of feedback and period of the repetitive
-            part.
-
-        Raises
-        ------
-        ParameterError
-            It differs in more than its gains.
-        """
-        if not isinstance(controller, Controller):
-            raise ParameterError(
-                f"controller is {type(controller).__name__}: expected pt.Controller"
-            )
-        if not math.isclose(controller.dt, self._controller.dt, rel_tol=1e-12):
-            raise ParameterError(
-                f"dt is {controller.dt:g} s: expected that of the session, "
-                f"{self._controller.dt:g} s"
-            )
-        if controller.feedforward != self._controller.feedforward:
-            raise ParameterError("feedforward is another: expected that of the session")
-        self._core.retune(controller._core)
-        self._controller = controller
-
-    def reset(self) -> None:
-        """Reset the state: errors, learnt signal and hysteresis."""
-        self._core.reset()
-        if self._inverse is not None:
-            self._inverse.reset()

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import copyreg
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from .. import _core
 from ..errors import ParameterError
@@ -11,14 +14,16 @@ from ..stages.base import MODEL_STEP, Stage
 from ..stages.virtual import VirtualStage
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from .controller import Controller
 
     Array = NDArray[np.float64]
 
-__all__ = ["Plant", "linearised_plants", "run_closed_loop", "unwrap"]
+__all__ = ["Plant", "linearised_plants", "reach", "run_closed_loop", "unwrap"]
+
+# A linearised stage is pickled as its matrices.
+copyreg.pickle(_core.LoopPlant, lambda one: (_core.LoopPlant.from_matrices, one.matrices()))
 
 # What a controller can drive; an identified model stands for its stage, with offset and delay.
 Plant = VirtualStage | Stage
@@ -58,6 +63,19 @@ def run_closed_loop(
     if isinstance(stage, VirtualStage):
         return stage._core.track(*run)
     return stage._core.track(min(MODEL_STEP, controller.dt / 4), *run)
+
+
+def reach(stage: Plant, limits: tuple[float, float], dt: float) -> tuple[float, float]:
+    """Simulate the lowest and the highest displacement [m] between two voltages [V].
+
+    The voltage goes to the lower limit, then slowly to the upper one and back: 4 s each way, with
+    rests, in samples of `dt` seconds.
+    """
+    low, high = limits
+    t = np.arange(0.0, 11.0, dt)
+    u = np.interp(t, [0, 0.5, 1, 5, 6, 10], [0.0, low, low, high, high, low])
+    x = stage.simulate(u, dt).x[t >= 1.0]
+    return float(x.min()), float(x.max())
 
 
 def linearised_plants(

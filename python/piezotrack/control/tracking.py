@@ -16,7 +16,7 @@ from ..errors import ParameterError
 from ..references.reference import Reference, SampledReference
 from ..stages.inverse import PlayedVoltage
 from .controller import Controller
-from .plant import run_closed_loop, unwrap
+from .plant import reach, run_closed_loop, unwrap
 from .stability import check_loop
 
 if TYPE_CHECKING:
@@ -410,11 +410,7 @@ def check_within_reach(
 ) -> None:
     """Refuse a reference that exceeds the reach of the stage between the limits."""
     low, high = controller.limits
-    # To the lower limit, then slowly to the upper one and back: 4 s each way, with rests.
-    t = np.arange(0.0, 11.0, 1e-3)
-    u = np.interp(t, [0, 0.5, 1, 5, 6, 10], [0.0, low, low, high, high, low])
-    x = stage.simulate(u, 1e-3).x[t >= 1.0] + offset
-    bottom, top = float(x.min()), float(x.max())
+    bottom, top = (end + offset for end in reach(stage, (low, high), 1e-3))
     slack = 0.01 * (top - bottom)
     for value, past, edge in (
         (samples.x.max(), samples.x.max() - top, top),

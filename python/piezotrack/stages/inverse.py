@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -264,7 +264,7 @@ def _continues(reference: Reference) -> bool:
 
 
 class InverseSession:
-    """An inverse that is evaluated sample by sample.
+    """An inverse that is evaluated sample by sample; it can be copied and pickled with its state.
 
     Parameters
     ----------
@@ -282,7 +282,11 @@ class InverseSession:
     """
 
     def __init__(self, inverse: Inverse, dt: float) -> None:
+        self._inverse, self._dt = inverse, dt
         self._core = inverse._begun(dt)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _resumed, (self._inverse, self._dt, self._core.save())
 
     def step(
         self,
@@ -312,7 +316,7 @@ class InverseSession:
         """
         try:
             return self._core.step(reference, velocity, acceleration, preview)
-        except TypeError:
+        except (TypeError, OverflowError):
             given = {"reference": reference, "velocity": velocity}
             given |= {"acceleration": acceleration, "preview": preview}
             for name, value in given.items():
@@ -323,3 +327,9 @@ class InverseSession:
     def reset(self) -> None:
         """Return to the initial state."""
         self._core.reset()
+
+
+def _resumed(inverse: Inverse, dt: float, state: list[float]) -> InverseSession:
+    session = inverse.start(dt)
+    session._core.load(state)
+    return session

@@ -216,7 +216,7 @@ impl<F: Feedback> Controller<F> {
         let others = next.repetitive.as_ref().map(SampledRepetitive::memory);
         if mine != others {
             let value = others.map_or(0.0, |(period, _)| period);
-            let expected = "the period of the controller that runs, and lines as long";
+            let expected = "a repetitive part of the same period, with lines as long";
             return Err(Error { name: "repetitive", value, unit: "samples", expected });
         }
         let kept = next.feedback.adopt(&self.feedback, &mut state.feedback);

@@ -159,39 +159,42 @@ pub fn load<S: Snapshot + Clone>(state: &mut S, numbers: Vec<f64>) -> PyResult<(
     Ok(())
 }
 
-/// Names and scales of units of length that are taken for metres by mistake.
-const UNITS: [(&str, f64); 3] = [("um", 1e-6), ("nm", 1e-9), ("mm", 1e-3)];
+/// Units of length that are taken for metres by mistake, and how many of them are a metre.
+const UNITS: [(&str, f64); 3] = [("um", 1e6), ("nm", 1e9), ("mm", 1e3)];
 
 /// The error for a displacement outside of the span.
 fn outside(name: &str, value: f64, span: Span) -> PyErr {
-    let found = format!("{value} m");
-    let mut expected =
-        format!("metres, from {:.4e} to {:.4e} as the stage can have", span.low(), span.high());
-    let fits = |(_, scale): &&(&str, f64)| span.contains(value * scale);
-    if let Some((unit, scale)) = UNITS.iter().find(fits) {
-        expected += &format!("; {value} {unit} is {:e} m", value * scale);
+    let mut expected = format!("a displacement from {:.3e} to {:.3e} m", span.low(), span.high());
+    if let Some((unit, metre)) = UNITS.iter().find(|(_, metre)| span.contains(value / metre)) {
+        expected += &format!("; {value} {unit} is {:e} m", value / metre);
         if *unit == "um" {
-            expected += ", which step_um takes as it is";
+            expected += ", and step_um takes um";
         }
     }
-    raise(&Error::parameter(name, found, expected + "; span= sets another range"))
+    raise(&Error::parameter(name, format!("{value} m"), expected + "; span= sets another range"))
 }
 
 #[pymethods]
 impl PySession {
-    /// The voltage of a sample. A reference outside of the span is refused, and so is the first
-    /// measurement where another unit would explain it: nothing has been moved by then.
-    fn step(&mut self, reference: f64, measured: f64, feedforward: f64) -> PyResult<f64> {
+    /// Refuses a reference outside of the span, and so the first measurement where another unit
+    /// would explain it: nothing has been moved by then.
+    fn check(&self, reference: f64, measured: f64) -> PyResult<()> {
         let span = self.controller.span;
         if reference.is_finite() && !span.contains(reference) {
             return Err(outside("reference", reference, span));
         }
         if self.state.measured().is_none()
             && !span.contains(measured)
-            && UNITS.iter().any(|(_, scale)| span.contains(measured * scale))
+            && UNITS.iter().any(|(_, metre)| span.contains(measured / metre))
         {
             return Err(outside("measured", measured, span));
         }
+        Ok(())
+    }
+
+    /// The voltage of a sample, for what `check` accepts.
+    fn step(&mut self, reference: f64, measured: f64, feedforward: f64) -> PyResult<f64> {
+        self.check(reference, measured)?;
         Ok(self.controller.step(&mut self.state, reference, measured, feedforward).volts)
     }
 
