@@ -135,7 +135,10 @@ WRONG: dict[str, tuple[Callable[[pt.control.Session], object], str]] = {
     "a whole number": (lambda s: s.step(110, 0.0), "reference is 110 m"),
     "float32": (lambda s: s.step(np.float32(110), 0.0), "reference is 110 m"),
     "int64": (lambda s: s.step(np.int64(110), 0.0), "reference is 110 m"),
-    "an array of one": (lambda s: s.step(np.array(110.0), 0.0), "reference is 110 m"),
+    "an array of one": (
+        lambda s: s.step(np.array(110.0), 0.0),  # type: ignore[arg-type]
+        "reference is 110 m",
+    ),
     "nm for m": (lambda s: s.step(110_000.0, 0.0), "110000 nm is 1.1e-4 m"),
     "half": (lambda s: s.step(0.5, 0.49), r"reference is 0.5 m: .*0.5 um is 5e-7 m"),
     "measured": (lambda s: s.step(10e-6, 9.8), r"measured is 9.8 m: .*9.8 um is 9.8"),
@@ -282,12 +285,17 @@ def test_a_copy_of_an_inverse_goes_on_by_itself(stage: Any) -> None:
     assert [other.step(desired(k), preview=desired(k + 1)) for k in range(300, 600)] == ahead
 
 
+def pickled(one: Any) -> Any:
+    return pickle.loads(pickle.dumps(one))
+
+
 def test_results_are_copied_whole() -> None:
     controller = FULL
     reference = pt.sine(frequency=0.2, low=0.0, high=60e-6, duration=10.0)
     run = pt.track(STAGE, controller, reference)
     report = pt.check_loop(STAGE, controller)
-    for copied in (copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))):
+    copies: list[Callable[[Any], Any]] = [copy.deepcopy, pickled]
+    for copied in copies:
         assert copied(controller) == controller
         again = copied(run)
         assert np.array_equal(again.voltage, run.voltage)

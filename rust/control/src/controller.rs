@@ -58,6 +58,10 @@ pub struct ControllerState<S, L> {
     last: Command,
     /// Applied voltage less the unclipped command, eu, V.
     excess: f64,
+    /// Whether that is from a voltage that was reported.
+    reported: bool,
+    /// Whether the next sample is the first after a start or a reported voltage.
+    apart: bool,
     /// Tracking error of the last sample, which the repetitive part has yet to store, m.
     unlearnt: f64,
     readings: Readings,
@@ -70,7 +74,9 @@ impl<S: Snapshot, L: AsRef<[f64]> + AsMut<[f64]>> Snapshot for ControllerState<S
         self.repetitive.is_some().save(write);
         self.repetitive.iter().for_each(|memory| memory.save(write));
         (self.filters.save(write), self.present.save(write), self.stepped.save(write));
-        (self.last.save(write), self.excess.save(write), self.unlearnt.save(write));
+        (self.last.save(write), self.excess.save(write), self.reported.save(write));
+        self.apart.save(write);
+        self.unlearnt.save(write);
         self.readings.save(write);
     }
 
@@ -83,7 +89,9 @@ impl<S: Snapshot, L: AsRef<[f64]> + AsMut<[f64]>> Snapshot for ControllerState<S
         }
         self.repetitive.iter_mut().try_for_each(|memory| memory.load(read))?;
         (self.filters.load(read)?, self.present.load(read)?, self.stepped.load(read)?);
-        (self.last.load(read)?, self.excess.load(read)?, self.unlearnt.load(read)?);
+        (self.last.load(read)?, self.excess.load(read)?, self.reported.load(read)?);
+        self.apart.load(read)?;
+        self.unlearnt.load(read)?;
         self.readings.load(read)
     }
 }
@@ -154,8 +162,10 @@ impl<F: Feedback> Controller<F> {
             stepped: false,
             last: Command { volts: self.limits.clip(0.0), ..Command::default() },
             excess: 0.0,
+            reported: false,
+            apart: true,
             unlearnt: 0.0,
-            readings: Readings::default(),
+            readings: Readings::NONE,
         })
     }
 
@@ -193,9 +203,9 @@ impl<F: Feedback> Controller<F> {
         state.filters = [None; 2];
         state.last = Command { volts: self.limits.clip(present), ..Command::default() };
         state.stepped = false;
-        state.excess = 0.0;
+        (state.excess, state.reported, state.apart) = (0.0, false, true);
         state.unlearnt = 0.0;
-        state.readings = Readings::default();
+        state.readings = Readings::NONE;
     }
 
     /// Goes on with the settings of `next` in place of these, without a bump; the limits and the
@@ -230,6 +240,7 @@ impl<F: Feedback> Controller<F> {
         let same = self.filters == next.filters && self.repetitive == next.repetitive;
         if state.stepped && !(kept && same) {
             state.present = Some(state.voltage());
+            state.apart = true;
         }
         Ok(())
     }
@@ -252,27 +263,26 @@ impl<F: Feedback> Controller<F> {
     ) -> Command {
         let measurement_ok = self.span.accepts(&mut state.readings, measured);
         let reference_fits = reference.abs() <= LONGEST;
-        let feedforward_ok = usable(feedforward);
+        let (low, high) = (self.limits.low(), self.limits.high());
+        let (mut feedforward_ok, mut used) = (true, feedforward);
+        if !(feedforward >= low - (high - low) && feedforward <= high + (high - low)) {
+            (feedforward_ok, used) = self.far_feedforward(feedforward, state.last.feedforward);
+        }
+        let (mut present, mut learns) = (None, state.excess);
+        if state.apart {
+            (present, learns) = self.first(state);
+        }
         let last = state.last;
-        let range = self.limits.high() - self.limits.low();
-        let feedforward = if feedforward_ok {
-            feedforward.max(self.limits.low() - range).min(self.limits.high() + range)
-        } else {
-            last.feedforward
-        };
         let repetitive = match (&self.repetitive, &mut state.repetitive) {
             (Some(part), Some(memory)) => {
-                let saturated = last.saturated || state.excess.abs() > READING * range;
-                let excess = if saturated { state.excess } else { 0.0 };
-                part.step(memory, Outcome { error: state.unlearnt, excess }, range)
+                let before = Outcome { error: state.unlearnt, excess: learns };
+                part.step(memory, before, high - low)
             }
             _ => 0.0,
         };
         let mut feedback = last.feedback;
-        if let Some(present) = state.present.take()
-            && self.feedback.holds()
-        {
-            feedback = present - feedforward - repetitive;
+        if let Some(present) = present {
+            feedback = present - used - repetitive;
             state.feedback = self.feedback.start(feedback);
             state.excess = 0.0;
         }
@@ -284,16 +294,15 @@ impl<F: Feedback> Controller<F> {
             feedback = if volts.is_finite() { volts } else { feedback };
             state.unlearnt = error;
         }
-        let unclipped = feedback + feedforward + repetitive;
+        let unclipped = feedback + used + repetitive;
         // The sum overflowed: hold the last voltage.
         let unclipped = if unclipped.is_finite() { unclipped } else { last.volts };
         let volts = self.limits.clip(unclipped);
         state.excess = volts - unclipped;
-        state.stepped = true;
         state.last = Command {
             volts,
             unclipped,
-            feedforward,
+            feedforward: used,
             feedback,
             repetitive,
             error,
@@ -302,6 +311,28 @@ impl<F: Feedback> Controller<F> {
             reference_ok: reference_fits && feedforward_ok,
         };
         state.last
+    }
+
+    /// Whether a feedforward far outside the limits is valid, and what is used in its place.
+    #[inline]
+    fn far_feedforward(&self, feedforward: f64, last: f64) -> (bool, f64) {
+        let (low, high) = (self.limits.low(), self.limits.high());
+        if usable(feedforward) {
+            (true, feedforward.max(low - (high - low)).min(high + (high - low)))
+        } else {
+            (false, last)
+        }
+    }
+
+    /// At the first sample after a start or a reported voltage: the voltage to start the feedback
+    /// from, if any, and the excess that the repetitive part is told.
+    #[inline]
+    fn first<L>(&self, state: &mut ControllerState<F::State, L>) -> (Option<f64>, f64) {
+        let range = self.limits.high() - self.limits.low();
+        let accurate = state.reported && state.excess.abs() <= READING * range;
+        let excess = if accurate { 0.0 } else { state.excess };
+        (state.stepped, state.reported, state.apart) = (true, false, false);
+        (state.present.take().filter(|_| self.feedback.holds()), excess)
     }
 
     #[inline]
@@ -332,6 +363,7 @@ impl<S, L> ControllerState<S, L> {
             return Err(Error { name: "volts", value: volts, unit: "V", expected });
         }
         self.excess = volts - self.last.unclipped;
+        (self.reported, self.apart) = (true, true);
         Ok(())
     }
 
@@ -350,7 +382,7 @@ impl<S, L> ControllerState<S, L> {
     /// The last valid measurement, m, if there was one.
     #[must_use]
     pub fn measured(&self) -> Option<f64> {
-        self.readings.last
+        self.readings.last()
     }
 
     /// The voltage at the actuator: the last command, or what was reported as applied, V.

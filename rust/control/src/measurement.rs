@@ -89,16 +89,40 @@ pub struct Refused {
 crate::snapshot!(Refused { not_finite, outside, jumps });
 
 /// State of the validation: the last valid reading, and what was refused.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Readings {
-    /// The last valid reading, m.
-    pub(crate) last: Option<f64>,
+    /// The last valid reading, m; infinite before the first.
+    last: f64,
     /// Samples since then.
-    pub(crate) since: u32,
+    since: u32,
     pub(crate) refused: Refused,
 }
 
 crate::snapshot!(Readings { last, since, refused });
+
+impl Readings {
+    pub(crate) const NONE: Self = Self {
+        last: f64::INFINITY,
+        since: 0,
+        refused: Refused { not_finite: 0, outside: 0, jumps: 0 },
+    };
+
+    /// The last valid reading, m.
+    pub(crate) fn last(&self) -> Option<f64> {
+        self.last.is_finite().then_some(self.last)
+    }
+
+    #[inline]
+    fn refuse(&mut self, reading: f64, outside: bool) {
+        self.since = self.since.saturating_add(1);
+        let count = match (reading.is_finite(), outside) {
+            (false, _) => &mut self.refused.not_finite,
+            (true, true) => &mut self.refused.outside,
+            (true, false) => &mut self.refused.jumps,
+        };
+        *count = count.saturating_add(1);
+    }
+}
 
 impl Span {
     /// Whether a reading (m) is a measurement; counts it where it is none.
@@ -107,21 +131,17 @@ impl Span {
     /// was moved meanwhile is found again.
     #[inline]
     pub(crate) fn accepts(&self, readings: &mut Readings, reading: f64) -> bool {
-        readings.since = readings.since.saturating_add(1);
-        if !self.contains(reading) {
-            let refused = &mut readings.refused;
-            let count =
-                if reading.is_finite() { &mut refused.outside } else { &mut refused.not_finite };
-            *count = count.saturating_add(1);
-            return false;
+        let inside = self.contains(reading);
+        if inside && (self.max_jump == f64::INFINITY || self.is_near(readings, reading)) {
+            (readings.last, readings.since) = (reading, 0);
+            return true;
         }
-        if let Some(last) = readings.last
-            && (reading - last).abs() > self.max_jump * f64::from(readings.since)
-        {
-            readings.refused.jumps = readings.refused.jumps.saturating_add(1);
-            return false;
-        }
-        (readings.last, readings.since) = (Some(reading), 0);
-        true
+        readings.refuse(reading, !inside);
+        false
+    }
+
+    fn is_near(&self, readings: &Readings, reading: f64) -> bool {
+        let samples = f64::from(readings.since) + 1.0;
+        readings.last.is_infinite() || (reading - readings.last).abs() <= self.max_jump * samples
     }
 }

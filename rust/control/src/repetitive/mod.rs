@@ -14,6 +14,8 @@
 mod sampled;
 mod saturation;
 
+use saturation::Lengths;
+
 pub use sampled::{Outcome, Recursion, RepetitiveState, SampledRepetitive};
 
 use crate::error::{Result, check, positive};
@@ -212,7 +214,7 @@ impl Repetitive {
             used.reverse();
         }
         SampledRepetitive {
-            period: delay,
+            lengths: Lengths { period: delay, whole: 0, entries: 0 },
             pole,
             gain: self.kq * 1e6,
             pause: self.pause,
@@ -221,6 +223,7 @@ impl Repetitive {
             taps,
             reads,
             entries: 0,
+            unread: 0,
         }
     }
 }

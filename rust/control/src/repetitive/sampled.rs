@@ -1,6 +1,6 @@
 //! The recursion of a repetitive controller for one sampling interval, and its delay line.
 
-use super::saturation::{Learning, Saturation};
+use super::saturation::{Learning, Lengths, Saturation};
 use super::{TAPS, count, samples};
 use crate::error::{Error, Result};
 use crate::snapshot::Snapshot;
@@ -8,8 +8,8 @@ use crate::snapshot::Snapshot;
 /// Coefficients of a repetitive controller for one sampling interval; see [`Repetitive::at`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampledRepetitive {
-    /// L/Ts.
-    pub(super) period: f64,
+    /// L/Ts and others.
+    pub(super) lengths: Lengths,
     /// p, 0 for a filter without memory.
     pub(super) pole: f64,
     /// Kq, V/m.
@@ -25,6 +25,8 @@ pub struct SampledRepetitive {
     pub(super) reads: usize,
     /// Entries of each of the two lines.
     pub(super) entries: usize,
+    /// Oldest entries that no tap reads.
+    pub(super) unread: usize,
 }
 
 /// Coefficients of a repetitive controller: see [`SampledRepetitive::recursion`].
@@ -113,7 +115,11 @@ impl SampledRepetitive {
     /// The same coefficients for a reference of `period` samples, with the lines' length.
     pub(super) fn for_period(self, period: f64) -> Self {
         let reach = self.nearest + self.reads - 1;
-        Self { period, entries: reach.max(samples(libm::ceil(period - 1e-9))), ..self }
+        let entries = reach.max(samples(libm::ceil(period - 1e-9)));
+        let count = |n| u32::try_from(n).unwrap_or(u32::MAX);
+        let whole = count(samples(libm::round(period)).clamp(1, entries));
+        let lengths = Lengths { period, whole, entries: count(entries) };
+        Self { lengths, entries, unread: entries - reach, ..self }
     }
 
     /// Least number of entries of the delay line.
@@ -125,7 +131,7 @@ impl SampledRepetitive {
     /// Period in samples and entries of a line: what a controller must share to use the memory of
     /// this one.
     pub(crate) fn memory(&self) -> (f64, usize) {
-        (self.period, self.entries)
+        (self.lengths.period, self.entries)
     }
 
     /// Coefficients of the recursion, for a stability analysis:
@@ -133,7 +139,7 @@ impl SampledRepetitive {
     #[must_use]
     pub fn recursion(&self) -> Recursion<'_> {
         Recursion {
-            period: self.period,
+            period: self.lengths.period,
             pole: self.pole,
             gain: self.gain,
             lead: self.lead,
@@ -173,50 +179,75 @@ impl SampledRepetitive {
         before: Outcome,
         most: f64,
     ) -> f64 {
-        let entries = self.entries;
-        let Some(lines) = state.line.as_mut().get_mut(..2 * entries) else { return 0.0 };
-        let (learnt, given) = lines.split_at_mut(entries);
         let clipped = self.pause && before.excess.abs() > 0.0;
-        let was_held = matches!(state.saturation.learning, Learning::Held { .. });
-        state.saturation.follow(clipped, self.period, length(learnt));
-        if !was_held {
-            let (learns, gives) = self.stored(state.volts, before, clipped);
-            if let (Some(sum), Some(volts)) =
-                (learnt.get_mut(state.next), given.get_mut(state.next))
-            {
-                (*sum, *volts) = (gives, state.volts);
-            }
-            let back = if state.next >= self.lead { state.next } else { state.next + entries };
-            if let Some(sum) = learnt.get_mut(back - self.lead) {
-                *sum += learns;
-            }
-            state.next = if state.next + 1 < entries { state.next + 1 } else { 0 };
+        if clipped || state.saturation.learning != Learning::On {
+            return self.step_saturated(state, before, clipped, most);
         }
-        let volts = match state.saturation.learning {
-            Learning::On => self.pole * state.volts + self.filtered(learnt, state.next),
-            Learning::Held { phase } => repeated(given, state.next, self.period - phase),
-            Learning::Resuming { .. } => repeated(given, state.next, self.period),
-        };
-        // An overflow starts again from 0 V.
-        state.volts = if volts.is_nan() { 0.0 } else { volts.max(-most).min(most) };
-        state.volts
+        state.saturation.pass();
+        let RepetitiveState { line, next, volts, .. } = state;
+        let Some(lines) = line.as_mut().get_mut(..2 * self.entries) else { return 0.0 };
+        let error = if before.error.is_finite() { before.error } else { 0.0 };
+        self.store(lines, next, [*volts, *volts], self.gain * error);
+        *volts = bounded(self.pole * *volts + self.filtered(lines, *next), most);
+        *volts
     }
 
-    /// What the sample before adds to the lines: Kq e, and uRC as far as it was of use.
+    /// A sample while command or memory are affected by saturation.
     #[inline]
-    fn stored(&self, volts: f64, before: Outcome, clipped: bool) -> (f64, f64) {
-        if clipped {
-            let used = volts + before.excess;
-            return (0.0, used.max(volts.min(0.0)).min(volts.max(0.0)));
+    fn step_saturated<L: AsMut<[f64]>>(
+        &self,
+        state: &mut RepetitiveState<L>,
+        before: Outcome,
+        clipped: bool,
+        most: f64,
+    ) -> f64 {
+        let RepetitiveState { line, next, volts, saturation } = state;
+        let Some(lines) = line.as_mut().get_mut(..2 * self.entries) else { return 0.0 };
+        let was_held = matches!(saturation.learning, Learning::Held { .. });
+        saturation.follow(clipped, &self.lengths);
+        if !was_held {
+            let (sum, learns) = if clipped {
+                // As much of uRC as takes the command to the limit.
+                let used = *volts + before.excess;
+                (used.max(volts.min(0.0)).min(volts.max(0.0)), 0.0)
+            } else {
+                (*volts, if before.error.is_finite() { self.gain * before.error } else { 0.0 })
+            };
+            self.store(lines, next, [sum, *volts], learns);
         }
-        let error = if before.error.is_finite() { before.error } else { 0.0 };
-        (self.gain * error, volts)
+        let given = lines.get(self.entries..).unwrap_or_default();
+        let out = match saturation.learning {
+            Learning::On => self.pole * *volts + self.filtered(lines, *next),
+            Learning::Held { left } => repeated(given, *next, left),
+            Learning::Resuming { .. } => repeated(given, *next, self.lengths.whole),
+        };
+        *volts = bounded(out, most);
+        *volts
+    }
+
+    /// Writes an entry of both lines, what is learnt (less the error's part) and what was put out,
+    /// and adds `learns` where its error belongs.
+    #[inline]
+    fn store(&self, lines: &mut [f64], next: &mut usize, entry: [f64; 2], learns: f64) {
+        let entries = self.entries;
+        if let Some(given) = lines.get_mut(entries + *next) {
+            *given = entry[1];
+        }
+        if let Some(sum) = lines.get_mut(*next) {
+            *sum = entry[0];
+        }
+        let back = if *next >= self.lead { *next } else { *next + entries };
+        if let Some(sum) = lines.get_mut(back - self.lead) {
+            *sum += learns;
+        }
+        *next = if *next + 1 < entries { *next + 1 } else { 0 };
     }
 
     /// The filter Q of what is learnt, without its memory; the entry at `next` is the oldest.
     #[inline]
-    fn filtered(&self, learnt: &[f64], next: usize) -> f64 {
-        let first = next + (self.entries - (self.nearest + self.reads - 1));
+    fn filtered(&self, lines: &[f64], next: usize) -> f64 {
+        let Some(learnt) = lines.get(..self.entries) else { return 0.0 };
+        let first = next + self.unread;
         let first = if first < self.entries { first } else { first - self.entries };
         let (newer, older) = learnt.split_at(first.min(learnt.len()));
         let (taps, rest) = self.taps.split_at(self.reads.min(older.len()).min(TAPS));
@@ -233,9 +264,19 @@ impl SampledRepetitive {
     }
 }
 
-/// The entry of a ring that was written `age` samples ago, to the nearest; `next` is the oldest.
-fn repeated(ring: &[f64], next: usize, age: f64) -> f64 {
-    let age = samples(libm::round(age)).clamp(1, ring.len().max(1));
-    let place = if next >= age { next - age } else { next + ring.len() - age };
+/// A voltage within `most` of 0; 0 V where it is not a number.
+#[inline]
+fn bounded(volts: f64, most: f64) -> f64 {
+    if volts.abs() <= most {
+        return volts;
+    }
+    if volts.is_nan() { 0.0 } else { volts.max(-most).min(most) }
+}
+
+/// The entry of a ring that was written `age` samples ago; `next` is the oldest.
+#[inline]
+fn repeated(ring: &[f64], next: usize, age: u32) -> f64 {
+    let age = age as usize;
+    let place = if next >= age { next - age } else { (next + ring.len()).wrapping_sub(age) };
     ring.get(place).copied().unwrap_or(0.0)
 }

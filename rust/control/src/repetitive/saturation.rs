@@ -2,18 +2,18 @@
 
 use crate::snapshot::Snapshot;
 
-/// Share of a period above which clipped samples stop learning as a whole, as 1/4.
-const QUARTER: f64 = 4.0;
+/// Clipped samples in a period, as its part, above which learning stops as a whole.
+const PART: u32 = 4;
 
 /// What the repetitive part does in a sample.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Learning {
     /// It learns.
     On,
     /// It repeats the period before the saturation, and stores nothing.
     Held {
-        /// Samples since the beginning of the held period.
-        phase: f64,
+        /// Samples left in the held period, this one included: the age of the entry that is due.
+        left: u32,
     },
     /// It stores again, and repeats until nothing that was stored before is read.
     Resuming {
@@ -25,91 +25,115 @@ pub(super) enum Learning {
 /// Written as its kind and its number.
 impl Snapshot for Learning {
     fn save(&self, write: &mut dyn FnMut(f64)) {
-        let (kind, number) = match *self {
-            Self::On => (0.0, 0.0),
-            Self::Held { phase } => (1.0, phase),
-            Self::Resuming { left } => (2.0, f64::from(left)),
+        let [kind, left] = match *self {
+            Self::On => [0, 0],
+            Self::Held { left } => [1, left],
+            Self::Resuming { left } => [2, left],
         };
-        (write(kind), write(number));
+        [kind, left].save(write);
     }
 
     fn load(&mut self, read: &mut dyn FnMut() -> Option<f64>) -> Option<()> {
-        let (kind, number) = (read()?, read()?);
-        let mut left = 0_u32;
-        *self = match kind {
-            0.0 => Self::On,
-            1.0 => Self::Held { phase: number },
-            2.0 => {
-                left.load(&mut || Some(number))?;
-                Self::Resuming { left }
-            }
+        let mut numbers = [0_u32; 2];
+        numbers.load(read)?;
+        *self = match numbers {
+            [0, _] => Self::On,
+            [1, left] => Self::Held { left },
+            [2, left] => Self::Resuming { left },
             _ => return None,
         };
         Some(())
     }
 }
 
+/// Lengths of a repetitive controller that its antiwindup uses, in samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Lengths {
+    /// L/Ts.
+    pub(super) period: f64,
+    /// The same as a whole number.
+    pub(super) whole: u32,
+    /// Entries of each line.
+    pub(super) entries: u32,
+}
+
 /// Counts clipped samples, and decides what the repetitive part does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Saturation {
     pub(super) learning: Learning,
-    /// Samples until the count ends; 0 while nothing is clipped.
-    pub(super) left: f64,
+    /// Samples since the first clipped one of the count; more than a period where none counts.
+    since: u32,
     /// Clipped samples in the count.
-    pub(super) clipped: f64,
+    clipped: u32,
     /// Held periods with few clipped samples, one after the other.
-    pub(super) well: u32,
+    well: u32,
+    /// Time by which the held periods are shorter than those of the reference, in samples.
+    behind: f64,
 }
 
-crate::snapshot!(Saturation { learning, left, clipped, well });
+crate::snapshot!(Saturation { learning, since, clipped, well, behind });
 
 impl Saturation {
-    pub(super) const NONE: Self = Self { learning: Learning::On, left: 0.0, clipped: 0.0, well: 0 };
+    pub(super) const NONE: Self =
+        Self { learning: Learning::On, since: u32::MAX, clipped: 0, well: 0, behind: 0.0 };
 
-    /// Continues with the next sample; `clipped` is of the one before. `period` and `entries` are
-    /// those of the controller, in samples.
+    /// Continues with the next sample where nothing was clipped and learning is on.
+    #[inline]
+    pub(super) fn pass(&mut self) {
+        self.since = self.since.saturating_add(1);
+    }
+
+    /// Continues with the next sample; `clipped` is of the one before.
     ///
     /// What was learnt is held for a whole number of periods, to the nearest sample, so that it is
     /// in phase with the reference afterwards.
     #[inline]
-    pub(super) fn follow(&mut self, clipped: bool, period: f64, entries: u32) {
-        if !clipped && self.left <= 0.0 && self.learning == Learning::On {
-            return;
-        }
-        let mut held = match self.learning {
-            Learning::Held { phase } => return self.hold(phase + 1.0, clipped, period, entries),
+    pub(super) fn follow(&mut self, clipped: bool, lengths: &Lengths) {
+        self.learning = match self.learning {
+            Learning::Held { left } => return self.hold(left - 1, clipped, lengths),
             Learning::Resuming { left } if left > 1 => Learning::Resuming { left: left - 1 },
             Learning::Resuming { .. } | Learning::On => Learning::On,
         };
-        if clipped && self.left <= 0.0 {
-            (self.left, self.clipped) = (period, 0.0);
+        self.pass();
+        if clipped && self.since >= lengths.whole {
+            (self.since, self.clipped) = (0, 0);
         }
-        self.left -= 1.0;
-        if clipped {
-            self.clipped += 1.0;
-            if QUARTER * self.clipped > period {
-                held = Learning::Held { phase: 0.0 };
-                (self.left, self.clipped) = (0.0, 0.0);
-            }
+        self.clipped += u32::from(clipped);
+        if clipped && self.clipped > lengths.whole / PART {
+            (self.since, self.clipped) = (u32::MAX, 0);
+            self.behind = 0.0;
+            self.learning = self.another(lengths);
         }
-        self.learning = held;
     }
 
-    /// Continues at `phase` of a held period. At its end, holds for another one: where too much was
-    /// clipped, and once more after that, so that the feedback has settled before it learns again.
-    fn hold(&mut self, phase: f64, clipped: bool, period: f64, entries: u32) {
-        self.clipped += f64::from(u8::from(clipped));
-        self.learning = Learning::Held { phase };
-        if phase < period - 0.5 {
+    /// Continues in a held period. At its end, holds for another one: where too much was clipped,
+    /// and once more after that, so that the feedback has settled before it learns again.
+    #[inline]
+    fn hold(&mut self, left: u32, clipped: bool, lengths: &Lengths) {
+        self.clipped += u32::from(clipped);
+        self.learning = Learning::Held { left };
+        if left > 0 {
             return;
         }
-        self.well = if QUARTER * self.clipped > period { 0 } else { self.well + 1 };
-        self.clipped = 0.0;
+        self.well = if self.clipped > lengths.whole / PART { 0 } else { self.well + 1 };
+        self.clipped = 0;
         self.learning = if self.well < 2 {
-            Learning::Held { phase: phase - period }
+            self.another(lengths)
         } else {
             self.well = 0;
-            Learning::Resuming { left: entries }
+            Learning::Resuming { left: lengths.entries }
         };
+    }
+
+    /// Another held period, of as many samples as keeps it in phase.
+    fn another(&mut self, lengths: &Lengths) -> Learning {
+        self.behind += lengths.period - f64::from(lengths.whole);
+        let mut left = lengths.whole;
+        if self.behind > 0.5 && left < lengths.entries {
+            (self.behind, left) = (self.behind - 1.0, left + 1);
+        } else if self.behind < -0.5 && left > 1 {
+            (self.behind, left) = (self.behind + 1.0, left - 1);
+        }
+        Learning::Held { left }
     }
 }
