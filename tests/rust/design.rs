@@ -225,7 +225,8 @@ impl Simulated {
         let (mut x, mut past) = ([0.0; 3], vec![0.0; 8]);
         let mut peaks = [0.0_f64; 2];
         for k in 0..samples {
-            let reference = if k < 5 { 1e-6 } else { 0.0 };
+            // So small that what grows stays a displacement that a stage can have.
+            let reference = if k < 5 { 1e-60 } else { 0.0 };
             past.insert(0, controller.step(&mut state, reference, x[0], 0.0).volts);
             past.truncate(8);
             let steps = 64_u32;

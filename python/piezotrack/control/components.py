@@ -111,9 +111,9 @@ class StateSpace:
     d : float, optional
         D [V/m].
     back : array_like, shape (n,), optional
-        Gain of back-calculation: the voltage of the amplifier less the command [V] enters the
-        state with it. Without it the state is held while the command is clipped and would move
-        further into saturation.
+        Gain l of back-calculation: the voltage of the amplifier less the command [V] enters the
+        state with it. By default that of an observer of the law, with which A - l C is stable; for
+        a PI law a tracking time of Ti. Zeros turn antiwindup off.
 
     Examples
     --------
@@ -232,7 +232,8 @@ class Repetitive:
         Share of the learnt signal kept from period to period, above 0, at most 1. Below 1 it stops
         the drift of uRC against uFB, which is not observable in the error.
     pause : bool, optional
-        Whether learning pauses while the voltage is clipped.
+        Whether learning pauses while the voltage is clipped. Where more than a quarter of a period
+        is clipped, what was learnt before is repeated unchanged until that ends.
 
     Raises
     ------
