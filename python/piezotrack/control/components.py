@@ -9,6 +9,8 @@ import numpy as np
 
 from .. import _core
 from .._support.arguments import finite, in_range, not_negative, positive
+from .._support.arrays import unmasked
+from .._support.messages import quoted
 from ..errors import ParameterError, ShapeError
 
 if TYPE_CHECKING:
@@ -147,9 +149,9 @@ class StateSpace:
 
 def _matrix(name: str, value: ArrayLike) -> NDArray[np.float64]:
     try:
-        entries = np.asarray(value, dtype=np.float64).ravel()
-    except (TypeError, ValueError):
-        raise ParameterError(f"{name} is {value!r}: expected an array of numbers") from None
+        entries = np.asarray(unmasked(value), dtype=np.float64).ravel()
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError(f"{name} is {quoted(value)}: expected an array of numbers") from None
     if not np.isfinite(entries).all():
         raise ParameterError(f"{name} has {entries}: expected finite numbers")
     return entries

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
+from .._support.arrays import unmasked
+from .._support.messages import quoted
 from .._support.units import best_length_unit
 from ..errors import ParameterError
 from .reference import Reference, read_reference
@@ -202,11 +204,11 @@ def _mixed(row: Array, x: Motion, y: Motion) -> Motion:
 def square_matrix(name: str, matrix: ArrayLike) -> Array:
     """Return a finite matrix of two rows and columns, or raise ParameterError."""
     try:
-        rows = np.array(matrix, dtype=np.float64)
-    except (TypeError, ValueError):
+        rows = np.array(unmasked(matrix), dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
         rows = np.zeros(0)
     if rows.shape != (2, 2) or not np.isfinite(rows).all():
-        raise ParameterError(f"{name} is {matrix!r}: expected 2 by 2 finite numbers")
+        raise ParameterError(f"{name} is {quoted(matrix)}: expected 2 by 2 finite numbers")
     return rows
 
 
