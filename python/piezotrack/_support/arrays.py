@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["check_dt", "real", "signal_of", "time_axis", "time_fault", "unmasked"]
+__all__ = ["check_dt", "real", "real_array", "signal_of", "time_axis", "time_fault", "unmasked"]
 
 # Largest departure of a time from the even grid, in sampling intervals.
 UNEVEN = 0.05
@@ -116,26 +116,45 @@ def unmasked(values: Any) -> Any:
     return values
 
 
-def signal_of(
-    name: str, values: ArrayLike | None, *, like: Array | None = None, finite: bool = True
-) -> Array:
-    """Return a read-only float64 copy of one-dimensional `values`, as long as `like`."""
+def real_array(name: str, values: object) -> Array:
+    """Return real numbers of any shape as float64: `values` themselves where they are that.
+
+    Raises
+    ------
+    ShapeError
+        They are no array, or more than memory should hold.
+    DataError
+        They are not real numbers.
+
+    Examples
+    --------
+    >>> real_array("t", [[1, 2]])
+    array([[1., 2.]])
+    """
     try:
         array = np.asarray(unmasked(values))
     except (TypeError, ValueError, OverflowError):
         raise ShapeError(f"{name} is not an array: expected one number for each sample") from None
     if array.dtype.kind not in "biuf":
         raise DataError(f"{name} holds values of type {array.dtype}: expected real numbers")
-    if array.ndim != 1:
-        raise ShapeError(f"{name} has the shape {array.shape}: expected one dimension")
     if array.size > MOST_SAMPLES:
         raise ShapeError(f"{name} has {array.size} samples: expected {MOST_SAMPLES} at most")
+    with np.errstate(over="ignore"):
+        return array.astype(np.float64, copy=False)
+
+
+def signal_of(
+    name: str, values: ArrayLike | None, *, like: Array | None = None, finite: bool = True
+) -> Array:
+    """Return a read-only float64 copy of one-dimensional `values`, as long as `like`."""
+    array = real_array(name, values)
+    if array.ndim != 1:
+        raise ShapeError(f"{name} has the shape {array.shape}: expected one dimension")
     if like is not None and array.size != like.size:
         raise ShapeError(
             f"u has {like.size} samples and {name} has {array.size}: expected equally many"
         )
-    with np.errstate(over="ignore"):
-        signal = np.array(array, dtype=np.float64)
+    signal = np.array(array)
     if finite and (bad := _first(~np.isfinite(signal))) is not None:
         raise DataError(f"{name} is {signal[bad]} at sample {bad}: expected finite numbers")
     signal.setflags(write=False)

@@ -265,7 +265,8 @@ class Dataset:
         factor = _factor(factor)
         if len(self) < MIN_SAMPLES * factor:
             raise ParameterError(
-                f"factor is {quoted(factor)}: that leaves fewer than {MIN_SAMPLES} of {len(self)} samples"
+                f"factor is {quoted(factor)}: that leaves fewer than {MIN_SAMPLES} of {len(self)} "
+                "samples"
             )
         first = self._start % factor
         less = Dataset(

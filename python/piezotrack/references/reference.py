@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._support.arguments import check_reach, finite, in_range, not_negative, plain, positive
-from .._support.arrays import check_dt, signal_of, unmasked
+from .._support.arrays import check_dt, real_array, signal_of
 from .._support.messages import quoted
 from .._support.units import best_length_unit
-from ..errors import DataError, ParameterError
+from ..errors import DataError, ParameterError, ShapeError
 from .motions import Spline, blended, extremes
 
 if TYPE_CHECKING:
@@ -180,8 +180,8 @@ class Reference:
         -86.9 um/s^2
         """
         try:
-            times = np.asarray(unmasked(t), dtype=np.float64)
-        except (TypeError, ValueError, OverflowError):
+            times = real_array("t", t)
+        except (DataError, ShapeError):
             raise ParameterError(f"t is {quoted(t)}: expected times in s") from None
         slack = 1e-12 * self.duration
         outside = ~((times >= -slack) & (times <= self.duration + slack))

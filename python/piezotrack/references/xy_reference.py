@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from .._support.arrays import unmasked
+from .._support.arrays import real_array
 from .._support.messages import quoted
 from .._support.units import best_length_unit
-from ..errors import ParameterError
+from ..errors import DataError, ParameterError, ShapeError
 from .reference import Reference, read_reference
 
 if TYPE_CHECKING:
@@ -204,8 +204,8 @@ def _mixed(row: Array, x: Motion, y: Motion) -> Motion:
 def square_matrix(name: str, matrix: ArrayLike) -> Array:
     """Return a finite matrix of two rows and columns, or raise ParameterError."""
     try:
-        rows = np.array(unmasked(matrix), dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
+        rows = np.array(real_array(name, matrix))
+    except (DataError, ShapeError):
         rows = np.zeros(0)
     if rows.shape != (2, 2) or not np.isfinite(rows).all():
         raise ParameterError(f"{name} is {quoted(matrix)}: expected 2 by 2 finite numbers")

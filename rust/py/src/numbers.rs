@@ -3,7 +3,7 @@
 use piezotrack_core::Error;
 use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyString};
+use pyo3::types::{PyBool, PyComplex, PyFloat, PyInt, PyString};
 
 use crate::errors::raise;
 
@@ -16,8 +16,11 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 /// A real number as a float; NaN and infinity pass, for the receiver to judge.
 #[pyfunction]
 fn as_number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
+    if is_other(value) {
+        return Err(refused(name, value, "a number"));
+    }
     match value.extract::<f64>() {
-        Ok(number) if !is_other(value) => Ok(number),
+        Ok(number) => Ok(number),
         Err(error) if error.is_instance_of::<PyOverflowError>(value.py()) => {
             Err(refused(name, value, "a number that float64 can hold, up to 1.8e308"))
         }
@@ -50,9 +53,20 @@ pub fn is_unsuitable(error: &PyErr, py: Python<'_>) -> bool {
         || error.is_instance_of::<PyOverflowError>(py)
 }
 
-/// Truth values and texts convert to numbers, and are hardly ever meant so.
+/// What converts to a number and is hardly ever meant so: truth values, texts, arrays, and what
+/// would lose its imaginary part.
 fn is_other(value: &Bound<'_, PyAny>) -> bool {
-    value.is_instance_of::<PyBool>() || value.is_instance_of::<PyString>()
+    if value.is_exact_instance_of::<PyFloat>() || value.is_exact_instance_of::<PyInt>() {
+        return false;
+    }
+    let attribute = |name: &str| value.getattr(name).ok();
+    let kind = attribute("dtype").and_then(|dtype| dtype.getattr("kind").ok()?.extract().ok());
+    let dimensions = attribute("ndim").and_then(|count| count.extract::<usize>().ok());
+    value.is_instance_of::<PyBool>()
+        || value.is_instance_of::<PyString>()
+        || value.is_instance_of::<PyComplex>()
+        || kind.is_some_and(|kind: String| kind == "c")
+        || dimensions.is_some_and(|count| count > 0)
 }
 
 fn refused(name: &str, value: &Bound<'_, PyAny>, expected: &str) -> PyErr {
