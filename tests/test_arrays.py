@@ -180,16 +180,14 @@ def row_of_two_dimensions(values: Array) -> Array:
 
 
 BYTES = st.integers(0, 13)
+BOTH: list[Literal["<", ">"]] = ["<", ">"]
+ORDERS = st.sampled_from(BOTH)
 LAYOUTS: st.SearchStrategy[Callable[[Array], Any]] = st.one_of(
-    st.tuples(BYTES, BYTES, st.sampled_from("<>")).map(
-        lambda chosen: lambda values: field(values, *chosen)
-    ),
+    st.tuples(BYTES, BYTES, ORDERS).map(lambda chosen: lambda values: field(values, *chosen)),
     st.integers(1, 15).map(lambda offset: lambda values: unaligned(values, offset)),
     st.sampled_from([-3, -2, -1, 1, 2, 5]).map(lambda step: lambda values: stepped(values, step)),
     st.sampled_from([read_only, row_of_two_dimensions, np.ma.masked_array, np.copy]),
-    st.sampled_from("<>").map(
-        lambda order: lambda values: values.astype(values.dtype.newbyteorder(order))
-    ),
+    ORDERS.map(lambda order: lambda values: values.astype(values.dtype.newbyteorder(order))),
 )
 KINDS = st.sampled_from(["f8", "f8", "f4", "f2", "g", "u1", "i1", "u2", "i2", "i4", "i8", "u8"])
 SIZES = st.integers(0, 40)
