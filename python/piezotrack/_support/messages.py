@@ -27,7 +27,7 @@ def quoted(value: object) -> str:
         text = repr(value)
     except Exception:
         # A number of thousands of digits; a class of the caller's may raise anything.
-        return f"a {type(value).__name__} that cannot be printed"
+        return f"an unprintable {type(value).__name__}"
     return text if len(text) <= LENGTH else f"{text[:LENGTH]}..."
 
 

@@ -63,7 +63,8 @@ def read(
     path : path-like
         A text file with a header line and one line for each sample, divided by commas,
         semicolons, tabs or blanks; outside of comma files the decimal mark may be a comma. Lines
-        before the header that begin with ``#`` or ``%`` are skipped, and so are blank lines.
+        before the header that begin with ``#`` or ``%`` are skipped, and so are blank lines. Up to
+        ten thousand columns, and a million characters in a line.
     time, drive, displacement : str or int, optional
         The columns to use: the title in the header, with or without its unit, or the number of
         the column counted from 0. Needed only where the header does not use a usual name (such

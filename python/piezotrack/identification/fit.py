@@ -105,7 +105,7 @@ def identify(
     runs : int, optional
         Number of independent restarts, 4 where not given, each with its own random numbers;
         different final costs show that there are several local minima. The restarts are simulated
-        side by side in the processor's SIMD lanes.
+        side by side in the processor's SIMD lanes. Up to a million particles in all of them.
     threads : int, optional
         Up to 256; all cores where it is 0 or not given.
     progress : bool, optional

@@ -55,7 +55,8 @@ impl Halt {
     }
 
     /// Calls Python, or stops the job where there is none any more: the interpreter ends without
-    /// waiting for a daemon thread, and to attach one to it then is a segmentation fault.
+    /// waiting for a daemon thread, and to attach one to it then is a segmentation fault. The end
+    /// of `detach` is safe: there `pyo3` lets such a thread sleep until the process is gone.
     fn with_python(&self, call: impl FnOnce(Python<'_>)) {
         if Python::try_attach(call).is_none() {
             self.stopped.store(true, Ordering::Relaxed);
