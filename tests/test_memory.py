@@ -29,6 +29,7 @@ t = np.arange(2000) / 1000.0
 u = 30.0 * (1.0 - np.cos(2.0 * np.pi * t))
 log = pt.Dataset(u=u, y=stage.simulate(u, 0.001).x, dt=0.001)
 swarm = pt.ParticleSwarm(particles=100_000)
+long = pt.Dataset(u=np.tile(u, 500), y=np.tile(log.y, 500), dt=0.001)
 try:
     {call}
 except (MemoryError, pt.PiezotrackError) as error:
@@ -48,6 +49,7 @@ NONE = {
     "circle": "circle.errors(many, many)",
     "path": "figure.errors(many, many)",
     "swarm": "pt.identify(log, swarm=swarm, runs=10)",
+    "refinement": "pt.identify(long, threads=16)",
 }
 
 

@@ -49,6 +49,13 @@ def test_a_motion_that_is_not_finite_is_refused_with_its_time(name: str) -> None
         reference.at(times)
 
 
+def test_the_path_of_such_a_motion_is_refused_too() -> None:
+    bad = own(lambda t: (np.where(t > 0.5, np.nan, t), t, np.where(t > 0.5, np.nan, t)))
+    path = pt.XYReference(name="path", x=own(lambda t: (t, t, t)), y=bad)
+    with pytest.raises(pt.ParameterError, match=r"^motion of mine is nan m"):
+        path.errors([0.0], [0.0])
+
+
 @pytest.mark.parametrize(
     "motion",
     [

@@ -36,7 +36,7 @@ def listed(values: Sequence[object]) -> str:
 
     Examples
     --------
-    >>> listed(["t", "u"]), listed(range(22))[-18:]
+    >>> listed(["t", "u"]), listed(range(22))[-17:]
     ("'t', 'u'", '18, 19 and 2 more')
     """
     shown = ", ".join(map(quoted, values[:VALUES]))

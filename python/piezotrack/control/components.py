@@ -8,16 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from .._support.arguments import finite, in_range, not_negative, positive
+from .._support.arguments import MOST_ENTRIES, finite, in_range, not_negative, positive
 from .._support.arrays import real_array
 from .._support.messages import quoted
 from ..errors import DataError, ParameterError, ShapeError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
-
-# Most states of a feedback in state space, as in the core.
-MOST_STATES = 16
 
 __all__ = ["Lag", "LowPass", "Notch", "Pid", "Repetitive", "StateSpace", "ZeroPhase"]
 
@@ -155,8 +152,8 @@ def _matrix(name: str, value: ArrayLike) -> NDArray[np.float64]:
         entries = real_array(name, value)
     except (DataError, ShapeError):
         raise ParameterError(f"{name} is {quoted(value)}: expected an array of numbers") from None
-    if entries.size > MOST_STATES**2:
-        raise ShapeError(f"{name} has {entries.size} entries: expected {MOST_STATES**2} at most")
+    if entries.size > MOST_ENTRIES:
+        raise ShapeError(f"{name} has {entries.size} entries: expected {MOST_ENTRIES} at most")
     if not np.isfinite(entries).all():
         raise ParameterError(f"{name} has {entries}: expected finite numbers")
     return entries.ravel()

@@ -191,17 +191,22 @@ class Reference:
                 f"from 0 to {self.duration:.10g} s"
             )
         inside = np.clip(np.atleast_1d(times), 0.0, self.duration)
+        x, v, a = self._finite(inside, self.ramp)
+        return x.reshape(times.shape), v.reshape(times.shape), a.reshape(times.shape)
+
+    def _finite(self, t: Array, ramp: float) -> tuple[Array, Array, Array]:
+        """Evaluate the motion with a start of this length, and refuse what is not finite."""
         # What overflows is found below.
         with np.errstate(all="ignore"):
-            x, v, a = blended(self._motion_at, inside, self.ramp, self.origin)
+            x, v, a = blended(self._motion_at, t, ramp, self.origin)
         good = np.isfinite(x) & np.isfinite(v) & np.isfinite(a)
         if not good.all():
             k = int(np.argmin(good))
             raise ParameterError(
                 f"motion of {self.name} is {x.flat[k]:g} m, {v.flat[k]:g} m/s, {a.flat[k]:g} "
-                f"m/s^2 at {inside.flat[k]:.10g} s: expected finite numbers"
+                f"m/s^2 at {t.flat[k]:.10g} s: expected finite numbers"
             )
-        return x.reshape(times.shape), v.reshape(times.shape), a.reshape(times.shape)
+        return x, v, a
 
     def _motion_at(self, t: Array) -> tuple[Array, Array, Array]:
         """Evaluate `motion`, which may be a function of the caller's."""

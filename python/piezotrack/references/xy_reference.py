@@ -111,10 +111,10 @@ class XYReference:
         """Points of the path, without its smooth start [m]: chords are within 0.1 nm of it."""
         length = min(self.duration, self.period or math.inf)
         t = np.linspace(0.0, length, COARSE)
-        bend = max(float(np.hypot(self.x.motion(t)[2], self.y.motion(t)[2]).max()), 1e-30)
+        bend = max(float(np.hypot(*(axis._finite(t, 0.0)[2] for axis in self.axes)).max()), 1e-30)
         count = length / math.sqrt(8.0 * SAGITTA / bend)
         t = np.linspace(0.0, length, int(min(max(count, COARSE), FINEST)) + 1)
-        return self.x.motion(t)[0], self.y.motion(t)[0]
+        return self.x._finite(t, 0.0)[0], self.y._finite(t, 0.0)[0]
 
     def errors(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Contour error: signed distance of points from the path.
