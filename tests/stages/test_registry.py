@@ -4,50 +4,18 @@ from __future__ import annotations
 
 import copy
 import pickle
-from dataclasses import fields, replace
+from dataclasses import fields
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 import piezotrack as pt
+from all_stages import STAGES
 from piezotrack.stages.registry import MODELS, model_named, model_of, stage_class
 
 if TYPE_CHECKING:
     from piezotrack.stages.base import ModelInfo
-
-STAGES: dict[str, pt.stages.Stage] = {
-    "dahl": replace(pt.DahlStage.xu_li_2010(), b0=40.0),
-    "bouc-wen": pt.BoucWenStage.xu_li_2010_corrected(),
-    "first-order-dahl": pt.FirstOrderDahlStage(
-        mass=0.1828,
-        damping=100.0,
-        stiffness=26065.0,
-        piezo_coefficient=0.0468,
-        rest_stiffness=9e3,
-        coulomb_force=0.15,
-    ),
-    "bouc-wen-oscillator": pt.BoucWenOscillator.benchmark(),
-    "prandtl-ishlinskii": pt.PrandtlIshlinskiiStage(
-        linear=1e-6,
-        thresholds=(10.0, 20.0),
-        weights=(0.2e-6, 0.1e-6),
-        creep_weights=(0.01,),
-        creep_times=(0.1,),
-        frequency=160.0,
-        damping_ratio=0.5,
-    ),
-    "generalised-prandtl-ishlinskii": pt.GeneralisedPrandtlIshlinskiiStage(
-        linear=1e-6,
-        thresholds=(10.0, 20.0),
-        weights=(0.2e-6, 0.1e-6),
-        scale=100.0,
-        slope=0.01,
-        shift=0.2,
-        level=-10.0,
-        time_constant=0.002,
-    ),
-}
 
 
 @pytest.mark.parametrize("info", MODELS, ids=[info.name for info in MODELS])

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .. import _core
 from ..errors import ParameterError
+from .arrays import unmasked
+from .messages import quoted
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -30,6 +33,8 @@ __all__ = [
 
 # A displacement [m] that only a wrong unit explains.
 TOO_FAR = 1.0
+# Most entries of a list of settings.
+MOST_ENTRIES = 1_000_000
 
 
 def finite(name: str, value: object, unit: str) -> float:
@@ -156,8 +161,9 @@ def numbers(
     >>> numbers("levels", [0, 1e-5], "m")
     array([0.e+00, 1.e-05])
     """
+    values = unmasked(values)
     several = isinstance(values, Sequence) or (isinstance(values, np.ndarray) and values.ndim > 0)
-    entries: list[object] = list(values) if several else [values]  # type: ignore[arg-type]
+    entries = _entries(name, values) if several else [values]  # type: ignore[arg-type]
     array = np.array([_core.as_number(name, value) for value in entries])
     if array.size < least:
         raise ParameterError(f"{name} has {array.size} entries: expected at least {least}")
@@ -179,8 +185,17 @@ def as_numbers(name: str, values: object) -> tuple[float, ...]:
     (1.0, 2.5)
     """
     if not isinstance(values, Iterable) or isinstance(values, (str, bytes)):
-        raise ParameterError(f"{name} is {values!r}: expected numbers in a list")
-    return tuple(_core.as_number(f"{name}[{i}]", value) for i, value in enumerate(values))
+        raise ParameterError(f"{name} is {quoted(values)}: expected numbers in a list")
+    entries = _entries(name, values)
+    return tuple(_core.as_number(f"{name}[{i}]", value) for i, value in enumerate(entries))
+
+
+def _entries(name: str, values: Iterable[object]) -> list[object]:
+    """Return the entries of a list of settings, of which there are never many."""
+    entries = list(islice(values, MOST_ENTRIES + 1))
+    if len(entries) > MOST_ENTRIES:
+        raise ParameterError(f"{name} has more entries: expected {MOST_ENTRIES} at most")
+    return entries
 
 
 def one_or_more_numbers(name: str, values: object) -> tuple[float, ...]:

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import math
 from numbers import Real
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import DataError, ParameterError, ShapeError
+from .messages import quoted
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     Array = NDArray[np.float64]
 
-__all__ = ["check_dt", "real", "signal_of", "time_axis", "time_fault"]
+__all__ = ["check_dt", "real", "real_array", "signal_of", "time_axis", "time_fault", "unmasked"]
 
 # Largest departure of a time from the even grid, in sampling intervals.
 UNEVEN = 0.05
+# Most samples of a record, as in the core.
+MOST_SAMPLES = 500_000_000
+# Sampling intervals beyond which numbers derived from them leave float64 [s], as in the core.
+SHORTEST, LONGEST = 1e-12, 1e9
 USE_DT = (
     "an evenly sampled record whose times are coarse or jittery can be given with dt=, "
     "which is used in place of the times"
@@ -26,10 +31,12 @@ USE_DT = (
 
 
 def check_dt(dt: float) -> float:
-    """Return `dt` [s] as a float, or raise ParameterError unless it is above 0 and finite."""
+    """Return `dt` [s] as a float, or raise ParameterError unless it is an interval."""
     number = real(dt)
     if not 0.0 < number < math.inf:
-        raise ParameterError(f"dt is {dt!r}: expected a finite number of seconds above 0")
+        raise ParameterError(f"dt is {quoted(dt)}: expected a finite number of seconds above 0")
+    if not SHORTEST <= number <= LONGEST:
+        raise ParameterError(f"dt is {number:g} s: expected {SHORTEST:g} to {LONGEST:g} s")
     return number
 
 
@@ -94,27 +101,60 @@ def time_axis(t: ArrayLike | None, dt: float | None, u: Array) -> tuple[Array, f
     return times, float(times[-1] - times[0]) / (times.size - 1)
 
 
-def signal_of(
-    name: str, values: ArrayLike | None, *, like: Array | None = None, finite: bool = True
-) -> Array:
-    """Return a read-only float64 copy of one-dimensional `values`, as long as `like`."""
+def unmasked(values: Any) -> Any:
+    """Return masked numbers as NaN, and anything else as it is.
+
+    A masked sample is missing; NumPy's conversions would restore its value.
+
+    Examples
+    --------
+    >>> unmasked(np.ma.array([1.0, 2.0], mask=[False, True]))
+    array([ 1., nan])
+    """
     if isinstance(values, np.ma.MaskedArray) and values.dtype.kind in "biuf":
-        # A masked sample is missing; asarray would restore its value.
-        values = np.ma.filled(values.astype(np.float64), np.nan)
+        return np.ma.filled(values.astype(np.float64), np.nan)
+    return values
+
+
+def real_array(name: str, values: object) -> Array:
+    """Return real numbers of any shape as float64: `values` themselves where they are that.
+
+    Raises
+    ------
+    ShapeError
+        They are no array, or more than memory should hold.
+    DataError
+        They are not real numbers.
+
+    Examples
+    --------
+    >>> real_array("t", [[1, 2]])
+    array([[1., 2.]])
+    """
     try:
-        array = np.asarray(values)
+        array = np.asarray(unmasked(values))
     except (TypeError, ValueError, OverflowError):
         raise ShapeError(f"{name} is not an array: expected one number for each sample") from None
     if array.dtype.kind not in "biuf":
         raise DataError(f"{name} holds values of type {array.dtype}: expected real numbers")
+    if array.size > MOST_SAMPLES:
+        raise ShapeError(f"{name} has {array.size} samples: expected {MOST_SAMPLES} at most")
+    with np.errstate(over="ignore"):
+        return array.astype(np.float64, copy=False)
+
+
+def signal_of(
+    name: str, values: ArrayLike | None, *, like: Array | None = None, finite: bool = True
+) -> Array:
+    """Return a read-only float64 copy of one-dimensional `values`, as long as `like`."""
+    array = real_array(name, values)
     if array.ndim != 1:
         raise ShapeError(f"{name} has the shape {array.shape}: expected one dimension")
     if like is not None and array.size != like.size:
         raise ShapeError(
             f"u has {like.size} samples and {name} has {array.size}: expected equally many"
         )
-    with np.errstate(over="ignore"):
-        signal = np.array(array, dtype=np.float64)
+    signal = np.array(array)
     if finite and (bad := _first(~np.isfinite(signal))) is not None:
         raise DataError(f"{name} is {signal[bad]} at sample {bad}: expected finite numbers")
     signal.setflags(write=False)

@@ -7,11 +7,11 @@ where other units are converted.
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..errors import ParameterError
+from .messages import quoted
 
 if TYPE_CHECKING:
     import numpy as np
@@ -137,10 +137,12 @@ def require(text: str, quantity: str | None = None) -> Unit:
     """
     unit = lookup(text)
     if unit is None:
-        raise ParameterError(f"unknown unit {text!r}: expected one of {known_units(quantity)}")
+        raise ParameterError(
+            f"unknown unit {quoted(text)}: expected one of {known_units(quantity)}"
+        )
     if quantity is not None and unit.quantity != quantity:
         raise ParameterError(
-            f"{text!r} is a unit of {unit.quantity}: expected a unit of {quantity}, "
+            f"{quoted(text)} is a unit of {unit.quantity}: expected a unit of {quantity}, "
             f"one of {known_units(quantity)}"
         )
     return unit
@@ -158,10 +160,6 @@ def known_units(quantity: str | None = None) -> str:
     return ", ".join(unit.name for unit in _TABLE if quantity in (None, unit.quantity))
 
 
-_BRACKETS = re.compile(r"^(.*?)[\s_]*[(\[]([^()\[\]]*)[)\]]$")
-_SUFFIX = re.compile(r"^(.+?)[\s_,]+([^\s_,]+)$")
-
-
 def split_unit(header: str) -> tuple[str, str]:
     """Split the title of a column into its name and the text of its unit.
 
@@ -177,15 +175,31 @@ def split_unit(header: str) -> tuple[str, str]:
     ('sensor_left', '')
     """
     title = header.strip()
-    if match := _BRACKETS.match(title):
-        return match[1].strip(), match[2].strip()
+    if title.endswith((")", "]")):
+        opened = max(title.rfind("("), title.rfind("["))
+        inside = title[opened + 1 : -1]
+        if opened >= 0 and ")" not in inside and "]" not in inside:
+            return title[: _end(title, opened, "_")].strip(), inside.strip()
     name, slash, unit = title.rpartition("/")
     if slash and name.strip():
         return name.strip(), unit.strip()
-    match = _SUFFIX.match(title)
-    if match and lookup(match[2]):
-        return match[1], match[2]
+    # Never the whole title: before the mark there is a letter at least.
+    start = max(title.rfind(mark) for mark in ("_", ",", *_blanks(title))) + 1
+    end = max(1, _end(title, start, "_,"))
+    if end < start < len(title) and lookup(title[start:]):
+        return title[:end], title[start:]
     return title, ""
+
+
+def _end(title: str, end: int, marks: str) -> int:
+    """Return where a title ends without the blanks and marks before `end`."""
+    while end and (title[end - 1].isspace() or title[end - 1] in marks):
+        end -= 1
+    return end
+
+
+def _blanks(title: str) -> set[str]:
+    return {letter for letter in set(title) if letter.isspace()}
 
 
 def best_length_unit(stroke_m: float) -> tuple[str, float]:

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from .._support.arguments import finite, in_range, not_negative, positive
-from ..errors import ParameterError, ShapeError
+from .._support.arguments import MOST_ENTRIES, finite, in_range, not_negative, positive
+from .._support.arrays import real_array
+from .._support.messages import quoted
+from ..errors import DataError, ParameterError, ShapeError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -147,12 +149,14 @@ class StateSpace:
 
 def _matrix(name: str, value: ArrayLike) -> NDArray[np.float64]:
     try:
-        entries = np.asarray(value, dtype=np.float64).ravel()
-    except (TypeError, ValueError):
-        raise ParameterError(f"{name} is {value!r}: expected an array of numbers") from None
+        entries = real_array(name, value)
+    except (DataError, ShapeError):
+        raise ParameterError(f"{name} is {quoted(value)}: expected an array of numbers") from None
+    if entries.size > MOST_ENTRIES:
+        raise ShapeError(f"{name} has {entries.size} entries: expected {MOST_ENTRIES} at most")
     if not np.isfinite(entries).all():
         raise ParameterError(f"{name} has {entries}: expected finite numbers")
-    return entries
+    return entries.ravel()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -274,7 +274,7 @@ def track(
         sample is drawn from an exponential distribution, truncated at nine tenths of the sampling
         interval. The draws depend on the seed of the stage's sensor.
     substeps : int, optional
-        Instants kept in each sampling interval, for plots.
+        Instants kept in each sampling interval, for plots; up to 100000.
     beyond_reach : bool, optional
         Whether the reference may exceed the reach of the stage within the voltage limits, as to
         study saturation.

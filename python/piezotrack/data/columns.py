@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from numbers import Integral
 from typing import TYPE_CHECKING
 
+from .._support.messages import listed, quoted
 from .._support.units import known_units, lookup, require, split_unit
 from ..errors import DataError, ParameterError
 
@@ -45,7 +46,7 @@ class Column:
     unit_from_caller: bool = False
 
     def __str__(self) -> str:
-        return f"column {self.title!r}" if self.title else f"column {self.index}"
+        return f"column {quoted(self.title)}" if self.title else f"column {self.index}"
 
 
 class Columns(list[Column]):
@@ -78,10 +79,12 @@ class Columns(list[Column]):
         """
         units = {} if units is None else units
         if not isinstance(units, Mapping):
-            raise ParameterError(f"units is {units!r}: expected a mapping of columns to units")
+            raise ParameterError(
+                f"units is {quoted(units)}: expected a mapping of columns to units"
+            )
         for key, unit in units.items():
             if not isinstance(unit, str):
-                raise ParameterError(f"units has {unit!r} for {key!r}: expected text")
+                raise ParameterError(f"units has {quoted(unit)} for {quoted(key)}: expected text")
             if key not in QUANTITIES:
                 self._set_unit(self._find(key, "units"), unit)
         roles = {role: self._find(key, role) for role, key in wanted.items() if key is not None}
@@ -123,7 +126,7 @@ class Columns(list[Column]):
             return found[0]
         problem = "is the name of several columns" if found else "is not a column"
         listed = _titles(self) if self.has_titles else f"0 to {len(self) - 1}, without titles"
-        raise ParameterError(f"{argument}: {key!r} {problem}; the columns are {listed}")
+        raise ParameterError(f"{argument}: {quoted(key)} {problem}; the columns are {listed}")
 
     def _candidates(self, role: str, taken: set[int]) -> list[Column]:
         """Return the columns with a usual name for `role`, those whose unit fits if there are."""
@@ -153,7 +156,7 @@ class Columns(list[Column]):
 
 
 def _titles(columns: Sequence[Column]) -> str:
-    return ", ".join(repr(column.title) for column in columns)
+    return listed([column.title for column in columns])
 
 
 def _check_unit(column: Column, role: str) -> None:

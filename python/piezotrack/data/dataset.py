@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from .._support.arrays import real, signal_of, time_axis
+from .._support.messages import listed, quoted
 from .._support.units import best_length_unit
 from ..errors import DataError, ParameterError
 
@@ -26,6 +27,8 @@ __all__ = ["Dataset", "Hold"]
 Hold = Literal["foh", "zoh"]
 
 MIN_SAMPLES = 3
+# Most samples of an interpolated record.
+MOST_SAMPLES = 50_000_000
 
 
 class Dataset:
@@ -101,10 +104,10 @@ class Dataset:
         source: str | None = None,
     ) -> None:
         if hold not in ("foh", "zoh"):
-            raise ParameterError(f"hold is {hold!r}: expected 'foh' or 'zoh'")
+            raise ParameterError(f"hold is {quoted(hold)}: expected 'foh' or 'zoh'")
         for name, text in (("drive_unit", drive_unit), ("source", source or "")):
             if not isinstance(text, str):
-                raise ParameterError(f"{name} is {text!r}: expected text")
+                raise ParameterError(f"{name} is {quoted(text)}: expected text")
         # The arrays hold the warm-up and the window, which begins at sample `_start`.
         self._u = signal_of("u", u)
         self._y = signal_of("y", y, like=self._u)
@@ -205,12 +208,12 @@ class Dataset:
     def __getitem__(self, window: slice) -> Dataset:
         if not isinstance(window, slice):
             raise ParameterError(
-                f"{window!r} is not a slice: a dataset is sliced in seconds, as in log[3.0:23.0]; "
-                "for single samples use log.u, log.y and log.t"
+                f"{quoted(window)} is not a slice: a dataset is sliced in seconds, as in "
+                "log[3.0:23.0]; for single samples use log.u, log.y and log.t"
             )
         if window.step is not None:
             raise ParameterError(
-                f"the slice has a step of {window.step!r}: expected log[start:stop] in seconds"
+                f"the slice has a step of {quoted(window.step)}: expected log[start:stop], in s"
             )
         first, stop = self._samples(window.start, window.stop)
         return self._part(0, stop, start=first)
@@ -262,7 +265,8 @@ class Dataset:
         factor = _factor(factor)
         if len(self) < MIN_SAMPLES * factor:
             raise ParameterError(
-                f"factor is {factor}: that leaves fewer than {MIN_SAMPLES} of {len(self)} samples"
+                f"factor is {quoted(factor)}: that leaves fewer than {MIN_SAMPLES} of {len(self)} "
+                "samples"
             )
         first = self._start % factor
         less = Dataset(
@@ -301,8 +305,8 @@ class Dataset:
         Raises
         ------
         ParameterError
-            `factor` is not a whole number of 2 or more, or the record's hold is "zoh", which
-            already defines the drive between the samples.
+            `factor` is not a whole number of 2 or more, or makes more than 50 million samples;
+            or the record's hold is "zoh", which already defines the drive between the samples.
 
         Examples
         --------
@@ -320,10 +324,16 @@ class Dataset:
         factor = _factor(factor)
         if self._hold == "zoh":
             raise ParameterError("hold is 'zoh': expected 'foh', as nothing is between the samples")
+        if (count := (self._t.size - 1) * factor + 1) > MOST_SAMPLES:
+            raise ParameterError(
+                f"factor is {quoted(factor)}: expected at most "
+                f"{(MOST_SAMPLES - 1) // (self._t.size - 1)}, with which {self._t.size} samples "
+                f"become {MOST_SAMPLES}"
+            )
         fine = Dataset(
             u=interpolated(self._u, factor),
             y=interpolated(self._y, factor),
-            t=self._t[0] + np.arange((self._t.size - 1) * factor + 1) * (self._dt / factor),
+            t=self._t[0] + np.arange(count) * (self._dt / factor),
             hold="foh",
             drive_unit=self._drive_unit,
             columns={k: interpolated(v, factor) for k, v in self._columns.items()},
@@ -382,14 +392,16 @@ class Dataset:
 
 def _factor(value: object) -> int:
     if isinstance(value, bool) or not isinstance(value, Integral) or value < 2:
-        raise ParameterError(f"factor is {value!r}: expected a whole number, 2 or more")
+        raise ParameterError(f"factor is {quoted(value)}: expected a whole number, 2 or more")
     return int(value)
 
 
 def _seconds(name: str, value: object) -> float:
     number = real(value)
     if not math.isfinite(number):
-        raise ParameterError(f"{name} is {value!r}: expected a finite number of seconds or None")
+        raise ParameterError(
+            f"{name} is {quoted(value)}: expected a finite number of seconds or None"
+        )
     return number
 
 
@@ -400,16 +412,20 @@ def _further(
     columns, units = columns or {}, units or {}
     for argument, mapping in (("columns", columns), ("column_units", units)):
         if not isinstance(mapping, Mapping):
-            raise ParameterError(f"{argument} is {mapping!r}: expected a mapping by name")
+            raise ParameterError(f"{argument} is {quoted(mapping)}: expected a mapping by name")
     for name in (*columns, *units):
         if name not in columns or not isinstance(name, str):
-            known = ", ".join(map(repr, columns)) or "none"
-            raise ParameterError(f"{name!r} is not the name of a column: the names are {known}")
+            known = listed(list(columns)) or "none"
+            raise ParameterError(
+                f"{quoted(name)} is not the name of a column: the names are {known}"
+            )
     for name, unit in units.items():
         if not isinstance(unit, str):
-            raise ParameterError(f"column_units has {unit!r} for {name!r}: expected text")
+            raise ParameterError(
+                f"column_units has {quoted(unit)} for {quoted(name)}: expected text"
+            )
     kept = {
-        name: signal_of(f"column {name!r}", values, like=u, finite=False)
+        name: signal_of(f"column {quoted(name)}", values, like=u, finite=False)
         for name, values in columns.items()
     }
     return kept, {name: units.get(name, "") for name in kept}

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .._support.arrays import check_dt, time_fault
+from .._support.messages import quoted
 from .._support.units import lookup, require
 from ..errors import DataError, ParameterError, ShapeError
 from .columns import Column, Columns
@@ -37,6 +38,9 @@ if TYPE_CHECKING:
 __all__ = ["DriveRecord", "read", "read_displacement", "read_drive"]
 
 NOT_TEXT = {".mat", ".h5", ".hdf5", ".tdms", ".npy", ".npz", ".xls", ".xlsx", ".parquet"}
+
+# A line and a header beyond these are none of a log: a million letters, ten thousand columns.
+MOST_LETTERS, MOST_COLUMNS = 1_000_000, 10_000
 
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 _SWAP = str.maketrans(",.", ".,")
@@ -59,7 +63,8 @@ def read(
     path : path-like
         A text file with a header line and one line for each sample, divided by commas,
         semicolons, tabs or blanks; outside of comma files the decimal mark may be a comma. Lines
-        before the header that begin with ``#`` or ``%`` are skipped, and so are blank lines.
+        before the header that begin with ``#`` or ``%`` are skipped, and so are blank lines. Up to
+        ten thousand columns, and a million characters in a line.
     time, drive, displacement : str or int, optional
         The columns to use: the title in the header, with or without its unit, or the number of
         the column counted from 0. Needed only where the header does not use a usual name (such
@@ -207,12 +212,16 @@ class _TextLog:
         try:
             file = Path(path)
         except TypeError:
-            raise ParameterError(f"path is {path!r}: expected the name of a file") from None
+            raise ParameterError(f"path is {quoted(path)}: expected the name of a file") from None
         self.name = file.name or str(file)
         self.lines = self._decode(self._load(file)).split("\n")
+        self._check_lines()
         header = self._first_line()
         self.delimiter = _delimiter(self.lines[header])
         titles = _split(self.lines[header], self.delimiter, is_header=True)
+        if len(titles) > MOST_COLUMNS:
+            found = f"this line has {len(titles)} fields, the first {quoted(titles[0])}"
+            raise self.error(f"{found}: expected {MOST_COLUMNS} columns at most", header + 1)
         has_header = _are_titles(titles)
         self.header = header + 1
         self.first = header + has_header
@@ -245,7 +254,7 @@ class _TextLog:
                 with file.open("rb") as opened:
                     data = opened.read() if is_text else b""
         except FileNotFoundError:
-            raise self.error(f"there is no such file in {str(file.parent)!r}") from None
+            raise self.error(f"there is no such file in {quoted(str(file.parent))}") from None
         except PermissionError:
             raise self.error("no permission to read this file") from None
         except (OSError, ValueError) as error:
@@ -272,6 +281,14 @@ class _TextLog:
             line = text.count("\n", 0, found.start()) + 1
             raise self.error(f"is not a text log: it holds the byte {ord(found[0])}", line)
         return text
+
+    def _check_lines(self) -> None:
+        """Refuse a line so long that it is none of a log, before it is divided."""
+        longest = max(map(len, self.lines))
+        if longest > MOST_LETTERS:
+            line = next(k for k, text in enumerate(self.lines) if len(text) == longest)
+            found = f"this line has {longest} characters and begins with {quoted(self.lines[line])}"
+            raise self.error(f"{found}: expected {MOST_LETTERS} at most", line + 1)
 
     def _first_line(self) -> int:
         for number, line in enumerate(self.lines):
@@ -440,7 +457,7 @@ def _fault(text: str, column: Column, swap: bool) -> str:
     if not text:
         return f"{column} is empty: expected a number"
     if text.lower().lstrip("+-") in ("nan", "inf", "infinity") or math.isinf(_number(text)):
-        return f"{text!r} in {column} is not a finite number"
+        return f"{quoted(text)} in {column} is not a finite number"
     mark = "comma" if swap else "point"
     other = f": the decimal mark of this log is a {mark}" if "." in text or "," in text else ""
-    return f"{text!r} in {column} is not a number{other}"
+    return f"{quoted(text)} in {column} is not a number{other}"

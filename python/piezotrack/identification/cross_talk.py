@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
+from .._support.messages import quoted
 from ..data.dataset import Dataset
 from ..errors import DataError, ParameterError
 
@@ -95,7 +96,9 @@ def identify_cross_talk(x_driven: Sequence[Dataset], y_driven: Sequence[Dataset]
         given = isinstance(logs, (tuple, list))
         pair = [log for log in logs if isinstance(log, Dataset)] if given else []
         if len(pair) != 2 or len(logs) != 2:
-            raise ParameterError(f"{name} is {logs!r}: expected the two pt.Dataset of x and y")
+            raise ParameterError(
+                f"{name} is {quoted(logs)}: expected the two pt.Dataset of x and y"
+            )
         other = 1 - driven
         moving, still = float(np.ptp(pair[driven].u)), float(np.ptp(pair[other].u))
         if still > HELD * moving:

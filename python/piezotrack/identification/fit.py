@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from .. import _core
+from .._support.messages import quoted
 from ..data.dataset import Dataset
 from ..errors import ParameterError
 from ..stages.registry import model_named
@@ -105,7 +106,7 @@ def identify(
     runs : int, optional
         Number of independent restarts, 4 where not given, each with its own random numbers;
         different final costs show that there are several local minima. The restarts are simulated
-        side by side in the processor's SIMD lanes.
+        side by side in the processor's SIMD lanes. Up to a million particles in all of them.
     threads : int, optional
         Up to 256; all cores where it is 0 or not given.
     progress : bool, optional
@@ -172,7 +173,7 @@ def identify(
     settings = LeastSquares() if least_squares is None else least_squares
     if not isinstance(settings, LeastSquares):
         raise ParameterError(
-            f"least_squares is {settings!r}: expected a pt.identification.LeastSquares"
+            f"least_squares is {quoted(settings)}: expected a pt.identification.LeastSquares"
         )
     return solve_least_squares(data, info, settings, offset)
 
@@ -182,6 +183,6 @@ def _refuse(info: ModelInfo, given: Mapping[str, object], how: str) -> None:
     for name, value in given.items():
         if value is not None:
             raise ParameterError(
-                f"{name} is {value!r}: expected none with the model {info.name!r}, whose "
+                f"{name} is {quoted(value)}: expected none with the model {info.name!r}, whose "
                 f"parameters {how}"
             )

@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import _core
 from .._support.arguments import as_numbers
+from .._support.messages import quoted
 from ..errors import DataError, ParameterError
 from ..stages.registry import stage_class
 from .model_file import provenance
@@ -97,7 +98,7 @@ class LeastSquares:
             object.__setattr__(self, "creep", as_numbers("creep", self.creep))
         if self.dynamics not in (None, "first", "second"):
             raise ParameterError(
-                f"dynamics is {self.dynamics!r}: expected None, 'first' or 'second'"
+                f"dynamics is {quoted(self.dynamics)}: expected None, 'first' or 'second'"
             )
 
     def _thresholds(self, data: Dataset) -> Sequence[float]:

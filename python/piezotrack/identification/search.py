@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from .. import _core
+from .._support.messages import quoted
 from .._support.progress_bar import ProgressBar
 from ..data import diagnostics
 from ..errors import Interrupted, ParameterError
@@ -69,9 +70,11 @@ def search(
     """
     swarm = ParticleSwarm() if swarm is None else swarm
     if not isinstance(swarm, ParticleSwarm):
-        raise ParameterError(f"swarm is {swarm!r}: expected a ParticleSwarm, as pt.ParticleSwarm()")
+        raise ParameterError(
+            f"swarm is {quoted(swarm)}: expected a ParticleSwarm, as pt.ParticleSwarm()"
+        )
     if callback is not None and not callable(callback):
-        raise ParameterError(f"callback is {callback!r}: expected a function, or None")
+        raise ParameterError(f"callback is {quoted(callback)}: expected a function, or None")
     seed = 0 if seed is None else _core.as_count("seed", seed)
     searched_delay = _delay(False if delay is None else delay)
     held = _held(initial, fixed, free, bounds)
@@ -124,7 +127,7 @@ def _names(free: object) -> list[str] | None:
     if free is None:
         return None
     if isinstance(free, str) or not isinstance(free, Iterable):
-        raise ParameterError(f"free is {free!r}: expected names in a list, as ['mass']")
+        raise ParameterError(f"free is {quoted(free)}: expected names in a list, as ['mass']")
     return [str(name) for name in free]
 
 
@@ -146,7 +149,9 @@ def _items(argument: str, mapping: object) -> list[tuple[str, Any]]:
     if mapping is None:
         return []
     if not isinstance(mapping, Mapping):
-        raise ParameterError(f"{argument} is {mapping!r}: expected a mapping of names to values")
+        raise ParameterError(
+            f"{argument} is {quoted(mapping)}: expected a mapping of names to values"
+        )
     return [(str(name), value) for name, value in mapping.items()]
 
 
@@ -154,7 +159,7 @@ def _pair(name: str, pair: object) -> tuple[float, float]:
     """Check that bounds are two numbers."""
     two = list(pair) if isinstance(pair, Iterable) and not isinstance(pair, str) else []
     if len(two) != 2:
-        raise ParameterError(f"bounds of {name} are {pair!r}: expected (low, high)")
+        raise ParameterError(f"bounds of {name} are {quoted(pair)}: expected (low, high)")
     low, high = two
     return (
         _core.as_number(f"lower bound of {name}", low),

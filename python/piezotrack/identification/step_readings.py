@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from .. import _core
 from .._core import Conventional
+from .._support.messages import quoted
 from ..errors import ParameterError
 
 if TYPE_CHECKING:
@@ -75,7 +76,9 @@ class StepReadings:
         try:
             values = list(self.peaks)
         except TypeError:
-            raise ParameterError(f"peaks is {self.peaks!r}: expected several numbers") from None
+            raise ParameterError(
+                f"peaks is {quoted(self.peaks)}: expected several numbers"
+            ) from None
         peaks = tuple(_core.as_number(f"peaks[{k}]", value) for k, value in enumerate(values))
         object.__setattr__(self, "peaks", peaks)
         _ = self._core

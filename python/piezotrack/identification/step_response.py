@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from .. import _core
+from .._support.messages import quoted
 from ..data.dataset import Dataset
 from ..errors import ParameterError
 from ..stages.dahl import DahlStage
@@ -414,7 +415,7 @@ def _level(second: object) -> tuple[float, float]:
         return second.readings.voltage, second.readings.steady_state
     if not isinstance(second, (tuple, list)) or len(second) != 2:
         raise ParameterError(
-            f"second_level is {second!r}: expected (voltage in V, displacement in m) or the "
+            f"second_level is {quoted(second)}: expected (voltage in V, displacement in m) or the "
             "StepResult of another step"
         )
     voltage, displacement = second

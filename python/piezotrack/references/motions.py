@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from ..errors import ParameterError
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -37,6 +39,8 @@ __all__ = [
 
 # Grid points in the shortest period to bracket an extremum, and Newton steps to refine it.
 POINTS, NEWTON = 64, 5
+# Most shortest periods in a motion whose extrema are sought, times its cosines: some 10 s.
+MOST_PERIODS = 2_100_000
 
 
 def s_curve(u: Array) -> tuple[Array, Array, Array]:
@@ -238,7 +242,9 @@ class Spline:
         )
 
 
-def extremes(motion: Motion, duration: float, shortest: float) -> tuple[float, float]:
+def extremes(
+    motion: Motion, duration: float, shortest: float, *, cosines: int = 1
+) -> tuple[float, float]:
     """Find the lowest and the highest displacement of a motion [m].
 
     Parameters
@@ -249,18 +255,35 @@ def extremes(motion: Motion, duration: float, shortest: float) -> tuple[float, f
         Interval to search, from 0 on [s].
     shortest : float
         The shortest period in it [s].
+    cosines : int, optional
+        How many cosines are added for each point of the grid.
 
     Returns
     -------
     low, high : float
         Bracketed on a grid and refined by Newton's method [m].
 
+    Raises
+    ------
+    ParameterError
+        There are so many of the shortest periods that the search would take minutes or gigabytes.
+
     Examples
     --------
     >>> extremes(Cosines(1.0, (2.0,), (0.2,), (0.3,)), 5.0, 5.0)
     (-1.0, 3.0)
     """
-    step = shortest / POINTS
+    periods = duration / shortest
+    if not periods * cosines <= MOST_PERIODS:
+        raise ParameterError(
+            f"the motion has {periods:.3g} of its shortest periods, {shortest:g} s, in "
+            f"{duration:g} s: expected at most {MOST_PERIODS // cosines} to find its range"
+        )
+    with np.errstate(all="ignore"):
+        return _extremes(motion, duration, shortest / POINTS)
+
+
+def _extremes(motion: Motion, duration: float, step: float) -> tuple[float, float]:
     grid = np.linspace(0.0, duration, math.ceil(duration / step) + 1)
     x = motion(grid)[0]
     found = [float(x.min()), float(x.max())]

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .._support.messages import quoted
 from .._support.units import Unit, known_units, lookup
 from ..errors import ParameterError
 from .paths import circle, lissajous, raster, spiral
@@ -110,7 +111,10 @@ KINDS = {
 LISTS = ("levels", "frequencies", "sizes", "centre")
 MISSING = {"low": "range", "start_frequency": "frequencies"}
 
-_VALUE = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\W\d_]*)")
+# Written so that each letter has one meaning: the time is linear in the length of a text.
+_VALUE = re.compile(r"([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\W\d_]*)")
+# Longest text: more than the longest path of a file.
+MOST_LETTERS = 10_000
 
 
 def parse_reference(text: str, *, duration: float | None = None) -> Reference:
@@ -173,7 +177,11 @@ def made_from_text(
     """Parse a text, or read the file that it names."""
     examples = ", ".join(kind.example for kind in kinds.values())
     if not isinstance(text, str) or not text.strip():
-        raise ParameterError(f"{what} is {text!r}: expected a file or one of {examples}")
+        raise ParameterError(f"{what} is {quoted(text)}: expected a file or one of {examples}")
+    if len(text) > MOST_LETTERS:
+        raise ParameterError(
+            f"{what} {quoted(text)} has {len(text)} letters: expected {MOST_LETTERS} at most"
+        )
     name, colon, rest = (part.strip() for part in text.partition(":"))
     kind = kinds.get(name.lower())
     is_there = os.path.exists(text)
@@ -183,7 +191,7 @@ def made_from_text(
         if is_there or (is_path and Path(text).suffix):
             return read(text, duration=duration)
         raise ParameterError(
-            f"{what} {text!r} is neither a file nor a known kind: expected a file or one of "
+            f"{what} {quoted(text)} is neither a file nor a known kind: expected a file or one of "
             f"{examples}"
         )
     try:
@@ -197,7 +205,7 @@ def made_from_text(
             raise ParameterError(f"there is no {called}: {kind.expected}")
         return kind.make(**values)
     except ParameterError as error:
-        raise ParameterError(f"{what} {text!r}: {error}") from None
+        raise ParameterError(f"{what} {quoted(text)}: {error}") from None
 
 
 def _values(kind: Kind, text: str) -> dict[str, Any]:
@@ -208,19 +216,21 @@ def _values(kind: Kind, text: str) -> dict[str, Any]:
         numbers, quantity, join = _item(written)
         if equals and keyword not in kind.keywords:
             known = ", ".join(kind.keywords)
-            raise ParameterError(f"{keyword!r} is not one of {known}: {kind.expected}")
+            raise ParameterError(f"{quoted(keyword)} is not one of {known}: {kind.expected}")
         if equals and quantity != (wanted := kind.keywords[keyword]):
             units = UNITS[wanted]
-            raise ParameterError(f"{item!r} has the wrong unit: expected {wanted}, unit {units}")
+            raise ParameterError(
+                f"{quoted(item)} has the wrong unit: expected {wanted}, unit {units}"
+            )
         if equals and join != ("/" if keyword in LISTS else ""):
-            raise ParameterError(f"{item!r} cannot be understood: {kind.expected}")
+            raise ParameterError(f"{quoted(item)} cannot be understood: {kind.expected}")
         names = (keyword,) if equals else kind.items.get((quantity, join))
         if names is None:
             problem = "has no unit" if quantity == "number" else "has no place here"
-            raise ParameterError(f"{item!r} {problem}: {kind.expected}")
+            raise ParameterError(f"{quoted(item)} {problem}: {kind.expected}")
         for name, number in zip(names, [numbers] if names[0] in LISTS else numbers, strict=True):
             if name in values:
-                raise ParameterError(f"{item!r} gives {name} a second time: {kind.expected}")
+                raise ParameterError(f"{quoted(item)} gives {name} a second time: {kind.expected}")
             values[name] = number
     return values
 
@@ -228,20 +238,24 @@ def _values(kind: Kind, text: str) -> dict[str, Any]:
 def _item(text: str) -> tuple[list[float], str, str]:
     """Parse one value or several: the numbers in SI, their quantity and their separator."""
     if "..." in text:
-        raise ParameterError(f"{text!r} has three dots: expected two, as in 0..110um")
+        raise ParameterError(f"{quoted(text)} has three dots: expected two, as in 0..110um")
     join = next((mark for mark in ("..", "/") if mark in text), "")
     found = []
     for part in text.split(join) if join else [text]:
         match = _VALUE.fullmatch(part.strip())
         if match is None:
-            raise ParameterError(f"{part.strip()!r} in {text!r} is not a number with its unit")
+            raise ParameterError(
+                f"{quoted(part.strip())} in {quoted(text)} is not a number with its unit"
+            )
         found.append((float(match[1]), match[2]))
     if join == ".." and len(found) != 2:
-        raise ParameterError(f"{text!r} has {len(found)} values: expected two, as in 0..110um")
+        raise ParameterError(
+            f"{quoted(text)} has {len(found)} values: expected two, as in 0..110um"
+        )
     # The last unit counts for the values before it that have none.
     units = [_unit(name or found[-1][1]) for _, name in found]
     if len({unit.quantity for unit in units}) > 1:
-        raise ParameterError(f"{text!r} mixes {units[0].name} and {units[-1].name}")
+        raise ParameterError(f"{quoted(text)} mixes {units[0].name} and {units[-1].name}")
     numbers = [
         number * unit.factor / unit.divisor for (number, _), unit in zip(found, units, strict=True)
     ]
@@ -254,7 +268,7 @@ def _unit(name: str) -> Unit:
     unit = PLAIN if not name else OTHER_UNITS.get(name) or lookup(name)
     if unit is None:
         known = ", ".join(UNITS[quantity] for quantity in ("frequency", "displacement", "time"))
-        raise ParameterError(f"unknown unit {name!r}: expected one of {known}")
+        raise ParameterError(f"unknown unit {quoted(name)}: expected one of {known}")
     return unit
 
 
@@ -351,7 +365,7 @@ def parse_path(text: str, *, duration: float | None = None) -> XYReference:
     """
     if duration is not None and str(text).strip().lower().startswith("spiral:"):
         raise ParameterError(
-            f"duration is {duration:g} s: expected none, as radius, pitch and frequency of a "
+            f"duration is {quoted(duration)}: expected none, as radius, pitch and frequency of a "
             "spiral are its length"
         )
     path: XYReference = made_from_text("path", text, PATHS, read_path, duration)

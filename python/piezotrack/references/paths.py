@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import _core
 from .._support.arguments import check_length, check_reach, finite, in_range, positive
+from .._support.messages import quoted
 from ..errors import ParameterError
 from .motions import Cosines, common_period, extremes, s_curve
 from .reference import Reference
@@ -389,7 +390,9 @@ def _pair(name: str, values: Sequence[float]) -> tuple[float, float]:
     try:
         first, second = values
     except (TypeError, ValueError):
-        raise ParameterError(f"{name} is {values!r}: expected two numbers, for x and y") from None
+        raise ParameterError(
+            f"{name} is {quoted(values)}: expected two numbers, for x and y"
+        ) from None
     return finite(f"{name}[0]", first, "SI units"), finite(f"{name}[1]", second, "SI units")
 
 

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._support.arguments import check_reach, finite, in_range, not_negative, plain, positive
-from .._support.arrays import check_dt, signal_of
+from .._support.arrays import check_dt, real_array, signal_of
+from .._support.messages import quoted
 from .._support.units import best_length_unit
-from ..errors import DataError, ParameterError
+from ..errors import DataError, ParameterError, ShapeError
 from .motions import Spline, blended, extremes
 
 if TYPE_CHECKING:
@@ -166,7 +167,8 @@ class Reference:
         Raises
         ------
         ParameterError
-            A time is outside of the reference.
+            A time is outside of the reference, or `motion` returns something else than three
+            arrays of finite numbers there.
 
         Examples
         --------
@@ -178,9 +180,9 @@ class Reference:
         -86.9 um/s^2
         """
         try:
-            times = np.asarray(t, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise ParameterError(f"t is {t!r}: expected times in s") from None
+            times = real_array("t", t)
+        except (DataError, ShapeError):
+            raise ParameterError(f"t is {quoted(t)}: expected times in s") from None
         slack = 1e-12 * self.duration
         outside = ~((times >= -slack) & (times <= self.duration + slack))
         if outside.any():
@@ -189,8 +191,36 @@ class Reference:
                 f"from 0 to {self.duration:.10g} s"
             )
         inside = np.clip(np.atleast_1d(times), 0.0, self.duration)
-        x, v, a = blended(self.motion, inside, self.ramp, self.origin)
+        x, v, a = self._finite(inside, self.ramp)
         return x.reshape(times.shape), v.reshape(times.shape), a.reshape(times.shape)
+
+    def _finite(self, t: Array, ramp: float) -> tuple[Array, Array, Array]:
+        """Evaluate the motion with a start of this length, and refuse what is not finite."""
+        # What overflows is found below.
+        with np.errstate(all="ignore"):
+            x, v, a = blended(self._motion_at, t, ramp, self.origin)
+        good = np.isfinite(x) & np.isfinite(v) & np.isfinite(a)
+        if not good.all():
+            k = int(np.argmin(good))
+            raise ParameterError(
+                f"motion of {self.name} is {x.flat[k]:g} m, {v.flat[k]:g} m/s, {a.flat[k]:g} "
+                f"m/s^2 at {t.flat[k]:.10g} s: expected finite numbers"
+            )
+        return x, v, a
+
+    def _motion_at(self, t: Array) -> tuple[Array, Array, Array]:
+        """Evaluate `motion`, which may be a function of the caller's."""
+        parts = self.motion(t)
+        try:
+            x, v, a = (np.asarray(part, dtype=np.float64) for part in parts)
+        except (TypeError, ValueError, OverflowError):
+            x = v = a = np.zeros(0)
+        if not (x.shape == v.shape == a.shape == t.shape):
+            raise ParameterError(
+                f"motion of {self.name} returns {quoted(parts)} for times of the shape {t.shape}: "
+                "expected displacement, velocity and acceleration, each of that shape"
+            )
+        return x, v, a
 
     def sample(self, dt: float) -> SampledReference:
         """Return the motion at even sampling instants, those with 0 <= t < `duration`.

@@ -349,7 +349,8 @@ def multisine(
     Raises
     ------
     ParameterError
-        A number is not finite or out of its range, or the range is given twice or not at all.
+        A number is not finite or out of its range, or the range is given twice or not at all, or
+        a period holds too many oscillations to find the range.
     ShapeError
         There are not as many amplitudes as frequencies.
 
@@ -389,7 +390,7 @@ def multisine(
         phases = random.uniform(0.0, math.tau, sizes.size)
     period = common_period(tuple(lines.tolist()))
     motion = Cosines(0.0, *(tuple(values.tolist()) for values in (sizes, lines, phases)))
-    bottom, top = extremes(motion, min(duration, period), 1.0 / lines[-1])
+    bottom, top = extremes(motion, min(duration, period), 1.0 / lines[-1], cosines=lines.size)
     if is_fitted:
         low, high = bounds(low, high)
         scale = (high - low) / (top - bottom)

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
+from .._support.arrays import real_array
+from .._support.messages import quoted
 from .._support.units import best_length_unit
-from ..errors import ParameterError
+from ..errors import DataError, ParameterError, ShapeError
 from .reference import Reference, read_reference
 
 if TYPE_CHECKING:
@@ -109,10 +111,10 @@ class XYReference:
         """Points of the path, without its smooth start [m]: chords are within 0.1 nm of it."""
         length = min(self.duration, self.period or math.inf)
         t = np.linspace(0.0, length, COARSE)
-        bend = max(float(np.hypot(self.x.motion(t)[2], self.y.motion(t)[2]).max()), 1e-30)
+        bend = max(float(np.hypot(*(axis._finite(t, 0.0)[2] for axis in self.axes)).max()), 1e-30)
         count = length / math.sqrt(8.0 * SAGITTA / bend)
         t = np.linspace(0.0, length, int(min(max(count, COARSE), FINEST)) + 1)
-        return self.x.motion(t)[0], self.y.motion(t)[0]
+        return self.x._finite(t, 0.0)[0], self.y._finite(t, 0.0)[0]
 
     def errors(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Contour error: signed distance of points from the path.
@@ -202,11 +204,11 @@ def _mixed(row: Array, x: Motion, y: Motion) -> Motion:
 def square_matrix(name: str, matrix: ArrayLike) -> Array:
     """Return a finite matrix of two rows and columns, or raise ParameterError."""
     try:
-        rows = np.array(matrix, dtype=np.float64)
-    except (TypeError, ValueError):
+        rows = np.array(real_array(name, matrix))
+    except (DataError, ShapeError):
         rows = np.zeros(0)
     if rows.shape != (2, 2) or not np.isfinite(rows).all():
-        raise ParameterError(f"{name} is {matrix!r}: expected 2 by 2 finite numbers")
+        raise ParameterError(f"{name} is {quoted(matrix)}: expected 2 by 2 finite numbers")
     return rows
 
 

@@ -330,6 +330,8 @@ class Stage:
             of a stage with another number of plays or relaxations.
         NumericalError
             The motion does not stay finite, or the accuracy is out of reach.
+        MemoryError
+            There is no room for the motion.
 
         Examples
         --------

@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import _core
 from .._support.arguments import finite, not_negative, positive
+from .._support.messages import quoted
 from ..errors import ParameterError
 from ..references.motions import Spline
 from ..references.reference import Reference
@@ -108,7 +109,9 @@ class Inverse:
         finite("offset", self.offset, "m")
         not_negative("delay", self.delay, "s")
         if self.playback not in ("table", "online"):
-            raise ParameterError(f"playback is {self.playback!r}: expected 'table' or 'online'")
+            raise ParameterError(
+                f"playback is {quoted(self.playback)}: expected 'table' or 'online'"
+            )
         if not 1 <= _core.as_count("settle", self.settle) <= 1000:
             raise ParameterError(f"settle is {self.settle}: expected 1 period or more, up to 1000")
         # The core refuses a stage without an inverse, and a state of another model.

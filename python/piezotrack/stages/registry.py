@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from importlib import import_module
 
+from .._support.messages import quoted
 from ..errors import ParameterError
 from .base import LISTED, REGISTERED, ModelInfo, Stage
 
@@ -35,7 +36,7 @@ def model_named(name: object) -> ModelInfo:
         if model.name == name:
             return model
     expected = " or ".join(repr(model.name) for model in MODELS)
-    raise ParameterError(f"model is {name!r}: expected {expected}")
+    raise ParameterError(f"model is {quoted(name)}: expected {expected}")
 
 
 def stage_class(model: ModelInfo) -> type[Stage]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import _core
 from .._core import XYStage as CoreStage
+from .._support.messages import quoted
 from ..data.dataset import Dataset
 from ..errors import ParameterError
 from ..references.xy_reference import square_matrix
@@ -210,7 +211,12 @@ class XYStage:
 
 def _shares(cross_talk: Sequence[float] | ArrayLike) -> tuple[float, float]:
     """Take two numbers, or the sides of a matrix with 1 on its diagonal."""
-    if np.ndim(cross_talk) == 2:
+    try:
+        dimensions = np.ndim(cross_talk)
+    except ValueError:
+        # Rows of different lengths.
+        dimensions = 0
+    if dimensions == 2:
         rows = square_matrix("cross_talk", cross_talk)
         if (np.diag(rows) != 1.0).any():
             raise ParameterError(
@@ -218,10 +224,10 @@ def _shares(cross_talk: Sequence[float] | ArrayLike) -> tuple[float, float]:
                 "the gains are the stages' own"
             )
         return float(rows[0, 1]), float(rows[1, 0])
-    listed = list(cross_talk) if np.ndim(cross_talk) == 1 else []  # type: ignore[arg-type]
+    listed = list(cross_talk) if dimensions == 1 else []  # type: ignore[arg-type]
     if len(listed) != 2:
         raise ParameterError(
-            f"cross_talk is {cross_talk!r}: expected two numbers, or a matrix of 2 by 2"
+            f"cross_talk is {quoted(cross_talk)}: expected two numbers, or a matrix of 2 by 2"
         )
     xy, yx = (_core.as_number(f"cross_talk[{i}]", one) for i, one in enumerate(listed))
     return xy, yx

@@ -32,6 +32,14 @@ pub enum Error {
     /// Valid input, but no usable result.
     #[error("{0}")]
     Numerical(String),
+    /// Memory that cannot be had.
+    #[error("{what}: {} MB of memory are not to be had", bytes.div_ceil(1_000_000))]
+    Memory {
+        /// What it was to hold.
+        what: String,
+        /// Its size.
+        bytes: usize,
+    },
 }
 
 impl Error {

@@ -4,7 +4,8 @@ use piezotrack_control::{
     Command, Controller, ControllerState, Filter, Limits, Pid, Repetitive, Smoothing, Snapshot,
     Span, StateSpace,
 };
-use piezotrack_core::simulate::{Law, LawState};
+use piezotrack_core::math::zeros;
+use piezotrack_core::simulate::{DELAY_LINE, Law, LawState};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
@@ -80,7 +81,7 @@ impl PyController {
 
     /// A session of its own, going on from the voltage `present` where that is given.
     fn start(&self, present: Option<f64>) -> PyResult<PySession> {
-        let line = vec![0.0; self.line_length()];
+        let line = zeros(DELAY_LINE, self.line_length()).map_err(|error| raise(&error))?;
         let state = match present {
             Some(volts) => self.controller.start(volts, line),
             None => self.controller.rest(line),

@@ -47,11 +47,20 @@ impl Halt {
     }
 
     fn look_at_signals(&self) {
-        Python::attach(|py| {
+        self.with_python(|py| {
             if let Err(error) = py.check_signals() {
                 self.stop(py, error);
             }
         });
+    }
+
+    /// Calls Python, or stops the job where there is none any more: the interpreter ends without
+    /// waiting for a daemon thread, and to attach one to it then is a segmentation fault. The end
+    /// of `detach` is safe: there `pyo3` lets such a thread sleep until the process is gone.
+    fn with_python(&self, call: impl FnOnce(Python<'_>)) {
+        if Python::try_attach(call).is_none() {
+            self.stopped.store(true, Ordering::Relaxed);
+        }
     }
 
     fn stopped(&self) -> bool {
@@ -167,7 +176,7 @@ fn tell(watchers: &Watchers, halt: &Halt, progress: &Progress, answers: &Sender<
         progress.cost,
         progress.theta.0.to_vec(),
     );
-    Python::attach(|py| {
+    halt.with_python(|py| {
         if let Some(bar) = &watchers.progress
             && let Err(error) = bar.call1(py, report.clone())
         {

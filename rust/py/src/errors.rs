@@ -2,6 +2,7 @@
 
 use piezotrack_core::Error;
 use pyo3::PyErr;
+use pyo3::exceptions::PyMemoryError;
 
 mod classes {
     pyo3::import_exception!(piezotrack.errors, ParameterError);
@@ -18,6 +19,7 @@ pub fn raise(error: &Error) -> PyErr {
         Error::Shape { .. } => classes::ShapeError::new_err(message),
         Error::Data(_) => classes::DataError::new_err(message),
         Error::Numerical(_) => classes::NumericalError::new_err(message),
+        Error::Memory { .. } => PyMemoryError::new_err(message),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Identification of a stage whose parameters a swarm searches.
 
-use numpy::{PyArray1, ToPyArray};
+use numpy::PyArray1;
 use piezotrack_core::identify::{
     Coordinate, DELAY, Delay, Identification, Outcome, Plan, Record, Spec, StopReason,
     identify as identified,
@@ -9,7 +9,7 @@ use piezotrack_core::integrator::Order;
 use piezotrack_core::models::Model;
 use pyo3::prelude::*;
 
-use crate::arrays::samples;
+use crate::arrays::{array, samples};
 use crate::enter::{Watchers, enter_pool};
 use crate::errors::raise;
 use crate::stage::hold;
@@ -108,8 +108,8 @@ impl PySearch {
     }
 
     #[getter]
-    fn history<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.outcome.history.to_pyarray(py)
+    fn history<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        array(py, self.outcome.history.iter().copied())
     }
 
     #[getter]

@@ -1,13 +1,14 @@
 //! The inverse of a stage, for feedforward.
 
-use numpy::{PyArray1, ToPyArray};
+use numpy::PyArray1;
 use piezotrack_control::inverse::Inverse;
 use piezotrack_control::{OnlineFeedforward, OnlineFeedforwardState, ReferenceSample};
+use piezotrack_core::math::room;
 use piezotrack_core::models::{StageInverse, StageInverseState};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
-use crate::arrays::samples;
+use crate::arrays::{array, samples};
 use crate::control::{load, saved};
 use crate::errors::raise;
 
@@ -54,7 +55,7 @@ impl PyInverse {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let (x, v, a) = (samples("x", x)?, samples("v", v)?, samples("a", a)?);
         let drive = along(self.online.inverse(), self.start, &x, &v, &a);
-        drive.map(|drive| drive.to_pyarray(py)).map_err(|error| raise(&error))
+        array(py, drive.map_err(|error| raise(&error))?.iter().copied())
     }
 
     /// The state as numbers, for `load` of the same inverse.
@@ -78,7 +79,7 @@ fn along(
     v: &[f64],
     a: &[f64],
 ) -> Result<Vec<f64>> {
-    let mut drive = Vec::with_capacity(x.len());
+    let mut drive = room("the drive along the reference", x.len())?;
     for (k, ((&x, &v), &a)) in x.iter().zip(v).zip(a).enumerate() {
         let value = inverse.step(&mut state, x, v, a);
         if !value.is_finite() {

@@ -1,14 +1,15 @@
 //! Stages of every model: their simulation, their inverse and their loop.
 
-use numpy::{PyArray1, ToPyArray};
+use numpy::PyArray1;
 use piezotrack_control::OnlineFeedforward;
+use piezotrack_core::error::finite;
 use piezotrack_core::models::{Experiment, Method, Model, Response, Stage, Values};
 use piezotrack_core::signal::{self, Drive, Hold};
 use piezotrack_core::simulate::Axis;
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
-use crate::arrays::samples;
+use crate::arrays::{array, samples};
 use crate::control::PyController;
 use crate::design::PyLoopPlant;
 use crate::enter::enter;
@@ -49,7 +50,14 @@ pub struct PyStage(pub Stage);
 
 impl PyStage {
     fn state(&self, given: Option<Named>) -> Result<Option<Values>> {
-        given.map(|given| Values::named(self.0.model().info().state, given)).transpose()
+        let Some(given) = given else { return Ok(None) };
+        let values = Values::named(self.0.model().info().state, given)?;
+        for (name, numbers) in values.iter() {
+            for &number in numbers {
+                finite(&format!("{name} of initial"), number, "")?;
+            }
+        }
+        Ok(Some(values))
     }
 
     /// The stage as a plant, in steps of at most `step` seconds.
@@ -137,18 +145,18 @@ struct PyResponse(Response);
 #[pymethods]
 impl PyResponse {
     #[getter]
-    fn x<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.0.x.to_pyarray(py)
+    fn x<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        array(py, self.0.x.iter().copied())
     }
 
     #[getter]
-    fn v<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.0.v.to_pyarray(py)
+    fn v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        array(py, self.0.v.iter().copied())
     }
 
     #[getter]
-    fn hysteresis<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.0.hysteresis.to_pyarray(py)
+    fn hysteresis<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        array(py, self.0.hysteresis.iter().copied())
     }
 
     /// State at the last sample.
@@ -183,5 +191,6 @@ fn delayed<'py>(
     delay: f64,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let (x, v) = (samples("x", x)?, samples("v", v)?);
-    Ok(signal::delayed(&x, &v, dt, delay).to_pyarray(py))
+    let delayed = signal::delayed(&x, &v, dt, delay).map_err(|error| raise(&error))?;
+    array(py, delayed.iter().copied())
 }

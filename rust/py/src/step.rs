@@ -1,11 +1,11 @@
 //! Step responses, and turning points of a signal.
 
-use numpy::{PyArray1, ToPyArray};
+use numpy::PyArray1;
 use piezotrack_core::identify::{self, Conventional, StepReadings, StepResponse};
 use piezotrack_core::signal;
 use pyo3::prelude::*;
 
-use crate::arrays::samples;
+use crate::arrays::{array, samples};
 use crate::errors::raise;
 use crate::stage::hold;
 
@@ -126,8 +126,9 @@ impl PyStepResponse {
     }
 
     /// Frequencies and gains.
-    fn spectrum<'py>(&self, py: Python<'py>) -> [Bound<'py, PyArray1<f64>>; 2] {
-        [self.0.spectrum.0.to_pyarray(py), self.0.spectrum.1.to_pyarray(py)]
+    fn spectrum<'py>(&self, py: Python<'py>) -> PyResult<[Bound<'py, PyArray1<f64>>; 2]> {
+        let (frequency, gain) = &self.0.spectrum;
+        Ok([array(py, frequency.iter().copied())?, array(py, gain.iter().copied())?])
     }
 }
 

@@ -1,13 +1,14 @@
 //! Closed-loop simulation of a controller on a stage, and its metrics.
 
-use numpy::{PyArray1, ToPyArray};
+use numpy::PyArray1;
+use piezotrack_core::math::room;
 use piezotrack_core::signal::Stop;
 use piezotrack_core::signal::metrics::{self, Tracking};
 use piezotrack_core::simulate::{Axis, ReferenceSamples, Timing, TrackingRun, track};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
-use crate::arrays::samples;
+use crate::arrays::{array, samples};
 use crate::control::PyController;
 use crate::errors::{raise, shape};
 
@@ -64,7 +65,7 @@ impl Arrays {
         let timing = timing(controller, self.reference.len(), sampling);
         let (apparatus, input) = (axis.apparatus(), self.input());
         let run = track(&apparatus, axis.start(), &timing, &controller.controller, input, stop)?;
-        Ok(PyTrackingRun::new(stopped(run)?))
+        PyTrackingRun::new(stopped(run)?)
     }
 }
 
@@ -79,25 +80,28 @@ pub struct PyTrackingRun {
 }
 
 impl PyTrackingRun {
-    pub fn new<S>(run: TrackingRun<S>) -> Self {
+    pub fn new<S>(run: TrackingRun<S>) -> Result<Self> {
         let TrackingRun { motion, commands } = run;
         let substeps = (motion.time.len() - 1) / (commands.len() - 1).max(1);
-        let measured = motion.measured.iter().step_by(substeps.max(1)).copied().collect();
-        Self { motion: [motion.time, motion.displacement, motion.applied], commands, measured }
+        let mut measured = room("the readings", commands.len())?;
+        measured.extend(motion.measured.iter().step_by(substeps.max(1)));
+        Ok(Self { motion: [motion.time, motion.displacement, motion.applied], commands, measured })
     }
 }
 
 #[pymethods]
 impl PyTrackingRun {
     /// Time, true displacement, applied voltage at the instants kept.
-    fn motion<'py>(&self, py: Python<'py>) -> [Bound<'py, PyArray1<f64>>; 3] {
-        [0, 1, 2].map(|i| self.motion[i].to_pyarray(py))
+    fn motion<'py>(&self, py: Python<'py>) -> PyResult<[Bound<'py, PyArray1<f64>>; 3]> {
+        let [time, displacement, applied] = &self.motion;
+        let array = |part: &Vec<f64>| array(py, part.iter().copied());
+        Ok([array(time)?, array(displacement)?, array(applied)?])
     }
 
     /// Reading of the sensor at the control samples.
     #[getter]
-    fn measured<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.measured.to_pyarray(py)
+    fn measured<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        array(py, self.measured.iter().copied())
     }
 
     /// A part of the commands by its name.
@@ -114,13 +118,13 @@ impl PyTrackingRun {
                 return Err(raise(&error));
             }
         };
-        Ok(PyArray1::from_iter(py, self.commands.iter().map(pick)))
+        array(py, self.commands.iter().map(pick))
     }
 
     /// Whether each command was clipped.
     #[getter]
-    fn saturated<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
-        PyArray1::from_iter(py, self.commands.iter().map(|command| command.saturated))
+    fn saturated<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        array(py, self.commands.iter().map(|command| command.saturated))
     }
 }
 

@@ -1,15 +1,15 @@
 //! The virtual stage: its settings, its simulation, a controller on it.
 
-use numpy::{PyArray1, ToPyArray};
+use numpy::PyArray1;
 use piezotrack_core::models::Creep;
 use piezotrack_core::signal::Drive;
 use piezotrack_core::simulate::{
-    Amplifier, Axis, RELAXATIONS, Sensor, StagePlay, VirtualSettings, VirtualStage,
+    Amplifier, Axis, OpenLoop, RELAXATIONS, Sensor, StagePlay, VirtualSettings, VirtualStage,
 };
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
-use crate::arrays::samples;
+use crate::arrays::{array, samples};
 use crate::control::PyController;
 use crate::enter::enter;
 use crate::errors::raise;
@@ -166,6 +166,15 @@ impl Settings {
 pub type OpenLoopArrays<'py> =
     (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
+/// The records of a driven stage.
+pub fn open_loop_arrays<'py, S>(
+    py: Python<'py>,
+    run: &OpenLoop<S>,
+) -> PyResult<OpenLoopArrays<'py>> {
+    let array = |part: &Vec<f64>| array(py, part.iter().copied());
+    Ok((array(&run.displacement)?, array(&run.measured)?, array(&run.applied)?))
+}
+
 /// A stage to experiment on.
 #[pyclass(name = "VirtualStage", frozen, module = "piezotrack._core")]
 pub struct PyVirtualStage(pub VirtualStage);
@@ -206,11 +215,7 @@ impl PyVirtualStage {
             let drive = Drive::new(&u, dt, hold(hold_name)?)?;
             stopped(self.0.simulate(&drive, stop)?)
         })?;
-        Ok((
-            run.displacement.to_pyarray(py),
-            run.measured.to_pyarray(py),
-            run.applied.to_pyarray(py),
-        ))
+        open_loop_arrays(py, &run)
     }
 
     /// Simulates closed-loop tracking of a reference.

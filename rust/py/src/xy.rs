@@ -1,23 +1,21 @@
 //! Two axes: an XY stage, contour errors, cross-talk; and a sensor's noise at rest.
 
-use numpy::{PyArray1, ToPyArray};
+use numpy::PyArray1;
 use piezotrack_core::Error;
 use piezotrack_core::identify::{cross_talk, noise_at_rest};
 use piezotrack_core::signal::Drive;
 use piezotrack_core::signal::contour_error::{Polyline, radial_errors};
 use piezotrack_core::signal::metrics::Spread;
-use piezotrack_core::simulate::{
-    Axis, AxisState, OpenLoop, TwoAxes, TwoStates, open_loops, track_both,
-};
+use piezotrack_core::simulate::{Axis, AxisState, TwoAxes, TwoStates, open_loops, track_both};
 use pyo3::prelude::*;
 
-use crate::arrays::samples;
+use crate::arrays::{array, samples};
 use crate::control::PyController;
 use crate::enter::enter;
 use crate::errors::raise;
 use crate::stage::{PyStage, hold};
 use crate::tracking::{Arrays, PyTrackingRun, Sampling, stopped, timing};
-use crate::virtual_stage::{OpenLoopArrays, PyVirtualStage};
+use crate::virtual_stage::{OpenLoopArrays, PyVirtualStage, open_loop_arrays};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyXyStage>()?;
@@ -88,14 +86,7 @@ impl PyXyStage {
             let (axes, start) = self.both();
             stopped(open_loops(&axes, start, drives, stop)?)
         })?;
-        let arrays = |run: OpenLoop<AxisState>| {
-            (
-                run.displacement.to_pyarray(py),
-                run.measured.to_pyarray(py),
-                run.applied.to_pyarray(py),
-            )
-        };
-        Ok([arrays(x), arrays(y)])
+        Ok([open_loop_arrays(py, &x)?, open_loop_arrays(py, &y)?])
     }
 
     /// Simulates the closed loops of two controllers of one interval along their references.
@@ -119,7 +110,7 @@ impl PyXyStage {
             let inputs = [inputs[0].input(), inputs[1].input()];
             let controllers = (&x.controller, &y.controller);
             let (x, y) = stopped(track_both(&axes, start, &timing, controllers, inputs, stop)?)?;
-            Ok((PyTrackingRun::new(x), PyTrackingRun::new(y)))
+            Ok((PyTrackingRun::new(x)?, PyTrackingRun::new(y)?))
         })
     }
 }
@@ -135,7 +126,7 @@ fn circle_errors<'py>(
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let (x, y) = (samples("x", x)?, samples("y", y)?);
     let errors = radial_errors(&x, &y, centre, radius).map_err(|error| raise(&error))?;
-    Ok(errors.to_pyarray(py))
+    array(py, errors.iter().copied())
 }
 
 /// Signed distance of points from a path.
@@ -150,7 +141,7 @@ fn path_errors<'py>(
     let (x, y) = (samples("x", x)?, samples("y", y)?);
     let (path_x, path_y) = (samples("path_x", path_x)?, samples("path_y", path_y)?);
     let errors = enter(py, |_| Polyline::new(&path_x, &path_y)?.signed_distances(&x, &y))?;
-    Ok(errors.to_pyarray(py))
+    array(py, errors.iter().copied())
 }
 
 /// Largest, RMS, mean, standard deviation, peak to peak.

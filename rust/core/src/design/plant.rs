@@ -4,7 +4,7 @@ use core::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::error::{Error, Result, finite, not_negative, positive};
+use crate::error::{Error, Result, finite, not_negative, positive, shown};
 use crate::integrator::{Mechanics, halvings};
 use crate::math::Ratio;
 
@@ -154,7 +154,7 @@ impl LoopPlant {
         if samples > DELAY {
             return Err(Error::parameter(
                 "delay",
-                format!("{} s", self.delay),
+                format!("{} s", shown(self.delay)),
                 "1000 samples or less",
             ));
         }

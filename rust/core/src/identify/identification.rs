@@ -7,7 +7,8 @@ use super::record::Record;
 use super::search::{Monitor, Outcome, Plan, StopReason, search};
 use crate::error::Result;
 use crate::integrator::Stepping;
-use crate::signal::Stop;
+use crate::math::available;
+use crate::signal::{FractionalDelay, Stop};
 
 /// An identified stage and how it was found.
 #[derive(Clone, Debug)]
@@ -29,7 +30,8 @@ pub struct Identification {
 ///
 /// # Errors
 /// [`crate::Error::Parameter`] for a specification or setting that cannot be used,
-/// [`crate::Error::Numerical`] where no candidate could be simulated.
+/// [`crate::Error::Numerical`] where no candidate could be simulated, [`crate::Error::Memory`] where
+/// there is no room for its threads.
 pub fn identify(
     record: &Record<'_>,
     spec: &Spec,
@@ -39,6 +41,7 @@ pub fn identify(
 ) -> Result<Identification> {
     plan.validate()?;
     let problem = Problem::new(record, spec)?;
+    enough_memory(record, &problem)?;
     let evaluator = Evaluator::new(record, &problem, stop);
     let mut runs = search(&evaluator, &problem, plan, monitor, stop)?;
     let ended = runs.iter().all(|run| run.reason != StopReason::Interrupted);
@@ -66,4 +69,18 @@ pub fn identify(
     }
     let stepping = evaluator.stepping;
     Ok(Identification { problem, stepping, runs, best, sensitivities })
+}
+
+/// Bytes of a thread for each sample: five motions' columns in the refinement.
+const COLUMNS: usize = 5 * size_of::<f64>();
+
+/// Bytes of a thread for each sample of the delay: displacement and velocity in eight lanes.
+const RING: usize = 16 * size_of::<f64>();
+
+/// Asks for the memory of the threads before they start, who could only fail silently.
+fn enough_memory(record: &Record<'_>, problem: &Problem) -> Result<()> {
+    let threads = rayon::current_num_threads();
+    let samples = record.drive.u.len();
+    let delay = FractionalDelay::new(problem.longest_delay(), record.drive.dt).whole.min(samples);
+    available("the search", COLUMNS * samples + RING * delay, threads)
 }

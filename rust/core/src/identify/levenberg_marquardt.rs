@@ -165,7 +165,7 @@ impl LocalRefinement<'_> {
     fn displacement(&self, place: &[f64], stride: usize) -> Option<Vec<f64>> {
         let theta = self.problem.theta(place);
         let [x, v] = self.evaluator.motion(&theta, self.stop)?;
-        let x = delayed(&x, &v, self.record.drive.dt, theta.delay());
+        let x = delayed(&x, &v, self.record.drive.dt, theta.delay()).ok()?;
         Some(x[self.record.window.clone()].iter().step_by(stride).copied().collect())
     }
 

@@ -206,6 +206,13 @@ impl Problem {
         self.coordinates[DELAY] != Coordinate::Fixed(0.0)
     }
 
+    /// The longest delay of any candidate, s.
+    #[must_use]
+    pub fn longest_delay(&self) -> f64 {
+        let coordinate = self.coordinates[DELAY];
+        [0.0, 1.0].map(|place| coordinate.value(place)).into_iter().fold(0.0, f64::max)
+    }
+
     /// Refuses bounds that reach where no stage exists.
     fn check_corners(&self) -> Result<()> {
         let count = self.free().count();

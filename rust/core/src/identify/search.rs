@@ -7,6 +7,7 @@ use super::problem::Problem;
 use super::residual_sums::Costs;
 use super::swarm::{Swarm, SwarmSettings};
 use crate::error::{Error, Result};
+use crate::math::available;
 use crate::signal::Stop;
 use std::ops::ControlFlow;
 
@@ -93,12 +94,27 @@ impl Plan {
             let expected = format!("1 or more, {MOST_RUNS} at most");
             return Err(Error::parameter("runs", self.runs, expected));
         }
-        Ok(())
+        let particles = self.runs * self.settings.particles;
+        if particles > MOST_PARTICLES {
+            let each = self.settings.particles;
+            let expected = format!(
+                "{} at most with {each} particles in each: {MOST_PARTICLES} together",
+                (MOST_PARTICLES / each).max(1)
+            );
+            return Err(Error::parameter("runs", self.runs, expected));
+        }
+        available("the particles of the search", particles, PARTICLE)
     }
 }
 
 /// Most swarms of a search.
 const MOST_RUNS: usize = 10_000;
+
+/// Most particles of all swarms together.
+const MOST_PARTICLES: usize = 1_000_000;
+
+/// Bytes that a particle takes at most, with what is asked about it.
+const PARTICLE: usize = 2000;
 
 /// One swarm of a search.
 struct Run {

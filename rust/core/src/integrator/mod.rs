@@ -21,4 +21,5 @@ pub use stepping_loop::{FEW_TERMS, Observer, Order, Stepping, SteppingLoop, TERM
 pub use traits::{Coupling, FeedbackState, Kernel, MOST_PARAMETERS, Memory, Parameters};
 
 pub(crate) use accuracy::{MOST_SUBSTEPS, first_substeps, out_of_reach};
+pub(crate) use simulate::columns;
 pub(crate) use traits::linear;

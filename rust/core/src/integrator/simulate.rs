@@ -7,7 +7,7 @@ use super::propagator::{Mechanics, halvings};
 use super::stepping_loop::{Observer, SteppingLoop};
 use super::traits::{FeedbackState, Kernel, Memory, Parameters};
 use crate::error::{Error, Result, positive};
-use crate::math::dispatch_fused;
+use crate::math::{dispatch_fused, room};
 use crate::signal::{Drive, Stop, all_finite, index, largest_difference};
 
 /// Accuracy, as a share of the displacement, that rounding limits.
@@ -83,7 +83,8 @@ impl<K: Kernel> LumpedStage<K> {
         if substeps == 0 {
             return Err(Error::parameter("substeps", 0, "1 or more"));
         }
-        let run = Run { of: *self, drive, start, substeps, stop };
+        let columns = columns(drive.u.len())?;
+        let run = Run { of: *self, drive, start, substeps, columns, stop };
         let Some(motion) = dispatch_fused(run) else { return Ok(None) };
         all_finite(&motion.x, drive.dt)?;
         Ok(Some(motion))
@@ -148,12 +149,22 @@ impl<K: Kernel> LumpedStage<K> {
     }
 }
 
+/// Room for the displacement, the velocity and the hysteresis force at so many samples.
+///
+/// # Errors
+/// [`Error::Memory`] where there is none.
+pub(crate) fn columns(samples: usize) -> Result<[Vec<f64>; 3]> {
+    let what = "the simulated motion";
+    Ok([room(what, samples)?, room(what, samples)?, room(what, samples)?])
+}
+
 /// One simulation.
 struct Run<'a, K: Kernel> {
     of: LumpedStage<K>,
     drive: &'a Drive<'a>,
     start: Instant<Memory<K, f64>>,
     substeps: usize,
+    columns: [Vec<f64>; 3],
     stop: Stop<'a>,
 }
 
@@ -163,19 +174,11 @@ impl<K: Kernel> WithSimd for Run<'_, K> {
     // One lane needs no vectors; the dispatch is for the fused multiply-add instruction.
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
-        let Self { of, drive, start, substeps, stop } = self;
+        let Self { of, drive, start, substeps, columns: [x, v, hysteresis], stop } = self;
         let h = drive.dt / index(substeps);
         let halvings = halvings(of.mechanics().rate(), h);
         let (coupling, gain) = of.kernel.coupling(&of.parameters, h, halvings);
-        let n = drive.u.len();
-        let mut samples = Samples {
-            of,
-            x: Vec::with_capacity(n),
-            v: Vec::with_capacity(n),
-            hysteresis: Vec::with_capacity(n),
-            step: h,
-            stop,
-        };
+        let mut samples = Samples { of, x, v, hysteresis, step: h, stop };
         let stepping = SteppingLoop { coupling, gain };
         let from = FeedbackState { x: start.x, w: start.v * h, memory: start.memory };
         let end = stepping.run(drive, substeps, from, &mut samples)?;

@@ -1,13 +1,16 @@
-//! Numerical methods: SIMD lanes, random numbers, least squares, line search, transfer functions.
+//! Numerical methods: SIMD lanes, random numbers, least squares, line search, transfer functions,
+//! memory.
 
 mod dispatch;
 mod golden_section;
 mod lanes;
+mod memory;
 mod nnls;
 mod random;
 mod transfer_function;
 
 pub use lanes::Lanes;
+pub use memory::{available, room, zeros};
 pub use nnls::{Rows, nnls};
 
 pub(crate) use dispatch::{dispatch_fused, dispatch_vectors};

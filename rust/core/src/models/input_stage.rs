@@ -19,6 +19,7 @@ use super::traits::{Experiment, Response};
 use super::values::{ParameterInfo, Values};
 use crate::design::LoopPlant;
 use crate::error::{Error, Result};
+use crate::integrator::columns;
 use crate::signal::Hold;
 
 /// Samples between two questions whether to stop.
@@ -206,11 +207,10 @@ impl<O: InputOperator> InputStage<O> {
     pub(super) fn follow(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
         let Experiment { drive, initial, method, stop, .. } = *experiment;
         method.exponential_only()?;
-        let count = drive.u.len();
         let flow = self.relaxation.flow(drive.dt);
         let zero = self.zero();
         let mut state = self.state(initial)?;
-        let [mut x, mut v, mut hysteresis] = [0, 1, 2].map(|_| Vec::with_capacity(count));
+        let [mut x, mut v, mut hysteresis] = columns(drive.u.len())?;
         for (k, &volts) in drive.u.iter().enumerate() {
             if k % POLL == 0 && stop() {
                 return Ok(None);

@@ -4,6 +4,7 @@
 //! to the inside, R - r.
 
 use crate::error::{Error, Result, finite, positive};
+use crate::math::room;
 
 /// Signed radial error R - r of points from a circle of radius R, m.
 ///
@@ -28,7 +29,14 @@ pub fn radial_errors(x: &[f64], y: &[f64], centre: [f64; 2], radius: f64) -> Res
     }
     check(["x", "y"], x, y, 1)?;
     let error = |(x, y): (&f64, &f64)| radius - libm::hypot(x - centre[0], y - centre[1]);
-    Ok(x.iter().zip(y).map(error).collect())
+    collected(x.iter().zip(y).map(error))
+}
+
+/// As many errors as there are points, m.
+fn collected(errors: impl ExactSizeIterator<Item = f64>) -> Result<Vec<f64>> {
+    let mut all = room("the contour error", errors.len())?;
+    all.extend(errors);
+    Ok(all)
 }
 
 /// Segments that a leaf of the tree holds: few boxes, short scans.
@@ -78,11 +86,14 @@ impl Polyline {
     /// [`Error::Data`] where one is not finite.
     pub fn new(x: &[f64], y: &[f64]) -> Result<Self> {
         check(["x of the path", "y of the path"], x, y, 2)?;
-        let points: Vec<[f64; 2]> = x.iter().zip(y).map(|(&x, &y)| [x, y]).collect();
+        let mut points = room("the points of the path", x.len())?;
+        points.extend(x.iter().zip(y).map(|(&x, &y)| [x, y]));
         let segments = points.len() - 1;
         // A complete binary tree whose leaves hold LEAF segments at most.
         let leaves = segments.div_ceil(LEAF).next_power_of_two();
-        let mut path = Self { points, boxes: vec![Bounds::EMPTY; 2 * leaves - 1] };
+        let mut boxes = room("the boxes around the path", 2 * leaves - 1)?;
+        boxes.resize(2 * leaves - 1, Bounds::EMPTY);
+        let mut path = Self { points, boxes };
         path.fill(0, 0, segments);
         Ok(path)
     }
@@ -101,7 +112,7 @@ impl Polyline {
             segment = best.segment;
             libm::copysign(best.square.sqrt(), self.side(&best, [x, y]))
         };
-        Ok(x.iter().zip(y).map(distance).collect())
+        collected(x.iter().zip(y).map(distance))
     }
 
     /// Boxes of the stretch `from..to` of segments and of all in it.

@@ -2,12 +2,19 @@
 
 use piezotrack_control::Number;
 
+use crate::error::Result;
+use crate::math::room;
+
 /// Displacement delayed by `delay` seconds, between the samples on the cubic through
 /// displacements and velocities, m; before the first sample the stage is where it starts.
-#[must_use]
-pub fn delayed(x: &[f64], v: &[f64], dt: f64, delay: f64) -> Vec<f64> {
+///
+/// # Errors
+/// [`crate::Error::Memory`] where there is no room for it.
+pub fn delayed(x: &[f64], v: &[f64], dt: f64, delay: f64) -> Result<Vec<f64>> {
+    let mut late = room("the delayed displacement", x.len())?;
     if delay == 0.0 {
-        return x.to_vec();
+        late.extend_from_slice(x);
+        return Ok(late);
     }
     let FractionalDelay { whole, part } = FractionalDelay::new(delay, dt);
     let at =
@@ -16,8 +23,12 @@ pub fn delayed(x: &[f64], v: &[f64], dt: f64, delay: f64) -> Vec<f64> {
         let ((x0, v0), (x1, v1)) = (at(k.checked_sub(whole + 1)), at(k.checked_sub(whole)));
         between(x0, v0 * dt, x1, v1 * dt, part)
     });
-    values.collect()
+    late.extend(values);
+    Ok(late)
 }
+
+/// Most samples of a delay: more than any record has, and still exact in its fraction.
+const LONGEST: f64 = 1e12;
 
 /// A delay in samples.
 #[derive(Clone, Copy, Debug)]
@@ -31,7 +42,7 @@ pub(crate) struct FractionalDelay {
 impl FractionalDelay {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 or above")]
     pub(crate) fn new(delay: f64, dt: f64) -> Self {
-        let samples = (delay / dt).max(0.0);
+        let samples = (delay / dt).clamp(0.0, LONGEST);
         let whole = libm::floor(samples);
         Self { whole: whole as usize, part: 1.0 - (samples - whole) }
     }

@@ -28,13 +28,21 @@ pub struct Drive<'a> {
     pub hold: Hold,
 }
 
+/// Sampling intervals beyond which numbers derived from them leave `f64`, s.
+const SHORTEST: f64 = 1e-12;
+const LONGEST: f64 = 1e9;
+
 impl<'a> Drive<'a> {
     /// Checks the interval and the samples.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where `dt` is not above 0, [`Error::Shape`] where `u` is empty.
+    /// [`Error::Parameter`] where `dt` is not from 1 ps to 1e9 s, [`Error::Shape`] where `u` is empty.
     pub fn new(u: &'a [f64], dt: f64, hold: Hold) -> Result<Self> {
         positive("dt", dt, "s")?;
+        if !(SHORTEST..=LONGEST).contains(&dt) {
+            let expected = format!("{SHORTEST:e} to {LONGEST:e} s");
+            return Err(Error::parameter("dt", format!("{dt:e} s"), expected));
+        }
         if u.is_empty() {
             return Err(Error::Shape {
                 name: "u".into(),

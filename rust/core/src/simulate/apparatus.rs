@@ -1,5 +1,7 @@
 //! A plant between its amplifier and its sensor, stepped through a stretch of time.
 
+use std::ops::RangeInclusive;
+
 use pulp::{Simd, WithSimd};
 
 use super::amplifier::{Amplifier, AmplifierFlow};
@@ -7,7 +9,7 @@ use super::sensor::{Sensor, SensorState};
 use crate::error::{Error, Result, positive};
 use crate::math::dispatch_fused;
 use crate::models::Plant;
-use crate::signal::index;
+use crate::signal::{Stop, index};
 
 /// A plant between its amplifier and its sensor.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +39,9 @@ pub struct ApparatusState<S> {
 
 /// Most steps of the simulation in one interval: beyond any use, and answered within a second.
 const MOST_STEPS: f64 = 1e7;
+
+/// Steps between two questions whether to stop: less than a millisecond.
+const BLOCK: usize = 1 << 14;
 
 /// Most instants of an experiment that are kept.
 const MOST_INSTANTS: usize = 100_000_000;
@@ -104,15 +109,28 @@ impl<'a, P: Plant> Apparatus<'a, P> {
         Ok(Stretch { steps, plant, amplifier })
     }
 
-    /// Simulates a stretch of time in which the command is linear from `from` to `to`, V.
+    /// Simulates a stretch of time in which the command is linear from one voltage to another;
+    /// false where `stop` said so meanwhile.
+    #[must_use]
     pub(super) fn drive(
         &self,
         stretch: &Stretch<P::Flow>,
         state: &mut ApparatusState<P::State>,
-        from: f64,
-        to: f64,
-    ) {
-        dispatch_fused(DriveStretch { apparatus: self, stretch, state, from, to });
+        command: [f64; 2],
+        stop: Stop<'_>,
+    ) -> bool {
+        let mut done = 0;
+        loop {
+            let steps = done + 1..=stretch.steps.min(done + BLOCK);
+            done = *steps.end();
+            dispatch_fused(DriveStretch { apparatus: self, stretch, state, command, steps });
+            if done == stretch.steps {
+                return true;
+            }
+            if stop() {
+                return false;
+            }
+        }
     }
 }
 
@@ -129,8 +147,10 @@ struct DriveStretch<'a, P: Plant> {
     apparatus: &'a Apparatus<'a, P>,
     stretch: &'a Stretch<P::Flow>,
     state: &'a mut ApparatusState<P::State>,
-    from: f64,
-    to: f64,
+    /// At the beginning and at the end of the stretch, V.
+    command: [f64; 2],
+    /// Those of its steps that are taken.
+    steps: RangeInclusive<usize>,
 }
 
 impl<P: Plant> WithSimd for DriveStretch<'_, P> {
@@ -138,10 +158,11 @@ impl<P: Plant> WithSimd for DriveStretch<'_, P> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) {
-        let Self { apparatus, stretch, state, from, to } = self;
+        let Self { apparatus, stretch, state, command: [from, to], steps } = self;
         let part = (to - from) / index(stretch.steps);
-        let mut before = from;
-        for j in 1..=stretch.steps {
+        let first = *steps.start() - 1;
+        let mut before = if first == 0 { from } else { part.mul_add(index(first), from) };
+        for j in steps {
             let after = if j == stretch.steps { to } else { part.mul_add(index(j), from) };
             let (low, high) =
                 apparatus.amplifier.advance(&stretch.amplifier, state.applied, before, after);
@@ -149,7 +170,7 @@ impl<P: Plant> WithSimd for DriveStretch<'_, P> {
             state.applied = high;
             before = after;
         }
-        state.command = to;
+        state.command = before;
     }
 }
 

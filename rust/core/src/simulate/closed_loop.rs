@@ -1,8 +1,10 @@
 //! A continuous plant under a sampled controller.
 
 use super::apparatus::{Apparatus, ApparatusState, Stretch, instants, still_finite};
+use super::open_loop::BLOCK;
 use super::timing::{Clock, Commands, Delay, Event, Timing, events};
 use crate::error::{Error, Result};
+use crate::math::room;
 use crate::models::Plant;
 use crate::signal::{Stop, index};
 
@@ -75,7 +77,7 @@ pub fn closed_loop<P: Plant>(
     let clock = Clock::new(timing, apparatus.sensor.seed);
     let delay = Delay::new(timing.delay, timing.interval);
     let held = record.run.last.command;
-    let mut commands = Commands::new(timing.samples, held, delay, clock, 0);
+    let mut commands = Commands::new(timing.samples, held, delay, clock, 0)?;
     let mut parts = Vec::new();
     let mut sample =
         |record: &mut Record<P::State>, commands: &mut Commands, k: usize| -> Result<()> {
@@ -102,9 +104,12 @@ pub fn closed_loop<P: Plant>(
         if last && prompt {
             break;
         }
-        for Part { stretch, from, event } in &parts {
+        for (i, Part { stretch, from, event }) in parts.iter().enumerate() {
             let volts = commands.acting(k, *from);
-            apparatus.drive(stretch, &mut record.run.last, volts, volts);
+            let moved = apparatus.drive(stretch, &mut record.run.last, [volts; 2], stop);
+            if !moved || ((i + 1) % BLOCK == 0 && stop()) {
+                return Ok(None);
+            }
             if event.kept && !last {
                 record.keep(apparatus.displacement(&record.run.last))?;
             }
@@ -128,8 +133,9 @@ fn cut<P: Plant>(
     sample: f64,
 ) -> Result<Vec<Part<P::Flow>>> {
     let mut from = 0.0;
-    let mut parts = Vec::new();
-    for event in events(timing.substeps, effects, [sample, 0.0, 0.0]) {
+    let events = events(timing.substeps, effects, [sample, 0.0, 0.0]);
+    let mut parts = room("the parts of a control interval", events.len())?;
+    for event in events {
         let stretch = apparatus.stretch((event.end - from) * timing.interval)?;
         parts.push(Part { stretch, from, event });
         from = event.end;
@@ -161,13 +167,13 @@ impl<S> Record<S> {
     pub(super) fn new(timing: &Timing, start: ApparatusState<S>) -> Result<Self> {
         timing.validate()?;
         let n = instants("samples", timing.samples.checked_mul(timing.substeps))?;
-        let empty = || Vec::with_capacity(n);
+        let empty = || room("the motion in the loop", n);
         let run = ClosedLoop {
-            time: empty(),
-            displacement: empty(),
-            measured: empty(),
-            command: empty(),
-            applied: empty(),
+            time: empty()?,
+            displacement: empty()?,
+            measured: empty()?,
+            command: empty()?,
+            applied: empty()?,
             last: start,
         };
         Ok(Self { run, timing: *timing, read: 0.0, measured: 0.0, command: 0.0 })

@@ -22,7 +22,7 @@ pub use closed_loop::{ClosedLoop, closed_loop};
 pub use open_loop::{OpenLoop, open_loop};
 pub use sensor::{Sensor, SensorState};
 pub use timing::Timing;
-pub use tracking::{Law, LawState, MOST_STATES, ReferenceSamples, TrackingRun, track};
+pub use tracking::{DELAY_LINE, Law, LawState, MOST_STATES, ReferenceSamples, TrackingRun, track};
 pub use two_axes::{
     TwoAxes, TwoLogs, TwoMotions, TwoStates, TwoTracked, closed_loops, open_loops, track_both,
 };

@@ -2,6 +2,7 @@
 
 use super::apparatus::{Apparatus, ApparatusState, Stretch, instants, still_finite};
 use crate::error::{Result, finite};
+use crate::math::room;
 use crate::models::Plant;
 use crate::signal::{Drive, Stop, index};
 
@@ -37,10 +38,9 @@ pub fn open_loop<P: Plant>(
     apparatus.validate()?;
     let n = checked(drive)?;
     let stretch = apparatus.stretch(drive.dt)?;
-    let mut run = OpenLoop::from_start(n, start);
+    let mut run = OpenLoop::from_start(n, start)?;
     for k in 0..n {
-        run.drive(apparatus, &stretch, drive, k);
-        if k % BLOCK == 0 && stop() {
+        if !run.drive(apparatus, &stretch, drive, k, stop) || (k % BLOCK == 0 && stop()) {
             return Ok(None);
         }
         let measured = apparatus.read(&mut run.last, since(drive, k));
@@ -64,23 +64,24 @@ pub(super) fn since(drive: &Drive<'_>, k: usize) -> f64 {
 
 impl<S> OpenLoop<S> {
     /// Room for `n` samples, none of them kept yet.
-    pub(super) fn from_start(n: usize, last: ApparatusState<S>) -> Self {
-        let empty = || Vec::with_capacity(n);
-        Self { displacement: empty(), measured: empty(), applied: empty(), last }
+    pub(super) fn from_start(n: usize, last: ApparatusState<S>) -> Result<Self> {
+        let empty = || room("the simulated motion", n);
+        Ok(Self { displacement: empty()?, measured: empty()?, applied: empty()?, last })
     }
 
-    /// Leads an apparatus to sample `k`.
+    /// Leads an apparatus to sample `k`; false where `stop` said so meanwhile.
+    #[must_use]
     pub(super) fn drive<P: Plant<State = S>>(
         &mut self,
         apparatus: &Apparatus<'_, P>,
         stretch: &Stretch<P::Flow>,
         drive: &Drive<'_>,
         k: usize,
-    ) {
-        if let Some(before) = k.checked_sub(1) {
-            let (from, change) = drive.interval(before);
-            apparatus.drive(stretch, &mut self.last, from, from + change);
-        }
+        stop: Stop<'_>,
+    ) -> bool {
+        let Some(before) = k.checked_sub(1) else { return true };
+        let (from, change) = drive.interval(before);
+        apparatus.drive(stretch, &mut self.last, [from, from + change], stop)
     }
 
     /// Keeps the present sample, at `time` s.

@@ -1,7 +1,7 @@
 //! Timing of a sampled controller: delays and random sampling jitter.
 
 use crate::error::{Error, Result, not_negative, positive};
-use crate::math::Draws;
+use crate::math::{Draws, room};
 use crate::signal::index;
 
 /// When a controller looks and acts, and at which instants the motion is kept.
@@ -22,16 +22,31 @@ pub struct Timing {
     pub substeps: usize,
 }
 
+/// Most instants kept in a control interval: each has numbers of its own for the whole run.
+const MOST_SUBSTEPS: usize = 100_000;
+
+/// Longest delay, in control intervals: beyond any run.
+const LONGEST_DELAY: f64 = 1e9;
+
 impl Timing {
     /// Checks the numbers.
     pub(super) fn validate(&self) -> Result<()> {
         positive("interval", self.interval, "s")?;
         not_negative("delay", self.delay, "s")?;
         not_negative("jitter", self.jitter, "s")?;
-        for (name, value) in [("samples", self.samples), ("substeps", self.substeps)] {
-            if value == 0 {
-                return Err(Error::parameter(name, 0, "1 or more"));
-            }
+        if self.delay / self.interval > LONGEST_DELAY {
+            let expected = format!(
+                "{:e} s at most: {LONGEST_DELAY:e} control intervals",
+                LONGEST_DELAY * self.interval
+            );
+            return Err(Error::parameter("delay", format!("{:e} s", self.delay), expected));
+        }
+        if self.samples == 0 {
+            return Err(Error::parameter("samples", 0, "1 or more"));
+        }
+        if !(1..=MOST_SUBSTEPS).contains(&self.substeps) {
+            let expected = format!("1 to {MOST_SUBSTEPS}");
+            return Err(Error::parameter("substeps", self.substeps, expected));
         }
         Ok(())
     }
@@ -120,8 +135,8 @@ impl Commands {
         delay: Delay,
         clock: Clock,
         behind: usize,
-    ) -> Self {
-        Self { issued: Vec::with_capacity(samples), held, delay, clock, behind }
+    ) -> Result<Self> {
+        Ok(Self { issued: room("the commands", samples)?, held, delay, clock, behind })
     }
 
     /// Takes the next command, V.

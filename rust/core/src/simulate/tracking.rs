@@ -10,11 +10,15 @@ use super::closed_loop::{ClosedLoop, closed_loop};
 use super::timing::Timing;
 use crate::design::LinearFeedback;
 use crate::error::{Error, Result};
+use crate::math::{room, zeros};
 use crate::models::Plant;
 use crate::signal::Stop;
 
 /// Most states of a feedback law in state space.
 pub const MOST_STATES: usize = 16;
+
+/// What an error calls the memory of the repetitive part.
+pub const DELAY_LINE: &str = "the delay line of the repetitive control";
 
 /// The feedback laws that a controller can be given.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -174,8 +178,8 @@ impl<'a, F: Feedback> ControllerRun<'a, F> {
             });
         }
         let length = controller.repetitive.map_or(0, |part| part.length());
-        let state = controller.rest(vec![0.0; length])?;
-        Ok(Self { controller, input, state, commands: Vec::with_capacity(samples) })
+        let state = controller.rest(zeros(DELAY_LINE, length)?)?;
+        Ok(Self { controller, input, state, commands: room("the commands", samples)? })
     }
 
     /// The command at sample `k`, V.

@@ -15,6 +15,7 @@ use super::open_loop::{BLOCK, OpenLoop, checked as checked_drive, since};
 use super::timing::{Clock, Commands, Delay, Event, SAMPLES, Timing, events};
 use super::tracking::{ControllerRun, ReferenceSamples, TrackingRun};
 use crate::error::{Error, Result, finite, not_negative};
+use crate::math::room;
 use crate::models::Plant;
 use crate::signal::{Drive, Stop, index};
 
@@ -103,8 +104,9 @@ impl<X: Plant, Y: Plant> TwoAxes<'_, X, Y> {
         let effects: Vec<f64> = run.commands.iter().flat_map(|one| one.effects(k)).collect();
         let samples = run.clocks.map(|clock| clock.at(k));
         let mut from = 0.0;
-        let mut parts = Vec::new();
-        for event in events(run.timing.substeps, &effects, samples) {
+        let events = events(run.timing.substeps, &effects, samples);
+        let mut parts = room("the parts of a control interval", events.len())?;
+        for event in events {
             let duration = (event.end - from) * run.timing.interval;
             let (x, y) = (self.x.stretch(duration)?, self.y.stretch(duration)?);
             parts.push(Part { x, y, from, event });
@@ -147,8 +149,8 @@ impl<X, Y> Pair<X, Y> {
         let held = [x.run.last.command, y.run.last.command];
         let acts = [delay, lag + delay].map(|delay| Delay::new(delay, interval));
         let commands = [
-            Commands::new(samples, held[0], acts[0], clock_x, 0),
-            Commands::new(samples, held[1], acts[1], late_y, whole.whole),
+            Commands::new(samples, held[0], acts[0], clock_x, 0)?,
+            Commands::new(samples, held[1], acts[1], late_y, whole.whole)?,
         ];
         let clocks = [clock_x, clock_y, late_y];
         Ok(Self { timing: *timing, lag: whole, clocks, x, y, commands })
@@ -252,14 +254,17 @@ pub fn closed_loops<X: Plant, Y: Plant>(
         let mut due = run.clocks.map(|clock| clock.at(k)).map(|at| at > 0.0);
         run.serve(axes, k, due.map(|late| !late), (&mut x, &mut y))?;
         run.keep(axes)?;
-        for part in &parts {
+        for (i, part) in parts.iter().enumerate() {
             due[2] &= !last || run.lag.fraction == 0.0;
             if last && due == [false; SAMPLES] {
                 break;
             }
             let [volts_x, volts_y] = [0, 1].map(|axis| run.commands[axis].acting(k, part.from));
-            axes.x.drive(&part.x, &mut run.x.run.last, volts_x, volts_x);
-            axes.y.drive(&part.y, &mut run.y.run.last, volts_y, volts_y);
+            let moved = axes.x.drive(&part.x, &mut run.x.run.last, [volts_x; 2], stop)
+                && axes.y.drive(&part.y, &mut run.y.run.last, [volts_y; 2], stop);
+            if !moved || ((i + 1) % BLOCK == 0 && stop()) {
+                return Ok(None);
+            }
             if part.event.kept && !last {
                 run.keep(axes)?;
             }
@@ -363,11 +368,11 @@ pub fn open_loops<X: Plant, Y: Plant>(
         return Err(Error::parameter("interval of uy", format!("{} s", to_y.dt), expected));
     }
     let (stretch_x, stretch_y) = (axes.x.stretch(to_x.dt)?, axes.y.stretch(to_y.dt)?);
-    let (mut x, mut y) = (OpenLoop::from_start(n, start.0), OpenLoop::from_start(n, start.1));
+    let (mut x, mut y) = (OpenLoop::from_start(n, start.0)?, OpenLoop::from_start(n, start.1)?);
     for k in 0..n {
-        x.drive(&axes.x, &stretch_x, to_x, k);
-        y.drive(&axes.y, &stretch_y, to_y, k);
-        if k % BLOCK == 0 && stop() {
+        let moved = x.drive(&axes.x, &stretch_x, to_x, k, stop)
+            && y.drive(&axes.y, &stretch_y, to_y, k, stop);
+        if !moved || (k % BLOCK == 0 && stop()) {
             return Ok(None);
         }
         let passed = since(to_x, k);

@@ -9,7 +9,7 @@ use piezotrack_control::hysteresis::DahlState;
 
 use super::{DahlStage, DahlStageState, STATE};
 use crate::error::{Error, Result};
-use crate::integrator::{MOST_SUBSTEPS, first_substeps, out_of_reach};
+use crate::integrator::{MOST_SUBSTEPS, columns, first_substeps, out_of_reach};
 use crate::models::traits::{Experiment, Method, Response};
 use crate::models::values::Values;
 use crate::signal::{Drive, Stop, index, largest_difference};
@@ -187,11 +187,12 @@ pub(super) fn simulate(
         if adaptive { DIGITS } else { (first_substeps(&stage.mechanics, drive.dt), MOST_SUBSTEPS) };
     let mut coarse: Option<Response> = None;
     loop {
+        let room = columns(drive.u.len())?;
         let fine = if adaptive {
             let mut crossing = Rk45::new(stage, drive, libm::pow(10.0, -index(level)));
-            along(stage, &mut crossing, drive, from, stop)
+            along(stage, &mut crossing, drive, from, room, stop)
         } else {
-            along(stage, &mut Rk4 { stage, substeps: level }, drive, from, stop)
+            along(stage, &mut Rk4 { stage, substeps: level }, drive, from, room, stop)
         };
         if stop() {
             return Ok(None);
@@ -228,17 +229,18 @@ fn along(
     crossing: &mut impl IntervalSolver,
     drive: &Drive<'_>,
     initial: DahlStageState,
+    mut columns: [Vec<f64>; 3],
     stop: Stop<'_>,
 ) -> Option<Response> {
     let n = drive.u.len();
     let memory = stage.memory(&initial);
     let mut state = [initial.x, initial.v, memory.force, memory.slope];
-    let mut columns = [0, 1, 2].map(|_| Vec::with_capacity(n));
     for k in 0..n {
         if k > 0 {
             let (u, change) = drive.interval(k - 1);
             state = crossing.cross(state, u, change, drive.dt)?;
-            if k % 64 == 0 && stop() {
+            // An interval of many steps is as long as many of few.
+            if (k % 64 == 0 || crossing.steps() > 64) && stop() {
                 return None;
             }
         }
