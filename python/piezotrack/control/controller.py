@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from .. import _core
-from .._support.arguments import finite, positive
+from .._support.arguments import finite
+from .._support.arrays import check_dt
 from ..errors import NumericalError, ParameterError
 from ..stages.inverse import Inverse
 from .components import LowPass, Notch, Pid, Repetitive, StateSpace
@@ -78,8 +79,9 @@ class Controller:
     _core: _core.Controller = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        dt = positive("dt", self.dt, "s")
+        dt = check_dt(self.dt)
         low, high = _pair("limits", self.limits, "V")
+        object.__setattr__(self, "limits", (low, high))
         _check_part("feedforward", self.feedforward, Inverse, "pt.Inverse")
         _check_part("feedback", self.feedback, (Pid, StateSpace), "pt.Pid or pt.control.StateSpace")
         _check_part("repetitive", self.repetitive, Repetitive, "pt.Repetitive")

@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import _core
 from .._support.arguments import finite, not_negative, positive
+from .._support.arrays import check_dt
 from .._support.messages import quoted
 from ..errors import ParameterError
 from ..references.motions import Spline
@@ -249,7 +250,7 @@ class Inverse:
         InverseSession
             With a state of its own; several sessions are independent.
         """
-        return InverseSession(self, positive("dt", dt, "s"))
+        return InverseSession(self, check_dt(dt))
 
 
 def _check(reference: object) -> None:

@@ -28,6 +28,7 @@ impl Limits {
         finite("low", low, "V")?;
         finite("high", high, "V")?;
         check("high", high, "V", low < high, "a voltage above low")?;
+        check("high", high, "V", (high - low).is_finite(), "a range that is finite")?;
         Ok(Self { low, high })
     }
 
