@@ -133,8 +133,14 @@ WRONG: dict[str, tuple[Callable[[pt.control.Session], object], str]] = {
         "reference is 110 m: .*110 um is 1.1e-4 m, .*step_um",
     ),
     "a whole number": (lambda s: s.step(110, 0.0), "reference is 110 m"),
-    "float32": (lambda s: s.step(np.float32(110), 0.0), "reference is 110 m"),
-    "int64": (lambda s: s.step(np.int64(110), 0.0), "reference is 110 m"),
+    "float32": (
+        lambda s: s.step(np.float32(110), 0.0),  # type: ignore[arg-type]
+        "reference is 110 m",
+    ),
+    "int64": (
+        lambda s: s.step(np.int64(110), 0.0),  # type: ignore[arg-type]
+        "reference is 110 m",
+    ),
     "an array of one": (
         lambda s: s.step(np.array(110.0), 0.0),  # type: ignore[arg-type]
         "reference is 110 m",

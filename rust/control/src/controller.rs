@@ -72,12 +72,24 @@ impl<S: Snapshot, L: AsRef<[f64]> + AsMut<[f64]>> Snapshot for ControllerState<S
     fn save(&self, write: &mut dyn FnMut(f64)) {
         self.feedback.save(write);
         self.repetitive.is_some().save(write);
-        self.repetitive.iter().for_each(|memory| memory.save(write));
-        (self.filters.save(write), self.present.save(write), self.stepped.save(write));
-        (self.last.save(write), self.excess.save(write), self.reported.save(write));
-        self.apart.save(write);
-        self.unlearnt.save(write);
-        self.readings.save(write);
+        if let Some(memory) = &self.repetitive {
+            memory.save(write);
+        }
+        let Self { filters, present, stepped, last, excess, reported, apart, .. } = self;
+        let parts: [&dyn Snapshot; 9] = [
+            filters,
+            present,
+            stepped,
+            last,
+            excess,
+            reported,
+            apart,
+            &self.unlearnt,
+            &self.readings,
+        ];
+        for part in parts {
+            part.save(write);
+        }
     }
 
     fn load(&mut self, read: &mut dyn FnMut() -> Option<f64>) -> Option<()> {
@@ -87,12 +99,22 @@ impl<S: Snapshot, L: AsRef<[f64]> + AsMut<[f64]>> Snapshot for ControllerState<S
         if repeats != self.repetitive.is_some() {
             return None;
         }
-        self.repetitive.iter_mut().try_for_each(|memory| memory.load(read))?;
-        (self.filters.load(read)?, self.present.load(read)?, self.stepped.load(read)?);
-        (self.last.load(read)?, self.excess.load(read)?, self.reported.load(read)?);
-        self.apart.load(read)?;
-        self.unlearnt.load(read)?;
-        self.readings.load(read)
+        if let Some(memory) = &mut self.repetitive {
+            memory.load(read)?;
+        }
+        let Self { filters, present, stepped, last, excess, reported, apart, .. } = self;
+        let parts: [&mut dyn Snapshot; 9] = [
+            filters,
+            present,
+            stepped,
+            last,
+            excess,
+            reported,
+            apart,
+            &mut self.unlearnt,
+            &mut self.readings,
+        ];
+        parts.into_iter().try_for_each(|part| part.load(read))
     }
 }
 

@@ -84,8 +84,9 @@ impl Snapshot for u32 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
     fn load(&mut self, read: &mut dyn FnMut() -> Option<f64>) -> Option<()> {
         let number = read()?;
-        let whole = (0.0..=f64::from(Self::MAX)).contains(&number) && libm::floor(number) == number;
-        *self = whole.then_some(number as Self)?;
+        let whole = (0.0..=f64::from(Self::MAX)).contains(&number).then_some(number as Self)?;
+        // Nothing was cut off.
+        *self = (f64::from(whole).to_bits() == number.to_bits()).then_some(whole)?;
         Some(())
     }
 }
@@ -113,7 +114,9 @@ impl Snapshot for () {
 
 impl<T: Snapshot, const N: usize> Snapshot for [T; N] {
     fn save(&self, write: &mut dyn FnMut(f64)) {
-        self.iter().for_each(|one| one.save(write));
+        for one in self {
+            one.save(write);
+        }
     }
 
     fn load(&mut self, read: &mut dyn FnMut() -> Option<f64>) -> Option<()> {
@@ -124,7 +127,9 @@ impl<T: Snapshot, const N: usize> Snapshot for [T; N] {
 impl<T: Snapshot + Default> Snapshot for Option<T> {
     fn save(&self, write: &mut dyn FnMut(f64)) {
         self.is_some().save(write);
-        self.iter().for_each(|one| one.save(write));
+        if let Some(one) = self {
+            one.save(write);
+        }
     }
 
     fn load(&mut self, read: &mut dyn FnMut() -> Option<f64>) -> Option<()> {

@@ -78,8 +78,11 @@ impl<L: AsRef<[f64]> + AsMut<[f64]>> Snapshot for RepetitiveState<L> {
     fn save(&self, write: &mut dyn FnMut(f64)) {
         let line = self.line.as_ref();
         length(line).save(write);
-        line.iter().for_each(|entry| write(*entry));
-        (length(line.get(..self.next).unwrap_or_default()).save(write), write(self.volts));
+        for entry in line {
+            write(*entry);
+        }
+        length(line.get(..self.next).unwrap_or_default()).save(write);
+        write(self.volts);
         self.saturation.save(write);
     }
 
@@ -91,7 +94,8 @@ impl<L: AsRef<[f64]> + AsMut<[f64]>> Snapshot for RepetitiveState<L> {
             return None;
         }
         line.iter_mut().try_for_each(|entry| entry.load(read))?;
-        (next.load(read)?, self.volts.load(read)?);
+        next.load(read)?;
+        self.volts.load(read)?;
         self.next = (2 * next < entries.max(1)).then_some(next as usize)?;
         self.saturation.load(read)
     }
