@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 import typer
+from matplotlib.figure import Figure
 
 import piezotrack as pt
 from commands import (
@@ -275,24 +276,29 @@ def test_ctrl_c_keeps_the_best_so_far() -> None:
 # Whole files or none.
 
 
-def test_a_failure_while_writing_leaves_whole_files(monkeypatch: pytest.MonkeyPatch) -> None:
+def content(folder: str) -> dict[str, bytes]:
+    return {name: Path(folder, name).read_bytes() for name in names(folder)}
+
+
+def test_a_failure_while_writing_leaves_all_old_files(monkeypatch: pytest.MonkeyPatch) -> None:
     ran("identify", "log.csv", *PAPER)
-    before = {name: Path("results", name).read_bytes() for name in names("results")}
-    replace = Path.replace
-    renamed: list[Path] = []
+    before = content("results")
+    drawn: list[object] = []
+    savefig = Figure.savefig
 
-    def once(path: Path, target: Path) -> Path:
-        if len(renamed) == 3:
+    def some(figure: Figure, path: Path, **options: Any) -> None:
+        if len(drawn) == 3:
             raise OSError(28, "No space left on device")
-        renamed.append(target)
-        return replace(path, target)
+        drawn.append(path)
+        savefig(figure, path, **options)
 
-    monkeypatch.setattr(Path, "replace", once)
-    result = run("identify", "log.csv", *PAPER)
+    monkeypatch.setattr(Figure, "savefig", some)
+    result = run("identify", "log.csv", *PAPER, "--seed", "5")
     assert result.exit_code == 2
     assert result.stderr.endswith("cannot be written: no space left on device\n")
     assert result.stderr.count("\n") == 1
-    assert {name: Path("results", name).read_bytes() for name in names("results")} == before
+    assert len(drawn) == 3
+    assert content("results") == before
 
 
 @pytest.mark.usefixtures("_no_pictures")
