@@ -30,7 +30,7 @@ from commands import (
     write,
     write_model,
 )
-from piezotrack.cli import app
+from piezotrack.cli.commands import app
 from piezotrack.xu_li_2010.demo import write_log
 from records import BOX, HELD, quick
 

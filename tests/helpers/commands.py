@@ -12,7 +12,7 @@ import numpy as np
 from typer.testing import CliRunner
 
 import piezotrack as pt
-from piezotrack.cli import app
+from piezotrack.cli.commands import app
 from piezotrack.xu_li_2010.demo import write_log
 from records import BOX, HELD, quick
 

@@ -95,9 +95,10 @@ def write_columns(path: Path, columns: Mapping[str, np.ndarray]) -> Path:
     pathlib.Path
         The file.
     """
-    with replacing(path) as temporary:
+    # NumPy opens a name only where there is a working folder.
+    with replacing(path) as temporary, temporary.open("w", encoding="ascii") as file:
         np.savetxt(
-            temporary,
+            file,
             np.column_stack(list(columns.values())),
             delimiter=",",
             fmt="%.10g",

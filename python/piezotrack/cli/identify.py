@@ -10,6 +10,7 @@ import typer
 
 from ..errors import Interrupted, ParameterError
 from .error_messages import in_words
+from .interruption import heard
 from .options import (
     Columns,
     DisplacementColumn,
@@ -175,6 +176,7 @@ def _search(log: Dataset, out: Path, kind: str, **arguments: Any) -> Identificat
     try:
         return identify(log, kind, **arguments)
     except Interrupted as stopped:
+        heard()
         if stopped.partial is None:
             raise
         path = stopped.partial.save(make_folder(out) / _partial(kind))
