@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, ParamSpec
 import typer
 
 from ..errors import PiezotrackError
-from .interruption import at_work, exit_code, stopped
+from .interruption import at_rest, at_work, exit_code, stopped
 from .terminal import one_line
 
 if TYPE_CHECKING:
@@ -66,6 +66,7 @@ def _say(sentence: str) -> None:
 
 
 def _stopped(error: KeyboardInterrupt) -> int:
+    at_rest()
     _say(str(error) or "interrupted")
     return exit_code()
 

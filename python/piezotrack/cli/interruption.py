@@ -19,7 +19,15 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from types import FrameType
 
-__all__ = ["answer_signals", "at_work", "exit_code", "heard", "leave_if_stopped", "stopped"]
+__all__ = [
+    "answer_signals",
+    "at_rest",
+    "at_work",
+    "exit_code",
+    "heard",
+    "leave_if_stopped",
+    "stopped",
+]
 
 WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 # Time after which an interruption is repeated that is known to be lost, or that nobody has heard:
@@ -49,7 +57,15 @@ def at_work() -> Iterator[None]:
     try:
         yield
     finally:
-        _working = False
+        at_rest()
+
+
+def at_rest() -> None:
+    """End the process at once when a signal comes from now on."""
+    global _working
+    _working = False
+    # A repetition that comes late in the end of the process would kill it.
+    heard()
 
 
 def heard() -> None:
