@@ -85,7 +85,8 @@ def test_sigterm_while_results_are_put_in_place_leaves_them_whole(after: float) 
     # It may come when all is done, and the interpreter no longer answers.
     said = {143: "piezotrack: terminated\n", 0: "", -signal.SIGTERM: ""}
     assert errors == said[code]
-    assert names("results") == [f"feedforward.{ending}" for ending in ("csv", "png", "svg")]
+    written = [f"feedforward.{ending}" for ending in ("csv", "png", "svg")]
+    assert names("results") in ([], written)
 
 
 # A command that does what is appended.

@@ -7,10 +7,10 @@ ends at once: modules that are being imported may turn a KeyboardInterrupt into 
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import sys
-import threading
 from contextlib import contextmanager, suppress
 
 # As type checkers read it; importing typing takes long.
@@ -52,10 +52,12 @@ def answer_signals() -> None:
 @contextmanager
 def at_work() -> Iterator[None]:
     """Raise KeyboardInterrupt within when a signal comes."""
-    global _working
+    global _came, _working
     _working = True
     try:
         yield
+        # All is done, in spite of a signal that did not arrive.
+        _came = None
     finally:
         at_rest()
 
@@ -84,12 +86,12 @@ def exit_code() -> int:
 
 
 def leave_if_stopped() -> None:
-    """End the process without waiting for threads that still compute what nobody wants."""
-    others = (one for one in threading.enumerate() if one is not threading.main_thread())
-    if stopped() and any(not one.daemon for one in others):
+    """End the process without a wait for its memory, or for threads that still compute."""
+    if stopped():
         for stream in (sys.stdout, sys.stderr):
             with suppress(OSError):
                 stream.flush()
+        atexit._run_exitfuncs()
         os._exit(exit_code())
 
 
