@@ -7,10 +7,11 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from commands import COMMAND, names, write_model
+from commands import COMMAND, names, refusal, write_model
 from piezotrack.cli.terminal import PlainStream, one_line
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="needs a POSIX shell")
@@ -81,6 +82,21 @@ def test_a_folder_that_cannot_be_made_is_named() -> None:
     assert errors == (
         f"piezotrack: --out: {'a' * 300} cannot be made a folder: file name too long\n"
     )
+
+
+def refused(path: object, **_: object) -> Any:
+    raise PermissionError(13, "Permission denied", str(path))
+
+
+def test_a_folder_without_access_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Path, "exists", refused)
+    said = refusal(*WORK, "--out", "closed")
+    assert said == "--out: closed cannot be made a folder: permission denied"
+
+
+def test_a_file_without_access_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("piezotrack.identification.identified.load", refused)
+    assert refusal(*WORK) == "dahl.json: permission denied"
 
 
 @POSIX

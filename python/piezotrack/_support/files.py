@@ -96,7 +96,7 @@ def write_columns(path: Path, columns: Mapping[str, np.ndarray]) -> Path:
         The file.
     """
     # NumPy opens a name only where there is a working folder.
-    with replacing(path) as temporary, temporary.open("w", encoding="ascii") as file:
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8") as file:
         np.savetxt(
             file,
             np.column_stack(list(columns.values())),

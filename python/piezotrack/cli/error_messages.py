@@ -86,7 +86,7 @@ def of_the_system(error: OSError) -> int:
     """
     reason = (error.strerror or str(error)).lower()
     if error.filename is not None:
-        _say(f"{os.fsdecode(error.filename)}: {reason}")
+        _say(f"{error.filename}: {reason}")
         return BAD_INPUT
     # Without a file it is the output, printed when all results have been written. The rest of it is
     # discarded, or Python would report an error when it exits.
