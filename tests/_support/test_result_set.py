@@ -76,13 +76,14 @@ def some(path, target):
     count -= 1
     return replace(path, target)
 pathlib.Path.replace = some
-save(pathlib.Path(sys.argv[1]), "new")
+save(pathlib.Path(sys.argv[1]), sys.argv[4], sys.argv[5].split())
 """
 
 
-def kill_after(count: int, folder: Path) -> None:
+def kill_after(count: int, folder: Path, text: str = "new", names: list[str] = NAMES) -> None:
+    here = str(Path(__file__).parent)
     done = subprocess.run(
-        [sys.executable, "-c", KILLED, str(folder), str(count), str(Path(__file__).parent)],
+        [sys.executable, "-c", KILLED, str(folder), str(count), here, text, " ".join(names)],
         check=False,
         timeout=60.0,
     )
@@ -109,6 +110,21 @@ def test_what_a_killed_run_has_not_renamed_is_listed_and_renamed_by_the_next(
             file.write_text("other")
         more = {"x.csv": "other"}
     assert content(tmp_path) == dict.fromkeys(NAMES, "new") | more
+
+
+@POSIX
+@pytest.mark.parametrize("count", range(5))
+def test_a_run_that_is_killed_while_it_finishes_another_is_finished(
+    tmp_path: Path, count: int
+) -> None:
+    save(tmp_path, "old")
+    kill_after(1, tmp_path)
+    # The marker is replaced, c and d of the first run are renamed, then the two of the second.
+    kill_after(count, tmp_path, "newer", ["b.json", "x.csv"])
+    save(tmp_path, "other", ["y.csv", "z.csv"])
+    found = content(tmp_path)
+    assert {found[name] for name in ("a.csv", "c.png", "d.svg")} == {"new"}
+    assert (found["b.json"], found.get("x.csv")) == ("newer", "newer") if count else ("new", None)
 
 
 @POSIX

@@ -175,14 +175,13 @@ def _take(marker: Path, own: Sequence[Pair]) -> list[Pair]:
             time.sleep(0.01)
         else:
             return []
+    listed = _listed(marker.parent)
     replaced = {file for _, file in own}
-    others = []
-    for temporary, file in _listed(marker.parent):
+    others = [pair for pair in listed if pair[1] not in replaced]
+    _write(marker, [*others, *own])
+    for temporary, file in listed:
         if file in replaced:
             _remove(temporary)
-        else:
-            others.append((temporary, file))
-    _write(marker, [*others, *own])
     return others
 
 
