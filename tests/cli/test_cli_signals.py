@@ -115,6 +115,13 @@ LOST = {
     time.sleep(50)""",
     "turned into another error": """try: press()
     except KeyboardInterrupt: raise ImportError("core")""",
+    "while seeds are under way": """from piezotrack.xu_li_2010 import reproduction
+    begun = threading.Semaphore(0)
+    reproduction.run_experiments = lambda *_: (begun.release(), time.sleep(50))
+    def later():
+        begun.acquire(), begun.acquire(), os.kill(os.getpid(), signal.SIGINT)
+    threading.Thread(target=later).start()
+    reproduction._scored(None, range(4), False)""",
     "while threads compute": """threading.Thread(target=time.sleep, args=(50,)).start()
     press()""",
 }
