@@ -65,6 +65,15 @@ def test_a_file_is_run_again_and_again() -> None:
     )
 
 
+def test_a_path_may_have_the_name_of_a_formula() -> None:
+    rows = "\n".join(f"{k / 50:.2f},{10 + 0.01 * k:.6f},{10 - 0.01 * k:.6f}" for k in range(60))
+    Path(r"$\foo$.csv").write_text("time_s,x_um,y_um\n" + rows + "\n", encoding="utf-8")
+    printed = ran("contour", "dahl.json", "--path", r"$\foo$.csv", "--beyond-reach")
+    assert r"$\foo$.csv" in printed
+    written = sorted(path.name for path in Path("results").iterdir())
+    assert written == ["contour.csv", "contour.json", "contour.png", "contour.svg"]
+
+
 @pytest.mark.usefixtures("_no_pictures_at_all")
 def test_table_2_is_one_command() -> None:
     printed = ran("contour", "--table-2")

@@ -12,7 +12,7 @@ import numpy as np
 from typer.testing import CliRunner
 
 import piezotrack as pt
-from piezotrack.cli import app
+from piezotrack.cli.commands import app
 from piezotrack.xu_li_2010.demo import write_log
 from records import BOX, HELD, quick
 
@@ -25,7 +25,12 @@ PAPER = [
     *(part for name, value in HELD.items() for part in ("--fix", f"{name}={value}")),
     *(part for name, (low, high) in BOX.items() for part in ("--bound", f"{name}={low}:{high}")),
 ]
-COMMAND = [sys.executable, "-c", "from piezotrack.cli import main; main()"]
+# SIGINT may be ignored where the tests are started, and a child would inherit that.
+HEADING = (
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    "from piezotrack.cli import main"
+)
+COMMAND = [sys.executable, "-c", f"{HEADING}; main()"]
 
 
 @cache

@@ -118,3 +118,15 @@ def bits(fit: pt.identification.Identification) -> dict[str, Any]:
         "parameters": repr(dict(fit.parameters)),
         "counts": (fit.nit, fit.nfev, fit.nfail, fit.npolish, fit.substeps, fit.stop_reason),
     }
+
+
+def published(**changes: Any) -> pt.identification.IdentifiedModel:
+    """The published stage as an identified model."""
+    content: dict[str, Any] = {
+        "model": pt.DahlStage.xu_li_2010(),
+        "offset": 1e-6,
+        "offset_fitted": True,
+        "scale_assumed": False,
+        "stroke": 119e-6,
+    }
+    return pt.identification.IdentifiedModel(**(content | changes))

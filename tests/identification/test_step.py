@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import piezotrack as pt
 from folders import SHARED
 from piezotrack._support.files import write_columns
-from piezotrack.cli import app
+from piezotrack.cli.commands import app
 from records import BOX, TABLE_1, quick
 
 if TYPE_CHECKING:

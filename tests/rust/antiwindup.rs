@@ -140,7 +140,6 @@ fn the_learnt_voltage_is_bounded_by_the_range_of_the_limits() {
 
 #[test]
 fn a_reading_that_no_stage_can_have_is_no_measurement() {
-    let state_space = StateSpace::<2>::new(&[1.0], &[2e4], &[1.0], 0.0, None).unwrap();
     fn settles<F: Feedback + Copy>(controller: Controller<F>) {
         for reading in [9.91e37, -9.9e37, 1.0, -0.5, 0.02, f64::NAN, f64::INFINITY] {
             let mut run = Loop::new(controller);
@@ -154,6 +153,7 @@ fn a_reading_that_no_stage_can_have_is_no_measurement() {
             assert!(after < 1.2 * before + 1e-6, "{reading}: {before} m, then {after} m");
         }
     }
+    let state_space = StateSpace::<2>::new(&[1.0], &[2e4], &[1.0], 0.0, None).unwrap();
     settles(Controller::new(limits(), state_space));
     settles(Controller::new(limits(), pid()));
     settles(learning(SMOOTHINGS[2], |part| part.pause = false));

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
 
 import piezotrack as pt
-from piezotrack.cli import app
+from piezotrack.cli.commands import app
 from reference import multisine, sine, triangle
 
 if TYPE_CHECKING:

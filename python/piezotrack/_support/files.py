@@ -12,23 +12,37 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import DataError
+from .plot_style import without_glyph_warnings
+from .result_set import current_set, finish_others, together
+from .temporary import create, forget
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from matplotlib.figure import Figure
 
-__all__ = ["make_folder", "replacing", "save_figures", "write_columns", "write_document"]
+__all__ = [
+    "make_folder",
+    "replacing",
+    "save_figures",
+    "together",
+    "write_columns",
+    "write_document",
+]
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+def replacing(path: str | os.PathLike[str], *, synced: bool = False) -> Iterator[Path]:
     """Write to a temporary file beside `path`, which is renamed on success.
+
+    Within `together` it is renamed at the end of that.
 
     Parameters
     ----------
     path : path-like
         The file to write.
+    synced : bool, optional
+        Whether to wait until the disk has the content, for files that take long to compute.
 
     Yields
     ------
@@ -40,22 +54,27 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     DataError
         The folder is missing, or the file cannot be written.
     """
-    import tempfile
-
     file = Path(path)
+    results = current_set(file.parent)
     try:
-        handle, name = tempfile.mkstemp(prefix=".", suffix=file.suffix, dir=file.parent)
-        os.close(handle)
-        temporary = Path(name)
+        if results is None:
+            finish_others(file.parent)
+        temporary = create(file.parent, file.suffix)
         try:
             yield temporary
-            # mkstemp makes files readable by their owner only.
-            mask = os.umask(0)
-            os.umask(mask)
-            temporary.chmod(0o666 & ~mask)
-            temporary.replace(file)
-        finally:
+            if synced:
+                with temporary.open("rb+") as content:
+                    os.fsync(content.fileno())
+            if results is None:
+                temporary.replace(file)
+            else:
+                results.add(temporary, file)
+        except BaseException:
             temporary.unlink(missing_ok=True)
+            raise
+        finally:
+            if results is None:
+                forget(temporary)
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise DataError(f"{file} cannot be written: {reason}") from None
@@ -76,9 +95,10 @@ def write_columns(path: Path, columns: Mapping[str, np.ndarray]) -> Path:
     pathlib.Path
         The file.
     """
-    with replacing(path) as temporary:
+    # NumPy opens a name only where there is a working folder.
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8") as file:
         np.savetxt(
-            temporary,
+            file,
             np.column_stack(list(columns.values())),
             delimiter=",",
             fmt="%.10g",
@@ -93,7 +113,7 @@ def write_document(path: str | os.PathLike[str], document: Mapping[str, Any]) ->
     import json
 
     text = json.dumps(_finite(document), indent=2, allow_nan=False)
-    with replacing(path) as temporary:
+    with replacing(path, synced=True) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
     return Path(path)
 
@@ -145,14 +165,15 @@ def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
 
     written = []
     try:
-        for name, figure in figures.items():
-            for ending in ("png", "svg"):
-                path = folder / f"{name}.{ending}"
-                # Without a date and with fixed ids, the same result gives the same file.
-                stamp = {"Date": None} if ending == "svg" else {}
-                with replacing(path) as temporary, mpl.rc_context({"svg.hashsalt": name}):
-                    figure.savefig(temporary, dpi=150, metadata=stamp)
-                written.append(path)
+        with together(folder), without_glyph_warnings():
+            for name, figure in figures.items():
+                for ending in ("png", "svg"):
+                    path = folder / f"{name}.{ending}"
+                    # Without a date and with fixed ids, the same result gives the same file.
+                    stamp = {"Date": None} if ending == "svg" else {}
+                    with replacing(path) as temporary, mpl.rc_context({"svg.hashsalt": name}):
+                        figure.savefig(temporary, dpi=150, metadata=stamp)
+                    written.append(path)
     finally:
         for figure in figures.values():
             plt.close(figure)

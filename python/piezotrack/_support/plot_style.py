@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
+import warnings
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
 
-__all__ = ["ACTUAL", "DESIRED", "MEASURED", "above", "axes_or_new", "plain_log_ticks", "thinned"]
+__all__ = [
+    "ACTUAL",
+    "DESIRED",
+    "MEASURED",
+    "above",
+    "axes_or_new",
+    "literal",
+    "plain_log_ticks",
+    "thinned",
+    "without_glyph_warnings",
+]
 
 # Distinct in black and white too, also where many cycles overlap.
 MEASURED: dict[str, Any] = {"color": "0.68", "linewidth": 3.2, "label": "measured"}
@@ -66,6 +78,24 @@ def plain_log_ticks(ax: Axes) -> None:
         ax.yaxis.set_minor_formatter(plain)
     else:
         ax.yaxis.set_minor_formatter(LogFormatter(labelOnlyBase=True))
+
+
+def literal(words: str) -> str:
+    """Write words from outside, as names and units, so that matplotlib shows them as they are.
+
+    A dollar sign would begin a formula; a control character has no glyph and is shown as Python
+    writes it.
+    """
+    shown = "".join(one if one.isprintable() else ascii(one)[1:-1] for one in words)
+    return shown.replace("$", r"\$")
+
+
+@contextmanager
+def without_glyph_warnings() -> Iterator[None]:
+    """Draw a box for a letter that the font does not have, without a warning for each."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", r"Glyph \d+ .*missing from", UserWarning)
+        yield
 
 
 def above(ax: Axes) -> None:

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from types import TracebackType
 
-__all__ = ["ProgressBar"]
+    from rich.console import Console
+
+__all__ = ["ProgressBar", "console"]
+
+
+def console() -> Console:
+    """Make the console of progress bars: stderr, without the escapes of the command's own."""
+    from rich.console import Console
+
+    return Console(file=getattr(sys.stderr, "unescaped", None), stderr=True)
 
 
 class ProgressBar:
@@ -20,10 +30,8 @@ class ProgressBar:
     """
 
     def __init__(self, show: bool | None) -> None:
-        from rich.console import Console
-
-        console = Console(stderr=True)
-        looking = console.is_terminal or console.is_jupyter
+        place = console()
+        looking = place.is_terminal or place.is_jupyter
         self._bar = None
         if looking if show is None else show:
             from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -34,7 +42,7 @@ class ProgressBar:
                 TextColumn("{task.completed:.0f} of at most {task.total:.0f} iterations"),
                 TextColumn("best {task.fields[cost]} um"),
                 TimeElapsedColumn(),
-                console=console,
+                console=place,
                 transient=True,
             )
             self._task = self._bar.add_task("search", total=1.0, cost="-")

@@ -1,70 +1,30 @@
-"""The command ``piezotrack``."""
+"""The command ``piezotrack``.
+
+This file imports little, so that Ctrl-C is answered in words from the first instant on.
+"""
 
 from __future__ import annotations
 
-import io
-import sys
-from typing import Annotated
+import os
 
-import typer
-
-from .. import __version__
-from .compare import compare_command
-from .contour import contour_command
-from .demo import demo_command
-from .identify import identify_command
-from .noise import noise_command
-from .reproduce import reproduce_command
-from .simulate import simulate_command
-from .step import step_command
-from .track import feedforward_command, track_command
-
-__all__ = ["app", "main"]
-
-app = typer.Typer(
-    help="Hysteresis identification and tracking control of piezo nanopositioners.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
+__all__ = ["main"]
 
 
 def main() -> None:
     """Run the command with the arguments of the process."""
-    import matplotlib as mpl
+    try:
+        from . import interruption
 
-    # No window is ever opened.
-    mpl.use("Agg")
-    # The name of a file may have characters that the terminal cannot print.
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
-    app()
+        interruption.answer_signals()
+    except KeyboardInterrupt:
+        os.write(2, b"piezotrack: interrupted\n")
+        os._exit(130)
+    from .terminal import prepare_streams
 
+    prepare_streams()
+    try:
+        from .commands import run
 
-def _version(requested: bool) -> None:
-    if requested:
-        print(f"piezotrack {__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def _options(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
-    ] = False,
-) -> None:
-    """Declare the options of the command itself."""
-
-
-app.command("identify")(identify_command)
-app.command("compare")(compare_command)
-app.command("step")(step_command)
-app.command("simulate")(simulate_command)
-app.command("feedforward")(feedforward_command)
-app.command("track")(track_command)
-app.command("contour")(contour_command)
-app.command("noise")(noise_command)
-app.command("reproduce")(reproduce_command)
-app.command("demo")(demo_command)
+        run()
+    finally:
+        interruption.leave_if_stopped()

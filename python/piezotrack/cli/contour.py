@@ -198,9 +198,14 @@ def _cross_talk(stage: XYStage) -> CrossTalk:
 def _write(run: Contour, out: Path) -> list[Path]:
     """Write the samples as CSV, the metrics as JSON, and the picture."""
     from .. import __version__
-    from .._support.files import make_folder, save_figures, write_columns, write_document
+    from .._support.files import (
+        make_folder,
+        save_figures,
+        together,
+        write_columns,
+        write_document,
+    )
 
-    folder = make_folder(out)
     table = {"time_s": run.t}
     for name, axis in (("x", run.x), ("y", run.y)):
         table |= {
@@ -209,7 +214,6 @@ def _write(run: Contour, out: Path) -> list[Path]:
             f"voltage_{name}_V": axis.voltage,
         }
     table["contour_error_um"] = 1e6 * run.error
-    written = [write_columns(folder / "contour.csv", table)]
     document = {
         "format": "piezotrack-contour",
         "schema_version": 1,
@@ -223,18 +227,21 @@ def _write(run: Contour, out: Path) -> list[Path]:
         "feedforward": run.x.note,
         "provenance": {"package": "piezotrack", "version": __version__},
     }
-    written.append(write_document(folder / "contour.json", document))
-    return [*written, *save_figures({"contour": run.plot()}, folder)]
+    with together(make_folder(out)) as folder:
+        return [
+            write_columns(folder / "contour.csv", table),
+            write_document(folder / "contour.json", document),
+            *save_figures({"contour": run.plot()}, folder),
+        ]
 
 
 def _write_table(table: Table2, out: Path) -> list[Path]:
     """Write the table with published and obtained values, and the pictures."""
     import numpy as np
 
-    from .._support.files import make_folder, save_figures, write_columns
+    from .._support.files import make_folder, save_figures, together, write_columns
     from ..xu_li_2010.table_2 import PUBLISHED
 
-    folder = make_folder(out)
     columns = {
         "radius_um": [1e6 * case.radius for case in PUBLISHED],
         "frequency_Hz": [case.frequency for case in PUBLISHED],
@@ -247,8 +254,9 @@ def _write_table(table: Table2, out: Path) -> list[Path]:
         columns[f"published_{name}_um"] = [1e6 * getattr(case, name) for case in PUBLISHED]
         columns[f"obtained_{name}_um"] = [1e6 * getattr(run.metrics, ours) for run in table.runs]
     arrays = {name: np.array(values) for name, values in columns.items()}
-    written = [write_columns(folder / "table_2.csv", arrays)]
     figures = {"table_2": table.plot()}
     for case, run in zip(PUBLISHED, table.runs, strict=True):
         figures[f"circle_{1e6 * case.radius:.0f}um_{case.frequency:g}Hz"] = run.plot()
-    return written + save_figures(figures, folder)
+    with together(make_folder(out)) as folder:
+        written = write_columns(folder / "table_2.csv", arrays)
+        return [written, *save_figures(figures, folder)]

@@ -19,7 +19,7 @@ def demo_command(
     seed: Annotated[int, typer.Option(help="Seed of the noise and of the search.")] = 1,
 ) -> None:
     """Identify a model from a simulated log, and track a reference with it."""
-    from .._support.files import make_folder, save_figures
+    from .._support.files import make_folder, save_figures, together
     from ..identification.report import save_identification
     from ..xu_li_2010.demo import demo_log, identify_demo, track_demo, write_log
 
@@ -28,9 +28,10 @@ def demo_command(
     fit = identify_demo(log, seed=seed)
     rest = fit.score(log.full[fit.data.t[-1] :], offset=fit.offset)
     runs = track_demo(fit, seed)
-    folder = make_folder(out)
-    written = [write_log(log, folder / "log.csv"), *save_identification(fit, folder, shown=log)]
-    written += save_figures({f"track_{name}": run.plot() for name, run in runs.items()}, folder)
+    with together(make_folder(out)) as folder:
+        written = [write_log(log, folder / "log.csv")]
+        written += save_identification(fit, folder, shown=log)
+        written += save_figures({f"track_{name}": run.plot() for name, run in runs.items()}, folder)
     print(
         "The virtual stage, which no model matches exactly, is driven 12 s with 0.25 Hz, 0 to 75 V."
     )

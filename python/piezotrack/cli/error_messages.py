@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import sys
+from contextlib import suppress
 from functools import wraps
 from typing import TYPE_CHECKING, ParamSpec
 
 import typer
 
 from ..errors import PiezotrackError
+from .interruption import at_rest, at_work, exit_code, stopped
+from .terminal import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["in_words"]
+__all__ = ["in_words", "of_the_system"]
 
 BAD_INPUT = 2
-INTERRUPTED = 130
 NOT_PRINTED = 1
+
+# Reasons for which the output cannot be printed.
+OUTPUT = (errno.ENOSPC, errno.EIO, errno.EBADF, errno.EDQUOT, errno.EFBIG)
 
 P = ParamSpec("P")
 
@@ -30,23 +36,65 @@ def in_words(command: Callable[P, None]) -> Callable[P, None]:
     @wraps(command)
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
         try:
-            command(*args, **kwargs)
-            sys.stdout.flush()
-        except PiezotrackError as error:
-            print(f"piezotrack: {_as_options(str(error))}", file=sys.stderr)
-            raise typer.Exit(BAD_INPUT) from None
+            with at_work():
+                command(*args, **kwargs)
+                sys.stdout.flush()
         except KeyboardInterrupt as error:
-            print(f"piezotrack: {str(error) or 'interrupted'}", file=sys.stderr)
-            raise typer.Exit(INTERRUPTED) from None
-        except OSError as error:
-            # All results have been written before anything is printed.
-            if not isinstance(error, BrokenPipeError):
-                print(f"piezotrack: cannot print: {error.strerror}", file=sys.stderr)
-            # Discard the rest of the output, or Python would report an error when it exits.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            raise typer.Exit(NOT_PRINTED) from None
+            code = _stopped(error)
+        except Exception as error:
+            if stopped():
+                # A module that was being imported has turned the interruption into another error.
+                code = _stopped(KeyboardInterrupt())
+            elif isinstance(error, PiezotrackError):
+                _say(_as_options(str(error)))
+                code = BAD_INPUT
+            elif isinstance(error, OSError):
+                code = of_the_system(error)
+            else:
+                raise
+        else:
+            return
+        raise typer.Exit(code)
 
     return run
+
+
+def _say(sentence: str) -> None:
+    # There is nowhere to say that it cannot be said.
+    with suppress(OSError):
+        print(f"piezotrack: {one_line(sentence)}", file=sys.stderr, flush=True)
+
+
+def _stopped(error: KeyboardInterrupt) -> int:
+    at_rest()
+    _say(str(error) or "interrupted")
+    return exit_code()
+
+
+def of_the_system(error: OSError) -> int:
+    """Say which file an error is about, or that nothing can be printed.
+
+    Parameters
+    ----------
+    error : OSError
+        Of a file, or of the output.
+
+    Returns
+    -------
+    int
+        The exit code.
+    """
+    reason = (error.strerror or str(error)).lower()
+    if error.filename is not None:
+        _say(f"{error.filename}: {reason}")
+        return BAD_INPUT
+    # Without a file it is the output, printed when all results have been written. The rest of it is
+    # discarded, or Python would report an error when it exits.
+    with suppress(OSError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    if not isinstance(error, BrokenPipeError):
+        _say(f"cannot print: {reason}" if error.errno in OUTPUT else reason)
+    return NOT_PRINTED
 
 
 # Advice of the library in Python, and the option that does the same.

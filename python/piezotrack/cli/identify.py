@@ -10,6 +10,7 @@ import typer
 
 from ..errors import Interrupted, ParameterError
 from .error_messages import in_words
+from .interruption import heard
 from .options import (
     Columns,
     DisplacementColumn,
@@ -175,6 +176,7 @@ def _search(log: Dataset, out: Path, kind: str, **arguments: Any) -> Identificat
     try:
         return identify(log, kind, **arguments)
     except Interrupted as stopped:
+        heard()
         if stopped.partial is None:
             raise
         path = stopped.partial.save(make_folder(out) / _partial(kind))
@@ -185,14 +187,13 @@ def _write(
     fit: Identification, out: Path, second: Dataset | None, score: Score | None
 ) -> list[Path]:
     """Write the model, with its validation on a second log, and the pictures."""
-    from .._support.files import save_figures
+    from .._support.files import make_folder, save_figures, together
     from ..identification.plot import plot_loop, plot_time
     from ..identification.report import save_identification
 
     kind = fit.model.info
-    if second is None or score is None:
-        written = save_identification(fit, out)
-    else:
+    figures = {}
+    if second is not None and score is not None:
         judged = {
             "source": second.source,
             "sha256": second.sha256,
@@ -202,13 +203,14 @@ def _write(
             "offset": {"value": score.offset, "unit": "m"},
         }
         fit = replace(fit, details={**fit.details, "validation": judged})
-        written = save_identification(fit, out)
         run = fit.simulate(second)
         figures = {
             f"{kind.name}_validation_loop": plot_loop(second, run).figure,
             f"{kind.name}_validation_time": plot_time(second, run, stroke=fit.stroke)[0].figure,
         }
-        written += save_figures(figures, out)  # type: ignore[arg-type]
+    with together(make_folder(out)) as folder:
+        written = save_identification(fit, folder)
+        written += save_figures(figures, folder)  # type: ignore[arg-type]
     # The result is complete: remove the file of an interrupted search.
     (out / _partial(kind.name)).unlink(missing_ok=True)
     return written

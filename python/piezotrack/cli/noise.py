@@ -41,7 +41,7 @@ def noise_command(
     dt: Interval = None,
 ) -> None:
     """Analyse a record at rest: rms, resolution, spectrum and a model of the noise."""
-    from .._support.files import make_folder, save_figures
+    from .._support.files import make_folder, save_figures, together
     from ..data.reader import read_displacement
     from ..identification.sensor_noise import identify_noise
 
@@ -53,8 +53,8 @@ def noise_command(
     log = windowed(log, file, "--window", window)
     with of_file(file):
         found = identify_noise(log)
-    folder = make_folder(out)
-    written = [_write(found, folder), *save_figures({"noise": found.plot()}, folder)]
+    with together(make_folder(out)) as folder:
+        written = [_write(found, folder), *save_figures({"noise": found.plot()}, folder)]
     print(found.summary())
     list_files(written)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from ..errors import ParameterError, PiezotrackError
+from .terminal import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -129,9 +130,14 @@ def of_file(file: Path) -> Iterator[None]:
 def can_be_folder(out: Path) -> None:
     """Refuse a folder that cannot be written to before the computation begins."""
     there = out
-    while not there.exists() and there != there.parent:
-        there = there.parent
-    if not there.is_dir():
+    try:
+        while not there.exists() and there != there.parent:
+            there = there.parent
+        is_folder = there.is_dir()
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise ParameterError(f"--out: {out} cannot be made a folder: {reason}") from None
+    if not is_folder:
         raise ParameterError(f"--out: {out} cannot be made a folder: {there} is a file")
     if not os.access(there, os.W_OK | os.X_OK):
         raise ParameterError(f"--out: {there} cannot be written to: permission denied")
@@ -141,7 +147,7 @@ def list_files(written: Iterable[Path]) -> None:
     """Print which files were written."""
     print("\nwritten")
     for path in written:
-        print(f"  {path}")
+        print(f"  {one_line(str(path))}")
 
 
 def seconds(option: str, text: str) -> tuple[float | None, float | None]:

@@ -38,7 +38,7 @@ def simulate_command(
     hold: HoldOption = "foh",
 ) -> None:
     """Simulate the response of a model to a drive: a CSV with the displacement, and a picture."""
-    from .._support.files import make_folder, save_figures, write_columns
+    from .._support.files import make_folder, save_figures, together, write_columns
     from ..data.reader import read_drive
     from ..identification.identified import load
     from ..identification.plot import plot_response
@@ -51,10 +51,10 @@ def simulate_command(
     can_be_folder(out)
     with of_file(drive_file):
         x = known.displacement(u, float(t[-1] - t[0]) / (t.size - 1), hold=hold)
-    folder = make_folder(out)
     table = {"time_s": t, "voltage_V": u, "displacement_um": 1e6 * x}
-    written = [write_columns(folder / "simulated.csv", table)]
-    written += save_figures({"simulated": plot_response(t, u, x)}, folder)
+    with together(make_folder(out)) as folder:
+        written = [write_columns(folder / "simulated.csv", table)]
+        written += save_figures({"simulated": plot_response(t, u, x)}, folder)
     print(
         f"{t.size} samples from rest, drive from {u.min():.4g} to {u.max():.4g} V: displacement "
         f"from {1e6 * x.min():.4g} to {1e6 * x.max():.4g} um"

@@ -55,7 +55,7 @@ def step_command(
     ] = None,
 ) -> None:
     """Identify frequency, damping and hysteresis parameters from a step response."""
-    from .._support.files import make_folder, save_figures
+    from .._support.files import make_folder, save_figures, together
     from ..identification.step_response import identify_step
 
     log = Columns(time, drive, displacement, unit, dt).read(file, hold)
@@ -64,8 +64,8 @@ def step_command(
     level = None if second_level is None else _level(second_level)
     with of_file(file):
         step = identify_step(log, stiffness=stiffness, mass=mass, second_level=level)
-    folder = make_folder(out)
-    written = [_write(step, folder), *save_figures({"step": step.plot()}, folder)]
+    with together(make_folder(out)) as folder:
+        written = [_write(step, folder), *save_figures({"step": step.plot()}, folder)]
     print(step.summary())
     options = " ".join(f"--fix {name}={value:.8g}" for name, value in step.hysteresis.items())
     print(f"\nto hold these in a search: piezotrack identify LOG {options}")

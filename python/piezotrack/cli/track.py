@@ -144,7 +144,7 @@ def feedforward_command(
     period: Period = None,
 ) -> None:
     """Compute the feedforward voltage for a reference: a CSV and a picture."""
-    from .._support.files import make_folder, save_figures, write_columns
+    from .._support.files import make_folder, save_figures, together, write_columns
     from ..control.tracking_plot import plot_feedforward
     from ..identification.identified import load
 
@@ -156,12 +156,11 @@ def feedforward_command(
     voltage, how = known.inverse(playback="online" if online else "table").played(
         desired, interval, samples=samples
     )
-    folder = make_folder(out)
     table = {"time_s": samples.t, "voltage_V": voltage, "displacement_um": 1e6 * samples.x}
-    written = [write_columns(folder / "feedforward.csv", table)]
-    written += save_figures(
-        {"feedforward": plot_feedforward(samples.t, voltage, samples.x)}, folder
-    )
+    with together(make_folder(out)) as folder:
+        written = [write_columns(folder / "feedforward.csv", table)]
+        picture = plot_feedforward(samples.t, voltage, samples.x)
+        written += save_figures({"feedforward": picture}, folder)
     print(f"{desired!r} at {1.0 / interval:g} Hz; {how}")
     print(f"{voltage.size} samples, voltage from {voltage.min():.4g} to {voltage.max():.4g} V")
     _note_range(known, voltage)
@@ -207,9 +206,14 @@ def _reference(text: str, duration: float | None, period: float | None) -> Refer
 def _write(run: Tracking, known: IdentifiedModel, loop: Controller, out: Path) -> list[Path]:
     """Write the samples as CSV, the metrics as JSON, and the pictures."""
     from .. import __version__
-    from .._support.files import make_folder, save_figures, write_columns, write_document
+    from .._support.files import (
+        make_folder,
+        save_figures,
+        together,
+        write_columns,
+        write_document,
+    )
 
-    folder = make_folder(out)
     table = {
         "time_s": run.t,
         "desired_um": 1e6 * run.desired,
@@ -219,7 +223,6 @@ def _write(run: Tracking, known: IdentifiedModel, loop: Controller, out: Path) -
         "feedback_V": run.feedback,
         "repetitive_V": run.repetitive,
     }
-    written = [write_columns(folder / "tracking.csv", table)]
     document: dict[str, Any] = {
         "format": "piezotrack-tracking",
         "schema_version": 1,
@@ -236,5 +239,9 @@ def _write(run: Tracking, known: IdentifiedModel, loop: Controller, out: Path) -
         "model_drive_range": known.drive_range,
         "provenance": {"package": "piezotrack", "version": __version__},
     }
-    written.append(write_document(folder / "tracking.json", document))
-    return [*written, *save_figures({"tracking": run.plot()}, folder)]
+    with together(make_folder(out)) as folder:
+        return [
+            write_columns(folder / "tracking.csv", table),
+            write_document(folder / "tracking.json", document),
+            *save_figures({"tracking": run.plot()}, folder),
+        ]

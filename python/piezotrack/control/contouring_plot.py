@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import matplotlib.pyplot as plt
 import numpy as np
 
-from .._support.plot_style import ACTUAL, DESIRED, above, axes_or_new
+from .._support.plot_style import ACTUAL, DESIRED, above, axes_or_new, literal
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -158,7 +158,7 @@ def plot_contour(run: Contour) -> Figure:
     plot_contour_error(run, contour)
     found = run.metrics
     figure.suptitle(
-        f"{run.path.name}: contour error {1e6 * found.peak_to_peak:.3f} um peak to peak, "
+        f"{literal(run.path.name)}: contour error {1e6 * found.peak_to_peak:.3f} um peak to peak, "
         f"mean {1e6 * found.mean_error:.3f} um, SD {1e6 * found.sd_error:.3f} um"
     )
     return figure

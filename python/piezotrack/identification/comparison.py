@@ -195,12 +195,14 @@ class Comparison:
         DataError
             The folder cannot be made or written to.
         """
-        from .._support.files import make_folder, save_figures
+        from .._support.files import make_folder, save_figures, together
 
-        path = make_folder(folder)
-        written = [write_document(path / "comparison.json", self.document())]
-        written += [row.fit.save(path / f"{row.name}.json") for row in self.rows]
-        return [*written, *save_figures({"comparison": self.plot()}, path)]
+        with together(make_folder(folder)) as path:
+            return [
+                write_document(path / "comparison.json", self.document()),
+                *(row.fit.save(path / f"{row.name}.json") for row in self.rows),
+                *save_figures({"comparison": self.plot()}, path),
+            ]
 
 
 def compare(

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from textwrap import fill
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._support.plot_style import MEASURED, thinned
+from .._support.plot_style import MEASURED, literal, thinned
 from .._support.units import best_length_unit
 
 if TYPE_CHECKING:
@@ -73,10 +73,10 @@ def _loops(comparison: Comparison, ax: Axes) -> None:
     unit, scale = best_length_unit(data.stroke)
     ax.plot(data.u[part], scale * data.y[part], **MEASURED)
     for row, x, line in zip(comparison.rows, followed, _lines(comparison), strict=True):
-        ax.plot(data.u[part], scale * x[part], label=row.title, linewidth=1.1, **line)
-    ax.set(xlabel=f"drive [{data.drive_unit}]", ylabel=f"displacement [{unit}]")
+        ax.plot(data.u[part], scale * x[part], label=literal(row.title), linewidth=1.1, **line)
+    ax.set(xlabel=f"drive [{literal(data.drive_unit)}]", ylabel=f"displacement [{unit}]")
     when = f"{data.t[part][0]:.4g} to {data.t[part][-1]:.4g} s"
-    where = "" if comparison.carried else f" of {data.source or 'the other record'}"
+    where = "" if comparison.carried else f" of {literal(data.source or 'the other record')}"
     ax.set_title(f"Largest error: {when}{where}", fontsize="medium")
     ax.legend(loc="lower right", frameon=False, fontsize="small")
 
@@ -100,11 +100,15 @@ def _bars(comparison: Comparison, ax: Axes) -> None:
         lengths = [score.rms_percent for score in scores]
         bars = ax.barh(places + shift, lengths, height=0.38, **style)
         ax.bar_label(bars, fmt=" %.3g", fontsize="small")
-    ax.set_yticks(places, [fill(row.title, LABEL) for row in rows])
+    ax.set_yticks(places, [_in_lines(row.title) for row in rows])
     ax.invert_yaxis()
     ax.margins(x=0.15)
     ax.set(xlabel="rms error [% of stroke]")
     ax.legend(fontsize="small", frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+
+
+def _in_lines(title: str) -> str:
+    return "\n".join(literal(line) for line in wrap(title, LABEL))
 
 
 def _errors(comparison: Comparison, axes: list[Axes]) -> None:
@@ -150,7 +154,7 @@ def _errors(comparison: Comparison, axes: list[Axes]) -> None:
 
 
 def _heading(row: ModelScore) -> str:
-    best = f"{row.title}: rms {row.train.rms_percent:.3g} % fitted"
+    best = f"{literal(row.title)}: rms {row.train.rms_percent:.3g} % fitted"
     return f"{best}, {row.test.rms_percent:.3g} % not fitted"
 
 

@@ -12,7 +12,7 @@ from .. import _core
 from .._support.files import write_document
 from ..data.dataset import Dataset
 from ..errors import ParameterError
-from .model_file import document_of, read_model
+from .model_file import document_of, read_model, sensor_number
 
 if TYPE_CHECKING:
     import os
@@ -107,8 +107,8 @@ class IdentifiedModel:
     @property
     def _record(self) -> Mapping[str, Any]:
         """Entries of the file on the record identified."""
-        found: Mapping[str, Any] = self.details.get("provenance", {}).get("data", {})
-        return found
+        origin: Mapping[str, Any] = self.details.get("provenance") or {}
+        return origin.get("data") or {}
 
     @property
     def free_count(self) -> int | None:
@@ -120,7 +120,8 @@ class IdentifiedModel:
         found = self.details.get("parameters", {})
         if not any("free" in entry for entry in found.values()):
             return None
-        free = [name for name, entry in found.items() if entry.get("free", False)]
+        own = self.model.parameter_names()
+        free = [name for name in own if found.get(name, {}).get("free", False)]
         delay = bool(self.details.get("delay", {}).get("free", False))
         return sum(_count(getattr(self.model, name)) for name in free) + delay + self.offset_fitted
 
@@ -319,13 +320,11 @@ class IdentifiedModel:
         DataError
             The file cannot be written.
         ParameterError
-            Offset, stroke or delay are not finite numbers.
+            Offset, stroke or delay are not finite numbers, or beyond what a stage can have.
         """
         # Refuse now what `load` would refuse, while the fit still exists.
-        numbers = {"offset": self.offset, "stroke": self.stroke, "delay": self.delay}
-        for name, value in numbers.items():
-            if not math.isfinite(_core.as_number(name, value)):
-                raise ParameterError(f"{name} is {value}: expected a finite number")
+        for name in ("offset", "stroke", "delay"):
+            sensor_number(name, getattr(self, name))
         return write_document(path, self.document())
 
 

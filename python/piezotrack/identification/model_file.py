@@ -8,17 +8,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import _core
+from .._support.json_text import number_pair, object_of, parse_json, text_of
 from ..errors import DataError, ParameterError, PiezotrackError
 from ..stages.registry import model_named, stage_class
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from ..data.dataset import Dataset
     from .identified import IdentifiedModel
 
-__all__ = ["document_of", "provenance", "read_model"]
+__all__ = ["document_of", "provenance", "read_model", "sensor_number"]
 
 FORMAT = "piezotrack-model"
 SCHEMA_VERSION = 2
@@ -38,6 +39,12 @@ OWN = {
     "offset",
     "stroke",
     "delay",
+}
+# Unit and limits of the numbers that go with a stage. What is beyond them is in another unit.
+SENSOR: dict[str, tuple[str, Callable[[float], bool], str]] = {
+    "offset": ("m", lambda value: abs(value) < 1.0, "a finite number between -1 and 1"),
+    "stroke": ("m", lambda value: value > 0.0, "a finite number above 0"),
+    "delay": ("s", lambda value: 0.0 <= value <= 1000.0, "a finite number from 0 to 1000"),
 }
 # Entries of a parameter that are not details of the fit.
 FACTS = ("value", "unit", "symbol")
@@ -119,19 +126,29 @@ def read_model(path: str | os.PathLike[str]) -> dict[str, Any]:
             if one.is_list:
                 values[one.name] = tuple(values[one.name])
         delay = document["delay"]
+        _check_origin(document.get("provenance"))
         return {
             "model": stage_class(info)(**values),
-            "offset": file_number("offset", document["offset"], "m"),
+            "offset": file_number("offset", document["offset"]),
             "offset_fitted": _core.as_truth("offset fitted", document["offset"]["fitted"]),
             "scale_assumed": _core.as_truth("scale_assumed", document["scale_assumed"]),
-            "stroke": file_number("stroke", document["stroke"], "m", above=0.0),
-            "delay": file_number("delay", delay, "s", least=0.0),
+            "stroke": file_number("stroke", document["stroke"]),
+            "delay": file_number("delay", delay),
             "details": {
                 "parameters": {key: _fit_details(entry) for key, entry in parameters.items()},
                 "delay": _fit_details(delay),
                 **{key: value for key, value in document.items() if key not in OWN},
             },
         }
+
+
+def _check_origin(found: Any) -> None:
+    """Refuse entries on the record identified that cannot be used."""
+    record = object_of("provenance: data", object_of("provenance", found).get("data"))
+    for name in ("source", "sha256"):
+        text_of(f"provenance: data: {name}", record.get(name))
+    for name in ("window_s", "drive_range"):
+        number_pair(f"provenance: data: {name}", record.get(name))
 
 
 def _fit_details(entry: Mapping[str, Any]) -> dict[str, Any]:
@@ -172,24 +189,17 @@ def read_document(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
     DataError
         The file is missing, is not a model file, or was written by a newer version.
     """
-    import json
-
     try:
         file = Path(path)
     except TypeError:
         raise ParameterError(f"path is {path!r}: expected the name of a file") from None
     try:
-        document = json.loads(file.read_text(encoding="utf-8"))
+        content = file.read_bytes()
     except OSError as error:
         raise DataError(f"{file.name}: {(error.strerror or str(error)).lower()}") from None
-    except RecursionError:
-        raise DataError(f"{file.name} is not a piezotrack model: nested too deep") from None
-    except UnicodeDecodeError:
-        raise DataError(f"{file.name} is not a text file: expected a model in JSON") from None
-    except json.JSONDecodeError as error:
-        raise DataError(f"{file.name}:{error.lineno}: not JSON: {error.msg}") from None
     except ValueError as error:
         raise DataError(f"{file.name} cannot be read: {error}") from None
+    document = parse_json(file.name, content)
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise DataError(f"{file.name} is not a piezotrack model: its 'format' is not '{FORMAT}'")
     version = document.get("schema_version")
@@ -208,7 +218,7 @@ def entries_of(name: str) -> Iterator[None]:
         yield
     except KeyError as error:
         raise DataError(f"{name}: the entry {error} is missing") from None
-    except (TypeError, AttributeError):
+    except (TypeError, AttributeError, OverflowError):
         raise DataError(f"{name}: an entry is not of the form that 'save' writes") from None
     except PiezotrackError as error:
         raise DataError(f"{name}: {error}") from None
@@ -240,18 +250,34 @@ def require_unit(name: str, entry: Mapping[str, Any], unit: str) -> None:
         raise ParameterError(f"the unit of {name} is {entry.get('unit')!r}: expected {unit!r}")
 
 
-def file_number(
-    name: str,
-    entry: Mapping[str, Any],
-    unit: str,
-    *,
-    above: float = -math.inf,
-    least: float = -math.inf,
-) -> float:
-    """Take a length or a time from the file."""
-    require_unit(name, entry, unit)
-    value = _core.as_number(name, entry["value"])
-    if not math.isfinite(value) or value <= above or value < least:
-        limit = " above 0" if above == 0.0 else ", 0 or above" if least == 0.0 else ""
-        raise ParameterError(f"{name} is {value} {unit}: expected a finite number{limit}")
-    return value
+def file_number(name: str, entry: Mapping[str, Any]) -> float:
+    """Take offset, stroke or delay from the file."""
+    require_unit(name, entry, SENSOR[name][0])
+    return sensor_number(name, entry["value"])
+
+
+def sensor_number(name: str, value: object) -> float:
+    """Check a number of the sensor, when it is saved and when it is loaded.
+
+    Parameters
+    ----------
+    name : {"offset", "stroke", "delay"}
+        Which one.
+    value : object
+        Its value, SI.
+
+    Returns
+    -------
+    float
+        The value.
+
+    Raises
+    ------
+    ParameterError
+        It is no number that such a sensor can have.
+    """
+    unit, fits, expected = SENSOR[name]
+    number = _core.as_number(name, value)
+    if not (math.isfinite(number) and fits(number)):
+        raise ParameterError(f"{name} is {number} {unit}: expected {expected}")
+    return number

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._support.plot_style import MEASURED, axes_or_new, plain_log_ticks, thinned
+from .._support.plot_style import MEASURED, axes_or_new, literal, plain_log_ticks, thinned
 from .._support.units import best_length_unit
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def plot_loop(data: Dataset, run: Response, ax: Axes | None = None) -> Axes:
     for y, style in ((data.y, MEASURED), (run.x, SIMULATED)):
         kept = thinned(y)
         ax.plot(data.u[kept], scale * y[kept], **style)
-    ax.set(xlabel=f"drive [{data.drive_unit}]", ylabel=f"displacement [{unit}]")
+    ax.set(xlabel=f"drive [{literal(data.drive_unit)}]", ylabel=f"displacement [{unit}]")
     ax.set_title("Hysteresis loop")
     ax.legend(loc="upper left", frameon=False)
     return ax

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from .._support.files import make_folder, save_figures
+from .._support.files import make_folder, save_figures, together
 
 if TYPE_CHECKING:
     import os
@@ -196,7 +196,6 @@ def save_identification(
     """
     from .plot import plot_convergence, plot_loop, plot_time
 
-    path = make_folder(folder)
     name = fit.model.info.name if name is None else name
     record = fit.data if shown is None else shown
     run = fit.simulate(record, offset=fit.offset)
@@ -207,4 +206,5 @@ def save_identification(
     }
     if fit.swarm is not None:
         figures[f"{name}_convergence"] = plot_convergence(fit).figure
-    return [fit.save(path / f"{name}.json"), *save_figures(figures, path)]  # type: ignore[arg-type]
+    with together(make_folder(folder)) as path:
+        return [fit.save(path / f"{name}.json"), *save_figures(figures, path)]  # type: ignore[arg-type]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, fields, replace
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
+from .._support.json_text import parse_json
 from ..control.controller import Controller
 from ..stages.virtual import VirtualStage
 from ..stages.xy import XYStage
@@ -112,8 +112,8 @@ class Apparatus:
 
 def calibration_file() -> dict[str, Any]:
     """Read the result of the calibration, with its provenance."""
-    text = files(__package__).joinpath("calibrated.json").read_text(encoding="utf-8")
-    document: dict[str, Any] = json.loads(text)
+    name = "calibrated.json"
+    document: dict[str, Any] = parse_json(name, files(__package__).joinpath(name).read_bytes())
     return document
 
 

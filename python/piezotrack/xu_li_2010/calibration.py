@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import _core
+from .._support.two_threads import two_threads
 from ..control.tracking import check_stable
 from ..errors import PiezotrackError
 from ..identification.fit import identify
@@ -123,7 +123,7 @@ def _round(
 ) -> tuple[float, dict[str, float]]:
     """Search a box with the swarm of the core: best cost and candidate."""
     swarm = _core.Swarm(settings._core, len(box), seed)
-    with ThreadPoolExecutor(max_workers=2) as pool:
+    with two_threads() as pool:
         for iteration in range(settings.iterations + 1):
             places = [None if one is None else theta_at(one, box) for one in swarm.ask()]
             swarm.tell(list(pool.map(lambda theta: _cost_at(theta, seeds), places)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from .._support.json_text import parse_json
 from ..identification.step_readings import StepReadings
 from ..stages.dahl import DahlStage
 from .table_2 import PUBLISHED
@@ -140,10 +140,11 @@ class Obtained:
 @cache
 def observables() -> tuple[Observable, ...]:
     """Return the published numbers, in the order of the paper."""
-    text = files(__package__).joinpath("published.json").read_text(encoding="utf-8")
+    name = "published.json"
+    document = parse_json(name, files(__package__).joinpath(name).read_bytes())
     read = [
         Observable(**{**entry, "published": entry["published"] * SI[entry["unit"]]})
-        for entry in json.loads(text)["observables"]
+        for entry in document["observables"]
     ]
     return (*read[:2], *_of_the_step(), *_of_table_1(), *read[2:], *_of_table_2())
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from .._support.files import make_folder, replacing, write_document
+from .._support.files import make_folder, replacing, together, write_document
+from .._support.plot_style import without_glyph_warnings
 from .figures import Drawn, drawn
 from .report_html import html_text
 from .report_text import summary_text
@@ -27,19 +28,19 @@ def save_report(found: Reproduction, folder: str | os.PathLike[str]) -> list[Pat
     """Write the three files; arguments, result and errors as of `Reproduction.save`."""
     import matplotlib.pyplot as plt
 
-    path = make_folder(folder)
     figures = drawn(found.experiments, found.drives)
     try:
-        page = html_text(found, figures)
-        with replacing(path / "report.html") as temporary:
-            temporary.write_text(page, encoding="utf-8")
-        with replacing(path / "report.pdf") as temporary:
-            _write_pdf(found, figures, temporary)
+        with together(make_folder(folder)) as path, without_glyph_warnings():
+            page = html_text(found, figures)
+            with replacing(path / "report.html") as temporary:
+                temporary.write_text(page, encoding="utf-8")
+            with replacing(path / "report.pdf") as temporary:
+                _write_pdf(found, figures, temporary)
+            document = write_document(path / "report.json", found.document())
+            return [path / "report.html", path / "report.pdf", document]
     finally:
         for one in figures:
             plt.close(one.figure)
-    document = write_document(path / "report.json", found.document())
-    return [path / "report.html", path / "report.pdf", document]
 
 
 def _write_pdf(found: Reproduction, figures: Sequence[Drawn], file: Path) -> None:

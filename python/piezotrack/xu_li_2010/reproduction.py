@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import _core
+from .._support.progress_bar import console
+from .._support.two_threads import two_threads
 from ..errors import ParameterError
 from .apparatus import Apparatus, calibration_file
 from .conclusions import Conclusion, conclusions
@@ -247,24 +248,18 @@ def _scored(
         experiments = run_experiments(apparatus, seed)
         return experiments.values, experiments.true_values
 
-    from rich.console import Console
     from rich.progress import track
 
-    console = Console(stderr=True)
-    shown = console.is_terminal if progress is None else progress
-    # The core releases the GIL, so threads suffice.
-    pool = ThreadPoolExecutor(max_workers=2)
-    try:
+    place = console()
+    shown = place.is_terminal if progress is None else progress
+    with two_threads() as pool:
         return list(
             track(
                 pool.map(score, seeds),
                 total=len(seeds),
                 description="seeds",
-                console=console,
+                console=place,
                 transient=True,
                 disable=not shown,
             )
         )
-    finally:
-        # After Ctrl-C the seeds that have not begun are cancelled.
-        pool.shutdown(cancel_futures=True)
