@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+import piezotrack as pt
 from commands import COMMAND, names, refusal, write_model
 from piezotrack.cli.terminal import PlainStream, one_line
 
@@ -157,3 +158,11 @@ def test_a_progress_bar_still_steers_the_terminal(monkeypatch: pytest.MonkeyPatc
     assert place.file is screen
     print("\x1b[0m", file=sys.stderr)
     assert screen.getvalue() == "\\x1b[0m\n"
+
+
+def test_memory_that_is_not_to_be_had_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: Any, **__: Any) -> None:
+        raise MemoryError("the response: 960 MB of memory are not to be had")
+
+    monkeypatch.setattr(pt.Inverse, "played", full)
+    assert refusal(*WORK) == "the response: 960 MB of memory are not to be had"

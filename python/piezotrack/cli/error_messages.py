@@ -48,6 +48,9 @@ def in_words(command: Callable[P, None]) -> Callable[P, None]:
             elif isinstance(error, PiezotrackError):
                 _say(_as_options(str(error)))
                 code = BAD_INPUT
+            elif isinstance(error, MemoryError):
+                _say(str(error) or "not enough memory")
+                code = BAD_INPUT
             elif isinstance(error, OSError):
                 code = of_the_system(error)
             else:

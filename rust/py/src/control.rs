@@ -165,14 +165,17 @@ const UNITS: [(&str, f64); 3] = [("um", 1e6), ("nm", 1e9), ("mm", 1e3)];
 
 /// The error for a displacement outside of the span.
 fn outside(name: &str, value: f64, span: Span) -> PyErr {
-    let mut expected = format!("a displacement from {:.3e} to {:.3e} m", span.low(), span.high());
-    if let Some((unit, metre)) = UNITS.iter().find(|(_, metre)| span.contains(value / metre)) {
-        expected += &format!("; {value} {unit} is {:e} m", value / metre);
-        if *unit == "um" {
-            expected += ", and step_um takes um";
+    let hint = match UNITS.iter().find(|(_, metre)| span.contains(value / metre)) {
+        Some((unit, metre)) => {
+            let taken = if *unit == "um" { ", and step_um takes um" } else { "" };
+            format!("; {value} {unit} is {:e} m{taken}", value / metre)
         }
-    }
-    raise(&Error::parameter(name, format!("{value} m"), expected + "; span= sets another range"))
+        None => String::new(),
+    };
+    let (low, high) = (span.low(), span.high());
+    let expected =
+        format!("a displacement from {low:.3e} to {high:.3e} m{hint}; span= sets another range");
+    raise(&Error::parameter(name, format!("{value} m"), expected))
 }
 
 #[pymethods]
