@@ -101,7 +101,7 @@ def signal(longest: int, size: float) -> Slot:
     """Samples: shapes that records have, at any scale, or what is no record."""
     seeds = st.integers(0, 2**32 - 1)
     record = seeds.map(lambda seed: wave(seed, longest, size))
-    wild = seeds.map(lambda seed: wave(seed, longest, size * 10.0 ** (seed % 31 - 15)))
+    wild = seeds.map(lambda seed: wave(seed, longest, size * 10.0 ** (seed % 13 - 6)))
     entries = st.lists(st.one_of(finite_number(size), st.sampled_from(EXTREMES)), max_size=12)
     return Slot(record, st.one_of(wild, wild, entries, _sampled(NOT_SIGNALS)))
 

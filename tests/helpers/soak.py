@@ -1,9 +1,9 @@
 """Judge of the fuzzers: makes a call, and notes what no call may do.
 
 A call may return, or raise one of piezotrack's own errors in a short sentence. Anything else is a
-failure: another exception, a warning, NaN or infinity in a result, another result when repeated,
-seconds without an answer. The statements that led to a failure are kept as a script that
-`tests/soak/test_finds.py` can replay.
+failure: another exception, a warning, NaN or infinity in a result, another result when repeated.
+What takes long, as a search or a drive of a gigavolt does, has to stop when asked to, as by Ctrl-C.
+The statements that led to a failure are kept as a script that `tests/soak/test_finds.py` replays.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 import faulthandler
 import math
+import signal
 import time
 import traceback
 import unicodedata
@@ -27,11 +28,14 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 LONGEST_MESSAGE = 500
-# Of one call [s]: what takes longer is noted, or is a hang, which ends the process with a traceback.
-SLOW, HANG = 5.0, 120.0
+# Of one call [s]: it is asked to stop, has to have done so, and ends the process with a traceback.
+LONG, SLOW, HANG = 2.0, 12.0, 60.0
 # Every so many successful calls are made twice.
 REPEAT_EVERY = 8
 KEPT = 3
+
+
+Row = tuple[str, int, int, int, int, int]
 
 
 class Tally:
@@ -39,7 +43,7 @@ class Tally:
 
     def __init__(self, target: str) -> None:
         self.target = target
-        self.tries = self.accepted = self.refused = 0
+        self.tries = self.accepted = self.refused = self.stopped = 0
         self.failures: Counter[str] = Counter()
         self.finds: list[str] = []
 
@@ -48,8 +52,9 @@ class Tally:
         if self.failures[kind] <= KEPT:
             self.finds.append(f"# {kind}\n{find}")
 
-    def row(self) -> tuple[str, int, int, int, int]:
-        return self.target, self.tries, self.accepted, self.refused, sum(self.failures.values())
+    def row(self) -> Row:
+        failed = sum(self.failures.values())
+        return self.target, self.tries, self.accepted, self.refused, self.stopped, failed
 
     def verdict(self) -> None:
         """Fail the test where there is a failure, with the kinds and a find of each."""
@@ -66,6 +71,8 @@ class Script:
         self.tally = tally
         self.lines: list[tuple[str, tuple[Any, ...], dict[str, Any]]] = []
         self.made: list[Any] = []
+        # Whether the last call was.
+        self.refused = False
 
     def new(self, path: str, /, *args: Any, **keywords: Any) -> Any:
         """Call a public name, as `"pt.sine"`; return None where it refuses."""
@@ -87,9 +94,10 @@ class Script:
         return self._judged(path, bound, args, keywords, finite=finite, again=again)
 
     def judge(self, holds: bool, kind: str, statement: str) -> None:
-        """Note a property of the last result, `_`, that does not hold."""
+        """Note where a statement about the last result, {}, does not hold."""
         if not holds:
-            self.tally.fail(kind, f"{self.text()}\nassert {statement}")
+            name = f"v{len(self.made) - 1}"
+            self.tally.fail(kind, f"{self.text()}\nassert {statement.format(name)}")
 
     def _judged(
         self, path: str, function: Callable[..., Any], args: tuple[Any, ...],
@@ -100,8 +108,10 @@ class Script:
         self.lines.append((path if read else f"{path}(", args, keywords))
         self.made.append(None)
         faults, value = judged(lambda: function(*args, **keywords))
-        if value is REFUSED:
-            tally.refused += 1
+        self.refused = value is REFUSED or value is STOPPED
+        if self.refused:
+            tally.refused += value is REFUSED
+            tally.stopped += value is STOPPED
             value = None
         else:
             tally.accepted += 1
@@ -140,24 +150,36 @@ class Script:
         return self._name(value) if not isinstance(value, (float, int, str)) else literal(value)
 
 
-REFUSED = object()
+REFUSED, STOPPED = object(), object()
+ALARM = getattr(signal, "SIGALRM", None)
+
+
+class TimeUpError(KeyboardInterrupt):
+    """Raised in a call that takes long, where Ctrl-C would be."""
+
+
+def _time_up(*_: object) -> None:
+    raise TimeUpError
 
 
 def judged(call: Callable[[], Any]) -> tuple[list[str], Any]:
-    """What a call did that it may not, and its result or `REFUSED`."""
+    """What a call did that it may not, and its result, `REFUSED` or `STOPPED`."""
     faults: list[str] = []
     value: Any = REFUSED
     faulthandler.dump_traceback_later(HANG, exit=True)
+    if ALARM is not None:
+        signal.signal(ALARM, _time_up)
+        signal.setitimer(signal.ITIMER_REAL, LONG)
     began = time.perf_counter()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
             value = call()
-        except pt.PiezotrackError as error:
+        except (pt.PiezotrackError, MemoryError) as error:
+            # MemoryError: a size within the documented limits and beyond those of the machine.
             faults += bad_message(str(error))
-        except MemoryError as error:
-            # A size that is within the documented limits and beyond those of the machine.
-            faults += bad_message(str(error))
+        except (TimeUpError, pt.Interrupted):
+            value = STOPPED
         except Exception as error:
             faults.append(f"{type(error).__name__} {origin(error)}: {str(error)[:80]}")
         except BaseException as error:
@@ -166,17 +188,21 @@ def judged(call: Callable[[], Any]) -> tuple[list[str], Any]:
             # PanicException of the Rust module.
             faults.append(f"{type(error).__name__}: {str(error)[:80]}")
         finally:
+            if ALARM is not None:
+                signal.setitimer(signal.ITIMER_REAL, 0.0)
             faulthandler.cancel_dump_traceback_later()
     faults += [f"{w.category.__name__}: {str(w.message)[:80]}" for w in caught[:2]]
     if time.perf_counter() - began > SLOW:
-        faults.append(f"slower than {SLOW:g} s")
+        faults.append(f"not stopped within {SLOW:g} s")
     return faults, value
 
 
 def repeated(call: Callable[[], Any], value: Any) -> list[str]:
     """Whether the same call gives another result."""
     faults, second = judged(call)
-    return faults or ([] if same(value, second) else ["differs when repeated"])
+    if faults or second is STOPPED:
+        return faults
+    return [] if same(value, second) else ["differs when repeated"]
 
 
 def bad_message(text: str) -> list[str]:
@@ -280,9 +306,11 @@ def home(name: str) -> str:
     return name
 
 
-def table(rows: list[tuple[str, int, int, int, int]]) -> str:
+def table(rows: list[Row]) -> str:
     """Tries and failures of each target, in Markdown."""
-    total = ("all", *(sum(row[k] for row in rows) for k in range(1, 5)))
-    lines = ["| target | tries | answered | refused | failures |", "| --- | --- | --- | --- | --- |"]
-    lines += [f"| {row[0]} | " + " | ".join(f"{n:,}".replace(",", " ") for n in row[1:]) + " |" for row in [*sorted(rows), total]]  # fmt: skip
+    total = ("all", *(sum(row[k] for row in rows) for k in range(1, 6)))
+    lines = ["| target | tries | answered | refused | stopped | failures |", "| --- " * 6 + "|"]
+    for name, *counts in [*sorted(rows), total]:
+        shown = " | ".join(f"{n:,}".replace(",", " ") for n in counts)
+        lines.append(f"| {name} | {shown} |")
     return "\n".join(lines) + "\n"

@@ -58,6 +58,11 @@ def slots_of(value: Any, **others: Slot) -> dict[str, Slot]:
     return {**made, **others}
 
 
+def sizeable(samples: float) -> bool:
+    """Whether so many samples are work and not a mistake, and too many here."""
+    return 1e6 < samples < 1e11
+
+
 # Stages.
 
 FIRST_ORDER = pt.FirstOrderDahlStage(
@@ -223,7 +228,8 @@ for _name, _slots in PATHS.items():
 
 def use_reference(script: Script, draw: Draw, made: Any) -> None:
     dt = number(0.01).draw(draw, odd=draw(st.integers(0, 2)) == 0)
-    script.on(made, "sample", dt)
+    if not (isinstance(dt, float) and dt > 0 and sizeable(made.duration / dt)):
+        script.on(made, "sample", dt)
     kind = draw(st.integers(0, 7))
     if kind == 0:
         script.on(made, "at", number(1.0).draw(draw, odd=True))
@@ -332,7 +338,7 @@ RUN = {
 
 def track(script: Script, draw: Draw) -> None:
     loop = controller(script, draw)
-    if loop is None:
+    if loop is None or sizeable(100 * SINE.duration / loop.dt):
         return
     run = script.new(
         "pt.track", draw(st.sampled_from(PLANTS)), loop, SINE, **arguments(draw, RUN, most=1)
@@ -349,7 +355,7 @@ CIRCLE = pt.circle(frequency=1.0, radius=1e-5, duration=0.5)
 
 def contour(script: Script, draw: Draw) -> None:
     loop = controller(script, draw)
-    if loop is None:
+    if loop is None or sizeable(100 * CIRCLE.duration / loop.dt):
         return
     slots = RUN | {"decoupling": Slot(None, st.one_of(st.just(np.eye(2)), numbers(1.0, 0.0).other))}
     run = script.new("pt.contour", XY, [loop, loop], CIRCLE, **arguments(draw, slots, most=1))
