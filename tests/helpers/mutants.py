@@ -6,6 +6,7 @@ import gzip
 import json
 import math
 import re
+from copy import deepcopy
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -126,7 +127,7 @@ def change_entry(draw: Draw, parent: Any, key: Any) -> None:
     elif how == 4:
         parent[key] = [old]
     else:
-        parent[key] = draw(st.integers(0, len(VALUES) - 1).map(VALUES.__getitem__))
+        parent[key] = deepcopy(VALUES[draw(st.integers(0, len(VALUES) - 1))])
 
 
 def changed_text(draw: Draw, text: str, pieces: list[str]) -> str:

@@ -158,18 +158,46 @@ class TimeUpError(KeyboardInterrupt):
     """Raised in a call that takes long, where Ctrl-C would be."""
 
 
-def _time_up(*_: object) -> None:
-    raise TimeUpError
+class Alarm:
+    """Interrupts a call after a while, as Ctrl-C would."""
+
+    rung = False
+
+    @classmethod
+    def ring(cls, *_: object) -> None:
+        cls.rung = True
+        raise TimeUpError
+
+    @classmethod
+    def set(cls) -> None:
+        cls.rung = False
+        faulthandler.dump_traceback_later(HANG, exit=True)
+        if ALARM is not None:
+            signal.signal(ALARM, cls.ring)
+            signal.setitimer(signal.ITIMER_REAL, LONG)
+
+    @staticmethod
+    def off() -> None:
+        if ALARM is not None:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+        faulthandler.cancel_dump_traceback_later()
 
 
 def judged(call: Callable[[], Any]) -> tuple[list[str], Any]:
     """What a call did that it may not, and its result, `REFUSED` or `STOPPED`."""
+    try:
+        Alarm.set()
+        return _judged(call)
+    except TimeUpError:
+        # It rang when the call was over.
+        return [], STOPPED
+    finally:
+        Alarm.off()
+
+
+def _judged(call: Callable[[], Any]) -> tuple[list[str], Any]:
     faults: list[str] = []
     value: Any = REFUSED
-    faulthandler.dump_traceback_later(HANG, exit=True)
-    if ALARM is not None:
-        signal.signal(ALARM, _time_up)
-        signal.setitimer(signal.ITIMER_REAL, LONG)
     began = time.perf_counter()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -178,19 +206,17 @@ def judged(call: Callable[[], Any]) -> tuple[list[str], Any]:
         except (pt.PiezotrackError, MemoryError) as error:
             # MemoryError: a size within the documented limits and beyond those of the machine.
             faults += bad_message(str(error))
-        except (TimeUpError, pt.Interrupted):
+        except KeyboardInterrupt:
+            if not Alarm.rung:
+                raise
             value = STOPPED
         except Exception as error:
             faults.append(f"{type(error).__name__} {origin(error)}: {str(error)[:80]}")
         except BaseException as error:
-            if isinstance(error, (KeyboardInterrupt, SystemExit)):
+            if isinstance(error, SystemExit):
                 raise
             # PanicException of the Rust module.
             faults.append(f"{type(error).__name__}: {str(error)[:80]}")
-        finally:
-            if ALARM is not None:
-                signal.setitimer(signal.ITIMER_REAL, 0.0)
-            faulthandler.cancel_dump_traceback_later()
     faults += [f"{w.category.__name__}: {str(w.message)[:80]}" for w in caught[:2]]
     if time.perf_counter() - began > SLOW:
         faults.append(f"not stopped within {SLOW:g} s")

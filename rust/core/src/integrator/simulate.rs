@@ -85,7 +85,9 @@ impl<K: Kernel> LumpedStage<K> {
         }
         let run = Run { of: *self, drive, start, substeps, stop };
         let Some(motion) = dispatch_fused(run) else { return Ok(None) };
-        all_finite(&motion.x, drive.dt)?;
+        for values in [&motion.x, &motion.v, &motion.hysteresis] {
+            all_finite(values, drive.dt)?;
+        }
         Ok(Some(motion))
     }
 
