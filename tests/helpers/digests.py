@@ -13,8 +13,8 @@ import piezotrack as pt
 
 T = np.arange(200) / 100.0
 U = 30.0 * (1.0 - np.cos(np.pi * T)) * (0.6 + 0.1 * T)
-UPDATES = ("classic", "hypersphere", "hypersphere-radial")
-TOPOLOGIES = ("ring", "global", "random")
+UPDATES: Any = ("classic", "hypersphere", "hypersphere-radial")
+TOPOLOGIES: Any = ("ring", "global", "random")
 PLAYS = ("prandtl-ishlinskii", "generalised-prandtl-ishlinskii")
 SEARCHED = ("dahl", "bouc-wen", "first-order-dahl", "bouc-wen-oscillator")
 

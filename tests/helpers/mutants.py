@@ -1,4 +1,4 @@
-"""Files that the readers are given: good ones, and what becomes of them by accident or by intent."""
+"""Files that the readers are given: good ones, and what becomes of them by accident or intent."""
 
 from __future__ import annotations
 
@@ -27,7 +27,11 @@ TITLES = "time_s,voltage_V,displacement_um"
 
 
 def log(
-    delimiter: str = ",", titles: str = TITLES, ending: str = "\n", after: str = "", point: str = "."
+    delimiter: str = ",",
+    titles: str = TITLES,
+    ending: str = "\n",
+    after: str = "",
+    point: str = ".",
 ) -> str:
     """A log of 40 samples in one of the forms that are read."""
     rows = (
@@ -40,14 +44,21 @@ def log(
 LOGS = [
     *(log(), log(";"), log(";", point=","), log("\t"), log(" "), log("\t", point=",")),
     *(log(ending="\r\n"), log(titles="t (s),u [V],x/um"), log(after=",")),
-    *("# a comment\n% another\n" + log(), log(titles='"time (s)","voltage (V)","displacement (um)"')),
+    *(
+        "# a comment\n% another\n" + log(),
+        log(titles='"time (s)","voltage (V)","displacement (um)"'),
+    ),
     log(titles="time [ms],U [mV],x [\u00b5m]"),
 ]
 POINTS = (f"{t},{10 * math.cos(t)},{10 * math.sin(t)}" for t in TIMES)
 TABLES = {
     "log": LOGS,
     "drive": LOGS,
-    "reference": [log(titles="time_s,voltage_V,target_um"), log(";", "time_s,u_V,target_um"), *LOGS],
+    "reference": [
+        log(titles="time_s,voltage_V,target_um"),
+        log(";", "time_s,u_V,target_um"),
+        *LOGS,
+    ],
     "path": ["\n".join(["time_s,x_um,y_um", *POINTS]), log(titles="time_s,x_um,y_um")],
 }
 FIELDS = [
@@ -105,7 +116,13 @@ def changed_document(draw: Draw, text: str) -> str:
     for _ in range(draw(st.sampled_from([1, 1, 1, 2, 3]))):
         node, parent, key = document, None, None
         for _ in range(draw(st.integers(1, 5))):
-            keys = list(node) if isinstance(node, dict) else range(len(node)) if isinstance(node, list) else []
+            keys = (
+                list(node)
+                if isinstance(node, dict)
+                else range(len(node))
+                if isinstance(node, list)
+                else []
+            )
             if not keys:
                 break
             parent, key = node, draw(st.sampled_from(list(keys)))

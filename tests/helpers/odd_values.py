@@ -19,23 +19,27 @@ if TYPE_CHECKING:
     Strategy = st.SearchStrategy[Any]
     Draw = Callable[[Strategy], Any]
 
+SIZES = [0.0, 1.0, 5e-324, 1e-300, 1e-15, 1e99, 1e100, 1e150, 1e300]
 EXTREMES = [
-    *(sign * v for v in (0.0, 1.0, 5e-324, 1e-300, 1e-15, 1e99, 1e100, 1e150, 1e300) for sign in (1, -1)),
-    *(math.nan, math.inf, -math.inf, 2.3e-308, 1.7976931348623157e308, 9.91e37, 2.0**53, 2.0**63),
-    *(0.9999999999999999, 1.0000000000000002),
+    *SIZES, *(-size for size in SIZES), math.nan, math.inf, -math.inf, 2.3e-308, 9.91e37,
+    1.7976931348623157e308, 2.0**53, 2.0**63, 0.9999999999999999, 1.0000000000000002,
 ]  # fmt: skip
-NOT_NUMBERS = [
+NOT_NUMBERS: list[Any] = [
     *(None, True, False, "1", "", b"1", 10**400, -(10**400), 2**63, 2**64, -1, 0, 7, 1j),
     *(np.float32(1.5), np.float64(math.nan), np.int8(3), np.uint64(2**63), np.bool_(True)),
     *([], [1.0], {}, object, np.array(2.0), np.array([1.0])),
 ]
 COUNTS = [0, 1, 2, 3, -1, 1000, 2**31, 2**32, 2**63, 2**64, 10**30]
-NOT_SIGNALS = [
+NOT_SIGNALS: list[Any] = [
     *([], None, "abc", 3.0, range(5), (0, 1, 2), [[1.0], [1.0, 2.0]], [10**400, 1], [None, 1.0]),
     *(np.zeros((3, 3)), np.array(["a"]), np.zeros(5, dtype=complex), np.zeros(5, dtype=bool)),
     *(np.zeros(5, dtype=object), np.zeros(5, dtype=">f8"), np.zeros(5, dtype=np.float16)),
     *(np.zeros(5, dtype="M8[s]"), np.arange(6.0)[::-1], np.arange(12.0)[::2]),
-    *(np.full(4, 1e308), np.full(4, 5e-324), np.ma.masked_array([1.0, 2.0, 3.0], [0, 1, 0])),
+    *(
+        np.full(4, 1e308),
+        np.full(4, 5e-324),
+        np.ma.masked_array([1.0, 2.0, 3.0], [False, True, False]),
+    ),
     np.zeros(8, dtype=[("u", "<f8"), ("n", "<i4")])["u"],
 ]
 
@@ -93,7 +97,9 @@ def numbers(*right: float, most: int = 5) -> Slot:
     wrong = [(), None, "abc", 3.0, [[1.0]], np.zeros((2, 2)), np.zeros(0), {1.0: 2.0}]
     listed = st.lists(entry, max_size=most)
     permuted = st.permutations(right).map(list) if right else listed
-    changed = st.tuples(*(st.one_of(st.just(v), number(v).other) for v in right)) if right else listed
+    changed = (
+        st.tuples(*(st.one_of(st.just(v), number(v).other) for v in right)) if right else listed
+    )
     return Slot(right, st.one_of(listed, permuted, changed, changed, st.sampled_from(wrong)))
 
 
@@ -152,7 +158,19 @@ ATOMS = [
     *("raster:", "spiral:", "0.2Hz", "1Hz", "0..110um", "10um", ",", "/", "..", "...", "=", ":"),
     *("phase=90deg", "ramp=1s", "rounding=0.2", "dwell=1s", "levels=0/30/10um", "seed=1", "20s"),
     *("0.5/1.3/2.7Hz", "lines=9", "20/20um", "pitch=2um", "centre=58.5/58.5um", "flyback=0.25"),
-    *("1e400Hz", "nan", "inf", "-1", "1e-300s", "1e9", "9" * 400, " ", "\u00b5m", "\u03bcm", "\x00"),
+    *(
+        "1e400Hz",
+        "nan",
+        "inf",
+        "-1",
+        "1e-300s",
+        "1e9",
+        "9" * 400,
+        " ",
+        "\u00b5m",
+        "\u03bcm",
+        "\x00",
+    ),
     *("\n", "\u0663Hz", "1_0Hz", "0x10", "+5", "1e5mHz", "kHz", "/dev/null", "a.csv", ".", "~"),
     *("\u00bd", "1e-5", "\u00b2", "\ud800", "1e308kHz", "1e-320s", "\x1b[31m", "m" * 600),
 ]
@@ -170,7 +188,7 @@ def texts(draw: Draw) -> str:
     if draw(st.integers(0, 2)) == 0:
         pieces = st.one_of(st.sampled_from(ATOMS), st.sampled_from(ATOMS), st.text(max_size=3))
         return "".join(draw(st.lists(pieces, max_size=9)))
-    text = draw(st.sampled_from(TEXTS))
+    text: str = draw(st.sampled_from(TEXTS))
     start = draw(st.integers(0, len(text)))
-    piece = draw(st.sampled_from([*ATOMS, ""]))
+    piece: str = draw(st.sampled_from([*ATOMS, ""]))
     return text[:start] + piece + text[start + draw(st.integers(0, 3)) :]

@@ -12,18 +12,38 @@ from mutants import changed_document, log
 from soak import LONGEST_MESSAGE, bad_message, judged
 
 NUMBERS = ["0.02", "0", "-1", "nan", "inf", "1e-9", "1e9", "1e300", "x", "", "\u0663", "1_0"]
+GAINS = ["0.12", "1e5", *NUMBERS]
+NAMES = ["0", "9", "time_s", "x", "9" * 30]
 WHOLE = ["1", "2", "0", "-1", "x", "99999999999999999999", "1.5"]
 RANGES = ["0:0.6", "1:0", ":", "0.1:", "x:y", "nan:1", "0:1e9", "0:1:2", ""]
 REFERENCES = [
-    *("sine:0.2Hz,0..50um,2s", "sine:1e9Hz,0..50um", "reference.csv", "none.csv", "", "x:", "\x1b[31m"),
+    *(
+        "sine:0.2Hz,0..50um,2s",
+        "sine:1e9Hz,0..50um",
+        "reference.csv",
+        "none.csv",
+        "",
+        "x:",
+        "\x1b[31m",
+    ),
     *("multisine:0.5/1.3Hz,0..9um,2s", "staircase:3,0..30um,dwell=0.2s", "triangle:1Hz,0..50um,1s"),
 ]
-PATHS = ["circle:1Hz,10um,1s", "x", "raster:1Hz,20/20um,lines=3,1s", "path.csv", "spiral:1Hz,2um,pitch=2um"]
+PATHS = [
+    "circle:1Hz,10um,1s",
+    "x",
+    "raster:1Hz,20/20um,lines=3,1s",
+    "path.csv",
+    "spiral:1Hz,2um,pitch=2um",
+]
 OPTIONS: dict[str, list[str]] = {
     "--dt": NUMBERS,
     "--limits": ["0:75", "75:0", "0:", ":", "nan:1", "-1e308:1e308", "0:75:80", "x"],
-    **dict.fromkeys(("--kp", "--ti", "--td", "--tt", "--kq", "--tq"), ["0.12", *NUMBERS]),
-    **dict.fromkeys(("--delay", "--jitter", "--lag", "--path-dt", "--duration", "--period"), NUMBERS),
+    **dict.fromkeys(
+        ("--kp", "--ti", "--td", "--tt", "--kq", "--tq", "--stiffness", "--mass"), GAINS
+    ),
+    **dict.fromkeys(
+        ("--delay", "--jitter", "--lag", "--path-dt", "--duration", "--period"), NUMBERS
+    ),
     **dict.fromkeys(("--seed", "--runs", "--threads"), WHOLE),
     "--reference": REFERENCES,
     "--path": PATHS,
@@ -33,10 +53,9 @@ OPTIONS: dict[str, list[str]] = {
     "--bound": ["mass=0.1:0.2", "mass=0.2:0.1", "mass=x:1", "mass=:", "a=1:2"],
     "--free": ["mass", "", "mass,,x", "mass,mass"],
     "--unit": ["voltage_V=V", "x=V", "=", "time=um", "displacement=nm"],
-    **dict.fromkeys(("--time", "--drive", "--displacement"), ["0", "9", "time_s", "x", "9" * 30]),
+    **dict.fromkeys(("--time", "--drive", "--displacement"), NAMES),
     "--hold": ["foh", "zoh", "x"],
     "--model": ["dahl", "bouc-wen", "prandtl-ishlinskii", "none", "model.json", ""],
-    **dict.fromkeys(("--stiffness", "--mass"), ["1e5", *NUMBERS]),
     "--second-level": ["40:50", "x", "0:0", "1:nan"],
     "--swarm": ["default", "spso-2011", "none"],
 }
@@ -50,15 +69,19 @@ COMMANDS: dict[str, tuple[list[str], tuple[str, ...]]] = {
     "contour": (["model.json"], (*LOOP, "--path", "--lag", "--cross-talk", "--path-dt")),
     "identify": (
         ["log.csv", "--runs", "1"],
-        (*COLUMNS, "--displacement", "--hold", "--window", "--threads", "--fix", "--bound", "--free",
-         "--model", "--stiffness", "--delay", "--swarm", "--seed"),
+        (*COLUMNS, "--displacement", "--hold", "--window", "--threads", "--fix", "--bound",
+         "--free", "--model", "--stiffness", "--delay", "--swarm", "--seed"),
     ),
     "compare": (["log.csv", "--runs", "1"], (*COLUMNS, "--train", "--test", "--model", "--seed")),
     "step": (["log.csv"], (*COLUMNS, "--stiffness", "--mass", "--second-level", "--window")),
     "noise": (["log.csv"], ("--dt", "--unit", "--time", "--displacement", "--window")),
 }  # fmt: skip
 # Their shares: those that identify take long.
-MIX = ["simulate", "feedforward", "track"] * 4 + ["step", "noise"] * 2 + ["contour", "identify", "compare"]
+MIX = (
+    ["simulate", "feedforward", "track"] * 4
+    + ["step", "noise"] * 2
+    + ["contour", "identify", "compare"]
+)
 
 
 @st.composite
@@ -73,7 +96,10 @@ def invocations(draw: Any, right: list[str]) -> tuple[list[str], dict[str, str]]
         "reference.csv": log(titles="time_s,voltage_V,target_um"),
         "path.csv": log(titles="time_s,x_um,y_um"),
     }
-    arguments = [command, *(draw(st.sampled_from(REFERENCES)) if a == "REFERENCE" else a for a in given)]
+    arguments = [
+        command,
+        *(draw(st.sampled_from(REFERENCES)) if a == "REFERENCE" else a for a in given),
+    ]
     chosen = draw(st.lists(st.sampled_from(options), max_size=3, unique=True))
     if command == "track" and "--reference" not in chosen:
         arguments += ["--reference", REFERENCES[0]]

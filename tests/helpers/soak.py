@@ -59,8 +59,7 @@ class Tally:
     def verdict(self) -> None:
         """Fail the test where there is a failure, with the kinds and a find of each."""
         assert not self.failures, "\n".join(
-            [f"{count} x {kind}" for kind, count in self.failures.most_common()]
-            + ["", *self.finds]
+            [f"{count} x {kind}" for kind, count in self.failures.most_common()] + ["", *self.finds]
         )
 
 
@@ -76,7 +75,7 @@ class Script:
 
     def new(self, path: str, /, *args: Any, **keywords: Any) -> Any:
         """Call a public name, as `"pt.sine"`; return None where it refuses."""
-        function = pt
+        function: Any = pt
         for name in path.split(".")[1:]:
             function = getattr(function, name)
         return self._judged(path, function, args, keywords)
@@ -299,17 +298,18 @@ NAMES = {"nan": math.nan, "inf": math.inf, "np": np, "pt": pt}
 
 def literal(value: Any) -> str:
     """A value as Python writes it, with the names above."""
+    if isinstance(value, np.generic):
+        return f"np.{type(value).__name__}({value.item()!r})"
     if value is None or isinstance(value, (bool, int, float, complex, str, bytes)):
-        plain = isinstance(value, np.generic)
-        return f"np.{type(value).__name__}({value.item()!r})" if plain else repr(value)
+        return repr(value)
     if isinstance(value, np.ma.MaskedArray):
-        return f"np.ma.masked_array({value.data.tolist()!r}, {np.ma.getmaskarray(value).tolist()!r})"
+        return (
+            f"np.ma.masked_array({value.data.tolist()!r}, {np.ma.getmaskarray(value).tolist()!r})"
+        )
     if isinstance(value, np.ndarray):
         if value.dtype.kind in "fiubc" and value.flags.c_contiguous and value.dtype != np.float64:
             return f"np.array({value.tolist()!r}, dtype={value.dtype.str!r})"
         return f"np.array({value.tolist()!r})"
-    if isinstance(value, np.generic):
-        return f"np.{type(value).__name__}({value.item()!r})"
     if isinstance(value, (list, tuple)):
         inner = ", ".join(literal(v) for v in value)
         return f"[{inner}]" if isinstance(value, list) else f"({inner}{',' * (len(value) == 1)})"
@@ -318,7 +318,11 @@ def literal(value: Any) -> str:
     if value is object:
         return "object"
     if dataclasses.is_dataclass(value):
-        given = (f"{f.name}={literal(getattr(value, f.name))}" for f in dataclasses.fields(value) if f.init)
+        given = (
+            f"{f.name}={literal(getattr(value, f.name))}"
+            for f in dataclasses.fields(value)
+            if f.init
+        )
         return f"{home(type(value).__name__)}({', '.join(given)})"
     return repr(value)
 
@@ -334,7 +338,7 @@ def home(name: str) -> str:
 
 def table(rows: list[Row]) -> str:
     """Tries and failures of each target, in Markdown."""
-    total = ("all", *(sum(row[k] for row in rows) for k in range(1, 6)))
+    total = ("all", *(sum(int(row[k]) for row in rows) for k in range(1, 6)))
     lines = ["| target | tries | answered | refused | stopped | failures |", "| --- " * 6 + "|"]
     for name, *counts in [*sorted(rows), total]:
         shown = " | ".join(f"{n:,}".replace(",", " ") for n in counts)

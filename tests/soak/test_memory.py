@@ -33,17 +33,17 @@ LOOP = pt.Controller(
 )  # fmt: skip
 
 
-class Stop(Exception):
+class StopError(Exception):
     """What a callback may raise."""
 
 
 def search(callback: Callable[[Any], object] | None = None) -> None:
-    with suppress(Stop, pt.Interrupted):
+    with suppress(StopError, pt.Interrupted):
         pt.identify(DATA, swarm=SMALL, runs=1, callback=callback)
 
 
 def raising(_: Any) -> None:
-    raise Stop
+    raise StopError
 
 
 def refused() -> None:
