@@ -13,6 +13,7 @@ use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
 
 /// The cases of a property: one in `fewer` where a case takes long.
+#[must_use]
 pub fn cases(fewer: u32) -> Config {
     let given = Config::default();
     let rng_seed = match given.rng_seed {
