@@ -42,7 +42,17 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--soak-seed", type=int, default=1, help="seed of all that is drawn")
     group.addoption("--soak-calls", type=int, default=20_000, help="calls of the API, all targets")
     group.addoption("--soak-files", type=int, default=4_000, help="files read, all formats")
+    group.addoption("--soak-trace", default=None, help="folder for the calls under way")
     group.addoption("--soak-table", default=None, help="file for the table of tries and failures")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Have the fuzzers write down what they are about to call."""
+    if (folder := config.getoption("--soak-trace")) is not None:
+        from soak import Script
+
+        Script.trace = Path(folder)
+        Script.trace.mkdir(parents=True, exist_ok=True)
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 import faulthandler
 import math
+import re
 import signal
 import time
 import traceback
@@ -26,6 +27,7 @@ import piezotrack as pt
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from pathlib import Path
 
 LONGEST_MESSAGE = 500
 # Of one call [s]: it is asked to stop, has to have done so, and ends the process with a traceback.
@@ -65,6 +67,9 @@ class Tally:
 
 class Script:
     """Calls one after the other on the objects that they make, each of them judged."""
+
+    # Where each script is written before its last call is made, to find what ended a process.
+    trace: Path | None = None
 
     def __init__(self, tally: Tally) -> None:
         self.tally = tally
@@ -106,6 +111,9 @@ class Script:
         tally.tries += 1
         self.lines.append((path if read else f"{path}(", args, keywords))
         self.made.append(None)
+        if Script.trace is not None:
+            name = re.sub(r"\W+", "_", tally.target)
+            (Script.trace / f"{name}.txt").write_text(self.text(), "utf-8", "backslashreplace")
         faults, value = judged(lambda: function(*args, **keywords))
         self.refused = value is REFUSED or value is STOPPED
         if self.refused:
