@@ -24,7 +24,7 @@ def raising(error: BaseException) -> Callable[[], object]:
     return call
 
 
-class Panic(BaseException):  # noqa: N818
+class Panic(BaseException):
     """As PyO3 raises one."""
 
 
