@@ -25,11 +25,8 @@ LONGEST = 480
 class PiezotrackError(Exception):
     """Base class of the exceptions of piezotrack, except `Interrupted`.
 
-    Parameters
-    ----------
-    message : str, optional
-        One sentence. Its middle is left out where it is long, and control characters, which a
-        quoted value may have, are shown as Python writes them.
+    The message is one sentence. Its middle is left out where it is long, and control characters,
+    which a quoted value may have, are shown as Python writes them.
     """
 
     def __init__(self, message: str = "") -> None:
