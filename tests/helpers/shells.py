@@ -112,7 +112,8 @@ def invocations(draw: Any, right: list[str]) -> tuple[list[str], dict[str, str]]
 
 def faults_of_command(arguments: list[str]) -> tuple[list[str], int | None]:
     """What a call of the command did that it may not, and its exit code."""
-    faults, result = judged(lambda: run(*arguments))
+    # Long enough for all that is asked here, on a busy machine too.
+    faults, result = judged(lambda: run(*arguments), after=100.0)
     if faults:
         return faults, None
     error = result.exception

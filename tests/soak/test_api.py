@@ -33,7 +33,11 @@ if TYPE_CHECKING:
     Draw = Callable[[st.SearchStrategy[Any]], Any]
     Target = Callable[[Script, Draw], None]
 
-pytestmark = pytest.mark.slow
+pytestmark = [
+    pytest.mark.slow,
+    # A call stopped for its time may be stopped in a callback of Python's own, which says so.
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
 
 DAHL = pt.DahlStage.xu_li_2010()
 VIRTUAL = pt.VirtualStage.xu_li_2010(seed=1)

@@ -14,7 +14,11 @@ from soak import Script, Tally
 if TYPE_CHECKING:
     from pathlib import Path
 
-pytestmark = pytest.mark.slow
+pytestmark = [
+    pytest.mark.slow,
+    # A call stopped for its time may be stopped in a callback of Python's own, which says so.
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
 
 # Each kind's share of the files.
 SHARES = {"log": 5, "drive": 1, "reference": 1, "path": 1, "model": 5}

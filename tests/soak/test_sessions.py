@@ -17,7 +17,11 @@ if TYPE_CHECKING:
 
     Draw = Callable[[st.SearchStrategy[Any]], Any]
 
-pytestmark = pytest.mark.slow
+pytestmark = [
+    pytest.mark.slow,
+    # A call stopped for its time may be stopped in a callback of Python's own, which says so.
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
 
 DAHL = pt.DahlStage.xu_li_2010()
 FEEDBACKS = [
