@@ -339,7 +339,8 @@ def dataset(script: Script, draw: Draw, longest: int = 60) -> Any:
     }  # fmt: skip
     given = arguments(draw, slots, most=2)
     if draw(st.integers(0, 4)) == 0:
-        given["t"] = 0.01 * np.arange(np.size(u)) if draw(st.booleans()) else y
+        even = draw(st.booleans()) and isinstance(u, np.ndarray)
+        given["t"] = 0.01 * np.arange(u.size) if even else y
         given["dt"] = None
     return script.new("pt.Dataset", u=u, y=y, **given)
 
