@@ -7,6 +7,7 @@ most slots of a call right and draws the rest, so that the calls get past the fi
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -189,6 +190,11 @@ def texts(draw: Draw) -> str:
         pieces = st.one_of(st.sampled_from(ATOMS), st.sampled_from(ATOMS), st.text(max_size=3))
         return "".join(draw(st.lists(pieces, max_size=9)))
     text: str = draw(st.sampled_from(TEXTS))
+    if draw(st.booleans()):
+        # Another number: what is still a text that can be read.
+        found = draw(st.sampled_from(list(re.finditer(r"\d+(\.\d+)?", text))))
+        number_text = f"{draw(st.floats(0.0, 200.0)):.4g}"
+        return text[: found.start()] + number_text + text[found.end() :]
     start = draw(st.integers(0, len(text)))
     piece: str = draw(st.sampled_from([*ATOMS, ""]))
     return text[:start] + piece + text[start + draw(st.integers(0, 3)) :]
