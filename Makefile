@@ -1,11 +1,17 @@
 # What a person types. Needs a Rust toolchain and Python 3.11 or newer; all else is put in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo reproduce test soak lint rust-test no-std python-test bench docs clean
+.PHONY: help demo reproduce test soak fuzz lint rust-test no-std python-test bench docs clean
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 WHEELS := target/wheels
+# Of the fuzzers: seed, calls of the API, files read, cases of each property, where their table goes.
+SEED ?= 1
+CALLS ?= 20000
+FILES ?= 4000
+CASES ?= 2048
+TABLE ?= target/tries.md
 # A Cortex-M4F.
 EMBEDDED := thumbv7em-none-eabihf
 SOURCES := $(shell find rust python/piezotrack -name '*.rs' -o -name '*.py' -o -name '*.pyi' -o -name '*.json' -o -name '*.css' -o -name '*.js' -o -name '*.gz' -o -name Cargo.toml) benches/Cargo.toml Cargo.toml Cargo.lock pyproject.toml
@@ -21,8 +27,12 @@ reproduce: $(VENV)/installed ## Every figure and table of the paper, published b
 
 test: lint rust-test no-std python-test ## Everything that must hold before a change lands
 
-soak: $(VENV)/installed $(VENV)/tools ## The tests that take long: examples, searches with full budgets
-	$(BIN)/pytest -n auto -m slow
+soak: fuzz ## The tests that take long: fuzzers, properties, examples, searches with full budgets
+	PROPTEST_CASES=$(CASES) PROPTEST_RNG_SEED=$(SEED) cargo test --locked --release -p piezotrack-core --test properties
+	$(BIN)/pytest -n auto -m slow --ignore=tests/soak
+
+fuzz: $(VENV)/installed $(VENV)/tools ## The fuzzers, with their table of tries and failures: SEED=7 CALLS=1000000 FILES=100000
+	$(BIN)/pytest -n auto --dist worksteal -m slow tests/soak --soak-seed=$(SEED) --soak-calls=$(CALLS) --soak-files=$(FILES) --soak-table=$(TABLE)
 
 lint: $(VENV)/installed $(VENV)/tools ## Formatting, clippy, ruff, types, layers, stubs
 	cargo fmt --all --check

@@ -1,16 +1,16 @@
-"""What all tests share: pictures are drawn without a screen, and left out where asked for."""
+"""What all tests share: pictures without a screen, and what the fuzzers are given and tell."""
 
 from __future__ import annotations
 
 import signal
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import pytest
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from pathlib import Path
 
     from matplotlib.figure import Figure
 
@@ -37,3 +37,42 @@ def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
 
     for module in ("_support.files", "identification.report"):
         monkeypatch.setattr(f"piezotrack.{module}.save_figures", none)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add what the fuzzers in tests/soak are given."""
+    group = parser.getgroup("soak", "fuzzers")
+    group.addoption("--soak-seed", type=int, default=1, help="seed of all that is drawn")
+    group.addoption("--soak-calls", type=int, default=20_000, help="calls of the API, all targets")
+    group.addoption("--soak-files", type=int, default=4_000, help="files read, all formats")
+    group.addoption("--soak-trace", default=None, help="folder for the calls under way")
+    group.addoption("--soak-table", default=None, help="file for the table of tries and failures")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Have the fuzzers write down what they are about to call."""
+    if (folder := config.getoption("--soak-trace")) is not None:
+        from soak import Script
+
+        Script.trace = Path(folder)
+        Script.trace.mkdir(parents=True, exist_ok=True)
+
+
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+    """Print the tries and failures of the fuzzers."""
+    rows = [
+        tuple(value)
+        for reports in terminalreporter.stats.values()
+        for report in reports
+        for name, value in getattr(report, "user_properties", ())
+        if name == "tally" and report.when == "call"
+    ]
+    if not rows:
+        return
+    from soak import table
+
+    text = table(rows)
+    terminalreporter.section("tries and failures")
+    terminalreporter.write(text)
+    if (path := config.getoption("--soak-table")) is not None:
+        Path(path).write_text(text, encoding="utf-8")

@@ -18,8 +18,29 @@ __all__ = [
 ]
 
 
+# Characters of a message, at most; what it quotes may be a file in one line.
+LONGEST = 480
+
+
 class PiezotrackError(Exception):
-    """Base class of the exceptions of piezotrack, except `Interrupted`."""
+    """Base class of the exceptions of piezotrack, except `Interrupted`.
+
+    The message is one sentence. Its middle is left out where it is long, and control characters,
+    which a quoted value may have, are shown as Python writes them.
+    """
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(_printable(message))
+
+
+def _printable(message: str) -> str:
+    shown = (c if c.isprintable() else repr(c)[1:-1] for c in _shortened(message))
+    return _shortened("".join(shown))
+
+
+def _shortened(text: str) -> str:
+    half = (LONGEST - 5) // 2
+    return text if len(text) <= LONGEST else f"{text[:half]} ... {text[-half:]}"
 
 
 class ParameterError(PiezotrackError, ValueError):

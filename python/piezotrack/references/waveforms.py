@@ -393,6 +393,8 @@ def multisine(
     bottom, top = extremes(motion, min(duration, period), 1.0 / lines[-1], cosines=lines.size)
     if is_fitted:
         low, high = bounds(low, high)
+        if not top > bottom:
+            raise ParameterError(f"duration is {duration:g} s: expected a time in which it moves")
         scale = (high - low) / (top - bottom)
         offset = low - scale * bottom
     else:

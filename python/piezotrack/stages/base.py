@@ -358,7 +358,9 @@ class Stage:
         dt = _core.as_number("dt", dt)
         accuracy = _core.as_number("accuracy", accuracy)
         start = None if initial is None else self._checked(initial)._named
-        run = self._core.simulate(u, dt, hold, initial=start, method=method, accuracy=accuracy)
+        run = self._core.simulate(
+            u, dt, str(hold), initial=start, method=str(method), accuracy=accuracy
+        )
         return Response(
             t=np.arange(run.x.size, dtype=np.float64) * dt,
             u=np.array(u, dtype=np.float64),

@@ -204,7 +204,7 @@ class VirtualStage:
             Motion at the n samples.
         """
         dt = _core.as_number("dt", dt)
-        x, y, applied = self._core.simulate(u, dt, hold)
+        x, y, applied = self._core.simulate(u, dt, str(hold))
         t = np.arange(x.size, dtype=np.float64) * dt
         return VirtualResponse(t=t, u=np.array(u, dtype=np.float64), applied=applied, x=x, y=y)
 

@@ -184,7 +184,7 @@ class XYStage:
                 y=read,
             )
             for u, (true, read, applied) in zip(
-                (ux, uy), self._core.simulate(ux, uy, dt, hold), strict=True
+                (ux, uy), self._core.simulate(ux, uy, dt, str(hold)), strict=True
             )
         )
         return XYResponse(x, y)

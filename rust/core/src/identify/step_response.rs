@@ -60,6 +60,21 @@ pub struct Conventional {
     pub b0: f64,
 }
 
+impl Conventional {
+    /// Whether all that is computed from these figures is a number too.
+    fn is_sound(&self) -> bool {
+        let above = [
+            self.natural_frequency * self.natural_frequency,
+            self.damping_ratio,
+            self.time_constant,
+            self.a2,
+        ];
+        let finite = [self.overshoot_ratio, self.decrement, self.a1, self.b1, self.b0];
+        above.iter().all(|value| value.is_normal() && *value > 0.0)
+            && finite.iter().all(|value| value.is_finite())
+    }
+}
+
 impl StepReadings {
     /// The paper's formulas (4) to (6) and (9) to (13).
     ///
@@ -103,7 +118,7 @@ impl StepReadings {
         let natural_frequency = TAU * self.frequency;
         let (a1, ring) = (2.0 * decrement / self.period, TAU / self.period);
         let a2 = ring * ring + a1 * a1 / 4.0;
-        Ok(Conventional {
+        let found = Conventional {
             overshoot_ratio: over[0] / self.steady_state.abs(),
             decrement,
             damping_ratio,
@@ -115,6 +130,13 @@ impl StepReadings {
             // The gain in um/V, as the paper has it.
             b1: 1e6 * (self.steady_state / self.voltage) * a2,
             b0: self.initial_slope,
+        };
+        found.is_sound().then_some(found).ok_or_else(|| {
+            Error::Numerical(format!(
+                "the readings give a natural frequency of {natural_frequency:e} rad/s and a \
+                 damping ratio of {damping_ratio:e}: check the units of frequency, period, \
+                 static_gain and resonance_gain"
+            ))
         })
     }
 

@@ -86,7 +86,9 @@ impl<K: Kernel> LumpedStage<K> {
         let columns = columns(drive.u.len())?;
         let run = Run { of: *self, drive, start, substeps, columns, stop };
         let Some(motion) = dispatch_fused(run) else { return Ok(None) };
-        all_finite(&motion.x, drive.dt)?;
+        for values in [&motion.x, &motion.v, &motion.hysteresis] {
+            all_finite(values, drive.dt)?;
+        }
         Ok(Some(motion))
     }
 

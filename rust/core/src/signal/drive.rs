@@ -66,7 +66,7 @@ impl<'a> Drive<'a> {
 pub(crate) fn all_finite(x: &[f64], dt: f64) -> Result<()> {
     let Some(k) = x.iter().position(|x| !x.is_finite()) else { return Ok(()) };
     Err(Error::Numerical(format!(
-        "the simulated displacement is not finite from sample {k} on ({:.6} s): check that \
+        "the simulated motion is not finite from sample {k} on ({:.6} s): check that \
          parameters and drive are in SI units",
         dt * index(k)
     )))

@@ -1,0 +1,130 @@
+"""The command given files and options that are not quite right."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from hypothesis import strategies as st
+
+from commands import run
+from mutants import changed_document, log
+from soak import LONGEST_MESSAGE, bad_message, judged
+
+NUMBERS = ["0.02", "0", "-1", "nan", "inf", "1e-9", "1e9", "1e300", "x", "", "\u0663", "1_0"]
+GAINS = ["0.12", "1e5", *NUMBERS]
+NAMES = ["0", "9", "time_s", "x", "9" * 30]
+WHOLE = ["1", "2", "0", "-1", "x", "99999999999999999999", "1.5"]
+RANGES = ["0:0.6", "1:0", ":", "0.1:", "x:y", "nan:1", "0:1e9", "0:1:2", ""]
+REFERENCES = [
+    *(
+        "sine:0.2Hz,0..50um,2s",
+        "sine:1e9Hz,0..50um",
+        "reference.csv",
+        "none.csv",
+        "",
+        "x:",
+        "\x1b[31m",
+    ),
+    *("multisine:0.5/1.3Hz,0..9um,2s", "staircase:3,0..30um,dwell=0.2s", "triangle:1Hz,0..50um,1s"),
+]
+PATHS = [
+    "circle:1Hz,10um,1s",
+    "x",
+    "raster:1Hz,20/20um,lines=3,1s",
+    "path.csv",
+    "spiral:1Hz,2um,pitch=2um",
+]
+OPTIONS: dict[str, list[str]] = {
+    "--dt": NUMBERS,
+    "--limits": ["0:75", "75:0", "0:", ":", "nan:1", "-1e308:1e308", "0:75:80", "x"],
+    **dict.fromkeys(
+        ("--kp", "--ti", "--td", "--tt", "--kq", "--tq", "--stiffness", "--mass"), GAINS
+    ),
+    **dict.fromkeys(
+        ("--delay", "--jitter", "--lag", "--path-dt", "--duration", "--period"), NUMBERS
+    ),
+    **dict.fromkeys(("--seed", "--runs", "--threads"), WHOLE),
+    "--reference": REFERENCES,
+    "--path": PATHS,
+    "--cross-talk": ["0.01:0.01", "x", "1e300:1", "0.01"],
+    **dict.fromkeys(("--window", "--train", "--test"), RANGES),
+    "--fix": ["mass=0.1", "mass=x", "=1", "mass=nan", "none=1", "mass=0.1=2"],
+    "--bound": ["mass=0.1:0.2", "mass=0.2:0.1", "mass=x:1", "mass=:", "a=1:2"],
+    "--free": ["mass", "", "mass,,x", "mass,mass"],
+    "--unit": ["voltage_V=V", "x=V", "=", "time=um", "displacement=nm"],
+    **dict.fromkeys(("--time", "--drive", "--displacement"), NAMES),
+    "--hold": ["foh", "zoh", "x"],
+    "--model": ["dahl", "bouc-wen", "prandtl-ishlinskii", "none", "model.json", ""],
+    "--second-level": ["40:50", "x", "0:0", "1:nan"],
+    "--swarm": ["default", "spso-2011", "none"],
+}
+COLUMNS = ("--dt", "--unit", "--time", "--drive")
+LOOP = ("--dt", "--limits", "--kp", "--ti", "--td", "--delay", "--jitter", "--seed", "--duration")
+# What stands behind the command, and the options that it takes.
+COMMANDS: dict[str, tuple[list[str], tuple[str, ...]]] = {
+    "simulate": (["model.json", "log.csv"], (*COLUMNS, "--hold")),
+    "feedforward": (["model.json", "REFERENCE"], ("--dt", "--duration", "--period")),
+    "track": (["model.json"], (*LOOP, "--reference", "--period", "--tq", "--kq", "--tt")),
+    "contour": (["model.json"], (*LOOP, "--path", "--lag", "--cross-talk", "--path-dt")),
+    "identify": (
+        ["log.csv", "--runs", "1"],
+        (*COLUMNS, "--displacement", "--hold", "--window", "--threads", "--fix", "--bound",
+         "--free", "--model", "--stiffness", "--delay", "--swarm", "--seed"),
+    ),
+    "compare": (["log.csv", "--runs", "1"], (*COLUMNS, "--train", "--test", "--model", "--seed")),
+    "step": (["log.csv"], (*COLUMNS, "--stiffness", "--mass", "--second-level", "--window")),
+    "noise": (["log.csv"], ("--dt", "--unit", "--time", "--displacement", "--window")),
+}  # fmt: skip
+# Their shares: those that identify take long.
+MIX = (
+    ["simulate", "feedforward", "track"] * 4
+    + ["step", "noise"] * 2
+    + ["contour", "identify", "compare"]
+)
+
+
+@st.composite
+def invocations(draw: Any, right: list[str]) -> tuple[list[str], dict[str, str]]:
+    """Arguments of the command, and the files that they are about; `right` are model files."""
+    command = draw(st.sampled_from(MIX))
+    given, options = COMMANDS[command]
+    text = draw(st.sampled_from(right))
+    files = {
+        "model.json": changed_document(draw, text) if draw(st.integers(0, 3)) else text,
+        "log.csv": log(),
+        "reference.csv": log(titles="time_s,voltage_V,target_um"),
+        "path.csv": log(titles="time_s,x_um,y_um"),
+    }
+    arguments = [
+        command,
+        *(draw(st.sampled_from(REFERENCES)) if a == "REFERENCE" else a for a in given),
+    ]
+    chosen = draw(st.lists(st.sampled_from(options), max_size=3, unique=True))
+    if command == "track" and "--reference" not in chosen:
+        arguments += ["--reference", REFERENCES[0]]
+    if command == "contour" and "--path" not in chosen:
+        arguments += ["--path", PATHS[0]]
+    for option in chosen:
+        arguments += [option, draw(st.sampled_from(OPTIONS[option]))]
+    return [*arguments, "--out", "out"], files
+
+
+def faults_of_command(arguments: list[str]) -> tuple[list[str], int | None]:
+    """What a call of the command did that it may not, and its exit code."""
+    # Long enough for all that is asked here, on a busy machine too.
+    faults, result = judged(lambda: run(*arguments), after=100.0)
+    if faults:
+        return faults, None
+    error = result.exception
+    if error is not None and not isinstance(error, SystemExit):
+        return [f"{type(error).__name__}: {str(error)[:80]}"], None
+    code, said = result.exit_code, result.stderr
+    if code == 0:
+        return [], code
+    if code == 2 and said.startswith("Usage"):
+        return [], code
+    if code == 2 and re.fullmatch(r"piezotrack: [^\n]+\n", said) and result.stdout == "":
+        # The name of the program and the file come on top.
+        return bad_message(said.rstrip("\n")[: LONGEST_MESSAGE + 1]), code
+    return [f"exit {code}: {said[:80]}"], code
