@@ -37,6 +37,8 @@ LEARNERS = [
 ]  # fmt: skip
 FILTERS = [(), (), (pt.LowPass(5.0),), (pt.LowPass(5.0), pt.Notch(10.0))]
 FORWARDS = [None, None, DAHL.inverse(), DAHL.inverse(playback="online")]
+SPANS = [None, None, (-5e-6, 120e-6), (-1.0, 1.0)]
+JUMPS = [None, None, 2e-6, 5e-324]
 LIMITS = [(0.0, 75.0), (0.0, 75.0), (-20.0, 120.0), (20.0, 75.0), (-75.0, -20.0), (0.0, 5e-324)]
 
 STEP = {name: number(1e-5) for name in ("reference", "measured")}
@@ -53,6 +55,8 @@ def loop(script: Script, draw: Draw) -> Any:
         repetitive=draw(st.sampled_from(LEARNERS)),
         filters=draw(st.sampled_from(FILTERS)),
         feedforward=draw(st.sampled_from(FORWARDS)),
+        span=draw(st.sampled_from(SPANS)),
+        max_jump=draw(st.sampled_from(JUMPS)),
     )
 
 
@@ -69,7 +73,8 @@ def drive(script: Script, draw: Draw) -> None:
     for _ in range(draw(st.integers(1, 20))):
         given = arguments(draw, STEP | OTHERS, most=draw(st.sampled_from([0, 0, 1, 3])))
         reference, measured = given.pop("reference"), given.pop("measured")
-        volts = script.on(session, "step", reference, measured, again=False, **given)
+        door = draw(st.sampled_from(["step", "step", "step_um"]))
+        volts = script.on(session, door, reference, measured, again=False, **given)
         if not script.refused:
             script.judge(low <= volts <= high, "outside the limits", f"{low} <= {{}} <= {high}")
             last = script.on(session, "last", again=False)

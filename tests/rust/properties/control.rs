@@ -2,7 +2,7 @@
 //! repetitive part beside its equation.
 
 use piezotrack_control::{
-    Controller, Feedback, Filter, Limits, Pid, Repetitive, Smoothing, StateSpace,
+    Controller, Feedback, Filter, Limits, Outcome, Pid, Repetitive, Smoothing, StateSpace,
 };
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
@@ -141,7 +141,7 @@ proptest! {
         let law = sampled.recursion();
         let mut state = sampled.rest(vec![0.0; sampled.length()]).unwrap();
         let mut volts: Vec<f64> = Vec::new();
-        let mut before = 0.0;
+        let mut before = Outcome::default();
         for k in 0..errors.len() {
             let delayed = |i: usize| {
                 let delay = law.nearest + law.taps.len() - 1 - i;
@@ -151,11 +151,11 @@ proptest! {
             };
             let learnt: f64 = (0..law.taps.len()).map(delayed).sum();
             let expected = law.pole * volts.last().copied().unwrap_or(0.0) + learnt;
-            let got = sampled.step(&mut state, before, false);
+            let got = sampled.step(&mut state, before, f64::INFINITY);
             let scale = volts.iter().fold(1e3, |most, v| f64::max(most, v.abs()));
             prop_assert!((got - expected).abs() <= 1e-9 * scale, "{got} {expected} at {k}");
             volts.push(got);
-            before = errors[k];
+            before = Outcome { error: errors[k], excess: 0.0 };
         }
     }
 
@@ -178,16 +178,16 @@ proptest! {
         let (pole, delay) = if lag { ((-DT / tq).exp(), samples + 1) } else { (0.0, samples) };
         let mut state = sampled.rest(vec![0.0; sampled.length()]).unwrap();
         let mut volts: Vec<f64> = Vec::new();
-        let mut before = 0.0;
+        let mut before = Outcome::default();
         for k in 0..errors.len() {
             let learnt =
                 k.checked_sub(delay as usize).map_or(0.0, |at| volts[at] + kq * 1e6 * errors[at]);
             let expected = pole * volts.last().copied().unwrap_or(0.0)
                 + forgetting_factor * (1.0 - pole) * learnt;
-            let got = sampled.step(&mut state, before, false);
+            let got = sampled.step(&mut state, before, f64::INFINITY);
             prop_assert!((got - expected).abs() < 1e-9 * (1.0 + expected.abs()), "{got} {expected}");
             volts.push(got);
-            before = errors[k];
+            before = Outcome { error: errors[k], excess: 0.0 };
         }
     }
 }

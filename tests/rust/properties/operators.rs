@@ -122,11 +122,10 @@ proptest! {
     fn bouc_wen_stays_below_its_limit(
         (rise, beta, gamma) in (0.01..10.0_f64, 0.01..1.0_f64, -1.0..1.0_f64),
         exponent in prop::sample::select(vec![1.0, 1.5, 2.0]),
-        path in prop::collection::vec(around(1.0), 0..20),
+        path in prop::collection::vec(around(100.0), 0..20),
     ) {
         // The limit for |gamma| <= beta: rise = (beta + gamma) |h|^n.
         let gamma = 0.9 * gamma * beta;
-        let path: Vec<f64> = path.iter().map(|to| 20.0 * to / (beta + gamma.abs())).collect();
         let operator = BoucWen { rise, beta, gamma, exponent };
         let limit = (rise / (beta + gamma)).powf(1.0 / exponent);
         for h in outputs(&operator, &path) {

@@ -33,7 +33,7 @@ proptest! {
     ) {
         let (x, v): (Vec<f64>, Vec<f64>) = motion.into_iter().unzip();
         let samples = f64::from(whole) + part;
-        let late = delayed(&x, &v, dt, samples * dt);
+        let late = delayed(&x, &v, dt, samples * dt).unwrap();
         prop_assert_eq!(late.len(), x.len());
         // Before the first sample the stage is where it starts.
         let at = |k: i64| usize::try_from(k).map_or([x[0], 0.0], |k| [x[k], v[k]]);
@@ -99,7 +99,7 @@ proptest! {
     ) {
         let hold = if first { Hold::First } else { Hold::Zero };
         let Ok(drive) = Drive::new(&u, dt, hold) else {
-            prop_assert!(u.is_empty() || dt <= 0.0 || !dt.is_finite());
+            prop_assert!(u.is_empty() || !(1e-12..=1e9).contains(&dt));
             return Ok(());
         };
         // A drive of 1e300 V, or a second from sample to sample, takes its steps.

@@ -118,11 +118,16 @@ impl<N: Number> BoucWen<N> {
                 return z;
             }
         }
-        // A bounded output has reached its limit by now; any other grows without bound.
+        // A bounded output has reached its limit by now, or the rest is one exponential towards it;
+        // any other grows without bound.
         let kappa = self.side(z, longest).mul_add(self.gamma, self.beta);
-        let moving = magnitude(kappa.mul_add(-z, self.rise) * longest);
+        let slope = kappa.mul_add(-z, self.rise);
+        let moving = magnitude(slope * longest);
         let still = magnitude(z).mul_add(z.like(-1e-9), moving - z.like(f64::MIN_POSITIVE));
-        (-left).where_negative(still.where_negative(z, z.like(f64::INFINITY)), z)
+        let rest = N::lanewise([z, slope, kappa, left], |[z, slope, kappa, left]| {
+            if kappa > 0.0 { z - slope / kappa * libm::expm1(-kappa * left) } else { f64::INFINITY }
+        });
+        (-left).where_negative(still.where_negative(z, rest), z)
     }
 
     /// n = 1 over one piece: an exponential up to the sign change of z, another one beyond it.
