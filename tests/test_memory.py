@@ -16,7 +16,7 @@ pytestmark = pytest.mark.skipif(
 PREPARED = """
 reference = pt.sine(frequency=1.0, low=0.0, high=5e-5, duration=100.0)
 loop = pt.Controller(dt=1e-4, limits=(0.0, 75.0), feedback=pt.Pid.from_um(kp=0.01, ti=0.1, td=0.0))
-repetitive = pt.Controller(dt=1e-6, limits=(0.0, 75.0), repetitive=pt.Repetitive(period=990))
+repetitive = pt.Controller(dt=1e-6, limits=(0.0, 75.0), repetitive=pt.Repetitive(period=9.9))
 stage = pt.DahlStage.xu_li_2010()
 plays = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=[5.0], weights=[1e-7])
 virtual = pt.VirtualStage.xu_li_2010()
@@ -32,7 +32,7 @@ swarm = pt.ParticleSwarm(particles=100_000)
 long = pt.Dataset(u=np.tile(u, 500), y=np.tile(log.y, 500), dt=0.001)
 try:
     {call}
-except (MemoryError, pt.PiezotrackError) as error:
+except (MemoryError, OSError, pt.PiezotrackError) as error:
     print(type(error).__name__, error)
 assert stage.simulate(few, 0.01).x.size == 1000
 """
@@ -44,7 +44,7 @@ NONE = {
     "virtual": "virtual.simulate(many, 0.01)",
     "both axes": "xy.simulate(many, many, 0.01)",
     "inverse": "stage.inverse()._begun(0.01).along(many, many, many)",
-    "delay line": "repetitive.start()",
+    "delay line": "[repetitive.start() for _ in range(10)]",
     "loop": "pt.track(stage, loop, reference, substeps=90)",
     "circle": "circle.errors(many, many)",
     "path": "figure.errors(many, many)",
@@ -59,6 +59,8 @@ def test_no_memory_is_an_exception_and_the_process_goes_on(name: str) -> None:
     assert (ended.returncode, ended.stderr) == (0, "")
     # NumPy's sentence where it is an array of its own that has no room.
     pattern = r"MemoryError ([a-z]\D*: \d+ MB of memory are not to be had|Unable to allocate .*)\n"
+    # The stacks of threads need memory too.
+    pattern += "|OSError no threads could be started: .*\n"
     assert re.fullmatch(pattern, ended.stdout), ended.stdout
 
 
@@ -74,6 +76,10 @@ TOO_MANY = {
     "instants": (
         "pt.track(stage, loop, reference, substeps=19_000_000)",
         "ParameterError substeps is 19000000: expected 1 to 100000",
+    ),
+    "period": (
+        "pt.Controller(dt=1e-6, limits=(0.0, 75.0), repetitive=pt.Repetitive(period=990))",
+        "ParameterError period is 990 s: expected from 2 to 1e7 sampling intervals",
     ),
     "particles": (
         "pt.identify(log, swarm=swarm, runs=10_000)",

@@ -38,8 +38,10 @@ def low_passed(signal: Array, factor: int) -> Array:
     taps, beta = kaiserord(STOP_DB, 2.0 * TRANSITION / factor)
     half = min(taps // 2 + 1, signal.size - 1)
     weights = firwin(2 * half + 1, 1.0 / factor, window=("kaiser", beta))
-    padded = np.pad(signal, half, mode="reflect", reflect_type="odd")
-    filtered: Array = fftconvolve(padded, weights, mode="valid")
+    # What leaves float64 is infinite or NaN then, and refused where it is used.
+    with np.errstate(over="ignore", invalid="ignore"):
+        padded = np.pad(signal, half, mode="reflect", reflect_type="odd")
+        filtered: Array = fftconvolve(padded, weights, mode="valid")
     return filtered
 
 
@@ -64,8 +66,9 @@ def interpolated(signal: Array, factor: int) -> Array:
     # Whole old intervals to either side: at the given samples all weights but one are then 0.
     half = min(taps // (2 * factor) + 1, signal.size - 1)
     weights = factor * firwin(2 * half * factor + 1, 1.0 / factor, window=("kaiser", beta))
-    padded = np.pad(signal, half, mode="reflect", reflect_type="odd")
-    filled = upfirdn(weights, padded, up=factor)
+    with np.errstate(over="ignore", invalid="ignore"):
+        padded = np.pad(signal, half, mode="reflect", reflect_type="odd")
+        filled = upfirdn(weights, padded, up=factor)
     first = 2 * half * factor
     between: Array = filled[first : first + (signal.size - 1) * factor + 1]
     between[::factor] = signal

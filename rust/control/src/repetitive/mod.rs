@@ -27,7 +27,7 @@ const HALF: usize = 4;
 /// Taps on the delay line, at most.
 const TAPS: usize = 2 * HALF + CUBIC;
 /// Longest period, in samples.
-const LONGEST: f64 = 1e9;
+const LONGEST: f64 = 1e7;
 
 /// The filter Q: what it passes is learnt; what it stops cannot make the learning unstable.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -157,7 +157,7 @@ impl Repetitive {
         let samples = self.period / dt;
         // Two samples given in decimals may miss 2 by rounding.
         let right = (2.0 - 1e-9..=LONGEST).contains(&samples);
-        check("period", self.period, "s", right, "from 2 to 1e9 sampling intervals")?;
+        check("period", self.period, "s", right, "from 2 to 1e7 sampling intervals")?;
 
         let mut q = [0.0; HALF + 1];
         q[0] = 1.0;
