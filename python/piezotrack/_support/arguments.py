@@ -23,6 +23,7 @@ __all__ = [
     "check_length",
     "check_reach",
     "finite",
+    "hertz",
     "in_range",
     "not_negative",
     "numbers",
@@ -33,6 +34,8 @@ __all__ = [
 
 # A displacement [m] that only a wrong unit explains.
 TOO_FAR = 1.0
+# Frequencies of references [Hz]: beyond them numbers derived from them leave float64.
+SLOWEST, FASTEST = 1e-9, 1e12
 # Most entries of a list of settings.
 MOST_ENTRIES = 1_000_000
 
@@ -81,6 +84,20 @@ def positive(name: str, value: object, unit: str) -> float:
     number = _core.as_number(name, value)
     if not 0.0 < number < math.inf:
         raise ParameterError(f"{name} is {number:g}: expected a finite number above 0, in {unit}")
+    return number
+
+
+def hertz(name: str, value: object) -> float:
+    """Return a frequency from 1e-9 to 1e12 Hz as a float; arguments and errors as in `finite`.
+
+    Examples
+    --------
+    >>> hertz("frequency", 5)
+    5.0
+    """
+    number = positive(name, value, "Hz")
+    if not SLOWEST <= number <= FASTEST:
+        raise ParameterError(f"{name} is {number:g} Hz: expected {SLOWEST:g} to {FASTEST:g} Hz")
     return number
 
 

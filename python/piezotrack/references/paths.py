@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from .._support.arguments import check_length, check_reach, finite, in_range, positive
+from .._support.arguments import check_length, check_reach, finite, hertz, in_range, positive
 from .._support.messages import quoted
 from ..errors import ParameterError
 from .motions import Cosines, common_period, extremes, s_curve
@@ -79,7 +79,7 @@ def circle(
     >>> path.period, path.duration
     (10.0, 30.0)
     """
-    frequency = positive("frequency", frequency, "Hz")
+    frequency = hertz("frequency", frequency)
     radius = _size("radius", radius)
     cx, cy = _pair("centre", centre)
     turn = finite("phase", phase, "rad")
@@ -134,7 +134,7 @@ def lissajous(
     >>> pt.lissajous(frequencies=(0.2, 0.3), sizes=(20e-6, 20e-6)).period
     10.0
     """
-    fx, fy = (positive("frequencies", one, "Hz") for one in _pair("frequencies", frequencies))
+    fx, fy = (hertz("frequencies", one) for one in _pair("frequencies", frequencies))
     a, b = (_size("sizes", one) for one in _pair("sizes", sizes))
     cx, cy = _pair("centre", centre)
     period = common_period((fx, fy))
@@ -199,7 +199,7 @@ def raster(
     >>> print(f"{scan.period:g} s a frame, x from {1e6 * scan.x.low:.1f} um")
     10 s a frame, x from 48.1 um
     """
-    rate = positive("line_rate", line_rate, "Hz")
+    rate = hertz("line_rate", line_rate)
     width, height = (_size("sizes", one) for one in _pair("sizes", sizes))
     cx, cy = _pair("centre", centre)
     count = _core.as_count("lines", lines)
@@ -264,7 +264,7 @@ def spiral(
     >>> pt.spiral(frequency=0.5, radius=20e-6, pitch=2e-6).duration
     20.0
     """
-    frequency = positive("frequency", frequency, "Hz")
+    frequency = hertz("frequency", frequency)
     radius, pitch = _size("radius", radius), _size("pitch", pitch)
     if pitch >= radius:
         raise ParameterError(f"pitch is {pitch:g}: expected less than the radius, {radius:g} m")

@@ -12,6 +12,7 @@ from .._support.arguments import (
     bounds,
     check_reach,
     finite,
+    hertz,
     in_range,
     not_negative,
     numbers,
@@ -31,6 +32,8 @@ __all__ = ["chirp", "multisine", "sine", "staircase", "triangle"]
 # The longest start, as a share of a period, with which a sine from one of its ends never goes
 # faster than later on.
 START = 1.0 / 6.0
+# Amplitude in m, or ratio of amplitudes, that only a wrong unit explains.
+MOST_AMPLITUDE = 1e9
 # The longest rise, as a share of the time at a level.
 RISE = 0.2
 
@@ -81,7 +84,7 @@ def sine(
     >>> pt.sine(frequency=0.2, low=0.0, high=110e-6, duration=20.0)
     Reference(sine 0.2 Hz, 0 to 110 um, 20 s)
     """
-    frequency = positive("frequency", frequency, "Hz")
+    frequency = hertz("frequency", frequency)
     low, high = bounds(low, high)
     duration = positive("duration", duration, "s")
     turn = finite("phase", phase, "rad")
@@ -142,7 +145,7 @@ def triangle(
     >>> pt.triangle(frequency=1.0, low=0.0, high=50e-6, duration=4.0, rounding=0.2)
     Reference(triangle 1 Hz, 0 to 50 um, 4 s)
     """
-    frequency = positive("frequency", frequency, "Hz")
+    frequency = hertz("frequency", frequency)
     low, high = bounds(low, high)
     duration = positive("duration", duration, "s")
     share = in_range("rounding", rounding, 1.0, "parts of a period")
@@ -288,8 +291,8 @@ def chirp(
     >>> pt.chirp(start_frequency=0.1, stop_frequency=5.0, low=0.0, high=50e-6, duration=20.0)
     Reference(chirp 0.1 to 5 Hz, 0 to 50 um, 20 s)
     """
-    first = positive("start_frequency", start_frequency, "Hz")
-    last = positive("stop_frequency", stop_frequency, "Hz")
+    first = hertz("start_frequency", start_frequency)
+    last = hertz("stop_frequency", stop_frequency)
     low, high = bounds(low, high)
     duration = positive("duration", duration, "s")
     return Reference(
@@ -361,7 +364,8 @@ def multisine(
     >>> lines, lines.period
     (Reference(multisine 0.5, 1, 1.5 Hz, 0 to 50 um, 8 s), 2.0)
     """
-    lines = numbers("frequencies", frequencies, "Hz", above=0.0)
+    given_lines = numbers("frequencies", frequencies, "Hz", above=0.0)
+    lines = np.array([hertz("frequencies", one) for one in given_lines])
     order = np.argsort(lines)
     lines = lines[order]
     if (np.diff(lines) == 0.0).any():
@@ -382,6 +386,10 @@ def multisine(
             raise ShapeError(
                 f"amplitudes has {given.size} entries: expected one, or {lines.size} like "
                 "frequencies"
+            )
+        if not (given < MOST_AMPLITUDE).all():
+            raise ParameterError(
+                f"amplitudes has {given.max():g}: expected m, or ratios, below {MOST_AMPLITUDE:g}"
             )
         sizes = np.broadcast_to(given, lines.shape)[order]
     phases = schroeder_phases(sizes)
