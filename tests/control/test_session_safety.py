@@ -130,7 +130,7 @@ def test_a_jump_further_than_the_stage_can_move_is_refused_and_counted() -> None
 WRONG: dict[str, tuple[Callable[[pt.control.Session], object], str]] = {
     "um for m": (
         lambda s: s.step(110.0, 0.0),
-        "reference is 110 m: .*110 um is 1.1e-4 m, .*step_um",
+        "reference is 110 m: .*110 um is 110e-6 m, .*step_um",
     ),
     "a whole number": (lambda s: s.step(110, 0.0), "reference is 110 m"),
     "float32": (
@@ -145,9 +145,9 @@ WRONG: dict[str, tuple[Callable[[pt.control.Session], object], str]] = {
         lambda s: s.step(np.array(110.0), 0.0),  # type: ignore[arg-type]
         "reference is 110 m",
     ),
-    "nm for m": (lambda s: s.step(110_000.0, 0.0), "110000 nm is 1.1e-4 m"),
-    "half": (lambda s: s.step(0.5, 0.49), r"reference is 0.5 m: .*0.5 um is 5e-7 m"),
-    "measured": (lambda s: s.step(10e-6, 9.8), r"measured is 9.8 m: .*9.8 um is 9.8"),
+    "nm for m": (lambda s: s.step(110_000.0, 0.0), "110000 nm is 110000e-9 m"),
+    "half": (lambda s: s.step(0.5, 0.49), r"reference is 0.5 m: .*0.5 um is 0.5e-6 m"),
+    "measured": (lambda s: s.step(10e-6, 9.8), r"measured is 9.8 m: .*9.8 um is 9.8e-6 m"),
     "measured whole": (lambda s: s.step(10e-6, 98), r"measured is 98 m"),
     "far too large": (lambda s: s.step(10**400, 0.0), r"reference is 1000.*"),
     "measured too large": (lambda s: s.step(0.0, 10**400), r"measured is 1000.*"),
@@ -182,6 +182,16 @@ def test_micrometres_are_metres() -> None:
             1e6 * desired(k), 0.9e6 * desired(k), velocity=1.0, preview=1e6 * desired(k + 1)
         )
         assert a == pytest.approx(b, rel=1e-12)
+
+
+def test_a_displacement_beyond_the_stage_is_refused_without_a_guess() -> None:
+    with pytest.raises(pt.ParameterError) as caught:
+        FULL.start().step(300e-6, 0.0)
+    assert " um is " not in str(caught.value)
+    # It may be the sensor's zero: no reason to stop at the first sample.
+    session = FULL.start()
+    session.step(10e-6, 300e-6)
+    assert session.refused.outside == 1
 
 
 def test_a_glitch_that_is_no_unit_never_raises() -> None:

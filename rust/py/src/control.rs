@@ -160,15 +160,24 @@ pub fn load<S: Snapshot + Clone>(state: &mut S, numbers: Vec<f64>) -> PyResult<(
     Ok(())
 }
 
-/// Units of length that are taken for metres by mistake, and how many of them are a metre.
-const UNITS: [(&str, f64); 3] = [("um", 1e6), ("nm", 1e9), ("mm", 1e3)];
+/// Units of length that are taken for metres by mistake, how many of them are a metre, and the
+/// power of ten.
+const UNITS: [(&str, f64, &str); 3] = [("um", 1e6, "e-6"), ("nm", 1e9, "e-9"), ("mm", 1e3, "e-3")];
+/// Least number that is taken for one of another unit.
+const LEAST: f64 = 0.01;
+
+/// The unit that explains a displacement outside of the span, if there is one.
+fn meant(value: f64, span: Span) -> Option<&'static (&'static str, f64, &'static str)> {
+    let fits = |(_, metre, _): &&(&str, f64, &str)| span.contains(value / metre);
+    UNITS.iter().find(fits).filter(|_| value.abs() >= LEAST)
+}
 
 /// The error for a displacement outside of the span.
 fn outside(name: &str, value: f64, span: Span) -> PyErr {
-    let hint = match UNITS.iter().find(|(_, metre)| span.contains(value / metre)) {
-        Some((unit, metre)) => {
+    let hint = match meant(value, span) {
+        Some((unit, _, power)) => {
             let taken = if *unit == "um" { ", and step_um takes um" } else { "" };
-            format!("; {value} {unit} is {:e} m{taken}", value / metre)
+            format!("; {value} {unit} is {value}{power} m{taken}")
         }
         None => String::new(),
     };
@@ -189,7 +198,7 @@ impl PySession {
         }
         if self.state.measured().is_none()
             && !span.contains(measured)
-            && UNITS.iter().any(|(_, metre)| span.contains(measured / metre))
+            && meant(measured, span).is_some()
         {
             return Err(outside("measured", measured, span));
         }
