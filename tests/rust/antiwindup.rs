@@ -251,6 +251,11 @@ fn a_reset_goes_on_from_the_voltage_that_is_there() {
     run.controller.reset(&mut run.state);
     let command = run.controller.step(&mut run.state, x, x, 12.0);
     assert!((command.volts - volts + 3.0).abs() < 1e-9);
+    // Before the first command there is none that a reported voltage could differ from.
+    let controller = Controller::new(limits(), pid());
+    let mut state = controller.rest([]).unwrap();
+    state.applied(37.0).unwrap();
+    assert!(controller.step(&mut state, 0.0, 0.0, 0.0).volts.abs() < 1e-12);
     // Nothing holds a voltage without feedback: the feedforward it is, with no measurement too.
     let controller = Controller::new(limits(), ());
     let mut state = controller.rest([]).unwrap();

@@ -384,8 +384,11 @@ impl<S, L> ControllerState<S, L> {
             let expected = "the voltage that the actuator got";
             return Err(Error { name: "volts", value: volts, unit: "V", expected });
         }
-        self.excess = volts - self.last.unclipped;
-        (self.reported, self.apart) = (true, true);
+        // Before the first command there is nothing to compare with.
+        if self.stepped {
+            self.excess = volts - self.last.unclipped;
+            (self.reported, self.apart) = (true, true);
+        }
         Ok(())
     }
 

@@ -90,7 +90,7 @@ impl Saturation {
     #[inline]
     pub(super) fn follow(&mut self, clipped: bool, lengths: &Lengths) {
         self.learning = match self.learning {
-            Learning::Held { left } => return self.hold(left - 1, clipped, lengths),
+            Learning::Held { left } => return self.hold(left.saturating_sub(1), clipped, lengths),
             Learning::Resuming { left } if left > 1 => Learning::Resuming { left: left - 1 },
             Learning::Resuming { .. } | Learning::On => Learning::On,
         };
