@@ -8,7 +8,15 @@
 
 from __future__ import annotations
 
-from ._core import __version__ as __version__
 from ._support.lazy import attach
 
-__getattr__, __dir__, __all__ = attach(__name__, globals())
+_named, __dir__, __all__ = attach(__name__, globals())
+
+
+def __getattr__(name: str) -> object:
+    # The compiled module is not loaded before it is used, so that Ctrl-C is answered in words.
+    if name == "__version__":
+        from ._core import __version__
+
+        return __version__
+    return _named(name)

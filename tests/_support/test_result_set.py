@@ -13,7 +13,7 @@ import pytest
 
 import piezotrack as pt
 from piezotrack._support import result_set
-from piezotrack._support.files import replacing, together
+from piezotrack._support.files import make_folder, replacing, together, write_document
 from piezotrack._support.result_set import MARKER
 from piezotrack._support.temporary import this_host
 
@@ -249,3 +249,22 @@ def test_a_marker_leads_to_no_other_folder(tmp_path: Path) -> None:
     expected = dict.fromkeys(NAMES[1:], "new") | {"notes.txt": "mine", temporary: "foreign"}
     assert content(folder) == expected
     assert sorted(path.name for path in tmp_path.iterdir()) == [temporary, "results"]
+
+
+def test_the_name_of_the_marker_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(pt.DataError, match="expected another name"):
+        write_document(tmp_path / MARKER, {"a": 1})
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_marker_with_a_name_that_no_file_can_have_is_no_obstacle(tmp_path: Path) -> None:
+    entry = '{"temporary": ".piezotrack-h-1-a.json", "result": "\\ud800"}'
+    (tmp_path / MARKER).write_text(f'{{"host": "h", "process": 1, "files": [{entry}]}}')
+    os.utime(tmp_path / MARKER, (0.0, 0.0))
+    write_document(tmp_path / "a.json", {"a": 1})
+    assert (tmp_path / "a.json").exists()
+
+
+def test_a_folder_without_a_name_is_refused() -> None:
+    with pytest.raises(pt.DataError, match="expected a name, or "):
+        make_folder("")

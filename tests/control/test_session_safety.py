@@ -326,5 +326,29 @@ def test_results_are_copied_whole() -> None:
 def test_a_state_of_another_controller_is_refused() -> None:
     session = FULL.start()
     with pytest.raises(pt.ParameterError, match="state is another"):
-        session._core.load([0.0] * 5)
+        session._core.load(b"0" * 40)
     assert session.refused == (0, 0, 0)
+
+
+def test_an_absurd_report_of_the_amplifier_is_ignored() -> None:
+    session, plant = LAWS["state space"].start(), Plant()
+    before = max(errors(session, plant, range(5000))[-250:])
+    session.applied(9.91e37)
+    session.reset()
+    assert max(errors(session, plant, range(5000, 5750))[-250:]) < 1.2 * before + 1e-6
+
+
+def test_a_running_loop_never_raises_for_a_reading() -> None:
+    session = loop().start()
+    for _ in range(10):
+        session.step(10e-6, math.nan)
+    session.step(10e-6, 0.5)
+    session.reset()
+    session.step(10e-6, 0.5)
+    assert session.refused == (0, 1, 0)
+
+
+def test_an_inverse_refuses_another_unit() -> None:
+    for reference in (110, np.float32(110), -110.0):
+        with pytest.raises(pt.ParameterError, match=r"reference is -?110 m: .*110 um is -?110e-6"):
+            STAGE.inverse().start(DT).step(reference)  # type: ignore[arg-type]

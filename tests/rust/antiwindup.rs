@@ -247,14 +247,14 @@ fn a_reset_goes_on_from_the_voltage_that_is_there() {
     assert!((command.volts - volts).abs() < 1e-9, "{volts} V, then {} V", command.volts);
     assert!(command.repetitive.abs() < 1e-12);
     // From what the amplifier gave, where that was reported.
-    run.state.applied(volts - 3.0).unwrap();
+    run.controller.applied(&mut run.state, volts - 3.0).unwrap();
     run.controller.reset(&mut run.state);
     let command = run.controller.step(&mut run.state, x, x, 12.0);
     assert!((command.volts - volts + 3.0).abs() < 1e-9);
     // Before the first command there is none that a reported voltage could differ from.
     let controller = Controller::new(limits(), pid());
     let mut state = controller.rest([]).unwrap();
-    state.applied(37.0).unwrap();
+    controller.applied(&mut state, 37.0).unwrap();
     assert!(controller.step(&mut state, 0.0, 0.0, 0.0).volts.abs() < 1e-12);
     // Nothing holds a voltage without feedback: the feedforward it is, with no measurement too.
     let controller = Controller::new(limits(), ());
@@ -318,7 +318,7 @@ fn a_reported_voltage_pauses_learning_as_a_limit_does() {
             let command = *run.state.last();
             let given = command.volts.min(40.0);
             if tells {
-                run.state.applied(given).unwrap();
+                run.controller.applied(&mut run.state, given).unwrap();
             }
             run.x += 0.95 * (GAIN * given - run.x);
             let angle = core::f64::consts::TAU * f64::from(run.k) / f64::from(PERIOD);
@@ -359,4 +359,22 @@ fn a_state_is_read_back_bit_for_bit() {
             assert!(plain.rest([]).unwrap().load(&mut || left.next()).is_none());
         }
     }
+}
+
+#[test]
+fn an_absurd_report_of_the_amplifier_is_ignored() {
+    let law = StateSpace::<2>::new(&[1.0], &[2e4], &[1.0], 0.0, None).unwrap();
+    for volts in [9.91e37, -1e17, 151.0, -76.0] {
+        let mut run = Loop::new(Controller::new(limits(), law));
+        run.periods(30, 80e-6);
+        let before = run.state.clone();
+        run.controller.applied(&mut run.state, volts).unwrap();
+        assert_eq!(run.state, before, "{volts} V");
+    }
+    // What may be there, but not between the limits, is where a reset starts from a limit.
+    let mut run = Loop::new(Controller::new(limits(), law));
+    run.step(80e-6, None);
+    run.controller.applied(&mut run.state, 149.0).unwrap();
+    run.controller.reset(&mut run.state);
+    assert!((run.state.last().volts - 75.0).abs() < 1e-12);
 }

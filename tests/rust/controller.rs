@@ -173,10 +173,10 @@ fn what_was_really_applied_counts() {
     let controller = Controller::new(Limits::new(0.0, 75.0).unwrap(), published());
     let mut state = controller.rest([]).unwrap();
     controller.step(&mut state, 0.0, 0.0, 20.0);
-    state.applied(15.0).unwrap();
+    controller.applied(&mut state, 15.0).unwrap();
     let command = controller.step(&mut state, 0.0, 0.0, 20.0);
     close(command.feedback, -5.0 * DT / (0.009_f64 * 0.044).sqrt(), 1e-12);
-    assert_eq!(state.applied(f64::NAN).unwrap_err().name, "volts");
+    assert_eq!(controller.applied(&mut state, f64::NAN).unwrap_err().name, "volts");
 }
 
 #[test]

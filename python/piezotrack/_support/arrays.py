@@ -24,6 +24,8 @@ UNEVEN = 0.05
 MOST_SAMPLES = 500_000_000
 # Sampling intervals beyond which numbers derived from them leave float64 [s], as in the core.
 SHORTEST, LONGEST = 1e-12, 1e9
+# Size beyond which no sample makes sense, and its square leaves float64 soon; as in the core.
+LARGEST = 1e100
 USE_DT = (
     "an evenly sampled record whose times are coarse or jittery can be given with dt=, "
     "which is used in place of the times"
@@ -155,7 +157,9 @@ def signal_of(
             f"u has {like.size} samples and {name} has {array.size}: expected equally many"
         )
     signal = np.array(array)
-    if finite and (bad := _first(~np.isfinite(signal))) is not None:
-        raise DataError(f"{name} is {signal[bad]} at sample {bad}: expected finite numbers")
+    if finite and (bad := _first(~(np.abs(signal) < LARGEST))) is not None:
+        value = signal[bad]
+        expected = f"numbers below {LARGEST:g}" if np.isfinite(value) else "finite numbers"
+        raise DataError(f"{name} is {value} at sample {bad}: expected {expected}")
     signal.setflags(write=False)
     return signal

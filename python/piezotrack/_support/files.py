@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import DataError
 from .plot_style import without_glyph_warnings
-from .result_set import current_set, finish_others, together
+from .result_set import MARKER, current_set, finish_others, together
 from .temporary import create, forget
 
 if TYPE_CHECKING:
@@ -55,6 +55,8 @@ def replacing(path: str | os.PathLike[str], *, synced: bool = False) -> Iterator
         The folder is missing, or the file cannot be written.
     """
     file = Path(path)
+    if file.name == MARKER:
+        raise DataError(f"{file}: expected another name, as this one lists unfinished results")
     results = current_set(file.parent)
     try:
         if results is None:
@@ -137,6 +139,10 @@ def make_folder(folder: str | os.PathLike[str]) -> Path:
         It cannot be made.
     """
     path = Path(folder)
+    if not os.fspath(folder):
+        raise DataError(
+            "the folder for results is '': expected a name, or . for the working folder"
+        )
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -236,6 +236,15 @@ def _read(marker: Path) -> dict[str, object]:
     return found if isinstance(found, dict) else {}
 
 
+def _is_a_name(text: str) -> bool:
+    """Whether a text is the name of a file in its folder."""
+    try:
+        os.fsencode(text)
+    except UnicodeEncodeError:
+        return False
+    return text == Path(text).name and text != ".." and "\0" not in text
+
+
 def _listed(folder: Path) -> list[Pair]:
     """Return the pairs of the marker of a folder; names that lead elsewhere are left out."""
     files = _read(folder / MARKER).get("files")
@@ -243,8 +252,7 @@ def _listed(folder: Path) -> list[Pair]:
     for entry in files if isinstance(files, list) else []:
         found = entry if isinstance(entry, dict) else {}
         temporary, result = str(found.get("temporary")), str(found.get("result"))
-        plain = result == Path(result).name and result != ".." and "\0" not in result
-        if plain and is_temporary(temporary):
+        if _is_a_name(result) and is_temporary(temporary):
             pairs.append((folder / temporary, folder / result))
     return pairs
 

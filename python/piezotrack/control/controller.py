@@ -50,7 +50,8 @@ class Controller:
         again at each end; without feedforward -10 to 10 mm.
     max_jump : float, optional
         Largest displacement in a sampling interval [m]. A reading further from the last valid one
-        is no measurement either; the distance allowed grows with each sample without one.
+        is no measurement either; the distance allowed grows with each sample without one. The first
+        reading is believed.
 
     Raises
     ------
@@ -109,7 +110,8 @@ class Controller:
 
     def __reduce__(self) -> tuple[Any, ...]:
         # The core's controller is made again.
-        return _made, ({one.name: getattr(self, one.name) for one in fields(self) if one.init},)
+        given = {one.name: getattr(self, one.name) for one in fields(self) if one.init}
+        return _made, (type(self), given)
 
     def _span(self, low: float, high: float) -> tuple[float, float] | None:
         """Range of valid readings [m] for limits [V]; None for that of the core."""
@@ -148,8 +150,8 @@ def _check_part(name: str, part: object, kinds: type | tuple[type, ...], expecte
         raise ParameterError(f"{name} is {type(part).__name__}: expected {expected}")
 
 
-def _made(settings: dict[str, Any]) -> Controller:
-    return Controller(**settings)
+def _made(kind: type[Controller], settings: dict[str, Any]) -> Controller:
+    return kind(**settings)
 
 
 def _pair(name: str, ends: object, unit: str) -> tuple[float, float]:

@@ -92,7 +92,7 @@ class Session:
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _resumed, (self._controller, self._core.save(), self._inverse)
+        return _resumed, (type(self), self._controller, self._core.save(), self._inverse)
 
     def step(
         self,
@@ -208,7 +208,8 @@ class Session:
         voltage : float
             Voltage [V], which the antiwindup uses in place of the command. Where it differs from
             the command by more than 1 % of the range of the limits, the sample counts as saturated:
-            learning pauses.
+            learning pauses. Further outside the limits than their range it is no reading, such as
+            9.91e37, and is ignored.
 
         Raises
         ------
@@ -253,8 +254,9 @@ class Session:
         """Forget errors, readings, hysteresis and what was learnt, and go on without a bump.
 
         The feedback starts anew from the voltage that is there: the last command, or what was
-        reported by `applied`. Without feedback the next command is the feedforward. For a start at
-        0 V use ``controller.start()``.
+        reported by `applied`. Without feedback the next command is the feedforward; a law without
+        an integrator keeps the voltage as a constant part of its output. For a start at 0 V use
+        ``controller.start()``.
         """
         self._core.reset()
         if self._inverse is not None:
@@ -265,8 +267,10 @@ def _metres(name: str, value: float) -> float:
     return 1e-6 * _core.as_number(name, value)
 
 
-def _resumed(controller: Controller, state: list[float], inverse: InverseSession | None) -> Session:
-    session = controller.start()
+def _resumed(
+    kind: type[Session], controller: Controller, state: bytes, inverse: InverseSession | None
+) -> Session:
+    session = kind(controller)
     session._core.load(state)
     # A shallow copy brings the inverse of the original.
     session._inverse = copy.copy(inverse)

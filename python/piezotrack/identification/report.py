@@ -111,7 +111,7 @@ def _runs(fit: Identification) -> list[str]:
     """Say whether several runs agree."""
     if len(fit.runs) == 1:
         return [
-            "      one run: several, as runs=4, would show whether there are other local minima"
+            "      one run: several (runs=4, --runs 4) would show whether there are other local minima"
         ]
     costs = ", ".join(f"{1e6 * cost:.4g}" for cost in sorted(run.cost for run in fit.runs)[:4])
     more = ", ..." if len(fit.runs) > 4 else ""

@@ -315,8 +315,13 @@ class InverseSession:
         Returns
         -------
         float
-            Voltage [V]; NaN, with the state unchanged, if an input is not finite. The differences
-            then continue as if the reference had kept its velocity.
+            Voltage [V]; NaN, with the state unchanged, if an input is not finite or beyond what the
+            model reaches. The differences then continue as if the reference had kept its velocity.
+
+        Raises
+        ------
+        ParameterError
+            `reference` is a metre or more.
         """
         try:
             return self._core.step(reference, velocity, acceleration, preview)
@@ -333,7 +338,7 @@ class InverseSession:
         self._core.reset()
 
 
-def _resumed(inverse: Inverse, dt: float, state: list[float]) -> InverseSession:
+def _resumed(inverse: Inverse, dt: float, state: bytes) -> InverseSession:
     session = inverse.start(dt)
     session._core.load(state)
     return session

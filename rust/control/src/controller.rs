@@ -192,7 +192,8 @@ impl<F: Feedback> Controller<F> {
     }
 
     /// The initial state for a bumpless start from the voltage `present` (V) at the actuator: the
-    /// feedback part starts at `present` less the other parts.
+    /// feedback part starts at `present` less the other parts. An integrator works that off; a law
+    /// without one keeps it as a constant part of its output.
     ///
     /// # Errors
     /// Names `present` where it is outside the limits, `line` as in [`Self::rest`].
@@ -213,17 +214,18 @@ impl<F: Feedback> Controller<F> {
     /// without a bump, as after [`Self::start`]; before the first step as after [`Self::rest`].
     ///
     /// Without feedback there is nothing that could hold the voltage: it is the feedforward then.
+    /// A law without an integrator holds it as a constant part of its output.
     pub fn reset<L: AsMut<[f64]>>(&self, state: &mut ControllerState<F::State, L>) {
         if let (Some(part), Some(memory)) = (&self.repetitive, &mut state.repetitive) {
             part.reset(memory);
         }
-        let present = state.voltage();
+        let present = self.limits.clip(state.voltage());
         if state.stepped {
             state.present = Some(present);
         }
         state.feedback = self.feedback.rest();
         state.filters = [None; 2];
-        state.last = Command { volts: self.limits.clip(present), ..Command::default() };
+        state.last = Command { volts: present, ..Command::default() };
         state.stepped = false;
         (state.excess, state.reported, state.apart) = (0.0, false, true);
         state.unlearnt = 0.0;
@@ -261,7 +263,7 @@ impl<F: Feedback> Controller<F> {
         }
         let same = self.filters == next.filters && self.repetitive == next.repetitive;
         if state.stepped && !(kept && same) {
-            state.present = Some(state.voltage());
+            state.present = Some(next.limits.clip(state.voltage()));
             state.apart = true;
         }
         Ok(())
@@ -357,6 +359,27 @@ impl<F: Feedback> Controller<F> {
         (state.present.take().filter(|_| self.feedback.holds()), excess)
     }
 
+    /// Reports the voltage (V) applied for the last command, where it differs from the clipped
+    /// command because of a slew rate or of the amplifier's own limits.
+    ///
+    /// Antiwindup uses it; without this call, it uses the clipped command. Where it differs from
+    /// the command by more than 1 % of the limits' range, the sample counts as saturated for the
+    /// repetitive part. A voltage outside the limits by more than the range between them is no
+    /// reading, and is ignored; so is one before the first command.
+    ///
+    /// # Errors
+    /// Names `volts` where it is not finite; nothing is changed then.
+    pub fn applied<L>(&self, state: &mut ControllerState<F::State, L>, volts: f64) -> Result<()> {
+        check("volts", volts, "V", volts.is_finite(), "the voltage that the actuator got")?;
+        let range = self.limits.high() - self.limits.low();
+        let near = volts >= self.limits.low() - range && volts <= self.limits.high() + range;
+        if state.stepped && near {
+            state.excess = volts - state.last.unclipped;
+            (state.reported, state.apart) = (true, true);
+        }
+        Ok(())
+    }
+
     #[inline]
     fn filtered(&self, states: &mut [FilterState; 2], measured: f64) -> f64 {
         let mut value = measured;
@@ -370,28 +393,6 @@ impl<F: Feedback> Controller<F> {
 }
 
 impl<S, L> ControllerState<S, L> {
-    /// Reports the voltage (V) applied for the last command, where it differs from the clipped
-    /// command because of a slew rate or of the amplifier's own limits.
-    ///
-    /// Antiwindup uses it; without this call, it uses the clipped command. Where it differs from
-    /// the command by more than 1 % of the limits' range, the sample counts as saturated for the
-    /// repetitive part.
-    ///
-    /// # Errors
-    /// Names `volts` where it is not finite; nothing is changed then.
-    pub fn applied(&mut self, volts: f64) -> Result<()> {
-        if !usable(volts) {
-            let expected = "the voltage that the actuator got";
-            return Err(Error { name: "volts", value: volts, unit: "V", expected });
-        }
-        // Before the first command there is nothing to compare with.
-        if self.stepped {
-            self.excess = volts - self.last.unclipped;
-            (self.reported, self.apart) = (true, true);
-        }
-        Ok(())
-    }
-
     /// The last command.
     #[must_use]
     pub fn last(&self) -> &Command {

@@ -14,6 +14,9 @@ use crate::numbers::is_unsuitable;
 /// Most samples of an array: 4 GB, of which a simulation needs several times as much.
 const MOST_SAMPLES: usize = 500_000_000;
 
+/// Size beyond which no sample makes sense, and its square leaves float64 soon; as in Python.
+const LARGEST: f64 = 1e100;
+
 const EXPECTED: &str = "a one-dimensional array of numbers";
 
 /// Copies a one-dimensional array of finite numbers.
@@ -39,9 +42,15 @@ pub fn samples(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let entries = array.as_slice()?;
     let mut samples = room(&format!("a copy of {name}"), entries.len()).map_err(|e| raise(&e))?;
     samples.extend_from_slice(entries);
-    if let Some(k) = samples.iter().position(|value: &f64| !value.is_finite()) {
+    let fits = |value: &f64| value.abs() < LARGEST;
+    if let Some(k) = samples.iter().position(|value| !fits(value)) {
         let value = samples[k];
-        return Err(data(format!("{name}[{k}] is {value}: expected finite numbers only")));
+        let expected = if value.is_finite() {
+            format!("numbers below {LARGEST:e}")
+        } else {
+            "finite numbers only".into()
+        };
+        return Err(data(format!("{name}[{k}] is {value:e}: expected {expected}")));
     }
     Ok(samples)
 }

@@ -8,6 +8,7 @@ use piezotrack_core::math::zeros;
 use piezotrack_core::simulate::{DELAY_LINE, Law, LawState};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 
 use crate::errors::raise;
 
@@ -87,7 +88,7 @@ impl PyController {
             None => self.controller.rest(line),
         };
         let state = state.map_err(|error| raise(&error.into()))?;
-        Ok(PySession { controller: self.controller, state })
+        Ok(PySession { controller: self.controller, state, begun: false })
     }
 }
 
@@ -135,28 +136,39 @@ fn filter_from((kind, first, second, third): &(String, f64, f64, f64), dt: f64) 
 struct PySession {
     controller: Controller<Law>,
     state: ControllerState<LawState, Vec<f64>>,
+    /// Whether there was a step.
+    begun: bool,
 }
 
 /// volts, unclipped, feedforward, feedback, repetitive, error, saturated, measured well, reference
 /// well.
 type CommandParts = (f64, f64, f64, f64, f64, f64, bool, bool, bool);
 
-/// A state as numbers.
-pub fn saved(state: &impl Snapshot) -> Vec<f64> {
-    let mut numbers = Vec::new();
-    state.save(&mut |number| numbers.push(number));
-    numbers
+/// A state as the bytes of its numbers.
+pub fn saved<'py>(py: Python<'py>, state: &impl Snapshot) -> PyResult<Bound<'py, PyBytes>> {
+    let mut count = 0_usize;
+    state.save(&mut |_| count += 1);
+    PyBytes::new_with(py, 8 * count, |bytes| {
+        let mut slots = bytes.chunks_exact_mut(8);
+        state.save(&mut |number| {
+            if let Some(slot) = slots.next() {
+                slot.copy_from_slice(&number.to_le_bytes());
+            }
+        });
+        Ok(())
+    })
 }
 
-/// Takes a state from the numbers that `saved` gave.
-pub fn load<S: Snapshot + Clone>(state: &mut S, numbers: Vec<f64>) -> PyResult<()> {
-    let mut restored = state.clone();
-    let mut left = numbers.into_iter();
-    if restored.load(&mut || left.next()).is_none() || left.next().is_some() {
+/// Takes a state from the bytes that `saved` gave; where they are of another, what is left is of
+/// no use.
+pub fn load(state: &mut impl Snapshot, bytes: &[u8]) -> PyResult<()> {
+    let mut left = bytes.chunks_exact(8).map(|one| one.try_into().map(f64::from_le_bytes));
+    let whole = bytes.len().is_multiple_of(8);
+    let loaded = state.load(&mut || left.next().and_then(std::result::Result::ok));
+    if !whole || loaded.is_none() || left.next().is_some() {
         let expected = "the numbers of a state of the same configuration";
         return Err(raise(&Error::parameter("state", "another", expected)));
     }
-    *state = restored;
     Ok(())
 }
 
@@ -174,32 +186,42 @@ fn meant(value: f64, span: Span) -> Option<&'static (&'static str, f64, &'static
 
 /// The error for a displacement outside of the span.
 fn outside(name: &str, value: f64, span: Span) -> PyErr {
-    let hint = match meant(value, span) {
-        Some((unit, _, power)) => {
-            let taken = if *unit == "um" { ", and step_um takes um" } else { "" };
-            format!("; {value} {unit} is {value}{power} m{taken}")
-        }
-        None => String::new(),
-    };
-    let (low, high) = (span.low(), span.high());
+    let (low, high, hint) = (span.low(), span.high(), hint(value, span));
     let expected =
         format!("a displacement from {low:.3e} to {high:.3e} m{hint}; span= sets another range");
     raise(&Error::parameter(name, format!("{value} m"), expected))
 }
 
+/// A reference in metres, or the error for one of a metre or more.
+pub fn in_metres(reference: f64) -> PyResult<f64> {
+    if reference.is_finite() && reference.abs() >= 1.0 {
+        let expected = format!("metres, below 1 m{}", hint(reference, Span::default()));
+        return Err(raise(&Error::parameter("reference", format!("{reference} m"), expected)));
+    }
+    Ok(reference)
+}
+
+/// What a displacement is in the unit that explains it.
+fn hint(value: f64, span: Span) -> String {
+    match meant(value, span) {
+        Some((unit, _, power)) => {
+            let taken = if *unit == "um" { ", and step_um takes um" } else { "" };
+            format!("; {value} {unit} is {value}{power} m{taken}")
+        }
+        None => String::new(),
+    }
+}
+
 #[pymethods]
 impl PySession {
-    /// Refuses a reference outside of the span, and so the first measurement where another unit
-    /// would explain it: nothing has been moved by then.
+    /// Refuses a reference outside of the span, and so the measurement of the first sample where
+    /// another unit would explain it: nothing has been moved by then.
     fn check(&self, reference: f64, measured: f64) -> PyResult<()> {
         let span = self.controller.span;
         if reference.is_finite() && !span.contains(reference) {
             return Err(outside("reference", reference, span));
         }
-        if self.state.measured().is_none()
-            && !span.contains(measured)
-            && meant(measured, span).is_some()
-        {
+        if !self.begun && !span.contains(measured) && meant(measured, span).is_some() {
             return Err(outside("measured", measured, span));
         }
         Ok(())
@@ -208,6 +230,7 @@ impl PySession {
     /// The voltage of a sample, for what `check` accepts.
     fn step(&mut self, reference: f64, measured: f64, feedforward: f64) -> PyResult<f64> {
         self.check(reference, measured)?;
+        self.begun = true;
         Ok(self.controller.step(&mut self.state, reference, measured, feedforward).volts)
     }
 
@@ -233,17 +256,18 @@ impl PySession {
         (refused.not_finite, refused.outside, refused.jumps)
     }
 
-    /// The state as numbers, for `load` of a session of the same controller.
-    fn save(&self) -> Vec<f64> {
-        saved(&self.state)
+    /// The state as bytes, for `load` of a session of the same controller.
+    fn save<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        saved(py, &self.state)
     }
 
-    fn load(&mut self, numbers: Vec<f64>) -> PyResult<()> {
-        load(&mut self.state, numbers)
+    fn load(&mut self, bytes: &[u8]) -> PyResult<()> {
+        self.begun = true;
+        load(&mut self.state, bytes)
     }
 
     fn applied(&mut self, volts: f64) -> PyResult<()> {
-        self.state.applied(volts).map_err(|error| raise(&error.into()))
+        self.controller.applied(&mut self.state, volts).map_err(|error| raise(&error.into()))
     }
 
     fn reset(&mut self) {

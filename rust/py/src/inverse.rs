@@ -7,9 +7,10 @@ use piezotrack_core::math::room;
 use piezotrack_core::models::{StageInverse, StageInverseState};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 
 use crate::arrays::{array, samples};
-use crate::control::{load, saved};
+use crate::control::{in_metres, load, saved};
 use crate::errors::raise;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -40,9 +41,10 @@ impl PyInverse {
         velocity: Option<f64>,
         acceleration: Option<f64>,
         preview: Option<f64>,
-    ) -> f64 {
-        let sample = ReferenceSample { position: reference, velocity, acceleration, preview };
-        self.online.step(&mut self.state, &sample)
+    ) -> PyResult<f64> {
+        let position = in_metres(reference)?;
+        let sample = ReferenceSample { position, velocity, acceleration, preview };
+        Ok(self.online.step(&mut self.state, &sample))
     }
 
     /// The drive along a whole path, whose derivatives are known, from the start.
@@ -58,13 +60,13 @@ impl PyInverse {
         array(py, drive.map_err(|error| raise(&error))?.iter().copied())
     }
 
-    /// The state as numbers, for `load` of the same inverse.
-    fn save(&self) -> Vec<f64> {
-        saved(&self.state)
+    /// The state as bytes, for `load` of the same inverse.
+    fn save<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        saved(py, &self.state)
     }
 
-    fn load(&mut self, numbers: Vec<f64>) -> PyResult<()> {
-        load(&mut self.state, numbers)
+    fn load(&mut self, bytes: &[u8]) -> PyResult<()> {
+        load(&mut self.state, bytes)
     }
 
     fn reset(&mut self) {

@@ -96,7 +96,7 @@ impl<L: AsRef<[f64]> + AsMut<[f64]>> Snapshot for RepetitiveState<L> {
         line.iter_mut().try_for_each(|entry| entry.load(read))?;
         next.load(read)?;
         self.volts.load(read)?;
-        self.next = (2 * next < entries.max(1)).then_some(next as usize)?;
+        self.next = (next < (entries / 2).max(1)).then_some(next as usize)?;
         self.saturation.load(read)
     }
 }

@@ -98,7 +98,7 @@ impl Saturation {
         if clipped && self.since >= lengths.whole {
             (self.since, self.clipped) = (0, 0);
         }
-        self.clipped += u32::from(clipped);
+        self.clipped = self.clipped.saturating_add(u32::from(clipped));
         if clipped && self.clipped > lengths.whole / PART {
             (self.since, self.clipped) = (u32::MAX, 0);
             self.behind = 0.0;
@@ -110,12 +110,13 @@ impl Saturation {
     /// and once more after that, so that the feedback has settled before it learns again.
     #[inline]
     fn hold(&mut self, left: u32, clipped: bool, lengths: &Lengths) {
-        self.clipped += u32::from(clipped);
+        self.clipped = self.clipped.saturating_add(u32::from(clipped));
         self.learning = Learning::Held { left };
         if left > 0 {
             return;
         }
-        self.well = if self.clipped > lengths.whole / PART { 0 } else { self.well + 1 };
+        self.well =
+            if self.clipped > lengths.whole / PART { 0 } else { self.well.saturating_add(1) };
         self.clipped = 0;
         self.learning = if self.well < 2 {
             self.another(lengths)
