@@ -110,9 +110,7 @@ def _scaled(fit: Identification, one: Parameter) -> list[float]:
 def _runs(fit: Identification) -> list[str]:
     """Say whether several runs agree."""
     if len(fit.runs) == 1:
-        return [
-            "      one run: several (runs=4, --runs 4) would show whether there are other local minima"
-        ]
+        return ["      one run: several (runs=4) would show whether there are other local minima"]
     costs = ", ".join(f"{1e6 * cost:.4g}" for cost in sorted(run.cost for run in fit.runs)[:4])
     more = ", ..." if len(fit.runs) > 4 else ""
     verdict = f"{fit.agreeing} of {len(fit.runs)} runs end within 0.1 % of the best"
