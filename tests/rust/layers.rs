@@ -13,10 +13,11 @@ const CORE: [&str; 8] =
     ["error", "math", "signal", "integrator", "design", "models", "simulate", "identify"];
 
 /// From the bottom up.
-const CONTROL: [&str; 16] = [
+const CONTROL: [&str; 19] = [
     "error",
     "number",
     "unfused",
+    "snapshot",
     "cubic_segment",
     "hysteresis",
     "creep",
@@ -26,9 +27,11 @@ const CONTROL: [&str; 16] = [
     "limits",
     "filters",
     "feedback_law",
+    "back_calculation",
     "state_space",
     "pid",
     "repetitive",
+    "measurement",
     "controller",
 ];
 
