@@ -219,13 +219,12 @@ impl Simulated {
         [v, force - 2.0 * self.damping * self.natural * v, self.amplifier * (u - a)]
     }
 
-    /// Growth of the displacement a sample, over the later half of `samples`.
+    /// Growth of a displacement far below any span, a sample, over the later half of `samples`.
     fn growth<F: Feedback>(&self, controller: &Controller<F>, dt: f64, samples: usize) -> f64 {
         let mut state = controller.rest(vec![0.0; 2000]).unwrap();
         let (mut x, mut past) = ([0.0; 3], vec![0.0; 8]);
         let mut peaks = [0.0_f64; 2];
         for k in 0..samples {
-            // So small that what grows stays a displacement that a stage can have.
             let reference = if k < 5 { 1e-60 } else { 0.0 };
             past.insert(0, controller.step(&mut state, reference, x[0], 0.0).volts);
             past.truncate(8);
