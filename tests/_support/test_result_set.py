@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 from threading import Thread
+from typing import Any
 
 import pytest
 
@@ -268,3 +269,18 @@ def test_a_marker_with_a_name_that_no_file_can_have_is_no_obstacle(tmp_path: Pat
 def test_a_folder_without_a_name_is_refused() -> None:
     with pytest.raises(pt.DataError, match="expected a name, or "):
         make_folder("")
+
+
+def test_an_interruption_while_the_marker_is_set_leaves_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write = result_set._write
+
+    def interrupted(*args: Any, **kwargs: Any) -> None:
+        write(*args, **kwargs)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(result_set, "_write", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        save(tmp_path, "new")
+    assert list(tmp_path.iterdir()) == []

@@ -142,7 +142,13 @@ def _rename(folder: Path, own: Sequence[Pair]) -> None:
     marker = folder / MARKER
     interruption: BaseException | None = None
     with _one_at_a_time:
-        others = _take(marker, own)
+        try:
+            others = _take(marker, own)
+        except BaseException:
+            # Nothing has been put in place, and what was to be is removed.
+            if _is_ours(marker) and {file for _, file in _listed(folder)} <= {f for _, f in own}:
+                marker.unlink(missing_ok=True)
+            raise
         try:
             failed = _move(others, own)
         except BaseException as error:
@@ -255,6 +261,12 @@ def _listed(folder: Path) -> list[Pair]:
         if _is_a_name(result) and is_temporary(temporary):
             pairs.append((folder / temporary, folder / result))
     return pairs
+
+
+def _is_ours(marker: Path) -> bool:
+    """Whether this process has set a marker."""
+    found = _read(marker)
+    return (found.get("host"), found.get("process")) == (this_host(), os.getpid())
 
 
 def _owner_is_gone(marker: Path) -> bool:
