@@ -5,6 +5,7 @@ mod candidate;
 mod coordinate;
 mod cost;
 mod cross_talk;
+mod history;
 mod identification;
 mod least_squares;
 mod levenberg_marquardt;
@@ -23,6 +24,7 @@ pub use candidate::{Candidate, DELAY, PLACES, Theta};
 pub use coordinate::{Coordinate, Scale};
 pub use cost::Evaluator;
 pub use cross_talk::{CrossTalk, cross_talk};
+pub use history::{History, visited};
 pub use identification::{Identification, identify};
 pub use least_squares::{
     DynamicsKind, LeastSquaresFit, Settings as WeightsSettings, WeightsRecord, identify_weights,

@@ -1,0 +1,51 @@
+//! Where a record begins: what the stage went through before the first sample.
+//!
+//! A stage is in equilibrium at the first sample of the drive, moved there slowly. How it came
+//! there decides the memory of its hysteresis. A record does not show the drive before it, so the
+//! history is assumed, or found with the parameters.
+
+use crate::signal::{Drive, Hold, range, turns};
+
+/// What is assumed of the drive before a record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum History {
+    /// The stage never moved before: it goes from 0 V to the first sample.
+    Virgin,
+    /// The drive of the record went on before it until the hysteresis repeated.
+    Settled,
+    /// The stage came from a voltage that is found with the parameters.
+    Fitted,
+}
+
+/// Smallest reversal that settles anything, as a share of the drive's range.
+const LEAST_TURN: f64 = 1e-3;
+
+/// Most reversals that are repeated before a record.
+const MOST_TURNS: usize = 128;
+
+/// Rounds through the reversals: operators without return-point memory need several.
+const ROUNDS: usize = 3;
+
+/// The voltages that a stage visits slowly, in turn, before the drive of a record, the last of
+/// which is its first sample; `from` is the voltage of a history that is fitted.
+#[must_use]
+pub fn visited(drive: &Drive<'_>, history: History, from: f64) -> Vec<f64> {
+    let first = drive.u.first().copied().unwrap_or(0.0);
+    match history {
+        History::Virgin => vec![first],
+        History::Fitted => vec![from, first],
+        History::Settled => {
+            let (low, high) = range(drive.u);
+            let turning = turns(drive.u, LEAST_TURN * (high - low));
+            let latest = &turning[turning.len().saturating_sub(MOST_TURNS)..];
+            let mut round = vec![low, high];
+            round.extend(latest.iter().map(|&k| drive.u[k]));
+            if drive.hold == Hold::First {
+                round.extend(drive.u.last());
+            }
+            let mut all = round.repeat(ROUNDS);
+            all.push(first);
+            all
+        }
+    }
+}
