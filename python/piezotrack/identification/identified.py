@@ -12,6 +12,7 @@ from .. import _core
 from .._support.files import write_document
 from ..data.dataset import Dataset
 from ..errors import ParameterError
+from .history import begin, checked_history, same_beginning
 from .model_file import document_of, read_model, sensor_number
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from ..data.dataset import Hold
     from ..stages.base import Response, StageState
     from ..stages.inverse import Inverse
+    from .history import History, Start
 
     Array = NDArray[np.float64]
 
@@ -85,6 +87,9 @@ class IdentifiedModel:
         force are known.
     delay : float
         Delay of the displacement, in the amplifier or the reading of the sensor [s].
+    start : Start or None
+        Where the record identified begins: what the stage went through before, and its state at
+        the first sample. None in files of older versions.
     details : mapping
         Other entries of the model file: fit, provenance.
     """
@@ -96,6 +101,7 @@ class IdentifiedModel:
     stroke: float
     scale_assumed: bool = False
     delay: float = 0.0
+    start: Start | None = None
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     @property
@@ -214,6 +220,7 @@ class IdentifiedModel:
         data: Dataset,
         *,
         offset: float | Literal["own"] = "own",
+        history: History | None = None,
         initial: StageState | None = None,
     ) -> Response:
         """Response of the model to the drive of a record.
@@ -225,9 +232,12 @@ class IdentifiedModel:
         offset : float or "own", optional
             Added to the displacement [m]. ``"own"``: if an offset was fitted, the one that fits
             this record's window best, otherwise none.
+        history : {"virgin", "settled", "fit"}, optional
+            What the stage went through before the record; see `identify`. Where it is not given:
+            of the record identified as it was there, of another one what that record shows.
         initial : StageState, optional
             State at the first sample of the record and its warm-up, such as the `final` of the
-            record before it; at rest where it is not given.
+            record before it, in place of a history.
 
         Returns
         -------
@@ -237,8 +247,9 @@ class IdentifiedModel:
         """
         if not isinstance(data, Dataset):
             raise ParameterError(f"data is {type(data).__name__}: expected a Dataset")
+        state = self._begins(data, history, initial)
         start = data.warmup
-        run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=initial)
+        run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
         x = self._shown(run)[start:]
         signals = {
             one.name: value[start:]
@@ -254,6 +265,7 @@ class IdentifiedModel:
         data: Dataset,
         *,
         offset: float | Literal["own"] = "own",
+        history: History | None = None,
         initial: StageState | None = None,
     ) -> Score:
         """Deviation of the model from a record, in the record's window.
@@ -264,6 +276,8 @@ class IdentifiedModel:
             The record, e.g. one that was not fitted.
         offset : float or "own", optional
             As in `simulate`.
+        history : {"virgin", "settled", "fit"}, optional
+            As in `simulate`.
         initial : StageState, optional
             As in `simulate`.
 
@@ -272,7 +286,7 @@ class IdentifiedModel:
         Score
             Percentages refer to the stroke of the record identified.
         """
-        x = self.simulate(data, offset=0.0, initial=initial).x
+        x = self.simulate(data, offset=0.0, history=history, initial=initial).x
         shift = self._shift(data, x, offset)
         error = data.y - x - shift
         return Score(
@@ -281,6 +295,45 @@ class IdentifiedModel:
             stroke=self.stroke,
             offset=shift,
         )
+
+    def start_on(self, data: Dataset, *, history: History | None = None) -> Start:
+        """Where a record begins: the state of the stage at its first sample.
+
+        Parameters
+        ----------
+        data : Dataset
+            The record.
+        history : {"virgin", "settled", "fit"}, optional
+            As in `simulate`.
+
+        Returns
+        -------
+        Start
+            Its `state` is in equilibrium under the first sample of the drive.
+        """
+        history = checked_history(history)
+        if self.start is not None and same_beginning(self.start, data):
+            if history in (None, self.start.history):
+                return self.start
+        return begin(self.model, data, history, self._residual, offset=self.offset_fitted)
+
+    def _residual(self, data: Dataset, state: StageState) -> Array:
+        """Measured less simulated displacement in the window, without offset [m]."""
+        run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
+        rest: Array = data.y - self._shown(run)[data.warmup :]
+        return rest
+
+    def _begins(
+        self, data: Dataset, history: History | None, initial: StageState | None
+    ) -> StageState:
+        """State at the first sample of a record."""
+        if initial is None:
+            return self.start_on(data, history=history).state
+        if history is not None:
+            raise ParameterError(
+                f"history is {history!r} beside an initial state: expected one of the two"
+            )
+        return initial
 
     def _shift(self, data: Dataset, x: Array, offset: float | Literal["own"]) -> float:
         """Offset to add to a simulated displacement [m]."""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ..data.dataset import Dataset
-    from ..stages.base import ModelInfo
+    from ..stages.model_info import ModelInfo
 
 __all__ = ["LeastSquares", "solve_least_squares"]
 

@@ -11,6 +11,7 @@ from .. import _core
 from .._support.json_text import number_pair, object_of, parse_json, text_of
 from ..errors import DataError, ParameterError, PiezotrackError
 from ..stages.registry import model_named, stage_class
+from .history import start_entry, start_of
 
 if TYPE_CHECKING:
     import os
@@ -39,6 +40,7 @@ OWN = {
     "offset",
     "stroke",
     "delay",
+    "start",
 }
 # Unit and limits of the numbers that go with a stage. What is beyond them is in another unit.
 SENSOR: dict[str, tuple[str, Callable[[float], bool], str]] = {
@@ -84,6 +86,7 @@ def document_of(model: IdentifiedModel) -> dict[str, Any]:
         "offset": {"value": model.offset, "unit": "m", "fitted": model.offset_fitted},
         "stroke": {"value": model.stroke, "unit": "m"},
         "delay": {"value": model.delay, "unit": "s"} | delay,
+        "start": start_entry(model.start),
         **details,
     }
 
@@ -134,6 +137,7 @@ def read_model(path: str | os.PathLike[str]) -> dict[str, Any]:
             "scale_assumed": _core.as_truth("scale_assumed", document["scale_assumed"]),
             "stroke": file_number("stroke", document["stroke"]),
             "delay": file_number("delay", delay),
+            "start": start_of(document.get("start"), stage_class(info)._state),
             "details": {
                 "parameters": {key: _fit_details(entry) for key, entry in parameters.items()},
                 "delay": _fit_details(delay),

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ..data.dataset import Dataset
-    from ..stages.base import Parameter
+    from ..stages.model_info import Parameter
     from .estimates import Estimate
     from .result import Identification
 

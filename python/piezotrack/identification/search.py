@@ -13,6 +13,7 @@ from ..data import diagnostics
 from ..errors import Interrupted, ParameterError
 from ..stages.registry import stage_class
 from .estimates import Estimate, Progress, SwarmRun
+from .history import shown_history, start_after
 from .model_file import provenance
 from .result import Identification
 from .step_response import StepResult
@@ -20,11 +21,14 @@ from .swarm import ParticleSwarm
 
 if TYPE_CHECKING:
     from ..data.dataset import Dataset
-    from ..stages.base import ModelInfo
+    from ..stages.model_info import ModelInfo
+    from .history import History
 
 __all__ = ["search"]
 
 DEFAULT_RUNS = 4
+# Unit and symbol of what is searched beside the parameters of a model.
+SENSOR = {"delay": ("s", "Td"), "voltage_before": ("V", "u0")}
 
 
 def search(
@@ -38,6 +42,7 @@ def search(
     bounds: object = None,
     stiffness: object = None,
     delay: object = None,
+    history: History | None = None,
     swarm: object = None,
     seed: object = None,
     runs: object = None,
@@ -55,6 +60,8 @@ def search(
         The model.
     offset : bool
         Whether an offset of the sensor is fitted.
+    history : {"virgin", "settled", "fit"} or None
+        What the stage went through before the record; None for what the record shows.
     free, fixed, initial, bounds, stiffness, delay, swarm, seed, runs, threads, progress, callback
         As for `identify`, not yet checked; None stands for the default.
 
@@ -80,6 +87,7 @@ def search(
     held = _held(initial, fixed, free, bounds)
     diagnostics.check_record(data, searches_hysteresis=bool(set(info.hysteresis) - set(held)))
     full = data.full
+    history = shown_history(data) if history is None else history
     with ProgressBar(progress) as bar:
         found = _core.identify(
             model=info.name,
@@ -94,6 +102,7 @@ def search(
             stiffness=None if stiffness is None else _core.as_number("stiffness", stiffness),
             offset=offset,
             delay=searched_delay,
+            history=history,
             settings=swarm._core,
             seed=seed,
             runs=DEFAULT_RUNS if runs is None else _core.as_count("runs", runs),
@@ -103,7 +112,7 @@ def search(
         )
     if found is None:
         raise Interrupted("interrupted before the first cost was computed")
-    fit = _identification(info, found, data, swarm, seed, offset)
+    fit = _identification(info, found, data, swarm, seed, offset, history)
     if not fit.success:
         raise Interrupted(
             f"interrupted after {fit.nit} iterations, best cost {fit.cost_um:.4g} um", fit
@@ -187,8 +196,9 @@ def _identification(
     swarm: ParticleSwarm,
     seed: int,
     offset: bool,
+    history: History,
 ) -> Identification:
-    facts = {one.name: (one.unit, one.symbol) for one in info.parameters} | {"delay": ("s", "Td")}
+    facts = {one.name: (one.unit, one.symbol) for one in info.parameters} | SENSOR
     parameters = {}
     for one in found.estimates:
         unit, symbol = facts[one["name"]]
@@ -200,10 +210,12 @@ def _identification(
     delay = values["delay"]
     if delay == 0.0 and not parameters["delay"].free:
         del parameters["delay"]
+    voltage = values["voltage_before"] if history == "fit" else None
+    if voltage is None:
+        del parameters["voltage_before"]
+    model = stage_class(info)._from((one.name, [values[one.name]]) for one in info.parameters)
     details: dict[str, Any] = {
-        "parameters": {
-            name: _details(estimate) for name, estimate in parameters.items() if name != "delay"
-        },
+        "parameters": {one.name: _details(parameters[one.name]) for one in info.parameters},
         "delay": _details(parameters["delay"]) if "delay" in parameters else {},
         "fit": {
             "cost": {"value": found.rms, "unit": "m"},
@@ -219,7 +231,8 @@ def _identification(
         "provenance": provenance(data, seed=seed, swarm=asdict(swarm)),
     }
     return Identification(
-        model=stage_class(info)._from((one.name, [values[one.name]]) for one in info.parameters),
+        model=model,
+        start=start_after(model, data, history, voltage),
         delay=delay,
         offset=found.offset,
         offset_fitted=offset,

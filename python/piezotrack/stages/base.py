@@ -5,18 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
 
 from .. import _core
 from .._core import Stage as CoreStage
-from .._support.arguments import as_numbers
+from .._support.arguments import as_numbers, one_or_more_numbers
 from ..errors import ParameterError
 from .inverse import Inverse
+from .model_info import LISTED, ModelInfo, Parameter
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
 __all__ = [
     "MODEL_STEP",
     "ForceState",
-    "ModelInfo",
-    "Parameter",
     "Ratio",
     "Response",
     "Stage",
@@ -39,103 +38,11 @@ __all__ = [
 
 # Longest simulation step of a model's mechanics between the steps of a held voltage [s].
 MODEL_STEP = 5e-5
-# Parameters that do not describe hysteresis.
-MECHANICS = ("mass", "damping", "stiffness", "piezo_coefficient")
 # Parameter, symbol, value and unit.
 Ratio = tuple[str, str, float, str]
 # Names and numbers, as the core takes and gives them.
 Named = list[tuple[str, list[float]]]
 Method = Literal["exponential", "rk4", "rk45"]
-
-
-class Parameter(NamedTuple):
-    """A parameter of a model, or a part of its state, as the core describes it.
-
-    Attributes
-    ----------
-    name, symbol, unit : str
-        Name in both languages, symbol in the literature, SI unit.
-    carries_force : bool
-        Whether it has the dimension of force: it scales with the stiffness.
-    default : float or None
-        Value if the caller gives none.
-    held : str or None
-        Why it is never searched; None if it can be.
-    is_list, is_optional : bool
-        Whether it is a list of numbers; whether it may be None.
-    """
-
-    name: str
-    symbol: str
-    unit: str
-    carries_force: bool
-    default: float | None
-    held: str | None
-    is_list: bool
-    is_optional: bool
-
-
-@dataclass(frozen=True, kw_only=True)
-class ModelInfo:
-    """Name, title, parameters and state of a model, as the core lists it.
-
-    Attributes
-    ----------
-    name : str
-        Name in files and on the command line.
-    title : str
-        Name in tables and pictures.
-    drive_unit : str
-        Unit of the drive.
-    searched : bool
-        Whether a swarm searches the parameters; otherwise least squares find them.
-    parameters, state : tuple of Parameter
-        The parameters, and the parts of the state.
-    """
-
-    name: str
-    title: str
-    drive_unit: str
-    searched: bool
-    parameters: tuple[Parameter, ...]
-    state: tuple[Parameter, ...]
-
-    @property
-    def hysteresis(self) -> tuple[str, ...]:
-        """Parameters of the hysteresis of a model that a swarm searches by default."""
-        return tuple(
-            one.name
-            for one in self.parameters
-            if self.searched and one.default is None and one.name not in MECHANICS
-        )
-
-    @property
-    def has_dead_zones(self) -> bool:
-        """Whether dead zones may follow the plays."""
-        return any(one.name == "dead_zone_weights" for one in self.parameters)
-
-    @property
-    def force_symbols(self) -> str:
-        """Symbols of the parameters that scale with the stiffness, in words."""
-        symbols = [
-            one.symbol for one in self.parameters if one.carries_force and one.name != "stiffness"
-        ]
-        return " and ".join(filter(None, [", ".join(symbols[:-1]), *symbols[-1:]]))
-
-
-def _listed(entry: dict[str, Any]) -> ModelInfo:
-    return ModelInfo(
-        name=entry["name"],
-        title=entry["title"],
-        drive_unit=entry["drive_unit"],
-        searched=entry["searched"],
-        parameters=tuple(Parameter(**one) for one in entry["parameters"]),
-        state=tuple(Parameter(**one) for one in entry["state"]),
-    )
-
-
-# The models of the core, in its order.
-LISTED = {entry["name"]: _listed(entry) for entry in _core.models()}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -345,6 +252,36 @@ class Stage:
         True
         """
         return self._simulate(u, dt, hold, initial, "exponential", accuracy)
+
+    def equilibrium(self, voltages: float | Sequence[float]) -> Any:
+        """State in equilibrium after a slow visit to each voltage in turn, from never moved.
+
+        Parameters
+        ----------
+        voltages : float or sequence of float
+            Voltages [V], in turn; the state is that at the last. Between two of them the drive goes
+            straight and slowly; creep is complete.
+
+        Returns
+        -------
+        StageState
+            For the `initial` of `simulate`.
+
+        Raises
+        ------
+        NumericalError
+            The stage has no equilibrium there.
+
+        Examples
+        --------
+        >>> import piezotrack as pt
+        >>> stage = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=[10.0], weights=[0.5e-6])
+        >>> up, down = stage.equilibrium(40.0), stage.equilibrium([80.0, 40.0])
+        >>> print(f"{1e6 * up.x:.0f} um on the way up, {1e6 * down.x:.0f} um on the way down")
+        55 um on the way up, 65 um on the way down
+        """
+        visited = one_or_more_numbers("voltages", voltages)
+        return self._state._from(self._core.equilibrium(visited), self.info.state)
 
     def _simulate(
         self,

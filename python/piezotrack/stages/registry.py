@@ -6,7 +6,8 @@ from importlib import import_module
 
 from .._support.messages import quoted
 from ..errors import ParameterError
-from .base import LISTED, REGISTERED, ModelInfo, Stage
+from .base import REGISTERED, Stage
+from .model_info import LISTED, ModelInfo
 
 __all__ = ["MODELS", "ModelInfo", "Stage", "model_named", "model_of", "stage_class"]
 

@@ -2,11 +2,13 @@
 
 use numpy::PyArray1;
 use piezotrack_core::identify::{
-    Coordinate, DELAY, Delay, Identification, Outcome, Plan, Record, Spec, StopReason,
-    identify as identified,
+    BEFORE, Coordinate, DELAY, Delay, History, Identification, Outcome, Plan, Record, Spec,
+    StopReason, identify as identified, visited,
 };
 use piezotrack_core::integrator::Order;
 use piezotrack_core::models::Model;
+use piezotrack_core::signal::Drive;
+use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
 use crate::arrays::{array, samples};
@@ -17,6 +19,7 @@ use crate::swarm::PySettings;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PySearch>()?;
+    module.add_function(wrap_pyfunction!(voltages_before, module)?)?;
     module.add_function(wrap_pyfunction!(identify, module)?)
 }
 
@@ -49,12 +52,12 @@ struct PySearch {
 
 #[pymethods]
 impl PySearch {
-    /// The parameters of the stage, and the delay under the name "delay".
+    /// The parameters of the stage, the delay and the voltage that it came from, by their names.
     #[getter]
     fn estimates(&self) -> Vec<Estimate> {
         let problem = &self.found.problem;
         let names = problem.model.info().parameters.iter().map(|info| info.name);
-        let places = names.enumerate().chain([(DELAY, "delay")]);
+        let places = names.enumerate().chain([(DELAY, "delay"), (BEFORE, "voltage_before")]);
         let estimate = |(place, name)| {
             let bounds = match problem.coordinates[place] {
                 Coordinate::Fixed(_) => None,
@@ -139,12 +142,44 @@ impl PySearch {
     }
 }
 
+/// What a stage went through before a record, by its name.
+pub fn history_named(name: &str) -> Result<History> {
+    match name {
+        "virgin" => Ok(History::Virgin),
+        "settled" => Ok(History::Settled),
+        "fit" => Ok(History::Fitted),
+        other => {
+            let expected = "'virgin', 'settled' or 'fit'";
+            Err(Error::parameter("history", format!("'{other}'"), expected))
+        }
+    }
+}
+
+/// The voltages that a stage visits slowly before the drive of a record.
+#[pyfunction]
+#[pyo3(name = "visited")]
+fn voltages_before<'py>(
+    py: Python<'py>,
+    u: &Bound<'py, PyAny>,
+    dt: f64,
+    hold_name: &str,
+    history: &str,
+    before: f64,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let u = samples("u", u)?;
+    let voltages = || {
+        let drive = Drive::new(&u, dt, hold(hold_name)?)?;
+        Ok(visited(&drive, history_named(history)?, before))
+    };
+    array(py, voltages().map_err(|error| raise(&error))?.into_iter())
+}
+
 /// Identifies a stage, its `delay` between two bounds, known where they are equal, or
 /// between bounds of its own choice where there are none; None where the search was stopped before
 /// its first cost.
 #[pyfunction]
 #[pyo3(signature = (*, model, u, y, dt, hold_name, start, free, fixed, bounds, stiffness, offset,
-    delay, settings, seed, runs, threads, callback, progress))]
+    delay, history, settings, seed, runs, threads, callback, progress))]
 #[expect(clippy::too_many_arguments, reason = "keyword-only, called from one place")]
 fn identify(
     py: Python<'_>,
@@ -160,6 +195,7 @@ fn identify(
     stiffness: Option<f64>,
     offset: bool,
     delay: Option<(f64, f64)>,
+    history: &str,
     settings: &PySettings,
     seed: u64,
     runs: usize,
@@ -175,7 +211,8 @@ fn identify(
         Some((low, high)) => Delay::Between(low, high),
     };
     let model = Model::named(model).map_err(|error| raise(&error))?;
-    let spec = Spec { model, free, fixed, bounds, stiffness, offset, delay };
+    let history = history_named(history).map_err(|error| raise(&error))?;
+    let spec = Spec { model, free, fixed, bounds, stiffness, offset, delay, history };
     let plan = Plan { settings: settings.0.clone(), seed, runs };
     let watchers = Watchers { callback, progress };
     let found = enter_pool(py, threads, &watchers, |monitor, stop| {

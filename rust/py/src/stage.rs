@@ -77,6 +77,13 @@ impl PyStage {
         build().map(Self).map_err(|error| raise(&error))
     }
 
+    /// State in equilibrium after a slow visit to each voltage in turn, from rest.
+    fn equilibrium(&self, voltages: &Bound<'_, PyAny>) -> PyResult<Named> {
+        let voltages = samples("voltages", voltages)?;
+        let state = self.0.equilibrium(&voltages).map_err(|error| raise(&error))?;
+        Ok(named(&state))
+    }
+
     /// Motion under a drive, from a state or from rest.
     #[pyo3(signature = (u, dt, hold_name, *, initial, method, accuracy))]
     #[expect(clippy::too_many_arguments, reason = "called from one place")]

@@ -1,15 +1,18 @@
-//! A point of the search: the parameters of a stage, and the delay of its sensor.
+//! A point of the search: the parameters of a stage, the delay of its sensor, and where it came from.
 
 use crate::integrator::{MOST_PARAMETERS, Parameters};
 
-/// Places of a [`Theta`]: the parameters of a model, and the delay.
-pub const PLACES: usize = MOST_PARAMETERS + 1;
+/// Places of a [`Theta`]: the parameters of a model, the delay and the voltage before the record.
+pub const PLACES: usize = MOST_PARAMETERS + 2;
 
 /// Place of the delay in a [`Theta`].
 pub const DELAY: usize = MOST_PARAMETERS;
 
+/// Place of the voltage that the stage came from, in a [`Theta`].
+pub const BEFORE: usize = MOST_PARAMETERS + 1;
+
 /// Scalar parameters in the order of the model, 0 for those that it does not have, and after them
-/// the delay, s.
+/// the delay, s, and the voltage that the stage came from, V.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Theta(pub [f64; PLACES]);
 
@@ -24,6 +27,12 @@ impl Theta {
     #[must_use]
     pub fn delay(&self) -> f64 {
         self.0[DELAY]
+    }
+
+    /// Voltage that the stage came from, V: of a history that is fitted.
+    #[must_use]
+    pub fn before(&self) -> f64 {
+        self.0[BEFORE]
     }
 }
 

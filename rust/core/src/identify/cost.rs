@@ -8,10 +8,12 @@
 //! value for each candidate is the mean of the deviation, so the swarm does not search it.
 //! Particles run in lockstep lanes, and no trajectory is stored.
 
+use piezotrack_control::Number;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::candidate::{Candidate, Theta};
+use super::candidate::{BEFORE, Candidate, Theta};
+use super::history::visited;
 use super::motion::motion;
 use super::problem::Problem;
 use super::record::Record;
@@ -33,6 +35,8 @@ pub struct Evaluator<'a> {
     /// How finely a sampling interval is stepped through.
     pub stepping: Stepping,
     halvings: u32,
+    /// Voltages visited before the record, in turn; the first of a fitted history is a candidate's.
+    visited: Vec<f64>,
 }
 
 impl<'a> Evaluator<'a> {
@@ -50,7 +54,8 @@ impl<'a> Evaluator<'a> {
         let halvings = halvings(rate, record.drive.dt / index(stepping.substeps));
         let (held, arch) = (problem.held(), Arch::new());
         let residuals = Residuals { record, offset: problem.offset, centre };
-        Self { residuals, problem, held, arch, stepping, halvings }
+        let visited = visited(&record.drive, problem.history, f64::NAN);
+        Self { residuals, problem, held, arch, stepping, halvings, visited }
     }
 
     /// Runs on another instruction set: the costs have the same bits.
@@ -63,7 +68,8 @@ impl<'a> Evaluator<'a> {
     /// Displacement and velocity of a candidate, stepped as its cost is; `None` where they are
     /// not finite.
     pub(super) fn motion(&self, theta: &Theta, stop: Stop<'_>) -> Option<[Vec<f64>; 2]> {
-        motion(self.problem.model, theta, &self.residuals.record.drive, self.stepping, stop)
+        let Problem { model, history, .. } = *self.problem;
+        motion(model, history, theta, &self.residuals.record.drive, self.stepping, stop)
     }
 
     /// Costs of candidates, in their order, computed on the threads of the present pool.
@@ -142,16 +148,24 @@ impl<K: Kernel, const V: usize> WithSimd for Bundle<'_, K, V> {
         let (drive, substeps) = (&of.residuals.record.drive, of.stepping.substeps);
         let zero = Lanes::<S, V>::splat(simd, 0.0);
         let mut parameters = [zero; MOST_PARAMETERS];
-        for (i, parameter) in parameters.iter_mut().enumerate() {
-            // Lanes without a candidate of their own repeat the last.
-            *parameter = Lanes::gather(simd, |lane| {
+        // Lanes without a candidate of their own repeat the last.
+        let place = |i: usize| {
+            Lanes::gather(simd, |lane| {
                 let candidate = candidates.get(lane).or(candidates.last());
                 candidate.map_or(f64::NAN, |candidate| candidate.theta.0[i])
-            });
+            })
+        };
+        for (i, parameter) in parameters.iter_mut().enumerate() {
+            *parameter = place(i);
         }
         let step = drive.dt / index(substeps);
         let (coupling, gain) = kernel.coupling(&parameters, step, of.halvings);
-        let start = FeedbackState { x: zero, w: zero, memory: kernel.rest(&parameters) };
+        let (x, memory) =
+            of.visited.iter().fold((zero, kernel.rest(&parameters)), |from, &volts| {
+                let volts = if volts.is_nan() { place(BEFORE) } else { Number::like(zero, volts) };
+                kernel.approach(&parameters, from, volts)
+            });
+        let start = FeedbackState { x, w: zero, memory };
         let stepping = SteppingLoop { coupling, gain };
         let residuals = &of.residuals;
         if const { V > 1 } {
@@ -159,7 +173,7 @@ impl<K: Kernel, const V: usize> WithSimd for Bundle<'_, K, V> {
             let ended = stepping.run(drive, substeps, start, &mut sums).is_some();
             sums.conclude(ended)
         } else {
-            let delayed = || Delayed::new(candidates, drive.dt, zero, index(substeps));
+            let delayed = || Delayed::new(candidates, drive.dt, x, index(substeps));
             let reading = of.problem.has_delay().then(delayed);
             let mut sums = ResidualSums::new(residuals, candidates, stop, zero, reading);
             let ended = stepping.run(drive, substeps, start, &mut sums).is_some();

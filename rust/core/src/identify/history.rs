@@ -21,10 +21,10 @@ pub enum History {
 const LEAST_TURN: f64 = 1e-3;
 
 /// Most reversals that are repeated before a record.
-const MOST_TURNS: usize = 128;
+const MOST_TURNS: usize = 24;
 
 /// Rounds through the reversals: operators without return-point memory need several.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 2;
 
 /// The voltages that a stage visits slowly, in turn, before the drive of a record, the last of
 /// which is its first sample; `from` is the voltage of a history that is fitted.
@@ -48,4 +48,12 @@ pub fn visited(drive: &Drive<'_>, history: History, from: f64) -> Vec<f64> {
             all
         }
     }
+}
+
+/// Voltages that a stage may have come from, V: half the drive's range beyond it at either end.
+#[must_use]
+pub fn came_from(drive: &Drive<'_>) -> (f64, f64) {
+    let (low, high) = range(drive.u);
+    let beyond = 0.5 * (high - low);
+    (low - beyond, high + beyond)
 }

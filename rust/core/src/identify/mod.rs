@@ -20,7 +20,7 @@ mod step_ringing;
 mod step_size;
 mod swarm;
 
-pub use candidate::{Candidate, DELAY, PLACES, Theta};
+pub use candidate::{BEFORE, Candidate, DELAY, PLACES, Theta};
 pub use coordinate::{Coordinate, Scale};
 pub use cost::Evaluator;
 pub use cross_talk::{CrossTalk, cross_talk};

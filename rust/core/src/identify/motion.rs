@@ -1,6 +1,7 @@
 //! Motion of one candidate, stepped as the search steps.
 
 use super::candidate::Theta;
+use super::history::{History, visited};
 use crate::integrator::{Kernel, LumpedStage, Parameters, Stepping};
 use crate::models::{Held, KernelVisitor, Model};
 use crate::signal::{Drive, Stop};
@@ -8,6 +9,7 @@ use crate::signal::{Drive, Stop};
 /// Displacement and velocity; `None` where they are not finite or `stop` said so.
 pub(super) fn motion(
     model: Model,
+    history: History,
     theta: &Theta,
     drive: &Drive<'_>,
     stepping: Stepping,
@@ -15,13 +17,15 @@ pub(super) fn motion(
 ) -> Option<[Vec<f64>; 2]> {
     let parameters = theta.parameters();
     let held = Held::all(model.info().parameters, &parameters);
-    let one = One { parameters, drive, substeps: stepping.substeps, stop };
+    let voltages = visited(drive, history, theta.before());
+    let one = One { parameters, voltages, drive, substeps: stepping.substeps, stop };
     model.kernel(&held, stepping.order, one).flatten()
 }
 
-/// One simulation from rest.
+/// One simulation from equilibrium.
 struct One<'a> {
     parameters: Parameters<f64>,
+    voltages: Vec<f64>,
     drive: &'a Drive<'a>,
     substeps: usize,
     stop: Stop<'a>,
@@ -32,7 +36,8 @@ impl KernelVisitor for One<'_> {
 
     fn visit<K: Kernel>(self, kernel: K) -> Self::Output {
         let stage = LumpedStage { kernel, parameters: self.parameters };
-        let run = stage.simulate_fixed(self.drive, stage.rest(), self.substeps, self.stop);
+        let start = stage.equilibrium(&self.voltages);
+        let run = stage.simulate_fixed(self.drive, start, self.substeps, self.stop);
         run.ok().flatten().map(|run| [run.x, run.v])
     }
 }

@@ -1,8 +1,9 @@
 //! The search problem: the parameters held, and the free ones with their bounds.
 
 use super::bounds;
-use super::candidate::{DELAY, PLACES, Theta};
+use super::candidate::{BEFORE, DELAY, PLACES, Theta};
 use super::coordinate::Coordinate;
+use super::history::{History, came_from};
 use super::record::Record;
 use crate::error::{Error, Result, positive, shown};
 use crate::integrator::MOST_PARAMETERS;
@@ -26,6 +27,8 @@ pub struct Spec {
     pub offset: bool,
     /// Delay of the displacement, s.
     pub delay: Delay,
+    /// What the stage went through before the record.
+    pub history: History,
 }
 
 impl Spec {
@@ -40,6 +43,7 @@ impl Spec {
             stiffness: None,
             offset: false,
             delay: Delay::default(),
+            history: History::Virgin,
         }
     }
 }
@@ -99,6 +103,8 @@ pub struct Problem {
     pub scale_assumed: bool,
     /// Whether an offset is fitted.
     pub offset: bool,
+    /// What the stage went through before the record.
+    pub history: History,
 }
 
 /// A value for each scalar parameter, where there is one.
@@ -147,6 +153,10 @@ impl Problem {
         let mut coordinates = [Coordinate::Fixed(0.0); PLACES];
         coordinates[..DELAY].copy_from_slice(&bounds::derive(record, spec.model, &fixed)?);
         coordinates[DELAY] = spec.delay.coordinate(record)?;
+        if spec.history == History::Fitted {
+            let (low, high) = came_from(&record.drive);
+            coordinates[BEFORE] = Coordinate::between("the voltage before", low, high)?;
+        }
         for (name, (low, high)) in &spec.bounds {
             let i = position(infos, "bounds", name)?;
             if !free[i] {
@@ -166,7 +176,8 @@ impl Problem {
                 "stiffness=, or a value other than 0 for another of them in fixed=",
             ));
         }
-        let problem = Self { model: spec.model, coordinates, scale_assumed, offset: spec.offset };
+        let Spec { model, offset, history, .. } = *spec;
+        let problem = Self { model, coordinates, scale_assumed, offset, history };
         problem.check_corners()?;
         Ok(problem)
     }

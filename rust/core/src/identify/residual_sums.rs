@@ -176,7 +176,8 @@ pub(super) struct Delayed<const V: usize, S: Simd> {
 }
 
 impl<const V: usize, S: Simd> Delayed<V, S> {
-    pub fn new(candidates: &[Candidate], dt: f64, zero: Lanes<S, V>, substeps: f64) -> Self {
+    pub fn new(candidates: &[Candidate], dt: f64, start: Lanes<S, V>, substeps: f64) -> Self {
+        let zero = start.like(0.0);
         let late = |lane: usize| {
             let delay = candidates.get(lane).map_or(0.0, |candidate| candidate.theta.delay());
             FractionalDelay::new(delay, dt)
@@ -185,7 +186,7 @@ impl<const V: usize, S: Simd> Delayed<V, S> {
         let part = zero.each(|lane| late(lane).part);
         let length = whole.iter().max().unwrap_or(&0) + 2;
         // At rest before the first sample.
-        Self { past: vec![[zero; 2]; length], whole, part, substeps }
+        Self { past: vec![[start, zero]; length], whole, part, substeps }
     }
 }
 

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::candidate::Theta;
+use super::history::History;
 use super::motion::motion;
 use super::problem::Problem;
 use super::record::Record;
@@ -78,7 +79,8 @@ impl Trial<'_> {
         let [mass, damping, stiffness, ..] = theta.parameters();
         let first = first_substeps(&Mechanics { mass, damping, stiffness }, drive.dt);
         steps_for(first, accuracy, most, |substeps| {
-            let [x, _] = motion(model, theta, drive, Stepping { order, substeps }, stop)?;
+            let [x, _] =
+                motion(model, History::Virgin, theta, drive, Stepping { order, substeps }, stop)?;
             Some(x)
         })
     }

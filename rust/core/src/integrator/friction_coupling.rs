@@ -16,6 +16,7 @@
 use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{Dahl, DahlBranch, DahlState, Operator};
 
+use super::equilibrium;
 use super::feedback_coupling::{Prediction, correct, predict, sign};
 use super::propagator::Propagator;
 use super::stepping_loop::TERMS;
@@ -57,6 +58,18 @@ impl<N: Number> FrictionParameters<N> {
     #[inline(always)]
     pub fn memory(&self, w: N, operator: DahlState<N>) -> FrictionMemory<N> {
         self.sliding().memory(w, operator)
+    }
+
+    /// Equilibrium under a force, N, that is approached slowly: without the dry friction, in the
+    /// middle of the forces under which the stage sticks.
+    #[inline(always)]
+    pub fn approach(&self, from: (N, FrictionMemory<N>), force: N) -> (N, FrictionMemory<N>) {
+        let zero = force.like(0.0);
+        let smooth = SlidingOperator { b0: zero, ..self.sliding() };
+        let [_, _, stiffness] = self.mechanics;
+        let (x, operator) =
+            equilibrium::feedback(&smooth, stiffness, (from.0, from.1.operator), force);
+        (x, self.memory(zero, operator))
     }
 
     #[inline(always)]

@@ -1,6 +1,7 @@
 //! Time integration of a hysteresis operator coupled with linear mechanics.
 
 mod accuracy;
+pub(crate) mod equilibrium;
 mod feedback_coupling;
 mod friction_coupling;
 mod input_coupling;

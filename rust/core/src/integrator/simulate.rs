@@ -61,6 +61,16 @@ impl<K: Kernel> LumpedStage<K> {
         Instant { x: 0.0, v: 0.0, memory: self.kernel.rest(&self.parameters) }
     }
 
+    /// Equilibrium after a slow visit to each voltage in turn, from rest; rest where there is none.
+    #[must_use]
+    pub fn equilibrium(&self, voltages: &[f64]) -> Instant<Memory<K, f64>> {
+        let (kernel, parameters) = (&self.kernel, &self.parameters);
+        let start = (0.0, kernel.rest(parameters));
+        let approach = |from, &volts: &f64| kernel.approach(parameters, from, volts);
+        let (x, memory) = voltages.iter().fold(start, approach);
+        Instant { x, v: 0.0, memory }
+    }
+
     /// Mass, damping and stiffness.
     #[must_use]
     pub fn mechanics(&self) -> Mechanics {

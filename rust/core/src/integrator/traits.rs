@@ -63,6 +63,15 @@ pub trait Kernel: Copy + Send + Sync {
     /// The memory before any motion.
     fn rest<N: Number>(&self, parameters: &Parameters<N>) -> Memory<Self, N>;
 
+    /// Displacement and memory in equilibrium at `volts`, which the drive approaches slowly from the
+    /// equilibrium `from`.
+    fn approach<N: Number>(
+        &self,
+        parameters: &Parameters<N>,
+        from: (N, Memory<Self, N>),
+        volts: N,
+    ) -> (N, Memory<Self, N>);
+
     /// Hysteresis force, N.
     fn force(&self, parameters: &Parameters<f64>, memory: &Memory<Self, f64>) -> f64;
 

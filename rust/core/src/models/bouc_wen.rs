@@ -15,13 +15,14 @@ use super::plant::KernelModel;
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
     Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
-    from_rest_only, leading, simulate_kernel,
+    from_rest_only, kernel_equilibrium, leading, simulate_kernel,
 };
 use super::values::{Held, ParameterInfo, Values};
 use crate::design::{Gains, LoopPlant};
 use crate::error::{Result, finite, not_zero, positive, within};
 use crate::integrator::{
-    InputCoupling, InputMemory, Kernel, LumpedStage, Mechanics, Order, Parameters, linear,
+    InputCoupling, InputMemory, Kernel, LumpedStage, Mechanics, Order, Parameters, equilibrium,
+    linear,
 };
 
 /// The unit of beta and gamma is that for n = 1; in general it is 1/(V m^(n-1)).
@@ -176,6 +177,10 @@ impl StageModel for BoucWenStage {
         Self::new(&values.numbers())
     }
 
+    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
+        kernel_equilibrium(self, voltages)
+    }
+
     fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
         simulate_kernel(self, experiment)
     }
@@ -269,6 +274,16 @@ impl Kernel for BoucWenKernel {
     fn rest<N: Number>(&self, parameters: &Parameters<N>) -> InputMemory<N, BoucWenState<N>> {
         let zero = parameters[0].like(0.0);
         InputMemory { operator: self.operator(parameters).rest(), input: zero, rise: zero }
+    }
+
+    #[inline(always)]
+    fn approach<N: Number>(
+        &self,
+        parameters: &Parameters<N>,
+        from: (N, InputMemory<N, BoucWenState<N>>),
+        volts: N,
+    ) -> (N, InputMemory<N, BoucWenState<N>>) {
+        equilibrium::input(&self.operator(parameters), parameters[3], &from.1, volts)
     }
 
     /// k h, what the hysteresis takes off the drive's force.

@@ -16,13 +16,13 @@ use super::plant::KernelModel;
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
     Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
-    from_rest_only, leading, simulate_kernel,
+    from_rest_only, kernel_equilibrium, leading, simulate_kernel,
 };
 use super::values::{Held, ParameterInfo, Values};
 use crate::design::{Gains, LoopPlant};
 use crate::error::{Result, finite, not_zero, within};
 use crate::integrator::{
-    Kernel, LumpedStage, Mechanics, NonsmoothCoupling, Order, Parameters, linear,
+    Kernel, LumpedStage, Mechanics, NonsmoothCoupling, Order, Parameters, equilibrium, linear,
 };
 
 /// The unit of gamma and delta is that for nu = 1 and a beta without one; in general it is
@@ -164,6 +164,10 @@ impl StageModel for BoucWenOscillator {
         Self::new(&values.numbers())
     }
 
+    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
+        kernel_equilibrium(self, voltages)
+    }
+
     fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
         simulate_kernel(self, experiment)
     }
@@ -260,6 +264,16 @@ impl Kernel for BoucWenOscillatorKernel {
     #[inline(always)]
     fn rest<N: Number>(&self, parameters: &Parameters<N>) -> BoucWenState<N> {
         self.operator(parameters).rest()
+    }
+
+    #[inline(always)]
+    fn approach<N: Number>(
+        &self,
+        parameters: &Parameters<N>,
+        from: (N, BoucWenState<N>),
+        volts: N,
+    ) -> (N, BoucWenState<N>) {
+        equilibrium::feedback(&self.operator(parameters), parameters[2], from, volts)
     }
 
     #[inline(always)]

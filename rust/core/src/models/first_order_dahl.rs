@@ -17,13 +17,13 @@ use super::plant::KernelModel;
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
     Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
-    from_rest_only, leading, simulate_kernel,
+    from_rest_only, kernel_equilibrium, leading, simulate_kernel,
 };
 use super::values::{Held, ParameterInfo, Values};
 use crate::design::{Gains, LoopPlant};
 use crate::error::{Result, not_negative, not_zero, positive, within};
 use crate::integrator::{
-    Kernel, LumpedStage, Mechanics, NonsmoothCoupling, Order, Parameters, linear,
+    Kernel, LumpedStage, Mechanics, NonsmoothCoupling, Order, Parameters, equilibrium, linear,
 };
 
 const PARAMETERS: &[ParameterInfo] = &[
@@ -137,6 +137,10 @@ impl StageModel for FirstOrderDahlStage {
         Self::new(&values.numbers())
     }
 
+    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
+        kernel_equilibrium(self, voltages)
+    }
+
     fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
         simulate_kernel(self, experiment)
     }
@@ -231,6 +235,17 @@ impl Kernel for FirstOrderDahlKernel {
     #[inline(always)]
     fn rest<N: Number>(&self, parameters: &Parameters<N>) -> BoucWenState<N> {
         self.operator(parameters).rest()
+    }
+
+    #[inline(always)]
+    fn approach<N: Number>(
+        &self,
+        parameters: &Parameters<N>,
+        from: (N, BoucWenState<N>),
+        volts: N,
+    ) -> (N, BoucWenState<N>) {
+        let [_, _, stiffness, piezo, ..] = *parameters;
+        equilibrium::feedback(&self.operator(parameters), stiffness, from, piezo * volts)
     }
 
     #[inline(always)]

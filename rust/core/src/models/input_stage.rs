@@ -15,7 +15,7 @@ use piezotrack_control::{CreepState, InputInverse, InputInverseState, OperatorIn
 
 use super::creep::{Dynamics, MOST_RELAXATIONS, Relaxation, RelaxationFlow, RelaxationState};
 use super::plant::Plant;
-use super::traits::{Experiment, Response};
+use super::traits::{Experiment, Response, finite_state};
 use super::values::{ParameterInfo, Values};
 use crate::design::LoopPlant;
 use crate::error::{Error, Result};
@@ -185,6 +185,20 @@ impl<O: InputOperator> InputStage<O> {
         let plays = self.operator.plays(&mut operator).to_vec();
         let (x, v, input) = (relaxation.x, relaxation.v, self.operator.input(&operator));
         Values::of(PLAYS_STATE, [vec![x], vec![v], vec![input], plays, creep])
+    }
+
+    /// Equilibrium after a slow visit to each voltage in turn, from rest, its creep complete.
+    pub(super) fn equilibrium_values(&self, voltages: &[f64]) -> Result<Values> {
+        let mut state = self.at_rest();
+        let mut output = 0.0;
+        for &volts in voltages {
+            output = self.operator.follow(&mut state.operator, volts) - self.zero();
+        }
+        let relaxation = &mut state.relaxation;
+        relaxation.input = output;
+        relaxation.creep[..self.relaxation.count].fill(output);
+        relaxation.x = self.relaxation.target(relaxation);
+        finite_state(self.values_of(&state), voltages)
     }
 
     /// The operator's output at rest, m.

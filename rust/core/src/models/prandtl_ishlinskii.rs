@@ -208,6 +208,10 @@ impl StageModel for PrandtlIshlinskiiStage {
         Ok(Self { operator, relaxation: Relaxation::build(values)? })
     }
 
+    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
+        self.equilibrium_values(voltages)
+    }
+
     fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
         self.follow(experiment)
     }

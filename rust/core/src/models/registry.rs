@@ -201,6 +201,14 @@ macro_rules! models {
                 match self { $(Self::$variant(_) => Model::$variant,)* }
             }
 
+            /// State in equilibrium after a slow visit to each voltage in turn, from rest.
+            ///
+            /// # Errors
+            /// Those of [`StageModel::equilibrium`].
+            pub fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
+                match self { $(Self::$variant(stage) => stage.equilibrium(voltages),)* }
+            }
+
             /// Motion under a drive; `None` where it was stopped.
             ///
             /// # Errors

@@ -9,7 +9,7 @@ use super::plant::{KernelModel, Plant};
 use super::search_ranges::{Measures, Ranges};
 use super::values::{Held, ParameterInfo, Values};
 use crate::design::LoopPlant;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, shown};
 use crate::integrator::{Instant, Kernel, Motion, Order};
 use crate::signal::{Drive, Stop};
 
@@ -127,6 +127,12 @@ pub trait StageModel: Plant + Copy {
     /// Names the parameter that is out of its range.
     fn build(values: &Values) -> Result<Self>;
 
+    /// State in equilibrium after a slow visit to each voltage in turn, from rest.
+    ///
+    /// # Errors
+    /// [`Error::Numerical`] where the stage has no equilibrium there.
+    fn equilibrium(&self, voltages: &[f64]) -> Result<Values>;
+
     /// Motion under a drive; `None` where it was stopped.
     ///
     /// # Errors
@@ -206,6 +212,28 @@ pub trait KernelVisitor {
 /// The first of some numbers; zeros where there are fewer.
 pub(super) fn leading<const N: usize>(numbers: &[f64]) -> [f64; N] {
     core::array::from_fn(|i| numbers.get(i).copied().unwrap_or(0.0))
+}
+
+/// A state, unless it is not finite.
+///
+/// # Errors
+/// [`Error::Numerical`] where it is not.
+pub(super) fn finite_state(state: Values, voltages: &[f64]) -> Result<Values> {
+    if state.iter().flat_map(|(_, numbers)| numbers).all(|number| number.is_finite()) {
+        return Ok(state);
+    }
+    let volts = voltages.last().copied().unwrap_or(0.0);
+    Err(Error::Numerical(format!("the stage has no equilibrium at a drive of {}", shown(volts))))
+}
+
+/// Equilibrium of a model that one kernel describes.
+pub(super) fn kernel_equilibrium<M: StageModel + KernelModel>(
+    stage: &M,
+    voltages: &[f64],
+) -> Result<Values> {
+    let Instant { x, v, memory } = stage.lumped().equilibrium(voltages);
+    let state = [vec![x, v], stage.state(&memory)].concat();
+    finite_state(Values::scalars(M::INFO.state, &state), voltages)
 }
 
 /// Motion of a model that one kernel describes.

@@ -6,7 +6,7 @@ use piezotrack_control::hysteresis::{Dahl, DahlState, Operator};
 use super::{DahlStage, DahlStageState};
 use crate::integrator::{
     Coupling, FeedbackCoupling, FeedbackState, FrictionCoupling, FrictionMemory,
-    FrictionParameters, Kernel, Parameters, TERMS, halvings, linear,
+    FrictionParameters, Kernel, Parameters, TERMS, equilibrium, halvings, linear,
 };
 use crate::models::Plant;
 
@@ -39,6 +39,17 @@ impl<const T: usize, const FOURTH: bool> Kernel for SmoothKernel<T, FOURTH> {
     #[inline(always)]
     fn rest<N: Number>(&self, parameters: &Parameters<N>) -> DahlState<N> {
         operator::<N, T>(parameters).rest()
+    }
+
+    #[inline(always)]
+    fn approach<N: Number>(
+        &self,
+        parameters: &Parameters<N>,
+        from: (N, DahlState<N>),
+        volts: N,
+    ) -> (N, DahlState<N>) {
+        let [_, _, stiffness, piezo, ..] = *parameters;
+        equilibrium::feedback(&operator::<N, T>(parameters), stiffness, from, piezo * volts)
     }
 
     #[inline(always)]
@@ -75,6 +86,16 @@ impl Kernel for FrictionKernel {
     fn rest<N: Number>(&self, parameters: &Parameters<N>) -> FrictionMemory<N> {
         let zero = parameters[0].like(0.0);
         friction(parameters).memory(zero, DahlState { force: zero, slope: zero })
+    }
+
+    #[inline(always)]
+    fn approach<N: Number>(
+        &self,
+        parameters: &Parameters<N>,
+        from: (N, FrictionMemory<N>),
+        volts: N,
+    ) -> (N, FrictionMemory<N>) {
+        friction(parameters).approach(from, parameters[3] * volts)
     }
 
     #[inline(always)]

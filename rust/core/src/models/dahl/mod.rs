@@ -17,7 +17,7 @@ use piezotrack_control::inverse::{DahlInverse, InverseState, SampledDahlInverse}
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
     Experiment, Invertible, KernelVisitor, Method, ModelInfo, Response, Searchable, StageModel,
-    from_rest_only,
+    finite_state, from_rest_only,
 };
 use super::values::{Held, ParameterInfo, Values};
 use crate::design::LoopPlant;
@@ -233,6 +233,18 @@ impl StageModel for DahlStage {
 
     fn build(values: &Values) -> Result<Self> {
         Self::new(&values.numbers())
+    }
+
+    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
+        let (x, (q1, q2)) = if self.b1 == 0.0 || self.has_friction() {
+            let Instant { x, memory, .. } = self.lumped(FrictionKernel).equilibrium(voltages);
+            (x, (memory.operator.force, memory.operator.slope))
+        } else {
+            let kernel = SmoothKernel::<TERMS, true>;
+            let Instant { x, memory, .. } = self.lumped(kernel).equilibrium(voltages);
+            (x, self.states(&memory))
+        };
+        finite_state(Values::scalars(STATE, &[x, 0.0, q1, q2]), voltages)
     }
 
     fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
