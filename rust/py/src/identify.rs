@@ -136,6 +136,14 @@ impl PySearch {
             .collect()
     }
 
+    /// Least and largest lag that fit as well, s, and whether none fits too; None where the drive
+    /// shows the dynamics.
+    #[getter]
+    fn lags(&self) -> Option<(f64, f64, bool)> {
+        let found = self.found.lags.as_ref()?;
+        Some((found.lags.0, found.lags.1, found.from_zero))
+    }
+
     #[getter]
     fn scale_assumed(&self) -> bool {
         self.found.problem.scale_assumed

@@ -20,8 +20,9 @@ pub fn derive(
     record: &Record<'_>,
     model: Model,
     fixed: &[Option<f64>; MOST_PARAMETERS],
+    wants_mode: bool,
 ) -> Result<[Coordinate; MOST_PARAMETERS]> {
-    let of = measures(record);
+    let of = Measures { wants_mode, ..measures(record) };
     if !of.usable() {
         return Err(Error::Data(format!(
             "a stroke of {} m, {} m/V and a drive of {} rad/s cannot be computed with: check \
@@ -40,7 +41,10 @@ pub fn derive(
         let range = ranges.iter().find(|(name, _)| *name == info.name);
         coordinates[i] = match (fixed[i], range) {
             (Some(value), _) => Coordinate::Fixed(value),
-            (None, Some(&(_, (low, high)))) => Coordinate::between(info.name, low, high)?,
+            (None, Some(&(_, (low, high)))) if low < high => {
+                Coordinate::between(info.name, low, high)?
+            }
+            (None, Some(&(_, (value, _)))) => Coordinate::Fixed(value),
             (None, None) => Coordinate::Fixed(0.0),
         };
     }

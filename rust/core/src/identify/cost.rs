@@ -65,6 +65,16 @@ impl<'a> Evaluator<'a> {
         self
     }
 
+    /// The same record and stepping for a problem with other parameters held.
+    pub(super) fn of<'b>(&self, problem: &'b Problem) -> Evaluator<'b>
+    where
+        'a: 'b,
+    {
+        let Self { residuals, arch, stepping, halvings, ref visited, .. } = *self;
+        let visited = visited.clone();
+        Evaluator { residuals, problem, held: problem.held(), arch, stepping, halvings, visited }
+    }
+
     /// Displacement and velocity of a candidate, stepped as its cost is; `None` where they are
     /// not finite.
     pub(super) fn motion(&self, theta: &Theta, stop: Stop<'_>) -> Option<[Vec<f64>; 2]> {

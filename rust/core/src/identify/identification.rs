@@ -1,6 +1,7 @@
 //! Identification of a stage from a record: bounds, search, local refinement, standard deviations.
 
 use super::cost::Evaluator;
+use super::lag::{LagRange, lag_range};
 use super::levenberg_marquardt::{LocalRefinement, Sensitivity};
 use super::problem::{Problem, Spec};
 use super::record::Record;
@@ -22,6 +23,8 @@ pub struct Identification {
     /// Which of the runs has the lowest cost; `None` where the search was stopped before its
     /// first cost.
     pub best: Option<usize>,
+    /// Lags that fit as well as the one of the best run, where the drive is slow.
+    pub lags: Option<LagRange>,
     /// Standard deviation of each free parameter; empty where the search was stopped.
     pub sensitivities: Vec<Sensitivity>,
 }
@@ -58,6 +61,16 @@ pub fn identify(
     let best = (0..runs.len())
         .filter(|&i| runs[i].costs.rms.is_finite())
         .min_by(|&i, &j| runs[i].costs.rms.total_cmp(&runs[j].costs.rms));
+    let mut lags = None;
+    if let Some(i) = best.filter(|_| ended && plan.settings.polish && problem.slow) {
+        lags = lag_range(&local, &runs[i].place, runs[i].costs);
+        if let Some(found) = &lags {
+            let run = &mut runs[i];
+            (run.place, run.costs) = (found.place.clone(), found.costs);
+            run.theta = problem.theta(&run.place);
+            run.polish_evaluations += found.evaluations;
+        }
+    }
     let mut sensitivities = Vec::new();
     if let Some(run) = best.map(|i| &runs[i]).filter(|_| ended) {
         sensitivities = local.sensitivities(&run.place, run.costs.rms);
@@ -68,7 +81,7 @@ pub fn identify(
         }
     }
     let stepping = evaluator.stepping;
-    Ok(Identification { problem, stepping, runs, best, sensitivities })
+    Ok(Identification { problem, stepping, runs, best, lags, sensitivities })
 }
 
 /// Bytes of a thread for each sample: five motions' columns in the refinement.

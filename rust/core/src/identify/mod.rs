@@ -7,6 +7,7 @@ mod cost;
 mod cross_talk;
 mod history;
 mod identification;
+mod lag;
 mod least_squares;
 mod levenberg_marquardt;
 mod motion;
@@ -26,6 +27,7 @@ pub use cost::Evaluator;
 pub use cross_talk::{CrossTalk, cross_talk};
 pub use history::{History, visited};
 pub use identification::{Identification, identify};
+pub use lag::LagRange;
 pub use least_squares::{
     DynamicsKind, LeastSquaresFit, Settings as WeightsSettings, WeightsRecord, identify_weights,
 };

@@ -105,6 +105,9 @@ pub struct Problem {
     pub offset: bool,
     /// What the stage went through before the record.
     pub history: History,
+    /// Whether the drive is so slow that any lag is as likely as another that fits: the least is
+    /// taken.
+    pub slow: bool,
 }
 
 /// A value for each scalar parameter, where there is one.
@@ -151,7 +154,9 @@ impl Problem {
         }
         check_fixed(spec.model, &fixed)?;
         let mut coordinates = [Coordinate::Fixed(0.0); PLACES];
-        coordinates[..DELAY].copy_from_slice(&bounds::derive(record, spec.model, &fixed)?);
+        let wants_mode = spec.free.as_ref().is_some_and(|names| names.iter().any(|n| n == "mass"));
+        let derived = bounds::derive(record, spec.model, &fixed, wants_mode)?;
+        coordinates[..DELAY].copy_from_slice(&derived);
         coordinates[DELAY] = spec.delay.coordinate(record)?;
         if spec.history == History::Fitted {
             let (low, high) = came_from(&record.drive);
@@ -177,7 +182,10 @@ impl Problem {
             ));
         }
         let Spec { model, offset, history, .. } = *spec;
-        let problem = Self { model, coordinates, scale_assumed, offset, history };
+        let chosen = |name: &str| spec.bounds.iter().any(|(other, _)| other == name);
+        let slow =
+            !wants_mode && !chosen("damping") && bounds::measures(record).excited().is_none();
+        let problem = Self { model, coordinates, scale_assumed, offset, history, slow };
         problem.check_corners()?;
         Ok(problem)
     }

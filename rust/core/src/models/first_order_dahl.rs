@@ -171,8 +171,7 @@ impl Searchable for FirstOrderDahlStage {
         let [mass, damping, stiffness] = of.mechanical((soft, hard));
         Ok(vec![
             ("mass", mass),
-            // The loop's width is the friction's: the damping may be far too small to show.
-            ("damping", (1e-2 * damping.0, damping.1)),
+            ("damping", damping),
             ("stiffness", stiffness),
             ("piezo_coefficient", of.piezo(soft * of.gain, hard * of.gain)),
             // The path to the Coulomb force is between a hundredth of the stroke and all of it.

@@ -11,6 +11,9 @@ use crate::signal::{Drive, index, range};
 /// Stiffness held where nothing in the input determines a force, N/m.
 pub const NOMINAL_STIFFNESS: f64 = 1e6;
 
+/// Least lag D/K that is searched, as a share of the sampling interval.
+const LEAST_LAG: f64 = 0.05;
+
 /// Lower and upper end of a range.
 pub type Range = (f64, f64);
 
@@ -31,6 +34,11 @@ pub struct Measures {
     /// The lower of that and two periods in the window, rad/s: of steps, the former is far above
     /// what moves the stage.
     pub slow: f64,
+    /// Rate of change of the drive's rate over that rate, rad/s: the frequency of a sine, far more
+    /// where the drive jumps or sweeps.
+    pub quickness: f64,
+    /// Whether the caller asks for a mode, whatever the record shows.
+    pub wants_mode: bool,
     /// Sampling interval, s.
     pub dt: f64,
     /// RMS of the drive about its mean, V or N.
@@ -62,6 +70,8 @@ impl Measures {
             inverted: together < 0.0,
             frequency,
             slow,
+            quickness: quickness(u, dt),
+            wants_mode: false,
             dt,
             drive_size,
             displacement_size,
@@ -82,18 +92,34 @@ impl Measures {
         (20.0 * self.dt).min(0.1 * core::f64::consts::TAU / self.frequency)
     }
 
+    /// Natural frequencies at which the drive could excite a mode, rad/s: from three times the
+    /// slowest motion to nine tenths of half the sampling rate. `None` for a drive that is slow
+    /// all the time, whose record does not show a mode.
+    #[must_use]
+    pub fn excited(&self) -> Option<Range> {
+        let slowest = 3.0 * self.slow;
+        let fastest = (0.9 * core::f64::consts::PI / self.dt).min(10.0 * self.quickness);
+        if self.wants_mode {
+            return Some((slowest, fastest.max(8.0 * slowest)));
+        }
+        (fastest > 8.0 * slowest).then_some((slowest, fastest))
+    }
+
     /// Ranges of mass, damping and stiffness between a soft and a hard stiffness, N/m.
+    ///
+    /// Where the record does not show a mode, the mass is that of a mode so fast that it does not
+    /// matter, and the damping, a lag D/K, down to a twentieth of the sampling interval.
     #[must_use]
     pub fn mechanical(&self, (soft, hard): Range) -> [Range; 3] {
-        // Ten times the drive's frequency up to a tenth of the sampling rate, where the paper's
-        // rule for sampling still holds; never less than two octaves.
-        let slowest = 10.0 * self.frequency;
-        let fastest = (0.2 * core::f64::consts::PI / self.dt).max(4.0 * slowest);
-        [
-            (soft / (fastest * fastest), hard / (slowest * slowest)),
-            (soft * 5e-3 / self.frequency, hard / self.slow),
-            (soft, hard),
-        ]
+        let least = (LEAST_LAG * self.dt).min(5e-3 / self.frequency);
+        let mass = self.excited().map_or_else(
+            || {
+                let mass = libm::sqrt(soft * hard) * (0.5 * least) * (0.5 * least);
+                (mass, mass)
+            },
+            |(slowest, fastest)| (soft / (fastest * fastest), hard / (slowest * slowest)),
+        );
+        [mass, (soft * least, hard / self.slow), (soft, hard)]
     }
 
     /// Range of a piezo coefficient of about `least` to `most`, of the sign that the record shows.
@@ -132,4 +158,12 @@ fn size_and_rate(values: &[f64], dt: f64) -> (f64, f64) {
     let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
     let change: f64 = values.windows(2).map(|w| (w[1] - w[0]) * (w[1] - w[0])).sum();
     (libm::sqrt(squares / index(values.len())), libm::sqrt(change / squares) / dt)
+}
+
+/// Rate of change of the rate of change, over the latter, rad/s.
+fn quickness(values: &[f64], dt: f64) -> f64 {
+    let first: f64 = values.windows(2).map(|w| (w[1] - w[0]) * (w[1] - w[0])).sum();
+    let bend = |w: &[f64]| w[2] - 2.0 * w[1] + w[0];
+    let second: f64 = values.windows(3).map(|w| bend(w) * bend(w)).sum();
+    libm::sqrt(second / first) / dt
 }

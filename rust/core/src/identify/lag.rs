@@ -1,0 +1,105 @@
+//! Which lags a record allows: those with which the other parameters fit as well.
+//!
+//! Under one slow sine the loop of a lag D/K and that of hysteresis or creep are alike. The cost is
+//! followed along the damping, all else fitted again: a profile (Pawitan 2001, In All Likelihood,
+//! section 3.4), here with a tolerance on the cost, as residuals of an inexact model are correlated.
+
+use super::coordinate::Coordinate;
+use super::levenberg_marquardt::LocalRefinement;
+use super::residual_sums::Costs;
+use crate::models::position;
+
+/// Share by which the cost may rise.
+const AS_WELL: f64 = 0.01;
+
+/// Bisections towards an end of the range.
+const BISECTIONS: usize = 7;
+
+/// A candidate at the least lag, and the range of lags.
+#[derive(Clone, Debug)]
+pub struct LagRange {
+    /// Least and largest lag D/K with which the cost is within a hundredth of its least, s.
+    pub lags: (f64, f64),
+    /// Whether all lags below the least one searched fit too.
+    pub from_zero: bool,
+    /// Place of the candidate with the least lag.
+    pub place: Vec<f64>,
+    /// Its cost.
+    pub costs: Costs,
+    /// Simulations.
+    pub evaluations: usize,
+}
+
+/// A profile along the damping.
+struct Profile<'a> {
+    local: LocalRefinement<'a>,
+    /// Place of the damping in the unit box.
+    damping: usize,
+    limit: f64,
+    evaluations: usize,
+}
+
+/// Follows the cost along the damping from the best candidate; `None` where it is not searched.
+pub(super) fn lag_range(
+    local: &LocalRefinement<'_>,
+    place: &[f64],
+    costs: Costs,
+) -> Option<LagRange> {
+    let infos = local.problem.model.info().parameters;
+    let parameter = position(infos, "parameters", "damping").ok()?;
+    let damping = local.problem.free().position(|free| free == parameter)?;
+    let limit = costs.rms * (1.0 + AS_WELL);
+    let mut profile = Profile { local: *local, damping, limit, evaluations: 0 };
+    let (least, costs) = profile.towards(place, costs, 0.0);
+    let (most, _) = profile.towards(place, costs, 1.0);
+    let lag = |place: &[f64]| {
+        let [_, damping, stiffness, ..] = local.problem.theta(place).parameters();
+        damping / stiffness
+    };
+    Some(LagRange {
+        lags: (lag(&least), lag(&most)),
+        from_zero: least[damping] <= 0.0,
+        costs,
+        place: least,
+        evaluations: profile.evaluations,
+    })
+}
+
+impl Profile<'_> {
+    /// The candidate nearest to an end of the range, 0 or 1, that fits as well.
+    fn towards(&mut self, place: &[f64], costs: Costs, end: f64) -> (Vec<f64>, Costs) {
+        let mut best = (place.to_vec(), costs);
+        let (mut fits, mut fails) = (place[self.damping], end);
+        if let Some(found) = self.fit_at(&best, end) {
+            return found;
+        }
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (fits + fails);
+            if let Some(found) = self.fit_at(&best, middle) {
+                (fits, best) = (middle, found);
+            } else {
+                fails = middle;
+            }
+        }
+        best
+    }
+
+    /// The best candidate with the damping held, from one beside it; `None` where it costs more.
+    fn fit_at(&mut self, from: &(Vec<f64>, Costs), damping: f64) -> Option<(Vec<f64>, Costs)> {
+        let local = self.local;
+        let parameter = local.problem.free().nth(self.damping)?;
+        let mut problem = local.problem.clone();
+        let value = problem.coordinates[parameter].value(damping);
+        problem.coordinates[parameter] = Coordinate::Fixed(value);
+        let evaluator = local.evaluator.of(&problem);
+        let held = LocalRefinement { problem: &problem, evaluator: &evaluator, ..local };
+        let mut others = from.0.clone();
+        others.remove(self.damping);
+        let start = Costs { rms: f64::INFINITY, ..from.1 };
+        let polished = held.polish(&others, start);
+        self.evaluations += polished.evaluations;
+        let mut place = polished.place;
+        place.insert(self.damping, damping);
+        (polished.costs.rms <= self.limit).then_some((place, polished.costs))
+    }
+}
