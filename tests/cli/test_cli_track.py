@@ -162,7 +162,7 @@ def test_feedforward_of_a_file_leads_the_model_along_it() -> None:
 @pytest.mark.usefixtures("_no_pictures")
 def test_feedforward_says_where_the_model_was_not_fitted() -> None:
     printed = ran("feedforward", "dahl.json", "sine:0.5Hz,0..200um,6s")
-    assert "note  the model was fitted from 0 to 75 V only" in printed
+    assert ", that of the record identified from 0 to 75 V" in printed
 
 
 # What they refuse.

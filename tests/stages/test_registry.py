@@ -15,7 +15,7 @@ from all_stages import STAGES
 from piezotrack.stages.registry import MODELS, model_named, model_of, stage_class
 
 if TYPE_CHECKING:
-    from piezotrack.stages.base import ModelInfo
+    from piezotrack.stages.model_info import ModelInfo
 
 
 @pytest.mark.parametrize("info", MODELS, ids=[info.name for info in MODELS])

@@ -59,8 +59,6 @@ def simulate_command(
         f"{t.size} samples from rest, drive from {u.min():.4g} to {u.max():.4g} V: displacement "
         f"from {1e6 * x.min():.4g} to {1e6 * x.max():.4g} um"
     )
-    if fitted := known.drive_range:
-        margin = 0.01 * (fitted[1] - fitted[0])
-        if u.min() < fitted[0] - margin or u.max() > fitted[1] + margin:
-            print(f"note  the model was fitted from {fitted[0]:.4g} to {fitted[1]:.4g} V only")
+    for remark in known.beyond_fit(u, float(t[-1] - t[0]) / (t.size - 1)):
+        print(f"note  {remark}")
     list_files(written)

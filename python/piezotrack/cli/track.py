@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -125,7 +126,8 @@ def track_command(
     print(f"the {stage} stage" if stage == "virtual" else "the model itself", end=", ")
     print(run.summary())
     if feedforward:
-        _note_range(known, run.voltage)
+        # A loop's voltage has the noise of the sensor, whose rate says nothing.
+        _list_remarks(known.beyond_fit(run.voltage, math.inf))
     if loop.feedback is not None or loop.repetitive is not None:
         print(f"loop at {check_loop(plant, loop, delay=delay).middle}")
     list_files(written)
@@ -163,7 +165,7 @@ def feedforward_command(
         written += save_figures({"feedforward": picture}, folder)
     print(f"{desired!r} at {1.0 / interval:g} Hz; {how}")
     print(f"{voltage.size} samples, voltage from {voltage.min():.4g} to {voltage.max():.4g} V")
-    _note_range(known, voltage)
+    _list_remarks(known.beyond_fit(voltage, interval))
     list_files(written)
 
 
@@ -183,12 +185,9 @@ def _refuse_without_effect(
         refuse_without_effect(context, ["seed"], "with --stage model, which has no sensor noise")
 
 
-def _note_range(known: IdentifiedModel, voltage: NDArray[np.float64]) -> None:
-    """Print a note where a model is used outside the voltages of its identification."""
-    if fitted := known.drive_range:
-        margin = 0.01 * (fitted[1] - fitted[0])
-        if voltage.min() < fitted[0] - margin or voltage.max() > fitted[1] + margin:
-            print(f"note  the model was fitted from {fitted[0]:.4g} to {fitted[1]:.4g} V only")
+def _list_remarks(remarks: list[str]) -> None:
+    for remark in remarks:
+        print(f"note  {remark}")
 
 
 def _reference(text: str, duration: float | None, period: float | None) -> Reference:

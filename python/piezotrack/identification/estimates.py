@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-__all__ = ["Estimate", "Progress", "StopReason", "SwarmRun"]
+__all__ = ["Estimate", "LagRange", "Progress", "StopReason", "SwarmRun"]
 
 StopReason = Literal["stalled", "iterations", "interrupted", "solved"]
 
@@ -78,6 +78,23 @@ class Estimate(NamedTuple):
     def identified(self) -> bool:
         """Whether the record determines the value: `precise`, and not on a bound."""
         return self.precise and not self.at_bound
+
+
+class LagRange(NamedTuple):
+    """Lags with which a model fits a record as well as with the best one.
+
+    Attributes
+    ----------
+    least, most : float
+        Ends of the range within which the cost is at most a hundredth above its least [s]. The
+        model has the least one.
+    from_zero : bool
+        Whether the model fits as well without any lag.
+    """
+
+    least: float
+    most: float
+    from_zero: bool
 
 
 class SwarmRun(NamedTuple):

@@ -73,9 +73,9 @@ def identify(
         ``"bouc-wen-oscillator"`` (`BoucWenOscillator`); least squares find
         ``"prandtl-ishlinskii"`` (`PrandtlIshlinskiiStage`) and
         ``"generalised-prandtl-ishlinskii"`` (`GeneralisedPrandtlIshlinskiiStage`). Of the
-        arguments below, `offset` and `history` apply to every model, `least_squares` to the models found by
-        least squares, and all others to the models that a swarm searches; an argument that does
-        not apply to the model is refused.
+        arguments below, `offset` and `history` apply to every model, `least_squares` to those
+        found by least squares, and all others to those that a swarm searches; an argument that
+        does not apply to the model is refused.
     free : iterable of str, optional
         Parameters to search; by default all that are not fixed. `b0`, dry friction at reversals,
         is held at 0 unless it is named here or in `fixed`. Exponents are held at 1 unless they

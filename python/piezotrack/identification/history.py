@@ -145,7 +145,7 @@ def start_of(entry: Any, state: type[StageState]) -> Start | None:
     found = object_of("start", entry)
     if not found:
         return None
-    numbers = {
+    numbers: dict[str, Any] = {
         name: tuple(as_numbers(name, value))
         if isinstance(value, list)
         else _core.as_number(name, value)
@@ -203,8 +203,8 @@ def start_after(
     full = data.full
     before = 0.0 if voltage is None else voltage
     visited = _core.visited(full.u, data.dt, data.hold, history, before)
-    state = model.equilibrium(visited)
-    if history == "settled" and getattr(state, "creep", ()):
+    state = model.equilibrium(visited.tolist())
+    if history == "settled" and len(getattr(state, "creep", ())):
         state = _repeating(model, data, state)
     return Start(history=history, state=state, voltage=voltage, record=fingerprint(data))
 
@@ -227,7 +227,7 @@ def _moved(state: Any, weights: Array, moved: Array) -> StageState:
 
 
 def shown_history(data: Dataset) -> History:
-    """What a record shows of the drive before it, whatever the model."""
+    """Find what a record shows of the drive before it, whatever the model."""
     del data
     return "virgin"
 

@@ -14,6 +14,7 @@ from ..data.dataset import Dataset
 from ..errors import ParameterError
 from .history import begin, checked_history, same_beginning
 from .model_file import document_of, read_model, sensor_number
+from .remarks import beyond_fit
 
 if TYPE_CHECKING:
     import os
@@ -44,12 +45,15 @@ class Score:
         Stroke that the percentages refer to [m].
     offset : float
         Offset added to the simulated displacement [m].
+    notes : tuple of str
+        Remarks on a record that goes beyond the one identified.
     """
 
     rms: float
     max_error: float
     stroke: float
     offset: float
+    notes: tuple[str, ...] = ()
 
     @property
     def rms_percent(self) -> float:
@@ -130,6 +134,25 @@ class IdentifiedModel:
         free = [name for name in own if found.get(name, {}).get("free", False)]
         delay = bool(self.details.get("delay", {}).get("free", False))
         return sum(_count(getattr(self.model, name)) for name in free) + delay + self.offset_fitted
+
+    def beyond_fit(self, u: ArrayLike, dt: float) -> list[str]:
+        """Remarks on a drive that goes beyond the range or the rate of the record identified.
+
+        Parameters
+        ----------
+        u : array_like, shape (n,)
+            Drive [V].
+        dt : float
+            Sampling interval [s].
+
+        Returns
+        -------
+        list of str
+            One sentence for each; none for a model without a record.
+        """
+        rate = self._record.get("drive_rate")
+        drive = np.asarray(u, dtype=np.float64)
+        return beyond_fit(drive, dt, self.drive_range, None if rate is None else float(rate))
 
     def fitted_on(self, data: Dataset) -> bool:
         """Return whether a record is the one identified, sample by sample.
@@ -294,6 +317,7 @@ class IdentifiedModel:
             max_error=float(np.abs(error).max()),
             stroke=self.stroke,
             offset=shift,
+            notes=tuple(self.beyond_fit(data.u, data.dt)),
         )
 
     def start_on(self, data: Dataset, *, history: History | None = None) -> Start:
@@ -312,9 +336,9 @@ class IdentifiedModel:
             Its `state` is in equilibrium under the first sample of the drive.
         """
         history = checked_history(history)
-        if self.start is not None and same_beginning(self.start, data):
-            if history in (None, self.start.history):
-                return self.start
+        known = self.start
+        if known and same_beginning(known, data) and history in (None, known.history):
+            return known
         return begin(self.model, data, history, self._residual, offset=self.offset_fitted)
 
     def _residual(self, data: Dataset, state: StageState) -> Array:

@@ -12,6 +12,7 @@ from .._support.json_text import number_pair, object_of, parse_json, text_of
 from ..errors import DataError, ParameterError, PiezotrackError
 from ..stages.registry import model_named, stage_class
 from .history import start_entry, start_of
+from .remarks import drive_rate
 
 if TYPE_CHECKING:
     import os
@@ -151,6 +152,8 @@ def _check_origin(found: Any) -> None:
     record = object_of("provenance: data", object_of("provenance", found).get("data"))
     for name in ("source", "sha256"):
         text_of(f"provenance: data: {name}", record.get(name))
+    if record.get("drive_rate") is not None:
+        _core.as_number("provenance: data: drive_rate", record["drive_rate"])
     for name in ("window_s", "drive_range"):
         number_pair(f"provenance: data: {name}", record.get(name))
 
@@ -242,6 +245,7 @@ def provenance(data: Dataset, **settings: Any) -> dict[str, Any]:
             "window_s": [float(data.t[0]), float(data.t[-1])],
             "dt_s": data.dt,
             "drive_range": [float(data.full.u.min()), float(data.full.u.max())],
+            "drive_rate": drive_rate(data.full.u, data.dt),
             "drive_unit": data.drive_unit,
             "hold": data.hold,
         },

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from .._support.files import make_folder, save_figures, together
+from .remarks import of_start
 
 if TYPE_CHECKING:
     import os
@@ -43,6 +44,8 @@ def summary_text(fit: Identification) -> str:
         f"cost  {fit.cost_um:.4g} um rms = {fit.cost_percent:.3g} % of stroke"
         + (f", offset {1e6 * fit.offset:.5g} um fitted" if fit.offset_fitted else ""),
     ]
+    if begun := of_start(fit.start, data):
+        lines.append(f"      the record begins {begun}")
     searched = fit.swarm is not None
     if searched:
         how = f"{fit.nit} iterations, {fit.nfev} simulations, seed {fit.seed}: {fit.message}"

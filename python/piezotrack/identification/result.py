@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..data import diagnostics
+from . import remarks
 from .identified import IdentifiedModel, Score
 
 if TYPE_CHECKING:
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
 
     from ..data.dataset import Dataset
     from ..stages.base import Response
-    from .estimates import Estimate, StopReason, SwarmRun
+    from .estimates import Estimate, LagRange, StopReason, SwarmRun
     from .least_squares import LeastSquares
     from .swarm import ParticleSwarm
 
@@ -66,6 +68,8 @@ class Identification(IdentifiedModel):
         Settings of the swarm.
     least_squares : LeastSquares or None
         Settings of the least squares.
+    lags : LagRange or None
+        Lags that fit as well, where the drive is too slow to tell them from hysteresis and creep.
     at_bound : bool
         Whether a time constant or a frequency lies on a bound of its range.
     """
@@ -85,6 +89,7 @@ class Identification(IdentifiedModel):
     seed: int | None = None
     swarm: ParticleSwarm | None = None
     least_squares: LeastSquares | None = None
+    lags: LagRange | None = None
     at_bound: bool = False
 
     def __repr__(self) -> str:
@@ -137,6 +142,8 @@ class Identification(IdentifiedModel):
             unit = data.drive_unit
             notes.append(f"the drive is in {unit}: forces are in {unit} too, not in N")
         notes += self.model._notes(lambda: self._response)
+        notes += remarks.of_lags(self.lags, 2.0 * math.pi * _frequency(data))
+        notes += remarks.first_samples(data.y - self._response.x, data)
         if self.at_bound:
             notes.append(
                 "the record does not determine the dynamics: time constant or mode lies on a bound"
@@ -199,3 +206,10 @@ class Identification(IdentifiedModel):
         from .plot import plot_identification
 
         return plot_identification(self, data)
+
+
+def _frequency(data: Dataset) -> float:
+    """Frequency of a drive: that of a sine [Hz]."""
+    size = float(np.std(data.u))
+    rate = float(np.sqrt(np.mean(np.diff(data.u) ** 2))) / data.dt
+    return rate / size / (2.0 * math.pi) if size else 0.0

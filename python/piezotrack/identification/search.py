@@ -12,7 +12,7 @@ from .._support.progress_bar import ProgressBar
 from ..data import diagnostics
 from ..errors import Interrupted, ParameterError
 from ..stages.registry import stage_class
-from .estimates import Estimate, Progress, SwarmRun
+from .estimates import Estimate, LagRange, Progress, SwarmRun
 from .history import shown_history, start_after
 from .model_file import provenance
 from .result import Identification
@@ -231,6 +231,7 @@ def _identification(
         "provenance": provenance(data, seed=seed, swarm=asdict(swarm)),
     }
     return Identification(
+        lags=None if found.lags is None else LagRange(*found.lags),
         model=model,
         start=start_after(model, data, history, voltage),
         delay=delay,

@@ -1,0 +1,178 @@
+"""What a fit says of its record: where it begins, its lag, and where the model was not fitted."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..data.dataset import Dataset
+    from .estimates import LagRange
+    from .history import Start
+
+    Array = NDArray[np.float64]
+
+__all__ = ["beyond_fit", "drive_rate", "first_samples", "of_lags", "of_start"]
+
+# Share of the travel that a lag makes up from which a loop is due to it.
+VISCOUS = 0.02
+# Share of the window that the first samples may be, and of the squared residual that they carry.
+FIRST, CARRIED = 0.1, 0.5
+# Margin of the drive's range, and factor of its rate, beyond which a model was not fitted.
+MARGIN, FASTER = 0.01, 2.0
+
+
+def drive_rate(u: Array, dt: float) -> float:
+    """Rate of a drive [V/s]: that which a thousandth of the samples exceed.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n,)
+        Drive [V].
+    dt : float
+        Sampling interval [s].
+
+    Returns
+    -------
+    float
+        The rate; 0 for fewer than two samples.
+    """
+    return float(np.quantile(np.abs(np.diff(u)), 0.999)) / dt if u.size > 1 else 0.0
+
+
+def beyond_fit(
+    u: Array, dt: float, fitted: tuple[float, float] | None, rate: float | None
+) -> list[str]:
+    """Remarks on a drive that goes beyond the record identified.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n,)
+        Drive [V].
+    dt : float
+        Sampling interval [s].
+    fitted : (float, float) or None
+        Range of the drive of the record identified [V].
+    rate : float or None
+        Its rate [V/s].
+
+    Returns
+    -------
+    list of str
+        A sentence for the range and one for the rate, where they are exceeded.
+
+    Examples
+    --------
+    >>> beyond_fit(np.array([0.0, 90.0]), 1.0, (0.0, 75.0), None)
+    ['the drive goes from 0 to 90 V, that of the record identified from 0 to 75 V']
+    """
+    remarks = []
+    low, high = float(u.min()), float(u.max())
+    if fitted is not None:
+        margin = MARGIN * (fitted[1] - fitted[0])
+        if low < fitted[0] - margin or high > fitted[1] + margin:
+            remarks.append(
+                f"the drive goes from {low:.4g} to {high:.4g} V, that of the record identified "
+                f"from {fitted[0]:.4g} to {fitted[1]:.4g} V"
+            )
+    if rate and (found := drive_rate(u, dt)) > FASTER * rate:
+        remarks.append(
+            f"the drive moves at up to {found:.3g} V/s, that of the record identified at "
+            f"{rate:.3g} V/s: the dynamics beyond that rate were not fitted"
+        )
+    return remarks
+
+
+def of_start(start: Start | None, data: Dataset) -> str | None:
+    """Say what the stage went through before the record.
+
+    Parameters
+    ----------
+    start : Start or None
+        Where the record begins.
+    data : Dataset
+        The record.
+
+    Returns
+    -------
+    str or None
+        A sentence without its end.
+    """
+    if start is None:
+        return None
+    unit, first = data.drive_unit, float(data.full.u[0])
+    before = {
+        "virgin": "never moved before",
+        "settled": "settled under the record's own drive",
+        "fit": f"having come from {start.voltage or 0.0:.4g} {unit}, which was fitted",
+    }[start.history]
+    return f"in equilibrium at {first:.4g} {unit}, {before}"
+
+
+def of_lags(lags: LagRange | None, frequency: float) -> list[str]:
+    """Say which lags the record allows.
+
+    Parameters
+    ----------
+    lags : LagRange or None
+        Lags that fit as well.
+    frequency : float
+        Frequency of the drive [rad/s].
+
+    Returns
+    -------
+    list of str
+        One sentence, or none.
+    """
+    if lags is None:
+        return []
+    if lags.from_zero:
+        return [
+            f"any lag from 0 to {1e3 * lags.most:.2g} ms fits as well, and the model has the "
+            "least: a record at another rate would tell"
+        ]
+    share = lags.least * frequency
+    if share < VISCOUS:
+        return [
+            f"any lag from {1e3 * lags.least:.2g} to {1e3 * lags.most:.2g} ms fits as well, and "
+            "the model has the least: a record at another rate would tell"
+        ]
+    return [
+        f"a lag of {1e3 * lags.least:.3g} ms makes {100 * share:.2g} % of the travel at this rate: "
+        "this model takes the width of the loop for damping, and holds at this rate only"
+    ]
+
+
+def first_samples(rest: Array, data: Dataset) -> list[str]:
+    """Say that the first samples carry the cost.
+
+    Parameters
+    ----------
+    rest : ndarray, shape (n,)
+        Residual in the window [m].
+    data : Dataset
+        The record.
+
+    Returns
+    -------
+    list of str
+        One sentence with the seconds to leave out, or none.
+    """
+    squares = np.cumsum((rest - rest.mean()) ** 2)
+    count = math.floor(FIRST * rest.size)
+    if count < 1 or squares[count - 1] < CARRIED * squares[-1]:
+        return []
+    # As far as the residual is well above that of the rest.
+    later = (squares[-1] - squares[count - 1]) / (rest.size - count)
+    above = np.flatnonzero((rest[:count] - rest.mean()) ** 2 > 4.0 * later)
+    until = float(data.t[min(int(above[-1]) + 1 if above.size else count, rest.size - 1)])
+    share = 100.0 * squares[count - 1] / squares[-1]
+    return [
+        f"{share:.0f} % of the squared residual is in the first {until - data.t[0]:.3g} s: what "
+        f"the stage went through before the record shows there; leave it out with "
+        f"log[{until:.4g}:]"
+    ]
