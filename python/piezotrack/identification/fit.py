@@ -5,20 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from .. import _core
-from .._support.messages import quoted
 from ..data.dataset import Dataset
 from ..errors import ParameterError
 from ..stages.registry import model_named
 from .history import checked_history
-from .least_squares import LeastSquares, solve_least_squares
-from .search import search
+from .kinds import identify_kind, refuse_given
+from .selection import AUTO, identify_best
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-    from ..stages.model_info import ModelInfo
     from .estimates import Progress
     from .history import History
+    from .least_squares import LeastSquares
     from .result import Identification
     from .step_response import StepResult
     from .swarm import ParticleSwarm
@@ -28,7 +27,7 @@ __all__ = ["identify"]
 
 def identify(
     data: Dataset,
-    model: str = "dahl",
+    model: str = "auto",
     *,
     free: Iterable[str] | None = None,
     fixed: Mapping[str, float] | None = None,
@@ -68,7 +67,9 @@ def identify(
         The record. ``log[3.0:23.0]`` counts this window only and keeps the drive before it as
         warm-up.
     model : str, optional
-        Name of the model. A swarm searches ``"dahl"`` (`DahlStage`), ``"bouc-wen"``
+        Name of the model. By default, ``"auto"``, those that suit the record are fitted to the
+        first three fifths of the window and judged on the rest, and the best is fitted to all of
+        it and says so: `Identification.trials`. A swarm searches ``"dahl"`` (`DahlStage`), ``"bouc-wen"``
         (`BoucWenStage`), ``"first-order-dahl"`` (`FirstOrderDahlStage`) and
         ``"bouc-wen-oscillator"`` (`BoucWenOscillator`); least squares find
         ``"prandtl-ishlinskii"`` (`PrandtlIshlinskiiStage`) and
@@ -151,6 +152,7 @@ def identify(
     >>> y = pt.DahlStage.xu_li_2010().simulate(u, 1 / 250.0).x
     >>> fit = pt.identify(
     ...     pt.Dataset(u=u, y=y, dt=1 / 250.0),
+    ...     "dahl",
     ...     fixed={"mass": 0.1828, "a1": 121.9874, "a2": 1.1773e6, "b1": 1.8485e6},
     ...     seed=1,
     ... )
@@ -159,7 +161,6 @@ def identify(
     """
     if not isinstance(data, Dataset):
         raise ParameterError(f"data is {type(data).__name__}: expected a Dataset, see pt.read")
-    info = model_named(model)
     offset = _core.as_truth("offset", offset)
     history = checked_history(history)
     of_swarm: dict[str, Any] = {
@@ -176,23 +177,17 @@ def identify(
         "progress": progress,
         "callback": callback,
     }
-    if info.searched:
-        _refuse(info, {"least_squares": least_squares}, "a swarm searches")
-        return search(data, info, offset=offset, history=history, **of_swarm)
-    _refuse(info, of_swarm, "least squares find")
-    settings = LeastSquares() if least_squares is None else least_squares
-    if not isinstance(settings, LeastSquares):
-        raise ParameterError(
-            f"least_squares is {quoted(settings)}: expected a pt.identification.LeastSquares"
+    if model == AUTO:
+        return identify_best(
+            data, offset=offset, history=history, of_swarm=of_swarm, least_squares=least_squares
         )
-    return solve_least_squares(data, info, settings, offset)
-
-
-def _refuse(info: ModelInfo, given: Mapping[str, object], how: str) -> None:
-    """Refuse arguments that do not apply to a model."""
-    for name, value in given.items():
-        if value is not None:
-            raise ParameterError(
-                f"{name} is {quoted(value)}: expected none with the model {info.name!r}, whose "
-                f"parameters {how}"
-            )
+    info = model_named(model)
+    refuse_given(info, of_swarm, least_squares)
+    return identify_kind(
+        data,
+        info,
+        offset=offset,
+        history=history,
+        of_swarm=of_swarm,
+        least_squares=least_squares,
+    )

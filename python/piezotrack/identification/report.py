@@ -52,8 +52,22 @@ def summary_text(fit: Identification) -> str:
         lines += [f"      {how}", *_runs(fit)]
     else:
         lines.append(f"      least squares, {fit.nfev} simulations")
+    lines += _trials(fit)
     lines += [*(f"note  {note}" for note in fit.notes), ""]
     return "\n".join([*lines, *(_estimates(fit) if searched else _values(fit))])
+
+
+def _trials(fit: Identification) -> list[str]:
+    """Say which kinds were tried, and on what they were judged."""
+    if not fit.trials:
+        return []
+    scores = ", ".join(f"{one.title} {100 * one.rms / fit.stroke:.3g} %" for one in fit.trials)
+    where = (
+        "on the part fitted, as the window is too short for another"
+        if fit.fitted_until is None
+        else f"after {fit.fitted_until:.4g} s, fitted before"
+    )
+    return [f"      chosen by the rms {where}: {scores}"]
 
 
 def _estimates(fit: Identification) -> list[str]:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ..stages.base import Response
     from .estimates import Estimate, LagRange, StopReason, SwarmRun
     from .least_squares import LeastSquares
+    from .selection import Trial
     from .swarm import ParticleSwarm
 
     Array = NDArray[np.float64]
@@ -70,6 +71,11 @@ class Identification(IdentifiedModel):
         Settings of the least squares.
     lags : LagRange or None
         Lags that fit as well, where the drive is too slow to tell them from hysteresis and creep.
+    trials : tuple of Trial
+        The kinds that were tried, the best first, where ``model="auto"`` chose one of them.
+    fitted_until : float or None
+        End of the part of the window that these were fitted to [s]; they were judged on the rest.
+        None where the window is too short for two parts.
     at_bound : bool
         Whether a time constant or a frequency lies on a bound of its range.
     """
@@ -90,6 +96,8 @@ class Identification(IdentifiedModel):
     swarm: ParticleSwarm | None = None
     least_squares: LeastSquares | None = None
     lags: LagRange | None = None
+    trials: tuple[Trial, ...] = ()
+    fitted_until: float | None = None
     at_bound: bool = False
 
     def __repr__(self) -> str:

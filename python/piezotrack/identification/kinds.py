@@ -1,0 +1,89 @@
+"""Identification of one kind of stage: by a swarm or by least squares."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from .._support.messages import quoted
+from ..errors import ParameterError
+from .least_squares import LeastSquares, solve_least_squares
+from .search import search
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from ..data.dataset import Dataset
+    from ..stages.model_info import ModelInfo
+    from .history import History
+    from .result import Identification
+
+__all__ = ["identify_kind", "refuse_given"]
+
+
+def identify_kind(
+    data: Dataset,
+    info: ModelInfo,
+    *,
+    offset: bool,
+    history: History | None,
+    of_swarm: Mapping[str, Any],
+    least_squares: object,
+) -> Identification:
+    """Identify a stage of one kind.
+
+    Parameters
+    ----------
+    data : Dataset
+        The record.
+    info : ModelInfo
+        The kind.
+    offset : bool
+        Whether an offset of the sensor is fitted.
+    history : {"virgin", "settled", "fit"} or None
+        What the stage went through before.
+    of_swarm, least_squares : mapping, object
+        Arguments for one of the two ways, not yet checked; those for the other are not used.
+
+    Returns
+    -------
+    Identification
+        The result.
+
+    Raises
+    ------
+    ParameterError, DataError, NumericalError, Interrupted
+        As for `identify`.
+    """
+    if info.searched:
+        return search(data, info, offset=offset, history=history, **of_swarm)
+    settings = LeastSquares() if least_squares is None else least_squares
+    if not isinstance(settings, LeastSquares):
+        raise ParameterError(
+            f"least_squares is {quoted(settings)}: expected a pt.identification.LeastSquares"
+        )
+    return solve_least_squares(data, info, settings, offset)
+
+
+def refuse_given(info: ModelInfo, of_swarm: Mapping[str, object], least_squares: object) -> None:
+    """Refuse arguments that do not apply to a kind.
+
+    Parameters
+    ----------
+    info : ModelInfo
+        The kind.
+    of_swarm, least_squares : mapping, object
+        Arguments for one of the two ways; None where not given.
+
+    Raises
+    ------
+    ParameterError
+        One is given for the other way.
+    """
+    how = "a swarm searches" if info.searched else "least squares find"
+    given = {"least_squares": least_squares} if info.searched else of_swarm
+    for name, value in given.items():
+        if value is not None:
+            raise ParameterError(
+                f"{name} is {quoted(value)}: expected none with the model {info.name!r}, whose "
+                f"parameters {how}"
+            )

@@ -1,0 +1,163 @@
+"""`model="auto"`: several kinds fitted to a part of a record, the best on the rest is the answer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from .. import _core
+from .._support.messages import quoted
+from ..errors import DataError, NumericalError, ParameterError
+from ..stages.registry import model_named
+from .kinds import identify_kind
+from .swarm import ParticleSwarm
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from ..data.dataset import Dataset
+    from ..stages.model_info import ModelInfo
+    from .history import History
+    from .result import Identification
+
+    Array = NDArray[np.float64]
+
+__all__ = ["AUTO", "Trial", "identify_best"]
+
+AUTO = "auto"
+# Kinds that are tried for a drive in volts, and for a force.
+OF_VOLTS = ("prandtl-ishlinskii", "first-order-dahl", "parallel-dahl", "bouc-wen")
+OF_FORCE = ("bouc-wen-oscillator", "prandtl-ishlinskii")
+# Arguments that name parameters of one model.
+OF_ONE_MODEL = ("free", "fixed", "initial", "bounds")
+# Share of the window that is fitted, and turns of the drive that each part needs.
+FITTED, TURNS = 0.6, 2
+# A residual of so many times the noise on what was not fitted cannot be bettered.
+AS_NOISE = 1.15
+# Another kind has to be better by this share than one before it in the list.
+BETTER = 0.03
+# The descent finds the bottom: swarms that only have to find the basin can be short.
+ITERATIONS = 40
+
+
+class Trial(NamedTuple):
+    """One kind of stage that was tried.
+
+    Attributes
+    ----------
+    model, title : str
+        Name of the model, and its title.
+    rms : float
+        Root mean square of the residual on the part that was not fitted [m]; where the record is
+        too short to be parted, on all of it.
+    """
+
+    model: str
+    title: str
+    rms: float
+
+
+def identify_best(
+    data: Dataset,
+    *,
+    offset: bool,
+    history: History | None,
+    of_swarm: Mapping[str, Any],
+    least_squares: object,
+) -> Identification:
+    """Identify the kind of stage that describes a record best.
+
+    Parameters
+    ----------
+    data : Dataset
+        The record.
+    offset : bool
+        Whether an offset of the sensor is fitted.
+    history : {"virgin", "settled", "fit"} or None
+        What the stage went through before.
+    of_swarm, least_squares : mapping, object
+        As for `identify`, not yet checked.
+
+    Returns
+    -------
+    Identification
+        The best kind, fitted to the whole window.
+
+    Raises
+    ------
+    ParameterError, DataError, NumericalError, Interrupted
+        As for `identify`.
+    """
+    for name in OF_ONE_MODEL:
+        if of_swarm[name] is not None:
+            raise ParameterError(
+                f"{name} is {quoted(of_swarm[name])}: expected none with model='auto'; name the "
+                "model whose parameters these are, as model='dahl'"
+            )
+    common: dict[str, Any] = {"offset": offset, "history": history, "least_squares": least_squares}
+    swarm = dict(of_swarm)
+    if swarm["swarm"] is None:
+        swarm["swarm"] = ParticleSwarm(iterations=ITERATIONS)
+    infos = _kinds(data, of_swarm)
+    part, rest = _parts(data)
+    noise = _noise(rest.y)
+    found: list[tuple[Trial, ModelInfo]] = []
+    refused: Exception | None = None
+    for info in infos:
+        try:
+            fit = identify_kind(part, info, of_swarm=swarm, **common)
+        except (DataError, NumericalError) as error:
+            refused = refused or error
+            continue
+        score = fit.score(rest, offset=fit.offset) if rest is not part else fit.fitted
+        found.append((Trial(info.name, info.title, score.rms), info))
+        if score.rms < AS_NOISE * noise:
+            break
+    if not found:
+        raise refused or DataError("no kind of stage could be fitted")
+    best, info = found[0]
+    for trial, other in found[1:]:
+        if trial.rms < (1.0 - BETTER) * best.rms:
+            best, info = trial, other
+    whole = fit if rest is part and best is found[-1][0] else None
+    if whole is None:
+        whole = identify_kind(data, info, of_swarm=swarm, **common)
+    trials = tuple(sorted((trial for trial, _ in found), key=lambda trial: trial.rms))
+    until = None if rest is part else float(part.t[-1])
+    details = {
+        "selection": {
+            "fitted_until_s": until,
+            "models": {trial.model: {"rms": trial.rms, "unit": "m"} for trial in trials},
+        }
+    }
+    return replace(whole, trials=trials, fitted_until=until, details={**whole.details, **details})
+
+
+def _kinds(data: Dataset, of_swarm: Mapping[str, Any]) -> list[ModelInfo]:
+    """Kinds that can be fitted with what the caller gives."""
+    names = OF_FORCE if data.drive_unit == "N" else OF_VOLTS
+    infos = [model_named(name) for name in names]
+    needs_swarm = of_swarm["delay"] is not None or of_swarm["stiffness"] is not None
+    return [info for info in infos if info.searched or not needs_swarm]
+
+
+def _parts(data: Dataset) -> tuple[Dataset, Dataset]:
+    """Part to fit and part to judge on; the whole twice where the drive turns too seldom."""
+    turns = np.array(_core.turns(data.u, 0.2 * float(np.ptp(data.u))), dtype=np.intp)
+    for place in turns[np.argsort(np.abs(turns - FITTED * len(data)))]:
+        before, after = int(np.sum(turns < place)), int(np.sum(turns >= place))
+        if before >= TURNS and after >= TURNS:
+            middle = float(data.t[place])
+            return data[data.t[0] : middle], data[middle:]
+    return data, data
+
+
+def _noise(y: Array) -> float:
+    """Noise of a sensor that is white from sample to sample [m]: from third differences."""
+    if y.size < 16:
+        return 0.0
+    return float(1.4826 * np.median(np.abs(np.diff(y, 3))) / np.sqrt(20.0))
