@@ -1,4 +1,4 @@
-"""`model="auto"`: several kinds fitted to a part of a record, the best on the rest is the answer."""
+"""`model="auto"`: the kind that is best on a part of the record that was not fitted."""
 
 from __future__ import annotations
 
