@@ -443,6 +443,10 @@ impl WeightedPlays for GeneralisedPrandtlIshlinskiiStage {
         (edge, edge)
     }
 
+    fn kept(plays: &[f64]) -> &[f64] {
+        plays
+    }
+
     fn values(fitted: &FittedPlays) -> Values {
         let of = fitted.clone();
         let TanhEnvelope { scale, slope, shift, level } = Self::envelope(&of.shape, of.drive);
