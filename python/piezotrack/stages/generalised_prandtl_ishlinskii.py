@@ -49,6 +49,9 @@ class GeneralisedPrandtlIshlinskiiStage(Stage):
         T [s] of a first-order lag.
     frequency, damping_ratio : float, optional
         Undamped frequency [Hz] and damping ratio zeta of a mode; not with `time_constant`.
+    mode_weights, mode_frequencies, mode_damping_ratios : sequence of float, optional
+        g, undamped frequency [Hz] and damping ratio of further modes in parallel with that mode;
+        3 at most, each g between -1 and 1.
 
     Raises
     ------
@@ -98,3 +101,6 @@ class GeneralisedPrandtlIshlinskiiStage(Stage):
     time_constant: float | None = None
     frequency: float | None = None
     damping_ratio: float | None = None
+    mode_weights: tuple[float, ...] = ()
+    mode_frequencies: tuple[float, ...] = ()
+    mode_damping_ratios: tuple[float, ...] = ()

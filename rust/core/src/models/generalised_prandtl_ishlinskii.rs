@@ -62,6 +62,9 @@ const PARAMETERS: &[ParameterInfo] = &[
     DYNAMICS[2],
     DYNAMICS[3],
     DYNAMICS[4],
+    DYNAMICS[5],
+    DYNAMICS[6],
+    DYNAMICS[7],
 ];
 
 /// An envelope: c0 tanh(c1 u + c2) + c3, V of V.
@@ -446,8 +449,8 @@ impl WeightedPlays for GeneralisedPrandtlIshlinskiiStage {
     fn values(fitted: &FittedPlays) -> Values {
         let of = fitted.clone();
         let TanhEnvelope { scale, slope, shift, level } = Self::envelope(&of.shape, of.drive);
-        let [creep_weights, creep_times, time, frequency, damping_ratio] = of.relaxation.values();
-        let entries = [
+        let relaxation = of.relaxation.values();
+        let operator = [
             vec![of.linear],
             of.thresholds,
             of.weights,
@@ -459,12 +462,7 @@ impl WeightedPlays for GeneralisedPrandtlIshlinskiiStage {
             vec![],
             vec![],
             vec![],
-            creep_weights,
-            creep_times,
-            time,
-            frequency,
-            damping_ratio,
         ];
-        Values::of(PARAMETERS, entries)
+        Values::of(PARAMETERS, operator.into_iter().chain(relaxation))
     }
 }

@@ -4,6 +4,7 @@
 //! h = H(u) - H(0)                                             hysteresis
 //! d = h + sum_k c_k q_k,   tau_k q_k' = h - q_k               creep
 //! T x' + x = d   or   x'' + 2 zeta wn x' + wn^2 x = wn^2 d   or   x = d
+//! or   x = sum_k g_k x_k, each x_k a mode as above            modes in parallel
 //! ```
 //!
 //! The hysteresis is exact from sample to sample; between samples its output is taken as linear.
@@ -13,12 +14,14 @@ use core::fmt::Debug;
 
 use piezotrack_control::{CreepState, InputInverse, InputInverseState, OperatorInverse};
 
-use super::creep::{Dynamics, MOST_RELAXATIONS, Relaxation, RelaxationFlow, RelaxationState};
+use super::creep::{
+    Dynamics, FURTHER, MOST_RELAXATIONS, Mode, Relaxation, RelaxationFlow, RelaxationState,
+};
 use super::plant::Plant;
 use super::traits::{Experiment, Response};
 use super::values::{ParameterInfo, Values};
 use crate::design::LoopPlant;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, not_negative, positive};
 use crate::integrator::columns;
 use crate::signal::Hold;
 
@@ -26,12 +29,15 @@ use crate::signal::Hold;
 const POLL: usize = 4096;
 
 /// Parameters of creep and dynamics, which follow those of the operator.
-pub(super) const DYNAMICS: [ParameterInfo; 5] = [
+pub(super) const DYNAMICS: [ParameterInfo; 8] = [
     ParameterInfo::list("creep_weights", "c", ""),
     ParameterInfo::list("creep_times", "tau", "s"),
     ParameterInfo::optional("time_constant", "T", "s"),
     ParameterInfo::optional("frequency", "fn", "Hz"),
     ParameterInfo::optional("damping_ratio", "zeta", ""),
+    ParameterInfo::list("mode_weights", "g", ""),
+    ParameterInfo::list("mode_frequencies", "f", "Hz"),
+    ParameterInfo::list("mode_damping_ratios", "zeta_k", ""),
 ];
 
 /// State of a stage whose operator has plays.
@@ -41,6 +47,8 @@ pub(super) const PLAYS_STATE: &[ParameterInfo] = &[
     ParameterInfo::new("u", "u", "V"),
     ParameterInfo::list("plays", "z", "V"),
     ParameterInfo::list("creep", "q", "m"),
+    ParameterInfo::list("mode_x", "x_k", "m"),
+    ParameterInfo::list("mode_v", "x_k'", "m/s"),
 ];
 
 /// A hysteresis operator that is followed from sample to sample, V to m.
@@ -95,7 +103,8 @@ impl Relaxation {
             ([], [], []) => Dynamics::None,
             ([time], [], []) => Dynamics::First { time: *time },
             ([], [frequency], [damping_ratio]) => {
-                Dynamics::Second { frequency: *frequency, damping_ratio: *damping_ratio }
+                let further = further_modes(values)?;
+                Dynamics::modes(*frequency, *damping_ratio, &further)?
             }
             ([time, ..], _, _) => {
                 let expected = "None beside a frequency or a damping ratio";
@@ -106,11 +115,16 @@ impl Relaxation {
                 return Err(Error::parameter("frequency and damping_ratio", "one", expected));
             }
         };
+        if !(list("mode_weights").is_empty() || matches!(dynamics, Dynamics::Modes(_))) {
+            let found = format!("{} entries", list("mode_weights").len());
+            let expected = "none without a frequency and a damping ratio";
+            return Err(Error::parameter("mode_weights", found, expected));
+        }
         Self::new(list("creep_weights"), list("creep_times"), dynamics)
     }
 
     /// The values of creep and dynamics, in the order of [`DYNAMICS`].
-    pub(super) fn values(&self) -> [Vec<f64>; 5] {
+    pub(super) fn values(&self) -> [Vec<f64>; 8] {
         let creep = self.used();
         let [time, frequency, damping_ratio] = match self.dynamics {
             Dynamics::None => [vec![], vec![], vec![]],
@@ -118,10 +132,25 @@ impl Relaxation {
             Dynamics::Second { frequency, damping_ratio } => {
                 [vec![], vec![frequency], vec![damping_ratio]]
             }
+            Dynamics::Modes(modes) => {
+                let [main, ..] = modes.all();
+                [vec![], vec![main.frequency], vec![main.damping_ratio]]
+            }
         };
+        let further = self.dynamics.further();
+        let each = |number: fn(&Mode) -> f64| further.iter().map(number).collect();
         let weights = creep.iter().map(|creep| creep.share).collect();
         let times = creep.iter().map(|creep| creep.time).collect();
-        [weights, times, time, frequency, damping_ratio]
+        [
+            weights,
+            times,
+            time,
+            frequency,
+            damping_ratio,
+            each(|mode| mode.weight),
+            each(|mode| mode.frequency),
+            each(|mode| mode.damping_ratio),
+        ]
     }
 
     /// A stage of some static gain (m/V) with these dynamics; its creep is slower than a loop and
@@ -135,8 +164,50 @@ impl Relaxation {
             Dynamics::Second { frequency, damping_ratio } => {
                 LoopPlant::mode(gain, frequency, damping_ratio)
             }
+            Dynamics::Modes(modes) => {
+                let each = |mode: &Mode| (gain * mode.weight, mode.frequency, mode.damping_ratio);
+                let modes: Vec<_> = modes.used().iter().map(each).collect();
+                LoopPlant::modes(&modes)
+            }
         }
     }
+}
+
+/// The modes beside the main one, from the values of a stage.
+fn further_modes(values: &Values) -> Result<Vec<Mode>> {
+    let [weights, frequencies, damping_ratios] =
+        ["mode_weights", "mode_frequencies", "mode_damping_ratios"].map(|name| values.list(name));
+    same_length("mode_frequencies", frequencies.len(), "mode_weights", weights.len(), FURTHER)?;
+    let (name, found) = ("mode_damping_ratios", damping_ratios.len());
+    same_length(name, found, "mode_weights", weights.len(), FURTHER)?;
+    let mode = |k: usize| {
+        let (name, weight) = (format!("mode_weights[{k}]"), weights[k]);
+        if weight.abs() >= 1.0 || weight.is_nan() {
+            return Err(Error::parameter(name, weight, "a number between -1 and 1"));
+        }
+        let frequency = positive(&format!("mode_frequencies[{k}]"), frequencies[k], "Hz")?;
+        let name = format!("mode_damping_ratios[{k}]");
+        Ok(Mode { weight, frequency, damping_ratio: not_negative(&name, damping_ratios[k], "")? })
+    };
+    (0..weights.len()).map(mode).collect()
+}
+
+/// Refuses lists of different lengths, and longer ones than there is room for.
+pub(super) fn same_length(
+    name: &str,
+    found: usize,
+    other: &str,
+    wanted: usize,
+    most: usize,
+) -> Result<()> {
+    if found == wanted && found <= most {
+        return Ok(());
+    }
+    Err(Error::Shape {
+        name: name.into(),
+        found: format!("{found} entries"),
+        expected: format!("as many as {other}, which has {wanted}, and {most} at most"),
+    })
 }
 
 impl<O: InputOperator> InputStage<O> {
@@ -145,6 +216,19 @@ impl<O: InputOperator> InputStage<O> {
     pub fn at_rest(&self) -> InputStageState<O::State> {
         let relaxation = RelaxationState::default();
         InputStageState { operator: self.operator.rest(), relaxation }
+    }
+
+    /// The state in equilibrium after a slow visit to each voltage (V) in turn, from a stage that
+    /// never moved: fully crept, at the static displacement, its modes at rest.
+    #[must_use]
+    pub fn settled_at(&self, voltages: &[f64]) -> InputStageState<O::State> {
+        let mut operator = self.operator.rest();
+        let zero = self.zero();
+        let mut output = zero;
+        for &volts in voltages {
+            output = self.operator.follow(&mut operator, volts);
+        }
+        InputStageState { operator, relaxation: self.relaxation.settled(output - zero) }
     }
 
     /// A state from its values, or that at rest; a play that the drive would have pushed on
@@ -157,6 +241,7 @@ impl<O: InputOperator> InputStage<O> {
         let mut state = self.at_rest();
         let Some(values) = values else { return Ok(state) };
         let (plays, creep) = (values.list("plays"), values.list("creep"));
+        let modes = (values.list("mode_x"), values.list("mode_v"));
         let slots = self.operator.plays(&mut state.operator);
         let (count, relaxations) = (slots.len(), self.relaxation.count);
         if plays.len() != count || creep.len() != relaxations {
@@ -164,6 +249,18 @@ impl<O: InputOperator> InputStage<O> {
                 name: "initial".into(),
                 found: format!("{} plays and {} relaxations", plays.len(), creep.len()),
                 expected: format!("{count} plays and {relaxations} relaxations, as the stage"),
+            });
+        }
+        let further = self.relaxation.dynamics.further().len();
+        if modes.0.len() != further || modes.1.len() != further {
+            return Err(Error::Shape {
+                name: "initial".into(),
+                found: format!(
+                    "{} and {} entries of mode_x and mode_v",
+                    modes.0.len(),
+                    modes.1.len()
+                ),
+                expected: format!("{further} each, as the stage has modes beside its main one"),
             });
         }
         if !values.iter().flat_map(|(_, numbers)| numbers).all(|value| value.is_finite()) {
@@ -175,6 +272,8 @@ impl<O: InputOperator> InputStage<O> {
         relaxation.input =
             self.operator.follow(&mut state.operator, values.number("u")) - self.zero();
         (relaxation.x, relaxation.v) = (values.number("x"), values.number("v"));
+        relaxation.mode_x[..further].copy_from_slice(modes.0);
+        relaxation.mode_v[..further].copy_from_slice(modes.1);
         Ok(state)
     }
 
@@ -184,7 +283,11 @@ impl<O: InputOperator> InputStage<O> {
         let creep = relaxation.creep[..self.relaxation.count].to_vec();
         let plays = self.operator.plays(&mut operator).to_vec();
         let (x, v, input) = (relaxation.x, relaxation.v, self.operator.input(&operator));
-        Values::of(PLAYS_STATE, [vec![x], vec![v], vec![input], plays, creep])
+        let further = self.relaxation.dynamics.further().len();
+        let (places, speeds) = (&relaxation.mode_x[..further], &relaxation.mode_v[..further]);
+        let entries =
+            [vec![x], vec![v], vec![input], plays, creep, places.to_vec(), speeds.to_vec()];
+        Values::of(PLAYS_STATE, entries)
     }
 
     /// The operator's output at rest, m.

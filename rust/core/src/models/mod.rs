@@ -17,7 +17,10 @@ mod weighted_plays;
 
 pub use bouc_wen::{BoucWenKernel, BoucWenStage};
 pub use bouc_wen_oscillator::{BoucWenOscillator, BoucWenOscillatorKernel};
-pub use creep::{Creep, Dynamics, MOST_RELAXATIONS, Relaxation, RelaxationFlow, RelaxationState};
+pub use creep::{
+    Creep, Dynamics, MOST_MODES, MOST_RELAXATIONS, Mode, Modes, Relaxation, RelaxationFlow,
+    RelaxationState,
+};
 pub use dahl::{DahlStage, DahlStageState};
 pub use first_order_dahl::{FirstOrderDahlKernel, FirstOrderDahlStage};
 pub use generalised_prandtl_ishlinskii::{
