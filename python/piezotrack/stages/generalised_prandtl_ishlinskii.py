@@ -62,6 +62,10 @@ class GeneralisedPrandtlIshlinskiiStage(Stage):
     -----
     In the state, the play of threshold 0 comes first.
 
+    Where creep or dynamics follow, a sampling interval is split where a play starts to move, and
+    along the bent envelopes into chords so short that `accuracy` holds; `Response.error_estimate`
+    is a bound of the error, for a mode with a damping ratio of 0.01 or more.
+
     An identification finds one envelope for both directions, which is 0 at 0 V and whose range over
     the drive is that of the drive, so that thresholds are in volts. It searches the ratio of the
     slopes at the two ends, and how much the envelope bends beyond that. A number

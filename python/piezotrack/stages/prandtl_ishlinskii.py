@@ -90,11 +90,11 @@ class PrandtlIshlinskiiStage(Stage):
 
     Notes
     -----
-    The hysteresis is exact from sample to sample. Creep and dynamics are exact for an `h` that is
-    linear between samples.
+    The simulation is exact for a drive that is held, or linear between samples: an interval in which
+    a play starts to move, or `p` passes a dead zone's threshold, is split there.
 
     The inverse inverts each part in turn: the dynamics with the derivatives of the reference, creep
-    exactly from sample to sample, dead zones and plays in Kuhnen's closed form. Several modes are
+    exactly for an `h` that is linear between samples, dead zones and plays in Kuhnen's closed form. Several modes are
     inverted by a filter, exact for derivatives that are linear between samples. It exists where all
     zeros of their sum are in the left half plane; elsewhere the inverse is refused.
 

@@ -10,7 +10,7 @@
 //!
 //! Relaxations whose time constants are a decade apart, with about equal shares, make a creep
 //! that grows nearly with the logarithm of time, as that of piezoceramics does. Every step is
-//! exact for an `h` that is linear over the step.
+//! exact for an `h` that is linear over the step, of any length.
 
 pub use piezotrack_control::{Creep, Dynamics, MOST_MODES, Mode, Modes};
 
@@ -24,6 +24,9 @@ pub const MOST_RELAXATIONS: usize = 8;
 
 /// Room for the modes beside the main one.
 pub(super) const FURTHER: usize = MOST_MODES - 1;
+
+/// Damping ratio below which the largest gain is not followed.
+const LEAST_DAMPING: f64 = 0.01;
 
 /// Creep and dynamics.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -160,6 +163,37 @@ impl Relaxation {
     #[inline(always)]
     pub fn used(&self) -> &[Creep] {
         self.creep.get(..self.count).unwrap_or(&self.creep)
+    }
+
+    /// Whether the displacement depends on the input before, and not only on that now.
+    #[must_use]
+    #[inline(always)]
+    pub fn remembers(&self) -> bool {
+        self.count > 0 || !matches!(self.dynamics, Dynamics::None)
+    }
+
+    /// Largest displacement that an input below 1 in size can make: the integral of the size of
+    /// the impulse response. A mode with less damping than `LEAST_DAMPING` counts as one with it.
+    #[must_use]
+    pub fn largest_gain(&self) -> f64 {
+        let mode = |damping_ratio: f64| {
+            // Its step response overshoots by `beyond`, and each half wave by so much less.
+            let damping = damping_ratio.max(LEAST_DAMPING);
+            if damping >= 1.0 {
+                return 1.0;
+            }
+            let half_wave = core::f64::consts::PI * damping / libm::sqrt(1.0 - damping * damping);
+            let beyond = libm::exp(-half_wave);
+            (1.0 + beyond) / (1.0 - beyond)
+        };
+        let dynamics = match self.dynamics {
+            Dynamics::None | Dynamics::First { .. } => 1.0,
+            Dynamics::Second { damping_ratio, .. } => mode(damping_ratio),
+            Dynamics::Modes(modes) => {
+                modes.used().iter().map(|one| one.weight.abs() * mode(one.damping_ratio)).sum()
+            }
+        };
+        dynamics * self.used().iter().fold(1.0, |sum, creep| sum + creep.share)
     }
 
     /// Input of the dynamics, d, m.

@@ -7,7 +7,9 @@
 //! or   x = sum_k g_k x_k, each x_k a mode as above            modes in parallel
 //! ```
 //!
-//! The hysteresis is exact from sample to sample; between samples its output is taken as linear.
+//! A drive that goes straight from sample to sample is followed exactly: the interval is split where
+//! the operator's output has a corner, and each part is stepped with the exact solution. Where the
+//! output bends it is split further, so that chords are as close to it as the accuracy asks.
 //! A model defines its operator; creep and dynamics are common to all.
 
 use core::fmt::Debug;
@@ -25,7 +27,16 @@ use crate::error::{Error, Result, not_negative, positive};
 use crate::integrator::columns;
 use crate::signal::Hold;
 
-/// Samples between two questions whether to stop.
+/// Parts of a sampling interval at most; the last one takes the rest.
+const MOST_PARTS: usize = 1 << 20;
+
+/// Shares of a sampling interval below this are no part of it.
+const LEAST_PART: f64 = 1e-9;
+
+/// Accuracy of a plant's steps, m.
+const ACCURACY: f64 = 1e-10;
+
+/// Steps between two questions whether to stop.
 const POLL: usize = 4096;
 
 /// Parameters of creep and dynamics, which follow those of the operator.
@@ -69,6 +80,16 @@ pub trait InputOperator: Copy + Debug {
     fn plays<'a>(&self, state: &'a mut Self::State) -> &'a mut [f64];
 }
 
+/// A hysteresis operator whose output is a straight line between corners, or nearly so.
+pub trait Segmented: InputOperator {
+    /// The end of the first part of the way to `volts` along which the output is a straight line
+    /// to within `deviation`, m: beyond the present input, and `volts` where all of the way is.
+    fn straight(&self, state: &Self::State, volts: f64, deviation: f64) -> f64;
+
+    /// Largest second derivative of the output between corners, m/V^2.
+    fn bend(&self) -> f64;
+}
+
 /// A stage with an operator at its input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InputStage<O> {
@@ -87,11 +108,16 @@ pub struct InputStageState<S> {
     pub relaxation: RelaxationState,
 }
 
-/// Steps of one length, and the operator's output at rest, m.
+/// Steps of one length.
 #[derive(Clone, Copy, Debug)]
 pub struct InputStageFlow {
     relaxation: RelaxationFlow,
+    /// The operator's output at rest, m.
     zero: f64,
+    /// Length of a step, s.
+    step: f64,
+    /// Largest deviation of the operator's output from the chords that stand for it, m.
+    deviation: f64,
 }
 
 impl Relaxation {
@@ -303,32 +329,111 @@ impl<O: InputOperator> InputStage<O> {
         self.relaxation.jump(&mut state.relaxation, output);
     }
 
-    /// Motion under a drive. Exact from sample to sample, so its error estimate is 0.
+    /// The inverse of the stage for references sampled every `dt` seconds, from the inverse of
+    /// its operator.
+    ///
+    /// # Errors
+    /// Names `dt` where it is not above 0.
+    pub fn feedforward<I: OperatorInverse>(
+        &self,
+        operator: I,
+        dt: f64,
+    ) -> Result<InputInverse<I, MOST_RELAXATIONS>> {
+        let Relaxation { dynamics, .. } = self.relaxation;
+        Ok(InputInverse::with(operator, self.zero(), self.relaxation.used(), dynamics, dt)?)
+    }
+}
+
+impl<O: Segmented> InputStage<O> {
+    /// Steps of `step` seconds, with errors of the displacement below `accuracy`, m.
+    fn steps(&self, step: f64, accuracy: f64) -> InputStageFlow {
+        InputStageFlow {
+            relaxation: self.relaxation.flow(step),
+            zero: self.zero(),
+            step,
+            deviation: accuracy / self.relaxation.largest_gain(),
+        }
+    }
+
+    /// Bound of the error where the drive moves by `longest` (V) at most in a step, m.
+    fn error_bound(&self, flow: &InputStageFlow, longest: f64) -> f64 {
+        if !self.relaxation.remembers() {
+            return 0.0;
+        }
+        // A chord of length l deviates by bend l^2 / 8 at most.
+        let whole = 0.125 * self.operator.bend() * longest * longest;
+        whole.min(flow.deviation) * self.relaxation.largest_gain()
+    }
+
+    /// Takes the drive straight to `volts` in one step, in parts where the operator's output is
+    /// not straight; returns how many.
+    #[inline(always)]
+    fn through(
+        &self,
+        flow: &InputStageFlow,
+        state: &mut InputStageState<O::State>,
+        volts: f64,
+    ) -> usize {
+        let InputStageFlow { relaxation, zero, step, deviation } = flow;
+        let from = self.operator.input(&state.operator);
+        let (mut done, mut parts) = (0.0, 1);
+        while self.relaxation.remembers() && parts < MOST_PARTS {
+            let next = self.operator.straight(&state.operator, volts, *deviation);
+            let reached = (next - from) / (volts - from);
+            // NaN where the drive stands still.
+            if reached.is_nan() || reached > 1.0 - LEAST_PART {
+                break;
+            }
+            let output = self.operator.follow(&mut state.operator, next) - zero;
+            if reached > done + LEAST_PART {
+                let part = self.relaxation.flow((reached - done) * step);
+                self.relaxation.step(&part, &mut state.relaxation, output);
+                done = reached;
+            }
+            parts += 1;
+        }
+        let output = self.operator.follow(&mut state.operator, volts) - zero;
+        if done > 0.0 {
+            let rest = self.relaxation.flow((1.0 - done) * step);
+            self.relaxation.step(&rest, &mut state.relaxation, output);
+        } else {
+            self.relaxation.step(relaxation, &mut state.relaxation, output);
+        }
+        parts
+    }
+
+    /// Motion under a drive. Exact where the output has no bends between corners: its error
+    /// estimate is 0 then, and a bound of the error otherwise.
     ///
     /// The drive jumps from where the initial state has it to its first sample. With a zero-order
     /// hold a sample shows the stage before the drive's step at that instant has any effect.
     pub(super) fn follow(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
-        let Experiment { drive, initial, method, stop, .. } = *experiment;
+        let Experiment { drive, initial, method, accuracy, stop } = *experiment;
         method.exponential_only()?;
-        let flow = self.relaxation.flow(drive.dt);
-        let zero = self.zero();
+        let flow = self.steps(drive.dt, positive("accuracy", accuracy, "m")?);
+        let zero = flow.zero;
         let mut state = self.state(initial)?;
+        let (mut steps, mut longest) = (POLL, 0.0_f64);
         let [mut x, mut v, mut hysteresis] = columns(drive.u.len())?;
         for (k, &volts) in drive.u.iter().enumerate() {
-            if k % POLL == 0 && stop() {
-                return Ok(None);
+            if steps >= POLL {
+                if stop() {
+                    return Ok(None);
+                }
+                steps = 0;
             }
+            steps += 1;
             match drive.hold {
                 Hold::First if k == 0 => self.jump(&mut state, volts, zero),
                 Hold::First => {
-                    let output = self.operator.follow(&mut state.operator, volts) - zero;
-                    self.relaxation.step(&flow, &mut state.relaxation, output);
+                    longest = longest.max((volts - drive.u[k - 1]).abs());
+                    steps += self.through(&flow, &mut state, volts);
                 }
                 Hold::Zero if k == 0 => {}
                 Hold::Zero => {
                     self.jump(&mut state, drive.u[k - 1], zero);
                     let held = state.relaxation.input;
-                    self.relaxation.step(&flow, &mut state.relaxation, held);
+                    self.relaxation.step(&flow.relaxation, &mut state.relaxation, held);
                 }
             }
             if !state.relaxation.x.is_finite() {
@@ -347,23 +452,9 @@ impl<O: InputOperator> InputStage<O> {
             hysteresis,
             last,
             substeps: 1,
-            error_estimate: 0.0,
+            error_estimate: self.error_bound(&flow, longest),
             unique: true,
         }))
-    }
-
-    /// The inverse of the stage for references sampled every `dt` seconds, from the inverse of
-    /// its operator.
-    ///
-    /// # Errors
-    /// Names `dt` where it is not above 0.
-    pub fn feedforward<I: OperatorInverse>(
-        &self,
-        operator: I,
-        dt: f64,
-    ) -> Result<InputInverse<I, MOST_RELAXATIONS>> {
-        let Relaxation { dynamics, .. } = self.relaxation;
-        Ok(InputInverse::with(operator, self.zero(), self.relaxation.used(), dynamics, dt)?)
     }
 }
 
@@ -376,7 +467,7 @@ pub(super) fn inverse_state<I: OperatorInverse>(
     inverse.start(operator, CreepState { input: relaxation.input, reached: relaxation.creep })
 }
 
-impl<O: InputOperator> Plant for InputStage<O> {
+impl<O: Segmented> Plant for InputStage<O> {
     type State = InputStageState<O::State>;
     type Flow = InputStageFlow;
 
@@ -385,17 +476,15 @@ impl<O: InputOperator> Plant for InputStage<O> {
     }
 
     fn flow(&self, step: f64) -> InputStageFlow {
-        InputStageFlow { relaxation: self.relaxation.flow(step), zero: self.zero() }
+        self.steps(step, ACCURACY)
     }
 
     #[inline(always)]
     fn advance(&self, flow: &InputStageFlow, state: &mut Self::State, from: f64, to: f64) {
-        let InputStageFlow { relaxation, zero } = flow;
         if (from - self.operator.input(&state.operator)).abs() > 0.0 {
-            self.jump(state, from, *zero);
+            self.jump(state, from, flow.zero);
         }
-        let output = self.operator.follow(&mut state.operator, to) - zero;
-        self.relaxation.step(relaxation, &mut state.relaxation, output);
+        self.through(flow, state, to);
     }
 
     #[inline(always)]

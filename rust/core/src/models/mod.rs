@@ -27,7 +27,7 @@ pub use generalised_prandtl_ishlinskii::{
     GeneralisedPlays, GeneralisedPlaysInverse, GeneralisedPlaysInverseState, GeneralisedPlaysState,
     GeneralisedPrandtlIshlinskiiStage, TanhEnvelope,
 };
-pub use input_stage::{InputOperator, InputStage, InputStageFlow, InputStageState};
+pub use input_stage::{InputOperator, InputStage, InputStageFlow, InputStageState, Segmented};
 pub use plant::{KernelFlow, KernelModel, Plant};
 pub use prandtl_ishlinskii::{
     MOST_PLAYS, MOST_ZONES, PlayHysteresis, Plays, PrandtlIshlinskiiStage,

@@ -13,7 +13,7 @@ use piezotrack_control::{InputInverseState, PlayInverse, PrandtlIshlinskiiInvers
 
 use super::creep::{MOST_RELAXATIONS, Relaxation};
 use super::input_stage::{
-    DYNAMICS, InputOperator, InputStage, PLAYS_STATE, inverse_state, same_length,
+    DYNAMICS, InputOperator, InputStage, PLAYS_STATE, Segmented, inverse_state, same_length,
 };
 use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
 use super::values::{ParameterInfo, Values};
@@ -170,6 +170,16 @@ impl InputOperator for PlayHysteresis {
 
     fn plays<'a>(&self, state: &'a mut Self::State) -> &'a mut [f64] {
         &mut state.plays[..self.count]
+    }
+}
+
+impl Segmented for PlayHysteresis {
+    fn straight(&self, state: &Self::State, volts: f64, _deviation: f64) -> f64 {
+        self.plays.straight(state, volts)
+    }
+
+    fn bend(&self) -> f64 {
+        0.0
     }
 }
 
