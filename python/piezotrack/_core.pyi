@@ -38,6 +38,7 @@ __all__ = [
     "published",
     "read_step",
     "residual",
+    "resonances",
     "sensor_noise",
     "spread",
     "tracking_metrics",
@@ -380,7 +381,13 @@ class LeastSquaresFit:
     @property
     def evaluations(self) -> int: ...
     @property
-    def at_bound(self) -> bool: ...
+    def at_bound(self) -> list[str]: ...
+    @property
+    def history(self) -> str: ...
+    @property
+    def start(self) -> _Named: ...
+    @property
+    def lag_range(self) -> tuple[float, float] | None: ...
 
 def identify_weights(
     *,
@@ -390,10 +397,15 @@ def identify_weights(
     dt: float,
     hold_name: str,
     start: int,
-    thresholds: Sequence[float],
+    count: int | None,
+    thresholds: Sequence[float] | None,
     zones: int,
-    creep_times: Sequence[float],
+    creep_times: Sequence[float] | None,
     dynamics: str,
+    history: str | None,
     offset: bool,
 ) -> LeastSquaresFit: ...
+def resonances(
+    *, u: ArrayLike, y: ArrayLike, dt: float, hold_name: str, start: int, most: int
+) -> list[tuple[float, float, float]]: ...
 def nnls(a: Sequence[Sequence[float]], b: Sequence[float], free: Sequence[bool]) -> list[float]: ...

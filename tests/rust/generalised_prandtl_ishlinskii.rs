@@ -331,6 +331,9 @@ fn values(change: &str, to: &[f64]) -> piezotrack_core::Result<Values> {
         ("time_constant", &[]),
         ("frequency", &[]),
         ("damping_ratio", &[]),
+        ("mode_weights", &[]),
+        ("mode_frequencies", &[]),
+        ("mode_damping_ratios", &[]),
     ];
     let entry = |(name, numbers): (&str, &[f64])| {
         (name.to_string(), if name == change { to } else { numbers }.to_vec())

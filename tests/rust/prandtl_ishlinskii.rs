@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use piezotrack_control::PlayInverse;
 use piezotrack_control::hysteresis::{Operator, Play};
 use piezotrack_core::identify::{DynamicsKind, WeightsRecord, WeightsSettings, identify_weights};
-use piezotrack_core::math::{Rows, nnls};
+use piezotrack_core::math::{NOT_NEGATIVE, Rows, bounded};
 use piezotrack_core::models::{
     Dynamics, Experiment, Model, Plant, PlayHysteresis, PrandtlIshlinskiiStage, Relaxation,
     StageModel,
@@ -144,7 +144,7 @@ fn the_solution_satisfies_kuhn_and_tucker() {
     });
     let b =
         DVector::from_fn(40, |i, _| a[(i, 0)] + libm::cos(f64::from(u32::try_from(i).unwrap())));
-    let x = nnls(a.clone(), &b, &[]);
+    let x = bounded(a.clone(), &b, &[]);
     let pull = a.tr_mul(&(&b - &a * &x));
     assert!(x.iter().any(|value| *value > 0.0));
     for (value, pull) in x.iter().zip(pull.iter()) {
@@ -159,7 +159,7 @@ fn the_solution_satisfies_kuhn_and_tucker() {
             rows.push(&row, b[i]);
         }
     }
-    for (one, other) in rows.solve(&[false; 6]).iter().zip(x.iter()) {
+    for (one, other) in rows.solve(&[NOT_NEGATIVE; 6]).iter().zip(x.iter()) {
         assert!((one - other).abs() < 1e-12);
     }
 }

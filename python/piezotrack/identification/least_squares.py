@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-
 from .. import _core
 from .._support.arguments import as_numbers
 from .._support.messages import quoted
@@ -23,7 +21,10 @@ if TYPE_CHECKING:
 
 __all__ = ["LeastSquares", "solve_least_squares"]
 
+History = Literal["virgin", "settled", "fit"]
+
 MOST_PLAYS, MOST_ZONES, MOST_RELAXATIONS = 32, 8, 8
+DYNAMICS = ("time_constant", "frequency", "damping_ratio")
 # Parameters that the settings and the record fix beforehand.
 CHOSEN = ("thresholds", "dead_zone_thresholds", "creep_times")
 
@@ -35,24 +36,29 @@ class LeastSquares:
     The weights of plays, dead zones and creep and the offset are found by the Gauss-Newton method,
     each step of which is a non-negative least-squares problem (Lawson and Hanson 1974); without
     dead zones and creep a single step solves the problem, as in Kuhnen 2003, doi
-    10.3166/ejc.9.407-418. A time constant, or the frequency and damping of a mode, is searched by
-    golden section. Nothing is random.
+    10.3166/ejc.9.407-418. Weights of dead zones stay between -0.5 and 1, the creep below half of
+    the displacement. The frequency and damping of a mode start from a grid and are found along
+    with the weights. By default plays, creep and dynamics are those that the record shows; each
+    has to lower the deviation by 1.5 to 3 % to be taken. Nothing is random.
 
     Parameters
     ----------
     count : int, optional
         Number of plays, 1 to 32, with thresholds spread evenly up to half of the drive's range.
+        None: 10, or 20 where these foretell a third of the window better that was left out.
     thresholds : sequence of float, optional
         Thresholds of the plays [V], in place of `count`.
     dead_zones : bool or int, optional
         Number of one-sided dead zones, 0 to 8, spread evenly over the displacement; True stands
         for 2, or for none where the model has no dead zones.
-    creep : bool or sequence of float, optional
+    creep : {"auto"} or bool or sequence of float, optional
         Time constants of the creep [s]; True stands for the powers of ten between five samples
-        and half of the window.
-    dynamics : {"first", "second"} or None, optional
+        and half of the window. ``"auto"``: two a decade apart, where the record shows them.
+    dynamics : {"auto", "first", "second"} or None, optional
         ``"first"``: a first-order lag, which also approximates a delayed reading. ``"second"``: a
-        mode, with a frequency between a fiftieth and a half of the sampling rate. None: neither.
+        mode, of at least three cycles in the window and at most 0.45 cycles a sample. None:
+        neither. ``"auto"``: a mode where the record shows one, else the smallest lag that
+        explains it within 1 %, which may be none.
 
     Raises
     ------
@@ -76,16 +82,17 @@ class LeastSquares:
     0.000, 0.200, 0.100 um/V
     """
 
-    count: int = 10
+    count: int | None = None
     thresholds: Sequence[float] | None = None
     dead_zones: bool | int = True
-    creep: bool | Sequence[float] = False
-    dynamics: Literal["first", "second"] | None = "first"
+    creep: Literal["auto"] | bool | Sequence[float] = "auto"
+    dynamics: Literal["auto", "first", "second"] | None = "auto"
 
     def __post_init__(self) -> None:
-        count = _core.as_count("count", self.count)
-        if not 1 <= count <= MOST_PLAYS:
-            raise ParameterError(f"count is {count}: expected 1 to {MOST_PLAYS} plays")
+        if self.count is not None:
+            count = _core.as_count("count", self.count)
+            if not 1 <= count <= MOST_PLAYS:
+                raise ParameterError(f"count is {count}: expected 1 to {MOST_PLAYS} plays")
         if self.thresholds is not None:
             object.__setattr__(self, "thresholds", as_numbers("thresholds", self.thresholds))
         if not isinstance(self.dead_zones, bool):
@@ -94,30 +101,30 @@ class LeastSquares:
                 raise ParameterError(
                     f"dead_zones is {zones}: expected up to {MOST_ZONES} dead zones"
                 )
-        if not isinstance(self.creep, bool):
+        if not (isinstance(self.creep, bool) or self._chosen):
             object.__setattr__(self, "creep", as_numbers("creep", self.creep))
-        if self.dynamics not in (None, "first", "second"):
+        if self.dynamics not in (None, "auto", "first", "second"):
             raise ParameterError(
-                f"dynamics is {quoted(self.dynamics)}: expected None, 'first' or 'second'"
+                f"dynamics is {quoted(self.dynamics)}: expected 'auto', None, 'first' or 'second'"
             )
 
-    def _thresholds(self, data: Dataset) -> Sequence[float]:
-        if self.thresholds is not None:
-            return self.thresholds
-        reach, count = 0.5 * float(np.ptp(data.full.u)), self.count
-        spread: list[float] = (reach * np.arange(1, count + 1) / (count + 1)).tolist()
-        return spread
+    @property
+    def _chosen(self) -> bool:
+        """Whether the creep is what the record shows."""
+        return isinstance(self.creep, str) and self.creep == "auto"
 
     def _zones(self, info: ModelInfo) -> int:
         if self.dead_zones is True:
             return 2 if info.has_dead_zones else 0
         return int(self.dead_zones)
 
-    def _times(self, data: Dataset) -> Sequence[float]:
+    def _times(self, data: Dataset) -> list[float] | None:
+        if isinstance(self.creep, str):
+            return None
         if not isinstance(self.creep, bool):
-            return self.creep
+            return list(self.creep)
         if not self.creep:
-            return ()
+            return []
         shortest, longest = 5.0 * data.dt, 0.5 * data.duration
         decades = [10.0**k for k in range(-9, 10) if shortest <= 10.0**k <= longest]
         if not decades:
@@ -129,7 +136,11 @@ class LeastSquares:
 
 
 def solve_least_squares(
-    data: Dataset, info: ModelInfo, settings: LeastSquares, offset: bool
+    data: Dataset,
+    info: ModelInfo,
+    settings: LeastSquares,
+    offset: bool,
+    history: History | None = None,
 ) -> Identification:
     """Identify a stage by least squares.
 
@@ -143,6 +154,9 @@ def solve_least_squares(
         Settings.
     offset : bool
         Whether an offset of the sensor is fitted.
+    history : {"virgin", "settled", "fit"} or None, optional
+        What went before the record: nothing, its own drive, or a voltage that is found with the
+        weights. None: the first of these that explains the record as well as the next.
 
     Returns
     -------
@@ -163,10 +177,12 @@ def solve_least_squares(
         dt=data.dt,
         hold_name=data.hold,
         start=data.warmup,
-        thresholds=list(settings._thresholds(data)),
+        count=settings.count,
+        thresholds=None if settings.thresholds is None else list(settings.thresholds),
         zones=settings._zones(info),
-        creep_times=list(settings._times(data)),
+        creep_times=settings._times(data),
         dynamics=settings.dynamics or "none",
+        history=history,
         offset=offset,
     )
     details: dict[str, Any] = {
@@ -178,6 +194,7 @@ def solve_least_squares(
             "cost": {"value": found.rms, "unit": "m"},
             "simulations": found.evaluations,
             "at_bound": found.at_bound,
+            "lag_range": {"value": found.lag_range, "unit": "s"},
         },
         "provenance": provenance(data, least_squares=asdict(settings)),
     }
@@ -192,5 +209,5 @@ def solve_least_squares(
         nfev=found.evaluations,
         stop_reason="solved",
         least_squares=settings,
-        at_bound=found.at_bound,
+        at_bound=any(name in DYNAMICS for name in found.at_bound),
     )

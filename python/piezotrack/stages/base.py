@@ -110,8 +110,9 @@ class Response:
         Steps of the integrator in each sampling interval.
     error_estimate : float
         Largest change of `x` from a simulation with half the steps [m]; the error of `x` is about
-        a third of it with the scheme of second order, a fifteenth with that of fourth. 0 if the
-        model is exact from sample to sample.
+        a third of it with the scheme of second order, a fifteenth with that of fourth. With
+        plays at the input 0 where the model is exact, and a bound of the error where its envelopes
+        bend.
     unique : bool
         Whether the solution is unique. False if a `DahlStage` with `b0` other than 0 was at rest
         with b0 q2 < 0 and a force smaller than that term: another motion then satisfies the same
@@ -203,7 +204,8 @@ class Stage:
         is the cubic through its values and slopes at both ends; where the hysteresis depends on the
         displacement, a predictor and a corrector compute them. The number of steps in a sampling
         interval is doubled until no sample moves by more than `accuracy`. A model with play
-        operators is exact from sample to sample and takes one step.
+        operators is stepped exactly from corner to corner of its hysteresis; where envelopes bend,
+        along chords that are as short as `accuracy` asks.
 
         Parameters
         ----------

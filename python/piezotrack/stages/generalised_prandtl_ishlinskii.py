@@ -49,6 +49,9 @@ class GeneralisedPrandtlIshlinskiiStage(Stage):
         T [s] of a first-order lag.
     frequency, damping_ratio : float, optional
         Undamped frequency [Hz] and damping ratio zeta of a mode; not with `time_constant`.
+    mode_weights, mode_frequencies, mode_damping_ratios : sequence of float, optional
+        g, undamped frequency [Hz] and damping ratio of further modes in parallel with that mode;
+        3 at most, each g between -1 and 1.
 
     Raises
     ------
@@ -58,6 +61,10 @@ class GeneralisedPrandtlIshlinskiiStage(Stage):
     Notes
     -----
     In the state, the play of threshold 0 comes first.
+
+    Where creep or dynamics follow, a sampling interval is split where a play starts to move, and
+    along the bent envelopes into chords so short that `accuracy` holds; `Response.error_estimate`
+    is a bound of the error, for a mode with a damping ratio of 0.01 or more.
 
     An identification finds one envelope for both directions, which is 0 at 0 V and whose range over
     the drive is that of the drive, so that thresholds are in volts. It searches the ratio of the
@@ -98,3 +105,6 @@ class GeneralisedPrandtlIshlinskiiStage(Stage):
     time_constant: float | None = None
     frequency: float | None = None
     damping_ratio: float | None = None
+    mode_weights: tuple[float, ...] = ()
+    mode_frequencies: tuple[float, ...] = ()
+    mode_damping_ratios: tuple[float, ...] = ()

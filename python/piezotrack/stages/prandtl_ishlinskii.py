@@ -25,11 +25,15 @@ class PrandtlIshlinskiiState(StageState):
         State of each play [V].
     creep : tuple of float
         State of each relaxation of the creep [m].
+    mode_x, mode_v : tuple of float
+        Displacement [m] and velocity [m/s] of each mode beside the main one.
     """
 
     u: float
     plays: tuple[float, ...]
     creep: tuple[float, ...] = ()
+    mode_x: tuple[float, ...] = ()
+    mode_v: tuple[float, ...] = ()
 
 
 @stage("prandtl-ishlinskii", state=PrandtlIshlinskiiState)
@@ -47,7 +51,9 @@ class PrandtlIshlinskiiStage(Stage):
 
     and the displacement follows `d` at once, with a first-order lag
     :math:`T \dot x + x = d`, or through a mode
-    :math:`\ddot x + 2 \zeta \omega_n \dot x + \omega_n^2 x = \omega_n^2 d`.
+    :math:`\ddot x + 2 \zeta \omega_n \dot x + \omega_n^2 x = \omega_n^2 d`. Several modes act
+    in parallel: :math:`x = (1 - \sum_k g_k) x_1 + \sum_k g_k x_k`, each :math:`x_k` the answer of
+    one mode to `d`.
 
     K. Kuhnen, European Journal of Control 9(4), 407-418, 2003, doi 10.3166/ejc.9.407-418.
 
@@ -73,6 +79,9 @@ class PrandtlIshlinskiiStage(Stage):
         T [s] of a first-order lag.
     frequency, damping_ratio : float, optional
         Undamped frequency [Hz] and damping ratio zeta of a mode; not with `time_constant`.
+    mode_weights, mode_frequencies, mode_damping_ratios : sequence of float, optional
+        g, undamped frequency [Hz] and damping ratio of further modes in parallel with that mode;
+        3 at most, each g between -1 and 1.
 
     Raises
     ------
@@ -81,11 +90,13 @@ class PrandtlIshlinskiiStage(Stage):
 
     Notes
     -----
-    The hysteresis is exact from sample to sample. Creep and dynamics are exact for an `h` that is
-    linear between samples.
+    The simulation is exact for a drive that is held, or linear between samples: an interval in which
+    a play starts to move, or `p` passes a dead zone's threshold, is split there.
 
     The inverse inverts each part in turn: the dynamics with the derivatives of the reference, creep
-    exactly from sample to sample, dead zones and plays in Kuhnen's closed form.
+    exactly for an `h` that is linear between samples, dead zones and plays in Kuhnen's closed form. Several modes are
+    inverted by a filter, exact for derivatives that are linear between samples. It exists where all
+    zeros of their sum are in the left half plane; elsewhere the inverse is refused.
 
     Examples
     --------
@@ -108,6 +119,9 @@ class PrandtlIshlinskiiStage(Stage):
     time_constant: float | None = None
     frequency: float | None = None
     damping_ratio: float | None = None
+    mode_weights: tuple[float, ...] = ()
+    mode_frequencies: tuple[float, ...] = ()
+    mode_damping_ratios: tuple[float, ...] = ()
 
     def _notes(self, response: Callable[[], Response]) -> list[str]:
         del response

@@ -58,14 +58,15 @@ pub mod unfused;
 
 pub use controller::{Command, Controller, ControllerState};
 pub use creep::{Creep, CreepState};
-pub use dynamics::Dynamics;
+pub use dynamics::{Dynamics, MOST_MODES, Mode, Modes};
 pub use error::{Error, Result};
 pub use feedback_law::Feedback;
 pub use filters::{Filter, FilterState};
 pub use inverse::{
     BoucWenInverse, BoucWenInverseState, DahlInverse, FeedbackInverse, FeedbackInverseState,
-    FirstOrderDahlInverse, InputInverse, InputInverseState, Inverse, InverseState, OperatorInverse,
-    OscillatorInverse, PlayInverse, PrandtlIshlinskiiInverse, SampledDahlInverse,
+    FirstOrderDahlInverse, InputInverse, InputInverseState, Inverse, InverseState, ModesInverse,
+    ModesInverseState, OperatorInverse, OscillatorInverse, PlayInverse, PrandtlIshlinskiiInverse,
+    SampledDahlInverse,
 };
 pub use limits::Limits;
 pub use measurement::{Refused, Span};

@@ -1,9 +1,10 @@
 //! Identification of a stage's weights by least squares.
 
 use piezotrack_core::identify::{
-    DynamicsKind, LeastSquaresFit, WeightsRecord, WeightsSettings, identify_weights,
+    CreepKind, DynamicsKind, History, LeastSquaresFit, PlaysKind, WeightsRecord, WeightsSettings,
+    identify_weights, resonances,
 };
-use piezotrack_core::math::Rows;
+use piezotrack_core::math::{FREE, NOT_NEGATIVE, Rows};
 use piezotrack_core::models::Model;
 use piezotrack_core::signal::Drive;
 use piezotrack_core::{Error, Result};
@@ -18,6 +19,7 @@ use crate::stage::hold;
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyLeastSquaresFit>()?;
     module.add_function(wrap_pyfunction!(fit_weights, module)?)?;
+    module.add_function(wrap_pyfunction!(shown_modes, module)?)?;
     module.add_function(wrap_pyfunction!(nnls, module)?)
 }
 
@@ -48,9 +50,31 @@ impl PyLeastSquaresFit {
         self.0.evaluations
     }
 
+    /// Names of the parameters that lie on a bound.
     #[getter]
-    fn at_bound(&self) -> bool {
-        self.0.at_bound
+    fn at_bound(&self) -> Vec<String> {
+        self.0.at_bound.clone()
+    }
+
+    #[getter]
+    fn history(&self) -> &'static str {
+        match self.0.history {
+            History::Virgin => "virgin",
+            History::Settled => "settled",
+            History::Fitted => "fit",
+        }
+    }
+
+    /// State of the stage before the first sample, by its names.
+    #[getter]
+    fn start(&self) -> Named {
+        named(&self.0.start)
+    }
+
+    /// Lags that explain the record as well, s.
+    #[getter]
+    fn lag_range(&self) -> Option<(f64, f64)> {
+        self.0.lag_range
     }
 }
 
@@ -59,17 +83,30 @@ fn dynamics_named(name: &str) -> Result<DynamicsKind> {
         "none" => Ok(DynamicsKind::None),
         "first" => Ok(DynamicsKind::First),
         "second" => Ok(DynamicsKind::Second),
+        "auto" => Ok(DynamicsKind::Auto),
         other => {
-            let expected = "None, 'first' or 'second'";
+            let expected = "'auto', None, 'first' or 'second'";
             Err(Error::parameter("dynamics", format!("'{other}'"), expected))
         }
     }
 }
 
-/// Identifies a stage of a model from a record.
+fn history_named(name: &str) -> Result<History> {
+    match name {
+        "virgin" => Ok(History::Virgin),
+        "settled" => Ok(History::Settled),
+        "fit" => Ok(History::Fitted),
+        other => {
+            let expected = "None, 'virgin', 'settled' or 'fit'";
+            Err(Error::parameter("history", format!("'{other}'"), expected))
+        }
+    }
+}
+
+/// Identifies a stage of a model from a record; what is None is chosen.
 #[pyfunction]
-#[pyo3(name = "identify_weights", signature = (*, model, u, y, dt, hold_name, start, thresholds,
-    zones, creep_times, dynamics, offset))]
+#[pyo3(name = "identify_weights", signature = (*, model, u, y, dt, hold_name, start, count,
+    thresholds, zones, creep_times, dynamics, history, offset))]
 #[expect(clippy::too_many_arguments, reason = "keyword-only, called from one place")]
 fn fit_weights(
     py: Python<'_>,
@@ -79,23 +116,53 @@ fn fit_weights(
     dt: f64,
     hold_name: &str,
     start: usize,
-    thresholds: Vec<f64>,
+    count: Option<usize>,
+    thresholds: Option<Vec<f64>>,
     zones: usize,
-    creep_times: Vec<f64>,
+    creep_times: Option<Vec<f64>>,
     dynamics: &str,
+    history: Option<&str>,
     offset: bool,
 ) -> PyResult<PyLeastSquaresFit> {
     let (u, y) = (samples("u", u)?, samples("y", y)?);
     let fit = enter(py, |stop| {
         let drive = Drive::new(&u, dt, hold(hold_name)?)?;
         let dynamics = dynamics_named(dynamics)?;
-        let settings = WeightsSettings { thresholds, zones, times: creep_times, dynamics, offset };
+        let plays = match (thresholds, count) {
+            (Some(thresholds), _) => PlaysKind::Thresholds(thresholds),
+            (None, Some(count)) => PlaysKind::Spread(count),
+            (None, None) => PlaysKind::Auto,
+        };
+        let creep = creep_times.map_or(CreepKind::Auto, CreepKind::Times);
+        let history = history.map(history_named).transpose()?;
+        let settings = WeightsSettings { plays, zones, creep, dynamics, history, offset };
         let record = WeightsRecord { drive, y: &y, start };
         identify_weights(Model::named(model)?, &record, &settings, stop)
     })?;
     // None means stopped, for which `enter` has raised.
     fit.map(PyLeastSquaresFit)
         .ok_or_else(|| raise(&Error::Numerical("the search was stopped".into())))
+}
+
+/// Modes that a record shows: frequency, damping ratio, share of the deviation that each explains.
+#[pyfunction]
+#[pyo3(name = "resonances", signature = (*, u, y, dt, hold_name, start, most))]
+fn shown_modes(
+    py: Python<'_>,
+    u: &Bound<'_, PyAny>,
+    y: &Bound<'_, PyAny>,
+    dt: f64,
+    hold_name: &str,
+    start: usize,
+    most: usize,
+) -> PyResult<Vec<(f64, f64, f64)>> {
+    let (u, y) = (samples("u", u)?, samples("y", y)?);
+    let found = enter(py, |stop| {
+        let drive = Drive::new(&u, dt, hold(hold_name)?)?;
+        Ok(resonances(&drive, &y, start, most, stop))
+    })?;
+    let all = found.unwrap_or_default();
+    Ok(all.iter().map(|one| (one.frequency, one.damping_ratio, one.gain)).collect())
 }
 
 /// Non-negative least squares, for tests: rows of A, b, which unknowns are free of sign.
@@ -110,5 +177,7 @@ fn nnls(a: Vec<Vec<f64>>, b: Vec<f64>, free: Vec<bool>) -> PyResult<Vec<f64>> {
     for (row, right) in a.iter().zip(&b) {
         rows.push(row, *right);
     }
-    Ok(rows.solve(&free))
+    let bounds: Vec<(f64, f64)> =
+        free.iter().map(|free| if *free { FREE } else { NOT_NEGATIVE }).collect();
+    Ok(rows.solve(&bounds))
 }

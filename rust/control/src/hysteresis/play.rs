@@ -59,6 +59,9 @@ pub struct Play<N, const PLAYS: usize, const ZONES: usize> {
     pub dead_zone_weights: [N; ZONES],
 }
 
+/// Shares of a way below this are its ends, by a rounding.
+const LEAST_SHARE: f64 = 1e-12;
+
 /// State of the operator: its input, the output of each play operator, and the slope.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlayState<N, const PLAYS: usize> {
@@ -92,6 +95,17 @@ impl<N: Number, const PLAYS: usize, const ZONES: usize> Play<N, PLAYS, ZONES> {
         self.output(state).0
     }
 
+    /// The weighted sum of a state, before the dead zones.
+    #[must_use]
+    #[inline(always)]
+    pub fn sum(&self, state: &PlayState<N, PLAYS>) -> N {
+        let mut value = self.linear * state.input;
+        for (weight, play) in self.weights.iter().zip(&state.plays) {
+            value = value + *weight * *play;
+        }
+        value
+    }
+
     /// The state where the input has become `input`.
     #[inline(always)]
     fn at(&self, branch: &PlayBranch<N, PLAYS>, input: N) -> PlayState<N, PLAYS> {
@@ -109,6 +123,39 @@ impl<N: Number, const PLAYS: usize, const ZONES: usize> Play<N, PLAYS, ZONES> {
     }
 }
 
+impl<const PLAYS: usize, const ZONES: usize> Play<f64, PLAYS, ZONES> {
+    /// The end of the first part of the way to `input` (V) along which the output is a straight
+    /// line: where a play starts to move, or the weighted sum passes a dead zone's threshold;
+    /// `input` where all of the way is.
+    #[must_use]
+    pub fn straight(&self, state: &PlayState<f64, PLAYS>, input: f64) -> f64 {
+        let from = state.input;
+        let side = if input < from { -1.0 } else { 1.0 };
+        let mut end = input;
+        let plays = self.thresholds.iter().zip(&self.weights).zip(&state.plays);
+        for ((threshold, weight), play) in plays {
+            let corner = play + side * threshold;
+            if side * (corner - from) > 0.0 && side * (end - corner) > 0.0 && *weight != 0.0 {
+                end = corner;
+            }
+        }
+        if self.dead_zone_weights.iter().all(|weight| *weight == 0.0) {
+            return end;
+        }
+        let mut there = *state;
+        self.follow(&mut there, end);
+        let (before, after) = (self.sum(state), self.sum(&there));
+        let mut share = 1.0 - LEAST_SHARE;
+        for (corner, weight) in self.dead_zone_thresholds.iter().zip(&self.dead_zone_weights) {
+            let place = (corner - before) / (after - before);
+            if place > LEAST_SHARE && place < share && *weight != 0.0 {
+                share = place;
+            }
+        }
+        if share < 1.0 - LEAST_SHARE { from + share * (end - from) } else { end }
+    }
+}
+
 impl<N: Number, const PLAYS: usize, const ZONES: usize> Operator<N> for Play<N, PLAYS, ZONES> {
     type State = PlayState<N, PLAYS>;
     type Branch = PlayBranch<N, PLAYS>;
@@ -121,10 +168,7 @@ impl<N: Number, const PLAYS: usize, const ZONES: usize> Operator<N> for Play<N, 
 
     #[inline(always)]
     fn output(&self, state: &PlayState<N, PLAYS>) -> (N, N) {
-        let mut value = self.linear * state.input;
-        for (weight, play) in self.weights.iter().zip(&state.plays) {
-            value = value + *weight * *play;
-        }
+        let value = self.sum(state);
         let zero = value.like(0.0);
         let (mut bent, mut factor) = (value, one(value));
         for (corner, bend) in self.dead_zone_thresholds.iter().zip(&self.dead_zone_weights) {

@@ -4,14 +4,15 @@
 //! h = H(u)                                                    hysteresis, 0 at rest
 //! d = h + sum_k c_k q_k,   tau_k q_k' = h - q_k               creep
 //! x = d   or   T x' + x = d   or   x'' + 2 zeta wn x' + wn^2 x = wn^2 d
+//! or   x = sum_k g_k x_k, each x_k a mode as above
 //! ```
 //!
 //! The parts are inverted in reverse order: the linear dynamics with the derivatives of the
-//! reference, the creep by the exact inverse of its step, the hysteresis by its own inverse. With
+//! reference (of several modes with a filter), the creep by the exact inverse of its step, the hysteresis by its own inverse. With
 //! play operators this is Kuhnen 2003, European Journal of Control 9(4), 407-418, doi
 //! 10.3166/ejc.9.407-418.
 
-use super::{Inverse, PlayInverse};
+use super::{Inverse, ModesInverse, ModesInverseState, PlayInverse};
 use crate::creep::{Creep, CreepInverse, CreepState};
 use crate::dynamics::Dynamics;
 use crate::error::{Result, usable};
@@ -69,6 +70,8 @@ pub struct InputInverse<I, const RELAXATIONS: usize> {
     inverse: I,
     creep: CreepInverse<RELAXATIONS>,
     dynamics: Dynamics,
+    /// Of the dynamics, where they are several modes.
+    modes: Option<ModesInverse>,
     /// H(0) before the zero is taken off, m: the operator's output at rest.
     zero: f64,
 }
@@ -86,13 +89,14 @@ pub type PrandtlIshlinskiiInverse<
 pub struct InputInverseState<S, const RELAXATIONS: usize> {
     operator: S,
     creep: CreepState<RELAXATIONS>,
+    modes: ModesInverseState,
     /// Whether the first sample has been.
     begun: bool,
 }
 
 crate::snapshot!(
     [S: crate::Snapshot, const RELAXATIONS: usize]
-    InputInverseState<S, RELAXATIONS> { operator, creep, begun }
+    InputInverseState<S, RELAXATIONS> { operator, creep, modes, begun }
 );
 
 impl<const PLAYS: usize, const ZONES: usize, const RELAXATIONS: usize>
@@ -119,7 +123,7 @@ impl<I: OperatorInverse, const RELAXATIONS: usize> InputInverse<I, RELAXATIONS> 
     ///
     /// # Errors
     /// Names the parameter that is out of its range; `creep` where there are more relaxations
-    /// than `RELAXATIONS`.
+    /// than `RELAXATIONS`; `mode_weights` where several modes have no stable inverse.
     pub fn with(
         inverse: I,
         zero: f64,
@@ -128,7 +132,12 @@ impl<I: OperatorInverse, const RELAXATIONS: usize> InputInverse<I, RELAXATIONS> 
         dt: f64,
     ) -> Result<Self> {
         dynamics.validate()?;
-        Ok(Self { inverse, creep: CreepInverse::new(creep, dt)?, dynamics, zero })
+        let creep = CreepInverse::new(creep, dt)?;
+        let modes = match dynamics {
+            Dynamics::Modes(modes) => Some(ModesInverse::new(&modes, dt)?),
+            _ => None,
+        };
+        Ok(Self { inverse, creep, dynamics, modes, zero })
     }
 
     /// The inverse of the operator.
@@ -150,11 +159,12 @@ impl<I: OperatorInverse, const RELAXATIONS: usize> InputInverse<I, RELAXATIONS> 
         operator: I::State,
         creep: CreepState<RELAXATIONS>,
     ) -> InputInverseState<I::State, RELAXATIONS> {
-        InputInverseState { operator, creep, begun: false }
+        InputInverseState { operator, creep, modes: ModesInverseState::default(), begun: false }
     }
 
     /// The voltage (V) for displacement `x` (m), velocity `v` (m/s) and acceleration `a` (m/s^2)
-    /// of the reference. The first sample is reached in a jump, without time to creep.
+    /// of the reference. The first sample is reached in a jump, without time to creep, and with all
+    /// modes at one displacement and velocity.
     ///
     /// NaN, with the state unchanged, where an input is not finite (or beyond 1e100) or the
     /// operator puts out nothing of that size.
@@ -166,7 +176,18 @@ impl<I: OperatorInverse, const RELAXATIONS: usize> InputInverse<I, RELAXATIONS> 
         v: f64,
         a: f64,
     ) -> f64 {
-        let target = self.dynamics.inverse(x, v, a);
+        let mut modes = state.modes;
+        let target = match &self.modes {
+            None => self.dynamics.inverse(x, v, a),
+            Some(inverse) => {
+                if state.begun {
+                    inverse.step(&mut modes, x, v, a);
+                } else {
+                    modes = inverse.begin(x, v, a);
+                }
+                inverse.output(&modes)
+            }
+        };
         if !usable(target) {
             return f64::NAN;
         }
@@ -178,7 +199,7 @@ impl<I: OperatorInverse, const RELAXATIONS: usize> InputInverse<I, RELAXATIONS> 
         };
         let input = self.inverse.follow(&mut state.operator, output + self.zero);
         if !input.is_nan() {
-            (state.creep, state.begun) = (creep, true);
+            (state.creep, state.modes, state.begun) = (creep, modes, true);
         }
         input
     }

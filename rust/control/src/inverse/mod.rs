@@ -8,6 +8,7 @@ mod bouc_wen;
 mod dahl;
 mod feedback;
 mod input;
+mod modes;
 mod play;
 
 pub use bouc_wen::{BoucWenInverse, BoucWenInverseState};
@@ -16,6 +17,7 @@ pub use feedback::{
     FeedbackInverse, FeedbackInverseState, FirstOrderDahlInverse, OscillatorInverse,
 };
 pub use input::{InputInverse, InputInverseState, OperatorInverse, PrandtlIshlinskiiInverse};
+pub use modes::{ModesInverse, ModesInverseState};
 pub use play::PlayInverse;
 
 /// Inverse of a stage model: configuration in `&self`, memory in `State`.

@@ -64,6 +64,27 @@ impl LoopPlant {
         Self::state_space(&rows, &[0.0, natural], &[gain, 0.0], 0.0)
     }
 
+    /// Modes in parallel (4 at most), each given by its static gain (m/V), its natural frequency
+    /// (Hz) and its damping ratio, as [`Self::mode`] takes them.
+    ///
+    /// # Errors
+    /// Names the argument that is out of its range.
+    pub fn modes(modes: &[(f64, f64, f64)]) -> Result<Self> {
+        let states = 2 * modes.len();
+        let (mut rows, mut b) = (vec![0.0; states * states], vec![0.0; states]);
+        let mut c = vec![0.0; states];
+        for (k, &(gain, frequency, damping)) in modes.iter().enumerate() {
+            let one = Self::mode(gain, frequency, damping)?;
+            for i in 0..2 {
+                for j in 0..2 {
+                    rows[(2 * k + i) * states + 2 * k + j] = one.a[(i, j)];
+                }
+                (b[2 * k + i], c[2 * k + i]) = (one.b[i], one.c[i]);
+            }
+        }
+        Self::state_space(&rows, &b, &c, 0.0)
+    }
+
     /// `M x'' + D x' + K x = T u`, T in N/V.
     ///
     /// # Errors

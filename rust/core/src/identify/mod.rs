@@ -14,6 +14,7 @@ mod motion;
 mod problem;
 mod record;
 mod residual_sums;
+mod resonances;
 mod search;
 mod sensor_noise;
 mod step_response;
@@ -29,12 +30,14 @@ pub use history::{History, visited};
 pub use identification::{Identification, identify};
 pub use lag::LagRange;
 pub use least_squares::{
-    DynamicsKind, LeastSquaresFit, Settings as WeightsSettings, WeightsRecord, identify_weights,
+    CreepKind, DynamicsKind, LeastSquaresFit, PlaysKind, Settings as WeightsSettings, WeightsRecord,
+    identify_weights,
 };
 pub use levenberg_marquardt::{LocalRefinement, Polished, Sensitivity};
 pub use problem::{Delay, Problem, Spec};
 pub use record::Record;
 pub use residual_sums::Costs;
+pub use resonances::{Resonance, resonances};
 pub use search::{Monitor, Outcome, Plan, Progress, StopReason, search};
 pub use sensor_noise::{Noise, noise_at_rest};
 pub use step_response::{Conventional, StepReadings, StepResponse, read_step, separate};

@@ -1,17 +1,17 @@
 //! Numerical methods: SIMD lanes, random numbers, least squares, line search, transfer functions,
 //! memory.
 
+mod bounded_least_squares;
 mod dispatch;
 mod golden_section;
 mod lanes;
 mod memory;
-mod nnls;
 mod random;
 mod transfer_function;
 
+pub use bounded_least_squares::{FREE, NOT_NEGATIVE, Rows, bounded};
 pub use lanes::Lanes;
 pub use memory::{available, room, zeros};
-pub use nnls::{Rows, nnls};
 
 pub(crate) use dispatch::{dispatch_fused, dispatch_vectors};
 pub(crate) use golden_section::least;

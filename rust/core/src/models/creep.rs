@@ -5,13 +5,14 @@
 //! x = d                                                   no dynamics
 //! T x' + x = d                                            first order
 //! x'' + 2 zeta wn x' + wn^2 x = wn^2 d                    second order
+//! x = sum_k g_k x_k                                       modes in parallel, each of second order
 //! ```
 //!
 //! Relaxations whose time constants are a decade apart, with about equal shares, make a creep
 //! that grows nearly with the logarithm of time, as that of piezoceramics does. Every step is
-//! exact for an `h` that is linear over the step.
+//! exact for an `h` that is linear over the step, of any length.
 
-pub use piezotrack_control::{Creep, Dynamics};
+pub use piezotrack_control::{Creep, Dynamics, MOST_MODES, Mode, Modes};
 
 use piezotrack_control::creep::{Lag, advance, output};
 
@@ -20,6 +21,12 @@ use crate::integrator::{Mechanics, Propagator, halvings};
 
 /// Most relaxations of the creep.
 pub const MOST_RELAXATIONS: usize = 8;
+
+/// Room for the modes beside the main one.
+pub(super) const FURTHER: usize = MOST_MODES - 1;
+
+/// Damping ratio below which the largest gain is not followed.
+const LEAST_DAMPING: f64 = 0.01;
 
 /// Creep and dynamics.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,6 +50,10 @@ pub struct RelaxationState {
     pub x: f64,
     /// Velocity, m/s; 0 where there is no mode.
     pub v: f64,
+    /// Displacement of each mode beside the main one, m.
+    pub mode_x: [f64; FURTHER],
+    /// Velocity of each of them, m/s.
+    pub mode_v: [f64; FURTHER],
 }
 
 /// Steps of one length.
@@ -57,7 +68,44 @@ pub struct RelaxationFlow {
 enum DynamicsFlow {
     None,
     First(Lag),
-    Second(Propagator<f64>),
+    Second(ModeFlow),
+    /// The main mode with its weight, then the modes beside it without.
+    Modes(ModeFlow, [ModeFlow; FURTHER]),
+}
+
+/// Steps of one mode.
+#[derive(Clone, Copy, Debug)]
+struct ModeFlow {
+    propagator: Propagator<f64>,
+    /// Of a mode of mass 1, times its share.
+    stiffness: f64,
+}
+
+impl ModeFlow {
+    /// Of a mode that follows a share of the static displacement.
+    fn new(frequency: f64, damping_ratio: f64, share: f64, step: f64) -> Self {
+        // Mass 1: only ratios matter, and the force is wn^2 d.
+        let natural = core::f64::consts::TAU * frequency;
+        let damping = 2.0 * damping_ratio * natural;
+        let modes = Mechanics { mass: 1.0, damping, stiffness: natural * natural };
+        let halvings = halvings(modes.rate().max(damping), step);
+        let propagator = Propagator::new(1.0, damping, modes.stiffness, step, halvings);
+        Self { propagator, stiffness: share * modes.stiffness }
+    }
+
+    /// Takes displacement and velocity through a step of `step` seconds in which the static
+    /// displacement rises by `rise` from `before`.
+    #[inline(always)]
+    fn step(&self, step: f64, x: &mut f64, v: &mut f64, before: f64, rise: f64) {
+        let Self { propagator: p, stiffness } = self;
+        let (force, ramp) = (stiffness * before, stiffness * rise);
+        let (from, w) = (*x, *v * step);
+        let end = |position: f64, velocity: f64, constant: f64, slope: f64| {
+            position.mul_add(from, velocity.mul_add(w, constant.mul_add(force, slope * ramp)))
+        };
+        *x = end(p.position.x, p.velocity.x, p.constant.x, p.ramp.x);
+        *v = end(p.position.w, p.velocity.w, p.constant.w, p.ramp.w) / step;
+    }
 }
 
 /// Steps of the dynamics of one length, s.
@@ -66,12 +114,14 @@ fn dynamics_flow(dynamics: Dynamics, step: f64) -> DynamicsFlow {
         Dynamics::None => DynamicsFlow::None,
         Dynamics::First { time } => DynamicsFlow::First(Lag::new(time, step)),
         Dynamics::Second { frequency, damping_ratio } => {
-            // Mass 1: only ratios matter, and the force is wn^2 d.
-            let natural = core::f64::consts::TAU * frequency;
-            let damping = 2.0 * damping_ratio * natural;
-            let modes = Mechanics { mass: 1.0, damping, stiffness: natural * natural };
-            let halvings = halvings(modes.rate().max(damping), step);
-            DynamicsFlow::Second(Propagator::new(1.0, damping, modes.stiffness, step, halvings))
+            DynamicsFlow::Second(ModeFlow::new(frequency, damping_ratio, 1.0, step))
+        }
+        Dynamics::Modes(modes) => {
+            let flow =
+                |mode: &Mode, share| ModeFlow::new(mode.frequency, mode.damping_ratio, share, step);
+            let all = modes.all();
+            let main = flow(&all[0], all[0].weight);
+            DynamicsFlow::Modes(main, core::array::from_fn(|k| flow(&all[k + 1], 1.0)))
         }
     }
 }
@@ -115,6 +165,37 @@ impl Relaxation {
         self.creep.get(..self.count).unwrap_or(&self.creep)
     }
 
+    /// Whether the displacement depends on the input before, and not only on that now.
+    #[must_use]
+    #[inline(always)]
+    pub fn remembers(&self) -> bool {
+        self.count > 0 || !matches!(self.dynamics, Dynamics::None)
+    }
+
+    /// Largest displacement that an input below 1 in size can make: the integral of the size of
+    /// the impulse response. A mode with less damping than `LEAST_DAMPING` counts as one with it.
+    #[must_use]
+    pub fn largest_gain(&self) -> f64 {
+        let mode = |damping_ratio: f64| {
+            // Its step response overshoots by `beyond`, and each half wave by so much less.
+            let damping = damping_ratio.max(LEAST_DAMPING);
+            if damping >= 1.0 {
+                return 1.0;
+            }
+            let half_wave = core::f64::consts::PI * damping / libm::sqrt(1.0 - damping * damping);
+            let beyond = libm::exp(-half_wave);
+            (1.0 + beyond) / (1.0 - beyond)
+        };
+        let dynamics = match self.dynamics {
+            Dynamics::None | Dynamics::First { .. } => 1.0,
+            Dynamics::Second { damping_ratio, .. } => mode(damping_ratio),
+            Dynamics::Modes(modes) => {
+                modes.used().iter().map(|one| one.weight.abs() * mode(one.damping_ratio)).sum()
+            }
+        };
+        dynamics * self.used().iter().fold(1.0, |sum, creep| sum + creep.share)
+    }
+
     /// Input of the dynamics, d, m.
     #[must_use]
     pub fn target(&self, state: &RelaxationState) -> f64 {
@@ -124,7 +205,7 @@ impl Relaxation {
     /// The input jumps to `input`, m.
     pub fn jump(&self, state: &mut RelaxationState, input: f64) {
         state.input = input;
-        if self.dynamics == Dynamics::None {
+        if matches!(self.dynamics, Dynamics::None) {
             state.x = self.target(state);
         }
     }
@@ -140,22 +221,39 @@ impl Relaxation {
         match &flow.dynamics {
             DynamicsFlow::None => state.x = target,
             DynamicsFlow::First(lag) => state.x = lag.step(state.x, target, target - before),
-            DynamicsFlow::Second(p) => {
-                let stiffness = match self.dynamics {
-                    Dynamics::Second { frequency, .. } => {
-                        let natural = core::f64::consts::TAU * frequency;
-                        natural * natural
-                    }
-                    _ => 0.0,
-                };
-                let (force, ramp) = (stiffness * before, stiffness * (target - before));
-                let (x, w) = (state.x, state.v * flow.step);
-                let end = |position: f64, velocity: f64, constant: f64, slope: f64| {
-                    position.mul_add(x, velocity.mul_add(w, constant.mul_add(force, slope * ramp)))
-                };
-                state.x = end(p.position.x, p.velocity.x, p.constant.x, p.ramp.x);
-                state.v = end(p.position.w, p.velocity.w, p.constant.w, p.ramp.w) / flow.step;
+            DynamicsFlow::Second(mode) => {
+                mode.step(flow.step, &mut state.x, &mut state.v, before, target - before);
+            }
+            DynamicsFlow::Modes(main, further) => {
+                let rise = target - before;
+                let (x, v) = self.beside(state);
+                let (mut x, mut v) = (state.x - x, state.v - v);
+                main.step(flow.step, &mut x, &mut v, before, rise);
+                let places = state.mode_x.iter_mut().zip(&mut state.mode_v);
+                for ((place, speed), mode) in places.zip(further) {
+                    mode.step(flow.step, place, speed, before, rise);
+                }
+                let beside = self.beside(state);
+                (state.x, state.v) = (x + beside.0, v + beside.1);
             }
         }
+    }
+
+    /// What the modes beside the main one add to displacement and velocity.
+    fn beside(&self, state: &RelaxationState) -> (f64, f64) {
+        let modes = self.dynamics.further().iter().zip(state.mode_x.iter().zip(&state.mode_v));
+        modes.fold((0.0, 0.0), |(x, v), (mode, (place, speed))| {
+            (x + mode.weight * place, v + mode.weight * speed)
+        })
+    }
+
+    /// The state in equilibrium with an input that has long been `input`, m.
+    #[must_use]
+    pub fn settled(&self, input: f64) -> RelaxationState {
+        let mut state = RelaxationState { input, ..RelaxationState::default() };
+        state.creep[..self.used().len()].fill(input);
+        state.x = self.target(&state);
+        state.mode_x[..self.dynamics.further().len()].fill(state.x);
+        state
     }
 }

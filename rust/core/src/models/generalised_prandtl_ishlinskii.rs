@@ -31,7 +31,9 @@ use piezotrack_control::hysteresis::{Operator, PlayState};
 use piezotrack_control::{InputInverse, InputInverseState, OperatorInverse};
 
 use super::creep::{MOST_RELAXATIONS, Relaxation};
-use super::input_stage::{DYNAMICS, InputOperator, InputStage, PLAYS_STATE, inverse_state};
+use super::input_stage::{
+    DYNAMICS, InputOperator, InputStage, PLAYS_STATE, Segmented, inverse_state,
+};
 use super::prandtl_ishlinskii::{MOST_PLAYS, PlayHysteresis};
 use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
 use super::values::{ParameterInfo, Values};
@@ -41,6 +43,9 @@ use crate::error::{Result, finite, positive};
 
 /// Room for the play of threshold 0 and the others.
 const SLOTS: usize = MOST_PLAYS + 1;
+
+/// Largest second derivative of tanh, 4 / (3 sqrt(3)).
+const MOST_BEND: f64 = 0.769_800_358_919_501;
 
 /// Why a fit has neither scale nor level.
 const NORMALISED: &str = "weights and offset could be traded for it";
@@ -62,6 +67,9 @@ const PARAMETERS: &[ParameterInfo] = &[
     DYNAMICS[2],
     DYNAMICS[3],
     DYNAMICS[4],
+    DYNAMICS[5],
+    DYNAMICS[6],
+    DYNAMICS[7],
 ];
 
 /// An envelope: c0 tanh(c1 u + c2) + c3, V of V.
@@ -186,6 +194,25 @@ impl GeneralisedPlays {
         Ok(all)
     }
 
+    /// Weight of all plays together, m/V, above 0.
+    fn total(&self) -> f64 {
+        self.weights[..self.count].iter().sum::<f64>().abs()
+    }
+
+    /// The end of the first of equal chords from `from` to `end`, which hold no corner and no tail.
+    fn chord(&self, from: f64, end: f64, weight: f64, deviation: f64) -> f64 {
+        let bent = |one: &TanhEnvelope| {
+            // Within the tails of the envelope, or outside.
+            let middle = one.slope * 0.5 * (from + end) + one.shift;
+            let tail = 0.5 * libm::log(2.0 * one.scale * weight / deviation);
+            let inside = middle.abs() < tail;
+            if inside { MOST_BEND * one.scale * one.slope * one.slope * weight } else { 0.0 }
+        };
+        let bend = bent(&self.rising).max(bent(&self.falling));
+        let chords = libm::ceil((end - from).abs() * libm::sqrt(0.125 * bend / deviation));
+        if chords > 1.0 { from + (end - from) / chords } else { end }
+    }
+
     /// Thresholds and weights of the plays, with where those of a state stand, V.
     fn plays<'a>(
         &'a self,
@@ -290,6 +317,43 @@ impl InputOperator for GeneralisedPlays {
 
     fn plays<'a>(&self, state: &'a mut GeneralisedPlaysState) -> &'a mut [f64] {
         &mut state.plays[..self.count]
+    }
+}
+
+impl Segmented for GeneralisedPlays {
+    fn straight(&self, state: &GeneralisedPlaysState, volts: f64, deviation: f64) -> f64 {
+        let from = state.input;
+        let side = if volts < from { -1.0 } else { 1.0 };
+        let envelope = if side > 0.0 { &self.rising } else { &self.falling };
+        let edge = envelope.at(from);
+        let mut end = volts;
+        let mut nearest = |corner: f64| {
+            if side * (corner - from) > 0.0 && side * (end - corner) > 0.0 {
+                end = corner;
+            }
+        };
+        for (threshold, weight, play) in self.plays(state) {
+            // A play that moves with the envelope already has no corner.
+            if side * (play - edge) + threshold > 0.0 && weight != 0.0 {
+                nearest(envelope.inverse(play + side * threshold));
+            }
+        }
+        // Beyond the tails all that is left of an envelope's range is below the deviation.
+        let weight = self.total();
+        for one in [&self.rising, &self.falling] {
+            let tail = 0.5 * libm::log(2.0 * one.scale * weight / deviation);
+            if tail.is_nan() || tail <= 0.0 {
+                continue;
+            }
+            let ends = [-tail, tail].map(|bent| (bent - one.shift) / one.slope);
+            ends.into_iter().for_each(&mut nearest);
+        }
+        self.chord(from, end, weight, deviation)
+    }
+
+    fn bend(&self) -> f64 {
+        let steepest = |one: &TanhEnvelope| MOST_BEND * one.scale * one.slope * one.slope;
+        steepest(&self.rising).max(steepest(&self.falling)) * self.total()
     }
 }
 
@@ -447,11 +511,15 @@ impl WeightedPlays for GeneralisedPrandtlIshlinskiiStage {
         (edge, edge)
     }
 
+    fn kept(plays: &[f64]) -> &[f64] {
+        plays
+    }
+
     fn values(fitted: &FittedPlays) -> Values {
         let of = fitted.clone();
         let TanhEnvelope { scale, slope, shift, level } = Self::envelope(&of.shape, of.drive);
-        let [creep_weights, creep_times, time, frequency, damping_ratio] = of.relaxation.values();
-        let entries = [
+        let relaxation = of.relaxation.values();
+        let operator = [
             vec![of.linear],
             of.thresholds,
             of.weights,
@@ -463,12 +531,7 @@ impl WeightedPlays for GeneralisedPrandtlIshlinskiiStage {
             vec![],
             vec![],
             vec![],
-            creep_weights,
-            creep_times,
-            time,
-            frequency,
-            damping_ratio,
         ];
-        Values::of(PARAMETERS, entries)
+        Values::of(PARAMETERS, operator.into_iter().chain(relaxation))
     }
 }

@@ -4,34 +4,51 @@
 //! h = H(u) - H(0)                                             hysteresis
 //! d = h + sum_k c_k q_k,   tau_k q_k' = h - q_k               creep
 //! T x' + x = d   or   x'' + 2 zeta wn x' + wn^2 x = wn^2 d   or   x = d
+//! or   x = sum_k g_k x_k, each x_k a mode as above            modes in parallel
 //! ```
 //!
-//! The hysteresis is exact from sample to sample; between samples its output is taken as linear.
+//! A drive that goes straight from sample to sample is followed exactly: the interval is split where
+//! the operator's output has a corner, and each part is stepped with the exact solution. Where the
+//! output bends it is split further, so that chords are as close to it as the accuracy asks.
 //! A model defines its operator; creep and dynamics are common to all.
 
 use core::fmt::Debug;
 
 use piezotrack_control::{CreepState, InputInverse, InputInverseState, OperatorInverse};
 
-use super::creep::{Dynamics, MOST_RELAXATIONS, Relaxation, RelaxationFlow, RelaxationState};
+use super::creep::{
+    Dynamics, FURTHER, MOST_RELAXATIONS, Mode, Relaxation, RelaxationFlow, RelaxationState,
+};
 use super::plant::Plant;
 use super::traits::{Experiment, Response, finite_state};
 use super::values::{ParameterInfo, Values};
 use crate::design::LoopPlant;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, not_negative, positive};
 use crate::integrator::columns;
 use crate::signal::Hold;
 
-/// Samples between two questions whether to stop.
+/// Parts of a sampling interval at most; the last one takes the rest.
+const MOST_PARTS: usize = 1 << 20;
+
+/// Shares of a sampling interval below this are no part of it.
+const LEAST_PART: f64 = 1e-9;
+
+/// Accuracy of a plant's steps, m.
+const ACCURACY: f64 = 1e-10;
+
+/// Steps between two questions whether to stop.
 const POLL: usize = 4096;
 
 /// Parameters of creep and dynamics, which follow those of the operator.
-pub(super) const DYNAMICS: [ParameterInfo; 5] = [
+pub(super) const DYNAMICS: [ParameterInfo; 8] = [
     ParameterInfo::list("creep_weights", "c", ""),
     ParameterInfo::list("creep_times", "tau", "s"),
     ParameterInfo::optional("time_constant", "T", "s"),
     ParameterInfo::optional("frequency", "fn", "Hz"),
     ParameterInfo::optional("damping_ratio", "zeta", ""),
+    ParameterInfo::list("mode_weights", "g", ""),
+    ParameterInfo::list("mode_frequencies", "f", "Hz"),
+    ParameterInfo::list("mode_damping_ratios", "zeta_k", ""),
 ];
 
 /// State of a stage whose operator has plays.
@@ -41,6 +58,8 @@ pub(super) const PLAYS_STATE: &[ParameterInfo] = &[
     ParameterInfo::new("u", "u", "V"),
     ParameterInfo::list("plays", "z", "V"),
     ParameterInfo::list("creep", "q", "m"),
+    ParameterInfo::list("mode_x", "x_k", "m"),
+    ParameterInfo::list("mode_v", "x_k'", "m/s"),
 ];
 
 /// A hysteresis operator that is followed from sample to sample, V to m.
@@ -61,6 +80,16 @@ pub trait InputOperator: Copy + Debug {
     fn plays<'a>(&self, state: &'a mut Self::State) -> &'a mut [f64];
 }
 
+/// A hysteresis operator whose output is a straight line between corners, or nearly so.
+pub trait Segmented: InputOperator {
+    /// The end of the first part of the way to `volts` along which the output is a straight line
+    /// to within `deviation`, m: beyond the present input, and `volts` where all of the way is.
+    fn straight(&self, state: &Self::State, volts: f64, deviation: f64) -> f64;
+
+    /// Largest second derivative of the output between corners, m/V^2.
+    fn bend(&self) -> f64;
+}
+
 /// A stage with an operator at its input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InputStage<O> {
@@ -79,11 +108,16 @@ pub struct InputStageState<S> {
     pub relaxation: RelaxationState,
 }
 
-/// Steps of one length, and the operator's output at rest, m.
+/// Steps of one length.
 #[derive(Clone, Copy, Debug)]
 pub struct InputStageFlow {
     relaxation: RelaxationFlow,
+    /// The operator's output at rest, m.
     zero: f64,
+    /// Length of a step, s.
+    step: f64,
+    /// Largest deviation of the operator's output from the chords that stand for it, m.
+    deviation: f64,
 }
 
 impl Relaxation {
@@ -95,7 +129,8 @@ impl Relaxation {
             ([], [], []) => Dynamics::None,
             ([time], [], []) => Dynamics::First { time: *time },
             ([], [frequency], [damping_ratio]) => {
-                Dynamics::Second { frequency: *frequency, damping_ratio: *damping_ratio }
+                let further = further_modes(values)?;
+                Dynamics::modes(*frequency, *damping_ratio, &further)?
             }
             ([time, ..], _, _) => {
                 let expected = "None beside a frequency or a damping ratio";
@@ -106,11 +141,16 @@ impl Relaxation {
                 return Err(Error::parameter("frequency and damping_ratio", "one", expected));
             }
         };
+        if !(list("mode_weights").is_empty() || matches!(dynamics, Dynamics::Modes(_))) {
+            let found = format!("{} entries", list("mode_weights").len());
+            let expected = "none without a frequency and a damping ratio";
+            return Err(Error::parameter("mode_weights", found, expected));
+        }
         Self::new(list("creep_weights"), list("creep_times"), dynamics)
     }
 
     /// The values of creep and dynamics, in the order of [`DYNAMICS`].
-    pub(super) fn values(&self) -> [Vec<f64>; 5] {
+    pub(super) fn values(&self) -> [Vec<f64>; 8] {
         let creep = self.used();
         let [time, frequency, damping_ratio] = match self.dynamics {
             Dynamics::None => [vec![], vec![], vec![]],
@@ -118,10 +158,25 @@ impl Relaxation {
             Dynamics::Second { frequency, damping_ratio } => {
                 [vec![], vec![frequency], vec![damping_ratio]]
             }
+            Dynamics::Modes(modes) => {
+                let [main, ..] = modes.all();
+                [vec![], vec![main.frequency], vec![main.damping_ratio]]
+            }
         };
+        let further = self.dynamics.further();
+        let each = |number: fn(&Mode) -> f64| further.iter().map(number).collect();
         let weights = creep.iter().map(|creep| creep.share).collect();
         let times = creep.iter().map(|creep| creep.time).collect();
-        [weights, times, time, frequency, damping_ratio]
+        [
+            weights,
+            times,
+            time,
+            frequency,
+            damping_ratio,
+            each(|mode| mode.weight),
+            each(|mode| mode.frequency),
+            each(|mode| mode.damping_ratio),
+        ]
     }
 
     /// A stage of some static gain (m/V) with these dynamics; its creep is slower than a loop and
@@ -135,8 +190,50 @@ impl Relaxation {
             Dynamics::Second { frequency, damping_ratio } => {
                 LoopPlant::mode(gain, frequency, damping_ratio)
             }
+            Dynamics::Modes(modes) => {
+                let each = |mode: &Mode| (gain * mode.weight, mode.frequency, mode.damping_ratio);
+                let modes: Vec<_> = modes.used().iter().map(each).collect();
+                LoopPlant::modes(&modes)
+            }
         }
     }
+}
+
+/// The modes beside the main one, from the values of a stage.
+fn further_modes(values: &Values) -> Result<Vec<Mode>> {
+    let [weights, frequencies, damping_ratios] =
+        ["mode_weights", "mode_frequencies", "mode_damping_ratios"].map(|name| values.list(name));
+    same_length("mode_frequencies", frequencies.len(), "mode_weights", weights.len(), FURTHER)?;
+    let (name, found) = ("mode_damping_ratios", damping_ratios.len());
+    same_length(name, found, "mode_weights", weights.len(), FURTHER)?;
+    let mode = |k: usize| {
+        let (name, weight) = (format!("mode_weights[{k}]"), weights[k]);
+        if weight.abs() >= 1.0 || weight.is_nan() {
+            return Err(Error::parameter(name, weight, "a number between -1 and 1"));
+        }
+        let frequency = positive(&format!("mode_frequencies[{k}]"), frequencies[k], "Hz")?;
+        let name = format!("mode_damping_ratios[{k}]");
+        Ok(Mode { weight, frequency, damping_ratio: not_negative(&name, damping_ratios[k], "")? })
+    };
+    (0..weights.len()).map(mode).collect()
+}
+
+/// Refuses lists of different lengths, and longer ones than there is room for.
+pub(super) fn same_length(
+    name: &str,
+    found: usize,
+    other: &str,
+    wanted: usize,
+    most: usize,
+) -> Result<()> {
+    if found == wanted && found <= most {
+        return Ok(());
+    }
+    Err(Error::Shape {
+        name: name.into(),
+        found: format!("{found} entries"),
+        expected: format!("as many as {other}, which has {wanted}, and {most} at most"),
+    })
 }
 
 impl<O: InputOperator> InputStage<O> {
@@ -145,6 +242,19 @@ impl<O: InputOperator> InputStage<O> {
     pub fn at_rest(&self) -> InputStageState<O::State> {
         let relaxation = RelaxationState::default();
         InputStageState { operator: self.operator.rest(), relaxation }
+    }
+
+    /// The state in equilibrium after a slow visit to each voltage (V) in turn, from a stage that
+    /// never moved: fully crept, at the static displacement, its modes at rest.
+    #[must_use]
+    pub fn settled_at(&self, voltages: &[f64]) -> InputStageState<O::State> {
+        let mut operator = self.operator.rest();
+        let zero = self.zero();
+        let mut output = zero;
+        for &volts in voltages {
+            output = self.operator.follow(&mut operator, volts);
+        }
+        InputStageState { operator, relaxation: self.relaxation.settled(output - zero) }
     }
 
     /// A state from its values, or that at rest; a play that the drive would have pushed on
@@ -157,6 +267,7 @@ impl<O: InputOperator> InputStage<O> {
         let mut state = self.at_rest();
         let Some(values) = values else { return Ok(state) };
         let (plays, creep) = (values.list("plays"), values.list("creep"));
+        let modes = (values.list("mode_x"), values.list("mode_v"));
         let slots = self.operator.plays(&mut state.operator);
         let (count, relaxations) = (slots.len(), self.relaxation.count);
         if plays.len() != count || creep.len() != relaxations {
@@ -164,6 +275,18 @@ impl<O: InputOperator> InputStage<O> {
                 name: "initial".into(),
                 found: format!("{} plays and {} relaxations", plays.len(), creep.len()),
                 expected: format!("{count} plays and {relaxations} relaxations, as the stage"),
+            });
+        }
+        let further = self.relaxation.dynamics.further().len();
+        if modes.0.len() != further || modes.1.len() != further {
+            return Err(Error::Shape {
+                name: "initial".into(),
+                found: format!(
+                    "{} and {} entries of mode_x and mode_v",
+                    modes.0.len(),
+                    modes.1.len()
+                ),
+                expected: format!("{further} each, as the stage has modes beside its main one"),
             });
         }
         if !values.iter().flat_map(|(_, numbers)| numbers).all(|value| value.is_finite()) {
@@ -175,6 +298,8 @@ impl<O: InputOperator> InputStage<O> {
         relaxation.input =
             self.operator.follow(&mut state.operator, values.number("u")) - self.zero();
         (relaxation.x, relaxation.v) = (values.number("x"), values.number("v"));
+        relaxation.mode_x[..further].copy_from_slice(modes.0);
+        relaxation.mode_v[..further].copy_from_slice(modes.1);
         Ok(state)
     }
 
@@ -184,7 +309,11 @@ impl<O: InputOperator> InputStage<O> {
         let creep = relaxation.creep[..self.relaxation.count].to_vec();
         let plays = self.operator.plays(&mut operator).to_vec();
         let (x, v, input) = (relaxation.x, relaxation.v, self.operator.input(&operator));
-        Values::of(PLAYS_STATE, [vec![x], vec![v], vec![input], plays, creep])
+        let further = self.relaxation.dynamics.further().len();
+        let (places, speeds) = (&relaxation.mode_x[..further], &relaxation.mode_v[..further]);
+        let entries =
+            [vec![x], vec![v], vec![input], plays, creep, places.to_vec(), speeds.to_vec()];
+        Values::of(PLAYS_STATE, entries)
     }
 
     /// Equilibrium after a slow visit to each voltage in turn, from rest, its creep complete.
@@ -214,32 +343,111 @@ impl<O: InputOperator> InputStage<O> {
         self.relaxation.jump(&mut state.relaxation, output);
     }
 
-    /// Motion under a drive. Exact from sample to sample, so its error estimate is 0.
+    /// The inverse of the stage for references sampled every `dt` seconds, from the inverse of
+    /// its operator.
+    ///
+    /// # Errors
+    /// Names `dt` where it is not above 0.
+    pub fn feedforward<I: OperatorInverse>(
+        &self,
+        operator: I,
+        dt: f64,
+    ) -> Result<InputInverse<I, MOST_RELAXATIONS>> {
+        let Relaxation { dynamics, .. } = self.relaxation;
+        Ok(InputInverse::with(operator, self.zero(), self.relaxation.used(), dynamics, dt)?)
+    }
+}
+
+impl<O: Segmented> InputStage<O> {
+    /// Steps of `step` seconds, with errors of the displacement below `accuracy`, m.
+    fn steps(&self, step: f64, accuracy: f64) -> InputStageFlow {
+        InputStageFlow {
+            relaxation: self.relaxation.flow(step),
+            zero: self.zero(),
+            step,
+            deviation: accuracy / self.relaxation.largest_gain(),
+        }
+    }
+
+    /// Bound of the error where the drive moves by `longest` (V) at most in a step, m.
+    fn error_bound(&self, flow: &InputStageFlow, longest: f64) -> f64 {
+        if !self.relaxation.remembers() {
+            return 0.0;
+        }
+        // A chord of length l deviates by bend l^2 / 8 at most.
+        let whole = 0.125 * self.operator.bend() * longest * longest;
+        whole.min(flow.deviation) * self.relaxation.largest_gain()
+    }
+
+    /// Takes the drive straight to `volts` in one step, in parts where the operator's output is
+    /// not straight; returns how many.
+    #[inline(always)]
+    fn through(
+        &self,
+        flow: &InputStageFlow,
+        state: &mut InputStageState<O::State>,
+        volts: f64,
+    ) -> usize {
+        let InputStageFlow { relaxation, zero, step, deviation } = flow;
+        let from = self.operator.input(&state.operator);
+        let (mut done, mut parts) = (0.0, 1);
+        while self.relaxation.remembers() && parts < MOST_PARTS {
+            let next = self.operator.straight(&state.operator, volts, *deviation);
+            let reached = (next - from) / (volts - from);
+            // NaN where the drive stands still.
+            if reached.is_nan() || reached > 1.0 - LEAST_PART {
+                break;
+            }
+            let output = self.operator.follow(&mut state.operator, next) - zero;
+            if reached > done + LEAST_PART {
+                let part = self.relaxation.flow((reached - done) * step);
+                self.relaxation.step(&part, &mut state.relaxation, output);
+                done = reached;
+            }
+            parts += 1;
+        }
+        let output = self.operator.follow(&mut state.operator, volts) - zero;
+        if done > 0.0 {
+            let rest = self.relaxation.flow((1.0 - done) * step);
+            self.relaxation.step(&rest, &mut state.relaxation, output);
+        } else {
+            self.relaxation.step(relaxation, &mut state.relaxation, output);
+        }
+        parts
+    }
+
+    /// Motion under a drive. Exact where the output has no bends between corners: its error
+    /// estimate is 0 then, and a bound of the error otherwise.
     ///
     /// The drive jumps from where the initial state has it to its first sample. With a zero-order
     /// hold a sample shows the stage before the drive's step at that instant has any effect.
     pub(super) fn follow(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
-        let Experiment { drive, initial, method, stop, .. } = *experiment;
+        let Experiment { drive, initial, method, accuracy, stop } = *experiment;
         method.exponential_only()?;
-        let flow = self.relaxation.flow(drive.dt);
-        let zero = self.zero();
+        let flow = self.steps(drive.dt, positive("accuracy", accuracy, "m")?);
+        let zero = flow.zero;
         let mut state = self.state(initial)?;
+        let (mut steps, mut longest) = (POLL, 0.0_f64);
         let [mut x, mut v, mut hysteresis] = columns(drive.u.len())?;
         for (k, &volts) in drive.u.iter().enumerate() {
-            if k % POLL == 0 && stop() {
-                return Ok(None);
+            if steps >= POLL {
+                if stop() {
+                    return Ok(None);
+                }
+                steps = 0;
             }
+            steps += 1;
             match drive.hold {
                 Hold::First if k == 0 => self.jump(&mut state, volts, zero),
                 Hold::First => {
-                    let output = self.operator.follow(&mut state.operator, volts) - zero;
-                    self.relaxation.step(&flow, &mut state.relaxation, output);
+                    longest = longest.max((volts - drive.u[k - 1]).abs());
+                    steps += self.through(&flow, &mut state, volts);
                 }
                 Hold::Zero if k == 0 => {}
                 Hold::Zero => {
                     self.jump(&mut state, drive.u[k - 1], zero);
                     let held = state.relaxation.input;
-                    self.relaxation.step(&flow, &mut state.relaxation, held);
+                    self.relaxation.step(&flow.relaxation, &mut state.relaxation, held);
                 }
             }
             if !state.relaxation.x.is_finite() {
@@ -258,23 +466,9 @@ impl<O: InputOperator> InputStage<O> {
             hysteresis,
             last,
             substeps: 1,
-            error_estimate: 0.0,
+            error_estimate: self.error_bound(&flow, longest),
             unique: true,
         }))
-    }
-
-    /// The inverse of the stage for references sampled every `dt` seconds, from the inverse of
-    /// its operator.
-    ///
-    /// # Errors
-    /// Names `dt` where it is not above 0.
-    pub fn feedforward<I: OperatorInverse>(
-        &self,
-        operator: I,
-        dt: f64,
-    ) -> Result<InputInverse<I, MOST_RELAXATIONS>> {
-        let Relaxation { dynamics, .. } = self.relaxation;
-        Ok(InputInverse::with(operator, self.zero(), self.relaxation.used(), dynamics, dt)?)
     }
 }
 
@@ -287,7 +481,7 @@ pub(super) fn inverse_state<I: OperatorInverse>(
     inverse.start(operator, CreepState { input: relaxation.input, reached: relaxation.creep })
 }
 
-impl<O: InputOperator> Plant for InputStage<O> {
+impl<O: Segmented> Plant for InputStage<O> {
     type State = InputStageState<O::State>;
     type Flow = InputStageFlow;
 
@@ -296,17 +490,15 @@ impl<O: InputOperator> Plant for InputStage<O> {
     }
 
     fn flow(&self, step: f64) -> InputStageFlow {
-        InputStageFlow { relaxation: self.relaxation.flow(step), zero: self.zero() }
+        self.steps(step, ACCURACY)
     }
 
     #[inline(always)]
     fn advance(&self, flow: &InputStageFlow, state: &mut Self::State, from: f64, to: f64) {
-        let InputStageFlow { relaxation, zero } = flow;
         if (from - self.operator.input(&state.operator)).abs() > 0.0 {
-            self.jump(state, from, *zero);
+            self.jump(state, from, flow.zero);
         }
-        let output = self.operator.follow(&mut state.operator, to) - zero;
-        self.relaxation.step(relaxation, &mut state.relaxation, output);
+        self.through(flow, state, to);
     }
 
     #[inline(always)]

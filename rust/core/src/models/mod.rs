@@ -17,14 +17,17 @@ mod weighted_plays;
 
 pub use bouc_wen::{BoucWenKernel, BoucWenStage};
 pub use bouc_wen_oscillator::{BoucWenOscillator, BoucWenOscillatorKernel};
-pub use creep::{Creep, Dynamics, MOST_RELAXATIONS, Relaxation, RelaxationFlow, RelaxationState};
+pub use creep::{
+    Creep, Dynamics, MOST_MODES, MOST_RELAXATIONS, Mode, Modes, Relaxation, RelaxationFlow,
+    RelaxationState,
+};
 pub use dahl::{DahlStage, DahlStageState};
 pub use first_order_dahl::{FirstOrderDahlKernel, FirstOrderDahlStage};
 pub use generalised_prandtl_ishlinskii::{
     GeneralisedPlays, GeneralisedPlaysInverse, GeneralisedPlaysInverseState, GeneralisedPlaysState,
     GeneralisedPrandtlIshlinskiiStage, TanhEnvelope,
 };
-pub use input_stage::{InputOperator, InputStage, InputStageFlow, InputStageState};
+pub use input_stage::{InputOperator, InputStage, InputStageFlow, InputStageState, Segmented};
 pub use plant::{KernelFlow, KernelModel, Plant};
 pub use prandtl_ishlinskii::{
     MOST_PLAYS, MOST_ZONES, PlayHysteresis, Plays, PrandtlIshlinskiiStage,

@@ -12,7 +12,9 @@ use piezotrack_control::hysteresis::{Operator, Play, PlayState};
 use piezotrack_control::{InputInverseState, PlayInverse, PrandtlIshlinskiiInverse};
 
 use super::creep::{MOST_RELAXATIONS, Relaxation};
-use super::input_stage::{DYNAMICS, InputOperator, InputStage, PLAYS_STATE, inverse_state};
+use super::input_stage::{
+    DYNAMICS, InputOperator, InputStage, PLAYS_STATE, Segmented, inverse_state, same_length,
+};
 use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
 use super::values::{ParameterInfo, Values};
 use super::weighted_plays::{FittedPlays, WeightedPlays};
@@ -39,6 +41,9 @@ const PARAMETERS: &[ParameterInfo] = &[
     DYNAMICS[2],
     DYNAMICS[3],
     DYNAMICS[4],
+    DYNAMICS[5],
+    DYNAMICS[6],
+    DYNAMICS[7],
 ];
 
 /// Plays with dead zones, and how many of the plays are used.
@@ -138,24 +143,6 @@ pub(super) fn checked_thresholds(thresholds: &[f64], unit: &str) -> Result<Vec<f
     thresholds.iter().enumerate().map(check).collect()
 }
 
-/// Refuses lists of different lengths, and longer ones than there is room for.
-pub(super) fn same_length(
-    name: &str,
-    found: usize,
-    other: &str,
-    wanted: usize,
-    most: usize,
-) -> Result<()> {
-    if found == wanted && found <= most {
-        return Ok(());
-    }
-    Err(Error::Shape {
-        name: name.into(),
-        found: format!("{found} entries"),
-        expected: format!("as many as {other}, which has {wanted}, and {most} at most"),
-    })
-}
-
 fn ascending(name: &str, value: f64, before: f64, unit: &str) -> Result<f64> {
     if value >= before {
         return Ok(value);
@@ -183,6 +170,16 @@ impl InputOperator for PlayHysteresis {
 
     fn plays<'a>(&self, state: &'a mut Self::State) -> &'a mut [f64] {
         &mut state.plays[..self.count]
+    }
+}
+
+impl Segmented for PlayHysteresis {
+    fn straight(&self, state: &Self::State, volts: f64, _deviation: f64) -> f64 {
+        self.plays.straight(state, volts)
+    }
+
+    fn bend(&self) -> f64 {
+        0.0
     }
 }
 
@@ -255,19 +252,14 @@ impl WeightedPlays for PrandtlIshlinskiiStage {
 
     fn values(fitted: &FittedPlays) -> Values {
         let of = fitted.clone();
-        let [creep_weights, creep_times, time, frequency, damping_ratio] = of.relaxation.values();
-        let entries = [
+        let relaxation = of.relaxation.values();
+        let operator = [
             vec![of.linear],
             of.thresholds,
             of.weights,
             of.dead_zone_thresholds,
             of.dead_zone_weights,
-            creep_weights,
-            creep_times,
-            time,
-            frequency,
-            damping_ratio,
         ];
-        Values::of(PARAMETERS, entries)
+        Values::of(PARAMETERS, operator.into_iter().chain(relaxation))
     }
 }

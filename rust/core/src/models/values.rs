@@ -117,8 +117,11 @@ impl Values {
 
     /// Values given whole, in the order of their descriptions.
     #[must_use]
-    pub fn of<const N: usize>(infos: &'static [ParameterInfo], entries: [Vec<f64>; N]) -> Self {
-        Self { infos, entries: entries.into() }
+    pub fn of(
+        infos: &'static [ParameterInfo],
+        entries: impl IntoIterator<Item = Vec<f64>>,
+    ) -> Self {
+        Self { infos, entries: entries.into_iter().collect() }
     }
 
     /// The first number of each parameter, in their order.

@@ -1,6 +1,7 @@
 //! Models identified by least squares: weighted sums of plays with given thresholds.
 
 use super::creep::Relaxation;
+use super::input_stage::PLAYS_STATE;
 use super::traits::StageModel;
 use super::values::Values;
 
@@ -52,6 +53,19 @@ pub trait WeightedPlays: StageModel {
 
     /// The parameters of the stage, as [`StageModel::build`] takes them.
     fn values(fitted: &FittedPlays) -> Values;
+
+    /// Plays of a state, of that of the drive itself and those with thresholds.
+    #[must_use]
+    fn kept(plays: &[f64]) -> &[f64] {
+        plays.get(1..).unwrap_or(&[])
+    }
+
+    /// A state at rest at `x`, m, and `volts` with the plays of the drive and the thresholds.
+    #[must_use]
+    fn start(x: f64, volts: f64, plays: &[f64], creep: &[f64]) -> Values {
+        let (plays, creep) = (Self::kept(plays).to_vec(), creep.to_vec());
+        Values::of(PLAYS_STATE, [vec![x], vec![0.0], vec![volts], plays, creep])
+    }
 }
 
 /// An operation on any model of weighted plays.

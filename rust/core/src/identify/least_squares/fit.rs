@@ -1,275 +1,329 @@
-//! Gauss-Newton method with non-negative least squares in each step.
+//! Gauss-Newton method whose steps are least squares within bounds.
 
-use super::follower::{Follower, crept};
-use super::{DynamicsKind, LeastSquaresFit, Settings, WeightsRecord};
+use core::cell::Cell;
+use core::ops::Range;
+
+use super::follower::Follower;
+use super::form::Form;
+use super::layout::Layout;
+use super::{LeastSquaresFit, WeightsRecord};
 use crate::error::Result;
-use crate::math::{Rows, least};
+use crate::identify::history::{History, visited};
+use crate::math::Rows;
 use crate::models::{Dynamics, FittedPlays, Relaxation, WeightedPlays};
 use crate::signal::{Stop, index, range};
 
 /// Least share of the mean slope that passes without memory: with less the inverse is no use.
 const LEAST_LINEAR: f64 = 1e-3;
 
-/// Rounds over the numbers of an envelope, at most.
-const SHAPE_ROUNDS: usize = 20;
+/// Change of a logarithm for a derivative by differences.
+const NUDGE: f64 = 1e-5;
 
-/// Least share by which a number of an envelope has to lower the deviation before it leaves the
-/// middle of its range: what a record does not determine is not changed.
-const LEAST_GAIN: f64 = 0.1;
+/// Weight of a row that holds a sum at its bound, relative to all others together.
+const STIFF: f64 = 1e4;
 
-/// Least slope of the dead zones while they are searched.
-const LEAST_SLOPE: f64 = 0.05;
+/// Most steps.
+const STEPS: usize = 60;
 
-/// The unknowns but for the dynamics.
-#[derive(Clone, Debug)]
-struct Unknowns {
-    /// w0 above its least value, then the weights, m/V.
-    weights: Vec<f64>,
-    dead_zone_weights: Vec<f64>,
-    shares: Vec<f64>,
-    offset: f64,
+/// What all fits of a record share.
+pub(super) struct Common<'a> {
+    pub record: &'a WeightsRecord<'a>,
+    pub offset: bool,
+    pub stop: Stop<'a>,
+    /// Range of the drive in the window, V.
+    pub drive: (f64, f64),
+    /// Range of the displacement in the window, m.
+    pub stroke: f64,
+    pub evaluations: Cell<usize>,
 }
 
-impl Unknowns {
-    /// Interpolates from `self` to `goal` by a share.
-    fn towards(&self, goal: &Self, part: f64) -> Self {
-        let mix = |a: &[f64], b: &[f64]| -> Vec<f64> {
-            a.iter().zip(b).map(|(a, b)| a + part * (b - a)).collect()
-        };
+impl<'a> Common<'a> {
+    pub fn new(record: &'a WeightsRecord<'a>, offset: bool, stop: Stop<'a>) -> Self {
+        let (least, most) = range(&record.y[record.start..]);
+        let drive = range(&record.drive.u[record.start..]);
+        Self { record, offset, stop, drive, stroke: most - least, evaluations: Cell::new(0) }
+    }
+
+    fn least_linear(&self) -> f64 {
+        LEAST_LINEAR * self.stroke / (self.drive.1 - self.drive.0)
+    }
+}
+
+/// A stage on its way to the best one of its structure.
+pub(super) struct Fit<'a, M: WeightedPlays> {
+    pub common: &'a Common<'a>,
+    pub thresholds: Vec<f64>,
+    /// Thresholds of the dead zones, m.
+    pub corners: Vec<f64>,
+    /// Time constants of the creep, s.
+    pub times: Vec<f64>,
+    pub form: Form,
+    /// Whether the numbers of the dynamics stay as they are.
+    pub held: bool,
+    pub history: History,
+    /// Voltage that a history which is fitted comes from, V.
+    pub from: f64,
+    /// Numbers of the envelope, and what they make.
+    pub shape: Vec<f64>,
+    envelope: M::Envelope,
+    /// Window to be judged, and every how many samples.
+    pub window: Range<usize>,
+    pub every: usize,
+    /// The unknowns, see [`Layout`].
+    pub x: Vec<f64>,
+    pub rms: f64,
+}
+
+impl<M: WeightedPlays> Clone for Fit<'_, M> {
+    fn clone(&self) -> Self {
         Self {
-            weights: mix(&self.weights, &goal.weights),
-            dead_zone_weights: mix(&self.dead_zone_weights, &goal.dead_zone_weights),
-            shares: mix(&self.shares, &goal.shares),
-            offset: self.offset + part * (goal.offset - self.offset),
+            thresholds: self.thresholds.clone(),
+            corners: self.corners.clone(),
+            times: self.times.clone(),
+            shape: self.shape.clone(),
+            envelope: self.envelope.clone(),
+            window: self.window.clone(),
+            x: self.x.clone(),
+            ..*self
         }
     }
-
-    fn rises(&self) -> bool {
-        let mut slope = 1.0;
-        self.dead_zone_weights.iter().all(|bend| {
-            slope += bend;
-            slope >= LEAST_SLOPE
-        })
-    }
-}
-
-/// State of a fit.
-pub(super) struct Fit<'a, M: WeightedPlays> {
-    record: &'a WeightsRecord<'a>,
-    settings: &'a Settings,
-    stop: Stop<'a>,
-    least_linear: f64,
-    dead_zone_thresholds: Vec<f64>,
-    unknowns: Unknowns,
-    dynamics: Dynamics,
-    /// Numbers of the envelope, and what they make.
-    shape: Vec<f64>,
-    envelope: M::Envelope,
-    /// Range of the drive in the window, V.
-    drive: (f64, f64),
-    rms: f64,
-    evaluations: usize,
-    at_bound: bool,
 }
 
 impl<'a, M: WeightedPlays> Fit<'a, M> {
-    pub fn new(record: &'a WeightsRecord<'a>, settings: &'a Settings, stop: Stop<'a>) -> Self {
-        let (low, high) = range(&record.drive.u[record.start..]);
-        let (least, most) = range(&record.y[record.start..]);
-        let unknowns = Unknowns {
-            weights: vec![0.0; 1 + settings.thresholds.len()],
-            dead_zone_weights: Vec::new(),
-            shares: vec![0.0; settings.times.len()],
-            offset: 0.0,
-        };
+    pub fn new(common: &'a Common<'a>, thresholds: &[f64], history: History) -> Self {
         let middle = |(from, to): &(f64, f64)| libm::sqrt(from * to);
         let shape: Vec<f64> = M::shapes().iter().map(middle).collect();
-        Self {
-            envelope: M::envelope(&shape, (low, high)),
+        let mut fit = Self {
+            envelope: M::envelope(&shape, common.drive),
             shape,
-            drive: (low, high),
-            record,
-            settings,
-            stop,
-            least_linear: LEAST_LINEAR * (most - least) / (high - low),
-            dead_zone_thresholds: Vec::new(),
-            unknowns,
-            dynamics: Dynamics::None,
+            common,
+            thresholds: thresholds.to_vec(),
+            corners: Vec::new(),
+            times: Vec::new(),
+            form: Form::None,
+            held: false,
+            history,
+            from: 0.0,
+            window: common.record.start..common.record.y.len(),
+            every: 1,
+            x: Vec::new(),
             rms: f64::INFINITY,
-            evaluations: 0,
-            at_bound: false,
-        }
-    }
-
-    /// False where it was stopped.
-    pub fn run(&mut self) -> bool {
-        self.search().is_some()
-    }
-
-    fn search(&mut self) -> Option<()> {
-        self.settle(1e-3)?;
-        self.search_shape()?;
-        self.place_corners();
-        let dt = self.record.drive.dt;
-        let length = dt * index(self.record.y.len() - self.record.start);
-        let times = (0.02 * dt, 0.1 * length);
-        match self.settings.dynamics {
-            DynamicsKind::None => {}
-            DynamicsKind::First => {
-                let first = |time| Dynamics::First { time };
-                let time = self.along(times, 1e-5, |fit, time| fit.dynamics = first(time))?;
-                self.dynamics = first(time);
-            }
-            DynamicsKind::Second => self.search_mode(times, (0.02 / dt, 0.5 / dt))?,
-        }
-        self.rms = f64::INFINITY;
-        self.settle(1e-10)
-    }
-
-    /// Frequency and lag of the mode in turn: the lag is what a slow record shows.
-    ///
-    /// Lower frequencies than a fiftieth of the sampling rate are left out: there a mode would
-    /// stand in for what the plays do not describe.
-    fn search_mode(&mut self, lags: (f64, f64), frequencies: (f64, f64)) -> Option<()> {
-        let mode = |frequency: f64, lag: f64| Dynamics::Second {
-            frequency,
-            damping_ratio: core::f64::consts::PI * frequency * lag,
         };
-        let mut frequency = 0.5 * frequencies.1;
-        let mut before = f64::INFINITY;
-        for _ in 0..6 {
-            let lag = self.along(lags, 1e-4, |fit, lag| fit.dynamics = mode(frequency, lag))?;
-            let edge = self.at_bound;
-            frequency = self
-                .along(frequencies, 1e-4, |fit, frequency| fit.dynamics = mode(frequency, lag))?;
-            self.at_bound |= edge;
-            self.dynamics = mode(frequency, lag);
-            if self.rms > 0.999 * before {
-                break;
-            }
-            before = self.rms;
-        }
-        Some(())
+        fit.x = vec![0.0; fit.layout().count()];
+        fit
     }
 
-    /// The numbers of the envelope in turn, each from its range.
-    fn search_shape(&mut self) -> Option<()> {
-        let ranges = M::shapes();
-        let mut released = vec![false; ranges.len()];
-        for _ in 0..SHAPE_ROUNDS {
-            let round = self.rms;
-            for (i, &range) in ranges.iter().enumerate() {
-                let (before, unknowns, here) = (self.rms, self.unknowns.clone(), self.shape[i]);
-                let place = self.along(range, 1e-4, |fit, place| fit.reshape(i, place))?;
-                let least = if released[i] { 0.0 } else { LEAST_GAIN };
-                if self.rms < (1.0 - least) * before {
-                    released[i] = true;
-                    self.reshape(i, place);
-                } else {
-                    (self.rms, self.unknowns) = (before, unknowns);
-                    self.reshape(i, here);
-                }
-            }
-            if self.rms > 0.99 * round {
-                break;
-            }
+    pub fn layout(&self) -> Layout {
+        let departing = self.history == History::Fitted;
+        Layout {
+            weights: 1 + self.thresholds.len(),
+            bends: self.corners.len(),
+            shares: self.times.len(),
+            departures: if departing { self.times.len() } else { 0 },
+            offset: usize::from(self.common.offset),
+            poles: self.form.numbers(),
         }
-        self.at_bound = false;
-        Some(())
     }
 
-    fn reshape(&mut self, i: usize, place: f64) {
+    /// Changes the structure; what both structures have stays.
+    pub fn restructure(&mut self, change: impl FnOnce(&mut Self)) {
+        let (before, kept) = (self.layout(), self.x.clone());
+        let (times, plays) = (self.times.clone(), self.thresholds.clone());
+        let form = self.form;
+        change(self);
+        let now = self.layout();
+        self.x = vec![0.0; now.count()];
+        let mut keep = |to: Range<usize>, from: Range<usize>, same: bool| {
+            if same && to.len() == from.len() {
+                self.x[to].copy_from_slice(&kept[from]);
+            }
+        };
+        keep(now.weights(), before.weights(), plays == self.thresholds);
+        keep(now.bends(), before.bends(), true);
+        keep(now.shares(), before.shares(), times == self.times);
+        keep(now.departures(), before.departures(), times == self.times);
+        keep(now.offset(), before.offset(), true);
+        keep(now.poles(), before.poles(), form == self.form);
+        self.rms = f64::INFINITY;
+    }
+
+    pub fn reshape(&mut self, i: usize, place: f64) {
         self.shape[i] = place;
-        self.envelope = M::envelope(&self.shape, self.drive);
+        self.envelope = M::envelope(&self.shape, self.common.drive);
     }
 
-    /// The best place along a line, which `set` takes the fit to.
-    fn along(
-        &mut self,
-        bounds: (f64, f64),
-        accuracy: f64,
-        set: impl Fn(&mut Self, f64),
-    ) -> Option<f64> {
-        let mut best = (f64::INFINITY, self.unknowns.clone());
-        let place = least(bounds, accuracy, |place| {
-            set(self, place);
-            self.rms = f64::INFINITY;
-            self.settle(1e-5)?;
-            if self.rms < best.0 {
-                best = (self.rms, self.unknowns.clone());
-            }
-            Some(self.rms)
-        })?;
-        (self.rms, self.unknowns) = best;
-        self.at_bound = place < 1.01 * bounds.0 || place > bounds.1 / 1.01;
-        Some(place)
+    /// Sets the numbers of the dynamics, logarithms.
+    pub fn set_poles(&mut self, form: Form, poles: &[f64]) {
+        self.restructure(|fit| fit.form = form);
+        let part = self.layout().poles();
+        self.x[part].copy_from_slice(poles);
     }
 
-    /// Spreads the dead zones over what comes out of the plays in the window.
-    fn place_corners(&mut self) {
-        let mut plays = self.plays();
-        let count = self.settings.zones;
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for (k, &volts) in self.record.drive.u.iter().enumerate() {
-            let value = self.follow(&mut plays, volts);
-            if k >= self.record.start {
-                (low, high) = (low.min(value), high.max(value));
-            }
+    pub fn dynamics(&self) -> Dynamics {
+        self.form.dynamics(&self.x[self.layout().poles()])
+    }
+
+    pub fn pole_ranges(&self) -> Vec<(f64, f64)> {
+        self.form.ranges(&self.common.record.drive, self.common.record.start)
+    }
+
+    /// Plays that were taken through the voltages before the record.
+    pub fn plays_before(&self) -> Vec<f64> {
+        let mut plays = vec![0.0; 1 + self.thresholds.len()];
+        for volts in visited(&self.common.record.drive, self.history, self.from) {
+            self.push(&mut plays, volts);
         }
-        self.dead_zone_thresholds =
-            (1..=count).map(|j| low + (high - low) * index(j) / index(count + 1)).collect();
-        self.unknowns.dead_zone_weights = vec![0.0; count];
+        plays
     }
 
-    /// The drive, then what the plays would stand at: all at rest.
-    fn plays(&self) -> Vec<f64> {
-        vec![0.0; 1 + self.settings.thresholds.len()]
-    }
-
-    /// Moves the plays to `volts` and returns p, m.
-    fn follow(&self, plays: &mut [f64], volts: f64) -> f64 {
+    /// Moves the plays to `volts`: that of the drive, then those with thresholds.
+    #[inline(always)]
+    pub fn push(&self, plays: &mut [f64], volts: f64) {
         let (up, down) = M::edges(&self.envelope, volts);
         plays[0] = up.max(down.min(plays[0]));
-        let mut value = (self.least_linear + self.unknowns.weights[0]) * plays[0];
-        for (i, threshold) in self.settings.thresholds.iter().enumerate() {
-            let play = &mut plays[i + 1];
+        for (play, threshold) in plays[1..].iter_mut().zip(&self.thresholds) {
             *play = (up - threshold).max((down + threshold).min(*play));
-            value += self.unknowns.weights[i + 1] * *play;
         }
-        value
     }
 
-    /// What the dead zones make of p.
+    /// What comes out of the plays, m.
+    #[inline(always)]
+    pub fn sum(&self, plays: &[f64]) -> f64 {
+        let weighted: f64 = plays.iter().zip(&self.x).map(|(play, weight)| weight * play).sum();
+        self.common.least_linear().mul_add(plays[0], weighted)
+    }
+
+    /// What the dead zones make of it.
+    #[inline(always)]
     fn bent(&self, value: f64) -> f64 {
-        let zones = self.dead_zone_thresholds.iter().zip(&self.unknowns.dead_zone_weights);
+        let zones = self.corners.iter().zip(&self.x[self.layout().bends()]);
         value + zones.map(|(corner, bend)| bend * beyond(value, *corner)).sum::<f64>()
     }
 
     /// Creep and dynamics as they are now.
-    fn relaxation(&self) -> Option<Relaxation> {
-        Relaxation::new(&self.unknowns.shares, &self.settings.times, self.dynamics).ok()
+    pub fn relaxation(&self) -> Result<Relaxation> {
+        let shares: Vec<f64> =
+            self.x[self.layout().shares()].iter().map(|share| share.max(0.0)).collect();
+        Relaxation::new(&shares, &self.times, self.dynamics())
     }
 
-    /// Gauss and Newton's method in all but the dynamics, until a step gains less than `gain`.
-    fn settle(&mut self, gain: f64) -> Option<()> {
+    /// Inputs of the columns of weights and dead zones, then that of the stage.
+    #[inline(always)]
+    fn inputs(&self, plays: &[f64], signals: &mut [f64]) {
+        let value = self.sum(plays);
+        let bends = &self.x[self.layout().bends()];
+        let passed = |(corner, bend): (&f64, &f64)| if value > *corner { *bend } else { 0.0 };
+        let slope = 1.0 + self.corners.iter().zip(bends).map(passed).sum::<f64>();
+        for (signal, play) in signals.iter_mut().zip(plays) {
+            *signal = slope * play;
+        }
+        for (signal, corner) in signals[plays.len()..].iter_mut().zip(&self.corners) {
+            *signal = beyond(value, *corner);
+        }
+        if let Some(last) = signals.last_mut() {
+            *last = self.bent(value);
+        }
+    }
+
+    /// Where the creep stands before the record behind each of the inputs.
+    fn creep_before(&self, width: usize) -> Vec<Vec<f64>> {
+        let drive = self.common.record.drive;
+        let mut plays = self.plays_before();
+        let mut signals = vec![0.0; width];
+        let whole_only = width == 1;
+        let take = |fit: &Self, plays: &mut Vec<f64>, volts: f64, signals: &mut Vec<f64>| {
+            fit.push(plays, volts);
+            if whole_only {
+                signals[0] = fit.bent(fit.sum(plays));
+            } else {
+                fit.inputs(plays, signals);
+            }
+        };
+        take(self, &mut plays, drive.u[0], &mut signals);
+        let relaxed = |signal: &f64| vec![*signal; self.times.len()];
+        if self.history != History::Settled || self.times.is_empty() {
+            let mut reached: Vec<Vec<f64>> = signals.iter().map(relaxed).collect();
+            let departures = &self.x[self.layout().departures()];
+            if let Some(whole) = reached.last_mut() {
+                whole.iter_mut().zip(departures).for_each(|(q, departure)| *q += departure);
+            }
+            return reached;
+        }
+        // From 0 through the record; q repeats that begins at its end / (1 - exp(-T / tau)).
+        let Ok(creep) = Relaxation::new(&vec![0.0; self.times.len()], &self.times, Dynamics::None)
+        else {
+            return signals.iter().map(relaxed).collect();
+        };
+        let flow = creep.flow(drive.dt);
+        let mut followers: Vec<Follower> =
+            signals.iter().map(|signal| Follower::at_rest(&creep, *signal, &[])).collect();
+        for &volts in &drive.u[1..] {
+            take(self, &mut plays, volts, &mut signals);
+            for (follower, signal) in followers.iter_mut().zip(&signals) {
+                follower.next(&creep, &flow, drive.hold, *signal);
+            }
+        }
+        let length = drive.dt * index(drive.u.len() - 1);
+        let repeats = |time: &f64| -libm::expm1(-length / time);
+        let factors: Vec<f64> = self.times.iter().map(repeats).collect();
+        let of = |follower: &Follower| {
+            follower.state.creep.iter().zip(&factors).map(|(end, factor)| end / factor).collect()
+        };
+        followers.iter().map(of).collect()
+    }
+
+    fn counts(&self, k: usize) -> bool {
+        self.window.contains(&k) && (k - self.window.start) % self.every == 0
+    }
+
+    /// RMS deviation in a window, m.
+    pub fn deviation(&self) -> f64 {
+        self.common.evaluations.set(self.common.evaluations.get() + 1);
+        let Ok(relaxation) = self.relaxation() else { return f64::INFINITY };
+        let WeightsRecord { drive, y, .. } = *self.common.record;
+        let flow = relaxation.flow(drive.dt);
+        let mut plays = self.plays_before();
+        let creep = self.creep_before(1);
+        let offset: f64 = self.x[self.layout().offset()].iter().sum();
+        let mut follower: Option<Follower> = None;
+        let (mut sum, mut count) = (0.0, 0);
+        for (k, &volts) in drive.u.iter().enumerate().take(self.window.end) {
+            self.push(&mut plays, volts);
+            let output = self.bent(self.sum(&plays));
+            let x = match &mut follower {
+                Some(follower) => follower.next(&relaxation, &flow, drive.hold, output),
+                none => none.insert(Follower::at_rest(&relaxation, output, &creep[0])).state.x,
+            };
+            if self.counts(k) {
+                let error = y[k] - x - offset;
+                sum += error * error;
+                count += 1;
+            }
+        }
+        libm::sqrt(sum / index(count))
+    }
+
+    /// Gauss and Newton's method until a step gains less than `gain`; `None` where stopped.
+    pub fn settle(&mut self, gain: f64) -> Option<()> {
         self.rms = self.deviation();
-        for _ in 0..50 {
-            if (self.stop)() {
+        for _ in 0..STEPS {
+            if (self.common.stop)() {
                 return None;
             }
-            let (before, start) = (self.rms, self.unknowns.clone());
-            let goal = self.linear_step()?;
+            let (before, start) = (self.rms, self.x.clone());
+            let goal = self.goal();
             let mut part = 1.0;
             loop {
-                self.unknowns = start.towards(&goal, part);
-                self.rms = if self.unknowns.rises() { self.deviation() } else { f64::INFINITY };
+                self.x = start.iter().zip(&goal).map(|(a, b)| a + part * (b - a)).collect();
+                self.rms =
+                    if self.layout().admits(&self.x) { self.deviation() } else { f64::INFINITY };
                 if self.rms < before || part < 1e-3 {
                     break;
                 }
                 part *= 0.5;
             }
             if self.rms >= before || self.rms.is_nan() {
-                (self.rms, self.unknowns) = (before, start);
+                (self.rms, self.x) = (before, start);
                 break;
             }
             if before - self.rms <= gain * before {
@@ -279,117 +333,149 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         Some(())
     }
 
-    /// RMS deviation in the window, m.
-    fn deviation(&mut self) -> f64 {
-        self.evaluations += 1;
-        let Some(relaxation) = self.relaxation() else { return f64::INFINITY };
-        let WeightsRecord { drive, y, start } = *self.record;
+    /// The solution of the problem linearised about the present unknowns.
+    fn goal(&self) -> Vec<f64> {
+        let Ok(rows) = self.linearised() else { return self.x.clone() };
+        let layout = self.layout();
+        let ranges = self.pole_ranges();
+        let bounds = layout.bounds(&self.x, self.held, &ranges, self.common.stroke);
+        let mut held = rows.clone();
+        let mut x = held.solve(&bounds);
+        // Sums beyond their bounds are held there, one more each time.
+        let sums = layout.sums();
+        for _ in 0..sums.len() {
+            let sum = |part: &Range<usize>| x[part.clone()].iter().sum::<f64>();
+            let beyond = sums.iter().find_map(|(part, (low, high))| {
+                let sum = sum(part);
+                let bound = if sum < low - 1e-9 { low } else { high };
+                (sum < low - 1e-9 || sum > high + 1e-9).then(|| (part.clone(), *bound))
+            });
+            let Some((part, bound)) = beyond else { break };
+            let mut row = vec![0.0; layout.count()];
+            let stiff = STIFF * held.size();
+            row[part].fill(stiff);
+            held.push(&row, stiff * bound);
+            x = held.solve(&bounds);
+        }
+        x
+    }
+
+    /// The rows of the linearised problem.
+    fn linearised(&self) -> Result<Rows> {
+        self.common.evaluations.set(self.common.evaluations.get() + 1);
+        let WeightsRecord { drive, y, .. } = *self.common.record;
+        let (layout, relaxation) = (self.layout(), self.relaxation()?);
         let flow = relaxation.flow(drive.dt);
-        let (mut plays, mut follower) = (self.plays(), Follower::new());
-        let mut sum = 0.0;
-        for (k, &volts) in drive.u.iter().enumerate() {
-            let output = self.bent(self.follow(&mut plays, volts));
-            let x = follower.next(&relaxation, &flow, drive.hold, output);
-            if k >= start {
-                let error = y[k] - x - self.unknowns.offset;
-                sum += error * error;
+        // Behind the creep: what its relaxations have reached goes through the dynamics alone.
+        let bare = Relaxation::new(&[], &[], self.dynamics())?;
+        let bare_flow = bare.flow(drive.dt);
+        let nudged = self.nudged()?;
+        let decay: Vec<f64> = self.times.iter().map(|time| libm::exp(-drive.dt / time)).collect();
+        let inner = layout.weights + layout.bends;
+        let mut signals = vec![0.0; inner + 1];
+        let mut plays = self.plays_before();
+        let creep = self.creep_before(inner + 1);
+        let shares = &self.x[layout.shares()];
+        let mut fading: Vec<f64> = shares[..layout.departures].to_vec();
+        let mut columns: Vec<Follower> = Vec::new();
+        let (mut reached, mut faded) = (Vec::new(), Vec::new());
+        let mut changed: Vec<Follower> = Vec::new();
+        let mut rows = Rows::new(layout.count());
+        let mut row = vec![1.0; layout.count()];
+        for (k, &volts) in drive.u.iter().enumerate().take(self.window.end) {
+            self.push(&mut plays, volts);
+            self.inputs(&plays, &mut signals);
+            if k == 0 {
+                let ready = |(input, q): (&f64, &Vec<f64>)| Follower::at_rest(&relaxation, *input, q);
+                columns = signals.iter().zip(&creep).map(ready).collect();
+                let bare = |q: &f64| Follower::at_rest(&bare, *q, &[]);
+                reached = creep[inner].iter().map(bare).collect();
+                faded = fading.iter().map(bare).collect();
+                changed = vec![columns[inner]; nudged.len()];
+            } else {
+                for (column, signal) in columns.iter_mut().zip(&signals) {
+                    column.next(&relaxation, &flow, drive.hold, *signal);
+                }
+                // These move from sample to sample whatever the hold.
+                for (column, q) in reached.iter_mut().zip(columns[inner].state.creep) {
+                    bare.step(&bare_flow, &mut column.state, q);
+                }
+                for ((column, left), factor) in faded.iter_mut().zip(&mut fading).zip(&decay) {
+                    *left *= factor;
+                    bare.step(&bare_flow, &mut column.state, *left);
+                }
+                for (column, (part, flow)) in changed.iter_mut().zip(&nudged) {
+                    column.next(part, flow, drive.hold, signals[inner]);
+                }
             }
+            if !self.counts(k) {
+                continue;
+            }
+            let x = columns[inner].state.x;
+            let linear = columns[..inner].iter().chain(&reached).chain(&faded).map(|one| one.state.x);
+            for (slot, value) in row.iter_mut().zip(linear) {
+                *slot = value;
+            }
+            for (slot, column) in row[layout.poles()].iter_mut().zip(&changed) {
+                *slot = (column.state.x - x) / NUDGE;
+            }
+            let known: f64 = row.iter().zip(&self.x).map(|(a, b)| a * b).sum();
+            let offset: f64 = self.x[layout.offset()].iter().sum();
+            rows.push(&row, y[k] - x - offset + known);
         }
-        libm::sqrt(sum / index(y.len() - start))
+        Ok(rows)
     }
 
-    /// The least squares solution of the problem linearised about the present unknowns.
-    fn linear_step(&mut self) -> Option<Unknowns> {
-        self.evaluations += 1;
-        let relaxation = self.relaxation()?;
-        let WeightsRecord { drive, y, start } = *self.record;
-        let flow = relaxation.flow(drive.dt);
-        // The creep's own part of the displacement, for the derivatives by its shares.
-        let parts: Vec<Relaxation> = (0..self.settings.times.len())
-            .map(|_| Relaxation::new(&[], &[], self.dynamics))
-            .collect::<Result<_>>()
-            .ok()?;
-        let (n, zones, times) =
-            (self.unknowns.weights.len(), self.dead_zone_thresholds.len(), parts.len());
-        let unknowns = n + zones + times + usize::from(self.settings.offset);
-        let mut free = vec![false; unknowns];
-        free[n..n + zones].fill(true);
-        free[n + zones + times..].fill(true);
-        let mut columns: Vec<Follower> = (0..n + zones + times).map(|_| Follower::new()).collect();
-        let (mut plays, mut whole) = (self.plays(), Follower::new());
-        let mut rows = Rows::new(unknowns);
-        let mut row = vec![1.0; unknowns];
-        let now = self.flat();
-        for (k, &volts) in drive.u.iter().enumerate() {
-            let value = self.follow(&mut plays, volts);
-            let zone = self.dead_zone_thresholds.iter().zip(&self.unknowns.dead_zone_weights);
-            let slope: f64 =
-                zone.map(|(d, s)| if value > *d { *s } else { 0.0 }).sum::<f64>() + 1.0;
-            let x = whole.next(&relaxation, &flow, drive.hold, self.bent(value));
-            for j in 0..n {
-                row[j] = columns[j].next(&relaxation, &flow, drive.hold, slope * plays[j]);
-            }
-            for (j, corner) in self.dead_zone_thresholds.iter().enumerate() {
-                let input = beyond(value, *corner);
-                row[n + j] = columns[n + j].next(&relaxation, &flow, drive.hold, input);
-            }
-            for (j, part) in parts.iter().enumerate() {
-                row[n + zones + j] =
-                    crept(&mut columns[n + zones + j], part, &flow, whole.state.creep[j]);
-            }
-            if k >= start {
-                let linear: f64 = row.iter().zip(&now).map(|(a, b)| a * b).sum();
-                rows.push(&row, y[k] - x - self.unknowns.offset + linear);
-            }
-        }
-        let found = rows.solve(&free);
-        let (weights, rest) = found.split_at(n);
-        let (dead_zone_weights, rest) = rest.split_at(zones);
-        let (shares, rest) = rest.split_at(times);
-        Some(Unknowns {
-            weights: weights.to_vec(),
-            dead_zone_weights: dead_zone_weights.to_vec(),
-            shares: shares.to_vec(),
-            offset: rest.first().copied().unwrap_or(0.0),
-        })
+    /// Creep and dynamics with each number of the dynamics changed a little.
+    fn nudged(&self) -> Result<Vec<(Relaxation, crate::models::RelaxationFlow)>> {
+        let dt = self.common.record.drive.dt;
+        let of = |i: usize| {
+            let mut other = self.clone();
+            let slot = other.layout().poles().start + i;
+            other.x[slot] += NUDGE;
+            let part = other.relaxation()?;
+            Ok((part, part.flow(dt)))
+        };
+        (0..self.layout().poles).map(of).collect()
     }
 
-    /// The unknowns in the order of the columns.
-    fn flat(&self) -> Vec<f64> {
-        let Unknowns { weights, dead_zone_weights, shares, offset } = &self.unknowns;
-        let mut all = [&weights[..], dead_zone_weights, shares].concat();
-        if self.settings.offset {
-            all.push(*offset);
-        }
-        all
-    }
-
+    /// What was found.
     pub fn result(&self) -> Result<LeastSquaresFit> {
-        let Settings { thresholds, times, .. } = self.settings;
-        let Unknowns { weights, dead_zone_weights, shares, offset } = &self.unknowns;
+        let layout = self.layout();
+        let relaxation = self.relaxation()?;
         let fitted = FittedPlays {
-            linear: self.least_linear + weights[0],
-            thresholds: thresholds.clone(),
-            weights: weights[1..].to_vec(),
-            dead_zone_thresholds: self.dead_zone_thresholds.clone(),
-            dead_zone_weights: dead_zone_weights.clone(),
+            linear: self.common.least_linear() + self.x[0],
+            thresholds: self.thresholds.clone(),
+            weights: self.x[1..layout.weights].to_vec(),
+            dead_zone_thresholds: self.corners.clone(),
+            dead_zone_weights: self.x[layout.bends()].to_vec(),
             shape: self.shape.clone(),
-            drive: self.drive,
-            relaxation: Relaxation::new(shares, times, self.dynamics)?,
+            drive: self.common.drive,
+            relaxation,
         };
         let values = M::values(&fitted);
         M::build(&values)?;
+        let first = self.common.record.drive.u[0];
+        let mut plays = self.plays_before();
+        self.push(&mut plays, first);
+        let creep = &self.creep_before(1)[0];
+        let rest = Follower::at_rest(&relaxation, self.bent(self.sum(&plays)), creep);
         Ok(LeastSquaresFit {
             values,
-            offset: *offset,
+            offset: self.x[layout.offset()].iter().sum(),
             rms: self.rms,
-            evaluations: self.evaluations,
-            at_bound: self.at_bound,
+            evaluations: self.common.evaluations.get(),
+            at_bound: layout.at_bound(&self.x, self.form, &self.pole_ranges()),
+            history: self.history,
+            start: M::start(rest.state.x, first, &plays, creep),
+            lag_range: None,
         })
     }
 }
 
 /// What a dead zone passes, less what it passes of 0.
+#[inline(always)]
 fn beyond(value: f64, corner: f64) -> f64 {
     (value - corner).max(0.0) - (-corner).max(0.0)
 }
+

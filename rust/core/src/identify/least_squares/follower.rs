@@ -3,18 +3,26 @@
 use crate::models::{Relaxation, RelaxationFlow, RelaxationState};
 use crate::signal::Hold;
 
-/// Creep and dynamics behind one signal of a record.
+/// Creep and dynamics behind one signal of a record, from an equilibrium on.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Follower {
     pub state: RelaxationState,
-    before: Option<f64>,
+    before: f64,
 }
 
 impl Follower {
-    pub fn new() -> Self {
-        Self { state: RelaxationState::default(), before: None }
+    /// At rest where `input` comes in; the creep stands at `creep`.
+    pub fn at_rest(part: &Relaxation, input: f64, creep: &[f64]) -> Self {
+        let mut state = RelaxationState { input, ..RelaxationState::default() };
+        for (slot, reached) in state.creep.iter_mut().zip(creep) {
+            *slot = *reached;
+        }
+        state.x = part.target(&state);
+        Self { state, before: input }
     }
 
     /// What comes out at the sample where `input` comes in, as the stage's simulation does.
+    #[inline(always)]
     pub fn next(
         &mut self,
         part: &Relaxation,
@@ -22,27 +30,14 @@ impl Follower {
         hold: Hold,
         input: f64,
     ) -> f64 {
-        match (hold, self.before) {
-            (Hold::First, None) => part.jump(&mut self.state, input),
-            (Hold::First, Some(_)) => part.step(flow, &mut self.state, input),
-            (Hold::Zero, None) => {}
-            (Hold::Zero, Some(held)) => {
-                part.jump(&mut self.state, held);
-                part.step(flow, &mut self.state, held);
+        match hold {
+            Hold::First => part.step(flow, &mut self.state, input),
+            Hold::Zero => {
+                part.jump(&mut self.state, self.before);
+                part.step(flow, &mut self.state, self.before);
             }
         }
-        self.before = Some(input);
+        self.before = input;
         self.state.x
     }
-}
-
-/// The dynamics behind what one relaxation has reached, which moves from sample to sample.
-pub(super) fn crept(
-    column: &mut Follower,
-    part: &Relaxation,
-    flow: &RelaxationFlow,
-    reached: f64,
-) -> f64 {
-    part.step(flow, &mut column.state, reached);
-    column.state.x
 }

@@ -4,33 +4,80 @@
 //! each step of which is a non-negative least-squares problem; without dead zones and creep one
 //! step is sufficient (Kuhnen 2003, doi 10.3166/ejc.9.407-418, has the linear problem;
 //! he identifies the dead zones of the inverse, which here would amplify the sensor's noise).
-//! The time constant, frequency and lag of a mode, and the numbers of an envelope, are searched
-//! along one line at a time.
+//! The numbers of the dynamics are further unknowns of these steps, from where the record's
+//! spectrum has a mode; the numbers of an envelope are searched along one line at a time.
 
+mod choices;
 mod fit;
 mod follower;
+mod form;
+mod layout;
 
 use crate::error::{Error, Result};
+use super::history::History;
 use crate::models::{
     Dynamics, Model, PlayHysteresis, Relaxation, Values, WeightedPlays, WeightedVisitor,
 };
 use crate::signal::{Drive, Stop, index, range, turns};
 
-use fit::Fit;
+use fit::{Common, Fit};
 
 /// What is to be found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Thresholds of the plays, V, ascending.
-    pub thresholds: Vec<f64>,
+    /// Which plays.
+    pub plays: PlaysKind,
     /// Number of dead zones.
     pub zones: usize,
-    /// Time constants of the creep, s.
-    pub times: Vec<f64>,
+    /// Which creep.
+    pub creep: CreepKind,
     /// Which dynamics.
     pub dynamics: DynamicsKind,
+    /// What went before the record; `None` chooses.
+    pub history: Option<History>,
     /// Whether the sensor shows something where the stage is at rest.
     pub offset: bool,
+}
+
+/// Plays of a fit.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PlaysKind {
+    /// Those of these thresholds, V, ascending.
+    Thresholds(Vec<f64>),
+    /// So many, spread evenly up to half of the drive's range.
+    Spread(usize),
+    /// As many as foretell best what they were not fitted to.
+    Auto,
+}
+
+/// Creep of a fit.
+#[derive(Clone, Debug, PartialEq)]
+pub enum CreepKind {
+    /// Relaxations of these time constants, s; none where empty.
+    Times(Vec<f64>),
+    /// What the record shows.
+    Auto,
+}
+
+impl PlaysKind {
+    /// Those given, or as many zeros as there may be.
+    fn thresholds(&self) -> Vec<f64> {
+        match self {
+            Self::Thresholds(thresholds) => thresholds.clone(),
+            Self::Spread(count) => vec![0.0; *count],
+            Self::Auto => vec![0.0; 10],
+        }
+    }
+}
+
+impl CreepKind {
+    /// Those given.
+    fn times(&self) -> &[f64] {
+        match self {
+            Self::Times(times) => times,
+            Self::Auto => &[],
+        }
+    }
 }
 
 /// Linear dynamics that can be searched.
@@ -42,6 +89,8 @@ pub enum DynamicsKind {
     First,
     /// A mode.
     Second,
+    /// What the record shows: a mode, the smallest lag that explains it, or none.
+    Auto,
 }
 
 /// A record: the displacement under a drive, judged from sample `start` on.
@@ -66,8 +115,15 @@ pub struct LeastSquaresFit {
     pub rms: f64,
     /// Simulations of the record.
     pub evaluations: usize,
-    /// Whether a time constant or a frequency lies on the edge of what was searched.
-    pub at_bound: bool,
+    /// Names of the parameters that lie on a bound of what was searched.
+    pub at_bound: Vec<String>,
+    /// What went before the record.
+    pub history: History,
+    /// State of the stage before the first sample.
+    pub start: Values,
+    /// Lags that explain the record within 1 % of the deviation, s; `None` where the record shows a
+    /// mode, or where the dynamics were set.
+    pub lag_range: Option<(f64, f64)>,
 }
 
 /// Identifies a stage of a model; `None` where `stop` said so meanwhile.
@@ -82,10 +138,11 @@ pub fn identify_weights(
 ) -> Result<Option<LeastSquaresFit>> {
     // What the settings are refused for, before anything else.
     let zeros = |count: usize| vec![0.0; count];
-    let weights = zeros(settings.thresholds.len());
     let zones = zeros(settings.zones);
-    PlayHysteresis::new(1.0, &settings.thresholds, &weights, &zones, &zones)?;
-    Relaxation::new(&zeros(settings.times.len()), &settings.times, Dynamics::None)?;
+    let thresholds = settings.plays.thresholds();
+    PlayHysteresis::new(1.0, &thresholds, &zeros(thresholds.len()), &zones, &zones)?;
+    let times = settings.creep.times();
+    Relaxation::new(&zeros(times.len()), times, Dynamics::None)?;
     check(record, settings)?;
     model.weighted(Search { record, settings, stop }).unwrap_or_else(|| {
         let found = format!("'{}'", model.info().name);
@@ -108,8 +165,12 @@ impl WeightedVisitor for Search<'_> {
             let expected = format!("0: {} has no dead zones", M::INFO.title);
             return Err(Error::parameter("dead_zones", self.settings.zones, expected));
         }
-        let mut fit = Fit::<M>::new(self.record, self.settings, self.stop);
-        fit.run().then(|| fit.result()).transpose()
+        let common = Common::new(self.record, self.settings.offset, self.stop);
+        let found = choices::search::<M>(&common, self.settings);
+        let result = |(fit, lag_range): (Fit<'_, M>, _)| {
+            Ok(LeastSquaresFit { lag_range, ..fit.result()? })
+        };
+        found.map(result).transpose()
     }
 }
 
@@ -123,7 +184,7 @@ fn check(record: &WeightsRecord<'_>, settings: &Settings) -> Result<()> {
             expected: format!("{}, as many as u", drive.u.len()),
         });
     }
-    let unknowns = 2 + settings.thresholds.len() + settings.zones + settings.times.len();
+    let unknowns = 2 + settings.plays.thresholds().len() + settings.zones + settings.creep.times().len();
     let count = y.len().saturating_sub(start);
     if count < 2 * unknowns {
         return Err(Error::Data(format!(

@@ -1,0 +1,385 @@
+//! Which structure a record asks for: plays, history, creep, dynamics.
+//!
+//! Each is decided in turn on the least squares so far, and has to earn its place.
+
+use super::fit::{Common, Fit};
+use super::form::Form;
+use super::{CreepKind, DynamicsKind, PlaysKind, Settings};
+use crate::identify::history::History;
+use crate::identify::resonances::resonances;
+use crate::math::least;
+use crate::models::WeightedPlays;
+use crate::signal::{index, range};
+
+/// Rounds over the numbers of an envelope, at most.
+const SHAPE_ROUNDS: usize = 20;
+
+/// Least share by which a number of an envelope has to lower the deviation before it leaves the
+/// middle of its range: what a record does not determine is not changed.
+const SHAPE_GAIN: f64 = 0.1;
+
+/// Shares of the deviation that histories, creep, modes and more plays have to take away.
+const HISTORY_GAIN: f64 = 0.02;
+const CREEP_GAIN: f64 = 0.015;
+const MODE_GAIN: f64 = 0.02;
+const PLAYS_GAIN: f64 = 0.03;
+
+/// Deviations that differ by less than this share tell nothing.
+const SAME: f64 = 1.01;
+
+/// Gain of a step below which a choice is settled.
+const ROUGH: f64 = 1e-3;
+
+/// Rows that choices are made on, about.
+const ROWS: usize = 4000;
+
+/// Share of a fitted creep to start from.
+const FIRST_SHARE: f64 = 0.005;
+
+/// The best stage, and the lags that explain the record as well; `None` where stopped.
+pub(super) fn search<'a, M: WeightedPlays>(
+    common: &'a Common<'a>,
+    settings: &Settings,
+) -> Option<(Fit<'a, M>, Option<(f64, f64)>)> {
+    let thresholds = match &settings.plays {
+        PlaysKind::Thresholds(thresholds) => thresholds.clone(),
+        PlaysKind::Spread(count) => spread(common, *count, 1.0),
+        PlaysKind::Auto => spread(common, 10, 1.0),
+    };
+    let mut fit = Fit::<M>::new(common, &thresholds, settings.history.unwrap_or(History::Virgin));
+    fit.every = (common.record.y.len() - common.record.start).div_ceil(ROWS);
+    fit.settle(ROUGH)?;
+    search_shape(&mut fit)?;
+    place_corners(&mut fit, settings.zones);
+    fit.settle(ROUGH)?;
+    let mode = first_mode(&mut fit, settings)?;
+    if let CreepKind::Times(times) = &settings.creep {
+        fit.restructure(|fit| fit.times.clone_from(times));
+        fit.settle(ROUGH)?;
+    }
+    choose_history(&mut fit, settings)?;
+    choose_creep(&mut fit, settings)?;
+    let lags = choose_dynamics(&mut fit, settings, mode)?;
+    choose_plays(&mut fit, settings)?;
+    fit.every = 1;
+    fit.settle(1e-10)?;
+    Some((fit, lags))
+}
+
+/// Thresholds up to half of the drive's range; a `power` above 1 has more of them near 0.
+fn spread(common: &Common<'_>, count: usize, power: f64) -> Vec<f64> {
+    let (low, high) = range(common.record.drive.u);
+    let reach = 0.5 * (high - low);
+    let part = |i: usize| libm::pow(index(i) / index(count + 1), power);
+    (1..=count).map(|i| reach * part(i)).collect()
+}
+
+/// Spreads the dead zones over what comes out of the plays in the window.
+fn place_corners<M: WeightedPlays>(fit: &mut Fit<'_, M>, count: usize) {
+    let record = fit.common.record;
+    let mut plays = fit.plays_before();
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for (k, &volts) in record.drive.u.iter().enumerate() {
+        fit.push(&mut plays, volts);
+        if k >= record.start {
+            let value = fit.sum(&plays);
+            (low, high) = (low.min(value), high.max(value));
+        }
+    }
+    let corner = |j: usize| low + (high - low) * index(j) / index(count + 1);
+    fit.restructure(|fit| fit.corners = (1..=count).map(corner).collect());
+}
+
+/// The numbers of the envelope in turn, each from its range.
+fn search_shape<M: WeightedPlays>(fit: &mut Fit<'_, M>) -> Option<()> {
+    let ranges = M::shapes();
+    let mut released = vec![false; ranges.len()];
+    for _ in 0..SHAPE_ROUNDS {
+        let round = fit.rms;
+        for (i, &range) in ranges.iter().enumerate() {
+            let here = fit.clone();
+            let mut best = here.clone();
+            least(range, 1e-4, |place| {
+                let mut trial = here.clone();
+                trial.reshape(i, place);
+                trial.settle(1e-5)?;
+                let rms = trial.rms;
+                if rms < best.rms {
+                    best = trial;
+                }
+                Some(rms)
+            })?;
+            let gain = if released[i] { 0.0 } else { SHAPE_GAIN };
+            if best.rms < (1.0 - gain) * here.rms {
+                released[i] = true;
+                *fit = best;
+            }
+        }
+        if fit.rms > 0.99 * round {
+            break;
+        }
+    }
+    Some(())
+}
+
+/// Whether a mode was found, which is then part of the fit.
+fn first_mode<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -> Option<bool> {
+    if !matches!(settings.dynamics, DynamicsKind::Auto | DynamicsKind::Second) {
+        return Some(false);
+    }
+    let common = fit.common;
+    let record = common.record;
+    let found = resonances(&record.drive, record.y, record.start, 1, common.stop)?;
+    let Some(mode) = found.first() else { return Some(false) };
+    let mut trial = fit.clone();
+    trial.set_poles(Form::Second, &[libm::log(mode.frequency), libm::log(mode.damping_ratio)]);
+    trial.settle(ROUGH)?;
+    let better = trial.rms < (1.0 - MODE_GAIN) * fit.rms;
+    if better {
+        *fit = trial;
+    }
+    Some(better)
+}
+
+/// The fit with another history, as good as it gets.
+fn with_history<'a, M: WeightedPlays>(
+    fit: &Fit<'a, M>,
+    history: History,
+    from: f64,
+) -> Option<Fit<'a, M>> {
+    let mut trial = fit.clone();
+    trial.restructure(|trial| (trial.history, trial.from) = (history, from));
+    if history == History::Fitted {
+        for share in trial.layout().shares() {
+            trial.x[share] = trial.x[share].max(FIRST_SHARE);
+        }
+    }
+    trial.settle(ROUGH)?;
+    Some(trial)
+}
+
+/// The voltage that the stage came from.
+fn fitted_history<'a, M: WeightedPlays>(fit: &Fit<'a, M>) -> Option<Fit<'a, M>> {
+    let drive = fit.common.record.drive;
+    let (low, high) = range(drive.u);
+    let (first, reach) = (drive.u[0], high - low);
+    let parts = 16;
+    let mut best = with_history(fit, History::Fitted, first)?;
+    let mut width = 2.0 * reach / index(parts);
+    for i in 0..=parts {
+        let trial = with_history(&best, History::Fitted, first - reach + width * index(i))?;
+        if trial.rms < best.rms {
+            best = trial;
+        }
+    }
+    for _ in 0..7 {
+        width *= 0.5;
+        for from in [best.from - width, best.from + width] {
+            let trial = with_history(&best, History::Fitted, from)?;
+            if trial.rms < best.rms {
+                best = trial;
+            }
+        }
+    }
+    Some(best)
+}
+
+/// The history that was set, or the simplest one that explains the record.
+fn choose_history<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -> Option<()> {
+    match settings.history {
+        Some(History::Fitted) => *fit = fitted_history(fit)?,
+        Some(_) => {}
+        None => {
+            // With creep, or what it does would be taken for a history.
+            if settings.creep == CreepKind::Auto {
+                let times = creeps(fit).pop().unwrap_or_default();
+                fit.restructure(|fit| fit.times = times);
+                fit.settle(ROUGH)?;
+            }
+            let settled = with_history(fit, History::Settled, 0.0)?;
+            if settled.rms < (1.0 - HISTORY_GAIN) * fit.rms {
+                *fit = settled;
+            }
+            let fitted = fitted_history(fit)?;
+            if fitted.rms < (1.0 - HISTORY_GAIN) * fit.rms {
+                *fit = fitted;
+            }
+        }
+    }
+    Some(())
+}
+
+/// Time constants of the creep that a record may ask for, s.
+fn creeps<M: WeightedPlays>(fit: &Fit<'_, M>) -> Vec<Vec<f64>> {
+    let record = fit.common.record;
+    let length = record.drive.dt * index(record.y.len() - record.start);
+    let shortest = 10.0 * record.drive.dt;
+    let pair = |divisor: f64| vec![length / divisor, 10.0 * length / divisor];
+    [10.0, 30.0, 100.0].into_iter().map(pair).filter(|times| times[0] >= shortest).collect()
+}
+
+/// Creep where it was not set: none, or the two relaxations that explain most.
+fn choose_creep<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -> Option<()> {
+    if settings.creep != CreepKind::Auto {
+        return Some(());
+    }
+    let mut none = fit.clone();
+    none.restructure(|none| none.times = Vec::new());
+    none.settle(ROUGH)?;
+    let mut best: Option<Fit<'_, M>> = None;
+    for times in creeps(fit) {
+        let mut trial = none.clone();
+        trial.restructure(|trial| trial.times = times);
+        for share in trial.layout().shares() {
+            trial.x[share] = FIRST_SHARE;
+        }
+        trial.settle(ROUGH)?;
+        if best.as_ref().is_none_or(|best| trial.rms < best.rms) {
+            best = Some(trial);
+        }
+    }
+    *fit = match best {
+        Some(best) if best.rms < (1.0 - CREEP_GAIN) * none.rms => best,
+        _ => none,
+    };
+    Some(())
+}
+
+/// Mode or lag where they are not set, and the lags that explain the record as well.
+#[expect(clippy::option_option, reason = "stopped, or no lag to tell of")]
+fn choose_dynamics<M: WeightedPlays>(
+    fit: &mut Fit<'_, M>,
+    settings: &Settings,
+    mode: bool,
+) -> Option<Option<(f64, f64)>> {
+    match settings.dynamics {
+        DynamicsKind::None => Some(None),
+        DynamicsKind::First => {
+            *fit = best_lag(fit)?;
+            Some(None)
+        }
+        DynamicsKind::Second => {
+            if !mode {
+                *fit = unseen_mode(fit)?;
+            }
+            Some(None)
+        }
+        DynamicsKind::Auto => {
+            let mut still = fit.clone();
+            if mode {
+                still.set_poles(Form::None, &[]);
+                still.settle(ROUGH)?;
+            }
+            let lagging = best_lag(&still)?;
+            if mode && fit.rms < (1.0 - MODE_GAIN) * lagging.rms {
+                return Some(None);
+            }
+            let (chosen, lags) = smallest_lag(still, lagging)?;
+            *fit = chosen;
+            Some(Some(lags))
+        }
+    }
+}
+
+/// The fit with the lag that explains most.
+fn best_lag<'a, M: WeightedPlays>(fit: &Fit<'a, M>) -> Option<Fit<'a, M>> {
+    let ranges = Form::First.ranges(&fit.common.record.drive, fit.common.record.start);
+    let bounds = (libm::exp(ranges[0].0), libm::exp(ranges[0].1));
+    let mut best: Option<Fit<'a, M>> = None;
+    least(bounds, 0.1, |time| {
+        let trial = at_lag(fit, time)?;
+        let rms = trial.rms;
+        if best.as_ref().is_none_or(|best| rms < best.rms) {
+            best = Some(trial);
+        }
+        Some(rms)
+    })?;
+    let mut best = best?;
+    best.settle(1e-5)?;
+    Some(best)
+}
+
+/// The fit with a lag of so many seconds, which is held.
+fn at_lag<'a, M: WeightedPlays>(fit: &Fit<'a, M>, time: f64) -> Option<Fit<'a, M>> {
+    let mut trial = fit.clone();
+    trial.set_poles(Form::First, &[libm::log(time)]);
+    trial.held = true;
+    trial.settle(ROUGH)?;
+    trial.held = false;
+    Some(trial)
+}
+
+/// The smallest lag that explains the record as well as the best one, and the range of such lags.
+fn smallest_lag<'a, M: WeightedPlays>(
+    still: Fit<'a, M>,
+    best: Fit<'a, M>,
+) -> Option<(Fit<'a, M>, (f64, f64))> {
+    let time = libm::exp(best.x[best.layout().poles().start]);
+    let enough = SAME * f64::min(best.rms, still.rms);
+    let as_good = |time: f64| Some(at_lag(&best, time)?.rms <= enough);
+    let longest = libm::exp(best.pole_ranges()[0].1);
+    let mut high = time;
+    while high < longest && as_good(1.5 * high)? {
+        high *= 1.5;
+    }
+    let mut beyond = 1.5 * high;
+    for _ in 0..4 {
+        let middle = 0.5 * (high + beyond);
+        if as_good(middle)? { high = middle } else { beyond = middle }
+    }
+    if still.rms <= enough {
+        return Some((still, (0.0, high)));
+    }
+    let (mut low, mut short) = (time, 0.0);
+    for _ in 0..6 {
+        let middle = 0.5 * (low + short);
+        if as_good(middle)? { low = middle } else { short = middle }
+    }
+    let mut chosen = at_lag(&best, low)?;
+    chosen.held = true;
+    Some((chosen, (low, high)))
+}
+
+/// A mode that the record does not show: as high and as little damped as the record allows.
+fn unseen_mode<'a, M: WeightedPlays>(fit: &Fit<'a, M>) -> Option<Fit<'a, M>> {
+    let dt = fit.common.record.drive.dt;
+    let mut best: Option<Fit<'a, M>> = None;
+    for (frequency, damping_ratio) in [(0.4, 0.1), (0.4, 1.0), (0.1, 0.1), (0.1, 1.0), (0.02, 1.0)] {
+        let mut trial = fit.clone();
+        trial.set_poles(Form::Second, &[libm::log(frequency / dt), libm::log(damping_ratio)]);
+        trial.settle(ROUGH)?;
+        if best.as_ref().is_none_or(|best| SAME * trial.rms < best.rms) {
+            best = Some(trial);
+        }
+    }
+    best
+}
+
+/// More plays, where they foretell a part of the window that they were not fitted to.
+fn choose_plays<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -> Option<()> {
+    if settings.plays != PlaysKind::Auto {
+        return Some(());
+    }
+    let window = fit.window.clone();
+    let split = window.start + 2 * window.len() / 3;
+    let foretold = |fit: &Fit<'_, M>| {
+        let mut trial = fit.clone();
+        trial.window = window.start..split;
+        trial.settle(ROUGH)?;
+        trial.window = split..window.end;
+        Some(trial.deviation())
+    };
+    let mut least = (1.0 - PLAYS_GAIN) * foretold(fit)?;
+    let here = fit.clone();
+    for (count, power) in [(20, 1.0), (20, 1.5)] {
+        let mut trial = here.clone();
+        trial.restructure(|trial| trial.thresholds = spread(trial.common, count, power));
+        trial.settle(ROUGH)?;
+        let rms = foretold(&trial)?;
+        if rms < least {
+            least = rms;
+            *fit = trial;
+        }
+    }
+    Some(())
+}

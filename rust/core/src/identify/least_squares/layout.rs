@@ -1,0 +1,129 @@
+//! The unknowns of a fit in one list, and the bounds of each.
+
+use core::f64::consts::LN_2;
+use core::ops::Range;
+
+use super::form::Form;
+use crate::math::{FREE, NOT_NEGATIVE};
+
+/// Bounds of the weight of a dead zone.
+const BEND: (f64, f64) = (-0.5, 1.0);
+
+/// Bounds of the slope beyond any number of dead zones, relative to that before them.
+const SLOPE: (f64, f64) = (0.2, 3.0);
+
+/// Most that the relaxations of the creep add to the displacement, as a share.
+const MOST_CREEP: f64 = 0.5;
+
+/// How far a relaxation may stand from its equilibrium before a record, in strokes.
+const MOST_DEPARTURE: f64 = 1.0;
+
+/// Most that a number of the dynamics changes by in one step, as a logarithm.
+const STRIDE: f64 = LN_2;
+
+/// How many unknowns there are of each sort, in this order.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Layout {
+    /// w0 above its least value, then the weights of the plays, m/V.
+    pub weights: usize,
+    /// Weights of the dead zones.
+    pub bends: usize,
+    /// Shares of the creep.
+    pub shares: usize,
+    /// What each relaxation stands at before the record, beyond its equilibrium, m.
+    pub departures: usize,
+    /// Displacement that the sensor shows at rest, m: none or one.
+    pub offset: usize,
+    /// Logarithms of the numbers of the dynamics.
+    pub poles: usize,
+}
+
+impl Layout {
+    pub fn weights(&self) -> Range<usize> {
+        0..self.weights
+    }
+
+    pub fn bends(&self) -> Range<usize> {
+        self.weights..self.weights + self.bends
+    }
+
+    pub fn shares(&self) -> Range<usize> {
+        self.bends().end..self.bends().end + self.shares
+    }
+
+    pub fn departures(&self) -> Range<usize> {
+        self.shares().end..self.shares().end + self.departures
+    }
+
+    pub fn offset(&self) -> Range<usize> {
+        self.departures().end..self.departures().end + self.offset
+    }
+
+    pub fn poles(&self) -> Range<usize> {
+        self.offset().end..self.offset().end + self.poles
+    }
+
+    pub fn count(&self) -> usize {
+        self.poles().end
+    }
+
+    /// Bounds for a step from `x`; `stroke` in m.
+    pub fn bounds(
+        &self,
+        x: &[f64],
+        held: bool,
+        ranges: &[(f64, f64)],
+        stroke: f64,
+    ) -> Vec<(f64, f64)> {
+        let mut bounds = vec![NOT_NEGATIVE; self.weights];
+        bounds.extend(vec![BEND; self.bends]);
+        bounds.extend(vec![(0.0, MOST_CREEP); self.shares]);
+        bounds.extend(vec![(-MOST_DEPARTURE * stroke, MOST_DEPARTURE * stroke); self.departures]);
+        bounds.extend(vec![FREE; self.offset]);
+        let stride = if held { 0.0 } else { STRIDE };
+        bounds.extend(x[self.poles()].iter().zip(ranges).map(|(at, (low, high))| {
+            let at = at.min(*high).max(*low);
+            (f64::max(*low, at - stride), f64::min(*high, at + stride))
+        }));
+        bounds
+    }
+
+    /// Sums of unknowns that have bounds too: from, to (exclusive), least and most.
+    pub fn sums(&self) -> Vec<(Range<usize>, (f64, f64))> {
+        let bends = self.bends();
+        let slopes = (bends.start + 1..bends.end)
+            .map(|end| (bends.start..end + 1, (SLOPE.0 - 1.0, SLOPE.1 - 1.0)));
+        let creep = (self.shares > 1).then(|| (self.shares(), (0.0, MOST_CREEP)));
+        slopes.chain(creep).collect()
+    }
+
+    /// Whether all sums lie within their bounds, but for rounding.
+    pub fn admits(&self, x: &[f64]) -> bool {
+        self.sums().into_iter().all(|(part, (low, high))| {
+            let sum: f64 = x[part].iter().sum();
+            sum > low - 1e-6 && sum < high + 1e-6
+        })
+    }
+
+    /// Names of the unknowns that lie on a bound, but for shares and weights of 0.
+    pub fn at_bound(&self, x: &[f64], form: Form, ranges: &[(f64, f64)]) -> Vec<String> {
+        let near = |value: f64, bound: f64| (value - bound).abs() < 1e-3;
+        let mut names = Vec::new();
+        for (j, bend) in x[self.bends()].iter().enumerate() {
+            let sum: f64 = x[self.bends()][..=j].iter().sum();
+            if near(*bend, BEND.0) || near(*bend, BEND.1) || near(1.0 + sum, SLOPE.0) {
+                names.push(format!("dead_zone_weights[{j}]"));
+            }
+        }
+        if near(x[self.shares()].iter().sum(), MOST_CREEP) {
+            names.push("creep_weights".into());
+        }
+        let poles = form.names().iter().zip(&x[self.poles()]).zip(ranges);
+        for ((name, at), (low, high)) in poles {
+            if at - low < 0.01 || high - at < 0.01 {
+                names.push((*name).into());
+            }
+        }
+        names
+    }
+}
