@@ -66,6 +66,7 @@ def identify(
     stiffness: float | None,
     offset: bool,
     delay: tuple[float, float] | None,
+    creep: list[float] | None,
     settings: SwarmSettings,
     seed: int,
     runs: int,
@@ -177,6 +178,8 @@ class Search:
     def rms(self) -> float: ...
     @property
     def offset(self) -> float: ...
+    @property
+    def creep(self) -> tuple[list[float], list[float]]: ...
     @property
     def iterations(self) -> int: ...
     @property

@@ -35,6 +35,7 @@ def identify(
     stiffness: float | None = None,
     offset: bool = True,
     delay: bool | float | tuple[float, float] | None = None,
+    creep: bool | Iterable[float] | None = None,
     swarm: ParticleSwarm | None = None,
     least_squares: LeastSquares | None = None,
     seed: int | None = None,
@@ -96,6 +97,13 @@ def identify(
         readings cause it: none (False, the default), fitted (True), known (a number), or fitted
         between two bounds. Under one slow sine the effect of a delay is that of damping; a drive
         of several frequencies separates the two.
+    creep : bool or iterable of float, optional
+        Creep of the stage: none (False, the default), relaxations with these time constants [s],
+        three at most, or two whose time constants follow from the record (True): at a quarter and
+        three quarters, on a logarithmic scale, of the times from ten samples, or a tenth of the
+        drive's period, to half of the window. Their weights, 0.5 together at most, are the best
+        for each candidate, by linear least squares, and add nothing to what the swarm searches.
+        For models found by least squares, see ``LeastSquares.creep``.
     swarm : ParticleSwarm, optional
         Settings of the swarm.
     least_squares : LeastSquares, optional
@@ -159,6 +167,7 @@ def identify(
         "bounds": bounds,
         "stiffness": stiffness,
         "delay": delay,
+        "creep": creep,
         "swarm": swarm,
         "seed": seed,
         "runs": runs,

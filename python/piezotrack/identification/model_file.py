@@ -120,6 +120,9 @@ def read_model(path: str | os.PathLike[str]) -> dict[str, Any]:
             _from_version_1(document, searched=info.searched)
         parameters = document["parameters"]
         for one in info.parameters:
+            if one.is_list and one.is_optional and one.name not in parameters:
+                # Files of versions without creep.
+                parameters[one.name] = {"value": [], "unit": one.unit}
             require_unit(one.name, parameters[one.name], one.unit)
         values = {one.name: parameters[one.name]["value"] for one in info.parameters}
         for one in info.parameters:

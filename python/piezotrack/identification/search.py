@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from .. import _core
+from .._support.arguments import as_numbers
 from .._support.messages import quoted
 from .._support.progress_bar import ProgressBar
 from ..data import diagnostics
@@ -38,6 +39,7 @@ def search(
     bounds: object = None,
     stiffness: object = None,
     delay: object = None,
+    creep: object = None,
     swarm: object = None,
     seed: object = None,
     runs: object = None,
@@ -55,7 +57,8 @@ def search(
         The model.
     offset : bool
         Whether an offset of the sensor is fitted.
-    free, fixed, initial, bounds, stiffness, delay, swarm, seed, runs, threads, progress, callback
+    free, fixed, initial, bounds, stiffness, delay, creep, swarm, seed, runs, threads, progress, \
+    callback
         As for `identify`, not yet checked; None stands for the default.
 
     Returns
@@ -77,6 +80,7 @@ def search(
         raise ParameterError(f"callback is {quoted(callback)}: expected a function, or None")
     seed = 0 if seed is None else _core.as_count("seed", seed)
     searched_delay = _delay(False if delay is None else delay)
+    creep_times = _creep_times(False if creep is None else creep)
     held = _held(initial, fixed, free, bounds)
     diagnostics.check_record(data, searches_hysteresis=bool(set(info.hysteresis) - set(held)))
     full = data.full
@@ -94,6 +98,7 @@ def search(
             stiffness=None if stiffness is None else _core.as_number("stiffness", stiffness),
             offset=offset,
             delay=searched_delay,
+            creep=creep_times,
             settings=swarm._core,
             seed=seed,
             runs=DEFAULT_RUNS if runs is None else _core.as_count("runs", runs),
@@ -180,6 +185,18 @@ def _delay(delay: object) -> tuple[float, float] | None:
     return known, known
 
 
+def _creep_times(creep: object) -> list[float] | None:
+    """Time constants of the creep: None if the core chooses them, empty if there is none."""
+    if isinstance(creep, bool):
+        return None if creep else []
+    if not isinstance(creep, Iterable) or isinstance(creep, str):
+        raise ParameterError(
+            f"creep is {quoted(creep)}: expected True, False or time constants in seconds, "
+            "as [0.1, 1.0]"
+        )
+    return list(as_numbers("creep", creep))
+
+
 def _identification(
     info: ModelInfo,
     found: _core.Search,
@@ -196,14 +213,16 @@ def _identification(
         parameters[one["name"]] = Estimate(
             one["value"], unit, symbol, bounds is not None, bounds, deviation, at_bound
         )
-    values = {name: estimate.value for name, estimate in parameters.items()}
-    delay = values["delay"]
+    values = {name: [estimate.value] for name, estimate in parameters.items()}
+    (delay,) = values.pop("delay")
+    values["creep_weights"], values["creep_times"] = found.creep
     if delay == 0.0 and not parameters["delay"].free:
         del parameters["delay"]
     details: dict[str, Any] = {
         "parameters": {
             name: _details(estimate) for name, estimate in parameters.items() if name != "delay"
-        },
+        }
+        | {"creep_weights": {"free": True}, "creep_times": {"free": False}},
         "delay": _details(parameters["delay"]) if "delay" in parameters else {},
         "fit": {
             "cost": {"value": found.rms, "unit": "m"},
@@ -219,7 +238,7 @@ def _identification(
         "provenance": provenance(data, seed=seed, swarm=asdict(swarm)),
     }
     return Identification(
-        model=stage_class(info)._from((one.name, [values[one.name]]) for one in info.parameters),
+        model=stage_class(info)._from(values.items()),
         delay=delay,
         offset=found.offset,
         offset_fitted=offset,

@@ -63,7 +63,8 @@ pub use error::{Error, Result};
 pub use feedback_law::Feedback;
 pub use filters::{Filter, FilterState};
 pub use inverse::{
-    BoucWenInverse, BoucWenInverseState, DahlInverse, FeedbackInverse, FeedbackInverseState,
+    BoucWenInverse, BoucWenInverseState, CreepingInverse, CreepingInverseState, DahlInverse,
+    FeedbackInverse, FeedbackInverseState,
     FirstOrderDahlInverse, InputInverse, InputInverseState, Inverse, InverseState, OperatorInverse,
     OscillatorInverse, PlayInverse, PrandtlIshlinskiiInverse, SampledDahlInverse,
 };

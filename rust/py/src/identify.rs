@@ -2,7 +2,7 @@
 
 use numpy::PyArray1;
 use piezotrack_core::identify::{
-    Coordinate, DELAY, Delay, Identification, Outcome, Plan, Record, Spec, StopReason,
+    Coordinate, DELAY, Delay, Identification, Outcome, Plan, Record, Spec, StopReason, creep_times,
     identify as identified,
 };
 use piezotrack_core::integrator::Order;
@@ -53,7 +53,7 @@ impl PySearch {
     #[getter]
     fn estimates(&self) -> Vec<Estimate> {
         let problem = &self.found.problem;
-        let names = problem.model.info().parameters.iter().map(|info| info.name);
+        let names = problem.model.scalars().iter().map(|info| info.name);
         let places = names.enumerate().chain([(DELAY, "delay")]);
         let estimate = |(place, name)| {
             let bounds = match problem.coordinates[place] {
@@ -80,6 +80,13 @@ impl PySearch {
     #[getter]
     fn offset(&self) -> f64 {
         self.outcome.costs.offset
+    }
+
+    /// Shares and time constants (s) of the creep.
+    #[getter]
+    fn creep(&self) -> (Vec<f64>, Vec<f64>) {
+        let times = self.found.problem.creep_times.clone();
+        (self.outcome.costs.shares[..times.len()].to_vec(), times)
     }
 
     #[getter]
@@ -139,12 +146,13 @@ impl PySearch {
     }
 }
 
-/// Identifies a stage, its `delay` between two bounds, known where they are equal, or
+/// Identifies a stage with creep of these time constants, or with those that suit the record where
+/// there are none, and its `delay` between two bounds, known where they are equal, or
 /// between bounds of its own choice where there are none; None where the search was stopped before
 /// its first cost.
 #[pyfunction]
 #[pyo3(signature = (*, model, u, y, dt, hold_name, start, free, fixed, bounds, stiffness, offset,
-    delay, settings, seed, runs, threads, callback, progress))]
+    delay, creep, settings, seed, runs, threads, callback, progress))]
 #[expect(clippy::too_many_arguments, reason = "keyword-only, called from one place")]
 fn identify(
     py: Python<'_>,
@@ -160,6 +168,7 @@ fn identify(
     stiffness: Option<f64>,
     offset: bool,
     delay: Option<(f64, f64)>,
+    creep: Option<Vec<f64>>,
     settings: &PySettings,
     seed: u64,
     runs: usize,
@@ -175,11 +184,12 @@ fn identify(
         Some((low, high)) => Delay::Between(low, high),
     };
     let model = Model::named(model).map_err(|error| raise(&error))?;
-    let spec = Spec { model, free, fixed, bounds, stiffness, offset, delay };
+    let mut spec = Spec { free, fixed, bounds, stiffness, offset, delay, ..Spec::of(model) };
     let plan = Plan { settings: settings.0.clone(), seed, runs };
     let watchers = Watchers { callback, progress };
     let found = enter_pool(py, threads, &watchers, |monitor, stop| {
         let record = Record::new(&u, &y, dt, hold(hold_name)?, start)?;
+        spec.creep_times = creep.map_or_else(|| creep_times(&record), Ok)?;
         identified(&record, &spec, &plan, monitor, stop)
     })?;
     Ok(found.best.map(|best| PySearch { outcome: found.runs[best].clone(), found }))

@@ -5,12 +5,14 @@
 //! the derivatives where they are not known and compensates offset and delay.
 
 mod bouc_wen;
+mod creeping;
 mod dahl;
 mod feedback;
 mod input;
 mod play;
 
 pub use bouc_wen::{BoucWenInverse, BoucWenInverseState};
+pub use creeping::{CreepingInverse, CreepingInverseState};
 pub use dahl::{DahlInverse, InverseState, SampledDahlInverse};
 pub use feedback::{
     FeedbackInverse, FeedbackInverseState, FirstOrderDahlInverse, OscillatorInverse,

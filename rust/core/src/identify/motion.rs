@@ -14,7 +14,7 @@ pub(super) fn motion(
     stop: Stop<'_>,
 ) -> Option<[Vec<f64>; 2]> {
     let parameters = theta.parameters();
-    let held = Held::all(model.info().parameters, &parameters);
+    let held = Held::all(model.scalars(), &parameters);
     let one = One { parameters, drive, substeps: stepping.substeps, stop };
     model.kernel(&held, stepping.order, one).flatten()
 }

@@ -3,6 +3,7 @@
 use super::bounds;
 use super::candidate::{DELAY, PLACES, Theta};
 use super::coordinate::Coordinate;
+use super::creep_shares::check_times;
 use super::record::Record;
 use crate::error::{Error, Result, positive, shown};
 use crate::integrator::MOST_PARAMETERS;
@@ -26,6 +27,8 @@ pub struct Spec {
     pub offset: bool,
     /// Delay of the displacement, s.
     pub delay: Delay,
+    /// Time constants of the creep whose shares are fitted, s; none for no creep.
+    pub creep_times: Vec<f64>,
 }
 
 impl Spec {
@@ -40,6 +43,7 @@ impl Spec {
             stiffness: None,
             offset: false,
             delay: Delay::default(),
+            creep_times: Vec::new(),
         }
     }
 }
@@ -99,6 +103,8 @@ pub struct Problem {
     pub scale_assumed: bool,
     /// Whether an offset is fitted.
     pub offset: bool,
+    /// Time constants of the creep whose shares are fitted, s.
+    pub creep_times: Vec<f64>,
 }
 
 /// A value for each scalar parameter, where there is one.
@@ -115,7 +121,7 @@ impl Problem {
     /// that is both fixed and free or has no value, and where all the parameters that carry
     /// force are free.
     pub fn new(record: &Record<'_>, spec: &Spec) -> Result<Self> {
-        let infos = spec.model.info().parameters;
+        let infos = spec.model.scalars();
         if spec.model.found_by() != FoundBy::Swarm {
             let found = format!("'{}'", spec.model.info().name);
             return Err(Error::parameter("model", found, "one that a swarm searches"));
@@ -166,7 +172,9 @@ impl Problem {
                 "stiffness=, or a value other than 0 for another of them in fixed=",
             ));
         }
-        let problem = Self { model: spec.model, coordinates, scale_assumed, offset: spec.offset };
+        check_times(&spec.creep_times)?;
+        let (offset, creep_times) = (spec.offset, spec.creep_times.clone());
+        let problem = Self { model: spec.model, coordinates, scale_assumed, offset, creep_times };
         problem.check_corners()?;
         Ok(problem)
     }
@@ -190,7 +198,7 @@ impl Problem {
     /// The parameters that all candidates share.
     #[must_use]
     pub fn held(&self) -> Held {
-        let mut held = Held::defaults(self.model.info().parameters);
+        let mut held = Held::defaults(self.model.scalars());
         for (slot, coordinate) in held.values.iter_mut().zip(&self.coordinates) {
             *slot = match coordinate {
                 Coordinate::Fixed(value) => Some(*value),
@@ -228,7 +236,7 @@ impl Problem {
 
 /// Values of `fixed=` and `stiffness=`, with the model's defaults.
 fn fixed_values(spec: &Spec) -> Result<Fixed> {
-    let infos = spec.model.info().parameters;
+    let infos = spec.model.scalars();
     let mut fixed: Fixed = [None; MOST_PARAMETERS];
     for (name, value) in &spec.fixed {
         let i = position(infos, "fixed", name)?;
@@ -255,7 +263,7 @@ fn fixed_values(spec: &Spec) -> Result<Fixed> {
 
 /// Refuses held values with which no stage exists, by their own names.
 fn check_fixed(model: Model, fixed: &Fixed) -> Result<()> {
-    let defaults = Held::defaults(model.info().parameters).values;
+    let defaults = Held::defaults(model.scalars()).values;
     let value = |i: usize| fixed[i].or(defaults[i]).unwrap_or(1.0);
     model.check(&core::array::from_fn(value))
 }
@@ -265,7 +273,7 @@ fn free_parameters(spec: &Spec, fixed: &mut Fixed) -> Result<Free> {
     let Some(names) = &spec.free else {
         return Ok(fixed.map(|value| value.is_none()));
     };
-    let infos = spec.model.info().parameters;
+    let infos = spec.model.scalars();
     let mut free: Free = [false; MOST_PARAMETERS];
     for name in names {
         let i = position(infos, "free", name)?;
