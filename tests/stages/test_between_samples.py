@@ -91,9 +91,7 @@ def test_it_is_the_answer_of_the_mode_to_the_path_between(rate: float) -> None:
     found = replace(PLAYS, **BEHIND["mode"]).simulate(u, 1.0 / rate)
     assert np.abs(found.x - x).max() < ACCURACY
     # That of a drive which goes straight in the hysteresis' output instead is micrometres off.
-    wrong = signal.lsim(
-        ([wn * wn], [1.0, 2.0 * zeta * wn, wn * wn]), h[::FINELY], t[::FINELY]
-    )[1]
+    wrong = signal.lsim(([wn * wn], [1.0, 2.0 * zeta * wn, wn * wn]), h[::FINELY], t[::FINELY])[1]
     assert np.abs(wrong - x).max() > 1e-7
 
 

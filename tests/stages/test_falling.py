@@ -96,9 +96,7 @@ def test_it_is_controlled_with_a_negative_gain() -> None:
     stage = falling(replace(STAGE, **BEHIND))
     reference = pt.sine(frequency=5.0, low=-40e-6, high=0.0, duration=1.0)
     pid = pt.Pid.from_um(kp=-0.05, ti=0.002, td=0.0)
-    loop = pt.Controller(
-        dt=1e-4, limits=(-10.0, 75.0), feedforward=stage.inverse(), feedback=pid
-    )
+    loop = pt.Controller(dt=1e-4, limits=(-10.0, 75.0), feedforward=stage.inverse(), feedback=pid)
     assert pt.track(stage, loop, reference).metrics.rms_error < 50e-9
 
 

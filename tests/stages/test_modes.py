@@ -50,7 +50,10 @@ def scipys(stage: Any, d: np.ndarray, dt: float) -> np.ndarray:
     """The sum of the modes of SciPy for a static displacement linear between samples."""
     t = np.arange(d.size) * dt
     return np.sum(
-        [g * signal.lsim(([w * w], [1.0, 2.0 * z * w, w * w]), d, t)[1] for g, w, z in parts(stage)],
+        [
+            g * signal.lsim(([w * w], [1.0, 2.0 * z * w, w * w]), d, t)[1]
+            for g, w, z in parts(stage)
+        ],
         axis=0,
     )
 

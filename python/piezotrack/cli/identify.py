@@ -80,6 +80,13 @@ def identify_command(
             help="Delay of the displacement in s: fitted, known, or bounds.",
         ),
     ] = None,
+    creep: Annotated[
+        str | None,
+        typer.Option(
+            metavar="fit|S,S,...",
+            help="Creep with weights fitted, and its time constants in s: from the record, or known.",
+        ),
+    ] = None,
     swarm: Annotated[
         str | None, typer.Option(help="Swarm settings: default, xu-li-2010 or spso-2011.")
     ] = None,
@@ -120,6 +127,7 @@ def identify_command(
         "stiffness": stiffness,
         "offset": offset,
         "delay": _delay(delay),
+        "creep": _creep(creep),
         "swarm": _swarm(swarm),
         "seed": seed,
         "runs": runs,
@@ -235,3 +243,9 @@ def _delay(text: str | None) -> bool | float | tuple[float, float] | None:
     if text is None or text == "fit":
         return None if text is None else True
     return number_range("--delay", text) if ":" in text else number("--delay", text)
+
+
+def _creep(text: str | None) -> bool | list[float] | None:
+    if text is None or text == "fit":
+        return None if text is None else True
+    return [number("--creep", part) for part in text.split(",")]

@@ -37,6 +37,7 @@ def identify(
     offset: bool = True,
     delay: bool | float | tuple[float, float] | None = None,
     history: History | None = None,
+    creep: bool | Iterable[float] | None = None,
     swarm: ParticleSwarm | None = None,
     least_squares: LeastSquares | None = None,
     seed: int | None = None,
@@ -106,6 +107,13 @@ def identify(
         (``"settled"``), or a voltage that is fitted with the rest, V (``"fit"``), with the creep
         that it left. Where it is not given, what the record shows: with more freedom only where
         that lowers the cost by 2 %.
+    creep : bool or iterable of float, optional
+        Creep of the stage: none (False, the default), relaxations with these time constants [s],
+        three at most, or two whose time constants follow from the record (True): at a quarter and
+        three quarters, on a logarithmic scale, of the times from ten samples, or a tenth of the
+        drive's period, to half of the window. Their weights, 0.5 together at most, are the best
+        for each candidate, by linear least squares, and add nothing to what the swarm searches.
+        For models found by least squares, see ``LeastSquares.creep``.
     swarm : ParticleSwarm, optional
         Settings of the swarm.
     least_squares : LeastSquares, optional
@@ -170,6 +178,7 @@ def identify(
         "bounds": bounds,
         "stiffness": stiffness,
         "delay": delay,
+        "creep": creep,
         "swarm": swarm,
         "seed": seed,
         "runs": runs,

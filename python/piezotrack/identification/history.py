@@ -30,7 +30,6 @@ __all__ = [
     "begin",
     "checked_history",
     "same_beginning",
-    "shown_history",
     "start_after",
     "start_entry",
     "start_of",
@@ -179,6 +178,26 @@ def same_beginning(start: Start | None, data: Dataset) -> bool:
     return start is not None and start.record == fingerprint(data)
 
 
+def start_of_fit(data: Dataset, history: History, state: StageState) -> Start:
+    """Start of a record whose state was fitted with the rest.
+
+    Parameters
+    ----------
+    data : Dataset
+        The record.
+    history : {"virgin", "settled", "fit"}
+        What the stage went through before.
+    state : StageState
+        State at the first sample.
+
+    Returns
+    -------
+    Start
+        The start, known by the beginning of the record.
+    """
+    return Start(history=history, state=state, voltage=None, record=fingerprint(data))
+
+
 def start_after(
     model: Stage, data: Dataset, history: History, voltage: float | None = None
 ) -> Start:
@@ -224,12 +243,6 @@ def _moved(state: Any, weights: Array, moved: Array) -> StageState:
     creep = tuple((np.array(state.creep) + moved).tolist())
     found: StageState = replace(state, creep=creep, x=state.x + float(weights @ moved))
     return found
-
-
-def shown_history(data: Dataset) -> History:
-    """Find what a record shows of the drive before it, whatever the model."""
-    del data
-    return "virgin"
 
 
 def begin(

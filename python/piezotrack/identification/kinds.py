@@ -61,7 +61,7 @@ def identify_kind(
         raise ParameterError(
             f"least_squares is {quoted(settings)}: expected a pt.identification.LeastSquares"
         )
-    return solve_least_squares(data, info, settings, offset)
+    return solve_least_squares(data, info, settings, offset, history)
 
 
 def refuse_given(info: ModelInfo, of_swarm: Mapping[str, object], least_squares: object) -> None:

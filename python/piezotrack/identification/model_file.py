@@ -31,8 +31,6 @@ NAMES_1 = {
     "bends": "dead_zone_weights",
     "creep_shares": "creep_weights",
 }
-# Lists that older files of version 2 lack: none of their models had any.
-ADDED = ("mode_weights", "mode_frequencies", "mode_damping_ratios")
 # Entries that are fields of a model; all others are its details.
 OWN = {
     "format",
@@ -126,8 +124,9 @@ def read_model(path: str | os.PathLike[str]) -> dict[str, Any]:
             _from_version_1(document, searched=info.searched)
         parameters = document["parameters"]
         for one in info.parameters:
-            if one.name in ADDED:
-                parameters.setdefault(one.name, {"value": [], "unit": one.unit})
+            if one.is_list and one.is_optional and one.name not in parameters:
+                # Files of versions without it.
+                parameters[one.name] = {"value": [], "unit": one.unit}
             require_unit(one.name, parameters[one.name], one.unit)
         values = {one.name: parameters[one.name]["value"] for one in info.parameters}
         for one in info.parameters:

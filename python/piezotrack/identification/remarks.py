@@ -105,10 +105,12 @@ def of_start(start: Start | None, data: Dataset) -> str | None:
     if start is None:
         return None
     unit, first = data.drive_unit, float(data.full.u[0])
+    volts = start.voltage
+    came_from = "another voltage" if volts is None else f"{volts:.4g} {unit}"
     before = {
         "virgin": "never moved before",
         "settled": "settled under the record's own drive",
-        "fit": f"having come from {start.voltage or 0.0:.4g} {unit}, which was fitted",
+        "fit": f"having come from {came_from}, which was fitted",
     }[start.history]
     return f"in equilibrium at {first:.4g} {unit}, {before}"
 

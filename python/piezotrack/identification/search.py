@@ -7,13 +7,15 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from .. import _core
+from .._support.arguments import as_numbers
 from .._support.messages import quoted
 from .._support.progress_bar import ProgressBar
 from ..data import diagnostics
 from ..errors import Interrupted, ParameterError
 from ..stages.registry import stage_class
 from .estimates import Estimate, LagRange, Progress, SwarmRun
-from .history import shown_history, start_after
+from .history import start_after
+from .least_squares import shown_history
 from .model_file import provenance
 from .result import Identification
 from .step_response import StepResult
@@ -43,6 +45,7 @@ def search(
     stiffness: object = None,
     delay: object = None,
     history: History | None = None,
+    creep: object = None,
     swarm: object = None,
     seed: object = None,
     runs: object = None,
@@ -62,7 +65,8 @@ def search(
         Whether an offset of the sensor is fitted.
     history : {"virgin", "settled", "fit"} or None
         What the stage went through before the record; None for what the record shows.
-    free, fixed, initial, bounds, stiffness, delay, swarm, seed, runs, threads, progress, callback
+    free, fixed, initial, bounds, stiffness, delay, creep, swarm, seed, runs, threads, progress, \
+    callback
         As for `identify`, not yet checked; None stands for the default.
 
     Returns
@@ -84,6 +88,7 @@ def search(
         raise ParameterError(f"callback is {quoted(callback)}: expected a function, or None")
     seed = 0 if seed is None else _core.as_count("seed", seed)
     searched_delay = _delay(False if delay is None else delay)
+    creep_times = _creep_times(False if creep is None else creep)
     held = _held(initial, fixed, free, bounds)
     diagnostics.check_record(data, searches_hysteresis=bool(set(info.hysteresis) - set(held)))
     full = data.full
@@ -103,6 +108,7 @@ def search(
             offset=offset,
             delay=searched_delay,
             history=history,
+            creep=creep_times,
             settings=swarm._core,
             seed=seed,
             runs=DEFAULT_RUNS if runs is None else _core.as_count("runs", runs),
@@ -189,6 +195,18 @@ def _delay(delay: object) -> tuple[float, float] | None:
     return known, known
 
 
+def _creep_times(creep: object) -> list[float] | None:
+    """Time constants of the creep: None if the core chooses them, empty if there is none."""
+    if isinstance(creep, bool):
+        return None if creep else []
+    if not isinstance(creep, Iterable) or isinstance(creep, str):
+        raise ParameterError(
+            f"creep is {quoted(creep)}: expected True, False or time constants in seconds, "
+            "as [0.1, 1.0]"
+        )
+    return list(as_numbers("creep", creep))
+
+
 def _identification(
     info: ModelInfo,
     found: _core.Search,
@@ -206,16 +224,23 @@ def _identification(
         parameters[one["name"]] = Estimate(
             one["value"], unit, symbol, bounds is not None, bounds, deviation, at_bound
         )
-    values = {name: estimate.value for name, estimate in parameters.items()}
-    delay = values["delay"]
+    values = {name: [estimate.value] for name, estimate in parameters.items()}
+    (delay,) = values.pop("delay")
+    values["creep_weights"], values["creep_times"] = found.creep
     if delay == 0.0 and not parameters["delay"].free:
         del parameters["delay"]
-    voltage = values["voltage_before"] if history == "fit" else None
-    if voltage is None:
+    (voltage,) = values.pop("voltage_before")
+    before = voltage if history == "fit" else None
+    if before is None:
         del parameters["voltage_before"]
-    model = stage_class(info)._from((one.name, [values[one.name]]) for one in info.parameters)
+    model = stage_class(info)._from(values.items())
     details: dict[str, Any] = {
-        "parameters": {one.name: _details(parameters[one.name]) for one in info.parameters},
+        "parameters": {
+            one.name: _details(parameters[one.name])
+            for one in info.parameters
+            if one.name in parameters
+        }
+        | {"creep_weights": {"free": True}, "creep_times": {"free": False}},
         "delay": _details(parameters["delay"]) if "delay" in parameters else {},
         "fit": {
             "cost": {"value": found.rms, "unit": "m"},
@@ -233,7 +258,7 @@ def _identification(
     return Identification(
         lags=None if found.lags is None else LagRange(*found.lags),
         model=model,
-        start=start_after(model, data, history, voltage),
+        start=start_after(model, data, history, before),
         delay=delay,
         offset=found.offset,
         offset_fitted=offset,

@@ -55,10 +55,13 @@ class StageState:
         Displacement [m].
     v : float
         Velocity [m/s].
+    creep : tuple of float
+        State q of each relaxation of the creep [m].
     """
 
     x: float = 0.0
     v: float = 0.0
+    creep: tuple[float, ...] = ()
 
     @property
     def _named(self) -> Named:
@@ -131,10 +134,24 @@ class Response:
 
 
 class Stage:
-    """Base class of the stage models.
+    r"""Base class of the stage models.
 
     A model is a frozen dataclass with one field for each parameter that the core lists for it,
     registered with the decorator `stage`.
+
+    Notes
+    -----
+    The displacement of every model may creep. Where x_m is that of hysteresis and mechanics,
+
+    .. math:: x = x_m + \sum_j c_j q_j, \qquad \tau_j \dot q_j = x_m - q_j
+
+    with weights c and times tau. Times a decade apart with equal weights make a creep that grows
+    with the logarithm of time, as that of piezoceramics does: Krejci and Kuhnen 2001, doi
+    10.1049/ip-cta:20010375. Without weights there is no creep. Between samples x_m is the cubic
+    through its values and velocities (in a closed loop, whose steps are short, a straight line).
+    The model begins in equilibrium: every q_j is x_m. The inverse takes off the creep first; a
+    loop is analysed without it, because it is slower. Models with play operators have their creep
+    before their dynamics.
     """
 
     info: ClassVar[ModelInfo]

@@ -61,6 +61,10 @@ class BoucWenStage(Stage):
     exponent : float, optional
         n, from 1 to 20: the sharpness of the bend. With 1 the hysteresis is exact in closed
         form; with another it is computed in short steps.
+    creep_weights : sequence of float, optional
+        c, final contribution of each relaxation of the creep as a share, 0 or above; 8 at most.
+    creep_times : sequence of float, optional
+        tau [s], as many: see `Stage`.
 
     Raises
     ------
@@ -92,6 +96,8 @@ class BoucWenStage(Stage):
     beta: float
     gamma: float
     exponent: float = 1.0
+    creep_weights: tuple[float, ...] = ()
+    creep_times: tuple[float, ...] = ()
 
     @classmethod
     def xu_li_2010(cls) -> BoucWenStage:

@@ -44,6 +44,10 @@ class BoucWenOscillator(Stage):
         here.
     exponent : float, optional
         nu, from 1 to 20: the sharpness of the bend.
+    creep_weights : sequence of float, optional
+        c, final contribution of each relaxation of the creep as a share, 0 or above; 8 at most.
+    creep_times : sequence of float, optional
+        tau [s], as many: see `Stage`.
 
     Raises
     ------
@@ -69,6 +73,8 @@ class BoucWenOscillator(Stage):
     gamma: float
     delta: float
     exponent: float = 1.0
+    creep_weights: tuple[float, ...] = ()
+    creep_times: tuple[float, ...] = ()
 
     @classmethod
     def benchmark(cls) -> BoucWenOscillator:

@@ -71,6 +71,10 @@ class DahlStage(Stage):
     up : float, optional
         Constant input of the operator. The motion depends only on the products of `up` with `b1`
         and `b0`.
+    creep_weights : sequence of float, optional
+        c, final contribution of each relaxation of the creep as a share, 0 or above; 8 at most.
+    creep_times : sequence of float, optional
+        tau [s], as many: see `Stage`.
 
     Raises
     ------
@@ -107,6 +111,8 @@ class DahlStage(Stage):
     b1: float
     b0: float = 0.0
     up: float = 30.0
+    creep_weights: tuple[float, ...] = ()
+    creep_times: tuple[float, ...] = ()
 
     @classmethod
     def xu_li_2010(cls) -> DahlStage:

@@ -43,6 +43,10 @@ class FirstOrderDahlStage(Stage):
         Fc [N], above 0: limit of the force on a long path in one direction.
     exponent : float, optional
         i, from 0 to 20: shape of the approach to Fc; linear up to sliding for 0, exponential for 1.
+    creep_weights : sequence of float, optional
+        c, final contribution of each relaxation of the creep as a share, 0 or above; 8 at most.
+    creep_times : sequence of float, optional
+        tau [s], as many: see `Stage`.
 
     Raises
     ------
@@ -76,6 +80,8 @@ class FirstOrderDahlStage(Stage):
     rest_stiffness: float
     coulomb_force: float
     exponent: float = 1.0
+    creep_weights: tuple[float, ...] = ()
+    creep_times: tuple[float, ...] = ()
 
     def force_ratios(self) -> list[Ratio]:
         """Return all but the exponent, which is held, forces over the stiffness."""

@@ -27,7 +27,7 @@ class Parameter(NamedTuple):
     held : str or None
         Why it is never searched; None if it can be.
     is_list, is_optional : bool
-        Whether it is a list of numbers; whether it may be None.
+        Whether it is a list of numbers; whether it may be left out.
     """
 
     name: str
@@ -71,7 +71,10 @@ class ModelInfo:
         return tuple(
             one.name
             for one in self.parameters
-            if self.searched and one.default is None and one.name not in MECHANICS
+            if self.searched
+            and one.default is None
+            and not one.is_list
+            and one.name not in MECHANICS
         )
 
     @property

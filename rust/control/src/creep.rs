@@ -17,10 +17,14 @@
 //! q1 = h1 - (p (h0 - q0 - r tau/T) + r tau/T)
 //! ```
 //!
+//! Behind mechanics, whose velocity is known too, the input is the cubic through values and slopes:
+//! [`CubicLag`].
+//!
 //! The relaxations are passed as slices, so that a model with room for more of them (the
 //! simulation's) and one of fixed size (the firmware's) run the same code.
 
 use crate::error::{Error, Result, not_negative, positive};
+use crate::number::Number;
 
 /// One relaxation of the creep.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -167,4 +171,76 @@ impl<const N: usize> CreepInverse<N> {
         state.input = input;
         input
     }
+}
+
+/// A first-order lag over steps of one length, in which its input is the cubic through its values
+/// and slopes at both ends.
+///
+/// ```text
+/// q1 = x1 + p (q0 - x1) + a (x0 - x1) + b h x0' + c h x1',   p = exp(-h/tau)
+/// ```
+///
+/// Exact for that cubic. The weights are the same for all inputs, so they serve one lag or lanes
+/// of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CubicLag {
+    /// p.
+    decay: f64,
+    /// a.
+    start: f64,
+    /// b and c.
+    slopes: [f64; 2],
+    /// h/tau.
+    rate: f64,
+}
+
+impl CubicLag {
+    /// The lag with time constant `time` (s) for steps of `step` seconds.
+    #[must_use]
+    pub fn new(time: f64, step: f64) -> Self {
+        let rate = step / time;
+        let [m0, m1, m2, m3] = moments(rate);
+        let start = m0 - 3.0 * m2 + 2.0 * m3;
+        let slopes = [m1 - 2.0 * m2 + m3, m3 - m2];
+        Self { decay: libm::exp(-rate), start, slopes, rate }
+    }
+
+    /// The output after one step from `output`; the input is given at the start and at the end
+    /// with its slope times the step.
+    #[must_use]
+    #[inline(always)]
+    pub fn step<N: Number>(&self, output: N, start: [N; 2], end: [N; 2]) -> N {
+        let [[x0, w0], [x1, w1]] = [start, end];
+        let number = |value: f64| x1.like(value);
+        let from = (output - x1).mul_add(number(self.decay), x1);
+        let from = (x0 - x1).mul_add(number(self.start), from);
+        let from = w0.mul_add(number(self.slopes[0]), from);
+        w1.mul_add(number(self.slopes[1]), from)
+    }
+
+    /// The output's slope times the step, at an input and an output.
+    #[must_use]
+    #[inline(always)]
+    pub fn slope<N: Number>(&self, input: N, output: N) -> N {
+        (input - output) * input.like(self.rate)
+    }
+}
+
+/// Moments `rate int_0^1 exp(-rate (1 - s)) s^k ds` for k from 0 to 3.
+fn moments(rate: f64) -> [f64; 4] {
+    if rate > 1.0 {
+        let m0 = -libm::expm1(-rate);
+        let m1 = 1.0 - m0 / rate;
+        let m2 = 1.0 - 2.0 * m1 / rate;
+        return [m0, m1, m2, 1.0 - 3.0 * m2 / rate];
+    }
+    // The recursion would cancel: the series rate sum_n (-rate)^n k!/(n + k + 1)!.
+    [1.0, 2.0, 3.0, 4.0].map(|order: f64| {
+        let (mut term, mut sum) = (rate / order, 0.0);
+        for n in 1..24 {
+            sum += term;
+            term *= -rate / (order + f64::from(n));
+        }
+        sum
+    })
 }

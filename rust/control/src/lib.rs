@@ -63,10 +63,10 @@ pub use error::{Error, Result};
 pub use feedback_law::Feedback;
 pub use filters::{Filter, FilterState};
 pub use inverse::{
-    BoucWenInverse, BoucWenInverseState, DahlInverse, FeedbackInverse, FeedbackInverseState,
-    FirstOrderDahlInverse, InputInverse, InputInverseState, Inverse, InverseState, ModesInverse,
-    ModesInverseState, OperatorInverse, OscillatorInverse, PlayInverse, PrandtlIshlinskiiInverse,
-    SampledDahlInverse,
+    BoucWenInverse, BoucWenInverseState, CreepingInverse, CreepingInverseState, DahlInverse,
+    FeedbackInverse, FeedbackInverseState, FirstOrderDahlInverse, InputInverse, InputInverseState,
+    Inverse, InverseState, ModesInverse, ModesInverseState, OperatorInverse, OscillatorInverse,
+    PlayInverse, PrandtlIshlinskiiInverse, SampledDahlInverse,
 };
 pub use limits::Limits;
 pub use measurement::{Refused, Span};

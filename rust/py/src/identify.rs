@@ -3,7 +3,7 @@
 use numpy::PyArray1;
 use piezotrack_core::identify::{
     BEFORE, Coordinate, DELAY, Delay, History, Identification, Outcome, Plan, Record, Spec,
-    StopReason, identify as identified, visited,
+    StopReason, creep_times, identify as identified, visited,
 };
 use piezotrack_core::integrator::Order;
 use piezotrack_core::models::Model;
@@ -56,7 +56,7 @@ impl PySearch {
     #[getter]
     fn estimates(&self) -> Vec<Estimate> {
         let problem = &self.found.problem;
-        let names = problem.model.info().parameters.iter().map(|info| info.name);
+        let names = problem.model.scalars().iter().map(|info| info.name);
         let places = names.enumerate().chain([(DELAY, "delay"), (BEFORE, "voltage_before")]);
         let estimate = |(place, name)| {
             let bounds = match problem.coordinates[place] {
@@ -83,6 +83,13 @@ impl PySearch {
     #[getter]
     fn offset(&self) -> f64 {
         self.outcome.costs.offset
+    }
+
+    /// Shares and time constants (s) of the creep.
+    #[getter]
+    fn creep(&self) -> (Vec<f64>, Vec<f64>) {
+        let times = self.found.problem.creep_times.clone();
+        (self.outcome.costs.shares[..times.len()].to_vec(), times)
     }
 
     #[getter]
@@ -182,12 +189,13 @@ fn voltages_before<'py>(
     array(py, voltages().map_err(|error| raise(&error))?.into_iter())
 }
 
-/// Identifies a stage, its `delay` between two bounds, known where they are equal, or
+/// Identifies a stage with creep of these time constants, or with those that suit the record where
+/// there are none, and its `delay` between two bounds, known where they are equal, or
 /// between bounds of its own choice where there are none; None where the search was stopped before
 /// its first cost.
 #[pyfunction]
 #[pyo3(signature = (*, model, u, y, dt, hold_name, start, free, fixed, bounds, stiffness, offset,
-    delay, history, settings, seed, runs, threads, callback, progress))]
+    delay, history, creep, settings, seed, runs, threads, callback, progress))]
 #[expect(clippy::too_many_arguments, reason = "keyword-only, called from one place")]
 fn identify(
     py: Python<'_>,
@@ -204,6 +212,7 @@ fn identify(
     offset: bool,
     delay: Option<(f64, f64)>,
     history: &str,
+    creep: Option<Vec<f64>>,
     settings: &PySettings,
     seed: u64,
     runs: usize,
@@ -220,11 +229,13 @@ fn identify(
     };
     let model = Model::named(model).map_err(|error| raise(&error))?;
     let history = history_named(history).map_err(|error| raise(&error))?;
-    let spec = Spec { model, free, fixed, bounds, stiffness, offset, delay, history };
+    let mut spec =
+        Spec { free, fixed, bounds, stiffness, offset, delay, history, ..Spec::of(model) };
     let plan = Plan { settings: settings.0.clone(), seed, runs };
     let watchers = Watchers { callback, progress };
     let found = enter_pool(py, threads, &watchers, |monitor, stop| {
         let record = Record::new(&u, &y, dt, hold(hold_name)?, start)?;
+        spec.creep_times = creep.map_or_else(|| creep_times(&record), Ok)?;
         identified(&record, &spec, &plan, monitor, stop)
     })?;
     Ok(found.best.map(|best| PySearch { outcome: found.runs[best].clone(), found }))

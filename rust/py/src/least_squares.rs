@@ -13,6 +13,7 @@ use pyo3::prelude::*;
 use crate::arrays::samples;
 use crate::enter::enter;
 use crate::errors::raise;
+use crate::identify::history_named;
 use crate::models::{Named, named};
 use crate::stage::hold;
 
@@ -87,18 +88,6 @@ fn dynamics_named(name: &str) -> Result<DynamicsKind> {
         other => {
             let expected = "'auto', None, 'first' or 'second'";
             Err(Error::parameter("dynamics", format!("'{other}'"), expected))
-        }
-    }
-}
-
-fn history_named(name: &str) -> Result<History> {
-    match name {
-        "virgin" => Ok(History::Virgin),
-        "settled" => Ok(History::Settled),
-        "fit" => Ok(History::Fitted),
-        other => {
-            let expected = "None, 'virgin', 'settled' or 'fit'";
-            Err(Error::parameter("history", format!("'{other}'"), expected))
         }
     }
 }

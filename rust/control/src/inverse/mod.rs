@@ -5,6 +5,7 @@
 //! the derivatives where they are not known and compensates offset and delay.
 
 mod bouc_wen;
+mod creeping;
 mod dahl;
 mod feedback;
 mod input;
@@ -12,6 +13,7 @@ mod modes;
 mod play;
 
 pub use bouc_wen::{BoucWenInverse, BoucWenInverseState};
+pub use creeping::{CreepingInverse, CreepingInverseState};
 pub use dahl::{DahlInverse, InverseState, SampledDahlInverse};
 pub use feedback::{
     FeedbackInverse, FeedbackInverseState, FirstOrderDahlInverse, OscillatorInverse,

@@ -32,7 +32,7 @@ pub fn derive(
             shown(of.frequency)
         )));
     }
-    let infos = model.info().parameters;
+    let infos = model.scalars();
     let mut held = Held::defaults(infos);
     held.values = *fixed;
     let ranges = model.ranges(&of, &held)?;

@@ -5,7 +5,8 @@
 //! ```
 //!
 //! Xu and Li 2010, equation (16), doi 10.1115/1.4001712. Where an offset is fitted, its best
-//! value for each candidate is the mean of the deviation, so the swarm does not search it.
+//! value for each candidate is the mean of the deviation, so the swarm does not search it; nor does
+//! it search the shares of the creep.
 //! Particles run in lockstep lanes, and no trajectory is stored.
 
 use piezotrack_control::Number;
@@ -13,6 +14,7 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::candidate::{BEFORE, Candidate, Theta};
+use super::creep_shares::ShareSums;
 use super::history::visited;
 use super::motion::motion;
 use super::problem::Problem;
@@ -23,8 +25,8 @@ use crate::integrator::{
     FeedbackState, Kernel, MOST_PARAMETERS, Mechanics, Stepping, SteppingLoop, halvings,
 };
 use crate::math::{Lanes, dispatch_vectors};
-use crate::models::{Held, KernelVisitor};
-use crate::signal::{Stop, index};
+use crate::models::{Held, KernelVisitor, relaxed};
+use crate::signal::{Stop, delayed, index};
 
 /// Computes costs of candidates for one problem, with the stepping fixed.
 pub struct Evaluator<'a> {
@@ -53,7 +55,8 @@ impl<'a> Evaluator<'a> {
             if problem.offset { window.iter().sum::<f64>() / index(window.len()) } else { 0.0 };
         let halvings = halvings(rate, record.drive.dt / index(stepping.substeps));
         let (held, arch) = (problem.held(), Arch::new());
-        let residuals = Residuals { record, offset: problem.offset, centre };
+        let creep_times = &problem.creep_times;
+        let residuals = Residuals { record, offset: problem.offset, centre, creep_times };
         let visited = visited(&record.drive, problem.history, f64::NAN);
         Self { residuals, problem, held, arch, stepping, halvings, visited }
     }
@@ -75,11 +78,37 @@ impl<'a> Evaluator<'a> {
         Evaluator { residuals, problem, held: problem.held(), arch, stepping, halvings, visited }
     }
 
-    /// Displacement and velocity of a candidate, stepped as its cost is; `None` where they are
-    /// not finite.
-    pub(super) fn motion(&self, theta: &Theta, stop: Stop<'_>) -> Option<[Vec<f64>; 2]> {
+    /// Displacement of a candidate as it is read in the window, with the best shares of the creep
+    /// but without offset, stepped as its cost is; `None` where it is not finite.
+    pub(super) fn reading(&self, theta: &Theta, stop: Stop<'_>) -> Option<Vec<f64>> {
+        let Residuals { record, centre, creep_times, .. } = self.residuals;
+        let dt = record.drive.dt;
         let Problem { model, history, .. } = *self.problem;
-        motion(model, history, theta, &self.residuals.record.drive, self.stepping, stop)
+        let [x, v] = motion(model, history, theta, &record.drive, self.stepping, stop)?;
+        let read = |x: &[f64], v: &[f64]| -> Option<Vec<f64>> {
+            let read = delayed(x, v, dt, theta.delay()).ok()?;
+            Some(read[record.window.clone()].to_vec())
+        };
+        let mut total = read(&x, &v)?;
+        let outputs: Option<Vec<Vec<f64>>> = creep_times
+            .iter()
+            .map(|&time| relaxed(time, dt, None, [&x, &v]))
+            .map(|[q, slopes]| read(&q, &slopes))
+            .collect();
+        let outputs = outputs?;
+        if outputs.is_empty() {
+            return Some(total);
+        }
+        let mut sums = ShareSums::default();
+        for (k, (x, y)) in total.iter().zip(&record.y[record.window.clone()]).enumerate() {
+            let at: Vec<f64> = outputs.iter().map(|output| output[k] - centre).collect();
+            sums.add(y - centre - x, &at);
+        }
+        let shares = self.residuals.costs(&sums, total.len(), false).shares;
+        for (output, share) in outputs.iter().zip(shares) {
+            total.iter_mut().zip(output).for_each(|(x, q)| *x += share * q);
+        }
+        Some(total)
     }
 
     /// Costs of candidates, in their order, computed on the threads of the present pool.
@@ -179,13 +208,15 @@ impl<K: Kernel, const V: usize> WithSimd for Bundle<'_, K, V> {
         let stepping = SteppingLoop { coupling, gain };
         let residuals = &of.residuals;
         if const { V > 1 } {
-            let mut sums = ResidualSums::new(residuals, candidates, stop, zero, Direct);
+            let mut sums =
+                ResidualSums::new(residuals, candidates, stop, zero, index(substeps), || Direct);
             let ended = stepping.run(drive, substeps, start, &mut sums).is_some();
             sums.conclude(ended)
         } else {
             let delayed = || Delayed::new(candidates, drive.dt, x, index(substeps));
-            let reading = of.problem.has_delay().then(delayed);
-            let mut sums = ResidualSums::new(residuals, candidates, stop, zero, reading);
+            let reading = || of.problem.has_delay().then(delayed);
+            let mut sums =
+                ResidualSums::new(residuals, candidates, stop, zero, index(substeps), reading);
             let ended = stepping.run(drive, substeps, start, &mut sums).is_some();
             sums.conclude(ended)
         }

@@ -87,6 +87,9 @@ pub fn identify(
 /// Bytes of a thread for each sample: five motions' columns in the refinement.
 const COLUMNS: usize = 5 * size_of::<f64>();
 
+/// Bytes of a thread for each sample and relaxation of the creep: two columns, and one read.
+const RELAXATION: usize = 3 * size_of::<f64>();
+
 /// Bytes of a thread for each sample of the delay: displacement and velocity in eight lanes.
 const RING: usize = 16 * size_of::<f64>();
 
@@ -95,5 +98,7 @@ fn enough_memory(record: &Record<'_>, problem: &Problem) -> Result<()> {
     let threads = rayon::current_num_threads();
     let samples = record.drive.u.len();
     let delay = FractionalDelay::new(problem.longest_delay(), record.drive.dt).whole.min(samples);
-    available("the search", COLUMNS * samples + RING * delay, threads)
+    let relaxations = problem.creep_times.len();
+    let columns = (COLUMNS + RELAXATION * relaxations) * samples;
+    available("the search", columns + RING * (1 + relaxations) * delay, threads)
 }

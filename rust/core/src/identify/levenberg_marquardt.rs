@@ -15,7 +15,7 @@ use super::cost::Evaluator;
 use super::problem::Problem;
 use super::record::Record;
 use super::residual_sums::Costs;
-use crate::signal::{Stop, delayed, index};
+use crate::signal::{Stop, index};
 
 /// Most samples in the Jacobian: more would hardly change the result.
 const MOST_ROWS: usize = 200_000;
@@ -161,12 +161,12 @@ impl LocalRefinement<'_> {
         })
     }
 
-    /// Every stride-th sample of the window, simulated as the search does.
+    /// Every stride-th sample of the window, simulated as the search does, with the shares of the
+    /// creep that suit it best.
     fn displacement(&self, place: &[f64], stride: usize) -> Option<Vec<f64>> {
         let theta = self.problem.theta(place);
-        let [x, v] = self.evaluator.motion(&theta, self.stop)?;
-        let x = delayed(&x, &v, self.record.drive.dt, theta.delay()).ok()?;
-        Some(x[self.record.window.clone()].iter().step_by(stride).copied().collect())
+        let x = self.evaluator.reading(&theta, self.stop)?;
+        Some(x.iter().step_by(stride).copied().collect())
     }
 
     /// Takes the mean off where an offset is fitted.

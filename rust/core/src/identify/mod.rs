@@ -4,6 +4,7 @@ pub mod bounds;
 mod candidate;
 mod coordinate;
 mod cost;
+mod creep_shares;
 mod cross_talk;
 mod history;
 mod identification;
@@ -25,13 +26,14 @@ mod swarm;
 pub use candidate::{BEFORE, Candidate, DELAY, PLACES, Theta};
 pub use coordinate::{Coordinate, Scale};
 pub use cost::Evaluator;
+pub use creep_shares::{MOST_CREEP, MOST_SHARES, Shares, creep_times};
 pub use cross_talk::{CrossTalk, cross_talk};
 pub use history::{History, visited};
 pub use identification::{Identification, identify};
 pub use lag::LagRange;
 pub use least_squares::{
-    CreepKind, DynamicsKind, LeastSquaresFit, PlaysKind, Settings as WeightsSettings, WeightsRecord,
-    identify_weights,
+    CreepKind, DynamicsKind, LeastSquaresFit, PlaysKind, Settings as WeightsSettings,
+    WeightsRecord, identify_weights,
 };
 pub use levenberg_marquardt::{LocalRefinement, Polished, Sensitivity};
 pub use problem::{Delay, Problem, Spec};

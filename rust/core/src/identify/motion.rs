@@ -16,7 +16,7 @@ pub(super) fn motion(
     stop: Stop<'_>,
 ) -> Option<[Vec<f64>; 2]> {
     let parameters = theta.parameters();
-    let held = Held::all(model.info().parameters, &parameters);
+    let held = Held::all(model.scalars(), &parameters);
     let voltages = visited(drive, history, theta.before());
     let one = One { parameters, voltages, drive, substeps: stepping.substeps, stop };
     model.kernel(&held, stepping.order, one).flatten()

@@ -3,6 +3,7 @@
 use super::bounds;
 use super::candidate::{BEFORE, DELAY, PLACES, Theta};
 use super::coordinate::Coordinate;
+use super::creep_shares::check_times;
 use super::history::{History, came_from};
 use super::record::Record;
 use crate::error::{Error, Result, positive, shown};
@@ -29,6 +30,8 @@ pub struct Spec {
     pub delay: Delay,
     /// What the stage went through before the record.
     pub history: History,
+    /// Time constants of the creep whose shares are fitted, s; none for no creep.
+    pub creep_times: Vec<f64>,
 }
 
 impl Spec {
@@ -44,6 +47,7 @@ impl Spec {
             offset: false,
             delay: Delay::default(),
             history: History::Virgin,
+            creep_times: Vec::new(),
         }
     }
 }
@@ -108,6 +112,8 @@ pub struct Problem {
     /// Whether the drive is so slow that any lag is as likely as another that fits: the least is
     /// taken.
     pub slow: bool,
+    /// Time constants of the creep whose shares are fitted, s.
+    pub creep_times: Vec<f64>,
 }
 
 /// A value for each scalar parameter, where there is one.
@@ -124,7 +130,7 @@ impl Problem {
     /// that is both fixed and free or has no value, and where all the parameters that carry
     /// force are free.
     pub fn new(record: &Record<'_>, spec: &Spec) -> Result<Self> {
-        let infos = spec.model.info().parameters;
+        let infos = spec.model.scalars();
         if spec.model.found_by() != FoundBy::Swarm {
             let found = format!("'{}'", spec.model.info().name);
             return Err(Error::parameter("model", found, "one that a swarm searches"));
@@ -181,11 +187,14 @@ impl Problem {
                 "stiffness=, or a value other than 0 for another of them in fixed=",
             ));
         }
+        check_times(&spec.creep_times)?;
         let Spec { model, offset, history, .. } = *spec;
+        let creep_times = spec.creep_times.clone();
         let chosen = |name: &str| spec.bounds.iter().any(|(other, _)| other == name);
         let slow =
             !wants_mode && !chosen("damping") && bounds::measures(record).excited().is_none();
-        let problem = Self { model, coordinates, scale_assumed, offset, history, slow };
+        let problem =
+            Self { model, coordinates, scale_assumed, offset, history, creep_times, slow };
         problem.check_corners()?;
         Ok(problem)
     }
@@ -209,7 +218,7 @@ impl Problem {
     /// The parameters that all candidates share.
     #[must_use]
     pub fn held(&self) -> Held {
-        let mut held = Held::defaults(self.model.info().parameters);
+        let mut held = Held::defaults(self.model.scalars());
         for (slot, coordinate) in held.values.iter_mut().zip(&self.coordinates) {
             *slot = match coordinate {
                 Coordinate::Fixed(value) => Some(*value),
@@ -247,7 +256,7 @@ impl Problem {
 
 /// Values of `fixed=` and `stiffness=`, with the model's defaults.
 fn fixed_values(spec: &Spec) -> Result<Fixed> {
-    let infos = spec.model.info().parameters;
+    let infos = spec.model.scalars();
     let mut fixed: Fixed = [None; MOST_PARAMETERS];
     for (name, value) in &spec.fixed {
         let i = position(infos, "fixed", name)?;
@@ -274,7 +283,7 @@ fn fixed_values(spec: &Spec) -> Result<Fixed> {
 
 /// Refuses held values with which no stage exists, by their own names.
 fn check_fixed(model: Model, fixed: &Fixed) -> Result<()> {
-    let defaults = Held::defaults(model.info().parameters).values;
+    let defaults = Held::defaults(model.scalars()).values;
     let value = |i: usize| fixed[i].or(defaults[i]).unwrap_or(1.0);
     model.check(&core::array::from_fn(value))
 }
@@ -284,7 +293,7 @@ fn free_parameters(spec: &Spec, fixed: &mut Fixed) -> Result<Free> {
     let Some(names) = &spec.free else {
         return Ok(fixed.map(|value| value.is_none()));
     };
-    let infos = spec.model.info().parameters;
+    let infos = spec.model.scalars();
     let mut free: Free = [false; MOST_PARAMETERS];
     for name in names {
         let i = position(infos, "free", name)?;

@@ -1,9 +1,11 @@
 //! Sums over the residuals, accumulated during the simulation of a bundle of lanes.
 
 use piezotrack_control::Number;
+use piezotrack_control::creep::CubicLag;
 use pulp::Simd;
 
 use super::candidate::Candidate;
+use super::creep_shares::{MOST_CREEP, MOST_SHARES, SLACK, ShareSums, Shares};
 use super::record::Record;
 use crate::integrator::{FeedbackState, Observer};
 use crate::math::Lanes;
@@ -17,11 +19,14 @@ pub struct Costs {
     pub rms: f64,
     /// Offset added to the simulated displacement, m.
     pub offset: f64,
+    /// Shares of the creep.
+    pub shares: Shares,
 }
 
 impl Costs {
     /// What a candidate costs that could not be simulated.
-    pub(super) const FAILED: Self = Self { rms: f64::INFINITY, offset: 0.0 };
+    pub(super) const FAILED: Self =
+        Self { rms: f64::INFINITY, offset: 0.0, shares: [0.0; MOST_SHARES] };
 }
 
 /// A record whose deviations are summed.
@@ -33,9 +38,33 @@ pub(super) struct Residuals<'a> {
     pub offset: bool,
     /// Subtracted from the measured displacement, m, to keep the sums small.
     pub centre: f64,
+    /// Time constants of the creep whose shares are fitted, s.
+    pub creep_times: &'a [f64],
 }
 
 impl Residuals<'_> {
+    /// Cost, offset and shares from the sums; a bound of the cost where they are of the part of
+    /// the window seen so far.
+    pub(super) fn costs(&self, sums: &ShareSums, samples: usize, bound: bool) -> Costs {
+        let [sum, squares] = sums.deviation;
+        let count = self.creep_times.len();
+        if count == 0 {
+            return self.conclude(sum, squares, samples);
+        }
+        let best = sums.best(count, samples, self.offset);
+        let rms = libm::sqrt(best.square.max(0.0));
+        // Outputs that hardly differ may have been left out of the best shares.
+        let rms = if bound { (rms - MOST_CREEP * SLACK * best.size).max(0.0) } else { rms };
+        let total: f64 = best.shares.iter().sum();
+        // The outputs were taken from the centre too.
+        let offset = if self.offset { best.mean + self.centre - self.centre * total } else { 0.0 };
+        if rms.is_finite() && offset.is_finite() && best.square.is_finite() {
+            Costs { rms, offset, shares: best.shares }
+        } else {
+            Costs::FAILED
+        }
+    }
+
     /// Cost and offset from the sums of the deviation and of its square.
     fn conclude(&self, sum: f64, squares: f64, samples: usize) -> Costs {
         let (mean, mean_square) = (sum / index(samples), squares / index(samples));
@@ -45,7 +74,7 @@ impl Residuals<'_> {
             (mean_square, 0.0)
         };
         if variance.is_finite() && mean.is_finite() {
-            Costs { rms: libm::sqrt(variance.max(0.0)), offset }
+            Costs { rms: libm::sqrt(variance.max(0.0)), offset, ..Costs::FAILED }
         } else {
             Costs::FAILED
         }
@@ -79,6 +108,18 @@ impl<N, R: Reading<N>> Reading<N> for Option<R> {
     }
 }
 
+/// A relaxation of the creep behind the mechanics, in lanes, with its sums.
+struct Relaxing<N, R> {
+    lag: CubicLag,
+    reached: N,
+    reading: R,
+    /// What is read at the present sample, from the centre.
+    output: N,
+    sum: N,
+    cross: N,
+    products: [N; MOST_SHARES],
+}
+
 /// Sums of the deviation and of its square, in lanes.
 pub(super) struct ResidualSums<'a, const V: usize, S: Simd, R> {
     of: &'a Residuals<'a>,
@@ -87,6 +128,11 @@ pub(super) struct ResidualSums<'a, const V: usize, S: Simd, R> {
     sum: Lanes<S, V>,
     squares: Lanes<S, V>,
     reading: R,
+    /// Sub-steps in a sampling interval.
+    substeps: f64,
+    /// Displacement and scaled velocity at the last sample.
+    last: [Lanes<S, V>; 2],
+    creep: Vec<Relaxing<Lanes<S, V>, R>>,
     /// Costs of the candidates that are settled before the end.
     verdicts: Vec<Option<Costs>>,
 }
@@ -99,10 +145,46 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
         candidates: &'a [Candidate],
         stop: Stop<'a>,
         zero: Lanes<S, V>,
-        reading: R,
+        substeps: f64,
+        reading: impl Fn() -> R,
     ) -> Self {
         let verdicts = vec![None; candidates.len()];
-        Self { of, candidates, stop, sum: zero, squares: zero, reading, verdicts }
+        let relaxing = |&time: &f64| Relaxing {
+            lag: CubicLag::new(time, of.record.drive.dt),
+            reached: zero,
+            reading: reading(),
+            output: zero,
+            sum: zero,
+            cross: zero,
+            products: [zero; MOST_SHARES],
+        };
+        let creep = of.creep_times.iter().map(relaxing).collect();
+        let (last, reading) = ([zero; 2], reading());
+        Self {
+            of,
+            candidates,
+            stop,
+            sum: zero,
+            squares: zero,
+            reading,
+            substeps,
+            last,
+            creep,
+            verdicts,
+        }
+    }
+
+    /// The sums of a lane.
+    fn sums(&self, lane: usize) -> ShareSums {
+        let at = |lanes: &Lanes<S, V>| lanes.as_slice().get(lane).copied().unwrap_or(f64::NAN);
+        let mut sums =
+            ShareSums { deviation: [at(&self.sum), at(&self.squares)], ..ShareSums::default() };
+        for (j, one) in self.creep.iter().enumerate() {
+            sums.outputs[j] = at(&one.sum);
+            sums.cross[j] = at(&one.cross);
+            sums.products[j] = one.products.each_ref().map(at);
+        }
+        sums
     }
 
     /// Gives up where every candidate is already beyond its limit: squares only add up, also
@@ -116,14 +198,15 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
             ((k + 1).saturating_sub(of.record.window.start), of.record.window.len());
         if seen > 0 && seen < samples {
             let share = libm::sqrt(index(seen) / index(samples));
-            let sums = self.sum.as_slice().iter().zip(self.squares.as_slice());
-            let each = sums.zip(candidates).zip(&mut self.verdicts);
-            for (((&sum, &squares), candidate), verdict) in each {
-                let part = of.conclude(sum, squares, seen);
+            for (lane, candidate) in candidates.iter().enumerate() {
+                if self.verdicts[lane].is_some() {
+                    continue;
+                }
+                let part = of.costs(&self.sums(lane), seen, true);
                 let bound = Costs { rms: share * part.rms, ..part };
                 // A hair above, so that rounding cannot abandon one that ends at its limit.
-                if verdict.is_none() && bound.rms > candidate.limit * (1.0 + 1e-9) {
-                    *verdict = Some(bound);
+                if bound.rms > candidate.limit * (1.0 + 1e-9) {
+                    self.verdicts[lane] = Some(bound);
                 }
             }
         }
@@ -132,15 +215,44 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
 
     /// The costs, where the lanes `ended` or were given up before.
     pub fn conclude(self, ended: bool) -> Vec<Costs> {
-        let of = self.of;
-        let samples = of.record.window.len();
-        let lanes = self.sum.as_slice().iter().zip(self.squares.as_slice()).zip(self.verdicts);
-        let costs = lanes.map(|((&sum, &squares), verdict)| match verdict {
-            Some(verdict) => verdict,
-            None if ended => of.conclude(sum, squares, samples),
+        let samples = self.of.record.window.len();
+        let costs = self.verdicts.iter().enumerate().map(|(lane, verdict)| match verdict {
+            Some(verdict) => *verdict,
+            None if ended => self.of.costs(&self.sums(lane), samples, false),
             None => Costs::FAILED,
         });
         costs.collect()
+    }
+}
+
+impl<const V: usize, S: Simd, R: Reading<Lanes<S, V>>> ResidualSums<'_, V, S, R> {
+    /// Takes the relaxations to sample `k`, before the displacement there is read.
+    #[inline(always)]
+    fn creep(&mut self, k: usize, x: Lanes<S, V>, w: Lanes<S, V>) {
+        let now = [x, w * w.like(self.substeps)];
+        for one in &mut self.creep {
+            // In equilibrium at the first sample.
+            one.reached = if k == 0 { x } else { one.lag.step(one.reached, self.last, now) };
+            let slope = one.lag.slope(x, one.reached) / x.like(self.substeps);
+            one.output = one.reading.read(k, one.reached, slope) - x.like(self.of.centre);
+        }
+        self.last = now;
+    }
+
+    /// Adds the relaxations at a sample that counts.
+    #[inline(always)]
+    fn add_creep(&mut self, deviation: Lanes<S, V>) {
+        for j in 0..self.creep.len() {
+            let (before, rest) = self.creep.split_at_mut(j);
+            let Some(one) = rest.first_mut() else { continue };
+            let output = one.output;
+            one.sum = one.sum + output;
+            one.cross = output.mul_add(deviation, one.cross);
+            for (product, other) in one.products.iter_mut().zip(before.iter()) {
+                *product = output.mul_add(other.output, *product);
+            }
+            one.products[j] = output.mul_add(output, one.products[j]);
+        }
     }
 }
 
@@ -149,12 +261,18 @@ impl<const V: usize, S: Simd, M, R: Reading<Lanes<S, V>>> Observer<Lanes<S, V>, 
 {
     #[inline(always)]
     fn sample(&mut self, k: usize, state: &FeedbackState<Lanes<S, V>, M>) {
+        if !self.creep.is_empty() {
+            self.creep(k, state.x, state.w);
+        }
         let x = self.reading.read(k, state.x, state.w);
         let record = self.of.record;
         if k >= record.window.start {
             let deviation = x.like(record.y[k] - self.of.centre) - x;
             self.sum = self.sum + deviation;
             self.squares = deviation.mul_add(deviation, self.squares);
+            if !self.creep.is_empty() {
+                self.add_creep(deviation);
+            }
         }
     }
 

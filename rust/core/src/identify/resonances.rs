@@ -161,9 +161,8 @@ impl Steps {
         all.push(x);
         for pair in input.windows(2) {
             let at = [x, w, pair[0], pair[1]];
-            let dot = |row: &[f64; 4]| {
-                row[0] * at[0] + row[1] * at[1] + row[2] * at[2] + row[3] * at[3]
-            };
+            let dot =
+                |row: &[f64; 4]| row[0] * at[0] + row[1] * at[1] + row[2] * at[2] + row[3] * at[3];
             (x, w) = (dot(&self.x), dot(&self.v));
             all.push(x);
         }

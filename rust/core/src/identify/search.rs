@@ -119,7 +119,8 @@ const PARTICLE: usize = 2000;
 /// One swarm of a search.
 struct Run {
     swarm: Swarm,
-    offset: f64,
+    /// Of its best candidate.
+    costs: Costs,
     evaluations: usize,
     failures: usize,
     history: Vec<f64>,
@@ -130,7 +131,7 @@ impl Run {
     fn new(settings: &SwarmSettings, coordinates: usize, seed: u64, run: u64) -> Result<Self> {
         Ok(Self {
             swarm: Swarm::new(settings.clone(), coordinates, seed, run)?,
-            offset: 0.0,
+            costs: Costs::FAILED,
             evaluations: 0,
             failures: 0,
             history: Vec::new(),
@@ -155,7 +156,7 @@ impl Run {
         self.failures += costs.iter().filter(|costs| costs.rms.is_infinite()).count();
         let best = costs.iter().min_by(|a, b| a.rms.total_cmp(&b.rms));
         if let Some(best) = best.filter(|best| best.rms < self.swarm.best().1) {
-            self.offset = best.offset;
+            self.costs = *best;
         }
         let mut computed = costs.iter();
         let costs: Vec<f64> = self
@@ -177,7 +178,7 @@ impl Run {
         Outcome {
             theta: problem.theta(place),
             place: place.to_vec(),
-            costs: Costs { rms, offset: self.offset },
+            costs: Costs { rms, ..self.costs },
             iterations: self.swarm.iteration(),
             evaluations: self.evaluations,
             polish_evaluations: 0,

@@ -46,9 +46,9 @@ pub(super) const DYNAMICS: [ParameterInfo; 8] = [
     ParameterInfo::optional("time_constant", "T", "s"),
     ParameterInfo::optional("frequency", "fn", "Hz"),
     ParameterInfo::optional("damping_ratio", "zeta", ""),
-    ParameterInfo::list("mode_weights", "g", ""),
-    ParameterInfo::list("mode_frequencies", "f", "Hz"),
-    ParameterInfo::list("mode_damping_ratios", "zeta_k", ""),
+    ParameterInfo::list("mode_weights", "g", "").or_none(),
+    ParameterInfo::list("mode_frequencies", "f", "Hz").or_none(),
+    ParameterInfo::list("mode_damping_ratios", "zeta_k", "").or_none(),
 ];
 
 /// State of a stage whose operator has plays.
@@ -58,8 +58,8 @@ pub(super) const PLAYS_STATE: &[ParameterInfo] = &[
     ParameterInfo::new("u", "u", "V"),
     ParameterInfo::list("plays", "z", "V"),
     ParameterInfo::list("creep", "q", "m"),
-    ParameterInfo::list("mode_x", "x_k", "m"),
-    ParameterInfo::list("mode_v", "x_k'", "m/s"),
+    ParameterInfo::list("mode_x", "x_k", "m").or_none(),
+    ParameterInfo::list("mode_v", "x_k'", "m/s").or_none(),
 ];
 
 /// A hysteresis operator that is followed from sample to sample, V to m.

@@ -3,6 +3,7 @@
 mod bouc_wen;
 mod bouc_wen_oscillator;
 mod creep;
+mod creeping;
 pub mod dahl;
 mod first_order_dahl;
 mod generalised_prandtl_ishlinskii;
@@ -21,6 +22,8 @@ pub use creep::{
     Creep, Dynamics, MOST_MODES, MOST_RELAXATIONS, Mode, Modes, Relaxation, RelaxationFlow,
     RelaxationState,
 };
+pub(crate) use creeping::relaxed;
+pub use creeping::{Creeping, CreepingFlow, CreepingState};
 pub use dahl::{DahlStage, DahlStageState};
 pub use first_order_dahl::{FirstOrderDahlKernel, FirstOrderDahlStage};
 pub use generalised_prandtl_ishlinskii::{

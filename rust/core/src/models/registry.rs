@@ -3,12 +3,13 @@
 use piezotrack_control::Snapshot;
 use piezotrack_control::inverse::Inverse;
 
+use super::creeping::Creeping;
 use super::plant::Plant;
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
     Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
 };
-use super::values::{Held, Values};
+use super::values::{Held, ParameterInfo, Values};
 use super::weighted_plays::WeightedVisitor;
 use crate::design::LoopPlant;
 use crate::error::{Error, Result};
@@ -299,10 +300,10 @@ macro_rules! models {
 }
 
 models! {
-    Dahl: super::DahlStage, swarm;
-    BoucWen: super::BoucWenStage, swarm;
-    FirstOrderDahl: super::FirstOrderDahlStage, swarm;
-    BoucWenOscillator: super::BoucWenOscillator, swarm;
+    Dahl: Creeping<super::DahlStage>, swarm;
+    BoucWen: Creeping<super::BoucWenStage>, swarm;
+    FirstOrderDahl: Creeping<super::FirstOrderDahlStage>, swarm;
+    BoucWenOscillator: Creeping<super::BoucWenOscillator>, swarm;
     PrandtlIshlinskii: super::PrandtlIshlinskiiStage, least_squares;
     GeneralisedPrandtlIshlinskii: super::GeneralisedPrandtlIshlinskiiStage, least_squares;
 }
@@ -318,6 +319,15 @@ impl Model {
                 Self::ALL.iter().map(|model| format!("'{}'", model.info().name)).collect();
             Error::parameter("model", format!("'{name}'"), names.join(" or "))
         })
+    }
+
+    /// Its parameters that are single numbers; in a model that a swarm searches, lists follow
+    /// them.
+    #[must_use]
+    pub fn scalars(self) -> &'static [ParameterInfo] {
+        let all = self.info().parameters;
+        let count = all.iter().take_while(|info| !info.is_list).count();
+        all.get(..count).unwrap_or_default()
     }
 
     /// Refuses scalar parameters with which no stage exists.

@@ -20,7 +20,7 @@ pub struct ParameterInfo {
     pub held: Option<&'static str>,
     /// Whether it is a list of numbers, as weights are.
     pub is_list: bool,
-    /// Whether it may be left out: a list of none or one.
+    /// Whether it may be left out: a list of none or one, or of any length.
     pub is_optional: bool,
 }
 
@@ -50,6 +50,12 @@ impl ParameterInfo {
     #[must_use]
     pub const fn optional(name: &'static str, symbol: &'static str, unit: &'static str) -> Self {
         Self { is_optional: true, ..Self::new(name, symbol, unit) }
+    }
+
+    /// It may be left out.
+    #[must_use]
+    pub const fn or_none(self) -> Self {
+        Self { is_optional: true, ..self }
     }
 
     /// It carries force.
@@ -103,16 +109,42 @@ impl Values {
         }
         let mut whole = Vec::with_capacity(infos.len());
         for (info, entry) in infos.iter().zip(entries) {
+            let entry = entry.or((info.is_list && info.is_optional).then(Vec::new));
             whole.push(entry.ok_or_else(|| Error::parameter(info.name, "missing", "a value"))?);
         }
         Ok(Self { infos, entries: whole })
     }
 
-    /// Values of parameters that are single numbers, in their order; zeros where there are more.
+    /// Values of parameters that are single numbers, in their order; zeros where there are more,
+    /// and lists without entries.
     #[must_use]
     pub fn scalars(infos: &'static [ParameterInfo], numbers: &[f64]) -> Self {
-        let entry = |i: usize| vec![numbers.get(i).copied().unwrap_or(0.0)];
-        Self { infos, entries: (0..infos.len()).map(entry).collect() }
+        let entry = |(i, info): (usize, &ParameterInfo)| {
+            if info.is_list { vec![] } else { vec![numbers.get(i).copied().unwrap_or(0.0)] }
+        };
+        Self { infos, entries: infos.iter().enumerate().map(entry).collect() }
+    }
+
+    /// The first of the values, which `infos` describes.
+    #[must_use]
+    pub fn leading(&self, infos: &'static [ParameterInfo]) -> Self {
+        Self { infos, entries: self.entries.iter().take(infos.len()).cloned().collect() }
+    }
+
+    /// These values and others after them, described together by `infos`.
+    #[must_use]
+    pub fn followed(&self, infos: &'static [ParameterInfo], others: Vec<Vec<f64>>) -> Self {
+        Self { infos, entries: self.entries.iter().cloned().chain(others).collect() }
+    }
+
+    /// The values with another number of a parameter.
+    #[must_use]
+    pub fn with(&self, name: &str, number: f64) -> Self {
+        let mut entries = self.entries.clone();
+        if let Some(i) = self.infos.iter().position(|info| info.name == name) {
+            entries[i] = vec![number];
+        }
+        Self { infos: self.infos, entries }
     }
 
     /// Values given whole, in the order of their descriptions.

@@ -386,7 +386,8 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
             self.push(&mut plays, volts);
             self.inputs(&plays, &mut signals);
             if k == 0 {
-                let ready = |(input, q): (&f64, &Vec<f64>)| Follower::at_rest(&relaxation, *input, q);
+                let ready =
+                    |(input, q): (&f64, &Vec<f64>)| Follower::at_rest(&relaxation, *input, q);
                 columns = signals.iter().zip(&creep).map(ready).collect();
                 let bare = |q: &f64| Follower::at_rest(&bare, *q, &[]);
                 reached = creep[inner].iter().map(bare).collect();
@@ -412,7 +413,8 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
                 continue;
             }
             let x = columns[inner].state.x;
-            let linear = columns[..inner].iter().chain(&reached).chain(&faded).map(|one| one.state.x);
+            let linear =
+                columns[..inner].iter().chain(&reached).chain(&faded).map(|one| one.state.x);
             for (slot, value) in row.iter_mut().zip(linear) {
                 *slot = value;
             }
@@ -478,4 +480,3 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
 fn beyond(value: f64, corner: f64) -> f64 {
     (value - corner).max(0.0) - (-corner).max(0.0)
 }
-

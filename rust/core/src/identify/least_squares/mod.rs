@@ -13,8 +13,8 @@ mod follower;
 mod form;
 mod layout;
 
-use crate::error::{Error, Result};
 use super::history::History;
+use crate::error::{Error, Result};
 use crate::models::{
     Dynamics, Model, PlayHysteresis, Relaxation, Values, WeightedPlays, WeightedVisitor,
 };
@@ -167,9 +167,8 @@ impl WeightedVisitor for Search<'_> {
         }
         let common = Common::new(self.record, self.settings.offset, self.stop);
         let found = choices::search::<M>(&common, self.settings);
-        let result = |(fit, lag_range): (Fit<'_, M>, _)| {
-            Ok(LeastSquaresFit { lag_range, ..fit.result()? })
-        };
+        let result =
+            |(fit, lag_range): (Fit<'_, M>, _)| Ok(LeastSquaresFit { lag_range, ..fit.result()? });
         found.map(result).transpose()
     }
 }
@@ -184,7 +183,8 @@ fn check(record: &WeightsRecord<'_>, settings: &Settings) -> Result<()> {
             expected: format!("{}, as many as u", drive.u.len()),
         });
     }
-    let unknowns = 2 + settings.plays.thresholds().len() + settings.zones + settings.creep.times().len();
+    let unknowns =
+        2 + settings.plays.thresholds().len() + settings.zones + settings.creep.times().len();
     let count = y.len().saturating_sub(start);
     if count < 2 * unknowns {
         return Err(Error::Data(format!(

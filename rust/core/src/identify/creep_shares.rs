@@ -1,0 +1,197 @@
+//! Shares of the creep, by least squares within the cost of a candidate.
+//!
+//! ```text
+//! y = xm + sum_j c_j q_j + offset + e,   c_j >= 0,   sum_j c_j <= 1/2
+//! ```
+//!
+//! With given time constants the displacement is linear in the shares c, so their best values
+//! follow for each candidate from sums over the record, and no swarm searches them: variable
+//! projection, Golub and Pereyra 1973, doi 10.1137/0710036.
+
+use super::record::Record;
+use crate::error::{Error, Result, positive};
+use crate::signal::{index, range, turns};
+
+/// Most relaxations of the creep in a search.
+pub const MOST_SHARES: usize = 3;
+
+/// Largest sum of the shares: creep that adds more is no creep.
+pub const MOST_CREEP: f64 = 0.5;
+
+/// A pivot below this part of its diagonal is 0: the column is a combination of the others.
+const LEAST_PIVOT: f64 = 1e-12;
+
+/// What a column that is a combination of others, but for [`LEAST_PIVOT`], can still move.
+pub(super) const SLACK: f64 = 1e-6;
+
+/// Shares of the relaxations; 0 for those that there are not.
+pub type Shares = [f64; MOST_SHARES];
+
+/// Sums over samples of the deviation r of the mechanics and the outputs g of the relaxations.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct ShareSums {
+    /// Of r, and of its square.
+    pub deviation: [f64; 2],
+    /// Of g.
+    pub outputs: Shares,
+    /// Of g r.
+    pub cross: Shares,
+    /// Of products of g, the lower triangle.
+    pub products: [Shares; MOST_SHARES],
+}
+
+/// The shares that suit best.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BestShares {
+    /// c.
+    pub shares: Shares,
+    /// Mean square of what is left, m^2.
+    pub square: f64,
+    /// Mean of what is left, m, before an offset is taken off.
+    pub mean: f64,
+    /// Largest rms of an output, m.
+    pub size: f64,
+}
+
+impl ShareSums {
+    /// Adds a sample.
+    pub fn add(&mut self, deviation: f64, outputs: &[f64]) {
+        self.deviation[0] += deviation;
+        self.deviation[1] += deviation * deviation;
+        for (j, g) in outputs.iter().enumerate() {
+            self.outputs[j] += g;
+            self.cross[j] += g * deviation;
+            for (i, other) in outputs.iter().enumerate().take(j + 1) {
+                self.products[j][i] += g * other;
+            }
+        }
+    }
+
+    /// The best of `count` shares over so many samples, with a free offset or none.
+    pub fn best(&self, count: usize, samples: usize, offset: bool) -> BestShares {
+        let n = index(samples);
+        let [mean, mut square] = self.deviation.map(|sum| sum / n);
+        let means = self.outputs.map(|sum| sum / n);
+        let mut slope = self.cross.map(|sum| sum / n);
+        let mut matrix = [[0.0; MOST_SHARES]; MOST_SHARES];
+        for j in 0..MOST_SHARES {
+            for i in 0..=j {
+                matrix[j][i] = self.products[j][i] / n;
+                if offset {
+                    matrix[j][i] -= means[j] * means[i];
+                }
+                matrix[i][j] = matrix[j][i];
+            }
+            if offset {
+                slope[j] -= means[j] * mean;
+            }
+        }
+        if offset {
+            square -= mean * mean;
+        }
+        let diagonal = [0, 1, 2].map(|j: usize| matrix[j][j]);
+        let size = diagonal.iter().fold(0.0, |most: f64, d| most.max(*d));
+        let mut best = ([0.0; MOST_SHARES], square);
+        // The minimum lies on a face of the simplex, and is the minimum of that face's plane.
+        for face in 1..1_usize << count {
+            for full in [false, true] {
+                let Some(shares) = on_face(&matrix, &slope, face, full) else { continue };
+                let total: f64 = shares.iter().sum();
+                let inside = shares.iter().all(|c| *c >= 0.0) && (full || total <= MOST_CREEP);
+                let left = remainder(&matrix, &slope, &shares, square);
+                if inside && left < best.1 {
+                    best = (shares, left);
+                }
+            }
+        }
+        let (shares, square) = best;
+        let mean = means.iter().zip(&shares).fold(mean, |mean, (g, c)| mean - c * g);
+        BestShares { shares, square, mean, size: libm::sqrt(size) }
+    }
+}
+
+/// Mean square that is left with these shares.
+fn remainder(matrix: &[Shares; 3], slope: &Shares, shares: &Shares, square: f64) -> f64 {
+    let mut left = square;
+    for j in 0..MOST_SHARES {
+        let along: f64 = (0..MOST_SHARES).map(|i| matrix[j][i] * shares[i]).sum();
+        left += shares[j] * (along - 2.0 * slope[j]);
+    }
+    left
+}
+
+/// The best shares of those in `face` (bit j for share j), the others 0; where it is `full`, with
+/// the largest sum. `None` where the outputs depend on each other.
+fn on_face(matrix: &[Shares; 3], slope: &Shares, face: usize, full: bool) -> Option<Shares> {
+    let free = solve(matrix, face, slope)?;
+    if !full {
+        return Some(free);
+    }
+    let ones = solve(matrix, face, &[1.0; MOST_SHARES])?;
+    let part = (free.iter().sum::<f64>() - MOST_CREEP) / ones.iter().sum::<f64>();
+    Some(core::array::from_fn(|j| free[j] - part * ones[j]))
+}
+
+/// Solves the rows and columns of `face`; 0 in the others.
+fn solve(matrix: &[Shares; 3], face: usize, right: &Shares) -> Option<Shares> {
+    let (mut a, mut b) = (*matrix, *right);
+    let used = |j: &usize| face >> j & 1 == 1;
+    for p in (0..MOST_SHARES).filter(used) {
+        if !(a[p][p] > LEAST_PIVOT * matrix[p][p]) {
+            return None;
+        }
+        for row in (p + 1..MOST_SHARES).filter(used) {
+            let factor = a[row][p] / a[p][p];
+            for column in p..MOST_SHARES {
+                a[row][column] -= factor * a[p][column];
+            }
+            b[row] -= factor * b[p];
+        }
+    }
+    let mut found = [0.0; MOST_SHARES];
+    for p in (0..MOST_SHARES).rev().filter(used) {
+        let rest: f64 = (p + 1..MOST_SHARES).map(|column| a[p][column] * found[column]).sum();
+        found[p] = (b[p] - rest) / a[p][p];
+    }
+    Some(found)
+}
+
+/// Refuses time constants that a search cannot use.
+pub(super) fn check_times(times: &[f64]) -> Result<()> {
+    if times.len() > MOST_SHARES {
+        let expected = format!("{MOST_SHARES} time constants at most");
+        return Err(Error::parameter("creep", format!("{} entries", times.len()), expected));
+    }
+    for (j, &time) in times.iter().enumerate() {
+        positive(&format!("creep[{j}]"), time, "s")?;
+    }
+    Ok(())
+}
+
+/// Smallest reversal of the drive that counts for its period, as a share of its range.
+const LEAST_TURN: f64 = 0.1;
+
+/// Two time constants for a record, s: at a quarter and three quarters, on a logarithmic scale, of
+/// what it can tell from the mechanics and from drift. That is from ten samples, or a tenth of
+/// the drive's period, to half of the window.
+///
+/// # Errors
+/// [`Error::Data`] where the window is shorter than forty of the shortest.
+pub fn creep_times(record: &Record<'_>) -> Result<Vec<f64>> {
+    let dt = record.drive.dt;
+    let u = &record.drive.u[record.window.clone()];
+    let (low, high) = range(u);
+    let reversals = turns(u, LEAST_TURN * (high - low)).len();
+    let window = dt * index(u.len());
+    let period = 2.0 * window / index(reversals + 1);
+    let (shortest, longest) = ((10.0 * dt).max(0.1 * period).min(0.05 * window), 0.5 * window);
+    if 40.0 * 10.0 * dt > window {
+        return Err(Error::Data(format!(
+            "the window of {window:.4} s is too short to show creep: expected at least {:.4} s, or \
+             creep=False",
+            400.0 * dt
+        )));
+    }
+    let ratio = longest / shortest;
+    Ok([0.25, 0.75].map(|part| shortest * libm::pow(ratio, part)).to_vec())
+}
