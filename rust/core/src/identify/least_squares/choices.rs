@@ -6,7 +6,7 @@ use super::fit::{Common, Fit};
 use super::form::Form;
 use super::{CreepKind, DynamicsKind, PlaysKind, Settings};
 use crate::identify::history::History;
-use crate::identify::resonances::resonances;
+use crate::identify::resonances::{Resonance, resonances};
 use crate::math::least;
 use crate::models::WeightedPlays;
 use crate::signal::{index, range};
@@ -32,6 +32,9 @@ const ROUGH: f64 = 1e-3;
 
 /// Rows that choices are made on, about.
 const ROWS: usize = 4000;
+
+/// Modes that are looked for.
+const MOST_SHOWN: usize = 2;
 
 /// Share of a fitted creep to start from.
 const FIRST_SHARE: f64 = 0.005;
@@ -62,6 +65,8 @@ pub(super) fn search<'a, M: WeightedPlays>(
     let lags = choose_dynamics(&mut fit, settings, mode)?;
     choose_plays(&mut fit, settings)?;
     fit.every = 1;
+    fit.settle(1e-4)?;
+    fit.exact = true;
     fit.settle(1e-10)?;
     Some((fit, lags))
 }
@@ -87,7 +92,10 @@ fn place_corners<M: WeightedPlays>(fit: &mut Fit<'_, M>, count: usize) {
         }
     }
     let corner = |j: usize| low + (high - low) * index(j) / index(count + 1);
-    fit.restructure(|fit| fit.corners = (1..=count).map(corner).collect());
+    fit.restructure(|fit| (fit.zones, fit.bent) = (count, (low, high)));
+    for (j, slot) in fit.layout().corners().enumerate() {
+        fit.x[slot] = corner(j + 1);
+    }
 }
 
 /// The numbers of the envelope in turn, each from its range.
@@ -129,16 +137,28 @@ fn first_mode<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -> Op
     }
     let common = fit.common;
     let record = common.record;
-    let found = resonances(&record.drive, record.y, record.start, 1, common.stop)?;
-    let Some(mode) = found.first() else { return Some(false) };
-    let mut trial = fit.clone();
-    trial.set_poles(Form::Second, &[libm::log(mode.frequency), libm::log(mode.damping_ratio)]);
-    trial.settle(ROUGH)?;
-    let better = trial.rms < (1.0 - MODE_GAIN) * fit.rms;
-    if better {
-        *fit = trial;
+    let most = if settings.dynamics == DynamicsKind::Auto { MOST_SHOWN } else { 1 };
+    let found = resonances(&record.drive, record.y, record.start, most, common.stop)?;
+    let mut better = false;
+    for count in 1..=found.len() {
+        let mut trial = fit.clone();
+        trial.set_poles(Form::Modes(count), &poles(&found[..count]));
+        trial.settle(ROUGH)?;
+        if trial.rms < (1.0 - MODE_GAIN) * fit.rms {
+            *fit = trial;
+            better = true;
+        }
     }
     Some(better)
+}
+
+/// Numbers of modes in the order of [`Form::names`].
+fn poles(modes: &[Resonance]) -> Vec<f64> {
+    let numbers = |(k, mode): (usize, &Resonance)| {
+        let logarithms = [libm::log(mode.frequency), libm::log(mode.damping_ratio)];
+        if k == 0 { logarithms.to_vec() } else { [&[mode.weight], &logarithms[..]].concat() }
+    };
+    modes.iter().enumerate().flat_map(numbers).collect()
 }
 
 /// The fit with another history, as good as it gets.
@@ -346,7 +366,7 @@ fn unseen_mode<'a, M: WeightedPlays>(fit: &Fit<'a, M>) -> Option<Fit<'a, M>> {
     let mut best: Option<Fit<'a, M>> = None;
     for (frequency, damping_ratio) in [(0.4, 0.1), (0.4, 1.0), (0.1, 0.1), (0.1, 1.0), (0.02, 1.0)] {
         let mut trial = fit.clone();
-        trial.set_poles(Form::Second, &[libm::log(frequency / dt), libm::log(damping_ratio)]);
+        trial.set_poles(Form::Modes(1), &[libm::log(frequency / dt), libm::log(damping_ratio)]);
         trial.settle(ROUGH)?;
         if best.as_ref().is_none_or(|best| SAME * trial.rms < best.rms) {
             best = Some(trial);

@@ -13,8 +13,8 @@ mod follower;
 mod form;
 mod layout;
 
-use crate::error::{Error, Result};
 use super::history::History;
+use crate::error::{Error, Result};
 use crate::models::{
     Dynamics, Model, PlayHysteresis, Relaxation, Values, WeightedPlays, WeightedVisitor,
 };
