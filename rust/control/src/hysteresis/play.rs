@@ -135,7 +135,9 @@ impl<const PLAYS: usize, const ZONES: usize> Play<f64, PLAYS, ZONES> {
         let plays = self.thresholds.iter().zip(&self.weights).zip(&state.plays);
         for ((threshold, weight), play) in plays {
             let corner = play + side * threshold;
-            if side * (corner - from) > 0.0 && side * (end - corner) > 0.0 && *weight != 0.0 {
+            // A corner that was reached may come out again a rounding further on.
+            let least = 4.0 * f64::EPSILON * (corner.abs() + threshold);
+            if side * (corner - from) > least && side * (end - corner) > 0.0 && *weight != 0.0 {
                 end = corner;
             }
         }

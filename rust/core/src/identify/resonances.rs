@@ -34,7 +34,7 @@ const LEAST_GAIN: f64 = 0.02;
 
 /// Least swing that the drive itself excites, as a share of what the mode takes away: with less
 /// it stands in for what the plays do not describe.
-const LEAST_SWING: f64 = 0.3;
+const LEAST_SWING: f64 = 0.1;
 
 /// Places of the grid that are refined.
 const STARTS: usize = 5;

@@ -30,6 +30,9 @@ use crate::signal::Hold;
 /// Parts of a sampling interval at most; the last one takes the rest.
 const MOST_PARTS: usize = 1 << 20;
 
+/// Corners at one place at most: rounding may find one again and again.
+const MOST_IDLE: usize = 128;
+
 /// Shares of a sampling interval below this are no part of it.
 const LEAST_PART: f64 = 1e-9;
 
@@ -376,8 +379,8 @@ impl<O: Segmented> InputStage<O> {
     ) -> usize {
         let InputStageFlow { relaxation, zero, step, deviation } = flow;
         let from = self.operator.input(&state.operator);
-        let (mut done, mut parts) = (0.0, 1);
-        while self.relaxation.remembers() && parts < MOST_PARTS {
+        let (mut done, mut parts, mut idle) = (0.0, 1, 0);
+        while self.relaxation.remembers() && parts < MOST_PARTS && idle < MOST_IDLE {
             let next = self.operator.straight(&state.operator, volts, *deviation);
             let reached = (next - from) / (volts - from);
             // NaN where the drive stands still.
@@ -389,6 +392,9 @@ impl<O: Segmented> InputStage<O> {
                 let part = self.relaxation.flow((reached - done) * step);
                 self.relaxation.step(&part, &mut state.relaxation, output);
                 done = reached;
+                idle = 0;
+            } else {
+                idle += 1;
             }
             parts += 1;
         }

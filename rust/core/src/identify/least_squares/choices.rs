@@ -4,7 +4,7 @@
 
 use super::fit::{Common, Fit};
 use super::form::Form;
-use super::{CreepKind, DynamicsKind, PlaysKind, Settings};
+use super::{CreepKind, DynamicsKind, PlaysKind, Settings, WeightsRecord};
 use crate::identify::history::History;
 use crate::identify::resonances::{Resonance, resonances};
 use crate::math::least;
@@ -35,6 +35,15 @@ const ROWS: usize = 4000;
 
 /// Modes that are looked for.
 const MOST_SHOWN: usize = 2;
+
+/// Least time constant of the creep, relative to that of the drive.
+const SLOWER: f64 = 0.5;
+
+/// Longest lag that is as likely as creep, in samples: a reading may come late.
+const LATE: f64 = 3.0;
+
+/// Deviation of the lag that is taken, relative to the least.
+const LAG_SAME: f64 = 1.003;
 
 /// Share of a fitted creep to start from.
 const FIRST_SHARE: f64 = 0.005;
@@ -67,7 +76,7 @@ pub(super) fn search<'a, M: WeightedPlays>(
     fit.every = 1;
     fit.settle(1e-4)?;
     fit.exact = true;
-    fit.settle(1e-10)?;
+    fit.settle(1e-6)?;
     Some((fit, lags))
 }
 
@@ -229,13 +238,19 @@ fn choose_history<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -
     Some(())
 }
 
-/// Time constants of the creep that a record may ask for, s.
+/// Time constants of the creep that a record may ask for, s: slower than the drive, whose phase a
+/// faster one would turn as a lag does.
 fn creeps<M: WeightedPlays>(fit: &Fit<'_, M>) -> Vec<Vec<f64>> {
-    let record = fit.common.record;
-    let length = record.drive.dt * index(record.y.len() - record.start);
-    let shortest = 10.0 * record.drive.dt;
+    let WeightsRecord { drive, y, start } = *fit.common.record;
+    let length = drive.dt * index(y.len() - start);
+    let u = &drive.u[start..];
+    let mean = u.iter().sum::<f64>() / index(u.len());
+    let moved: f64 = u.iter().map(|u| (u - mean).powi(2)).sum();
+    let changed: f64 = u.windows(2).map(|u| (u[1] - u[0]).powi(2)).sum();
+    let shortest = f64::max(SLOWER * drive.dt * libm::sqrt(moved / changed), 10.0 * drive.dt);
     let pair = |divisor: f64| vec![length / divisor, 10.0 * length / divisor];
-    [10.0, 30.0, 100.0].into_iter().map(pair).filter(|times| times[0] >= shortest).collect()
+    let all = [3.0, 10.0, 30.0, 100.0, 300.0].into_iter().map(pair);
+    all.filter(|times| times[0] >= shortest).collect()
 }
 
 /// Creep where it was not set: none, or the two relaxations that explain most.
@@ -258,10 +273,19 @@ fn choose_creep<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -> 
             best = Some(trial);
         }
     }
-    *fit = match best {
-        Some(best) if best.rms < (1.0 - CREEP_GAIN) * none.rms => best,
-        _ => none,
+    let Some(best) = best.filter(|best| best.rms < (1.0 - CREEP_GAIN) * none.rms) else {
+        *fit = none;
+        return Some(());
     };
+    if settings.dynamics == DynamicsKind::Auto && none.form == Form::None {
+        let late = best_lag(&none)?;
+        let time = libm::exp(late.x[late.layout().poles().start]);
+        if time < LATE * fit.common.record.drive.dt && late.rms < SAME * best.rms {
+            *fit = none;
+            return Some(());
+        }
+    }
+    *fit = best;
     Some(())
 }
 
@@ -347,15 +371,20 @@ fn smallest_lag<'a, M: WeightedPlays>(
         let middle = 0.5 * (high + beyond);
         if as_good(middle)? { high = middle } else { beyond = middle }
     }
-    if still.rms <= enough {
-        return Some((still, (0.0, high)));
+    let shortest = |enough: f64| {
+        let (mut low, mut short) = (time, 0.0);
+        for _ in 0..6 {
+            let middle = 0.5 * (low + short);
+            if at_lag(&best, middle)?.rms <= enough { low = middle } else { short = middle }
+        }
+        Some(low)
+    };
+    let low = if still.rms <= enough { 0.0 } else { shortest(enough)? };
+    let least = LAG_SAME / SAME * enough;
+    if still.rms <= least {
+        return Some((still, (low, high)));
     }
-    let (mut low, mut short) = (time, 0.0);
-    for _ in 0..6 {
-        let middle = 0.5 * (low + short);
-        if as_good(middle)? { low = middle } else { short = middle }
-    }
-    let mut chosen = at_lag(&best, low)?;
+    let mut chosen = at_lag(&best, shortest(least)?)?;
     chosen.held = true;
     Some((chosen, (low, high)))
 }
