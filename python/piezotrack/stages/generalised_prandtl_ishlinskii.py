@@ -33,12 +33,12 @@ class GeneralisedPrandtlIshlinskiiStage(Stage):
     Parameters
     ----------
     linear : float
-        w0 [m/V], above 0: weight of the play of threshold 0, which with one envelope for both
-        directions has no memory.
+        w0 [m/V], not 0: weight of the play of threshold 0, which with one envelope for both
+        directions has no memory. Below 0 the displacement falls as the drive rises.
     thresholds : sequence of float
         r [V], half the width of each play's backlash, 0 or above and ascending; 32 at most.
     weights : sequence of float
-        w [m/V], as many, 0 or above.
+        w [m/V], as many, each 0 or of the sign of `linear`.
     scale, slope, shift, level : float
         c0 [V] and c1 [1/V], above 0, c2 and c3 [V] of the envelope of a rising drive.
     falling_scale, falling_slope, falling_shift, falling_level : float, optional
@@ -49,6 +49,9 @@ class GeneralisedPrandtlIshlinskiiStage(Stage):
         T [s] of a first-order lag.
     frequency, damping_ratio : float, optional
         Undamped frequency [Hz] and damping ratio zeta of a mode; not with `time_constant`.
+    mode_weights, mode_frequencies, mode_damping_ratios : sequence of float, optional
+        g, undamped frequency [Hz] and damping ratio of further modes in parallel with that mode;
+        3 at most, each g between -1 and 1.
     mode_weights, mode_frequencies, mode_damping_ratios : sequence of float, optional
         g, undamped frequency [Hz] and damping ratio of further modes in parallel with that mode;
         3 at most, each g between -1 and 1.
@@ -105,6 +108,9 @@ class GeneralisedPrandtlIshlinskiiStage(Stage):
     time_constant: float | None = None
     frequency: float | None = None
     damping_ratio: float | None = None
+    mode_weights: tuple[float, ...] = ()
+    mode_frequencies: tuple[float, ...] = ()
+    mode_damping_ratios: tuple[float, ...] = ()
     mode_weights: tuple[float, ...] = ()
     mode_frequencies: tuple[float, ...] = ()
     mode_damping_ratios: tuple[float, ...] = ()
