@@ -83,9 +83,6 @@ class PrandtlIshlinskiiStage(Stage):
     mode_weights, mode_frequencies, mode_damping_ratios : sequence of float, optional
         g, undamped frequency [Hz] and damping ratio of further modes in parallel with that mode;
         3 at most, each g between -1 and 1.
-    mode_weights, mode_frequencies, mode_damping_ratios : sequence of float, optional
-        g, undamped frequency [Hz] and damping ratio of further modes in parallel with that mode;
-        3 at most, each g between -1 and 1.
 
     Raises
     ------
@@ -94,16 +91,17 @@ class PrandtlIshlinskiiStage(Stage):
 
     Notes
     -----
-    With the signs of `linear` and all `weights` turned, the stage does under -u what it did under u:
-    dead zones act on `p`, and keep their thresholds.
+    With the signs of `linear` and all `weights` turned, the stage does under -u what it did under
+    u: dead zones act on `p`, and keep their thresholds.
 
-    The simulation is exact for a drive that is held, or linear between samples: an interval in which
-    a play starts to move, or `p` passes a dead zone's threshold, is split there.
+    The simulation is exact for a drive that is held, or linear between samples: an interval in
+    which a play starts to move, or `p` passes a dead zone's threshold, is split there.
 
     The inverse inverts each part in turn: the dynamics with the derivatives of the reference, creep
-    exactly for an `h` that is linear between samples, dead zones and plays in Kuhnen's closed form. Several modes are
-    inverted by a filter, exact for derivatives that are linear between samples. It exists where all
-    zeros of their sum are in the left half plane; elsewhere the inverse is refused.
+    exactly for an `h` that is linear between samples, dead zones and plays in Kuhnen's closed form.
+    Several modes are inverted by a filter, exact for derivatives that are linear between samples.
+    It exists where all zeros of their sum are in the left half plane; elsewhere the inverse is
+    refused.
 
     Examples
     --------
@@ -126,9 +124,6 @@ class PrandtlIshlinskiiStage(Stage):
     time_constant: float | None = None
     frequency: float | None = None
     damping_ratio: float | None = None
-    mode_weights: tuple[float, ...] = ()
-    mode_frequencies: tuple[float, ...] = ()
-    mode_damping_ratios: tuple[float, ...] = ()
     mode_weights: tuple[float, ...] = ()
     mode_frequencies: tuple[float, ...] = ()
     mode_damping_ratios: tuple[float, ...] = ()
