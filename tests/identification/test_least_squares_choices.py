@@ -36,7 +36,7 @@ def fitted(u: NDArray[np.float64], y: NDArray[np.float64], **given: Any) -> Any:
 
 
 def number(fit: Any, name: str) -> float:
-    (value,) = fit.parameters[name]
+    (value,) = dict(fit.parameters)[name]
     return float(value)
 
 
@@ -74,7 +74,9 @@ def test_two_modes_are_found() -> None:
     )
     u = shaken("steps")
     fit = fitted(u, noisy(stage.simulate(u, DT).x), dynamics="auto", history="virgin", start=200)
-    found = sorted(fit.parameters["frequency"] + fit.parameters["mode_frequencies"])
+    found = sorted(
+        dict(fit.parameters)["frequency"] + dict(fit.parameters)["mode_frequencies"]
+    )
     assert found == pytest.approx([60.0, 160.0], rel=0.02)
     assert fit.rms < 20e-9
 
@@ -83,7 +85,7 @@ def test_a_slow_record_shows_no_mode() -> None:
     u = drive()
     for stage in (MODE, replace(PLAIN, creep_weights=(0.01, 0.01), creep_times=(0.1, 1.0))):
         fit = fitted(u, noisy(stage.simulate(u, DT).x), dynamics="auto", creep_times=None)
-        assert fit.parameters["frequency"] == []
+        assert dict(fit.parameters)["frequency"] == []
 
 
 def test_a_lag_is_told_as_a_range() -> None:
@@ -92,7 +94,7 @@ def test_a_lag_is_told_as_a_range() -> None:
     shortest, longest = fit.lag_range
     assert shortest == 0.0
     assert 0.0 < longest < 5e-3
-    assert fit.parameters["time_constant"] == []
+    assert dict(fit.parameters)["time_constant"] == []
     late = replace(PLAIN, time_constant=4e-3)
     fit = fitted(u, noisy(late.simulate(u, DT).x), dynamics="auto")
     shortest, longest = fit.lag_range
@@ -150,20 +152,20 @@ def test_bounds_hold_and_are_named() -> None:
     u = drive()
     x = PLAIN.simulate(u, DT).x
     fit = fitted(u, x + 3.0 * np.maximum(x - 40e-6, 0.0), zones=1)
-    (bend,) = fit.parameters["dead_zone_weights"]
+    (bend,) = dict(fit.parameters)["dead_zone_weights"]
     assert bend == pytest.approx(1.0, abs=1e-3)
     assert "dead_zone_weights[0]" in fit.at_bound
     # Creep that would be most of the displacement.
     stage = replace(PLAIN, creep_weights=(0.8,), creep_times=(0.3,))
     fit = fitted(u, stage.simulate(u, DT).x, creep_times=[0.3, 3.0])
-    assert sum(fit.parameters["creep_weights"]) <= 0.5 + 1e-6
+    assert sum(dict(fit.parameters)["creep_weights"]) <= 0.5 + 1e-6
 
 
 def test_corners_are_found() -> None:
     log = record(STAGE, samples=6000)
     fit = fitted(log.u, log.y, zones=2, thresholds=list(STAGE.thresholds))
-    assert fit.parameters["dead_zone_thresholds"] == pytest.approx([20e-6, 50e-6], rel=1e-2)
-    assert fit.parameters["dead_zone_weights"] == pytest.approx([0.08, -0.05], rel=2e-2)
+    assert dict(fit.parameters)["dead_zone_thresholds"] == pytest.approx([20e-6, 50e-6], rel=1e-2)
+    assert dict(fit.parameters)["dead_zone_weights"] == pytest.approx([0.08, -0.05], rel=2e-2)
     assert fit.rms < 1e-9
 
 

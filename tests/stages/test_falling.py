@@ -40,7 +40,8 @@ def falling(stage: Any) -> Any:
 def path() -> np.ndarray:
     """A drive that turns at places which do not repeat, from 0 V on."""
     t = np.arange(4000) * 0.01
-    return 20.0 * np.sin(t) + 12.0 * np.sin(2.7 * t) + 3.0 * np.sin(17.3 * t)
+    u: np.ndarray = 20.0 * np.sin(t) + 12.0 * np.sin(2.7 * t) + 3.0 * np.sin(17.3 * t)
+    return u
 
 
 @pytest.mark.parametrize("behind", [{}, BEHIND], ids=["bare", "behind"])
@@ -86,7 +87,8 @@ def test_the_inverse_can_begin_on_a_settled_loop(stage: Any) -> None:
 def test_its_gains_are_negative(stage: Any) -> None:
     plants = falling(stage)._core.loop_plants(-30.0, 30.0, 0.0)
     least, middle, most = (plant.matrices()[3] for plant in plants)
-    assert 0.0 > least > middle > most
+    # Between two envelopes the output stands still after a reversal.
+    assert 0.0 >= least > middle > most
     if stage is ENVELOPE:
         rising = [plant.matrices()[3] for plant in stage._core.loop_plants(-30.0, 30.0, 0.0)]
         assert [-least, -middle, -most] == rising
@@ -96,9 +98,7 @@ def test_it_is_controlled_with_a_negative_gain() -> None:
     stage = falling(replace(STAGE, **BEHIND))
     reference = pt.sine(frequency=5.0, low=-40e-6, high=0.0, duration=1.0)
     pid = pt.Pid.from_um(kp=-0.05, ti=0.002, td=0.0)
-    loop = pt.Controller(
-        dt=1e-4, limits=(-10.0, 75.0), feedforward=stage.inverse(), feedback=pid
-    )
+    loop = pt.Controller(dt=1e-4, limits=(-10.0, 75.0), feedforward=stage.inverse(), feedback=pid)
     assert pt.track(stage, loop, reference).metrics.rms_error < 50e-9
 
 

@@ -358,14 +358,14 @@ impl<O: Segmented> InputStage<O> {
         }
     }
 
-    /// Bound of the error where the drive moves by `longest` (V) at most in a step, m.
-    fn error_bound(&self, flow: &InputStageFlow, longest: f64) -> f64 {
+    /// Bound of the error of one chord for each step in which the drive moves by `longest` (V) at
+    /// most, m.
+    fn error_bound(&self, longest: f64) -> f64 {
         if !self.relaxation.remembers() {
             return 0.0;
         }
         // A chord of length l deviates by bend l^2 / 8 at most.
-        let whole = 0.125 * self.operator.bend() * longest * longest;
-        whole.min(flow.deviation) * self.relaxation.largest_gain()
+        0.125 * self.operator.bend() * longest * longest * self.relaxation.largest_gain()
     }
 
     /// Takes the drive straight to `volts` in one step, in parts where the operator's output is
@@ -458,7 +458,7 @@ impl<O: Segmented> InputStage<O> {
             hysteresis,
             last,
             substeps: 1,
-            error_estimate: self.error_bound(&flow, longest),
+            error_estimate: self.error_bound(longest).min(accuracy),
             unique: true,
         }))
     }
