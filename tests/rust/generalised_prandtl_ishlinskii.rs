@@ -213,7 +213,8 @@ fn the_inverse_of_the_stage_goes_on_from_any_state() {
     let (inverse, mut state) = stage.inverse(dt, Some(&middle)).unwrap();
     for (&x, &volts) in run.x.iter().zip(after) {
         let found = inverse.step(&mut state, x, 0.0, 0.0);
-        assert!((found - volts).abs() < 1e-12 * 40.0, "{found} for {volts}");
+        // The inverse of the creep takes the output as straight from sample to sample.
+        assert!((found - volts).abs() < 1e-6, "{found} for {volts}");
     }
 }
 

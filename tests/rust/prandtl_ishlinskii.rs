@@ -7,7 +7,7 @@ use piezotrack_control::hysteresis::{Operator, Play};
 use piezotrack_core::identify::{DynamicsKind, WeightsRecord, WeightsSettings, identify_weights};
 use piezotrack_core::math::{NOT_NEGATIVE, Rows, bounded};
 use piezotrack_core::models::{
-    Dynamics, Experiment, Model, Plant, PlayHysteresis, PrandtlIshlinskiiStage, Relaxation,
+    Dynamics, Experiment, Mode, Model, Plant, PlayHysteresis, PrandtlIshlinskiiStage, Relaxation,
     StageModel,
 };
 use piezotrack_core::signal::{Drive, Hold, NEVER};
@@ -48,6 +48,69 @@ fn the_inverse_undoes_the_operator() {
 }
 
 #[test]
+fn the_inverse_of_a_falling_operator_undoes_it() {
+    let falling = Play { linear: -PLAY.linear, weights: PLAY.weights.map(|w| -w), ..PLAY };
+    let inverse = PlayInverse::new(&falling).unwrap();
+    let (mut there, mut back) = (falling.rest(), inverse.rest());
+    let (mut rising, mut mirrored) = (PLAY.rest(), 0.0);
+    for (k, input) in path(20_000).into_iter().enumerate() {
+        let output = falling.follow(&mut there, input);
+        mirrored = PLAY.follow(&mut rising, -input);
+        assert_eq!(output, mirrored);
+        if k == 777 {
+            back = inverse.memory(&falling, &there);
+        }
+        let found = inverse.follow(&mut back, output);
+        assert!((found - input).abs() < 1e-12, "{found} for {input}");
+    }
+    assert!(mirrored.abs() > 0.1);
+}
+
+#[test]
+fn a_stage_can_begin_in_equilibrium() {
+    let further = [Mode { weight: 0.3, frequency: 70.0, damping_ratio: 0.05 }];
+    for dynamics in [
+        Dynamics::None,
+        Dynamics::First { time: 0.02 },
+        Dynamics::Second { frequency: 30.0, damping_ratio: 0.1 },
+        Dynamics::modes(30.0, 0.1, &further).unwrap(),
+    ] {
+        let stage = stage(dynamics);
+        assert_eq!(stage.settled_at(&[]), stage.at_rest());
+        let mut state = stage.settled_at(&[40.0, -10.0, 25.0]);
+        // The same, slowly, as a simulation has it.
+        let slowly = Drive::new(&[0.0, 40.0, -10.0, 25.0, 25.0], 1e3, Hold::First).unwrap();
+        let run = stage.simulate(&Experiment::of(&slowly, NEVER)).unwrap().unwrap();
+        assert!((stage.displacement(&state) - run.x[4]).abs() < 1e-17);
+        assert!((stage.displacement(&state) - 1.01 * run.hysteresis[4]).abs() < 1e-17);
+        // And it stays.
+        let (flow, before) = (stage.flow(1e-3), stage.displacement(&state));
+        for _ in 0..100 {
+            stage.advance(&flow, &mut state, 25.0, 25.0);
+            assert!((stage.displacement(&state) - before).abs() < 1e-19);
+        }
+    }
+}
+
+#[test]
+fn a_plants_step_is_exact_however_long() {
+    // A closed loop moves the voltage far in one step: no further off than in many.
+    let dynamics = Dynamics::Second { frequency: 160.0, damping_ratio: 0.065 };
+    let stage = stage(dynamics);
+    let (long, short) = (stage.flow(5e-3), stage.flow(5e-3 / 64.0));
+    let (mut one, mut many) = (Plant::rest(&stage), Plant::rest(&stage));
+    for (from, to) in [(0.0, 60.0), (60.0, 3.0), (3.0, 50.0), (10.0, 11.0), (11.0, -40.0)] {
+        stage.advance(&long, &mut one, from, to);
+        for k in 0..64 {
+            let at = |k: i32| from + (to - from) * f64::from(k) / 64.0;
+            stage.advance(&short, &mut many, at(k), at(k + 1));
+        }
+        let off = stage.displacement(&one) - stage.displacement(&many);
+        assert!(off.abs() < 1e-17, "{off}");
+    }
+}
+
+#[test]
 fn the_inverse_can_begin_anywhere() {
     let inverse = PlayInverse::new(&PLAY).unwrap();
     let mut there = PLAY.rest();
@@ -77,6 +140,7 @@ fn what_is_not_finite_leaves_no_trace() {
 fn operators_without_an_inverse_are_refused() {
     let refused = |play: Play<f64, 4, 2>| PlayInverse::new(&play).unwrap_err().name;
     assert_eq!(refused(Play { linear: 0.0, ..PLAY }), "linear");
+    assert_eq!(refused(Play { linear: -0.6, ..PLAY }), "weights");
     assert_eq!(refused(Play { weights: [0.1, -0.1, 0.0, 0.0], ..PLAY }), "weights");
     assert_eq!(refused(Play { thresholds: [2.0, 1.0, 3.0, 4.0], ..PLAY }), "thresholds");
     assert_eq!(refused(Play { dead_zone_thresholds: [1.0, 0.0], ..PLAY }), "dead_zone_thresholds");

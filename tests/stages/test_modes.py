@@ -49,13 +49,14 @@ def parts(stage: Any) -> list[tuple[float, float, float]]:
 def scipys(stage: Any, d: np.ndarray, dt: float) -> np.ndarray:
     """The sum of the modes of SciPy for a static displacement linear between samples."""
     t = np.arange(d.size) * dt
-    return np.sum(
+    total: np.ndarray = np.sum(
         [
             g * signal.lsim(([w * w], [1.0, 2.0 * z * w, w * w]), d, t)[1]
             for g, w, z in parts(stage)
         ],
         axis=0,
     )
+    return total
 
 
 def test_the_displacement_is_the_weighted_sum_of_the_modes() -> None:
@@ -88,7 +89,7 @@ def test_the_velocity_is_that_of_the_displacement() -> None:
 
 
 def test_a_main_mode_without_weight_is_no_hindrance() -> None:
-    halves = {"mode_weights": (0.5, 0.5)}
+    halves: dict[str, Any] = {"mode_weights": (0.5, 0.5)}
     u = np.sin(np.arange(2000) * 0.02)
     stage = replace(STAGE, **halves)
     np.testing.assert_allclose(
@@ -124,7 +125,11 @@ def test_the_inverse_undoes_the_modes(stage: Any) -> None:
 def test_an_inverse_that_would_grow_is_refused() -> None:
     # A zero of the sum of the modes is in the right half plane, or there are too few of them.
     reference = pt.sine(frequency=5.0, low=0.0, high=20e-6, duration=0.5)
-    none = {"mode_weights": (-0.5,), "mode_frequencies": (900.0,), "mode_damping_ratios": (0.1,)}
+    none: dict[str, Any] = {
+        "mode_weights": (-0.5,),
+        "mode_frequencies": (900.0,),
+        "mode_damping_ratios": (0.1,),
+    }
     stage = replace(STAGE, **none)
     gains = parts(stage)
     total = np.zeros(3)

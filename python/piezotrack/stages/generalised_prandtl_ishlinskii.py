@@ -33,12 +33,12 @@ class GeneralisedPrandtlIshlinskiiStage(Stage):
     Parameters
     ----------
     linear : float
-        w0 [m/V], above 0: weight of the play of threshold 0, which with one envelope for both
-        directions has no memory.
+        w0 [m/V], not 0: weight of the play of threshold 0, which with one envelope for both
+        directions has no memory. Below 0 the displacement falls as the drive rises.
     thresholds : sequence of float
         r [V], half the width of each play's backlash, 0 or above and ascending; 32 at most.
     weights : sequence of float
-        w [m/V], as many, 0 or above.
+        w [m/V], as many, each 0 or of the sign of `linear`.
     scale, slope, shift, level : float
         c0 [V] and c1 [1/V], above 0, c2 and c3 [V] of the envelope of a rising drive.
     falling_scale, falling_slope, falling_shift, falling_level : float, optional

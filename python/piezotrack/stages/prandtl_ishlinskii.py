@@ -60,11 +60,12 @@ class PrandtlIshlinskiiStage(Stage):
     Parameters
     ----------
     linear : float
-        w0 [m/V], above 0: gain without hysteresis, and the slope just after a reversal.
+        w0 [m/V], not 0: gain without hysteresis, and the slope just after a reversal. Below 0 the
+        displacement falls as the drive rises.
     thresholds : sequence of float
         r [V], half the width of each play's backlash, 0 or above and ascending; 32 at most.
     weights : sequence of float
-        w [m/V], as many, 0 or above.
+        w [m/V], as many, each 0 or of the sign of `linear`.
     dead_zone_thresholds : sequence of float, optional
         d [m], thresholds of the one-sided dead zones, ascending; 8 at most.
     dead_zone_weights : sequence of float, optional
@@ -90,13 +91,17 @@ class PrandtlIshlinskiiStage(Stage):
 
     Notes
     -----
-    The simulation is exact for a drive that is held, or linear between samples: an interval in which
-    a play starts to move, or `p` passes a dead zone's threshold, is split there.
+    With the signs of `linear` and all `weights` turned, the stage does under -u what it did under
+    u: dead zones act on `p`, and keep their thresholds.
+
+    The simulation is exact for a drive that is held, or linear between samples: an interval in
+    which a play starts to move, or `p` passes a dead zone's threshold, is split there.
 
     The inverse inverts each part in turn: the dynamics with the derivatives of the reference, creep
-    exactly for an `h` that is linear between samples, dead zones and plays in Kuhnen's closed form. Several modes are
-    inverted by a filter, exact for derivatives that are linear between samples. It exists where all
-    zeros of their sum are in the left half plane; elsewhere the inverse is refused.
+    exactly for an `h` that is linear between samples, dead zones and plays in Kuhnen's closed form.
+    Several modes are inverted by a filter, exact for derivatives that are linear between samples.
+    It exists where all zeros of their sum are in the left half plane; elsewhere the inverse is
+    refused.
 
     Examples
     --------
@@ -125,6 +130,6 @@ class PrandtlIshlinskiiStage(Stage):
 
     def _notes(self, response: Callable[[], Response]) -> list[str]:
         del response
-        if self.linear + sum(self.weights) <= 100.0 * self.linear:
+        if abs(self.linear + sum(self.weights)) <= 100.0 * abs(self.linear):
             return []
         return ["the gain just after a reversal is close to 0: the inverse is ill-conditioned"]

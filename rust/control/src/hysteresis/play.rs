@@ -34,15 +34,17 @@ use crate::Number;
 /// ```
 ///
 /// It is strictly increasing, and so has an inverse, where `linear` and all partial sums of
-/// 1 + `dead_zone_weights` are positive and no weight is negative.
+/// 1 + `dead_zone_weights` are positive and no weight is negative. With `linear` and all weights
+/// negative it is strictly decreasing: the dead zones act on the sum as before, so that the output
+/// is that of positive weights for the negative input.
 ///
 /// The unit of the output is free; it is written Y here: V, or m for a stage.
 ///
 /// | field | symbol | unit | range |
 /// | --- | --- | --- | --- |
-/// | `linear` | w0 | Y/V | > 0 |
+/// | `linear` | w0 | Y/V | not 0 |
 /// | `thresholds` | r | V | >= 0, ascending |
-/// | `weights` | w | Y/V | >= 0 |
+/// | `weights` | w | Y/V | 0, or of the sign of w0 |
 /// | `dead_zone_thresholds` | d | Y | ascending |
 /// | `dead_zone_weights` | s | 1 | partial sums above -1 |
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,8 +61,8 @@ pub struct Play<N, const PLAYS: usize, const ZONES: usize> {
     pub dead_zone_weights: [N; ZONES],
 }
 
-/// Shares of a way below this are its ends, by a rounding.
-const LEAST_SHARE: f64 = 1e-12;
+/// Distances below this are roundings, relative to the numbers that they are between.
+const ROUNDING: f64 = 1e-12;
 
 /// State of the operator: its input, the output of each play operator, and the slope.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -132,10 +134,13 @@ impl<const PLAYS: usize, const ZONES: usize> Play<f64, PLAYS, ZONES> {
         let from = state.input;
         let side = if input < from { -1.0 } else { 1.0 };
         let mut end = input;
-        let plays = self.thresholds.iter().zip(&self.weights).zip(&state.plays);
-        for ((threshold, weight), play) in plays {
+        // What is nearer is a corner that the input stands at, but for a rounding.
+        let least = ROUNDING * (from.abs() + input.abs());
+        for ((threshold, weight), play) in
+            self.thresholds.iter().zip(&self.weights).zip(&state.plays)
+        {
             let corner = play + side * threshold;
-            if side * (corner - from) > 0.0 && side * (end - corner) > 0.0 && *weight != 0.0 {
+            if side * (corner - from) > least && side * (end - corner) > 0.0 && *weight != 0.0 {
                 end = corner;
             }
         }
@@ -145,14 +150,16 @@ impl<const PLAYS: usize, const ZONES: usize> Play<f64, PLAYS, ZONES> {
         let mut there = *state;
         self.follow(&mut there, end);
         let (before, after) = (self.sum(state), self.sum(&there));
-        let mut share = 1.0 - LEAST_SHARE;
+        let rise = after - before;
+        let least = ROUNDING * (before.abs() + after.abs()) / rise.abs();
+        let mut share = 1.0;
         for (corner, weight) in self.dead_zone_thresholds.iter().zip(&self.dead_zone_weights) {
-            let place = (corner - before) / (after - before);
-            if place > LEAST_SHARE && place < share && *weight != 0.0 {
+            let place = (corner - before) / rise;
+            if place > least && place < share && *weight != 0.0 {
                 share = place;
             }
         }
-        if share < 1.0 - LEAST_SHARE { from + share * (end - from) } else { end }
+        if share < 1.0 { from + share * (end - from) } else { end }
     }
 }
 

@@ -4,17 +4,17 @@
 //! v = S^-1(y) = y + sum_j s'_j max(y - d'_j, 0)          inverse of the dead zones
 //! u = w'_0 v + sum_i w'_i z'_i,  z'_i a play of threshold r'_i driven by v
 //!
-//! r'_i = sum_{j <= i} w_j (r_i - r_j)                     r_0 = 0
+//! r'_i = |sum_{j <= i} w_j (r_i - r_j)|                   r_0 = 0
 //! w'_0 = 1 / w_0,   w'_i = 1 / W_i - 1 / W_(i-1),         W_i = w_0 + ... + w_i
 //! z'_i = sum_{j <= i} w_j z_i + sum_{j > i} w_j z_j       the same memory
 //! d'_j = S(d_j),   s'_j = 1 / m_j - 1 / m_(j-1),          m_j = 1 + s_1 + ... + s_j
 //! ```
 //!
 //! Kuhnen 2003, European Journal of Control 9(4), 407-418, doi 10.3166/ejc.9.407-418. A step
-//! takes as long as one of the operator.
+//! takes as long as one of the operator. It holds for negative weights too.
 
 use super::Inverse;
-use crate::error::{Result, check, finite, not_negative, positive, usable};
+use crate::error::{Result, check, finite, not_negative, usable};
 use crate::hysteresis::{Operator, Play, PlayState};
 
 /// Inverse of a [`Play`] with `PLAYS` play operators and `ZONES` dead zones: output in, input out.
@@ -54,8 +54,8 @@ impl<const PLAYS: usize, const ZONES: usize> PlayInverse<PLAYS, ZONES> {
     /// Transforms the thresholds, weights and dead zones.
     ///
     /// # Errors
-    /// Where the operator has no inverse of this form: `linear` is not above 0, a weight is
-    /// negative, thresholds or dead-zone thresholds do not ascend, or a slope of the dead zones is
+    /// Where the operator has no inverse of this form: `linear` is 0, a weight has another sign,
+    /// thresholds or dead-zone thresholds do not ascend, or a slope of the dead zones is
     /// not above 0.
     pub fn new(play: &Play<f64, PLAYS, ZONES>) -> Result<Self> {
         let (dead_zone_thresholds, dead_zone_weights) = zones(play)?;
@@ -160,7 +160,10 @@ fn zones<const PLAYS: usize, const ZONES: usize>(
 fn plays<const PLAYS: usize, const ZONES: usize>(
     play: &Play<f64, PLAYS, ZONES>,
 ) -> Result<Play<f64, PLAYS, 0>> {
-    let mut sum = positive("linear", play.linear, "")?;
+    let right = play.linear.is_finite() && play.linear != 0.0;
+    let expected = "a finite number other than 0";
+    let mut sum = check("linear", play.linear, "", right, expected)?;
+    let sign = sum.signum();
     let mut inverse = Play {
         linear: 1.0 / sum,
         thresholds: [0.0; PLAYS],
@@ -173,8 +176,15 @@ fn plays<const PLAYS: usize, const ZONES: usize>(
     for i in 0..PLAYS {
         let here = not_negative("thresholds", play.thresholds[i], "V")?;
         check("thresholds", here, "V", here >= before, "thresholds that ascend")?;
-        let weight = not_negative("weights", play.weights[i], "")?;
-        threshold += sum * (here - before);
+        let weight = finite("weights", play.weights[i], "")?;
+        check(
+            "weights",
+            weight,
+            "",
+            sign * weight >= 0.0,
+            "0 or a number with the sign of linear",
+        )?;
+        threshold += sign * sum * (here - before);
         let next = sum + weight;
         inverse.thresholds[i] = threshold;
         inverse.weights[i] = -weight / (next * sum);

@@ -32,6 +32,10 @@ const DAMPING: (f64, f64) = (1e-3, 0.8);
 /// Share of the deviation that a mode has to take away.
 const LEAST_GAIN: f64 = 0.02;
 
+/// Least swing that the drive itself excites, as a share of what the mode takes away: with less
+/// it stands in for what the plays do not describe.
+const LEAST_SWING: f64 = 0.1;
+
 /// Places of the grid that are refined.
 const STARTS: usize = 5;
 
@@ -42,6 +46,8 @@ pub struct Resonance {
     pub frequency: f64,
     /// Damping ratio.
     pub damping_ratio: f64,
+    /// Share of the static displacement that it has; of the first, what the others leave.
+    pub weight: f64,
     /// Share of the deviation that it takes away.
     pub gain: f64,
 }
@@ -78,11 +84,16 @@ pub fn resonances(
         let Some((cost, modes)) = best else { break };
         let gain = 1.0 - cost / before;
         let proper = |mode: &Mode| mode.within(edges);
-        if !(gain > LEAST_GAIN && modes.iter().all(proper)) {
+        let taken = libm::sqrt(before * before - cost * cost);
+        let Some(last) = modes.last() else { break };
+        let shown = |mode: &Mode| trial.swings(*mode) > LEAST_SWING * taken;
+        if !(gain > LEAST_GAIN && modes.iter().all(proper) && (!known.is_empty() || shown(last))) {
             break;
         }
+        let weights = trial.weights(&modes);
         let gains = found.iter().map(|one| one.gain).chain([gain]);
-        found = modes.iter().zip(gains).map(|(mode, gain)| mode.resonance(gain)).collect();
+        let all = modes.iter().zip(weights).zip(gains);
+        found = all.map(|((mode, weight), gain)| mode.resonance(weight, gain)).collect();
     }
     Some(found)
 }
@@ -105,9 +116,9 @@ impl Mode {
         Dynamics::Second { frequency, damping_ratio }
     }
 
-    fn resonance(self, gain: f64) -> Resonance {
+    fn resonance(self, weight: f64, gain: f64) -> Resonance {
         let [frequency, damping_ratio] = self.0.map(libm::exp);
-        Resonance { frequency, damping_ratio, gain }
+        Resonance { frequency, damping_ratio, weight, gain }
     }
 
     fn within(&self, (low, high): (f64, f64)) -> bool {
@@ -237,6 +248,28 @@ impl<'a> Trial<'a> {
             inputs.iter().map(|input| steps.of(input)).collect()
         };
         modes.iter().enumerate().map(of).collect()
+    }
+
+    /// Shares of the static displacement.
+    fn weights(&self, modes: &[Mode]) -> Vec<f64> {
+        let (_, all) = self.cost(modes);
+        let further: Vec<f64> = (1..modes.len()).map(|i| all[self.columns.len() + i - 1]).collect();
+        let rest = 1.0 - further.iter().sum::<f64>();
+        [vec![rest], further].concat()
+    }
+
+    /// What a mode makes of the drive beyond the drive itself and its rate, rms, m.
+    fn swings(&self, mode: Mode) -> f64 {
+        let [_, u] = &self.few;
+        let Some(steps) = Steps::new(mode.dynamics(), &self.drive) else { return 0.0 };
+        let last = u.len() - 1;
+        let rate = |k: usize| u[(k + 1).min(last)] - u[k.saturating_sub(1)];
+        let (moved, mut rows) = (steps.of(u), Rows::new(3));
+        for &k in &self.rows {
+            rows.push(&[u[k], rate(k), 1.0], moved[k]);
+        }
+        let (low, high) = range(&self.y);
+        (high - low) * rows.rms(&rows.solve(&[FREE; 3]), index(self.rows.len()))
     }
 
     fn cost(&self, modes: &[Mode]) -> (f64, Vec<f64>) {

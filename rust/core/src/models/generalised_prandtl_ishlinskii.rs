@@ -23,7 +23,8 @@
 //! another play starts to move, and convex: the plays that move are known after a few passes, g
 //! follows, and u = `gamma_l^-1(g)` with artanh. A falling stretch is the same with signs turned.
 //! With equal envelopes this is the inverse of the Prandtl-Ishlinskii operator, then `gamma^-1`.
-//! There is an inverse where `gamma_l <= gamma_r`.
+//! There is an inverse where `gamma_l <= gamma_r`. With all weights negative the displacement falls
+//! as the drive rises, and is the negative of that with positive ones.
 //!
 //! Operator and inverse use arrays and `libm` only, and could move to the firmware's crate.
 
@@ -43,6 +44,9 @@ use crate::error::{Result, finite, positive};
 
 /// Room for the play of threshold 0 and the others.
 const SLOTS: usize = MOST_PLAYS + 1;
+
+/// Distances below this are roundings, relative to the voltages that they are between.
+const ROUNDING: f64 = 1e-12;
 
 /// Largest second derivative of tanh, 4 / (3 sqrt(3)).
 const MOST_BEND: f64 = 0.769_800_358_919_501;
@@ -166,7 +170,7 @@ pub type GeneralisedPlaysState = PlayState<f64, SLOTS>;
 pub type GeneralisedPrandtlIshlinskiiStage = InputStage<GeneralisedPlays>;
 
 impl GeneralisedPlays {
-    /// The operator from its parameters: weights in m/V, thresholds in V.
+    /// The operator from its parameters: weights in m/V, all of one sign, thresholds in V.
     ///
     /// # Errors
     /// [`crate::error::Error::Shape`] where entries are missing or too many,
@@ -246,16 +250,18 @@ impl GeneralisedPlays {
 
     /// Where the envelope of a direction stands for an output (m) beyond that of the state, V.
     ///
-    /// `sum_i w_i max(g - r_i, z_i)` is convex in g: Newton's method from above, where all plays
+    /// With w above 0, `sum_i w_i max(g - r_i, z_i)` is convex in g: Newton's method from above, where all plays
     /// move, comes down from corner to corner and ends on the straight part that g lies on.
     #[inline]
     fn edge(&self, state: &GeneralisedPlaysState, output: f64, rises: bool) -> f64 {
         // A falling stretch is a rising one of the negative plays.
         let sign = if rises { 1.0 } else { -1.0 };
+        let turn = self.weights[0].signum();
         let mut edge = f64::INFINITY;
         for _ in 0..=self.count {
-            let (mut slope, mut rest) = (0.0, sign * output);
+            let (mut slope, mut rest) = (0.0, sign * turn * output);
             for (threshold, weight, play) in self.plays(state) {
+                let weight = turn * weight;
                 if sign * play + threshold < edge {
                     slope += weight;
                     rest += weight * threshold;
@@ -327,8 +333,9 @@ impl Segmented for GeneralisedPlays {
         let envelope = if side > 0.0 { &self.rising } else { &self.falling };
         let edge = envelope.at(from);
         let mut end = volts;
+        let least = ROUNDING * (from.abs() + volts.abs());
         let mut nearest = |corner: f64| {
-            if side * (corner - from) > 0.0 && side * (end - corner) > 0.0 {
+            if side * (corner - from) > least && side * (end - corner) > 0.0 {
                 end = corner;
             }
         };
@@ -397,7 +404,8 @@ impl OperatorInverse for GeneralisedPlaysInverse {
         if distance == 0.0 {
             return state.operator.input;
         }
-        let rises = distance > 0.0;
+        // The input falls where the output rises with negative weights.
+        let rises = (distance > 0.0) == (operator.weights[0] > 0.0);
         let edge = operator.edge(&state.operator, output, rises);
         let envelope = if rises { &operator.rising } else { &operator.falling };
         let volts = envelope.inverse(edge);

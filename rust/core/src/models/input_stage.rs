@@ -30,6 +30,9 @@ use crate::signal::Hold;
 /// Parts of a sampling interval at most; the last one takes the rest.
 const MOST_PARTS: usize = 1 << 20;
 
+/// Corners at one place at most: rounding may find one again and again.
+const MOST_IDLE: usize = 128;
+
 /// Shares of a sampling interval below this are no part of it.
 const LEAST_PART: f64 = 1e-9;
 
@@ -369,14 +372,14 @@ impl<O: Segmented> InputStage<O> {
         }
     }
 
-    /// Bound of the error where the drive moves by `longest` (V) at most in a step, m.
-    fn error_bound(&self, flow: &InputStageFlow, longest: f64) -> f64 {
+    /// Bound of the error of one chord for each step in which the drive moves by `longest` (V) at
+    /// most, m.
+    fn error_bound(&self, longest: f64) -> f64 {
         if !self.relaxation.remembers() {
             return 0.0;
         }
         // A chord of length l deviates by bend l^2 / 8 at most.
-        let whole = 0.125 * self.operator.bend() * longest * longest;
-        whole.min(flow.deviation) * self.relaxation.largest_gain()
+        0.125 * self.operator.bend() * longest * longest * self.relaxation.largest_gain()
     }
 
     /// Takes the drive straight to `volts` in one step, in parts where the operator's output is
@@ -390,8 +393,8 @@ impl<O: Segmented> InputStage<O> {
     ) -> usize {
         let InputStageFlow { relaxation, zero, step, deviation } = flow;
         let from = self.operator.input(&state.operator);
-        let (mut done, mut parts) = (0.0, 1);
-        while self.relaxation.remembers() && parts < MOST_PARTS {
+        let (mut done, mut parts, mut idle) = (0.0, 1, 0);
+        while self.relaxation.remembers() && parts < MOST_PARTS && idle < MOST_IDLE {
             let next = self.operator.straight(&state.operator, volts, *deviation);
             let reached = (next - from) / (volts - from);
             // NaN where the drive stands still.
@@ -403,6 +406,9 @@ impl<O: Segmented> InputStage<O> {
                 let part = self.relaxation.flow((reached - done) * step);
                 self.relaxation.step(&part, &mut state.relaxation, output);
                 done = reached;
+                idle = 0;
+            } else {
+                idle += 1;
             }
             parts += 1;
         }
@@ -466,7 +472,7 @@ impl<O: Segmented> InputStage<O> {
             hysteresis,
             last,
             substeps: 1,
-            error_estimate: self.error_bound(&flow, longest),
+            error_estimate: self.error_bound(longest).min(accuracy),
             unique: true,
         }))
     }

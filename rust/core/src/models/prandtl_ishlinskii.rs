@@ -7,6 +7,10 @@
 //!
 //! Kuhnen 2003, European Journal of Control 9(4), 407-418, doi 10.3166/ejc.9.407-418, with the
 //! weights in m/V; [`InputStage`] says what follows the operator.
+//!
+//! Where `w_0` and all `w_i` are negative the displacement falls as the drive rises. The dead zones
+//! act on p as before: with the signs of all weights turned, the stage does under -u what it did
+//! under u.
 
 use piezotrack_control::hysteresis::{Operator, Play, PlayState};
 use piezotrack_control::{InputInverseState, PlayInverse, PrandtlIshlinskiiInverse};
@@ -19,7 +23,7 @@ use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
 use super::values::{ParameterInfo, Values};
 use super::weighted_plays::{FittedPlays, WeightedPlays};
 use crate::design::{Gains, LoopPlant};
-use crate::error::{Error, Result, finite, not_negative, positive};
+use crate::error::{Error, Result, finite, not_negative, shown};
 
 /// Most plays of a stage.
 pub const MOST_PLAYS: usize = 32;
@@ -78,8 +82,8 @@ pub struct PlayHysteresis {
 pub type PrandtlIshlinskiiStage = InputStage<PlayHysteresis>;
 
 impl PlayHysteresis {
-    /// The hysteresis from its parameters: weights in m/V, thresholds in V, those of the dead
-    /// zones in m.
+    /// The hysteresis from its parameters: weights in m/V, all of one sign, thresholds in V, those
+    /// of the dead zones in m.
     ///
     /// # Errors
     /// [`Error::Shape`] where entries are missing or too many, [`Error::Parameter`] where one is
@@ -91,7 +95,7 @@ impl PlayHysteresis {
         dead_zone_thresholds: &[f64],
         dead_zone_weights: &[f64],
     ) -> Result<Self> {
-        positive("linear", linear, "m/V")?;
+        let sign = direction(linear)?;
         let count = thresholds.len();
         same_length("weights", weights.len(), "thresholds", count, MOST_PLAYS)?;
         let names = ("dead_zone_weights", "dead_zone_thresholds");
@@ -112,7 +116,7 @@ impl PlayHysteresis {
         };
         plays.thresholds[..count].copy_from_slice(&checked_thresholds(thresholds, "V")?);
         for (i, weight) in weights.iter().enumerate() {
-            plays.weights[i] = not_negative(&format!("weights[{i}]"), *weight, "m/V")?;
+            plays.weights[i] = along(&format!("weights[{i}]"), *weight, sign)?;
         }
         let (mut before, mut slope) = (f64::NEG_INFINITY, 1.0);
         for j in 0..dead_zone_thresholds.len() {
@@ -130,6 +134,25 @@ impl PlayHysteresis {
         }
         Ok(Self { plays, count })
     }
+}
+
+/// The sign of a gain (m/V) that is not 0.
+fn direction(linear: f64) -> Result<f64> {
+    if linear.is_finite() && linear != 0.0 {
+        return Ok(linear.signum());
+    }
+    let found = format!("{} m/V", shown(linear));
+    Err(Error::parameter("linear", found, "a finite number other than 0"))
+}
+
+/// A weight, m/V, that does not work against `linear`, whose sign is given.
+fn along(name: &str, weight: f64, sign: f64) -> Result<f64> {
+    if sign * finite(name, weight, "m/V")? >= 0.0 {
+        return Ok(weight);
+    }
+    let side = if sign > 0.0 { "0 or above" } else { "0 or below" };
+    let expected = format!("a finite number, {side}, as linear is");
+    Err(Error::parameter(name, format!("{} m/V", shown(weight)), expected))
 }
 
 /// Thresholds of plays, which are not below 0 and ascend.

@@ -60,11 +60,14 @@ pub trait WeightedPlays: StageModel {
         plays.get(1..).unwrap_or(&[])
     }
 
-    /// A state at rest at `x`, m, and `volts` with the plays of the drive and the thresholds.
+    /// A state at rest at `x`, m, and `volts` with the plays of the drive and the thresholds, and
+    /// so many further modes.
     #[must_use]
-    fn start(x: f64, volts: f64, plays: &[f64], creep: &[f64]) -> Values {
+    fn start(x: f64, volts: f64, plays: &[f64], creep: &[f64], modes: usize) -> Values {
         let (plays, creep) = (Self::kept(plays).to_vec(), creep.to_vec());
-        Values::of(PLAYS_STATE, [vec![x], vec![0.0], vec![volts], plays, creep])
+        let (mode_x, mode_v) = (vec![x; modes], vec![0.0; modes]);
+        let entries = [vec![x], vec![0.0], vec![volts], plays, creep, mode_x, mode_v];
+        Values::of(PLAYS_STATE, entries)
     }
 }
 

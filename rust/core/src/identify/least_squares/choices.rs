@@ -4,9 +4,9 @@
 
 use super::fit::{Common, Fit};
 use super::form::Form;
-use super::{CreepKind, DynamicsKind, PlaysKind, Settings};
+use super::{CreepKind, DynamicsKind, PlaysKind, Settings, WeightsRecord};
 use crate::identify::history::History;
-use crate::identify::resonances::resonances;
+use crate::identify::resonances::{Resonance, resonances};
 use crate::math::least;
 use crate::models::WeightedPlays;
 use crate::signal::{index, range};
@@ -32,6 +32,18 @@ const ROUGH: f64 = 1e-3;
 
 /// Rows that choices are made on, about.
 const ROWS: usize = 4000;
+
+/// Modes that are looked for.
+const MOST_SHOWN: usize = 2;
+
+/// Least time constant of the creep, relative to that of the drive.
+const SLOWER: f64 = 0.5;
+
+/// Longest lag that is as likely as creep, in samples: a reading may come late.
+const LATE: f64 = 3.0;
+
+/// Deviation of the lag that is taken, relative to the least.
+const LAG_SAME: f64 = 1.003;
 
 /// Share of a fitted creep to start from.
 const FIRST_SHARE: f64 = 0.005;
@@ -62,7 +74,9 @@ pub(super) fn search<'a, M: WeightedPlays>(
     let lags = choose_dynamics(&mut fit, settings, mode)?;
     choose_plays(&mut fit, settings)?;
     fit.every = 1;
-    fit.settle(1e-10)?;
+    fit.settle(1e-4)?;
+    fit.exact = true;
+    fit.settle(1e-6)?;
     Some((fit, lags))
 }
 
@@ -87,7 +101,10 @@ fn place_corners<M: WeightedPlays>(fit: &mut Fit<'_, M>, count: usize) {
         }
     }
     let corner = |j: usize| low + (high - low) * index(j) / index(count + 1);
-    fit.restructure(|fit| fit.corners = (1..=count).map(corner).collect());
+    fit.restructure(|fit| (fit.zones, fit.bent) = (count, (low, high)));
+    for (j, slot) in fit.layout().corners().enumerate() {
+        fit.x[slot] = corner(j + 1);
+    }
 }
 
 /// The numbers of the envelope in turn, each from its range.
@@ -129,16 +146,28 @@ fn first_mode<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -> Op
     }
     let common = fit.common;
     let record = common.record;
-    let found = resonances(&record.drive, record.y, record.start, 1, common.stop)?;
-    let Some(mode) = found.first() else { return Some(false) };
-    let mut trial = fit.clone();
-    trial.set_poles(Form::Second, &[libm::log(mode.frequency), libm::log(mode.damping_ratio)]);
-    trial.settle(ROUGH)?;
-    let better = trial.rms < (1.0 - MODE_GAIN) * fit.rms;
-    if better {
-        *fit = trial;
+    let most = if settings.dynamics == DynamicsKind::Auto { MOST_SHOWN } else { 1 };
+    let found = resonances(&record.drive, record.y, record.start, most, common.stop)?;
+    let mut better = false;
+    for count in 1..=found.len() {
+        let mut trial = fit.clone();
+        trial.set_poles(Form::Modes(count), &poles(&found[..count]));
+        trial.settle(ROUGH)?;
+        if trial.rms < (1.0 - MODE_GAIN) * fit.rms {
+            *fit = trial;
+            better = true;
+        }
     }
     Some(better)
+}
+
+/// Numbers of modes in the order of [`Form::names`].
+fn poles(modes: &[Resonance]) -> Vec<f64> {
+    let numbers = |(k, mode): (usize, &Resonance)| {
+        let logarithms = [libm::log(mode.frequency), libm::log(mode.damping_ratio)];
+        if k == 0 { logarithms.to_vec() } else { [&[mode.weight], &logarithms[..]].concat() }
+    };
+    modes.iter().enumerate().flat_map(numbers).collect()
 }
 
 /// The fit with another history, as good as it gets.
@@ -209,13 +238,19 @@ fn choose_history<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -
     Some(())
 }
 
-/// Time constants of the creep that a record may ask for, s.
+/// Time constants of the creep that a record may ask for, s: slower than the drive, whose phase a
+/// faster one would turn as a lag does.
 fn creeps<M: WeightedPlays>(fit: &Fit<'_, M>) -> Vec<Vec<f64>> {
-    let record = fit.common.record;
-    let length = record.drive.dt * index(record.y.len() - record.start);
-    let shortest = 10.0 * record.drive.dt;
+    let WeightsRecord { drive, y, start } = *fit.common.record;
+    let length = drive.dt * index(y.len() - start);
+    let u = &drive.u[start..];
+    let mean = u.iter().sum::<f64>() / index(u.len());
+    let moved: f64 = u.iter().map(|u| (u - mean).powi(2)).sum();
+    let changed: f64 = u.windows(2).map(|u| (u[1] - u[0]).powi(2)).sum();
+    let shortest = f64::max(SLOWER * drive.dt * libm::sqrt(moved / changed), 10.0 * drive.dt);
     let pair = |divisor: f64| vec![length / divisor, 10.0 * length / divisor];
-    [10.0, 30.0, 100.0].into_iter().map(pair).filter(|times| times[0] >= shortest).collect()
+    let all = [3.0, 10.0, 30.0, 100.0, 300.0].into_iter().map(pair);
+    all.filter(|times| times[0] >= shortest).collect()
 }
 
 /// Creep where it was not set: none, or the two relaxations that explain most.
@@ -238,10 +273,19 @@ fn choose_creep<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -> 
             best = Some(trial);
         }
     }
-    *fit = match best {
-        Some(best) if best.rms < (1.0 - CREEP_GAIN) * none.rms => best,
-        _ => none,
+    let Some(best) = best.filter(|best| best.rms < (1.0 - CREEP_GAIN) * none.rms) else {
+        *fit = none;
+        return Some(());
     };
+    if settings.dynamics == DynamicsKind::Auto && none.form == Form::None {
+        let late = best_lag(&none)?;
+        let time = libm::exp(late.x[late.layout().poles().start]);
+        if time < LATE * fit.common.record.drive.dt && late.rms < SAME * best.rms {
+            *fit = none;
+            return Some(());
+        }
+    }
+    *fit = best;
     Some(())
 }
 
@@ -327,15 +371,20 @@ fn smallest_lag<'a, M: WeightedPlays>(
         let middle = 0.5 * (high + beyond);
         if as_good(middle)? { high = middle } else { beyond = middle }
     }
-    if still.rms <= enough {
-        return Some((still, (0.0, high)));
+    let shortest = |enough: f64| {
+        let (mut low, mut short) = (time, 0.0);
+        for _ in 0..6 {
+            let middle = 0.5 * (low + short);
+            if at_lag(&best, middle)?.rms <= enough { low = middle } else { short = middle }
+        }
+        Some(low)
+    };
+    let low = if still.rms <= enough { 0.0 } else { shortest(enough)? };
+    let least = LAG_SAME / SAME * enough;
+    if still.rms <= least {
+        return Some((still, (low, high)));
     }
-    let (mut low, mut short) = (time, 0.0);
-    for _ in 0..6 {
-        let middle = 0.5 * (low + short);
-        if as_good(middle)? { low = middle } else { short = middle }
-    }
-    let mut chosen = at_lag(&best, low)?;
+    let mut chosen = at_lag(&best, shortest(least)?)?;
     chosen.held = true;
     Some((chosen, (low, high)))
 }
@@ -347,7 +396,7 @@ fn unseen_mode<'a, M: WeightedPlays>(fit: &Fit<'a, M>) -> Option<Fit<'a, M>> {
     for (frequency, damping_ratio) in [(0.4, 0.1), (0.4, 1.0), (0.1, 0.1), (0.1, 1.0), (0.02, 1.0)]
     {
         let mut trial = fit.clone();
-        trial.set_poles(Form::Second, &[libm::log(frequency / dt), libm::log(damping_ratio)]);
+        trial.set_poles(Form::Modes(1), &[libm::log(frequency / dt), libm::log(damping_ratio)]);
         trial.settle(ROUGH)?;
         if best.as_ref().is_none_or(|best| SAME * trial.rms < best.rms) {
             best = Some(trial);

@@ -7,10 +7,12 @@ use super::follower::Follower;
 use super::form::Form;
 use super::layout::Layout;
 use super::{LeastSquaresFit, WeightsRecord};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::identify::history::{History, visited};
 use crate::math::Rows;
-use crate::models::{Dynamics, FittedPlays, Relaxation, WeightedPlays};
+use crate::models::{
+    Dynamics, Experiment, FittedPlays, Relaxation, RelaxationFlow, Values, WeightedPlays,
+};
 use crate::signal::{Stop, index, range};
 
 /// Least share of the mean slope that passes without memory: with less the inverse is no use.
@@ -53,8 +55,9 @@ impl<'a> Common<'a> {
 pub(super) struct Fit<'a, M: WeightedPlays> {
     pub common: &'a Common<'a>,
     pub thresholds: Vec<f64>,
-    /// Thresholds of the dead zones, m.
-    pub corners: Vec<f64>,
+    /// Number of dead zones, and what comes to them, m.
+    pub zones: usize,
+    pub bent: (f64, f64),
     /// Time constants of the creep, s.
     pub times: Vec<f64>,
     pub form: Form,
@@ -66,6 +69,8 @@ pub(super) struct Fit<'a, M: WeightedPlays> {
     /// Numbers of the envelope, and what they make.
     pub shape: Vec<f64>,
     envelope: M::Envelope,
+    /// Whether the motion is that of the stage's simulation, exact between samples too.
+    pub exact: bool,
     /// Window to be judged, and every how many samples.
     pub window: Range<usize>,
     pub every: usize,
@@ -78,7 +83,6 @@ impl<M: WeightedPlays> Clone for Fit<'_, M> {
     fn clone(&self) -> Self {
         Self {
             thresholds: self.thresholds.clone(),
-            corners: self.corners.clone(),
             times: self.times.clone(),
             shape: self.shape.clone(),
             envelope: self.envelope.clone(),
@@ -98,12 +102,14 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
             shape,
             common,
             thresholds: thresholds.to_vec(),
-            corners: Vec::new(),
+            zones: 0,
+            bent: (0.0, 0.0),
             times: Vec::new(),
             form: Form::None,
             held: false,
             history,
             from: 0.0,
+            exact: false,
             window: common.record.start..common.record.y.len(),
             every: 1,
             x: Vec::new(),
@@ -117,7 +123,8 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         let departing = self.history == History::Fitted;
         Layout {
             weights: 1 + self.thresholds.len(),
-            bends: self.corners.len(),
+            bends: self.zones,
+            corners: self.zones,
             shares: self.times.len(),
             departures: if departing { self.times.len() } else { 0 },
             offset: usize::from(self.common.offset),
@@ -140,6 +147,7 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         };
         keep(now.weights(), before.weights(), plays == self.thresholds);
         keep(now.bends(), before.bends(), true);
+        keep(now.corners(), before.corners(), true);
         keep(now.shares(), before.shares(), times == self.times);
         keep(now.departures(), before.departures(), times == self.times);
         keep(now.offset(), before.offset(), true);
@@ -193,10 +201,14 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         self.common.least_linear().mul_add(plays[0], weighted)
     }
 
+    fn corners(&self) -> &[f64] {
+        &self.x[self.layout().corners()]
+    }
+
     /// What the dead zones make of it.
     #[inline(always)]
     fn bent(&self, value: f64) -> f64 {
-        let zones = self.corners.iter().zip(&self.x[self.layout().bends()]);
+        let zones = self.corners().iter().zip(&self.x[self.layout().bends()]);
         value + zones.map(|(corner, bend)| bend * beyond(value, *corner)).sum::<f64>()
     }
 
@@ -213,12 +225,18 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         let value = self.sum(plays);
         let bends = &self.x[self.layout().bends()];
         let passed = |(corner, bend): (&f64, &f64)| if value > *corner { *bend } else { 0.0 };
-        let slope = 1.0 + self.corners.iter().zip(bends).map(passed).sum::<f64>();
+        let corners = self.corners();
+        let slope = 1.0 + corners.iter().zip(bends).map(passed).sum::<f64>();
         for (signal, play) in signals.iter_mut().zip(plays) {
             *signal = slope * play;
         }
-        for (signal, corner) in signals[plays.len()..].iter_mut().zip(&self.corners) {
+        let (bent, moved) = signals[plays.len()..].split_at_mut(corners.len());
+        for (signal, corner) in bent.iter_mut().zip(corners) {
             *signal = beyond(value, *corner);
+        }
+        for ((signal, corner), bend) in moved.iter_mut().zip(corners).zip(bends) {
+            let through = |on: bool| if on { *bend } else { 0.0 };
+            *signal = through(*corner < 0.0) - through(value > *corner);
         }
         if let Some(last) = signals.last_mut() {
             *last = self.bent(value);
@@ -276,31 +294,46 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         self.window.contains(&k) && (k - self.window.start) % self.every == 0
     }
 
-    /// RMS deviation in a window, m.
+    /// RMS deviation in the window, m.
     pub fn deviation(&self) -> f64 {
         self.common.evaluations.set(self.common.evaluations.get() + 1);
-        let Ok(relaxation) = self.relaxation() else { return f64::INFINITY };
-        let WeightsRecord { drive, y, .. } = *self.common.record;
-        let flow = relaxation.flow(drive.dt);
-        let mut plays = self.plays_before();
-        let creep = self.creep_before(1);
+        let Ok(motion) = self.motion() else { return f64::INFINITY };
         let offset: f64 = self.x[self.layout().offset()].iter().sum();
-        let mut follower: Option<Follower> = None;
         let (mut sum, mut count) = (0.0, 0);
-        for (k, &volts) in drive.u.iter().enumerate().take(self.window.end) {
-            self.push(&mut plays, volts);
-            let output = self.bent(self.sum(&plays));
-            let x = match &mut follower {
-                Some(follower) => follower.next(&relaxation, &flow, drive.hold, output),
-                none => none.insert(Follower::at_rest(&relaxation, output, &creep[0])).state.x,
-            };
+        for (k, (y, x)) in self.common.record.y.iter().zip(&motion).enumerate() {
             if self.counts(k) {
-                let error = y[k] - x - offset;
+                let error = y - x - offset;
                 sum += error * error;
                 count += 1;
             }
         }
         libm::sqrt(sum / index(count))
+    }
+
+    /// Displacement up to the end of the window, m.
+    fn motion(&self) -> Result<Vec<f64>> {
+        let relaxation = self.relaxation()?;
+        let drive = self.common.record.drive;
+        if self.exact {
+            let (values, start) = self.stage()?;
+            let experiment =
+                Experiment { initial: Some(&start), ..Experiment::of(&drive, self.common.stop) };
+            let stopped = || Error::Numerical("the simulation was stopped".into());
+            return Ok(M::build(&values)?.simulate(&experiment)?.ok_or_else(stopped)?.x);
+        }
+        let flow = relaxation.flow(drive.dt);
+        let mut plays = self.plays_before();
+        let creep = self.creep_before(1);
+        let mut follower: Option<Follower> = None;
+        let through = |volts: &f64| {
+            self.push(&mut plays, *volts);
+            let output = self.bent(self.sum(&plays));
+            match &mut follower {
+                Some(follower) => follower.next(&relaxation, &flow, drive.hold, output),
+                none => none.insert(Follower::at_rest(&relaxation, output, &creep[0])).state.x,
+            }
+        };
+        Ok(drive.u.iter().take(self.window.end).map(through).collect())
     }
 
     /// Gauss and Newton's method until a step gains less than `gain`; `None` where stopped.
@@ -338,7 +371,7 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         let Ok(rows) = self.linearised() else { return self.x.clone() };
         let layout = self.layout();
         let ranges = self.pole_ranges();
-        let bounds = layout.bounds(&self.x, self.held, &ranges, self.common.stroke);
+        let bounds = layout.bounds(&self.x, self.held, self.bent, &ranges, self.common.stroke);
         let mut held = rows.clone();
         let mut x = held.solve(&bounds);
         // Sums beyond their bounds are held there, one more each time.
@@ -369,9 +402,9 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         // Behind the creep: what its relaxations have reached goes through the dynamics alone.
         let bare = Relaxation::new(&[], &[], self.dynamics())?;
         let bare_flow = bare.flow(drive.dt);
-        let nudged = self.nudged()?;
+        let (nudged, motion) = (self.nudged()?, self.motion()?);
         let decay: Vec<f64> = self.times.iter().map(|time| libm::exp(-drive.dt / time)).collect();
-        let inner = layout.weights + layout.bends;
+        let inner = layout.weights + layout.bends + layout.corners;
         let mut signals = vec![0.0; inner + 1];
         let mut plays = self.plays_before();
         let creep = self.creep_before(inner + 1);
@@ -423,13 +456,13 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
             }
             let known: f64 = row.iter().zip(&self.x).map(|(a, b)| a * b).sum();
             let offset: f64 = self.x[layout.offset()].iter().sum();
-            rows.push(&row, y[k] - x - offset + known);
+            rows.push(&row, y[k] - motion[k] - offset + known);
         }
         Ok(rows)
     }
 
     /// Creep and dynamics with each number of the dynamics changed a little.
-    fn nudged(&self) -> Result<Vec<(Relaxation, crate::models::RelaxationFlow)>> {
+    fn nudged(&self) -> Result<Vec<(Relaxation, RelaxationFlow)>> {
         let dt = self.common.record.drive.dt;
         let of = |i: usize| {
             let mut other = self.clone();
@@ -441,27 +474,34 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         (0..self.layout().poles).map(of).collect()
     }
 
-    /// What was found.
-    pub fn result(&self) -> Result<LeastSquaresFit> {
+    /// Parameters of the stage, and its state before the first sample.
+    fn stage(&self) -> Result<(Values, Values)> {
         let layout = self.layout();
         let relaxation = self.relaxation()?;
         let fitted = FittedPlays {
             linear: self.common.least_linear() + self.x[0],
             thresholds: self.thresholds.clone(),
-            weights: self.x[1..layout.weights].to_vec(),
-            dead_zone_thresholds: self.corners.clone(),
+            weights: self.x[1..layout.weights].iter().map(|weight| weight.max(0.0)).collect(),
+            dead_zone_thresholds: self.corners().to_vec(),
             dead_zone_weights: self.x[layout.bends()].to_vec(),
             shape: self.shape.clone(),
             drive: self.common.drive,
             relaxation,
         };
-        let values = M::values(&fitted);
-        M::build(&values)?;
         let first = self.common.record.drive.u[0];
         let mut plays = self.plays_before();
         self.push(&mut plays, first);
         let creep = &self.creep_before(1)[0];
-        let rest = Follower::at_rest(&relaxation, self.bent(self.sum(&plays)), creep);
+        let rest = Follower::at_rest(&relaxation, self.bent(self.sum(&plays)), creep).state.x;
+        let modes = self.dynamics().further().len();
+        Ok((M::values(&fitted), M::start(rest, first, &plays, creep, modes)))
+    }
+
+    /// What was found.
+    pub fn result(&self) -> Result<LeastSquaresFit> {
+        let layout = self.layout();
+        let (values, start) = self.stage()?;
+        M::build(&values)?;
         Ok(LeastSquaresFit {
             values,
             offset: self.x[layout.offset()].iter().sum(),
@@ -469,7 +509,7 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
             evaluations: self.common.evaluations.get(),
             at_bound: layout.at_bound(&self.x, self.form, &self.pole_ranges()),
             history: self.history,
-            start: M::start(rest.state.x, first, &plays, creep),
+            start,
             lag_range: None,
         })
     }

@@ -18,6 +18,7 @@ impl Follower {
             *slot = *reached;
         }
         state.x = part.target(&state);
+        state.mode_x.fill(state.x);
         Self { state, before: input }
     }
 

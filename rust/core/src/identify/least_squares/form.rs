@@ -1,8 +1,7 @@
-//! Linear dynamics as logarithms of their numbers, which are found.
+//! Linear dynamics as logarithms of their numbers, and weights of modes, which are found.
 
-use crate::models::Dynamics;
-use crate::signal::Drive;
-use crate::signal::index;
+use crate::models::{Dynamics, Mode};
+use crate::signal::{Drive, index};
 
 /// Longest lag that is searched, as a share of the record.
 const LONGEST_LAG: f64 = 0.1;
@@ -19,12 +18,16 @@ const CYCLES: f64 = 3.0;
 /// Damping ratios that are searched.
 const DAMPING: (f64, f64) = (2e-3, 2.0);
 
+/// Shares of the static displacement of a further mode.
+const WEIGHT: (f64, f64) = (-0.9, 0.9);
+
 /// Which dynamics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Form {
     None,
     First,
-    Second,
+    /// So many modes in parallel, 1 or 2.
+    Modes(usize),
 }
 
 impl Form {
@@ -38,7 +41,14 @@ impl Form {
         match self {
             Self::None => &[],
             Self::First => &["time_constant"],
-            Self::Second => &["frequency", "damping_ratio"],
+            Self::Modes(1) => &["frequency", "damping_ratio"],
+            Self::Modes(_) => &[
+                "frequency",
+                "damping_ratio",
+                "mode_weights[0]",
+                "mode_frequencies[0]",
+                "mode_damping_ratios[0]",
+            ],
         }
     }
 
@@ -50,15 +60,28 @@ impl Form {
         match self {
             Self::None => Vec::new(),
             Self::First => vec![log((SHORTEST_LAG * dt, LONGEST_LAG * length))],
-            Self::Second => vec![log((CYCLES / length, HIGHEST / dt)), log(DAMPING)],
+            Self::Modes(count) => {
+                let mode = [log((CYCLES / length, HIGHEST / dt)), log(DAMPING)];
+                let further = [WEIGHT, mode[0], mode[1]].repeat(count - 1);
+                [&mode[..], &further].concat()
+            }
         }
     }
 
     /// The dynamics of these logarithms.
     pub fn dynamics(self, poles: &[f64]) -> Dynamics {
         match (self, poles) {
+            (Self::Modes(2), [frequency, damping_ratio, weight, second, second_damping]) => {
+                let further = Mode {
+                    weight: *weight,
+                    frequency: libm::exp(*second),
+                    damping_ratio: libm::exp(*second_damping),
+                };
+                Dynamics::modes(libm::exp(*frequency), libm::exp(*damping_ratio), &[further])
+                    .unwrap_or(Dynamics::None)
+            }
             (Self::First, [time, ..]) => Dynamics::First { time: libm::exp(*time) },
-            (Self::Second, [frequency, damping_ratio, ..]) => Dynamics::Second {
+            (Self::Modes(_), [frequency, damping_ratio, ..]) => Dynamics::Second {
                 frequency: libm::exp(*frequency),
                 damping_ratio: libm::exp(*damping_ratio),
             },

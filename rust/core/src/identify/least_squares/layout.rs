@@ -18,6 +18,9 @@ const MOST_CREEP: f64 = 0.5;
 /// How far a relaxation may stand from its equilibrium before a record, in strokes.
 const MOST_DEPARTURE: f64 = 1.0;
 
+/// Least distance of corners from each other and from the ends, as a share of what they bend.
+const MARGIN: f64 = 0.05;
+
 /// Most that a number of the dynamics changes by in one step, as a logarithm.
 const STRIDE: f64 = LN_2;
 
@@ -28,6 +31,8 @@ pub(super) struct Layout {
     pub weights: usize,
     /// Weights of the dead zones.
     pub bends: usize,
+    /// Thresholds of the dead zones, m, as many.
+    pub corners: usize,
     /// Shares of the creep.
     pub shares: usize,
     /// What each relaxation stands at before the record, beyond its equilibrium, m.
@@ -47,8 +52,12 @@ impl Layout {
         self.weights..self.weights + self.bends
     }
 
+    pub fn corners(&self) -> Range<usize> {
+        self.bends().end..self.bends().end + self.corners
+    }
+
     pub fn shares(&self) -> Range<usize> {
-        self.bends().end..self.bends().end + self.shares
+        self.corners().end..self.corners().end + self.shares
     }
 
     pub fn departures(&self) -> Range<usize> {
@@ -72,11 +81,13 @@ impl Layout {
         &self,
         x: &[f64],
         held: bool,
+        corners: (f64, f64),
         ranges: &[(f64, f64)],
         stroke: f64,
     ) -> Vec<(f64, f64)> {
         let mut bounds = vec![NOT_NEGATIVE; self.weights];
         bounds.extend(vec![BEND; self.bends]);
+        bounds.extend(self.near(&x[self.corners()], corners));
         bounds.extend(vec![(0.0, MOST_CREEP); self.shares]);
         bounds.extend(vec![(-MOST_DEPARTURE * stroke, MOST_DEPARTURE * stroke); self.departures]);
         bounds.extend(vec![FREE; self.offset]);
@@ -86,6 +97,17 @@ impl Layout {
             (f64::max(*low, at - stride), f64::min(*high, at + stride))
         }));
         bounds
+    }
+
+    /// Bounds of corners for a step: they stay apart, and away from the ends of what they bend.
+    fn near(&self, corners: &[f64], (low, high): (f64, f64)) -> Vec<(f64, f64)> {
+        let apart = MARGIN * (high - low);
+        let bound = |(j, at): (usize, &f64)| {
+            let below = if j == 0 { low + apart } else { 0.5 * (corners[j - 1] + at + apart) };
+            let above = corners.get(j + 1).map_or(high - apart, |next| 0.5 * (next + at - apart));
+            (f64::max(below, at - 2.0 * apart).min(*at), f64::min(above, at + 2.0 * apart).max(*at))
+        };
+        corners.iter().enumerate().map(bound).collect()
     }
 
     /// Sums of unknowns that have bounds too: from, to (exclusive), least and most.

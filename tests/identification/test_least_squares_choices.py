@@ -1,0 +1,179 @@
+"""What least squares choose by the record: modes, lags, creep, histories, bounds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import piezotrack as pt
+from piezotrack import _core
+from play_records import PLAIN, STAGE, drive, record
+
+MODE = replace(PLAIN, frequency=160.0, damping_ratio=0.03)
+DT = 1e-3
+
+
+def fitted(u: NDArray[np.float64], y: NDArray[np.float64], **given: Any) -> Any:
+    """A fit through the core; what is not given is chosen."""
+    settings: dict[str, Any] = {
+        "model": "prandtl-ishlinskii",
+        "dt": DT,
+        "hold_name": "foh",
+        "start": 0,
+        "count": None,
+        "thresholds": list(PLAIN.thresholds),
+        "zones": 0,
+        "creep_times": [],
+        "dynamics": "none",
+        "history": None,
+        "offset": True,
+    }
+    return _core.identify_weights(u=u, y=y, **(settings | given))
+
+
+def number(fit: Any, name: str) -> float:
+    (value,) = dict(fit.parameters)[name]
+    return float(value)
+
+
+def noisy(y: NDArray[np.float64], nanometres: float = 10.0) -> NDArray[np.float64]:
+    return y + 1e-9 * nanometres * np.random.default_rng(3).normal(size=y.size)
+
+
+def shaken(kind: str, samples: int = 3000) -> NDArray[np.float64]:
+    rng, t = np.random.default_rng(5), DT * np.arange(samples)
+    slow: NDArray[np.float64] = 37.5 * (1.0 - np.cos(2.0 * np.pi * t))
+    if kind == "steps":
+        return np.repeat(rng.uniform(0.0, 75.0, 30), samples // 30)
+    if kind == "noise":
+        return 37.5 + 20.0 * np.convolve(rng.normal(size=samples), np.ones(5) / 5.0, "same")
+    if kind == "chirp":
+        return 37.5 + 5.0 * np.sin(2.0 * np.pi * (1.0 + 40.0 * t) * t)
+    return np.where(t < 1.5, slow, 75.0 - 0.5 * slow)
+
+
+@pytest.mark.parametrize("kind", ["steps", "noise", "chirp", "sine with a step"])
+def test_a_lightly_damped_mode_that_the_record_shows_is_found(kind: str) -> None:
+    u = shaken(kind)
+    y = noisy(MODE.simulate(u, DT).x)
+    for dynamics in ("auto", "second"):
+        fit = fitted(u, y, dynamics=dynamics, history="virgin", start=200)
+        assert number(fit, "frequency") == pytest.approx(160.0, rel=0.01)
+        assert number(fit, "damping_ratio") == pytest.approx(0.03, rel=0.1)
+        assert fit.rms < 15e-9
+        assert not fit.at_bound
+
+
+def test_two_modes_are_found() -> None:
+    stage = replace(
+        MODE, mode_weights=(0.2,), mode_frequencies=(60.0,), mode_damping_ratios=(0.05,)
+    )
+    u = shaken("steps")
+    fit = fitted(u, noisy(stage.simulate(u, DT).x), dynamics="auto", history="virgin", start=200)
+    found = sorted(
+        dict(fit.parameters)["frequency"] + dict(fit.parameters)["mode_frequencies"]
+    )
+    assert found == pytest.approx([60.0, 160.0], rel=0.02)
+    assert fit.rms < 20e-9
+
+
+def test_a_slow_record_shows_no_mode() -> None:
+    u = drive()
+    for stage in (MODE, replace(PLAIN, creep_weights=(0.01, 0.01), creep_times=(0.1, 1.0))):
+        fit = fitted(u, noisy(stage.simulate(u, DT).x), dynamics="auto", creep_times=None)
+        assert dict(fit.parameters)["frequency"] == []
+
+
+def test_a_lag_is_told_as_a_range() -> None:
+    u = drive()
+    fit = fitted(u, noisy(PLAIN.simulate(u, DT).x), dynamics="auto")
+    shortest, longest = fit.lag_range
+    assert shortest == 0.0
+    assert 0.0 < longest < 5e-3
+    assert dict(fit.parameters)["time_constant"] == []
+    late = replace(PLAIN, time_constant=4e-3)
+    fit = fitted(u, noisy(late.simulate(u, DT).x), dynamics="auto")
+    shortest, longest = fit.lag_range
+    assert 1e-3 < shortest < 4e-3 < longest < 8e-3
+    assert number(fit, "time_constant") == pytest.approx(4e-3, rel=0.3)
+
+
+def simulated(fit: Any, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    optional = ("time_constant", "frequency", "damping_ratio")
+    values: dict[str, Any] = {
+        name: (value[0] if value else None) if name in optional else tuple(value)
+        for name, value in dict(fit.parameters).items()
+    }
+    values["linear"] = values["linear"][0]
+    stage = pt.PrandtlIshlinskiiStage(**values)
+    state = stage.simulate([0.0], DT).final
+    start = {name: value for name, value in dict(fit.start).items()}
+    first = {
+        name: start[name][0] if isinstance(getattr(state, name), float) else tuple(start[name])
+        for name in start
+    }
+    return stage.simulate(u, DT, initial=replace(state, **first)).x
+
+
+@pytest.mark.parametrize("history", ["virgin", "settled", "fit"])
+@pytest.mark.parametrize("dynamics", ["none", "first", "second"])
+def test_the_start_reproduces_the_cost(history: str, dynamics: str) -> None:
+    u = 20.0 + 0.5 * drive()
+    y = noisy(replace(STAGE, creep_weights=(0.02,), creep_times=(0.5,)).simulate(u, DT).x)
+    fit = fitted(
+        u, y, zones=2, creep_times=[0.5], history=history, dynamics=dynamics, start=10
+    )
+    left = (y - simulated(fit, u) - fit.offset)[10:]
+    assert np.sqrt(np.mean(left**2)) == pytest.approx(fit.rms, rel=1e-6)
+
+
+def test_a_record_that_begins_at_half_of_the_range() -> None:
+    t = DT * np.arange(3000)
+    u = 37.5 + 37.5 * np.sin(2.0 * np.pi * t)
+    before = 37.5 * (1.0 - np.cos(2.0 * np.pi * np.linspace(0.0, 2.25, 9001)))[:-1]
+    y = noisy(PLAIN.simulate(np.concatenate([before, u]), DT).x[before.size :])
+    assert fitted(u, y, history="virgin").rms > 30e-9
+    fit = fitted(u, y)
+    assert fit.history == "settled"
+    assert fit.rms < 11e-9
+    # One that came from another voltage.
+    before = np.concatenate([np.linspace(0.0, 60.0, 500), np.linspace(60.0, 37.5, 500)])
+    y = noisy(PLAIN.simulate(np.concatenate([before, u]), DT).x[before.size :])
+    fit = fitted(u, y, history="fit")
+    assert fit.rms < 12e-9
+
+
+def test_bounds_hold_and_are_named() -> None:
+    # A kink far sharper than a dead zone may make.
+    u = drive()
+    x = PLAIN.simulate(u, DT).x
+    fit = fitted(u, x + 3.0 * np.maximum(x - 40e-6, 0.0), zones=1)
+    (bend,) = dict(fit.parameters)["dead_zone_weights"]
+    assert bend == pytest.approx(1.0, abs=1e-3)
+    assert "dead_zone_weights[0]" in fit.at_bound
+    # Creep that would be most of the displacement.
+    stage = replace(PLAIN, creep_weights=(0.8,), creep_times=(0.3,))
+    fit = fitted(u, stage.simulate(u, DT).x, creep_times=[0.3, 3.0])
+    assert sum(dict(fit.parameters)["creep_weights"]) <= 0.5 + 1e-6
+
+
+def test_corners_are_found() -> None:
+    log = record(STAGE, samples=6000)
+    fit = fitted(log.u, log.y, zones=2, thresholds=list(STAGE.thresholds))
+    assert dict(fit.parameters)["dead_zone_thresholds"] == pytest.approx([20e-6, 50e-6], rel=1e-2)
+    assert dict(fit.parameters)["dead_zone_weights"] == pytest.approx([0.08, -0.05], rel=2e-2)
+    assert fit.rms < 1e-9
+
+
+def test_resonances_of_a_record() -> None:
+    u = shaken("noise")
+    y = noisy(MODE.simulate(u, DT).x)
+    found = _core.resonances(u=u, y=y, dt=DT, hold_name="foh", start=0, most=1)
+    assert found[0][:2] == pytest.approx((160.0, 0.03), rel=0.03)
+    u = drive()
+    y = noisy(MODE.simulate(u, DT).x)
+    assert _core.resonances(u=u, y=y, dt=DT, hold_name="foh", start=0, most=1) == []
