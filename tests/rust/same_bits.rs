@@ -43,7 +43,8 @@ fn candidates(problem: &Problem) -> Vec<Candidate> {
 
 fn bits(evaluator: &Evaluator<'_>, candidates: &[Candidate]) -> Vec<(u64, u64, [u64; 3])> {
     let costs = evaluator.costs(candidates, NEVER);
-    let bits = costs.iter().map(|c| (c.rms.to_bits(), c.offset.to_bits(), c.shares.map(f64::to_bits)));
+    let bits =
+        costs.iter().map(|c| (c.rms.to_bits(), c.offset.to_bits(), c.shares.map(f64::to_bits)));
     bits.collect()
 }
 

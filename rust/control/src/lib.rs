@@ -64,9 +64,9 @@ pub use feedback_law::Feedback;
 pub use filters::{Filter, FilterState};
 pub use inverse::{
     BoucWenInverse, BoucWenInverseState, CreepingInverse, CreepingInverseState, DahlInverse,
-    FeedbackInverse, FeedbackInverseState,
-    FirstOrderDahlInverse, InputInverse, InputInverseState, Inverse, InverseState, OperatorInverse,
-    OscillatorInverse, PlayInverse, PrandtlIshlinskiiInverse, SampledDahlInverse,
+    FeedbackInverse, FeedbackInverseState, FirstOrderDahlInverse, InputInverse, InputInverseState,
+    Inverse, InverseState, OperatorInverse, OscillatorInverse, PlayInverse,
+    PrandtlIshlinskiiInverse, SampledDahlInverse,
 };
 pub use limits::Limits;
 pub use measurement::{Refused, Span};

@@ -137,13 +137,14 @@ fn solve(matrix: &[Shares; 3], face: usize, right: &Shares) -> Option<Shares> {
     let (mut a, mut b) = (*matrix, *right);
     let used = |j: &usize| face >> j & 1 == 1;
     for p in (0..MOST_SHARES).filter(used) {
-        if !(a[p][p] > LEAST_PIVOT * matrix[p][p]) {
+        let pivots = a[p];
+        if pivots[p].is_nan() || pivots[p] <= LEAST_PIVOT * matrix[p][p] {
             return None;
         }
         for row in (p + 1..MOST_SHARES).filter(used) {
-            let factor = a[row][p] / a[p][p];
-            for column in p..MOST_SHARES {
-                a[row][column] -= factor * a[p][column];
+            let factor = a[row][p] / pivots[p];
+            for (slot, pivot) in a[row].iter_mut().zip(pivots).skip(p) {
+                *slot -= factor * pivot;
             }
             b[row] -= factor * b[p];
         }

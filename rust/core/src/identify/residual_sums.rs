@@ -57,8 +57,7 @@ impl Residuals<'_> {
         let rms = if bound { (rms - MOST_CREEP * SLACK * best.size).max(0.0) } else { rms };
         let total: f64 = best.shares.iter().sum();
         // The outputs were taken from the centre too.
-        let offset =
-            if self.offset { best.mean + self.centre - self.centre * total } else { 0.0 };
+        let offset = if self.offset { best.mean + self.centre - self.centre * total } else { 0.0 };
         if rms.is_finite() && offset.is_finite() && best.square.is_finite() {
             Costs { rms, offset, shares: best.shares }
         } else {
@@ -189,7 +188,7 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
     }
 
     /// Gives up where every candidate is already beyond its limit: squares only add up, also
-    /// about the mean that would suit best what has been seen.
+    /// about the mean, and with the shares of the creep, that would suit best what has been seen.
     ///
     /// A candidate's verdict is its own, whatever the other lanes hold, so it does not depend on
     /// how candidates are bundled.

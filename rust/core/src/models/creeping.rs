@@ -114,8 +114,8 @@ impl<M: StageModel> Creeping<M> {
         }
         let used = || self.creep().iter().zip(reached);
         let x = used().fold(state.number("x"), |x, (creep, q)| x - creep.share * q);
-        let v = used()
-            .fold(state.number("v"), |v, (creep, q)| v - creep.share * (x - q) / creep.time);
+        let v =
+            used().fold(state.number("v"), |v, (creep, q)| v - creep.share * (x - q) / creep.time);
         Ok(state.leading(M::INFO.state).with("x", x).with("v", v))
     }
 
