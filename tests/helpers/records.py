@@ -111,7 +111,11 @@ def quick_fit(**arguments: Any) -> pt.identification.Identification:
 def bits(fit: pt.identification.Identification) -> dict[str, Any]:
     """All numbers of a result, down to the last bit."""
     return {
-        "model": [value.hex() for value in asdict(fit.model).values()],
+        "model": [
+            one.hex()
+            for value in asdict(fit.model).values()
+            for one in (value if isinstance(value, tuple) else (value,))
+        ],
         "cost": fit.cost.hex(),
         "offset": fit.offset.hex(),
         "history": fit.history.tobytes(),

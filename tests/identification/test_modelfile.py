@@ -178,6 +178,8 @@ def test_the_file_has_units_and_a_schema_version(tmp_path: Path) -> None:
         "b1": "N/m^2",
         "b0": "N/m",
         "up": "",
+        "creep_weights": "",
+        "creep_times": "s",
     }
     for name, estimate in fit.parameters.items():
         entry = content["parameters"][name]

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ def test_the_callback_is_told_of_every_iteration_in_order() -> None:
     assert {progress.iterations for progress in seen} == {30}
     assert [progress.nfev for progress in seen] == [12 * (k + 1) for k in range(31)]
     assert [progress.cost for progress in seen] == fit.history.tolist()
-    last = seen[-1].parameters
+    last: dict[str, Any] = dict(seen[-1].parameters)
     assert tuple(last) == NAMES
     score = pt.identification.IdentifiedModel(
         model=pt.DahlStage(**last),
@@ -57,7 +58,7 @@ def test_a_true_answer_stops_with_the_best_so_far() -> None:
     assert isinstance(partial, pt.identification.Identification)
     assert len(seen) == 8
     assert partial.cost == seen[-1].cost
-    assert partial.model == pt.DahlStage(**seen[-1].parameters)
+    assert partial.model == pt.DahlStage(**cast("dict[str, Any]", seen[-1].parameters))
     assert (partial.nit, partial.nfev) == (7, 4 * 12 * 8)
     assert (partial.success, partial.stop_reason) == (False, "interrupted")
     assert partial.message == "interrupted"

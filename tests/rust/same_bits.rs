@@ -41,9 +41,11 @@ fn candidates(problem: &Problem) -> Vec<Candidate> {
         .collect()
 }
 
-fn bits(evaluator: &Evaluator<'_>, candidates: &[Candidate]) -> Vec<(u64, u64)> {
+fn bits(evaluator: &Evaluator<'_>, candidates: &[Candidate]) -> Vec<(u64, u64, [u64; 3])> {
     let costs = evaluator.costs(candidates, NEVER);
-    costs.iter().map(|c| (c.rms.to_bits(), c.offset.to_bits())).collect()
+    let bits =
+        costs.iter().map(|c| (c.rms.to_bits(), c.offset.to_bits(), c.shares.map(f64::to_bits)));
+    bits.collect()
 }
 
 fn instruction_sets() -> Vec<Arch> {
@@ -131,11 +133,64 @@ fn one_lane_and_many_of_models_with_an_exponent() {
     }
 }
 
+/// Shares of the creep within the cost, with and without a delay.
 #[test]
-fn abandoning_a_guess_changes_no_result() {
+fn one_lane_and_many_with_creep() {
     let (u, y) = log();
     let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
-    let problem = Problem::new(&record, &spec()).unwrap();
+    for delay in [Delay::default(), Delay::Between(0.0, 0.02)] {
+        let problem = Problem::new(&record, &Spec { delay, ..creeping() }).unwrap();
+        let asked = candidates(&problem);
+        let expected = bits(&Evaluator::new(&record, &problem, NEVER), &asked);
+        assert!(expected.iter().any(|c| c.2 != [0; 3]), "no candidate has a share");
+        for arch in instruction_sets() {
+            let evaluator = Evaluator::new(&record, &problem, NEVER).on(arch);
+            assert_eq!(bits(&evaluator, &asked), expected, "{arch:?}");
+            let alone: Vec<_> = asked.iter().flat_map(|one| bits(&evaluator, &[*one])).collect();
+            assert_eq!(alone, expected, "{arch:?}, one by one");
+        }
+    }
+}
+
+fn creeping() -> Spec {
+    Spec { creep_times: vec![0.02, 0.2, 1.5], ..spec() }
+}
+
+/// A candidate that is given up has a cost beyond its limit, also with the best shares.
+#[test]
+fn a_bound_of_the_cost_is_never_above_it() {
+    let (u, mut y) = log();
+    // Displacement that is wrong at first, and right later.
+    for (k, y) in y.iter_mut().enumerate() {
+        *y += if k < 700 { 3e-6 } else { 0.0 };
+    }
+    let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
+    for offset in [true, false] {
+        let problem = Problem::new(&record, &Spec { offset, ..creeping() }).unwrap();
+        let evaluator = Evaluator::new(&record, &problem, NEVER);
+        let asked = candidates(&problem);
+        for (one, cost) in asked.iter().zip(evaluator.costs(&asked, NEVER)) {
+            for part in [0.2, 0.5, 0.8, 0.95, 0.999] {
+                let limited = Candidate { limit: part * cost.rms, ..*one };
+                let bound = evaluator.costs(&[limited], NEVER)[0];
+                assert!(bound.rms <= cost.rms, "{} above {}", bound.rms, cost.rms);
+                assert!(bound.rms >= limited.limit, "{} below its limit", bound.rms);
+            }
+        }
+    }
+}
+
+#[test]
+fn abandoning_a_guess_changes_no_result() {
+    for spec in [spec(), creeping()] {
+        abandoning(&spec);
+    }
+}
+
+fn abandoning(spec: &Spec) {
+    let (u, y) = log();
+    let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
+    let problem = Problem::new(&record, spec).unwrap();
     let evaluator = Evaluator::new(&record, &problem, NEVER);
     let asked = candidates(&problem);
     let whole = evaluator.costs(&asked, NEVER);

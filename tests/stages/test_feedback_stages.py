@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import pytest
@@ -300,7 +300,7 @@ def test_a_run_can_be_carried_on(stage: pt.FirstOrderDahlStage | pt.BoucWenOscil
 def test_refusals_of_friction(name: str, value: float, expected: str) -> None:
     """By name, with the value and the unit."""
     with pytest.raises(pt.ParameterError, match=expected):
-        dataclasses.replace(FRICTION, **{name: value})
+        dataclasses.replace(FRICTION, **{name: cast("Any", value)})
 
 
 @pytest.mark.parametrize(
@@ -315,7 +315,7 @@ def test_refusals_of_friction(name: str, value: float, expected: str) -> None:
 def test_refusals_of_the_oscillator(name: str, value: float, expected: str) -> None:
     """By name, with the value."""
     with pytest.raises(pt.ParameterError, match=expected):
-        dataclasses.replace(BENCHMARK, **{name: value})
+        dataclasses.replace(BENCHMARK, **{name: cast("Any", value)})
 
 
 def test_what_is_not_in_the_data_is_not_searched() -> None:

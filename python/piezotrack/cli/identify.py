@@ -84,7 +84,7 @@ def identify_command(
         str | None,
         typer.Option(
             metavar="fit|S,S,...",
-            help="Creep with weights fitted, and its time constants in s: from the record, or known.",
+            help="Creep, its time constants in s: from the record, or known; weights fitted.",
         ),
     ] = None,
     swarm: Annotated[

@@ -109,10 +109,11 @@ def identify(
         that lowers the cost by 2 %.
     creep : bool or iterable of float, optional
         Creep of the stage: none (False, the default), relaxations with these time constants [s],
-        three at most, or two whose time constants follow from the record (True): at a quarter and
-        three quarters, on a logarithmic scale, of the times from ten samples, or a tenth of the
-        drive's period, to half of the window. Their weights, 0.5 together at most, are the best
-        for each candidate, by linear least squares, and add nothing to what the swarm searches.
+        three at most, or two whose time constants follow from the record (True): the drive's
+        period and half of the window. What relaxes within a period widens the loop, as damping and
+        hysteresis do, and one record does not tell them apart. The weights, 0.5 together at most,
+        are the best for each candidate, by linear least squares, and add nothing to what the swarm
+        searches.
         For models found by least squares, see ``LeastSquares.creep``.
     swarm : ParticleSwarm, optional
         Settings of the swarm.

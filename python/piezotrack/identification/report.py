@@ -10,6 +10,7 @@ from .remarks import of_start
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Iterable
     from pathlib import Path
 
     from ..data.dataset import Dataset
@@ -54,7 +55,9 @@ def summary_text(fit: Identification) -> str:
         lines.append(f"      least squares, {fit.nfev} simulations")
     lines += _trials(fit)
     lines += [*(f"note  {note}" for note in fit.notes), ""]
-    return "\n".join([*lines, *(_estimates(fit) if searched else _values(fit))])
+    return "\n".join(
+        [*lines, *(_estimates(fit) if searched else _values(fit, fit.model.info.parameters))]
+    )
 
 
 def _trials(fit: Identification) -> list[str]:
@@ -84,6 +87,7 @@ def _estimates(fit: Identification) -> list[str]:
     width = 1 + max(3, *(len(estimate.symbol) for estimate in fit.parameters.values()))
     lines.append(f"  {'':<18}{'':<{width}}{'value':>13}  {'':<9}{'standard deviation'}")
     lines += [_row(name, estimate, width) for name, estimate in fit.parameters.items()]
+    lines += _values(fit, [one for one in fit.model.info.parameters if one.is_list])[1:-1]
     if unclear := [n for n, e in fit.parameters.items() if not e.identified]:
         lines += ["", "Not determined by this record: " + ", ".join(unclear) + "."]
     if fit.nfail:
@@ -91,9 +95,9 @@ def _estimates(fit: Identification) -> list[str]:
     return lines
 
 
-def _values(fit: Identification) -> list[str]:
+def _values(fit: Identification, parameters: Iterable[Parameter]) -> list[str]:
     """List the values of the parameters, lists of one length side by side in pairs."""
-    lines, parts = ["parameters"], list(fit.model.info.parameters)
+    lines, parts = ["parameters"], list(parameters)
     while parts:
         one = parts.pop(0)
         value = getattr(fit.model, one.name)

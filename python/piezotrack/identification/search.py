@@ -128,7 +128,7 @@ def search(
 
 def _reporting(info: ModelInfo, callback: Callable[[Progress], object]) -> Callable[..., bool]:
     """Convert the core's plain numbers to a `Progress` for the callback."""
-    names = [one.name for one in info.parameters]
+    names = [one.name for one in info.parameters if not one.is_list]
 
     def report(nit: int, most: int, nfev: int, cost: float, theta: list[float]) -> bool:
         parameters = dict(zip(names, theta, strict=False))

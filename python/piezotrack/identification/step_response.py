@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .. import _core
 from .._support.messages import quoted
@@ -182,8 +182,8 @@ class StepResult:
         if any(part is None for part in parts):
             return None
         names = ("mass", "damping", "stiffness", "piezo_coefficient")
-        known = {name: part for name, part in zip(names, parts, strict=True) if part is not None}
-        return DahlStage(**known, **self.hysteresis)
+        known: dict[str, Any] = dict(zip(names, parts, strict=True))
+        return DahlStage(**known | self.hysteresis)
 
     @property
     def lowest_sampling_rate(self) -> float:

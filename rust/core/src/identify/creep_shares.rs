@@ -137,13 +137,14 @@ fn solve(matrix: &[Shares; 3], face: usize, right: &Shares) -> Option<Shares> {
     let (mut a, mut b) = (*matrix, *right);
     let used = |j: &usize| face >> j & 1 == 1;
     for p in (0..MOST_SHARES).filter(used) {
-        if !(a[p][p] > LEAST_PIVOT * matrix[p][p]) {
+        let pivots = a[p];
+        if pivots[p].is_nan() || pivots[p] <= LEAST_PIVOT * matrix[p][p] {
             return None;
         }
         for row in (p + 1..MOST_SHARES).filter(used) {
-            let factor = a[row][p] / a[p][p];
-            for column in p..MOST_SHARES {
-                a[row][column] -= factor * a[p][column];
+            let factor = a[row][p] / pivots[p];
+            for (slot, pivot) in a[row].iter_mut().zip(pivots).skip(p) {
+                *slot -= factor * pivot;
             }
             b[row] -= factor * b[p];
         }
@@ -171,27 +172,37 @@ pub(super) fn check_times(times: &[f64]) -> Result<()> {
 /// Smallest reversal of the drive that counts for its period, as a share of its range.
 const LEAST_TURN: f64 = 0.1;
 
-/// Two time constants for a record, s: at a quarter and three quarters, on a logarithmic scale, of
-/// what it can tell from the mechanics and from drift. That is from ten samples, or a tenth of
-/// the drive's period, to half of the window.
+/// Fewest reversals that make a period.
+const FEWEST_TURNS: usize = 3;
+
+/// Fewest samples of a window with creep.
+const FEWEST_SAMPLES: usize = 400;
+
+/// Two time constants for a record, s: the drive's period and half of the window; at least three
+/// apart. Where the drive does not swing, a fiftieth of the window and half of it.
+///
+/// What relaxes within a period widens the loop, as damping and hysteresis do: one record does
+/// not tell them apart.
 ///
 /// # Errors
-/// [`Error::Data`] where the window is shorter than forty of the shortest.
+/// [`Error::Data`] where the window is too short.
 pub fn creep_times(record: &Record<'_>) -> Result<Vec<f64>> {
-    let dt = record.drive.dt;
     let u = &record.drive.u[record.window.clone()];
-    let (low, high) = range(u);
-    let reversals = turns(u, LEAST_TURN * (high - low)).len();
-    let window = dt * index(u.len());
-    let period = 2.0 * window / index(reversals + 1);
-    let (shortest, longest) = ((10.0 * dt).max(0.1 * period).min(0.05 * window), 0.5 * window);
-    if 40.0 * 10.0 * dt > window {
+    let window = record.drive.dt * index(u.len());
+    if u.len() < FEWEST_SAMPLES {
         return Err(Error::Data(format!(
-            "the window of {window:.4} s is too short to show creep: expected at least {:.4} s, or \
-             creep=False",
-            400.0 * dt
+            "the window has {} samples: expected at least {FEWEST_SAMPLES} to show creep, or time \
+             constants in creep=",
+            u.len()
         )));
     }
-    let ratio = longest / shortest;
-    Ok([0.25, 0.75].map(|part| shortest * libm::pow(ratio, part)).to_vec())
+    let (low, high) = range(u);
+    let reversals = turns(u, LEAST_TURN * (high - low)).len();
+    let shortest = if reversals < FEWEST_TURNS {
+        window / 50.0
+    } else {
+        (2.0 * window / index(reversals)).max(10.0 * record.drive.dt)
+    };
+    let longest = 0.5 * window;
+    Ok(vec![shortest.min(longest / 3.0), longest])
 }

@@ -188,7 +188,7 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
     }
 
     /// Gives up where every candidate is already beyond its limit: squares only add up, also
-    /// about the mean that would suit best what has been seen.
+    /// about the mean, and with the shares of the creep, that would suit best what has been seen.
     ///
     /// A candidate's verdict is its own, whatever the other lanes hold, so it does not depend on
     /// how candidates are bundled.
