@@ -66,9 +66,9 @@ def identify(
         warm-up.
     model : str, optional
         Name of the model. A swarm searches ``"dahl"`` (`DahlStage`), ``"bouc-wen"``
-        (`BoucWenStage`), ``"first-order-dahl"`` (`FirstOrderDahlStage`) and
-        ``"bouc-wen-oscillator"`` (`BoucWenOscillator`); least squares find
-        ``"prandtl-ishlinskii"`` (`PrandtlIshlinskiiStage`) and
+        (`BoucWenStage`), ``"first-order-dahl"`` (`FirstOrderDahlStage`), ``"parallel-dahl"``
+        (`ParallelDahlStage`) and ``"bouc-wen-oscillator"`` (`BoucWenOscillator`); least squares
+        find ``"prandtl-ishlinskii"`` (`PrandtlIshlinskiiStage`) and
         ``"generalised-prandtl-ishlinskii"`` (`GeneralisedPrandtlIshlinskiiStage`). Of the
         arguments below, `offset` applies to every model, `least_squares` to the models found by
         least squares, and all others to the models that a swarm searches; an argument that does

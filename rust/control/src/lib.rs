@@ -65,7 +65,8 @@ pub use filters::{Filter, FilterState};
 pub use inverse::{
     BoucWenInverse, BoucWenInverseState, DahlInverse, FeedbackInverse, FeedbackInverseState,
     FirstOrderDahlInverse, InputInverse, InputInverseState, Inverse, InverseState, OperatorInverse,
-    OscillatorInverse, PlayInverse, PrandtlIshlinskiiInverse, SampledDahlInverse,
+    OscillatorInverse, ParallelDahlInverse, PlayInverse, PrandtlIshlinskiiInverse,
+    SampledDahlInverse,
 };
 pub use limits::Limits;
 pub use measurement::{Refused, Span};

@@ -14,6 +14,7 @@ pub use bouc_wen::{BoucWenInverse, BoucWenInverseState};
 pub use dahl::{DahlInverse, InverseState, SampledDahlInverse};
 pub use feedback::{
     FeedbackInverse, FeedbackInverseState, FirstOrderDahlInverse, OscillatorInverse,
+    ParallelDahlInverse,
 };
 pub use input::{InputInverse, InputInverseState, OperatorInverse, PrandtlIshlinskiiInverse};
 pub use play::PlayInverse;

@@ -294,6 +294,7 @@ models! {
     Dahl: super::DahlStage, swarm;
     BoucWen: super::BoucWenStage, swarm;
     FirstOrderDahl: super::FirstOrderDahlStage, swarm;
+    ParallelDahl: super::ParallelDahlStage, swarm;
     BoucWenOscillator: super::BoucWenOscillator, swarm;
     PrandtlIshlinskii: super::PrandtlIshlinskiiStage, least_squares;
     GeneralisedPrandtlIshlinskii: super::GeneralisedPrandtlIshlinskiiStage, least_squares;
