@@ -82,22 +82,35 @@ impl<N: Number> ParallelDahl<N> {
         yield_path: N,
         path_ratio: N,
     ) -> Self {
-        let mut path = yield_path;
-        let elements = rest_stiffnesses.map(|stiffness| {
-            let here = path;
-            path = path * path_ratio;
-            (stiffness * here, here.like(1.0) / here)
-        });
-        Self { coulomb_forces: elements.map(|one| one.0), rates: elements.map(|one| one.1) }
+        let second = yield_path * path_ratio;
+        let third = second * path_ratio;
+        let one = yield_path.like(1.0);
+        Self {
+            coulomb_forces: product(rest_stiffnesses, [yield_path, second, third]),
+            rates: [one / yield_path, one / second, one / third],
+        }
     }
 
     /// dF/dx of the sum at forces counted along the direction of motion.
     #[inline(always)]
     fn slope(&self, along: &[N; FRICTION_ELEMENTS]) -> N {
-        let [first, second, third] =
-            core::array::from_fn(|j| (self.coulomb_forces[j] - along[j]) * self.rates[j]);
-        first + second + third
+        let mut sum = (self.coulomb_forces[0] - along[0]) * self.rates[0];
+        for j in 1..FRICTION_ELEMENTS {
+            sum = (self.coulomb_forces[j] - along[j]).mul_add(self.rates[j], sum);
+        }
+        sum
     }
+}
+
+// Closures, as of `map`, would not be compiled for the vector instructions of their caller.
+
+/// Element by element.
+#[inline(always)]
+fn product<N: Number>(
+    [a, b, c]: [N; FRICTION_ELEMENTS],
+    [d, e, f]: [N; FRICTION_ELEMENTS],
+) -> [N; FRICTION_ELEMENTS] {
+    [a * d, b * e, c * f]
 }
 
 /// e^-path - 1 for a path from 0 up.
@@ -119,7 +132,7 @@ impl<N: Number> Operator<N> for ParallelDahl<N> {
 
     #[inline(always)]
     fn rest(&self) -> ParallelDahlState<N> {
-        let forces = self.rates.map(|rate| rate.like(0.0));
+        let forces = [self.rates[0].like(0.0); FRICTION_ELEMENTS];
         ParallelDahlState { forces, slope: self.slope(&forces) }
     }
 
@@ -131,25 +144,28 @@ impl<N: Number> Operator<N> for ParallelDahl<N> {
 
     #[inline(always)]
     fn branch(&self, state: &ParallelDahlState<N>, direction: N) -> ParallelDahlBranch<N> {
-        ParallelDahlBranch { along: state.forces.map(|force| direction * force), direction }
+        let along = product([direction; FRICTION_ELEMENTS], state.forces);
+        ParallelDahlBranch { along, direction }
     }
 
     #[inline(always)]
     fn along(&self, branch: &ParallelDahlBranch<N>, distance: N) -> ParallelDahlState<N> {
         let ParallelDahlBranch { along, direction } = branch;
         let length = *direction * distance;
-        let there = core::array::from_fn(|j| {
-            (along[j] - self.coulomb_forces[j]).mul_add(decay(self.rates[j] * length), along[j])
-        });
+        let mut there = *along;
+        for (j, force) in there.iter_mut().enumerate() {
+            let change = decay(self.rates[j] * length);
+            *force = (*force - self.coulomb_forces[j]).mul_add(change, *force);
+        }
         let slope = self.slope(&there);
-        ParallelDahlState { forces: there.map(|force| *direction * force), slope }
+        ParallelDahlState { forces: product([*direction; FRICTION_ELEMENTS], there), slope }
     }
 }
 
 impl<N: Number> NonsmoothOperator<N> for ParallelDahl<N> {
     #[inline(always)]
     fn leaving(&self, state: &ParallelDahlState<N>, _distance: N, direction: N) -> Self::State {
-        let slope = self.slope(&state.forces.map(|force| direction * force));
+        let slope = self.slope(&product([direction; FRICTION_ELEMENTS], state.forces));
         ParallelDahlState { slope, ..*state }
     }
 }
