@@ -7,13 +7,13 @@
 //! Each element is that of Dahl 1976, doi 10.2514/3.61511, with exponent 1. Elements that slide at
 //! different displacements are the generalised Maxwell-slip arrangement (Al-Bender, Lampaert and
 //! Swevers 2005, doi 10.1109/TAC.2005.858676); here each has the smooth transition of Dahl's, so
-//! that the tips of a loop are smooth too. With p the length of the path and l_j = Fc_j/sigma_j
+//! that the tips of a loop are smooth too. With p the length of the path and `l_j = Fc_j/sigma_j`
 //!
 //! ```text
 //! F_j = Fc_j - (Fc_j - F_j(0)) exp(-p/l_j)
 //! ```
 //!
-//! along the direction of motion. The force stays within the sum of the Fc_j, and loops close.
+//! along the direction of motion. The force stays within the sum of the `Fc_j`, and loops close.
 
 use super::bouc_wen::growth;
 use super::{NonsmoothOperator, Operator};
@@ -26,8 +26,8 @@ pub const FRICTION_ELEMENTS: usize = 3;
 ///
 /// | field | symbol | unit | range |
 /// | --- | --- | --- | --- |
-/// | `coulomb_forces` | Fc_j | N | >= 0 |
-/// | `rates` | 1/l_j | 1/m | > 0 |
+/// | `coulomb_forces` | `Fc_j` | N | >= 0 |
+/// | `rates` | `1/l_j` | 1/m | > 0 |
 ///
 /// ```
 /// use piezotrack_control::hysteresis::{Operator, ParallelDahl};
@@ -94,11 +94,10 @@ impl<N: Number> ParallelDahl<N> {
     /// dF/dx of the sum at forces counted along the direction of motion.
     #[inline(always)]
     fn slope(&self, along: &[N; FRICTION_ELEMENTS]) -> N {
-        let mut sum = (self.coulomb_forces[0] - along[0]) * self.rates[0];
-        for j in 1..FRICTION_ELEMENTS {
-            sum = (self.coulomb_forces[j] - along[j]).mul_add(self.rates[j], sum);
-        }
-        sum
+        let [a, b, c] = self.coulomb_forces;
+        let [d, e, f] = *along;
+        let [first, second, third] = product([a - d, b - e, c - f], self.rates);
+        first + second + third
     }
 }
 
