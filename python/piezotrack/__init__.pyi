@@ -50,6 +50,7 @@ from .stages.generalised_prandtl_ishlinskii import (
     GeneralisedPrandtlIshlinskiiStage as GeneralisedPrandtlIshlinskiiStage,
 )
 from .stages.inverse import Inverse as Inverse
+from .stages.parallel_dahl import ParallelDahlStage as ParallelDahlStage
 from .stages.prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage
 from .stages.virtual import VirtualStage as VirtualStage
 from .stages.xy import XYStage as XYStage

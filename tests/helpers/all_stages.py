@@ -17,6 +17,17 @@ STAGES: dict[str, pt.stages.Stage] = {
         rest_stiffness=9e3,
         coulomb_force=0.15,
     ),
+    "parallel-dahl": pt.ParallelDahlStage(
+        mass=0.1828,
+        damping=100.0,
+        stiffness=26065.0,
+        piezo_coefficient=0.0468,
+        rest_stiffness_1=4e3,
+        rest_stiffness_2=3e3,
+        rest_stiffness_3=2e3,
+        yield_path=2e-6,
+        path_ratio=4.0,
+    ),
     "bouc-wen-oscillator": pt.BoucWenOscillator.benchmark(),
     "prandtl-ishlinskii": pt.PrandtlIshlinskiiStage(
         linear=1e-6,

@@ -16,7 +16,7 @@ U = 30.0 * (1.0 - np.cos(np.pi * T)) * (0.6 + 0.1 * T)
 UPDATES: Any = ("classic", "hypersphere", "hypersphere-radial")
 TOPOLOGIES: Any = ("ring", "global", "random")
 PLAYS = ("prandtl-ishlinskii", "generalised-prandtl-ishlinskii")
-SEARCHED = ("dahl", "bouc-wen", "first-order-dahl", "bouc-wen-oscillator")
+SEARCHED = ("dahl", "bouc-wen", "first-order-dahl", "parallel-dahl", "bouc-wen-oscillator")
 
 
 def digests(threads: int) -> list[str]:

@@ -83,7 +83,7 @@ def models() -> list[str]:
         u=VOLTS, y=pt.DahlStage.xu_li_2010().simulate(VOLTS, 0.02).x, dt=0.02, source="a.csv"
     )
     small = pt.ParticleSwarm(particles=8, iterations=4)
-    kinds = ("dahl", "bouc-wen", "first-order-dahl", "bouc-wen-oscillator")
+    kinds = ("dahl", "bouc-wen", "first-order-dahl", "parallel-dahl", "bouc-wen-oscillator")
     fits = [
         *(pt.identify(data, k, swarm=small, runs=1, threads=1, delay=k == "dahl") for k in kinds),
         *(pt.identify(data, k) for k in ("prandtl-ishlinskii", "generalised-prandtl-ishlinskii")),

@@ -74,6 +74,11 @@ FIRST_ORDER = pt.FirstOrderDahlStage(
     mass=0.2, damping=300.0, stiffness=26065.0, piezo_coefficient=0.05,
     rest_stiffness=2e4, coulomb_force=0.3,
 )  # fmt: skip
+PARALLEL = pt.ParallelDahlStage(
+    mass=0.2, damping=300.0, stiffness=26065.0, piezo_coefficient=0.05,
+    rest_stiffness_1=9e3, rest_stiffness_2=6e3, rest_stiffness_3=3e3, yield_path=2e-6,
+    path_ratio=4.0,
+)  # fmt: skip
 PLAYS = pt.PrandtlIshlinskiiStage(
     linear=1e-6, thresholds=(5.0, 20.0), weights=(0.2e-6, 0.1e-6), dead_zone_thresholds=(3e-6,),
     dead_zone_weights=(0.1,), creep_weights=(0.02,), creep_times=(1.0,),
@@ -87,6 +92,7 @@ STAGES = {
     "pt.BoucWenStage": pt.BoucWenStage.xu_li_2010_corrected(),
     "pt.BoucWenOscillator": pt.BoucWenOscillator.benchmark(),
     "pt.FirstOrderDahlStage": FIRST_ORDER,
+    "pt.ParallelDahlStage": PARALLEL,
     "pt.PrandtlIshlinskiiStage": PLAYS,
     "pt.GeneralisedPrandtlIshlinskiiStage": ENVELOPE,
 }
@@ -390,7 +396,7 @@ def step_readings(script: Script, draw: Draw) -> None:
 
 KINDS = {
     "dahl": DAHL, "bouc-wen": STAGES["pt.BoucWenStage"], "first-order-dahl": FIRST_ORDER,
-    "bouc-wen-oscillator": STAGES["pt.BoucWenOscillator"],
+    "parallel-dahl": PARALLEL, "bouc-wen-oscillator": STAGES["pt.BoucWenOscillator"],
 }  # fmt: skip
 
 

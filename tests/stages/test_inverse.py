@@ -12,6 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import piezotrack as pt
+from all_stages import STAGES as ONE_OF_EACH
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -345,7 +346,9 @@ def test_the_wording_of_a_refusal() -> None:
     assert str(caught.value) == "stage is int: expected a stage, as a pt.DahlStage"
 
 
-@pytest.mark.parametrize("model", ["dahl", "bouc-wen", "first-order-dahl", "bouc-wen-oscillator"])
+@pytest.mark.parametrize(
+    "model", ["dahl", "bouc-wen", "first-order-dahl", "parallel-dahl", "bouc-wen-oscillator"]
+)
 def test_a_state_is_refused_where_the_inverse_begins_at_rest(model: str) -> None:
     stage: Any = {
         "dahl": TABLE_1,
@@ -358,6 +361,7 @@ def test_a_state_is_refused_where_the_inverse_begins_at_rest(model: str) -> None
             rest_stiffness=1e4,
             coulomb_force=0.3,
         ),
+        "parallel-dahl": ONE_OF_EACH["parallel-dahl"],
         "bouc-wen-oscillator": pt.BoucWenOscillator.benchmark(),
     }[model]
     final = stage.simulate([0.0, 1.0], 0.01).final

@@ -58,6 +58,7 @@ def test_hysteresis_and_forces_follow_from_the_core() -> None:
     assert known["dahl"].hysteresis == ("a1", "a2", "b1")
     assert known["bouc-wen"].hysteresis == ("alpha", "beta", "gamma")
     assert known["first-order-dahl"].hysteresis == ("rest_stiffness", "coulomb_force")
+    assert known["parallel-dahl"].hysteresis[-2:] == ("yield_path", "path_ratio")
     assert known["prandtl-ishlinskii"].hysteresis == ()
     assert known["dahl"].force_symbols == "M, D, T, b1 and b0"
     assert known["bouc-wen"].force_symbols == "m and b"

@@ -71,8 +71,9 @@ def identify(
         Name of the model. By default, ``"auto"``, those that suit the record are fitted to the
         first three fifths of the window and judged on the rest, and the best is fitted to all of
         it and says so: `Identification.trials`. A swarm searches ``"dahl"`` (`DahlStage`),
-        ``"bouc-wen"`` (`BoucWenStage`), ``"first-order-dahl"`` (`FirstOrderDahlStage`) and
-        ``"bouc-wen-oscillator"`` (`BoucWenOscillator`); least squares find
+        ``"bouc-wen"`` (`BoucWenStage`), ``"first-order-dahl"`` (`FirstOrderDahlStage`),
+        ``"parallel-dahl"`` (`ParallelDahlStage`) and ``"bouc-wen-oscillator"``
+        (`BoucWenOscillator`); least squares find
         ``"prandtl-ishlinskii"`` (`PrandtlIshlinskiiStage`) and
         ``"generalised-prandtl-ishlinskii"`` (`GeneralisedPrandtlIshlinskiiStage`). Of the
         arguments below, `offset` and `history` apply to every model, `least_squares` to those

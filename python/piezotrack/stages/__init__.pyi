@@ -16,6 +16,8 @@ from .generalised_prandtl_ishlinskii import (
 from .inverse import Inverse as Inverse
 from .inverse import InverseSession as InverseSession
 from .inverse import PlayedVoltage as PlayedVoltage
+from .parallel_dahl import ParallelDahlStage as ParallelDahlStage
+from .parallel_dahl import ParallelDahlState as ParallelDahlState
 from .prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage
 from .prandtl_ishlinskii import PrandtlIshlinskiiState as PrandtlIshlinskiiState
 from .virtual import VirtualResponse as VirtualResponse

@@ -66,7 +66,7 @@ pub use inverse::{
     BoucWenInverse, BoucWenInverseState, CreepingInverse, CreepingInverseState, DahlInverse,
     FeedbackInverse, FeedbackInverseState, FirstOrderDahlInverse, InputInverse, InputInverseState,
     Inverse, InverseState, ModesInverse, ModesInverseState, OperatorInverse, OscillatorInverse,
-    PlayInverse, PrandtlIshlinskiiInverse, SampledDahlInverse,
+    ParallelDahlInverse, PlayInverse, PrandtlIshlinskiiInverse, SampledDahlInverse,
 };
 pub use limits::Limits;
 pub use measurement::{Refused, Span};

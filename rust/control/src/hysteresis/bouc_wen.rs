@@ -136,7 +136,7 @@ impl<N: Number> BoucWen<N> {
         let side = self.side(z, length);
         let kappa = side.mul_add(self.gamma, self.beta);
         let slope = kappa.mul_add(-z, self.rise);
-        let end = (slope * length).mul_add(growth(-(kappa * length)), z);
+        let end = (slope * length).mul_add(growth::<_, TERMS>(-(kappa * length)), z);
         let crossed = side * end;
         if !crossed.any_negative() {
             return end;
@@ -146,7 +146,7 @@ impl<N: Number> BoucWen<N> {
         let zero_at = reach * logarithm(-(kappa * reach));
         let rest = length - zero_at;
         let kappa = self.beta - side * self.gamma;
-        let beyond = (self.rise * rest) * growth(-(kappa * rest));
+        let beyond = (self.rise * rest) * growth::<_, TERMS>(-(kappa * rest));
         crossed.where_negative(beyond, end)
     }
 
@@ -270,9 +270,9 @@ impl Bend {
     }
 }
 
-/// (e^x - 1)/x for |x| up to [`PIECE`].
+/// (e^x - 1)/x by its series: with [`TERMS`] terms for |x| up to [`PIECE`].
 #[inline(always)]
-fn growth<N: Number>(x: N) -> N {
+pub(super) fn growth<N: Number, const TERMS: usize>(x: N) -> N {
     let mut sum = x.like(RECIPROCAL_FACTORIAL[TERMS]);
     for k in (1..TERMS).rev() {
         sum = sum.mul_add(x, x.like(RECIPROCAL_FACTORIAL[k]));

@@ -8,11 +8,13 @@
 mod bouc_wen;
 mod dahl;
 mod first_order_dahl;
+mod parallel_dahl;
 mod play;
 
 pub use bouc_wen::{BoucWen, BoucWenBranch, BoucWenState};
 pub use dahl::{Dahl, DahlBranch, DahlState};
 pub use first_order_dahl::FirstOrderDahl;
+pub use parallel_dahl::{FRICTION_ELEMENTS, ParallelDahl, ParallelDahlBranch, ParallelDahlState};
 pub use play::{Play, PlayBranch, PlayState};
 
 use crate::Number;

@@ -4,18 +4,23 @@
 //! uFF = (M xd'' + D xd' + K xd + F(xd))/T
 //! ```
 //!
-//! Xu and Li 2010, equation (21), doi 10.1115/1.4001712, for first-order Dahl friction and the
-//! Bouc-Wen oscillator: the force F depends on the path of the reference only, so the inverse is
+//! Xu and Li 2010, equation (21), doi 10.1115/1.4001712, for first-order Dahl friction, one
+//! element or several, and the Bouc-Wen oscillator: the force F depends on the path of the reference only, so the inverse is
 //! explicit. Reversals between two samples are treated as in [`crate::DahlInverse`].
 
 use super::Inverse;
 use crate::cubic_segment::{is_straight, legs};
 use crate::error::{Result, check, finite, not_negative, positive, usable};
-use crate::hysteresis::{BoucWen, BoucWenState, FirstOrderDahl, Operator};
+use crate::hysteresis::{
+    BoucWen, BoucWenState, FRICTION_ELEMENTS, FirstOrderDahl, Operator, ParallelDahl,
+};
 use crate::unfused::Unfused;
 
 /// Inverse of a stage with first-order Dahl friction.
 pub type FirstOrderDahlInverse = FeedbackInverse<FirstOrderDahl<Unfused>>;
+
+/// Inverse of a stage with first-order Dahl elements in parallel.
+pub type ParallelDahlInverse = FeedbackInverse<ParallelDahl<Unfused>>;
 
 /// Inverse of a Bouc-Wen oscillator; its drive is a force, N.
 pub type OscillatorInverse = FeedbackInverse<BoucWen<Unfused>>;
@@ -45,14 +50,14 @@ pub struct FeedbackInverse<O> {
 
 /// State of a [`FeedbackInverse`]: the last sample of the reference and the operator's state.
 #[derive(Clone, Copy, Debug)]
-pub struct FeedbackInverseState {
+pub struct FeedbackInverseState<M = BoucWenState<Unfused>> {
     x: f64,
     /// x' times the sampling interval, m; `None` before the first sample.
     w: Option<f64>,
-    memory: BoucWenState<Unfused>,
+    memory: M,
 }
 
-crate::snapshot!(FeedbackInverseState { x, w, memory });
+crate::snapshot!([M: crate::Snapshot] FeedbackInverseState<M> { x, w, memory });
 
 impl FirstOrderDahlInverse {
     /// The inverse of the stage with this mass (kg), damping (N s/m), stiffness (N/m) and piezo
@@ -69,15 +74,39 @@ impl FirstOrderDahlInverse {
         (rest_stiffness, coulomb_force, exponent): (f64, f64, f64),
         dt: f64,
     ) -> Result<Self> {
-        finite("piezo_coefficient", piezo_coefficient, "N/V")?;
-        let right = piezo_coefficient.abs() > 0.0;
-        check("piezo_coefficient", piezo_coefficient, "N/V", right, "a value other than 0")?;
         let operator = FirstOrderDahl {
             rest_stiffness: Unfused(not_negative("rest_stiffness", rest_stiffness, "N/m")?),
             coulomb_force: Unfused(positive("coulomb_force", coulomb_force, "N")?),
             exponent: not_negative("exponent", exponent, "")?,
         };
-        Self::with([mass, damping, stiffness], piezo_coefficient, operator, dt)
+        Self::with([mass, damping, stiffness], not_zero(piezo_coefficient)?, operator, dt)
+    }
+}
+
+impl ParallelDahlInverse {
+    /// The inverse of the stage with this mass (kg), damping (N s/m), stiffness (N/m) and piezo
+    /// coefficient (N/V), and with rest stiffnesses (N/m), shortest yield path (m) and ratio of
+    /// the paths of the friction, as in [`ParallelDahl::geometric`], for samples every `dt` seconds.
+    ///
+    /// # Errors
+    /// Names the parameter that is out of its range.
+    pub fn new(
+        mass: f64,
+        damping: f64,
+        stiffness: f64,
+        piezo_coefficient: f64,
+        (rest_stiffnesses, yield_path, path_ratio): ([f64; FRICTION_ELEMENTS], f64, f64),
+        dt: f64,
+    ) -> Result<Self> {
+        for one in rest_stiffnesses {
+            not_negative("rest_stiffness", one, "N/m")?;
+        }
+        let operator = ParallelDahl::geometric(
+            rest_stiffnesses.map(Unfused),
+            Unfused(positive("yield_path", yield_path, "m")?),
+            Unfused(positive("path_ratio", path_ratio, "")?),
+        );
+        Self::with([mass, damping, stiffness], not_zero(piezo_coefficient)?, operator, dt)
     }
 }
 
@@ -106,7 +135,14 @@ impl OscillatorInverse {
     }
 }
 
-impl<O: Operator<Unfused, State = BoucWenState<Unfused>>> FeedbackInverse<O> {
+/// A piezo coefficient that drives.
+fn not_zero(piezo_coefficient: f64) -> Result<f64> {
+    finite("piezo_coefficient", piezo_coefficient, "N/V")?;
+    let right = piezo_coefficient.abs() > 0.0;
+    check("piezo_coefficient", piezo_coefficient, "N/V", right, "a value other than 0")
+}
+
+impl<O: Operator<Unfused>> FeedbackInverse<O> {
     fn with([mass, damping, stiffness]: [f64; 3], gain: f64, operator: O, dt: f64) -> Result<Self> {
         Ok(Self {
             inertia: not_negative("mass", mass, "kg")? / gain,
@@ -120,7 +156,7 @@ impl<O: Operator<Unfused, State = BoucWenState<Unfused>>> FeedbackInverse<O> {
 
     /// The state for a stage at rest at 0 that never moved.
     #[must_use]
-    pub fn rest(&self) -> FeedbackInverseState {
+    pub fn rest(&self) -> FeedbackInverseState<O::State> {
         FeedbackInverseState { x: 0.0, w: None, memory: self.operator.rest() }
     }
 
@@ -129,7 +165,7 @@ impl<O: Operator<Unfused, State = BoucWenState<Unfused>>> FeedbackInverse<O> {
     ///
     /// NaN, with the state unchanged, where an input is not finite (or beyond 1e100), or the
     /// hysteresis force grows without bound; a controller holds its feedforward then.
-    pub fn step(&self, state: &mut FeedbackInverseState, x: f64, v: f64, a: f64) -> f64 {
+    pub fn step(&self, state: &mut FeedbackInverseState<O::State>, x: f64, v: f64, a: f64) -> f64 {
         if !(usable(x) && usable(v) && usable(a)) {
             return f64::NAN;
         }
@@ -146,7 +182,7 @@ impl<O: Operator<Unfused, State = BoucWenState<Unfused>>> FeedbackInverse<O> {
             self.operator.along(&branch, Unfused(leg))
         });
         let linear = self.inertia * a + self.damping * v + self.stiffness * x;
-        let drive = linear + memory.value.0 / self.gain;
+        let drive = linear + self.operator.output(&memory).0.0 / self.gain;
         if !drive.is_finite() {
             return f64::NAN;
         }
@@ -155,8 +191,8 @@ impl<O: Operator<Unfused, State = BoucWenState<Unfused>>> FeedbackInverse<O> {
     }
 }
 
-impl<O: Operator<Unfused, State = BoucWenState<Unfused>>> Inverse for FeedbackInverse<O> {
-    type State = FeedbackInverseState;
+impl<O: Operator<Unfused>> Inverse for FeedbackInverse<O> {
+    type State = FeedbackInverseState<O::State>;
 
     fn rest(&self) -> Self::State {
         self.rest()

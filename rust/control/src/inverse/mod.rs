@@ -17,6 +17,7 @@ pub use creeping::{CreepingInverse, CreepingInverseState};
 pub use dahl::{DahlInverse, InverseState, SampledDahlInverse};
 pub use feedback::{
     FeedbackInverse, FeedbackInverseState, FirstOrderDahlInverse, OscillatorInverse,
+    ParallelDahlInverse,
 };
 pub use input::{InputInverse, InputInverseState, OperatorInverse, PrandtlIshlinskiiInverse};
 pub use modes::{ModesInverse, ModesInverseState};

@@ -145,20 +145,29 @@ impl StageModel for FirstOrderDahlStage {
         simulate_kernel(self, experiment)
     }
 
-    /// On its settled loop between the displacements that the two voltages lead to without
-    /// friction: `T/(K + dF/dx)`.
     fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
-        let (Mechanics { mass, damping, stiffness }, piezo) =
-            (self.mechanics, self.piezo_coefficient);
-        let ends = [low, high].map(|volts| piezo * volts / stiffness);
-        let ends = if piezo < 0.0 { [ends[1], ends[0]] } else { ends };
-        let gain = |slope: f64| piezo / (stiffness + slope);
-        let gains = Gains::of(&self.operator(), ends[0], ends[1], gain)?;
-        gains.plants(|gain| {
-            let mechanics = Mechanics { mass, damping, stiffness: piezo / gain };
-            LoopPlant::mechanical(&mechanics, piezo)
-        })
+        plants_with_friction(&self.operator(), &self.mechanics, self.piezo_coefficient, low, high)
     }
+}
+
+/// A stage with friction on its settled loop between the displacements that the two voltages lead
+/// to without friction: `T/(K + dF/dx)`.
+pub(super) fn plants_with_friction<O: Operator<f64>>(
+    operator: &O,
+    mechanics: &Mechanics,
+    piezo: f64,
+    low: f64,
+    high: f64,
+) -> Result<[LoopPlant; 3]> {
+    let Mechanics { mass, damping, stiffness } = *mechanics;
+    let ends = [low, high].map(|volts| piezo * volts / stiffness);
+    let ends = if piezo < 0.0 { [ends[1], ends[0]] } else { ends };
+    let gain = |slope: f64| piezo / (stiffness + slope);
+    let gains = Gains::of(operator, ends[0], ends[1], gain)?;
+    gains.plants(|gain| {
+        let mechanics = Mechanics { mass, damping, stiffness: piezo / gain };
+        LoopPlant::mechanical(&mechanics, piezo)
+    })
 }
 
 impl Searchable for FirstOrderDahlStage {

@@ -8,6 +8,7 @@ pub mod dahl;
 mod first_order_dahl;
 mod generalised_prandtl_ishlinskii;
 mod input_stage;
+mod parallel_dahl;
 mod plant;
 mod prandtl_ishlinskii;
 mod registry;
@@ -31,6 +32,7 @@ pub use generalised_prandtl_ishlinskii::{
     GeneralisedPrandtlIshlinskiiStage, TanhEnvelope,
 };
 pub use input_stage::{InputOperator, InputStage, InputStageFlow, InputStageState, Segmented};
+pub use parallel_dahl::{ParallelDahlKernel, ParallelDahlStage};
 pub use plant::{KernelFlow, KernelModel, Plant};
 pub use prandtl_ishlinskii::{
     MOST_PLAYS, MOST_ZONES, PlayHysteresis, Plays, PrandtlIshlinskiiStage,

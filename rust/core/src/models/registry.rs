@@ -303,6 +303,7 @@ models! {
     Dahl: Creeping<super::DahlStage>, swarm;
     BoucWen: Creeping<super::BoucWenStage>, swarm;
     FirstOrderDahl: Creeping<super::FirstOrderDahlStage>, swarm;
+    ParallelDahl: Creeping<super::ParallelDahlStage>, swarm;
     BoucWenOscillator: Creeping<super::BoucWenOscillator>, swarm;
     PrandtlIshlinskii: super::PrandtlIshlinskiiStage, least_squares;
     GeneralisedPrandtlIshlinskii: super::GeneralisedPrandtlIshlinskiiStage, least_squares;
