@@ -6,12 +6,14 @@
 
 mod bouc_wen;
 mod dahl;
+mod drive;
 mod feedback;
 mod input;
 mod play;
 
 pub use bouc_wen::{BoucWenInverse, BoucWenInverseState};
 pub use dahl::{DahlInverse, InverseState, SampledDahlInverse};
+pub use drive::after_drive;
 pub use feedback::{
     FeedbackInverse, FeedbackInverseState, FirstOrderDahlInverse, OscillatorInverse,
 };
