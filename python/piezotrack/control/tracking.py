@@ -16,7 +16,7 @@ from ..errors import ParameterError
 from ..references.reference import Reference, SampledReference
 from ..stages.inverse import PlayedVoltage
 from .controller import Controller
-from .plant import reach, run_closed_loop, unwrap
+from .plant import reach, run_closed_loop, settled_bottom, unwrap
 from .stability import check_loop
 
 if TYPE_CHECKING:
@@ -331,7 +331,9 @@ def feedforward_of(
     """Compute the feedforward of a whole run [V], and a note of how."""
     if controller.feedforward is None:
         return PlayedVoltage(np.zeros(len(samples)), "no feedforward")
-    return controller.feedforward.played(reference, controller.dt, samples=samples)
+    return controller.feedforward.played(
+        reference, controller.dt, samples=samples, limits=controller.limits
+    )
 
 
 def collected(
@@ -423,3 +425,13 @@ def check_within_reach(
                 f"beyond {1e6 * edge:.4g} um: expected what the stage reaches from {low:g} to "
                 f"{high:g} V, or beyond_reach=True"
             )
+    # The loop stays above the curve from rest: once up, the stage no longer comes all the way down.
+    k = int(np.argmax(samples.x))
+    k += int(np.argmin(samples.x[k:]))
+    lowest = settled_bottom(stage, (low, high), float(samples.x.max()) - offset, 1e-3) + offset
+    if (past := lowest - samples.x[k]) > slack:
+        raise ParameterError(
+            f"reference is {1e6 * samples.x[k]:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} "
+            f"um below {1e6 * lowest:.4g} um: expected what the stage reaches at {low:g} V on the "
+            f"settled loop, from {1e6 * samples.x.max():.4g} um down, or beyond_reach=True"
+        )
