@@ -396,8 +396,11 @@ def check_stable(stage: Plant, controller: Controller, delay: float) -> None:
     found = f"the loop is unstable on this stage, {1e6 * one.gain:.3g} um/V"
     if one.slowest_root is not None:
         found += f": its largest root is {one.slowest_root:.5g}"
-    if one.gain_margin is not None and one.gain_margin < 1.0:
-        found += f", and {one.gain_margin:.3g} times the gain would be at the limit"
+    without = one.gain_margin is not None and one.gain_margin < 1.0
+    if without and one.stable_gains is not None and one.stable_gains[1] < 1.0:
+        found += f", and {one.stable_gains[1]:.3g} times the gain would be at the limit"
+    elif without:
+        found += f", and {one.gain_margin:.3g} times the gain would be at that of the feedback"
     elif controller.repetitive is not None:
         found += "; without the repetitive part it is stable, so lower kq or take another filter"
     hint = f" ({one.hint})" if one.hint else ""
