@@ -215,6 +215,27 @@ def test_the_time_constant_counts_as_a_lag() -> None:
     assert margin == pytest.approx((1.0 + pole) / (1.0 - pole), rel=1e-6)
 
 
+def test_a_repetitive_loop_prints_its_own_margin() -> None:
+    """A feedback with a margin of 10 helps nothing where the learning is unstable."""
+    feedback = pt.Pid(kp=0.05e6, ti=0.02, td=0.0)
+    learning = pt.Repetitive(period=1.0, kq=1.9e6, smoothing=None)
+
+    def check(gain: float) -> pt.control.LoopCheck:
+        static = pt.PrandtlIshlinskiiStage(linear=gain, thresholds=(), weights=())
+        return pt.check_loop(static, loop(feedback=feedback, repetitive=learning)).middle
+
+    found = check(1.3e-6)
+    assert found.gain_margin == pytest.approx(10.26, rel=1e-3)
+    assert found.stable_gains is not None
+    factor = found.stable_gains[1]
+    assert factor < 1.0
+    assert str(found) == f"1.3 um/V: UNSTABLE, gain margin {factor:.3g}"
+    # At that gain the loop is at its limit.
+    assert check(0.99 * factor * 1.3e-6).stable
+    assert "Ms of the feedback" in str(check(0.99 * factor * 1.3e-6))
+    assert not check(1.01 * factor * 1.3e-6).stable
+
+
 def test_an_unstable_loop_is_refused() -> None:
     with pytest.raises(pt.ParameterError, match=r"the loop is unstable on this stage, 1\.\d+ um/V"):
         pt.track(PLAYS, loop(feedback=pt.Pid.from_um(kp=0.2, ti=0.009, td=0.044)), sine(0.2, 5.0))

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
+from all_stages import STAGES
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -274,26 +275,9 @@ def test_a_copy_of_a_session_goes_on_by_itself(law: str, copied: Callable[[Any],
     assert other.refused == session.refused
 
 
-@pytest.mark.parametrize(
-    "stage",
-    [
-        pt.DahlStage.xu_li_2010(),
-        pt.BoucWenStage.xu_li_2010(),
-        STAGE,
-        pt.FirstOrderDahlStage(
-            mass=0.18,
-            damping=50.0,
-            stiffness=2.6e4,
-            piezo_coefficient=0.0468,
-            rest_stiffness=1e4,
-            coulomb_force=0.3,
-            exponent=1.0,
-        ),
-    ],
-    ids=lambda stage: type(stage).__name__,
-)
-def test_a_copy_of_an_inverse_goes_on_by_itself(stage: Any) -> None:
-    session = stage.inverse().start(DT)
+@pytest.mark.parametrize("model", STAGES)
+def test_a_copy_of_an_inverse_goes_on_by_itself(model: str) -> None:
+    session = STAGES[model].inverse().start(DT)
     for k in range(300):
         session.step(desired(k), preview=desired(k + 1))
     other = pickle.loads(pickle.dumps(session))

@@ -411,3 +411,64 @@ def test_a_remark_above_the_samples_is_no_header(tmp_path: Path) -> None:
     path.write_text("# measured on Monday, cold\n0,1,2\n1,2,3\n2,1,2\n", encoding="utf-8")
     with pytest.raises(pt.DataError, match="there is no header line"):
         pt.read(path)
+
+
+def multi_rate(folder: Path) -> Path:
+    """Write a log of 0.1 s of a triangle and what follows it, every 10 ms and then every 1 ms."""
+    t = np.concatenate([np.arange(50) * 0.01, 0.5 + np.arange(500) * 0.001])
+    u = 10.0 * (1.0 - np.abs(t - 0.5) / 0.5)
+    lines = [f"{a:.3f},{b:.6f},{1.5 * b:.6f}" for a, b in zip(t, u, strict=True)]
+    return write(folder, "\n".join((HEADER, *lines)))
+
+
+def test_a_log_of_several_rates_is_resampled_and_not_given_an_interval(tmp_path: Path) -> None:
+    file = multi_rate(tmp_path)
+    with pytest.raises(pt.DataError, match=r"t is not even: .*; resample= puts it on") as caught:
+        pt.read(file)
+    # One interval in place of the times would stretch half of the log.
+    assert "dt=" not in str(caught.value)
+    log = pt.read(file, resample=0.001)
+    assert (log.dt, len(log)) == (pytest.approx(0.001), 1000)
+    triangle = 10.0 * (1.0 - np.abs(log.t - 0.5) / 0.5)
+    assert np.abs(log.u - triangle).max() < 1e-5
+    assert np.abs(log.y - 1.5e-6 * triangle).max() < 1e-11
+
+
+def test_a_drive_held_between_samples_stays_so_when_resampled(tmp_path: Path) -> None:
+    text = "\n".join((HEADER, "0,0,0", "1,10,1", "3,20,3", "4,0,4"))
+    log = pt.read(write(tmp_path, text), resample=0.5, hold="zoh")
+    assert log.u.tolist() == [0, 0, 10, 10, 10, 10, 20, 20, 0]
+    assert np.abs(log.y - 1e-6 * log.t).max() < 1e-18
+
+
+def test_jitter_may_be_either(tmp_path: Path) -> None:
+    t = 0.01 * np.arange(100) + 0.002 * np.random.default_rng(1).uniform(-1.0, 1.0, 100)
+    lines = [f"{a:.6f},{10 * a:.6f},{a:.6f}" for a in t]
+    file = write(tmp_path, "\n".join((HEADER, *lines)))
+    with pytest.raises(pt.DataError, match=r"resample= puts it on .* can be given with dt="):
+        pt.read(file)
+    assert len(pt.read(file, dt=0.01)) == 100
+    log = pt.read(file, resample=0.005)
+    assert np.abs(log.u - 10.0 * log.t).max() < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"resample": 0.002}, r"stage\.csv: resample is 0\.002 s: expected .* to 0\.001 s"),
+        ({"resample": 1e-13}, "resample is 1e-13 s"),
+        ({"resample": 0.0}, "resample is 0.0: expected a finite number"),
+        ({"resample": 0.001, "dt": 0.001}, "dt and resample: expected one of them at most"),
+    ],
+)
+def test_a_resampling_that_cannot_be_used(
+    arguments: dict[str, float], words: str, tmp_path: Path
+) -> None:
+    with pytest.raises(pt.ParameterError, match=words):
+        pt.read(multi_rate(tmp_path), **arguments)
+
+
+def test_times_that_go_back_are_not_resampled(tmp_path: Path) -> None:
+    text = with_line(4, "0.05,5.0,13.0")
+    with pytest.raises(pt.DataError, match="expected increasing times"):
+        pt.read(write(tmp_path, text), resample=0.01)

@@ -137,3 +137,58 @@ def test_b0_is_found() -> None:
     assert fit.model.damping == pytest.approx(TABLE_1.damping, rel=5e-3)
     assert fit.parameters["b0"].identified
     assert "b0 up/K" in fit.summary()
+
+
+def test_a_velocity_that_grazes_zero_turns_twice_in_a_step() -> None:
+    """It comes back within a step, whose ends look as if the stage had not turned."""
+    natural = 2.0 * np.pi * 160.0
+    stage = pt.DahlStage(
+        mass=2.6e4 / natural**2,
+        damping=0.2 * 2.6e4 / natural,
+        stiffness=2.6e4,
+        piezo_coefficient=0.0468,
+        a1=2000.0,
+        a2=1e7,
+        b1=1e6,
+        b0=20.0,
+        up=30.0,
+    )
+    t = np.arange(60) / 2000.0
+    u = np.clip(8e3 * t, 0.0, 20.0) + 0.5 * 2263.6424282855237 * t
+    run = stage.simulate(u, 1 / 2000.0)
+    assert np.abs(run.x - stage.simulate(u, 1 / 2000.0, accuracy=1e-13).x).max() < 1e-10
+
+
+@pytest.mark.parametrize(
+    ("mechanics", "hysteresis", "state", "u", "dt"),
+    [
+        (
+            (0.0034397468124525966, 163.04176755549528, 20670.08304037104, 0.03134049308013962),
+            (2738.715278129175, 104169595.6039606, 3597323.9061232447, 67.33916297205859, 30.0),
+            (-5.990949461284448e-05, -1.520365393e-07, 4.945737022839577e-08, -0.00155625313),
+            (-30.492436953870744, 44.507563046129256),
+            0.005,
+        ),
+        (
+            (0.0014909834670278922, 61.75513535511154, 10419.302217675824, 0.014681718105546917),
+            (4073.681591519866, 23141120.42511609, 1897879.0825975048, 13.906111551314789, 30.0),
+            (-2.879588645451272e-05, -3.22788336e-07, 1.1946660757719008e-08, -0.000812528631),
+            (-18.123252172016798, -15.882436957119285),
+            0.02,
+        ),
+    ],
+)
+def test_a_reversal_just_after_a_sample(
+    mechanics: tuple[float, ...],
+    hysteresis: tuple[float, ...],
+    state: tuple[float, ...],
+    u: tuple[float, ...],
+    dt: float,
+) -> None:
+    """The velocity settles in a small part of the step, in which it turns: no cubic shows when."""
+    names = ("mass", "damping", "stiffness", "piezo_coefficient", "a1", "a2", "b1", "b0", "up")
+    stage = pt.DahlStage(**dict(zip(names, mechanics + hysteresis, strict=True)))
+    start = pt.stages.DahlState(**dict(zip(("x", "v", "q1", "q2"), state, strict=True)))
+    run = stage.simulate([*u, u[1]], dt, initial=start)
+    fine = stage.simulate([*u, u[1]], dt, initial=start, accuracy=1e-13)
+    assert np.abs(run.x - fine.x).max() < 1e-10

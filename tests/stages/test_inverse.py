@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import itertools
 import math
@@ -11,8 +12,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+import all_stages
 import piezotrack as pt
-from all_stages import STAGES as ONE_OF_EACH
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -350,20 +351,7 @@ def test_the_wording_of_a_refusal() -> None:
     "model", ["dahl", "bouc-wen", "first-order-dahl", "parallel-dahl", "bouc-wen-oscillator"]
 )
 def test_a_state_is_refused_where_the_inverse_begins_at_rest(model: str) -> None:
-    stage: Any = {
-        "dahl": TABLE_1,
-        "bouc-wen": pt.BoucWenStage.xu_li_2010(),
-        "first-order-dahl": pt.FirstOrderDahlStage(
-            mass=0.18,
-            damping=50.0,
-            stiffness=2.6e4,
-            piezo_coefficient=0.0468,
-            rest_stiffness=1e4,
-            coulomb_force=0.3,
-        ),
-        "parallel-dahl": ONE_OF_EACH["parallel-dahl"],
-        "bouc-wen-oscillator": pt.BoucWenOscillator.benchmark(),
-    }[model]
+    stage = all_stages.STAGES[model]
     final = stage.simulate([0.0, 1.0], 0.01).final
     with pytest.raises(pt.ParameterError, match=r"^initial is a state: expected none"):
         stage.inverse(initial=final)
@@ -375,3 +363,92 @@ def test_a_reference_too_far_for_any_piezo_is_told_where() -> None:
     )
     with pytest.raises(pt.NumericalError, match="no voltage for sample 1 of the reference"):
         TABLE_1.inverse().voltage(far, LOOP)
+
+
+# Plays that a piezo may have; they reach 98.1 um at 75 V.
+PLAYS = pt.PrandtlIshlinskiiStage(
+    linear=8e-7, thresholds=(3.0, 8.0, 15.0, 25.0), weights=(2e-7, 1e-7, 2e-7, 1e-7)
+)
+OVERDRIVEN = {
+    "plays": PLAYS,
+    "asymmetric, creep": dataclasses.replace(
+        PLAYS,
+        dead_zone_thresholds=(30e-6,),
+        dead_zone_weights=(0.2,),
+        creep_weights=(0.02, 0.01),
+        creep_times=(0.05, 1.0),
+    ),
+    "bouc-wen": pt.BoucWenStage.xu_li_2010_corrected(),
+}
+
+
+def overdriven(t: Any) -> Any:
+    """Displacement of three periods; the middle one has a peak that is far out of reach [m]."""
+    top = np.where((t > 1.0) & (t < 2.0), 140e-6, 80e-6)
+    return 20e-6 + (top - 20e-6) * 0.5 * (1.0 - np.cos(2.0 * np.pi * t))
+
+
+@pytest.mark.parametrize("name", OVERDRIVEN)
+def test_an_inverse_is_exact_again_after_it_was_clipped(name: str) -> None:
+    """A stage that got 75 V has the memory of 75 V, whatever the inverse asked for."""
+    stage, dt, limits = OVERDRIVEN[name], 1e-3, (-30.0, 75.0)
+    t = np.arange(0.0, 3.0, dt)
+    session = stage.inverse().start(dt, limits=limits)
+    v = np.gradient(overdriven(t), dt)
+    a = np.gradient(v, dt)
+    x = overdriven(t)
+    u = np.array(
+        [
+            session.step(one, velocity=speed, acceleration=change)
+            for one, speed, change in zip(x, v, a, strict=True)
+        ]
+    )
+    error = stage.simulate(np.clip(u, *limits), dt).x - x
+    clipped = (u < limits[0]) | (u > limits[1])
+    before, after = t < t[clipped][0], t > t[clipped][-1] + 0.05
+    assert 0.05 < clipped.mean() < 0.4
+    assert np.abs(error[clipped]).max() > 5e-6
+    # Between samples the creep and the dynamics go on, before as well as after.
+    assert np.abs(error[after]).max() < max(1e-9, 1.5 * np.abs(error[before & (t > 0.05)]).max())
+
+
+def test_an_amplifier_that_reports_its_voltage_leaves_the_inverse_exact() -> None:
+    dt, t = 1e-3, np.arange(0.0, 3.0, 1e-3)
+    loop = pt.Controller(dt=dt, limits=(-30.0, 150.0), feedforward=PLAYS.inverse())
+    session, u = loop.start(), np.empty(t.size)
+    for k, x in enumerate(overdriven(t)):
+        # It gives no more than 75 V, of which the limits know nothing.
+        u[k] = min(session.step(x, 0.0), 75.0)
+        session.applied(u[k])
+    error = PLAYS.simulate(u, dt).x - overdriven(t)
+    assert np.abs(error[(t > 1.2) & (t < 1.8)]).max() > 5e-6
+    assert np.abs(error[t > 2.0]).max() < 1e-9
+
+
+@pytest.mark.parametrize("playback", ["online", "table"])
+def test_a_tracked_run_is_exact_again_after_it_was_clipped(playback: Any) -> None:
+    loop = pt.Controller(
+        dt=1e-3, limits=(-30.0, 75.0), feedforward=PLAYS.inverse(playback=playback)
+    )
+    course = pt.sine(frequency=1.0, low=0.0, high=110e-6, duration=6.0)
+    run = pt.track(PLAYS, loop, course, beyond_reach=True)
+    assert 0.1 < run.saturated.mean() < 0.3
+    # The voltage of a sample acts at the next.
+    lag = run.displacement[1:] - run.desired[:-1]
+    free = ~run.saturated[:-1] & (run.t[:-1] > 2.0) & (run.desired[:-1] < 60e-6)
+    assert np.abs(lag[free]).max() < 1e-9
+
+
+def test_the_limits_of_a_session_are_those_of_its_controller() -> None:
+    """Also of one that it is changed to, and after a copy."""
+    t = np.arange(0.0, 3.0, 1e-3)
+    loop = pt.Controller(dt=1e-3, limits=(-30.0, 150.0), feedforward=PLAYS.inverse())
+    session = loop.start()
+    session.retune(dataclasses.replace(loop, limits=(-30.0, 75.0)))
+    u = np.empty(t.size)
+    for k, x in enumerate(overdriven(t)):
+        u[k] = session.step(x, 0.0)
+        if k == 1300:
+            session = copy.copy(session)
+    error = PLAYS.simulate(u, 1e-3).x - overdriven(t)
+    assert np.abs(error[t > 2.0]).max() < 1e-9

@@ -16,7 +16,17 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["check_dt", "real", "real_array", "signal_of", "time_axis", "time_fault", "unmasked"]
+__all__ = [
+    "MOST_SAMPLES",
+    "backward",
+    "check_dt",
+    "real",
+    "real_array",
+    "signal_of",
+    "time_axis",
+    "time_fault",
+    "unmasked",
+]
 
 # Largest departure of a time from the even grid, in sampling intervals.
 UNEVEN = 0.05
@@ -30,48 +40,62 @@ USE_DT = (
     "an evenly sampled record whose times are coarse or jittery can be given with dt=, "
     "which is used in place of the times"
 )
+# Largest departure of the times of an evenly sampled record from a straight line, in its
+# intervals: jitter does not add up, other intervals do.
+JITTER = 1.0
 
 
-def check_dt(dt: float) -> float:
+def check_dt(dt: float, name: str = "dt") -> float:
     """Return `dt` [s] as a float, or raise ParameterError unless it is an interval."""
     number = real(dt)
     if not 0.0 < number < math.inf:
-        raise ParameterError(f"dt is {quoted(dt)}: expected a finite number of seconds above 0")
+        raise ParameterError(f"{name} is {quoted(dt)}: expected a finite number of seconds above 0")
     if not SHORTEST <= number <= LONGEST:
-        raise ParameterError(f"dt is {number:g} s: expected {SHORTEST:g} to {LONGEST:g} s")
+        raise ParameterError(f"{name} is {number:g} s: expected {SHORTEST:g} to {LONGEST:g} s")
     return number
 
 
-def time_fault(t: Array) -> tuple[int, str] | None:
+def time_fault(
+    t: Array, resampling: str = "put it on even times with numpy.interp"
+) -> tuple[int, str] | None:
     """Return the first sample at which times [s] are not increasing or even, with a message.
 
-    Return None if there is none.
+    Return None if there is none. `resampling` says how such a record can be used all the same.
     """
+    if (fault := backward(t)) is not None or t.size < 2:
+        return fault
     with np.errstate(all="ignore"):
         steps = np.diff(t)
-        if steps.size == 0:
-            return None
-        if (backward := _first(~(steps > 0.0))) is not None:
-            k = backward + 1
-            hint = f"; {USE_DT}" if steps[backward] == 0.0 else ""
-            return k, (
-                f"t goes from {t[k - 1]:.10g} s to {t[k]:.10g} s at sample {k}: "
-                f"expected increasing times{hint}"
-            )
         typical = np.median(steps)
+        dt = (t[-1] - t[0]) / steps.size
+        departure = np.abs(t - (t[0] + dt * np.arange(t.size)))
+        # In place of the times of a log with several rates or gaps, dt= would distort it.
+        remedy = f"{resampling}; {USE_DT}" if departure.max() <= JITTER * dt else resampling
         if (uneven := _first(~(np.abs(steps - typical) <= UNEVEN * typical))) is not None:
             return uneven + 1, (
                 f"t is not even: it goes {steps[uneven]:.6g} s forward to sample {uneven + 1}, "
-                f"where most steps are {typical:.6g} s; {USE_DT}"
+                f"where most steps are {typical:.6g} s; {remedy}"
             )
-        dt = (t[-1] - t[0]) / steps.size
-        departure = np.abs(t - (t[0] + dt * np.arange(t.size)))
         if (drifted := _first(~(departure <= UNEVEN * dt))) is not None:
             return drifted, (
                 f"t is not even: {t[drifted]:.10g} s at sample {drifted} is "
-                f"{departure[drifted]:.3g} s off an even grid of {dt:.6g} s; {USE_DT}"
+                f"{departure[drifted]:.3g} s off an even grid of {dt:.6g} s; {remedy}"
             )
     return None
+
+
+def backward(t: Array) -> tuple[int, str] | None:
+    """Return the first sample at which times [s] are not increasing, with a message, or None."""
+    with np.errstate(all="ignore"):
+        steps = np.diff(t)
+    if (place := _first(~(steps > 0.0))) is None:
+        return None
+    k = place + 1
+    hint = f"; {USE_DT}" if steps[place] == 0.0 else ""
+    return k, (
+        f"t goes from {t[k - 1]:.10g} s to {t[k]:.10g} s at sample {k}: "
+        f"expected increasing times{hint}"
+    )
 
 
 def _first(mask: NDArray[np.bool_]) -> int | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from .. import _core
-from .._support.arguments import finite
+from .._support.arguments import TOO_FAR, finite
 from .._support.arrays import check_dt
 from ..errors import NumericalError, ParameterError
 from ..stages.inverse import Inverse
@@ -17,8 +17,6 @@ from .session import Session
 
 __all__ = ["Controller"]
 
-# Longest displacement [m] that any range may have.
-LONGEST = 1.0
 # Sampling interval for the reach of a stage [s]: its drive takes seconds.
 REACH_STEP = 0.05
 
@@ -125,7 +123,7 @@ class Controller:
             return None
         bottom, top = bottom + self.feedforward.offset, top + self.feedforward.offset
         wide = top - bottom
-        span = max(bottom - wide, -LONGEST), min(top + wide, LONGEST)
+        span = max(bottom - wide, -TOO_FAR), min(top + wide, TOO_FAR)
         return span if span[0] < span[1] else None
 
     def start(self, *, present: float | None = None) -> Session:

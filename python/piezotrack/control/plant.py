@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Plant", "linearised_plants", "reach", "run_closed_loop", "unwrap"]
+__all__ = ["Plant", "linearised_plants", "reach", "run_closed_loop", "settled_bottom", "unwrap"]
 
 # A linearised stage is pickled as its matrices.
 copyreg.pickle(_core.LoopPlant, lambda one: (_core.LoopPlant.from_matrices, one.matrices()))
@@ -72,10 +72,31 @@ def reach(stage: Plant, limits: tuple[float, float], dt: float) -> tuple[float, 
     rests, in samples of `dt` seconds.
     """
     low, high = limits
+    t, _, x = _slow_cycle(stage, low, high, dt)
+    x = x[t >= 1.0]
+    return float(x.min()), float(x.max())
+
+
+def settled_bottom(stage: Plant, limits: tuple[float, float], top: float, dt: float) -> float:
+    """Simulate the lowest displacement [m] at the lower of two voltages [V], from `top` [m] down.
+
+    The voltage takes the course of `reach`, but only up to where the displacement is `top`.
+    """
+    low, high = limits
+    t, u, x = _slow_cycle(stage, low, high, dt)
+    rising = (t >= 1.0) & (t < 6.0)
+    there = np.flatnonzero(x[rising] >= top)
+    if there.size:
+        high = float(u[rising][there[0]])
+        t, u, x = _slow_cycle(stage, low, high, dt)
+    return float(x[t >= 6.0].min())
+
+
+def _slow_cycle(stage: Plant, low: float, high: float, dt: float) -> tuple[Array, Array, Array]:
+    """Simulate from `low` slowly to `high` and back [V]: times [s], voltages and displacements."""
     t = np.arange(0.0, 11.0, dt)
     u = np.interp(t, [0, 0.5, 1, 5, 6, 10], [0.0, low, low, high, high, low])
-    x = stage.simulate(u, dt).x[t >= 1.0]
-    return float(x.min()), float(x.max())
+    return t, u, stage.simulate(u, dt).x
 
 
 def linearised_plants(

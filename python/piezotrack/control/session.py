@@ -88,7 +88,7 @@ class Session:
         )
         inverse = controller.feedforward
         self._inverse: InverseSession | None = (
-            None if inverse is None else inverse.start(controller.dt)
+            None if inverse is None else inverse.start(controller.dt, limits=controller.limits)
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -208,8 +208,8 @@ class Session:
         voltage : float
             Voltage [V], which the antiwindup uses in place of the command. Where it differs from
             the command by more than 1 % of the range of the limits, the sample counts as saturated:
-            learning pauses. Further outside the limits than their range it is no reading, such as
-            9.91e37, and is ignored.
+            learning pauses, and the feedforward remembers no more than that. Further outside the
+            limits than their range it is no reading, such as 9.91e37, and is ignored.
 
         Raises
         ------
@@ -217,6 +217,8 @@ class Session:
             It is not a finite number.
         """
         self._core.applied(finite("voltage", voltage, "V"))
+        if self._inverse is not None and (reached := self._core.reached()) is not None:
+            self._inverse.applied(reached)
 
     def retune(self, controller: Controller) -> None:
         """Change gains, filters, limits and span without a bump.
@@ -249,6 +251,8 @@ class Session:
             raise ParameterError("feedforward is another: expected that of the session")
         self._core.retune(controller._core)
         self._controller = controller
+        if self._inverse is not None:
+            self._inverse._limit(controller.limits)
 
     def reset(self) -> None:
         """Forget errors, readings, hysteresis and what was learnt, and go on without a bump.

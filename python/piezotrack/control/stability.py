@@ -40,8 +40,12 @@ class LoopCheck:
         Whether that was decided by counting roots; for periods above 10 000 samples it is decided
         by the small-gain bound, which is sufficient but not necessary.
     gain_margin : float or None
-        Factor on the gain at the stability limit of the feedback; below 1 for an unstable loop;
-        None where there is no such gain.
+        Factor on the gain at the stability limit of the feedback without the repetitive part;
+        below 1 where the feedback is unstable; None where there is no such gain.
+    stable_gains : tuple of (float, float) or None
+        Factors on the gain of the stage between which the whole loop is stable, the upper one
+        `inf` where there is none; for an unstable loop the nearest such range. None where no
+        gain makes it stable, and with a repetitive part of more than 10 000 samples.
     phase_margin : float or None
         Phase margin of the feedback without the repetitive part [rad]; None where its gain is
         never 1.
@@ -71,6 +75,7 @@ class LoopCheck:
     stable: bool
     exact: bool
     gain_margin: float | None
+    stable_gains: tuple[float, float] | None
     phase_margin: float | None
     delay_margin: float | None
     crossover: float | None
@@ -83,15 +88,25 @@ class LoopCheck:
 
     def __str__(self) -> str:
         text = f"{1e6 * self.gain:.3g} um/V: {'stable' if self.stable else 'UNSTABLE'}"
-        if self.gain_margin is not None:
-            text += f", gain margin {self.gain_margin:.3g}"
+        text += self._gains()
+        # With a repetitive part these are margins of another loop: of the feedback alone.
+        of = "" if self.small_gain is None else " of the feedback"
         if self.stable and self.phase_margin is not None:
-            text += f", phase margin {self.phase_margin:.2g} rad"
+            text += f", phase margin{of} {self.phase_margin:.2g} rad"
         if self.stable:
-            text += f", Ms {self.sensitivity:.3g}"
+            text += f", Ms{of} {self.sensitivity:.3g}"
         if self.periods is not None:
             text += f", learns in {self.periods:.2g} periods"
         return text
+
+    def _gains(self) -> str:
+        """Describe where the whole loop is stable."""
+        if self.stable_gains is None:
+            return ", at any gain" if self.exact and not self.stable else ""
+        low, high = self.stable_gains
+        if low > 1.0:
+            return f", stable from {low:.3g} times the gain on"
+        return f", gain margin {high:.3g}" if math.isfinite(high) else ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -256,6 +271,7 @@ def _check(controller: Controller, plant: _core.LoopPlant) -> LoopCheck:
         stable=found["stable"],
         exact=found["exact"],
         gain_margin=None if margin is None or math.isinf(margin) else margin,
+        stable_gains=found["gains"],
         phase_margin=found["phase_margin"],
         delay_margin=found["delay_margin"],
         crossover=found["crossover"],

@@ -16,7 +16,7 @@ from ..errors import ParameterError
 from ..references.reference import Reference, SampledReference
 from ..stages.inverse import PlayedVoltage
 from .controller import Controller
-from .plant import reach, run_closed_loop, unwrap
+from .plant import reach, run_closed_loop, settled_bottom, unwrap
 from .stability import check_loop
 
 if TYPE_CHECKING:
@@ -331,7 +331,9 @@ def feedforward_of(
     """Compute the feedforward of a whole run [V], and a note of how."""
     if controller.feedforward is None:
         return PlayedVoltage(np.zeros(len(samples)), "no feedforward")
-    return controller.feedforward.played(reference, controller.dt, samples=samples)
+    return controller.feedforward.played(
+        reference, controller.dt, samples=samples, limits=controller.limits
+    )
 
 
 def collected(
@@ -394,8 +396,11 @@ def check_stable(stage: Plant, controller: Controller, delay: float) -> None:
     found = f"the loop is unstable on this stage, {1e6 * one.gain:.3g} um/V"
     if one.slowest_root is not None:
         found += f": its largest root is {one.slowest_root:.5g}"
-    if one.gain_margin is not None and one.gain_margin < 1.0:
-        found += f", and {one.gain_margin:.3g} times the gain would be at the limit"
+    without = one.gain_margin is not None and one.gain_margin < 1.0
+    if without and one.stable_gains is not None and one.stable_gains[1] < 1.0:
+        found += f", and {one.stable_gains[1]:.3g} times the gain would be at the limit"
+    elif without:
+        found += f", and {one.gain_margin:.3g} times the gain would be at that of the feedback"
     elif controller.repetitive is not None:
         found += "; without the repetitive part it is stable, so lower kq or take another filter"
     hint = f" ({one.hint})" if one.hint else ""
@@ -423,3 +428,13 @@ def check_within_reach(
                 f"beyond {1e6 * edge:.4g} um: expected what the stage reaches from {low:g} to "
                 f"{high:g} V, or beyond_reach=True"
             )
+    # The loop stays above the curve from rest: once up, the stage no longer comes all the way down.
+    k = int(np.argmax(samples.x))
+    k += int(np.argmin(samples.x[k:]))
+    lowest = settled_bottom(stage, (low, high), float(samples.x.max()) - offset, 1e-3) + offset
+    if (past := lowest - samples.x[k]) > slack:
+        raise ParameterError(
+            f"reference is {1e6 * samples.x[k]:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} "
+            f"um below {1e6 * lowest:.4g} um: expected what the stage reaches at {low:g} V on the "
+            f"settled loop, from {1e6 * samples.x.max():.4g} um down, or beyond_reach=True"
+        )

@@ -12,18 +12,20 @@ import math
 import re
 from collections import Counter
 from contextlib import contextmanager
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .._support.arrays import check_dt, time_fault
+from .._support.arrays import backward, check_dt, time_fault
 from .._support.messages import quoted
 from .._support.units import lookup, require
 from ..errors import DataError, ParameterError, ShapeError
 from .columns import Column, Columns
 from .dataset import Dataset
+from .resampling import even_times, evened
 
 if TYPE_CHECKING:
     import os
@@ -42,6 +44,8 @@ NOT_TEXT = {".mat", ".h5", ".hdf5", ".tdms", ".npy", ".npz", ".xls", ".xlsx", ".
 # A line and a header beyond these are none of a log: a million letters, ten thousand columns.
 MOST_LETTERS, MOST_COLUMNS = 1_000_000, 10_000
 
+USE_RESAMPLE = "resample= puts it on even times at that interval [s]"
+
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 _SWAP = str.maketrans(",.", ".,")
 
@@ -54,6 +58,7 @@ def read(
     displacement: str | int | None = None,
     units: Mapping[str | int, str] | None = None,
     dt: float | None = None,
+    resample: float | None = None,
     hold: Hold = "foh",
 ) -> Dataset:
     r"""Read the log of one axis from a text file.
@@ -74,6 +79,11 @@ def read(
         ``"drive"`` or ``"displacement"`` for the column in that role, or else a column as above.
     dt : float, optional
         Sampling interval [s]. The time column is then ignored and the first sample is at 0 s.
+    resample : float, optional
+        Sampling interval [s] of even times on which the record is put, for a log with gaps,
+        several rates or jitter: on straight lines between its samples, the drive with ``"zoh"``
+        as the last one before. No longer than most intervals of the log, as what is faster than
+        half the new rate would be misread; `Dataset.decimate` then lowers the rate without that.
     hold : {"foh", "zoh"}, optional
         Drive between two samples; see `Dataset`.
 
@@ -103,7 +113,11 @@ def read(
     """
     log = _TextLog(path)
     roles = log.roles({"time": time, "drive": drive, "displacement": displacement}, units, dt)
-    return log.dataset(roles, dt, hold)
+    if resample is not None:
+        if dt is not None:
+            raise ParameterError("dt and resample: expected one of them at most, both are given")
+        check_dt(resample, "resample")
+    return log.dataset(roles, dt, hold, resample)
 
 
 class DriveRecord(NamedTuple):
@@ -325,14 +339,29 @@ class _TextLog:
                 check_dt(dt)
             return self.columns.roles(wanted, units, needs_time=dt is None)
 
-    def dataset(self, roles: Mapping[str, Column], dt: float | None, hold: Hold) -> Dataset:
+    def dataset(
+        self,
+        roles: Mapping[str, Column],
+        dt: float | None,
+        hold: Hold,
+        resample: float | None = None,
+    ) -> Dataset:
         """Read the samples."""
         main = {role: c for role, c in roles.items() if role != "time" or dt is None}
         table = self._table(list(main.values()))
         signals = {role: require(c.unit).to_si(table[:, c.index]) for role, c in main.items()}
-        if "time" in signals and (fault := time_fault(signals["time"])) is not None:
+        t = signals.get("time")
+        check = partial(time_fault, resampling=USE_RESAMPLE) if resample is None else backward
+        if t is not None and (fault := check(t)) is not None:
             line = next(islice(self._rows(), fault[0], None))[0]
             raise self.error(f"{roles['time']}: {fault[1]}", line)
+        if t is not None and resample is not None:
+            with self.named():
+                times = even_times(t, resample)
+            steps = {main["drive"].index} if hold == "zoh" and "drive" in main else set()
+            table = evened(t, table, times, constant=steps)
+            signals = {role: require(c.unit).to_si(table[:, c.index]) for role, c in main.items()}
+            signals["time"] = times
         columns, units = self._further(table, {column.index for column in roles.values()})
         # A drive alone is a record with an unused displacement, and vice versa.
         nothing = np.zeros(len(table))

@@ -1,17 +1,23 @@
-"""Lower and higher sampling rates."""
+"""Lower, higher and even sampling rates."""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .._support.arrays import MOST_SAMPLES
+from ..errors import ParameterError
+
 if TYPE_CHECKING:
+    from collections.abc import Set as AbstractSet
+
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
 
-__all__ = ["interpolated", "low_passed"]
+__all__ = ["even_times", "evened", "interpolated", "low_passed"]
 
 STOP_DB = 80.0
 # Half the width of the transition, in new Nyquist frequencies.
@@ -73,3 +79,72 @@ def interpolated(signal: Array, factor: int) -> Array:
     between: Array = filled[first : first + (signal.size - 1) * factor + 1]
     between[::factor] = signal
     return between
+
+
+def even_times(t: Array, interval: float) -> Array:
+    """Even times from the first to the last of uneven ones.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Increasing times [s].
+    interval : float
+        Interval of the even ones [s].
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        Times [s].
+
+    Raises
+    ------
+    ParameterError
+        `interval` is longer than most of those in `t`, or so short that there are too many.
+    """
+    length, longest = float(t[-1] - t[0]), float(np.median(np.diff(t))) if t.size > 1 else interval
+    shortest = length / MOST_SAMPLES
+    if not shortest < interval <= longest * (1.0 + 1e-6):
+        raise ParameterError(
+            f"resample is {interval:g} s: expected {shortest:.3g} s to {longest:.6g} s, than which "
+            "half of the intervals of the log are not shorter; decimate() goes further"
+        )
+    count = math.floor(length / interval * (1.0 + 1e-12)) + 1
+    return np.minimum(t[0] + interval * np.arange(count), t[-1])
+
+
+def evened(
+    t: Array, table: Array, times: Array, *, constant: AbstractSet[int] = frozenset()
+) -> Array:
+    """Values at other times than they were sampled at, on straight lines between the samples.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Times of the samples [s], increasing.
+    table : ndarray, shape (n, columns)
+        The samples.
+    times : ndarray, shape (m,)
+        Times [s] from the first to the last sample.
+    constant : set of int, optional
+        Columns that stay constant from each sample to the next instead.
+
+    Returns
+    -------
+    ndarray, shape (m, columns)
+        Values at `times`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t, table = np.array([0.0, 1.0, 3.0]), np.array([[0.0, 0.0], [1.0, 1.0], [3.0, 3.0]])
+    >>> evened(t, table, np.array([0.0, 1.5, 3.0]), constant={1})
+    array([[0. , 0. ],
+           [1.5, 1. ],
+           [3. , 3. ]])
+    """
+    before = np.searchsorted(t, times, side="right") - 1
+    columns = [
+        column[before] if k in constant else np.interp(times, t, column)
+        for k, column in enumerate(table.T)
+    ]
+    return np.column_stack(columns)

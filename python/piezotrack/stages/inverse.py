@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["Inverse", "InverseSession", "PlayedVoltage"]
 
 Playback = Literal["table", "online"]
+Limits = tuple[float, float] | None
 
 
 class PlayedVoltage(NamedTuple):
@@ -118,13 +119,21 @@ class Inverse:
         # The core refuses a stage without an inverse, and a state of another model.
         self._begun(1.0)
 
-    def _begun(self, dt: float) -> _core.Inverse:
+    def _begun(self, dt: float, limits: Limits = None) -> _core.Inverse:
         """Return the inverse in the core, before its first sample."""
         initial = None if self.initial is None else self.stage._checked(self.initial)._named
-        return self.stage._core.inverse(dt, offset=self.offset, delay=self.delay, initial=initial)
+        core = self.stage._core.inverse(dt, offset=self.offset, delay=self.delay, initial=initial)
+        if limits is not None:
+            core.limit(*limits)
+        return core
 
     def voltage(
-        self, reference: Reference, dt: float, *, samples: SampledReference | None = None
+        self,
+        reference: Reference,
+        dt: float,
+        *,
+        samples: SampledReference | None = None,
+        limits: Limits = None,
     ) -> Array:
         """Voltage for a whole reference that begins at rest.
 
@@ -136,11 +145,14 @@ class Inverse:
             Sampling interval [s].
         samples : SampledReference, optional
             ``reference.sample(dt)``, if already computed.
+        limits : tuple of (float, float), optional
+            Range of the voltages that reach the stage [V]. The voltage is not clipped, but what is
+            beyond does not enter the memory of the inverse: after it, the inverse is exact again.
 
         Returns
         -------
         ndarray, shape (n,)
-            Voltage at the samples ``reference.sample(dt).t`` [V]. Limits are not applied.
+            Voltage at the samples ``reference.sample(dt).t`` [V].
 
         Raises
         ------
@@ -159,9 +171,9 @@ class Inverse:
         else:
             longer = replace(reference, duration=reference.duration + self.delay + samples.dt)
             x, v, a = longer.at(t)
-        return self._begun(samples.dt).along(x - self.offset, v, a)
+        return self._begun(samples.dt, limits).along(x - self.offset, v, a)
 
-    def table(self, reference: Reference, dt: float) -> Array:
+    def table(self, reference: Reference, dt: float, *, limits: Limits = None) -> Array:
         """One settled period, as a table of the voltages at the sampling instants.
 
         Parameters
@@ -170,6 +182,8 @@ class Inverse:
             A reference whose period is a whole number of samples.
         dt : float
             Sampling interval [s].
+        limits : tuple of (float, float), optional
+            As of `voltage`.
 
         Returns
         -------
@@ -198,10 +212,15 @@ class Inverse:
                 f"reference ({reference.name}) lasts {reference.duration:g} s: expected "
                 f"{length:g} s, until a period has settled"
             )
-        return self.voltage(replace(reference, duration=length), dt)[-count:]
+        return self.voltage(replace(reference, duration=length), dt, limits=limits)[-count:]
 
     def played(
-        self, reference: Reference, dt: float, *, samples: SampledReference | None = None
+        self,
+        reference: Reference,
+        dt: float,
+        *,
+        samples: SampledReference | None = None,
+        limits: Limits = None,
     ) -> PlayedVoltage:
         """Feedforward of a run, from a table or online as `playback` says.
 
@@ -213,13 +232,15 @@ class Inverse:
             Sampling interval [s].
         samples : SampledReference, optional
             ``reference.sample(dt)``, if already computed.
+        limits : tuple of (float, float), optional
+            As of `voltage`.
 
         Returns
         -------
         PlayedVoltage
             Voltage at the samples [V], and how it was computed.
         """
-        volts = self.voltage(reference, dt, samples=samples)
+        volts = self.voltage(reference, dt, samples=samples, limits=limits)
         period = reference.period
         before = 0 if period is None else self._settled(reference, period)
         head = 0 if period is None else round((before + 1) * period / dt)
@@ -237,20 +258,22 @@ class Inverse:
         """Periods before the one of the table: `settle`, or those of the smooth start if more."""
         return max(self.settle, math.ceil(reference.ramp / period - 1e-9))
 
-    def start(self, dt: float) -> InverseSession:
+    def start(self, dt: float, *, limits: Limits = None) -> InverseSession:
         """Start a session that computes the voltage sample by sample.
 
         Parameters
         ----------
         dt : float
             Sampling interval [s].
+        limits : tuple of (float, float), optional
+            As of `voltage`.
 
         Returns
         -------
         InverseSession
             With a state of its own; several sessions are independent.
         """
-        return InverseSession(self, check_dt(dt))
+        return InverseSession(self, check_dt(dt), limits)
 
 
 def _check(reference: object) -> None:
@@ -276,6 +299,8 @@ class InverseSession:
         The model with offset and delay.
     dt : float
         Sampling interval [s].
+    limits : tuple of (float, float), optional
+        Range of the voltages that reach the stage [V]; see `Inverse.voltage`.
 
     Examples
     --------
@@ -285,12 +310,12 @@ class InverseSession:
     8.40 V
     """
 
-    def __init__(self, inverse: Inverse, dt: float) -> None:
-        self._inverse, self._dt = inverse, dt
-        self._core = inverse._begun(dt)
+    def __init__(self, inverse: Inverse, dt: float, limits: Limits = None) -> None:
+        self._inverse, self._dt, self._limits = inverse, dt, limits
+        self._core = inverse._begun(dt, limits)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _resumed, (self._inverse, self._dt, self._core.save())
+        return _resumed, (self._inverse, self._dt, self._limits, self._core.save())
 
     def step(
         self,
@@ -333,12 +358,45 @@ class InverseSession:
                     _core.as_number(name, value)
             raise
 
+    def applied(self, voltage: float) -> None:
+        """Report the voltage that reached the stage in place of that of the last step.
+
+        The inverse remembers it instead, and is exact again where the voltage is what it asks for.
+        Within `limits` it does that by itself; a `Session` of a controller does it as well.
+
+        Parameters
+        ----------
+        voltage : float
+            Voltage [V]. Where no displacement explains it, nothing changes.
+
+        Raises
+        ------
+        ParameterError
+            It is not a finite number.
+
+        Examples
+        --------
+        >>> import piezotrack as pt
+        >>> plays = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(5.0,), weights=(5e-7,))
+        >>> session = plays.inverse().start(0.001)
+        >>> for reference in (20e-6, 30e-6, 20e-6, 10e-6):
+        ...     asked = session.step(reference)
+        ...     session.applied(min(asked, 15.0))
+        >>> print(f"{asked:.3f} V")
+        10.000 V
+        """
+        self._core.applied(finite("voltage", voltage, "V"))
+
+    def _limit(self, limits: tuple[float, float]) -> None:
+        self._limits = limits
+        self._core.limit(*limits)
+
     def reset(self) -> None:
         """Return to the initial state."""
         self._core.reset()
 
 
-def _resumed(inverse: Inverse, dt: float, state: bytes) -> InverseSession:
-    session = inverse.start(dt)
+def _resumed(inverse: Inverse, dt: float, limits: Limits, state: bytes) -> InverseSession:
+    session = inverse.start(dt, limits=limits)
     session._core.load(state)
     return session

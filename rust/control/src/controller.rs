@@ -67,56 +67,22 @@ pub struct ControllerState<S, L> {
     readings: Readings,
 }
 
-/// A state without a repetitive part must have been one when it was saved too.
-impl<S: Snapshot, L: AsRef<[f64]> + AsMut<[f64]>> Snapshot for ControllerState<S, L> {
-    fn save(&self, write: &mut dyn FnMut(f64)) {
-        self.feedback.save(write);
-        self.repetitive.is_some().save(write);
-        if let Some(memory) = &self.repetitive {
-            memory.save(write);
-        }
-        let Self { filters, present, stepped, last, excess, reported, apart, .. } = self;
-        let parts: [&dyn Snapshot; 9] = [
-            filters,
-            present,
-            stepped,
-            last,
-            excess,
-            reported,
-            apart,
-            &self.unlearnt,
-            &self.readings,
-        ];
-        for part in parts {
-            part.save(write);
-        }
+crate::snapshot!(
+    [S: Snapshot, L: AsRef<[f64]> + AsMut<[f64]>]
+    ControllerState<S, L> {
+        feedback,
+        repetitive,
+        filters,
+        present,
+        stepped,
+        last,
+        excess,
+        reported,
+        apart,
+        unlearnt,
+        readings,
     }
-
-    fn load(&mut self, read: &mut dyn FnMut() -> Option<f64>) -> Option<()> {
-        self.feedback.load(read)?;
-        let mut repeats = false;
-        repeats.load(read)?;
-        if repeats != self.repetitive.is_some() {
-            return None;
-        }
-        if let Some(memory) = &mut self.repetitive {
-            memory.load(read)?;
-        }
-        let Self { filters, present, stepped, last, excess, reported, apart, .. } = self;
-        let parts: [&mut dyn Snapshot; 9] = [
-            filters,
-            present,
-            stepped,
-            last,
-            excess,
-            reported,
-            apart,
-            &mut self.unlearnt,
-            &mut self.readings,
-        ];
-        parts.into_iter().try_for_each(|part| part.load(read))
-    }
-}
+);
 
 /// Share of the limits' range by which a reported voltage may differ from the command without
 /// counting as saturated: accuracy of its reading.
@@ -378,6 +344,22 @@ impl<F: Feedback> Controller<F> {
             (state.reported, state.apart) = (true, true);
         }
         Ok(())
+    }
+
+    /// How much of the last feedforward reached the stage, V: for [`crate::OnlineFeedforward`],
+    /// whose inverse otherwise remembers what the stage never got.
+    ///
+    /// It is within the limits and, where the command was clipped or [`Self::applied`] reported a
+    /// saturated amplifier, not beyond the voltage that was applied. `None` where that is all of it.
+    #[must_use]
+    pub fn reached<L>(&self, state: &ControllerState<F::State, L>) -> Option<f64> {
+        let (asked, excess) = (state.last.feedforward, state.excess);
+        let mut reached = self.limits.clip(asked);
+        if excess.abs() > READING * (self.limits.high() - self.limits.low()) {
+            let volts = state.voltage();
+            reached = if excess < 0.0 { reached.min(volts) } else { reached.max(volts) };
+        }
+        ((reached - asked).abs() > 0.0).then_some(reached)
     }
 
     #[inline]

@@ -19,7 +19,8 @@
 //! another model; see [`Inverse`].
 
 use crate::error::{Result, finite, not_negative, positive};
-use crate::inverse::Inverse;
+use crate::inverse::{Inverse, after_drive};
+use crate::limits::Limits;
 
 /// One sample of a reference, with what is known beside its value; `None` for what is not.
 ///
@@ -89,9 +90,14 @@ pub struct OnlineFeedforwardState<S> {
     /// The last two references, the older one first, m; `None` before the first sample.
     past: Option<[f64; 2]>,
     inverse: S,
+    /// The inverse before the last sample, and what that asked of it.
+    before: S,
+    target: [f64; 3],
 }
 
-crate::snapshot!([S: crate::Snapshot] OnlineFeedforwardState<S> { past, inverse });
+crate::snapshot!(
+    [S: crate::Snapshot] OnlineFeedforwardState<S> { past, inverse, before, target }
+);
 
 impl<I: Inverse> OnlineFeedforward<I> {
     /// Feedforward through `inverse` for samples every `dt` seconds.
@@ -127,7 +133,7 @@ impl<I: Inverse> OnlineFeedforward<I> {
     /// moved before.
     #[must_use]
     pub fn start(&self, inverse: I::State) -> OnlineFeedforwardState<I::State> {
-        OnlineFeedforwardState { past: None, inverse }
+        OnlineFeedforwardState { past: None, inverse, before: inverse, target: [f64::NAN; 3] }
     }
 
     /// The drive (V for a piezo stage) for the next sample of the reference.
@@ -155,6 +161,8 @@ impl<I: Inverse> OnlineFeedforward<I> {
         let a = sample.acceleration.unwrap_or(acceleration);
         let lead = self.delay;
         let x = reference + lead * (v + 0.5 * lead * a) - self.offset;
+        state.before = state.inverse;
+        state.target = [x, v + lead * a, a];
         let drive = self.inverse.step(&mut state.inverse, x, v + lead * a, a);
         if reference.is_finite() {
             state.past = Some([before, reference]);
@@ -162,5 +170,35 @@ impl<I: Inverse> OnlineFeedforward<I> {
             state.past = Some([before, 2.0 * before - first]);
         }
         drive
+    }
+
+    /// The drive for the next sample, as [`Self::step`], of which only that within the limits
+    /// reaches the stage: that is what the inverse remembers.
+    #[inline]
+    pub fn step_within(
+        &self,
+        state: &mut OnlineFeedforwardState<I::State>,
+        sample: &ReferenceSample,
+        limits: &Limits,
+    ) -> f64 {
+        let drive = self.step(state, sample);
+        let reached = limits.clip(drive);
+        // Not where the drive is NaN.
+        if (drive - reached).abs() > 0.0 {
+            self.applied(state, reached);
+        }
+        drive
+    }
+
+    /// Reports the drive that reached the stage in place of the last one: the inverse remembers
+    /// it instead. [`crate::Controller::reached`] knows it.
+    ///
+    /// The last step is done again for the displacement at which the inverse gives this drive. It
+    /// takes some hundred times as long as a step. Without a last drive, and where no displacement
+    /// has this one, nothing changes.
+    pub fn applied(&self, state: &mut OnlineFeedforwardState<I::State>, volts: f64) {
+        if let Some(inverse) = after_drive(&self.inverse, &state.before, state.target, volts) {
+            state.inverse = inverse;
+        }
     }
 }

@@ -1,8 +1,8 @@
 //! Controllers, as configuration and as sessions.
 
 use piezotrack_control::{
-    Command, Controller, ControllerState, Filter, Limits, Pid, Repetitive, Smoothing, Snapshot,
-    Span, StateSpace,
+    Command, Controller, ControllerState, Filter, Limits, Pid, Repetitive, Smoothing, Span,
+    StateSpace,
 };
 use piezotrack_core::math::zeros;
 use piezotrack_core::simulate::{DELAY_LINE, Law, LawState};
@@ -10,7 +10,9 @@ use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
+use crate::displacements::{meant, outside};
 use crate::errors::raise;
+use crate::snapshots::{load, saved};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyController>()?;
@@ -144,74 +146,6 @@ struct PySession {
 /// well.
 type CommandParts = (f64, f64, f64, f64, f64, f64, bool, bool, bool);
 
-/// A state as the bytes of its numbers.
-pub fn saved<'py>(py: Python<'py>, state: &impl Snapshot) -> PyResult<Bound<'py, PyBytes>> {
-    let mut count = 0_usize;
-    state.save(&mut |_| count += 1);
-    PyBytes::new_with(py, 8 * count, |bytes| {
-        let mut slots = bytes.chunks_exact_mut(8);
-        state.save(&mut |number| {
-            if let Some(slot) = slots.next() {
-                slot.copy_from_slice(&number.to_le_bytes());
-            }
-        });
-        Ok(())
-    })
-}
-
-/// Takes a state from the bytes that `saved` gave; where they are of another, what is left is of
-/// no use.
-pub fn load(state: &mut impl Snapshot, bytes: &[u8]) -> PyResult<()> {
-    let mut left = bytes.chunks_exact(8).map(|one| one.try_into().map(f64::from_le_bytes));
-    let whole = bytes.len().is_multiple_of(8);
-    let loaded = state.load(&mut || left.next().and_then(std::result::Result::ok));
-    if !whole || loaded.is_none() || left.next().is_some() {
-        let expected = "the numbers of a state of the same configuration";
-        return Err(raise(&Error::parameter("state", "another", expected)));
-    }
-    Ok(())
-}
-
-/// Units of length that are taken for metres by mistake, how many of them are a metre, and the
-/// power of ten.
-const UNITS: [(&str, f64, &str); 3] = [("um", 1e6, "e-6"), ("nm", 1e9, "e-9"), ("mm", 1e3, "e-3")];
-/// Least number that is taken for one of another unit.
-const LEAST: f64 = 0.01;
-
-/// The unit that explains a displacement outside of the span, if there is one.
-fn meant(value: f64, span: Span) -> Option<&'static (&'static str, f64, &'static str)> {
-    let fits = |(_, metre, _): &&(&str, f64, &str)| span.contains(value / metre);
-    UNITS.iter().find(fits).filter(|_| value.abs() >= LEAST)
-}
-
-/// The error for a displacement outside of the span.
-fn outside(name: &str, value: f64, span: Span) -> PyErr {
-    let (low, high, hint) = (span.low(), span.high(), hint(value, span));
-    let expected =
-        format!("a displacement from {low:.3e} to {high:.3e} m{hint}; span= sets another range");
-    raise(&Error::parameter(name, format!("{value} m"), expected))
-}
-
-/// A reference in metres, or the error for one of a metre or more.
-pub fn in_metres(reference: f64) -> PyResult<f64> {
-    if reference.is_finite() && reference.abs() >= 1.0 {
-        let expected = format!("metres, below 1 m{}", hint(reference, Span::default()));
-        return Err(raise(&Error::parameter("reference", format!("{reference} m"), expected)));
-    }
-    Ok(reference)
-}
-
-/// What a displacement is in the unit that explains it.
-fn hint(value: f64, span: Span) -> String {
-    match meant(value, span) {
-        Some((unit, _, power)) => {
-            let taken = if *unit == "um" { ", and step_um takes um" } else { "" };
-            format!("; {value} {unit} is {value}{power} m{taken}")
-        }
-        None => String::new(),
-    }
-}
-
 #[pymethods]
 impl PySession {
     /// Refuses a reference outside of the span, and so the measurement of the first sample where
@@ -268,6 +202,11 @@ impl PySession {
 
     fn applied(&mut self, volts: f64) -> PyResult<()> {
         self.controller.applied(&mut self.state, volts).map_err(|error| raise(&error.into()))
+    }
+
+    /// The part of the last feedforward that reached the stage; `None` where that is all of it.
+    fn reached(&self) -> Option<f64> {
+        self.controller.reached(&self.state)
     }
 
     fn reset(&mut self) {

@@ -1,8 +1,8 @@
 //! The inverse of a stage, for feedforward.
 
 use numpy::PyArray1;
-use piezotrack_control::inverse::Inverse;
-use piezotrack_control::{OnlineFeedforward, OnlineFeedforwardState, ReferenceSample};
+use piezotrack_control::inverse::{Inverse, after_drive};
+use piezotrack_control::{Limits, OnlineFeedforward, OnlineFeedforwardState, ReferenceSample};
 use piezotrack_core::math::room;
 use piezotrack_core::models::{StageInverse, StageInverseState};
 use piezotrack_core::{Error, Result};
@@ -10,8 +10,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::arrays::{array, samples};
-use crate::control::{in_metres, load, saved};
+use crate::displacements::in_metres;
 use crate::errors::raise;
+use crate::snapshots::{load, saved};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyInverse>()
@@ -23,12 +24,14 @@ pub struct PyInverse {
     online: OnlineFeedforward<StageInverse>,
     start: StageInverseState,
     state: OnlineFeedforwardState<StageInverseState>,
+    /// Drives that reach the stage, where that is known.
+    limits: Option<Limits>,
 }
 
 impl PyInverse {
     /// An inverse that starts from what it remembers.
     pub fn new(online: OnlineFeedforward<StageInverse>, start: &StageInverseState) -> Self {
-        Self { state: online.start(*start), online, start: *start }
+        Self { state: online.start(*start), online, start: *start, limits: None }
     }
 }
 
@@ -44,7 +47,21 @@ impl PyInverse {
     ) -> PyResult<f64> {
         let position = in_metres(reference)?;
         let sample = ReferenceSample { position, velocity, acceleration, preview };
-        Ok(self.online.step(&mut self.state, &sample))
+        Ok(match &self.limits {
+            Some(limits) => self.online.step_within(&mut self.state, &sample, limits),
+            None => self.online.step(&mut self.state, &sample),
+        })
+    }
+
+    /// Sets the drives that reach the stage, V.
+    fn limit(&mut self, low: f64, high: f64) -> PyResult<()> {
+        self.limits = Some(Limits::new(low, high).map_err(|error| raise(&error.into()))?);
+        Ok(())
+    }
+
+    /// Takes the drive (V) that reached the stage in place of the last one.
+    fn applied(&mut self, volts: f64) {
+        self.online.applied(&mut self.state, volts);
     }
 
     /// The drive along a whole path, whose derivatives are known, from the start.
@@ -56,7 +73,7 @@ impl PyInverse {
         a: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let (x, v, a) = (samples("x", x)?, samples("v", v)?, samples("a", a)?);
-        let drive = along(self.online.inverse(), self.start, &x, &v, &a);
+        let drive = along(self.online.inverse(), self.start, self.limits.as_ref(), [&x, &v, &a]);
         array(py, drive.map_err(|error| raise(&error))?.iter().copied())
     }
 
@@ -74,21 +91,26 @@ impl PyInverse {
     }
 }
 
+/// What is beyond the limits does not reach the stage, and the inverse does not remember it.
 fn along(
     inverse: &StageInverse,
     mut state: StageInverseState,
-    x: &[f64],
-    v: &[f64],
-    a: &[f64],
+    limits: Option<&Limits>,
+    [x, v, a]: [&[f64]; 3],
 ) -> Result<Vec<f64>> {
     let mut drive = room("the drive along the reference", x.len())?;
     for (k, ((&x, &v), &a)) in x.iter().zip(v).zip(a).enumerate() {
+        let before = state;
         let value = inverse.step(&mut state, x, v, a);
         if !value.is_finite() {
             return Err(Error::Numerical(format!(
                 "the inverse has no voltage for sample {k} of the reference ({x:e} m, \
                  {v:e} m/s, {a:e} m/s^2): check its units and its sampling"
             )));
+        }
+        let reached = limits.map_or(value, |limits| limits.clip(value));
+        if (value - reached).abs() > 0.0 {
+            state = after_drive(inverse, &before, [x, v, a], reached).unwrap_or(state);
         }
         drive.push(value);
     }

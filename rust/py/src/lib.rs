@@ -3,6 +3,7 @@
 mod arrays;
 mod control;
 mod design;
+mod displacements;
 mod enter;
 mod errors;
 mod identify;
@@ -10,6 +11,7 @@ mod inverse;
 mod least_squares;
 mod models;
 mod numbers;
+mod snapshots;
 mod stage;
 mod step;
 mod swarm;

@@ -7,6 +7,7 @@
 mod bouc_wen;
 mod creeping;
 mod dahl;
+mod drive;
 mod feedback;
 mod input;
 mod modes;
@@ -15,6 +16,7 @@ mod play;
 pub use bouc_wen::{BoucWenInverse, BoucWenInverseState};
 pub use creeping::{CreepingInverse, CreepingInverseState};
 pub use dahl::{DahlInverse, InverseState, SampledDahlInverse};
+pub use drive::after_drive;
 pub use feedback::{
     FeedbackInverse, FeedbackInverseState, FirstOrderDahlInverse, OscillatorInverse,
     ParallelDahlInverse,

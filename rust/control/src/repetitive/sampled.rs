@@ -101,6 +101,25 @@ impl<L: AsRef<[f64]> + AsMut<[f64]>> Snapshot for RepetitiveState<L> {
     }
 }
 
+/// A state without a repetitive part must have been one when it was saved too.
+impl<L: AsRef<[f64]> + AsMut<[f64]>> Snapshot for Option<RepetitiveState<L>> {
+    fn save(&self, write: &mut dyn FnMut(f64)) {
+        self.is_some().save(write);
+        if let Some(memory) = self {
+            memory.save(write);
+        }
+    }
+
+    fn load(&mut self, read: &mut dyn FnMut() -> Option<f64>) -> Option<()> {
+        let mut repeats = false;
+        repeats.load(read)?;
+        if repeats != self.is_some() {
+            return None;
+        }
+        self.iter_mut().try_for_each(|memory| memory.load(read))
+    }
+}
+
 /// Number of entries, of which a line has fewer than 2^32.
 fn length(line: &[f64]) -> u32 {
     u32::try_from(line.len()).unwrap_or(u32::MAX)

@@ -7,6 +7,19 @@ use crate::signal::{index, largest_difference};
 /// Most sub-steps in one sampling interval that are tried.
 pub(crate) const MOST_SUBSTEPS: usize = 1 << 17;
 
+/// Factor by which a difference surely falls with twice the steps: 16 by the order, less where the
+/// steps pass kinks of the hysteresis.
+const SURE: f64 = 10.0;
+
+/// Whether the `difference` of two simulations shows that the finer is accurate.
+///
+/// Two can agree by chance. So the difference `before`, of the two that were coarser, has to
+/// promise the same; where there was none (infinity), this one has to be that much smaller.
+pub(crate) fn agrees(before: f64, difference: f64, accuracy: f64) -> bool {
+    let promised = if before.is_finite() { before / SURE } else { SURE * difference };
+    difference.max(promised) <= accuracy
+}
+
 /// Where the search for sub-steps begins: a radian of the oscillation in each.
 ///
 /// Coarser steps could agree with each other by chance, both blind to the oscillation.

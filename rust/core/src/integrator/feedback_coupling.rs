@@ -139,7 +139,8 @@ pub(super) fn heading<N: Number, M>(from: &FeedbackState<N, M>, ahead: &Predicti
     ahead.w.mul_add(ahead.w.like(1e-12), from.w)
 }
 
-/// The operator's memory where a step ends: along the branch, or to the turning point and back.
+/// The operator's memory where a step ends: along the branch, to the turning point and back, or
+/// through both turning points of a step that goes back in its middle.
 #[inline(always)]
 pub(super) fn advance_operator<N: Number, O: Operator<N>>(
     operator: &O,
@@ -155,7 +156,72 @@ pub(super) fn advance_operator<N: Number, O: Operator<N>>(
         let there = operator.along(branch, turning - from.x);
         operator.along(&operator.branch(&there, sign(w)), x - turning)
     } else {
-        operator.along(branch, x - from.x)
+        let velocity = CubicVelocity::between(from, x, w);
+        let dips = velocity.dips();
+        if dips.any_negative() {
+            // Lanes that do not dip go to the end on the first leg, the others back and on again.
+            let [first, second] = velocity.dip().map(|part| between(from.x, from.w, x, w, part));
+            let first = dips.where_negative(first, x);
+            let second = dips.where_negative(second, x);
+            let there = operator.along(branch, first - from.x);
+            let back = operator.branch(&there, -velocity.direction);
+            let there = operator.along(&back, second - first);
+            operator.along(&operator.branch(&there, velocity.direction), x - second)
+        } else {
+            operator.along(branch, x - from.x)
+        }
+    }
+}
+
+/// Velocity along the direction of motion over a step, `c + b s + a s^2` for s from 0 to 1: that
+/// of the cubic through displacement and velocity at both ends.
+pub(super) struct CubicVelocity<N> {
+    pub direction: N,
+    pub a: N,
+    pub b: N,
+    pub c: N,
+}
+
+impl<N: Number> CubicVelocity<N> {
+    /// Of a step that starts in the direction of its velocity.
+    #[inline(always)]
+    fn between<M>(from: &FeedbackState<N, M>, x: N, w: N) -> Self {
+        Self::along(sign(from.w), from, x, w)
+    }
+
+    /// Of a step that starts in a given direction.
+    #[inline(always)]
+    pub fn along<M>(direction: N, from: &FeedbackState<N, M>, x: N, w: N) -> Self {
+        let rise = x - from.x;
+        let c3 = rise.mul_add(rise.like(-2.0), from.w + w);
+        let c2 = rise - from.w - c3;
+        Self {
+            direction,
+            a: direction * (c3 + c3 + c3),
+            b: direction * (c2 + c2),
+            c: direction * from.w,
+        }
+    }
+
+    /// Below 0 where the velocity starts along the direction, passes zero and comes back to it:
+    /// both ends of such a step look as if it had not turned.
+    #[inline(always)]
+    pub fn dips(&self) -> N {
+        let Self { a, b, c, .. } = *self;
+        let one = a.like(1.0);
+        let roots = (a * c).mul_add(a.like(4.0), -(b * b));
+        let falls = b.where_negative(roots, one);
+        let rises = (-(a + a + b)).where_negative(falls, one);
+        (-c).where_negative(rises, one)
+    }
+
+    /// Both parts of the step after which the velocity of a step that dips passes zero.
+    #[inline(always)]
+    pub fn dip(&self) -> [N; 2] {
+        let Self { a, b, c, .. } = *self;
+        let square = b.mul_add(b, -((a * c) * a.like(4.0)));
+        let root = square.where_negative(a.like(0.0), square).sqrt();
+        [(c + c) / (root - b), (root - b) / (a + a)]
     }
 }
 

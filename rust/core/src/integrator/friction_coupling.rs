@@ -17,13 +17,20 @@ use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{Dahl, DahlBranch, DahlState, Operator};
 
 use super::equilibrium;
-use super::feedback_coupling::{Prediction, correct, predict, sign};
+use super::feedback_coupling::{CubicVelocity, Prediction, correct, predict, sign};
 use super::propagator::Propagator;
 use super::stepping_loop::TERMS;
 use super::traits::{Coupling, FeedbackState};
 
 /// Legs of one step between reversals, at most: more wait for the next step.
 const LEGS: usize = 4;
+
+/// Corrections of the time of a reversal, at most. The cubic is far off where the velocity settles
+/// within a small part of the step: with much damping, just after a sample.
+const CORRECTIONS: usize = 4;
+
+/// Share of the leg by which that time may be off without them: what is left is made up for.
+const TIMELY: f64 = 0.01;
 
 /// Share of the forces by which the limit of sticking is widened, against rounding.
 const SLACK: f64 = 1e-12;
@@ -256,18 +263,42 @@ impl<N: Number> FrictionCoupling<N> {
             (scaled, self.slide(&self.part(length), &scaled, direction, now, rise * length))
         };
         let (from, whole) = slide(left);
-        let turns = if last { one } else { held.where_negative(direction * whole.w, one) };
+        let turns = reverses(direction, &from, whole.x, whole.w);
+        let turns = if last { one } else { held.where_negative(turns, one) };
         let fraction = turning_fraction(direction, &from, whole.x, whole.w);
-        let length = turns.where_negative(fraction * left, left);
-        let (_, part) = slide(length);
-        let w = (drive.like(1e-12) - length).where_negative(part.w / length, at.w);
+        let mut length = turns.where_negative(fraction * left, left);
+        let (_, mut part) = slide(length);
+        let sliding = self.moving(direction);
+        let velocity = |part: &Slide<N>, length: N| {
+            (drive.like(1e-12) - length).where_negative(part.w / length, at.w)
+        };
+        // Time until the velocity is 0 at the present acceleration.
+        let rests_in = |x: N, w: N, operator: &DahlState<N>, force: N| {
+            let net = force - sliding.output(operator).0 - self.stiffness * x;
+            -(w / (-self.rates[1]).mul_add(w, net * self.rates[0]))
+        };
+        let early = rests_in(at.x, at.w, &memory.operator, now);
+        let early = early.where_negative(zero, (left - early).where_negative(left, early));
+        for _ in 0..CORRECTIONS {
+            let there = sliding.along(&part.branch, part.x - at.x);
+            let w = velocity(&part, length);
+            let late = rests_in(part.x, w, &there, rise.mul_add(length, now));
+            let timely = length.mul_add(drive.like(TIMELY), -magnitude(late));
+            let timely = turns.where_negative(timely, one);
+            if !timely.any_negative() {
+                break;
+            }
+            // From the start of the leg where this leads out of it.
+            let next = length + late;
+            let next = (left - next).where_negative(early, next.where_negative(early, next));
+            length = timely.where_negative(next, length);
+            part = slide(length).1;
+        }
+        let w = velocity(&part, length);
 
         // What velocity the reversal is off by is made up for in its time.
-        let reached = rise.mul_add(length, now);
-        let sliding = self.moving(direction);
         let there = sliding.along(&part.branch, part.x - at.x);
-        let net = reached - sliding.output(&there).0 - self.stiffness * part.x;
-        let late = -(w / (net * self.rates[0]));
+        let late = rests_in(part.x, w, &there, rise.mul_add(length, now));
         let late = (magnitude(late) - length * drive.like(0.1)).where_negative(late, zero);
         let late = turns.where_negative(late, zero);
         let x = (w * late).mul_add(drive.like(0.5), part.x);
@@ -320,7 +351,8 @@ impl<N: Number> Coupling<N> for FrictionCoupling<N> {
         let grip = self.grip(&memory.operator, drive);
         let (first, second) = (grip - magnitude(pull), grip - magnitude(pull + rise));
         let sticks = (second - first).where_negative(second, first);
-        let calm = held.where_negative(direction * slide.w, sticks);
+        let turns = reverses(direction, state, slide.x, slide.w);
+        let calm = held.where_negative(turns, sticks);
 
         let sliding = self.moving(direction);
         let operator = sliding.along(&slide.branch, slide.x - state.x);
@@ -377,17 +409,18 @@ fn magnitude<N: Number>(value: N) -> N {
     value.where_negative(-value, value)
 }
 
-/// Part of a leg after which the velocity, which starts along `direction` and ends against it,
-/// passes zero, on the cubic through displacement and velocity at both ends.
+/// Below 0 where a leg along `direction` ends against it, or goes back in between.
+#[inline(always)]
+fn reverses<N: Number, M>(direction: N, from: &FeedbackState<N, M>, x: N, w: N) -> N {
+    let end = direction * w;
+    end.where_negative(end, CubicVelocity::along(direction, from, x, w).dips())
+}
+
+/// Part of a leg along `direction` after which its velocity first passes zero, on the cubic
+/// through displacement and velocity at both ends.
 #[inline(always)]
 fn turning_fraction<N: Number, M>(direction: N, from: &FeedbackState<N, M>, x: N, w: N) -> N {
-    // Velocity c + b s + a s^2 along the direction.
-    let rise = x - from.x;
-    let c3 = rise.mul_add(rise.like(-2.0), from.w + w);
-    let c2 = rise - from.w - c3;
-    let c = direction * from.w;
-    let b = direction * (c2 + c2);
-    let a = direction * (c3 + c3 + c3);
+    let CubicVelocity { a, b, c, .. } = CubicVelocity::along(direction, from, x, w);
     let square = b.mul_add(b, -((a * c) * a.like(4.0)));
     let root = square.where_negative(a.like(0.0), square).sqrt();
     // Each form where it does not cancel.

@@ -21,6 +21,6 @@ pub use simulate::{Instant, LumpedStage, Motion};
 pub use stepping_loop::{FEW_TERMS, Observer, Order, Stepping, SteppingLoop, TERMS};
 pub use traits::{Coupling, FeedbackState, Kernel, MOST_PARAMETERS, Memory, Parameters};
 
-pub(crate) use accuracy::{MOST_SUBSTEPS, first_substeps, out_of_reach};
+pub(crate) use accuracy::{MOST_SUBSTEPS, agrees, first_substeps, out_of_reach};
 pub(crate) use simulate::columns;
 pub(crate) use traits::linear;

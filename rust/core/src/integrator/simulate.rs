@@ -2,7 +2,7 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::accuracy::{MOST_SUBSTEPS, first_substeps, out_of_reach};
+use super::accuracy::{MOST_SUBSTEPS, agrees, first_substeps, out_of_reach};
 use super::propagator::{Mechanics, halvings};
 use super::stepping_loop::{Observer, SteppingLoop};
 use super::traits::{FeedbackState, Kernel, Memory, Parameters};
@@ -124,8 +124,8 @@ impl<K: Kernel> LumpedStage<K> {
         }))
     }
 
-    /// Simulates so that twice the sub-steps moved no sample by more than `accuracy`, m, and
-    /// returns the finer of the two; `None` where `stop` said so.
+    /// Simulates so that twice the sub-steps moved no sample by more than `accuracy`, m, as the
+    /// difference before promised, and returns the finest; `None` where `stop` said so.
     ///
     /// # Errors
     /// [`Error::Parameter`] where `accuracy` is not above 0; [`Error::Numerical`] where the
@@ -143,15 +143,17 @@ impl<K: Kernel> LumpedStage<K> {
         let Some(mut coarse) = self.simulate_fixed(drive, start, substeps, stop)? else {
             return Ok(None);
         };
+        let mut before = f64::INFINITY;
         loop {
             substeps *= 2;
             let Some(mut fine) = self.simulate_fixed(drive, start, substeps, stop)? else {
                 return Ok(None);
             };
             fine.error_estimate = largest_difference(&coarse.x, &fine.x);
-            if fine.error_estimate <= accuracy {
+            if agrees(before, fine.error_estimate, accuracy) {
                 return Ok(Some(fine));
             }
+            before = fine.error_estimate;
             let most = fine.x.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
             if substeps > limit / 2 || accuracy < ROUNDING * most {
                 return Err(out_of_reach(accuracy, substeps, fine.error_estimate));

@@ -24,7 +24,7 @@ use crate::design::LoopPlant;
 use crate::error::{Error, Result, finite, not_negative, not_zero, positive};
 use crate::integrator::{
     FEW_TERMS, FrictionParameters, Instant, Kernel, LumpedStage, Mechanics, Memory, Motion, Order,
-    TERMS,
+    TERMS, agrees,
 };
 
 pub use kernels::{DahlFlow, FrictionKernel, SmoothKernel};
@@ -187,7 +187,7 @@ impl DahlStage {
         };
         let quick = self.lumped(SmoothKernel::<TERMS, false>).simulate_once(drive, start, stop);
         if let Ok(Some(quick)) = quick
-            && quick.error_estimate <= accuracy
+            && agrees(f64::INFINITY, quick.error_estimate, accuracy)
         {
             return Ok(Some(response(quick)));
         }
