@@ -212,7 +212,7 @@ def _moved(
     changes = {
         one.key: (moved[one.key] - values[one.key]) / one.slack * math.copysign(1.0, step)
         for one in observables()
-        if one.key in values
+        if one.calibrated and one.key in values
     }
     largest = sorted(changes, key=lambda key: -abs(changes[key]))[:3]
     return {key: changes[key] for key in largest}

@@ -38,10 +38,11 @@ def observe(table: Table2, lag: float, *, true: bool = False) -> dict[str, float
     """
     found = {}
     for case, run in table.cases:
-        key, metrics = f"circle.{1e6 * case.radius:g}um.{case.frequency:g}Hz", run.score(true=true)
+        key, metrics = case.key, run.score(true=true)
         found[f"{key}.max"] = metrics.peak_to_peak
         found[f"{key}.mean"] = metrics.mean_error
         found[f"{key}.sd"] = metrics.sd_error
+        found[f"{key}.ratio"] = metrics.peak_to_peak / metrics.sd_error
     small = table.runs[0]
     found["circle.axes"] = max(
         _largest(small.x, small.settled, 0.0, true), _largest(small.y, small.settled, lag, true)
