@@ -18,7 +18,7 @@ import piezotrack as pt
 from commands import refusal
 from folders import MEASURED
 from piezotrack import _core
-from piezotrack.xu_li_2010 import fig_06_identification, fig_12_14_tracking
+from piezotrack.xu_li_2010 import fig_06_identification, fig_12_14_tracking, fig_15_circles
 from piezotrack.xu_li_2010.apparatus import Apparatus, calibration_file
 from piezotrack.xu_li_2010.calibration import calibrate, cost, medians
 from piezotrack.xu_li_2010.conclusions import conclusions
@@ -257,6 +257,22 @@ def test_an_apparatus_survives_its_file() -> None:
     apparatus = Apparatus.calibrated()
     assert Apparatus.of(json.loads(json.dumps(apparatus.document()))) == apparatus
     assert apparatus.seeded(3).x.seed != apparatus.seeded(3).y.seed
+    stage = dataclasses.replace(apparatus.stage, missed_ticks=0.1, most_behind=4)
+    late = dataclasses.replace(apparatus, stage=stage)
+    assert Apparatus.of(json.loads(json.dumps(late.document()))) == late != apparatus
+    # One that was written when there were no ticks to miss.
+    older = apparatus.document()
+    del older["missed_ticks"], older["most_behind"]
+    assert Apparatus.of(older) == apparatus
+
+
+def test_a_true_error_that_no_record_tells_is_left_out() -> None:
+    # y's controller follows points of the path of which only its own readings tell.
+    table, stage = quick().experiments.table, quick().apparatus.stage
+    late = dataclasses.replace(stage, missed_ticks=0.1, most_behind=4)
+    known = fig_15_circles.observe(table, stage, true=True)
+    assert set(known) - set(fig_15_circles.observe(table, late, true=True)) == {"circle.axes"}
+    assert "circle.axes" in fig_15_circles.observe(table, late)
 
 
 @pytest.mark.parametrize("seeds", [0, 1001])

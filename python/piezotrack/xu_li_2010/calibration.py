@@ -68,7 +68,7 @@ def values_of(apparatus: Apparatus) -> dict[str, float]:
         **fig_12_14_tracking.observe_compensation(
             fig_12_14_tracking.compensation(apparatus, inverse)
         ),
-        **fig_15_circles.observe(table, apparatus.stage.lag),
+        **fig_15_circles.observe(table, apparatus.stage),
     }
 
 

@@ -138,7 +138,8 @@ def _stage(found: Reproduction) -> list[str]:
     return [
         "<h2>The stage</h2>",
         f"<p>{escape(calibration_file()['provenance']['how'])}</p>",
-        f"<p>Lag of y {1e3 * parts['lag']:.3g} ms, delay {1e3 * parts['delay']:.3g} ms, "
+        f"<p>Lag of y {1e3 * parts['lag']:.3g} ms, chance of a missed tick "
+        f"{100 * parts['missed_ticks']:.3g} %, delay {1e3 * parts['delay']:.3g} ms, "
         f"mean sampling jitter {1e3 * parts['jitter']:.2g} ms, cross-talk "
         f"{100 * xy:.3g} % and {100 * yx:.3g} %. SI units:</p>",
         table(("parameter", "x", "y"), rows),
