@@ -26,7 +26,7 @@ use crate::signal::{Drive, Stop, index};
 ///
 /// | field | symbol | unit | range |
 /// | --- | --- | --- | --- |
-/// | `cross_talk` | c_xy, c_yx | m/m | product below 1 |
+/// | `cross_talk` | `c_xy`, `c_yx` | m/m | product below 1 |
 /// | `lag` | | s | >= 0 |
 /// | `missed.chance`, `missed.most` | | | 0 to 1, >= 0 |
 ///
