@@ -303,7 +303,12 @@ _Spread = tuple[float, float, float, float, float]
 @final
 class XYStage:
     def __new__(
-        cls, x: _Axis, y: _Axis, cross_talk: tuple[float, float], lag: float
+        cls,
+        x: _Axis,
+        y: _Axis,
+        cross_talk: tuple[float, float],
+        lag: float,
+        missed: tuple[float, int],
     ) -> XYStage: ...
     def simulate(
         self, ux: ArrayLike, uy: ArrayLike, dt: float, hold_name: str

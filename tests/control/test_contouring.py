@@ -209,6 +209,26 @@ def test_the_lag_moves_y_and_leaves_x() -> None:
     assert other.metrics.sd_error == pytest.approx(10 * UM * math.sin(angle) / 8**0.5, rel=0.1)
 
 
+def test_missed_ticks_move_y_by_whole_samples_and_leave_x() -> None:
+    path = pt.circle(frequency=0.5, radius=10 * UM, duration=12.0)
+    stage = pt.XYStage(x=TABLE_1, y=TABLE_1)
+    late = dataclasses.replace(stage, missed_ticks=0.2, most_behind=3)
+    one, other = (pt.contour(one, led(), path) for one in (stage, late))
+    assert np.array_equal(one.x.measured, other.x.measured)
+    # What its controller followed is the path, 0 to 3 samples before.
+    followed = other.y.loop_error + other.y.measured
+    whole = np.arange(followed.size)
+    off = [np.abs(followed - other.y.desired[np.maximum(whole - n, 0)]) for n in range(4)]
+    assert np.min(off, axis=0).max() < 1e-13
+    behind = np.argmin(off, axis=0)[100:]
+    assert set(behind) == {0, 1, 2, 3}
+    assert other.metrics.sd_error > 2 * one.metrics.sd_error
+    # No chance, or no sample to fall behind by: the same bits.
+    for chance, most in ((0.0, 3), (0.2, 0)):
+        same = dataclasses.replace(stage, missed_ticks=chance, most_behind=most)
+        assert np.array_equal(pt.contour(same, led(), path).y.measured, one.y.measured)
+
+
 def test_the_mean_error_of_a_viscous_stage_under_pid_is_as_computed() -> None:
     """With an integrator on a lag D/K, |T| = 1 + w^2 tau (D/K - tau/2), tau = Ti / (Kp G).
 
@@ -419,6 +439,8 @@ BAD: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "same": (lambda: pt.XYStage(x=TABLE_1, y=TABLE_1, cross_talk=(1.0, 1.0)), "cross_talk"),
     "lag": (lambda: pt.XYStage(x=TABLE_1, y=TABLE_1, lag=-1.0), "lag"),
+    "ticks": (lambda: pt.XYStage(x=TABLE_1, y=TABLE_1, missed_ticks=1.5), "missed_ticks"),
+    "behind": (lambda: pt.XYStage(x=TABLE_1, y=TABLE_1, most_behind=-1), "most_behind"),
     "radius": (lambda: pt.circle(frequency=0.1, radius=10.0), "radius"),
     "pair": (lambda: pt.circle(frequency=0.1, radius=UM, centre=3.0), "centre"),  # type: ignore[arg-type]
     "lines": (lambda: pt.raster(line_rate=1.0, sizes=(UM, UM), lines=1), "lines"),

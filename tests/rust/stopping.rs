@@ -9,7 +9,7 @@ use piezotrack_core::math::{available, room, zeros};
 use piezotrack_core::models::{DahlStage, Experiment, Method, Model, Values};
 use piezotrack_core::signal::{Drive, Hold, NEVER, delayed};
 use piezotrack_core::simulate::{
-    Sensor, Timing, TwoAxes, VirtualSettings, VirtualStage, closed_loop, open_loops,
+    MissedTicks, Sensor, Timing, TwoAxes, VirtualSettings, VirtualStage, closed_loop, open_loops,
 };
 
 fn stage() -> VirtualStage {
@@ -35,8 +35,13 @@ fn a_long_sample_of_the_virtual_stage_is_left_in_the_middle() {
     let stage = stage();
     let drive = Drive::new(&[0.0, 10.0], 20.0, Hold::First).unwrap();
     assert_eq!(asked(|stop| stage.simulate(&drive, stop).unwrap()), 3);
-    let axes =
-        TwoAxes { x: stage.apparatus(), y: stage.apparatus(), cross_talk: [0.0; 2], lag: 0.0 };
+    let axes = TwoAxes {
+        x: stage.apparatus(),
+        y: stage.apparatus(),
+        cross_talk: [0.0; 2],
+        lag: 0.0,
+        missed: MissedTicks::NONE,
+    };
     let start = || (stage.start(), stage.start());
     let run = |stop: &(dyn Fn() -> bool + Sync)| {
         open_loops(&axes, start(), [&drive, &drive], stop).unwrap()

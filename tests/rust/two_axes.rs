@@ -10,8 +10,8 @@ use piezotrack_core::signal::contour_error::radial_errors;
 use piezotrack_core::signal::metrics::Spread;
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 use piezotrack_core::simulate::{
-    Apparatus, ApparatusState, Law, ReferenceSamples, Timing, TwoAxes, VirtualSettings,
-    VirtualStage, open_loops, track, track_both,
+    Apparatus, ApparatusState, Law, MissedTicks, ReferenceSamples, Timing, TwoAxes,
+    VirtualSettings, VirtualStage, open_loops, track, track_both,
 };
 
 const UM: f64 = 1e-6;
@@ -95,7 +95,7 @@ fn without_cross_talk_and_lag_each_axis_is_alone() {
         [&to_x, &to_y].map(|reference| ReferenceSamples { reference, feedforward: &none });
     for (delay, substeps) in [(0.0, 1), (0.7e-3, 10), (0.027, 3)] {
         let timing = timing(delay, substeps);
-        let axes = TwoAxes { x, y, cross_talk: [0.0, 0.0], lag: 0.0 };
+        let axes = TwoAxes { x, y, cross_talk: [0.0, 0.0], lag: 0.0, missed: MissedTicks::NONE };
         let start = (stage.start(), y.rest());
         let both = track_both(&axes, start, &timing, (&pid(), &pid()), courses, NEVER);
         let (along_x, along_y) = both.unwrap().unwrap();
@@ -120,7 +120,13 @@ fn a_lag_makes_the_ellipse_of_its_angle() {
     let (cosine, sine) =
         (wave(1001, 0.0, radius, frequency, 0.0), wave(1001, 0.0, radius, frequency, TAU / 4.0));
     for (whole, intervals) in [(1, 1.0), (2, 2.0), (5, 5.0)] {
-        let axes = TwoAxes { x: axis, y: axis, cross_talk: [0.0, 0.0], lag: intervals * TS };
+        let axes = TwoAxes {
+            x: axis,
+            y: axis,
+            cross_talk: [0.0, 0.0],
+            lag: intervals * TS,
+            missed: MissedTicks::NONE,
+        };
         let courses =
             [&cosine, &sine].map(|volts| ReferenceSamples { reference: volts, feedforward: volts });
         let start = (axis.rest(), axis.rest());
@@ -156,7 +162,7 @@ fn late_axes_without_cross_talk_and_lag_move_as_each_alone() {
     let course = ReferenceSamples { reference: &reference, feedforward: &vec![0.0; 150] };
     for (delay, jitter, substeps) in [(0.0, 2e-3, 1), (0.027, 4e-3, 3)] {
         let timing = Timing { jitter, ..timing(delay, substeps) };
-        let axes = TwoAxes { x, y, cross_talk: [0.0, 0.0], lag: 0.0 };
+        let axes = TwoAxes { x, y, cross_talk: [0.0, 0.0], lag: 0.0, missed: MissedTicks::NONE };
         let start = (stage.start(), other.start());
         let both = track_both(&axes, start, &timing, (&pid(), &pid()), [course; 2], NEVER);
         let (along_x, along_y) = both.unwrap().unwrap();
@@ -181,7 +187,13 @@ fn each_axis_is_late_by_its_own_time() {
         apparatus.sensor.seed = stage.settings().sensor.seed;
         apparatus
     };
-    let axes = TwoAxes { x: seeded(&x), y: seeded(&y), cross_talk: [0.0; 2], lag: 0.0 };
+    let axes = TwoAxes {
+        x: seeded(&x),
+        y: seeded(&y),
+        cross_talk: [0.0; 2],
+        lag: 0.0,
+        missed: MissedTicks::NONE,
+    };
     let ones = vec![1.0; 3000];
     let zeros = vec![0.0; 3000];
     let course = ReferenceSamples { reference: &zeros, feedforward: &ones };
@@ -231,7 +243,13 @@ fn a_lag_of_a_part_of_an_interval_is_kept_to_the_instant() {
     for (lag, delay) in [(3, 0), (0, 3), (2, 1), (3, 4), (13, 0), (9, 22)] {
         // In tenths of an interval.
         let seconds = |tenths: usize| 0.1 * TS * tenths as f64;
-        let axes = TwoAxes { x: axis, y: axis, cross_talk: [0.0, 0.0], lag: seconds(lag) };
+        let axes = TwoAxes {
+            x: axis,
+            y: axis,
+            cross_talk: [0.0, 0.0],
+            lag: seconds(lag),
+            missed: MissedTicks::NONE,
+        };
         let start = (axis.rest(), axis.rest());
         let timing = timing(seconds(delay), 10);
         let run = track_both(&axes, start, &timing, (&open(), &open()), [course; 2], NEVER);
@@ -253,7 +271,8 @@ fn cross_talk_mixes_what_the_sensors_see() {
     let plant = Rigid;
     let axis = Apparatus::ideal(&plant, 1.0);
     let [xy, yx] = [0.03, -0.02];
-    let axes = TwoAxes { x: axis, y: axis, cross_talk: [xy, yx], lag: 0.0 };
+    let axes =
+        TwoAxes { x: axis, y: axis, cross_talk: [xy, yx], lag: 0.0, missed: MissedTicks::NONE };
     let (ux, uy) = (vec![3.0, 5.0, -1.0, 2.0], vec![0.0, 7.0, 4.0, -6.0]);
     let drives = [&ux, &uy].map(|u| Drive::new(u, 1e-3, Hold::First).unwrap());
     let start = (axis.rest(), axis.rest());
@@ -293,8 +312,13 @@ fn identified_cross_talk_is_the_stage_s_within_its_deviation() {
     let (mut square, mut count) = (0.0, 0.0);
     for seed in 0..30 {
         let (x, y) = (VirtualStage::xu_li_2010(seed), VirtualStage::xu_li_2010_y(seed));
-        let axes =
-            TwoAxes { x: x.apparatus(), y: y.apparatus(), cross_talk: [0.015, 0.01], lag: 0.01 };
+        let axes = TwoAxes {
+            x: x.apparatus(),
+            y: y.apparatus(),
+            cross_talk: [0.015, 0.01],
+            lag: 0.01,
+            missed: MissedTicks::NONE,
+        };
         let drives = [&u, &held].map(|u| Drive::new(u, 1e-3, Hold::First).unwrap());
         let start = (x.start(), y.start());
         let run = open_loops(&axes, start, [&drives[0], &drives[1]], NEVER).unwrap().unwrap();
@@ -347,18 +371,26 @@ fn refusals_name_the_argument() {
     let plant = Rigid;
     let axis = Apparatus::ideal(&plant, 1.0);
     let told = |cross_talk, lag| {
-        TwoAxes { x: axis, y: axis, cross_talk, lag }.validate().unwrap_err().to_string()
+        TwoAxes { x: axis, y: axis, cross_talk, lag, missed: MissedTicks::NONE }
+            .validate()
+            .unwrap_err()
+            .to_string()
     };
     assert!(told([0.1, f64::NAN], 0.0).starts_with("cross_talk[1] is NaN"));
     assert!(told([1.0, 1.0], 0.0).contains("product is below 1"));
     assert!(told([0.0, 0.0], -0.1).starts_with("lag is -0.1 s"));
+    let missed = MissedTicks { chance: 1.5, most: 3 };
+    let axes = TwoAxes { x: axis, y: axis, cross_talk: [0.0, 0.0], lag: 0.0, missed };
+    let told = axes.validate().unwrap_err().to_string();
+    assert!(told.starts_with("missed_ticks is 1.5: expected a number from 0 to 1"), "{told}");
 }
 
 #[test]
 fn a_run_stops_when_told() {
     let plant = Rigid;
     let axis = Apparatus::ideal(&plant, 1.0);
-    let axes = TwoAxes { x: axis, y: axis, cross_talk: [0.0, 0.0], lag: 0.01 };
+    let axes =
+        TwoAxes { x: axis, y: axis, cross_talk: [0.0, 0.0], lag: 0.01, missed: MissedTicks::NONE };
     let volts = [1.0; 9];
     let course = ReferenceSamples { reference: &volts, feedforward: &volts };
     let start = (axis.rest(), axis.rest());
@@ -367,4 +399,67 @@ fn a_run_stops_when_told() {
     assert!(run.unwrap().is_none());
     let drive = Drive::new(&volts, 1e-3, Hold::First).unwrap();
     assert!(open_loops(&axes, start, [&drive, &drive], stop).unwrap().is_none());
+}
+
+#[test]
+fn missed_ticks_put_y_behind_by_whole_samples_of_the_path() {
+    let plant = Rigid;
+    let axis = Apparatus::ideal(&plant, 1.0);
+    // The voltage tells which point of the path it is for.
+    let points: Vec<f64> = (0..4000).map(f64::from).collect();
+    let course = ReferenceSamples { reference: &points, feedforward: &points };
+    let course = [course, course];
+    let limits = Limits::new(-1e4, 1e4).unwrap();
+    let open = Controller::new(limits, Law::None);
+    let behind = |missed, seed| {
+        let mut y = axis;
+        y.sensor.seed = seed;
+        let axes = TwoAxes { x: axis, y, cross_talk: [0.0, 0.0], lag: 0.0, missed };
+        let start = (axis.rest(), axis.rest());
+        let run = track_both(&axes, start, &timing(0.0, 1), (&open, &open), course, NEVER);
+        let (x, y) = run.unwrap().unwrap();
+        assert!(x.commands.iter().zip(&points).all(|(command, at)| command.volts == *at));
+        let late = y.commands.iter().zip(&points).map(|(command, at)| at - command.volts);
+        late.collect::<Vec<f64>>()
+    };
+    assert!(behind(MissedTicks::NONE, 3).iter().all(|late| *late == 0.0));
+    assert!(behind(MissedTicks { chance: 1.0, most: 0 }, 3).iter().all(|late| *late == 0.0));
+    let found = behind(MissedTicks { chance: 0.2, most: 3 }, 3);
+    assert_eq!(found, behind(MissedTicks { chance: 0.2, most: 3 }, 3));
+    assert_ne!(found, behind(MissedTicks { chance: 0.2, most: 3 }, 4));
+    let steps: Vec<f64> = found.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    assert!(found[0] <= 1.0 && steps.iter().all(|step| step.abs() <= 1.0));
+    // Each of 0 to 3 a quarter of the time; a missed tick shows unless the walk is at its end.
+    for late in [0.0, 1.0, 2.0, 3.0] {
+        let share = found.iter().filter(|one| **one == late).count() as f64 / 4000.0;
+        assert!((share - 0.25).abs() < 0.12, "{late}: {share}");
+    }
+    let share = steps.iter().filter(|step| **step != 0.0).count() as f64 / 4000.0;
+    assert!((share - 0.2 * 0.75).abs() < 0.03, "{share}");
+}
+
+#[test]
+fn a_lag_that_varies_has_peaks_of_its_largest_value() {
+    // Peak to peak by SD of the contour error: sqrt 8 for a constant lag. One that is each of 0 to
+    // 3 samples a quarter of the time has the peaks of 3, and the SD of its mean square, 3.5.
+    let plant = Rigid;
+    let axis = Apparatus::ideal(&plant, 1.0);
+    let turn = 500;
+    let courses = [0.0, TAU / 4.0].map(|phase| wave(40 * turn + 1, 0.0, 40.0, 0.1, phase));
+    let ratio = |lag, missed| {
+        let axes = TwoAxes { x: axis, y: axis, cross_talk: [0.0, 0.0], lag, missed };
+        let courses = [&courses[0], &courses[1]]
+            .map(|volts| ReferenceSamples { reference: volts, feedforward: volts });
+        let start = (axis.rest(), axis.rest());
+        let run = track_both(&axes, start, &timing(0.0, 1), (&open(), &open()), courses, NEVER);
+        let (x, y) = run.unwrap().unwrap();
+        let [x, y] = [&x.motion.measured[turn..], &y.motion.measured[turn..]];
+        let spread = Spread::of(radial_errors(x, y, [0.0, 0.0], 40.0 * UM).unwrap().into_iter());
+        spread.peak_to_peak / spread.sd
+    };
+    let constant = ratio(3.0 * TS, MissedTicks::NONE);
+    assert!((constant - 8.0_f64.sqrt()).abs() < 0.03, "{constant}");
+    let varying = ratio(0.0, MissedTicks { chance: 0.1, most: 3 });
+    let expected = (8.0_f64 * 9.0 / 3.5).sqrt();
+    assert!((varying / expected - 1.0).abs() < 0.1, "{varying} {expected}");
 }

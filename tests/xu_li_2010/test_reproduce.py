@@ -18,13 +18,15 @@ import piezotrack as pt
 from commands import refusal
 from folders import MEASURED
 from piezotrack import _core
-from piezotrack.xu_li_2010 import fig_06_identification, fig_12_14_tracking
+from piezotrack.xu_li_2010 import fig_06_identification, fig_12_14_tracking, fig_15_circles
 from piezotrack.xu_li_2010.apparatus import Apparatus, calibration_file
 from piezotrack.xu_li_2010.calibration import calibrate, cost, medians
 from piezotrack.xu_li_2010.conclusions import conclusions
 from piezotrack.xu_li_2010.free_parameters import FREE, Free, apparatus_at
 from piezotrack.xu_li_2010.measured_log import drives
-from piezotrack.xu_li_2010.published import Observable, Obtained, observables
+from piezotrack.xu_li_2010.published import Observable, Obtained, Use, observables
+from piezotrack.xu_li_2010.report_text import tally
+from piezotrack.xu_li_2010.table_2 import PUBLISHED
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -37,6 +39,16 @@ def quick() -> pt.xu_li_2010.Reproduction:
 
 def by_key() -> dict[str, Observable]:
     return {one.key: one for one in observables()}
+
+
+@cache
+def report(folder: Path) -> tuple[Path, ...]:
+    return tuple(quick().save(folder))
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ...]:
+    return report(tmp_path_factory.mktemp("report"))
 
 
 # Observables.
@@ -69,15 +81,29 @@ def test_what_was_to_be_left_out_is() -> None:
         left_out = one.figure[:2] in ("13", "14") or one.key.startswith("circle.40um")
         # And what no record at 0.25 Hz tells.
         left_out = left_out or one.key == "table_1.mass"
-        assert one.calibrated != left_out, one.key
+        # A ratio of two published numbers is neither.
+        derived = one.key.endswith(".ratio")
+        left_out = left_out and not derived
+        assert (one.use == "left out") == left_out, one.key
+        assert (one.use == "derived") == derived, one.key
+        assert one.calibrated != (left_out or derived), one.key
     fitted = {entry["key"] for entry in calibration_file().get("observables", [])}
     assert fitted <= {one.key for one in observables() if one.calibrated}
 
 
-def made(kind: str, published: float, *, calibrated: bool, unit: str = "um") -> Observable:
+def made(
+    kind: str,
+    published: float,
+    *,
+    calibrated: bool,
+    unit: str = "um",
+    key: str = "k",
+    use: Use | None = None,
+) -> Observable:
+    use = use or ("calibrated" if calibrated else "left out")
     return Observable(
-        key="k", figure="1", name="n", unit=unit, published=published, kind=kind,  # type: ignore[arg-type]
-        calibrated=calibrated, how="",
+        key=key, figure="1", name=f"n {key}", unit=unit, published=published, kind=kind,  # type: ignore[arg-type]
+        use=use, how="",
     )  # fmt: skip
 
 
@@ -100,6 +126,75 @@ def test_medians_and_quartiles_of_a_hand_made_array() -> None:
     assert found.median == 3.0
     assert found.quartiles == (1.75, 4.25)
     assert found.ratio == 1.5
+
+
+def test_what_is_put_in_is_what_the_stage_is_set_to() -> None:
+    given = {one.key for one in observables() if one.use == "put in"}
+    assert given == {"rest.rms", "rest.step", "step.steady"}
+    # Whatever the free parameters are: y's own displacement apart, they move none of the three.
+    theta = {one.name: one.at(0.3) for one in FREE}
+    x = apparatus_at(theta).x
+    assert x.resolution == pytest.approx(2.5e-3 / 2**16)
+    # With the steps, the noise makes 0.097 um.
+    assert math.hypot(x.noise, x.resolution / math.sqrt(12.0)) == pytest.approx(0.097e-6, rel=1e-3)
+    end = x.simulate(np.full(300, 75.0), 1e-3, hold="zoh").x[-100:].mean()
+    assert end == pytest.approx(117.7622e-6, rel=1e-3)
+
+
+def test_the_tally_counts_by_use() -> None:
+    def row(key: str, value: float, use: Use) -> Obtained:
+        known = made("value", 2e-6, calibrated=False, key=key, use=use)
+        return Obtained(observable=known, values=(value,))
+
+    good, bad = 2e-6, 9e-6
+    rows = [
+        row("a", good, "calibrated"), row("b", bad, "calibrated"), row("c", good, "put in"),
+        row("circle.d", good, "left out"), row("circle.e", bad, "left out"),
+        row("f", bad, "left out"), row("g", good, "left out"), row("circle.h", bad, "derived"),
+    ]  # fmt: skip
+
+    class Found:
+        obtained, seeds = tuple(rows), (1,)
+
+    fitted, left_out, ratios = tally(Found())  # type: ignore[arg-type]
+    assert "2 of 3 calibrated" in fitted
+    assert "1 of them were put in: n c (Fig. 1)" in fitted
+    assert "2 of 4 numbers left out" in left_out
+    assert "1 of 2 of circles" in left_out
+    assert "1 of 2 others. Not reached of these: n f (Fig. 1)." in left_out
+    assert "1 circles" in ratios
+    assert "gives 2.83" in ratios
+
+
+def test_the_summary_says_what_is_not_predicted(files: tuple[Path, ...]) -> None:
+    found = quick()
+    text = " ".join(found.summary().split())
+    page = files[0].read_text(encoding="utf-8")
+    others = [
+        one for one in found.obtained
+        if one.observable.use == "left out" and not one.observable.circle
+    ]  # fmt: skip
+    assert len(others) == 5
+    count = sum(one.reached for one in others) or "none"
+    for words in (f"and {count} of 5 others", "3 of them were put in"):
+        assert words in text
+        assert words in page
+    for one in others:
+        if not one.reached:
+            assert f"{one.observable.name} (" in text.split("Not reached of these")[1]
+
+
+def test_peak_to_peak_by_sd_is_beside_the_published_one() -> None:
+    found = {one.observable.key: one for one in quick().obtained}
+    for case in PUBLISHED:
+        one = found[f"{case.key}.ratio"]
+        assert one.observable.published == pytest.approx(case.peak_to_peak / case.sd)
+        assert 4.5 < one.observable.published < 5.4
+        run = quick().values[0]
+        assert run[f"{case.key}.ratio"] == run[f"{case.key}.max"] / run[f"{case.key}.sd"]
+    # It follows from what is counted already.
+    assert "of 52 numbers" in repr(quick())
+    assert "4.5 to 5.4 published" in " ".join(quick().summary().split())
 
 
 def test_conclusions_tell_what_is_not_so() -> None:
@@ -162,6 +257,22 @@ def test_an_apparatus_survives_its_file() -> None:
     apparatus = Apparatus.calibrated()
     assert Apparatus.of(json.loads(json.dumps(apparatus.document()))) == apparatus
     assert apparatus.seeded(3).x.seed != apparatus.seeded(3).y.seed
+    stage = dataclasses.replace(apparatus.stage, missed_ticks=0.1, most_behind=4)
+    late = dataclasses.replace(apparatus, stage=stage)
+    assert Apparatus.of(json.loads(json.dumps(late.document()))) == late != apparatus
+    # One that was written when there were no ticks to miss.
+    older = apparatus.document()
+    del older["missed_ticks"], older["most_behind"]
+    assert Apparatus.of(older) == apparatus
+
+
+def test_a_true_error_that_no_record_tells_is_left_out() -> None:
+    # y's controller follows points of the path of which only its own readings tell.
+    table, stage = quick().experiments.table, quick().apparatus.stage
+    late = dataclasses.replace(stage, missed_ticks=0.1, most_behind=4)
+    known = fig_15_circles.observe(table, stage, true=True)
+    assert set(known) - set(fig_15_circles.observe(table, late, true=True)) == {"circle.axes"}
+    assert "circle.axes" in fig_15_circles.observe(table, late)
 
 
 @pytest.mark.parametrize("seeds", [0, 1001])
@@ -358,16 +469,6 @@ def test_the_swarm_refuses_no_coordinates() -> None:
 
 
 # The report.
-
-
-@cache
-def report(folder: Path) -> tuple[Path, ...]:
-    return tuple(quick().save(folder))
-
-
-@pytest.fixture(scope="module")
-def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ...]:
-    return report(tmp_path_factory.mktemp("report"))
 
 
 def test_the_page_needs_no_network(files: tuple[Path, ...]) -> None:

@@ -73,6 +73,12 @@ class XYStage:
     lag : float, optional
         Time from sampling x to sampling y [s], with the same point of the path; it may exceed a
         control interval.
+    missed_ticks : float, optional
+        Chance, 0 to 1, that in a control interval one of the two axes misses its tick: y is then a
+        sample of the path further behind x, or one less, with equal chances. Drawn from the seed
+        of y, and part of `pt.contour` only.
+    most_behind : int, optional
+        Most samples of the path by which y falls behind x; it is never ahead.
 
     Raises
     ------
@@ -94,6 +100,8 @@ class XYStage:
     y: VirtualStage | Stage
     cross_talk: tuple[float, float] = (0.0, 0.0)
     lag: float = 0.0
+    missed_ticks: float = 0.0
+    most_behind: int = 0
 
     def __post_init__(self) -> None:
         for name in ("x", "y"):
@@ -105,6 +113,9 @@ class XYStage:
                 )
         object.__setattr__(self, "cross_talk", _shares(self.cross_talk))
         object.__setattr__(self, "lag", _core.as_number("lag", self.lag))
+        chance = _core.as_number("missed_ticks", self.missed_ticks)
+        object.__setattr__(self, "missed_ticks", chance)
+        object.__setattr__(self, "most_behind", _core.as_count("most_behind", self.most_behind))
         _ = self._core
 
     @property
@@ -114,7 +125,7 @@ class XYStage:
             stage._core if isinstance(stage, VirtualStage) else (stage._core, MODEL_STEP)
             for stage in (self.x, self.y)
         )
-        return CoreStage(x, y, self.cross_talk, self.lag)
+        return CoreStage(x, y, self.cross_talk, self.lag, (self.missed_ticks, self.most_behind))
 
     @property
     def matrix(self) -> Array:

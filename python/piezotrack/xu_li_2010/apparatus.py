@@ -31,7 +31,7 @@ class Apparatus:
     Attributes
     ----------
     stage : XYStage
-        Both axes, their cross-talk and the lag between them.
+        Both axes, their cross-talk, the lag between them and the ticks that they miss.
     delay : float
         Time from a reading to the effect of its voltage [s].
     jitter : float
@@ -82,6 +82,8 @@ class Apparatus:
             "y": _numbers(self.y),
             "cross_talk": list(self.stage.cross_talk),
             "lag": self.stage.lag,
+            "missed_ticks": self.stage.missed_ticks,
+            "most_behind": self.stage.most_behind,
             "delay": self.delay,
             "jitter": self.jitter,
         }
@@ -101,7 +103,10 @@ class Apparatus:
             With seed 0.
         """
         x, y = (VirtualStage(**document[axis], seed=0) for axis in "xy")
-        stage = XYStage(x=x, y=y, cross_talk=document["cross_talk"], lag=document["lag"])
+        # Documents written before ticks were missed have none.
+        ticks = {key: document[key] for key in ("missed_ticks", "most_behind") if key in document}
+        both = {key: document[key] for key in ("cross_talk", "lag")}
+        stage = XYStage(x=x, y=y, **both, **ticks)
         return cls(stage=stage, delay=document["delay"], jitter=document["jitter"]).seeded(0)
 
     @classmethod

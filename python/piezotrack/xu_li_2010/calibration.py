@@ -68,7 +68,7 @@ def values_of(apparatus: Apparatus) -> dict[str, float]:
         **fig_12_14_tracking.observe_compensation(
             fig_12_14_tracking.compensation(apparatus, inverse)
         ),
-        **fig_15_circles.observe(table, apparatus.stage.lag),
+        **fig_15_circles.observe(table, apparatus.stage),
     }
 
 
@@ -212,7 +212,7 @@ def _moved(
     changes = {
         one.key: (moved[one.key] - values[one.key]) / one.slack * math.copysign(1.0, step)
         for one in observables()
-        if one.key in values
+        if one.calibrated and one.key in values
     }
     largest = sorted(changes, key=lambda key: -abs(changes[key]))[:3]
     return {key: changes[key] for key in largest}

@@ -82,7 +82,7 @@ def _learns(run: Values) -> bool:
 
 def _keys(figure: str) -> list[list[str]]:
     """Return the keys of Table 2, a row for each radius."""
-    keys = [f"circle.{1e6 * case.radius:g}um.{case.frequency:g}Hz.{figure}" for case in PUBLISHED]
+    keys = [f"{case.key}.{figure}" for case in PUBLISHED]
     return [keys[i : i + 3] for i in range(0, 9, 3)]
 
 

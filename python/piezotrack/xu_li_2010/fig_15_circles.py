@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from ..control.tracking import Tracking
     from ..stages.inverse import Inverse
+    from ..stages.xy import XYStage
     from .apparatus import Apparatus
 
 __all__ = ["circles", "draw", "observe"]
@@ -30,22 +31,25 @@ def circles(
     )
 
 
-def observe(table: Table2, lag: float, *, true: bool = False) -> dict[str, float]:
+def observe(table: Table2, stage: XYStage, *, true: bool = False) -> dict[str, float]:
     """Compute the published quantities, SI.
 
     From the readings at 50 Hz, as in the paper; with `true`, from the true positions between them
-    too. The errors of an axis are those of its controller, which samples y `lag` [s] after x.
+    too. The errors of an axis are those of its controller, which samples y later than x; where it
+    misses ticks, their true values are not known from the record.
     """
     found = {}
     for case, run in table.cases:
-        key, metrics = f"circle.{1e6 * case.radius:g}um.{case.frequency:g}Hz", run.score(true=true)
+        key, metrics = case.key, run.score(true=true)
         found[f"{key}.max"] = metrics.peak_to_peak
         found[f"{key}.mean"] = metrics.mean_error
         found[f"{key}.sd"] = metrics.sd_error
-    small = table.runs[0]
-    found["circle.axes"] = max(
-        _largest(small.x, small.settled, 0.0, true), _largest(small.y, small.settled, lag, true)
-    )
+        found[f"{key}.ratio"] = metrics.peak_to_peak / metrics.sd_error
+    small, lag = table.runs[0], stage.lag
+    if not true or stage.missed_ticks == 0.0:
+        found["circle.axes"] = max(
+            _largest(small.x, small.settled, 0.0, true), _largest(small.y, small.settled, lag, true)
+        )
     return found
 
 

@@ -12,12 +12,12 @@ import numpy as np
 from .._support.json_text import parse_json
 from ..identification.step_readings import StepReadings
 from ..stages.dahl import DahlStage
-from .table_2 import PUBLISHED
+from .table_2 import PUBLISHED, Published
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["SI", "Observable", "Obtained", "gathered", "observables"]
+__all__ = ["SI", "Observable", "Obtained", "Use", "gathered", "observables"]
 
 # The units in SI.
 SI = {
@@ -29,6 +29,8 @@ SI = {
     "%": 0.01,
     "": 1.0,
 } | dict.fromkeys(("kg", "N s/m", "N/m", "N/V"), 1.0)
+# What a number has to do with the stage's free parameters.
+Use = Literal["put in", "calibrated", "left out", "derived"]
 # Tolerances: a share of the published value, or a length [m] if that is more.
 CALIBRATED, LEFT_OUT = (0.15, 0.04e-6), (0.30, 0.08e-6)
 
@@ -51,8 +53,10 @@ class Observable:
         Published value, SI.
     kind : {"value", "about", "bound"}
         ``"about"``: printed as such, or derived; ``"bound"``: the obtained value must be below.
-    calibrated : bool
-        Whether the stage's free parameters were chosen to agree with it.
+    use : {"put in", "calibrated", "left out", "derived"}
+        ``"put in"``: a setting of the stage, or one that its gain follows from;
+        ``"calibrated"``: the free parameters were chosen to agree with it; ``"derived"``: follows
+        from other published numbers, shown but not counted.
     how : str
         How it is obtained here.
     """
@@ -63,13 +67,28 @@ class Observable:
     unit: str
     published: float
     kind: Literal["value", "about", "bound"]
-    calibrated: bool
+    use: Use
     how: str
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether the stage was made to agree with it."""
+        return self.use in ("calibrated", "put in")
+
+    @property
+    def circle(self) -> bool:
+        """Whether it is of a circle: those of 40 um scale from the calibrated ones."""
+        return self.key.startswith("circle.")
+
+    @property
+    def label(self) -> str:
+        """Its use, and whether what was left out is of a circle."""
+        return "left out, circle" if self.use == "left out" and self.circle else self.use
 
     @property
     def slack(self) -> float:
         """Tolerance, SI."""
-        share, length = CALIBRATED if self.calibrated else LEFT_OUT
+        share, length = LEFT_OUT if self.use == "left out" else CALIBRATED
         part = share * abs(self.published)
         return max(part, length) if self.unit == "um" else part
 
@@ -127,6 +146,7 @@ class Obtained:
             "published": one.published / unit,
             "kind": one.kind,
             "calibrated": one.calibrated,
+            "use": one.use,
             "how": one.how,
             "median": self.median / unit,
             "quartiles": [low / unit, high / unit],
@@ -171,7 +191,7 @@ def _of_the_step() -> list[Observable]:
             unit=unit,
             published=value,
             kind="value",
-            calibrated=True,
+            use="put in" if key == "steady" else "calibrated",
             how=how,
         )
         for key, name, unit, value in rows
@@ -202,7 +222,7 @@ def _of_table_1() -> list[Observable]:
             unit=unit,
             published=value,
             kind="value",
-            calibrated=key != "mass",
+            use="left out" if key == "mass" else "calibrated",
             how=how,
         )
         for key, name, unit, value, how in rows
@@ -213,21 +233,30 @@ def _of_table_2() -> list[Observable]:
     """Table 2; the row of 40 um was left out of the calibration."""
     return [
         Observable(
-            key=f"circle.{1e6 * case.radius:g}um.{case.frequency:g}Hz.{key}",
+            key=f"{case.key}.{key}",
             figure="Table 2",
             name=f"{1e6 * case.radius:g} um, {case.frequency:g} Hz: {name}",
-            unit="um",
+            unit=unit,
             published=value,
             kind="value",
-            calibrated=case.radius < 30e-6,
-            how="radial error R - r at 50 Hz, two turns after the one with the start",
+            use=use,
+            how=how,
         )
         for case in PUBLISHED
-        for key, name, value in (
-            ("max", "peak to peak", case.peak_to_peak),
-            ("mean", "mean", case.mean),
-            ("sd", "SD", case.sd),
-        )
+        for key, name, unit, value, use, how in _of_a_circle(case)
+    ]
+
+
+def _of_a_circle(case: Published) -> list[tuple[str, str, str, float, Use, str]]:
+    """Key, name, unit, value, use and way of the numbers of a circle."""
+    use: Use = "calibrated" if case.radius < 30e-6 else "left out"
+    how = "radial error R - r at 50 Hz, two turns after the one with the start"
+    ratio = "2.83 for a pure angle between the axes, whose error is a second harmonic"
+    return [
+        ("max", "peak to peak", "um", case.peak_to_peak, use, how),
+        ("mean", "mean", "um", case.mean, use, how),
+        ("sd", "SD", "um", case.sd, use, how),
+        ("ratio", "peak to peak by SD", "", case.ratio, "derived", ratio),
     ]
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .apparatus import calibration_file
 from .published import observables
 from .references import RULES
-from .report_text import number, reading, seen, tally
+from .report_text import number, place, reading, seen, tally
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -75,10 +75,10 @@ def _numbers(found: Reproduction) -> list[str]:
             f"<b>{number(one, one.median)}</b>",
             f"{one.ratio:.2f}",
             "yes" if one.reached else "<b>no</b>",
-            "calibrated" if known.calibrated else "left out",
+            known.label,
             f"{number(one, low)} to {number(one, high)}",
             "" if true is None else number(one, true),
-            f"{'' if known.figure.startswith('Table') else 'Fig. '}{escape(known.figure)}",
+            escape(place(one)),
         ]
         rows.append(cells)
     heads = (
@@ -94,7 +94,7 @@ def _numbers(found: Reproduction) -> list[str]:
     )
     return [
         "<h2>Numbers</h2>",
-        f"<p>{escape(tally(found).replace(' * marks the others.', ''))}</p>",
+        *(f"<p>{escape(line)}</p>" for line in tally(found)),
         f'<div class="numbers">{table(heads, rows)}</div>',
     ]
 
@@ -138,7 +138,8 @@ def _stage(found: Reproduction) -> list[str]:
     return [
         "<h2>The stage</h2>",
         f"<p>{escape(calibration_file()['provenance']['how'])}</p>",
-        f"<p>Lag of y {1e3 * parts['lag']:.3g} ms, delay {1e3 * parts['delay']:.3g} ms, "
+        f"<p>Lag of y {1e3 * parts['lag']:.3g} ms, chance of a missed tick "
+        f"{100 * parts['missed_ticks']:.3g} %, delay {1e3 * parts['delay']:.3g} ms, "
         f"mean sampling jitter {1e3 * parts['jitter']:.2g} ms, cross-talk "
         f"{100 * xy:.3g} % and {100 * yx:.3g} %. SI units:</p>",
         table(("parameter", "x", "y"), rows),

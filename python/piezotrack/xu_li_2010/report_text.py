@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from .published import SI
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from .published import Obtained
     from .reproduction import Reproduction
     from .section import Section
 
-__all__ = ["number", "reading", "seen", "summary_text", "tally"]
+__all__ = ["number", "place", "reading", "seen", "summary_text", "tally"]
 
+# A second harmonic has this peak to peak in units of its SD.
+PURE_ANGLE = 2.0 * math.sqrt(2.0)
 SIGNS = {"value": "", "about": "about ", "bound": "within "}
 
 
@@ -27,13 +32,14 @@ def summary_text(found: Reproduction) -> str:
         low, high = (number(one, value) for value in one.quartiles)
         true = found.true_median(one.observable.key)
         mark = " " if one.reached else "*"
-        use = "" if one.observable.calibrated else "left out"
+        use = "" if one.observable.use == "calibrated" else one.observable.label
         lines.append(
             f"{one.observable.figure:<9}{_name(one):<50}{reading(one):>14}  "
             f"{number(one, one.median):>8}{mark}  {low + ' to ' + high:<17}"
             f"{'' if true is None else number(one, true):>8}  {one.ratio:>5.2f}  {use}".rstrip()
         )
-    lines += ["", tally(found), "", "Conclusions of the paper"]
+    lines += ["", *(line for part in tally(found) for line in wrap(part, 118))]
+    lines += ["* marks numbers that are not reached.", "", "Conclusions of the paper"]
     for conclusion in found.conclusions:
         lines += [
             f"  {'confirmed    ' if conclusion.holds else 'NOT CONFIRMED'}  {conclusion.text}",
@@ -56,14 +62,50 @@ def _columns(part: Section) -> list[str]:
     return lines
 
 
-def tally(found: Reproduction) -> str:
-    """Count the numbers within their tolerances."""
-    parts = []
-    for name, used in (("calibrated", True), ("left out", False)):
-        rows = [one for one in found.obtained if one.observable.calibrated == used]
-        goal = "15 % or 0.04 um" if used else "30 % or 0.08 um"
-        parts.append(f"{sum(one.reached for one in rows)} of {len(rows)} {name} within {goal}")
-    return f"{'; '.join(parts)}. * marks the others. Medians over {len(found.seeds)} seeds."
+def tally(found: Reproduction) -> list[str]:
+    """Count the numbers within their tolerances, by their use; a string for each paragraph."""
+    rows = found.obtained
+    fitted = [one for one in rows if one.observable.calibrated]
+    given = [one for one in fitted if one.observable.use == "put in"]
+    left_out = [one for one in rows if one.observable.use == "left out"]
+    circles = [one for one in left_out if one.observable.circle]
+    others = [one for one in left_out if not one.observable.circle]
+    missed = [one for one in others if not one.reached]
+    return [
+        f"{_reached(fitted)} calibrated numbers within 15 % or 0.04 um, medians over "
+        f"{len(found.seeds)} seeds; {len(given)} of them were put in: {_listed(given)}.",
+        f"{_reached(left_out)} numbers left out of the calibration within 30 % or 0.08 um: "
+        f"{_reached(circles)} of circles, which scale from the calibrated ones, and "
+        f"{_reached(others)} others. Not reached of these: {_listed(missed)}.",
+        _ratios([one for one in rows if one.observable.use == "derived"]),
+    ]
+
+
+def _reached(rows: Sequence[Obtained]) -> str:
+    return f"{sum(one.reached for one in rows) or 'none'} of {len(rows)}"
+
+
+def _listed(rows: Sequence[Obtained]) -> str:
+    """Name numbers with their figures."""
+    named = (f"{one.observable.name} ({place(one)})" for one in rows)
+    return "; ".join(named) or "none"
+
+
+def _ratios(rows: Sequence[Obtained]) -> str:
+    """Compare peak to peak by SD of the circles, which no calibration aims at."""
+    published = [one.observable.published for one in rows]
+    seen = [one.median for one in rows]
+    return (
+        f"Contour errors of the {len(rows)} circles, peak to peak by SD: {min(published):.1f} to "
+        f"{max(published):.1f} published, {min(seen):.1f} to {max(seen):.1f} obtained; a pure "
+        f"angle between the axes gives {PURE_ANGLE:.2f}."
+    )
+
+
+def place(one: Obtained) -> str:
+    """Write where in the paper a number is."""
+    figure = one.observable.figure
+    return figure if figure.startswith("Table") else f"Fig. {figure}"
 
 
 def number(one: Obtained, value: float) -> str:

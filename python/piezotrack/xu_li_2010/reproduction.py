@@ -63,8 +63,9 @@ class Reproduction:
     drives: Drives | None
 
     def __repr__(self) -> str:
-        reached = sum(one.reached for one in self.obtained)
-        return f"<Reproduction, {reached} of {len(self.obtained)} numbers reached>"
+        counted = [one for one in self.obtained if one.observable.use != "derived"]
+        reached = sum(one.reached for one in counted)
+        return f"<Reproduction, {reached} of {len(counted)} numbers reached>"
 
     @property
     def obtained(self) -> tuple[Obtained, ...]:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ..identification.result import Identification
     from ..identification.sensor_noise import Noise
     from ..identification.step_response import StepResult
+    from ..stages.xy import XYStage
     from .apparatus import Apparatus
     from .fig_12_14_tracking import Runs
     from .table_2 import Table2
@@ -38,8 +39,8 @@ class Experiments:
         Figs. 12, 13 and 14.
     table : Table2
         Fig. 15 and Table 2.
-    lag : float
-        Time from sampling x to sampling y [s].
+    stage : XYStage
+        The platform of the circles.
     """
 
     noise: Noise
@@ -50,7 +51,7 @@ class Experiments:
     antiwindup: Runs
     repetitive: Runs
     table: Table2
-    lag: float
+    stage: XYStage
 
     @property
     def values(self) -> dict[str, float]:
@@ -61,7 +62,7 @@ class Experiments:
             **fig_06_identification.observe(self.fit),
             **fig_07_model_comparison.observe(self.judged),
             **fig_12_14_tracking.observe(self.compensation, self.antiwindup, self.repetitive),
-            **fig_15_circles.observe(self.table, self.lag),
+            **fig_15_circles.observe(self.table, self.stage),
         }
 
     @property
@@ -71,7 +72,7 @@ class Experiments:
             **fig_12_14_tracking.observe(
                 self.compensation, self.antiwindup, self.repetitive, true=True
             ),
-            **fig_15_circles.observe(self.table, self.lag, true=True),
+            **fig_15_circles.observe(self.table, self.stage, true=True),
         }
 
 
@@ -103,5 +104,5 @@ def run_experiments(apparatus: Apparatus, seed: int) -> Experiments:
         antiwindup=fig_12_14_tracking.antiwindup(apparatus, inverse),
         repetitive=fig_12_14_tracking.repetitive(apparatus, inverse),
         table=fig_15_circles.circles(apparatus, inverse),
-        lag=apparatus.stage.lag,
+        stage=apparatus.stage,
     )

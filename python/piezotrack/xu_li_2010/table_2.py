@@ -29,6 +29,16 @@ class Published(NamedTuple):
     mean: float
     sd: float
 
+    @property
+    def key(self) -> str:
+        """Name of the circle in the keys of its numbers."""
+        return f"circle.{1e6 * self.radius:g}um.{self.frequency:g}Hz"
+
+    @property
+    def ratio(self) -> float:
+        """Peak to peak divided by SD."""
+        return self.peak_to_peak / self.sd
+
 
 # Doi 10.1115/1.4001712; printed in um. "Max" is of the peak-to-peak error.
 PUBLISHED = tuple(
@@ -67,7 +77,8 @@ class Table2:
     def __str__(self) -> str:
         lines = [
             "contour error in um, published / obtained; max is peak to peak",
-            "radius um  frequency Hz          max               mean                SD",
+            "radius um  frequency Hz          max               mean                SD"
+            "             max / SD",
         ]
         for case, run in self.cases:
             found = run.metrics
@@ -77,7 +88,8 @@ class Table2:
                 (case.sd, found.sd_error),
             )
             cells = "  ".join(f"{1e6 * one:>7.3f} /{1e6 * other:>7.3f}" for one, other in pairs)
-            lines.append(f"{1e6 * case.radius:>9g}  {case.frequency:>12g}  {cells}")
+            ratio = f"{case.ratio:>6.1f} /{found.peak_to_peak / found.sd_error:>5.1f}"
+            lines.append(f"{1e6 * case.radius:>9g}  {case.frequency:>12g}  {cells}  {ratio}")
         return "\n".join(lines)
 
     def plot(self) -> Figure:

@@ -6,7 +6,9 @@ use piezotrack_control::{Controller, DahlInverse, Limits, Pid};
 use piezotrack_core::signal::NEVER;
 use piezotrack_core::signal::contour_error::radial_errors;
 use piezotrack_core::signal::metrics::Spread;
-use piezotrack_core::simulate::{Law, ReferenceSamples, Timing, TwoAxes, VirtualStage, track_both};
+use piezotrack_core::simulate::{
+    Law, MissedTicks, ReferenceSamples, Timing, TwoAxes, VirtualStage, track_both,
+};
 
 const INTERVAL: f64 = 0.02;
 const FREQUENCY: f64 = 0.1;
@@ -42,8 +44,13 @@ fn coordinate(radius: f64, phase: f64) -> Result<[Vec<f64>; 2], piezotrack_contr
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (x, y) = (VirtualStage::xu_li_2010(1), VirtualStage::xu_li_2010_y(1));
-    let axes =
-        TwoAxes { x: x.apparatus(), y: y.apparatus(), cross_talk: [0.015, 0.010], lag: 0.010 };
+    let axes = TwoAxes {
+        x: x.apparatus(),
+        y: y.apparatus(),
+        cross_talk: [0.015, 0.010],
+        lag: 0.010,
+        missed: MissedTicks::NONE,
+    };
     let pid = Law::Pid(Pid::xu_li_2010().at(INTERVAL)?);
     let controller = Controller::new(Limits::new(0.0, 75.0)?, pid);
     for (radius, published) in [(10e-6, 0.184), (20e-6, 0.300), (40e-6, 0.472)] {

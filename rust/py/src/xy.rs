@@ -6,7 +6,9 @@ use piezotrack_core::identify::{cross_talk, noise_at_rest};
 use piezotrack_core::signal::Drive;
 use piezotrack_core::signal::contour_error::{Polyline, radial_errors};
 use piezotrack_core::signal::metrics::Spread;
-use piezotrack_core::simulate::{Axis, AxisState, TwoAxes, TwoStates, open_loops, track_both};
+use piezotrack_core::simulate::{
+    Axis, AxisState, MissedTicks, TwoAxes, TwoStates, open_loops, track_both,
+};
 use pyo3::prelude::*;
 
 use crate::arrays::{array, samples};
@@ -48,6 +50,7 @@ struct PyXyStage {
     axes: [Axis; 2],
     cross_talk: [f64; 2],
     lag: f64,
+    missed: MissedTicks,
 }
 
 impl PyXyStage {
@@ -56,7 +59,8 @@ impl PyXyStage {
         let [x, y] = &self.axes;
         let start = (x.start(), y.start());
         let (x, y) = (x.apparatus(), y.apparatus());
-        (TwoAxes { x, y, cross_talk: self.cross_talk, lag: self.lag }, start)
+        let Self { cross_talk, lag, missed, .. } = *self;
+        (TwoAxes { x, y, cross_talk, lag, missed }, start)
     }
 }
 
@@ -64,8 +68,15 @@ impl PyXyStage {
 impl PyXyStage {
     #[new]
     #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
-    fn new(x: Given<'_>, y: Given<'_>, cross_talk: [f64; 2], lag: f64) -> PyResult<Self> {
-        let stage = Self { axes: [x.axis(), y.axis()], cross_talk, lag };
+    fn new(
+        x: Given<'_>,
+        y: Given<'_>,
+        cross_talk: [f64; 2],
+        lag: f64,
+        missed: (f64, usize),
+    ) -> PyResult<Self> {
+        let missed = MissedTicks { chance: missed.0, most: missed.1 };
+        let stage = Self { axes: [x.axis(), y.axis()], cross_talk, lag, missed };
         stage.both().0.validate().map_err(|error| raise(&error))?;
         Ok(stage)
     }

@@ -15,6 +15,9 @@ const SENSOR: u64 = u64::MAX;
 /// Stream of the sampling jitter of a controller.
 const LATENESS: u64 = u64::MAX - 1;
 
+/// Stream of the ticks that an axis misses.
+const TICKS: u64 = u64::MAX - 2;
+
 /// Which of a run's streams draws the links between particles.
 const LINKS: u64 = 1 << 63;
 
@@ -57,6 +60,11 @@ impl Draws {
     /// Jitter of one control sample, in units of the mean.
     pub(crate) fn jitter(seed: u64, sample: u64) -> f64 {
         Self::at(seed, LATENESS, sample, 0, 1).exponential()
+    }
+
+    /// Decides about the tick of one control sample: uniform in [0, 1).
+    pub(crate) fn tick(seed: u64, sample: u64) -> f64 {
+        Self::at(seed, TICKS, sample, 0, 1).uniform()
     }
 
     /// A whole number below `count`.

@@ -21,7 +21,7 @@ pub use axis::{Axis, AxisFlow, AxisState};
 pub use closed_loop::{ClosedLoop, closed_loop};
 pub use open_loop::{OpenLoop, open_loop};
 pub use sensor::{Sensor, SensorState};
-pub use timing::Timing;
+pub use timing::{MissedTicks, Timing};
 pub use tracking::{DELAY_LINE, Law, LawState, MOST_STATES, ReferenceSamples, TrackingRun, track};
 pub use two_axes::{
     TwoAxes, TwoLogs, TwoMotions, TwoStates, TwoTracked, closed_loops, open_loops, track_both,

@@ -1,6 +1,6 @@
 //! Timing of a sampled controller: delays and random sampling jitter.
 
-use crate::error::{Error, Result, not_negative, positive};
+use crate::error::{Error, Result, not_negative, positive, within};
 use crate::math::{Draws, room};
 use crate::signal::index;
 
@@ -49,6 +49,50 @@ impl Timing {
             return Err(Error::parameter("substeps", self.substeps, expected));
         }
         Ok(())
+    }
+}
+
+/// Ticks that two axes of one computer miss, each on its own, so that one falls behind the other
+/// along the path by whole samples.
+///
+/// In each control interval the axis behind has missed one tick more with half of the chance, and
+/// the axis ahead with the other half. The computer keeps them within `most`, and the axis that is
+/// served first is never behind.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MissedTicks {
+    /// Chance that one of the axes misses a tick in a control interval, 0 to 1.
+    pub chance: f64,
+    /// Most samples of the path between the axes.
+    pub most: usize,
+}
+
+impl MissedTicks {
+    /// Every tick comes.
+    pub const NONE: Self = Self { chance: 0.0, most: 0 };
+
+    /// Checks the numbers.
+    pub(super) fn validate(&self) -> Result<()> {
+        within("missed_ticks", self.chance, 0.0, 1.0).map(|_| ())
+    }
+
+    /// How many samples of the path one axis is behind at each control sample; empty where no tick
+    /// is missed.
+    pub(super) fn behind(&self, seed: u64, samples: usize) -> Result<Vec<usize>> {
+        if self.chance == 0.0 || self.most == 0 {
+            return Ok(Vec::new());
+        }
+        let mut course = room("the missed ticks", samples)?;
+        let mut now = 0;
+        for k in 0..samples {
+            let drawn = Draws::tick(seed, k as u64);
+            if drawn < 0.5 * self.chance {
+                now = self.most.min(now + 1);
+            } else if drawn < self.chance {
+                now = now.saturating_sub(1);
+            }
+            course.push(now);
+        }
+        Ok(course)
     }
 }
 

@@ -163,6 +163,8 @@ pub(super) struct ControllerRun<'a, F: Feedback> {
     controller: &'a Controller<F>,
     input: ReferenceSamples<'a>,
     state: ControllerState<F::State, Vec<f64>>,
+    /// By how many samples the reference is late at each sample; where empty, by none.
+    behind: Vec<usize>,
     /// The commands so far.
     pub(super) commands: Vec<Command>,
 }
@@ -179,12 +181,19 @@ impl<'a, F: Feedback> ControllerRun<'a, F> {
         }
         let length = controller.repetitive.map_or(0, |part| part.length());
         let state = controller.rest(zeros(DELAY_LINE, length)?)?;
-        Ok(Self { controller, input, state, commands: room("the commands", samples)? })
+        let commands = room("the commands", samples)?;
+        Ok(Self { controller, input, state, behind: Vec::new(), commands })
+    }
+
+    /// The same, with a reference that is late by so many samples.
+    pub(super) fn late(self, behind: Vec<usize>) -> Self {
+        Self { behind, ..self }
     }
 
     /// The command at sample `k`, V.
     pub(super) fn command(&mut self, k: usize, measured: f64) -> f64 {
-        let (reference, feedforward) = (self.input.reference[k], self.input.feedforward[k]);
+        let at = k.saturating_sub(self.behind.get(k).copied().unwrap_or(0));
+        let (reference, feedforward) = (self.input.reference[at], self.input.feedforward[at]);
         let command = self.controller.step(&mut self.state, reference, measured, feedforward);
         self.commands.push(command);
         command.volts

@@ -12,7 +12,7 @@ use piezotrack_control::{Command, Controller, Feedback};
 use super::apparatus::{Apparatus, ApparatusState, Stretch};
 use super::closed_loop::{ClosedLoop, Record, checked};
 use super::open_loop::{BLOCK, OpenLoop, checked as checked_drive, since};
-use super::timing::{Clock, Commands, Delay, Event, SAMPLES, Timing, events};
+use super::timing::{Clock, Commands, Delay, Event, MissedTicks, SAMPLES, Timing, events};
 use super::tracking::{ControllerRun, ReferenceSamples, TrackingRun};
 use crate::error::{Error, Result, finite, not_negative};
 use crate::math::room;
@@ -26,8 +26,12 @@ use crate::signal::{Drive, Stop, index};
 ///
 /// | field | symbol | unit | range |
 /// | --- | --- | --- | --- |
-/// | `cross_talk` | c_xy, c_yx | m/m | product below 1 |
+/// | `cross_talk` | `c_xy`, `c_yx` | m/m | product below 1 |
 /// | `lag` | | s | >= 0 |
+/// | `missed.chance`, `missed.most` | | | 0 to 1, >= 0 |
+///
+/// Where ticks are missed, y's controller takes a point of the path that is up to `missed.most`
+/// samples old: drawn from the seed of y's sensor, and seen by [`track_both`] only.
 #[derive(Clone, Copy, Debug)]
 pub struct TwoAxes<'a, X, Y> {
     /// The axis that is served first.
@@ -38,6 +42,8 @@ pub struct TwoAxes<'a, X, Y> {
     pub cross_talk: [f64; 2],
     /// Time from the sampling of x to that of y, s; it may be more than an interval.
     pub lag: f64,
+    /// Ticks that one axis misses and the other does not.
+    pub missed: MissedTicks,
 }
 
 /// Memory of both axes.
@@ -67,7 +73,8 @@ impl<X: Plant, Y: Plant> TwoAxes<'_, X, Y> {
             let expected = "two shares whose product is below 1, or the axes are one";
             return Err(Error::parameter("cross_talk", format!("({xy}, {yx})"), expected));
         }
-        not_negative("lag", self.lag, "s").map(|_| ())
+        not_negative("lag", self.lag, "s")?;
+        self.missed.validate()
     }
 
     /// What cross-talk adds to each axis, m.
@@ -304,9 +311,11 @@ pub fn track_both<X: Plant, Y: Plant, F: Feedback, G: Feedback>(
             expected: format!("{samples}, as many as that of x"),
         });
     }
+    axes.validate()?;
+    let behind = axes.missed.behind(axes.y.sensor.seed, samples)?;
     let (mut x, mut y) = (
         ControllerRun::new(controllers.0, inputs[0])?,
-        ControllerRun::new(controllers.1, inputs[1])?,
+        ControllerRun::new(controllers.1, inputs[1])?.late(behind),
     );
     let timing = Timing { samples, ..*timing };
     let waiting = Command { volts: start.1.command, ..Command::default() };
@@ -328,12 +337,13 @@ pub fn track_both<X: Plant, Y: Plant, F: Feedback, G: Feedback>(
 ///
 /// ```
 /// use piezotrack_core::signal::{Drive, Hold, NEVER};
-/// use piezotrack_core::simulate::{TwoAxes, VirtualStage, open_loops};
+/// use piezotrack_core::simulate::{MissedTicks, TwoAxes, VirtualStage, open_loops};
 ///
 /// # fn main() -> piezotrack_core::Result<()> {
 /// let (x, y) = (VirtualStage::xu_li_2010(1), VirtualStage::xu_li_2010_y(1));
+/// let (cross_talk, missed) = ([0.015, 0.010], MissedTicks::NONE);
 /// let axes =
-///     TwoAxes { x: x.apparatus(), y: y.apparatus(), cross_talk: [0.015, 0.010], lag: 0.0 };
+///     TwoAxes { x: x.apparatus(), y: y.apparatus(), cross_talk, lag: 0.0, missed };
 /// let (up, held) = ([75.0; 1500], [0.0; 1500]);
 /// let drives = [Drive::new(&up, 2e-4, Hold::Zero)?, Drive::new(&held, 2e-4, Hold::Zero)?];
 /// let run = open_loops(&axes, (x.start(), y.start()), [&drives[0], &drives[1]], NEVER)?;
