@@ -74,9 +74,7 @@ def test_two_modes_are_found() -> None:
     )
     u = shaken("steps")
     fit = fitted(u, noisy(stage.simulate(u, DT).x), dynamics="auto", history="virgin", start=200)
-    found = sorted(
-        dict(fit.parameters)["frequency"] + dict(fit.parameters)["mode_frequencies"]
-    )
+    found = sorted(dict(fit.parameters)["frequency"] + dict(fit.parameters)["mode_frequencies"])
     assert found == pytest.approx([60.0, 160.0], rel=0.02)
     assert fit.rms < 20e-9
 
@@ -124,9 +122,7 @@ def simulated(fit: Any, u: NDArray[np.float64]) -> NDArray[np.float64]:
 def test_the_start_reproduces_the_cost(history: str, dynamics: str) -> None:
     u = 20.0 + 0.5 * drive()
     y = noisy(replace(STAGE, creep_weights=(0.02,), creep_times=(0.5,)).simulate(u, DT).x)
-    fit = fitted(
-        u, y, zones=2, creep_times=[0.5], history=history, dynamics=dynamics, start=10
-    )
+    fit = fitted(u, y, zones=2, creep_times=[0.5], history=history, dynamics=dynamics, start=10)
     left = (y - simulated(fit, u) - fit.offset)[10:]
     assert np.sqrt(np.mean(left**2)) == pytest.approx(fit.rms, rel=1e-6)
 
