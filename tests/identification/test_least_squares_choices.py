@@ -109,7 +109,7 @@ def simulated(fit: Any, u: NDArray[np.float64]) -> NDArray[np.float64]:
     values["linear"] = values["linear"][0]
     stage = pt.PrandtlIshlinskiiStage(**values)
     state = stage.simulate([0.0], DT).final
-    start = {name: value for name, value in dict(fit.start).items()}
+    start = dict(fit.start)
     first = {
         name: start[name][0] if isinstance(getattr(state, name), float) else tuple(start[name])
         for name in start
