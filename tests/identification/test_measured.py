@@ -17,7 +17,7 @@ HEADLINE = {
     "bouc-wen": (0.71, 0.81, 1.23),
     "prandtl-ishlinskii": (0.32, 0.51, 0.58),
     "first-order-dahl": (0.72, 0.83, 0.79),
-    "parallel-dahl": (0.69, 0.75, 0.75),
+    "parallel-dahl": (0.70, 0.74, 0.77),
     "generalised-prandtl-ishlinskii": (0.32, 0.51, 0.55),
 }
 
