@@ -109,7 +109,8 @@ def even_times(t: Array, interval: float) -> Array:
             "half of the intervals of the log are not shorter; decimate() goes further"
         )
     count = math.floor(length / interval * (1.0 + 1e-12)) + 1
-    return np.minimum(t[0] + interval * np.arange(count), t[-1])
+    times: Array = np.minimum(t[0] + interval * np.arange(count), t[-1])
+    return times
 
 
 def evened(
