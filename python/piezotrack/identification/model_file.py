@@ -31,6 +31,8 @@ NAMES_1 = {
 }
 # Lists that older files of version 2 lack: none of their models had any.
 ADDED = ("mode_weights", "mode_frequencies", "mode_damping_ratios")
+# Lists that older files of version 2 lack: none of their models had any.
+ADDED = ("mode_weights", "mode_frequencies", "mode_damping_ratios")
 # Entries that are fields of a model; all others are its details.
 OWN = {
     "format",
