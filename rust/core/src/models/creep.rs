@@ -65,6 +65,7 @@ pub struct RelaxationFlow {
 }
 
 #[derive(Clone, Copy, Debug)]
+#[expect(clippy::large_enum_variant, reason = "one for each length of a step, and no allocation")]
 enum DynamicsFlow {
     None,
     First(Lag),
