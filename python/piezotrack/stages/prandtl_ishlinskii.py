@@ -98,7 +98,9 @@ class PrandtlIshlinskiiStage(Stage):
     u: dead zones act on `p`, and keep their thresholds.
 
     The simulation is exact for a drive that is held, or linear between samples: an interval in
-    which a play starts to move, or `p` passes a dead zone's threshold, is split there.
+    which a play starts to move, or `p` passes a dead zone's threshold, is split there. With
+    creep and a lag or mode behind it, the creep is taken as linear over each part: an error of up
+    to c H dt/(8 tau) where `h` rises by H in an interval of dt.
 
     The inverse inverts each part in turn: the dynamics with the derivatives of the reference, creep
     exactly for an `h` that is linear between samples, dead zones and plays in Kuhnen's closed form.
