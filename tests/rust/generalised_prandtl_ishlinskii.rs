@@ -214,7 +214,7 @@ fn the_inverse_of_the_stage_goes_on_from_any_state() {
     for (&x, &volts) in run.x.iter().zip(after) {
         let found = inverse.step(&mut state, x, 0.0, 0.0);
         // The inverse of the creep takes the output as straight from sample to sample.
-        assert!((found - volts).abs() < 1e-6, "{found} for {volts}");
+        assert!((found - volts).abs() < 1e-5, "{found} for {volts}");
     }
 }
 

@@ -52,6 +52,9 @@ class GeneralisedPrandtlIshlinskiiStage(Stage):
     mode_weights, mode_frequencies, mode_damping_ratios : sequence of float, optional
         g, undamped frequency [Hz] and damping ratio of further modes in parallel with that mode;
         3 at most, each g between -1 and 1.
+    mode_weights, mode_frequencies, mode_damping_ratios : sequence of float, optional
+        g, undamped frequency [Hz] and damping ratio of further modes in parallel with that mode;
+        3 at most, each g between -1 and 1.
 
     Raises
     ------
@@ -105,6 +108,9 @@ class GeneralisedPrandtlIshlinskiiStage(Stage):
     time_constant: float | None = None
     frequency: float | None = None
     damping_ratio: float | None = None
+    mode_weights: tuple[float, ...] = ()
+    mode_frequencies: tuple[float, ...] = ()
+    mode_damping_ratios: tuple[float, ...] = ()
     mode_weights: tuple[float, ...] = ()
     mode_frequencies: tuple[float, ...] = ()
     mode_damping_ratios: tuple[float, ...] = ()

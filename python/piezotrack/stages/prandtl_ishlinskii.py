@@ -83,6 +83,9 @@ class PrandtlIshlinskiiStage(Stage):
     mode_weights, mode_frequencies, mode_damping_ratios : sequence of float, optional
         g, undamped frequency [Hz] and damping ratio of further modes in parallel with that mode;
         3 at most, each g between -1 and 1.
+    mode_weights, mode_frequencies, mode_damping_ratios : sequence of float, optional
+        g, undamped frequency [Hz] and damping ratio of further modes in parallel with that mode;
+        3 at most, each g between -1 and 1.
 
     Raises
     ------
@@ -95,7 +98,9 @@ class PrandtlIshlinskiiStage(Stage):
     u: dead zones act on `p`, and keep their thresholds.
 
     The simulation is exact for a drive that is held, or linear between samples: an interval in
-    which a play starts to move, or `p` passes a dead zone's threshold, is split there.
+    which a play starts to move, or `p` passes a dead zone's threshold, is split there. With
+    creep and a lag or mode behind it, the creep is taken as linear over each part: an error of up
+    to c H dt/(8 tau) where `h` rises by H in an interval of dt.
 
     The inverse inverts each part in turn: the dynamics with the derivatives of the reference, creep
     exactly for an `h` that is linear between samples, dead zones and plays in Kuhnen's closed form.
@@ -124,6 +129,9 @@ class PrandtlIshlinskiiStage(Stage):
     time_constant: float | None = None
     frequency: float | None = None
     damping_ratio: float | None = None
+    mode_weights: tuple[float, ...] = ()
+    mode_frequencies: tuple[float, ...] = ()
+    mode_damping_ratios: tuple[float, ...] = ()
     mode_weights: tuple[float, ...] = ()
     mode_frequencies: tuple[float, ...] = ()
     mode_damping_ratios: tuple[float, ...] = ()

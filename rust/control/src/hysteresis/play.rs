@@ -97,17 +97,6 @@ impl<N: Number, const PLAYS: usize, const ZONES: usize> Play<N, PLAYS, ZONES> {
         self.output(state).0
     }
 
-    /// The weighted sum of a state, before the dead zones.
-    #[must_use]
-    #[inline(always)]
-    pub fn sum(&self, state: &PlayState<N, PLAYS>) -> N {
-        let mut value = self.linear * state.input;
-        for (weight, play) in self.weights.iter().zip(&state.plays) {
-            value = value + *weight * *play;
-        }
-        value
-    }
-
     /// The state where the input has become `input`.
     #[inline(always)]
     fn at(&self, branch: &PlayBranch<N, PLAYS>, input: N) -> PlayState<N, PLAYS> {
@@ -128,28 +117,32 @@ impl<N: Number, const PLAYS: usize, const ZONES: usize> Play<N, PLAYS, ZONES> {
 impl<const PLAYS: usize, const ZONES: usize> Play<f64, PLAYS, ZONES> {
     /// The end of the first part of the way to `input` (V) along which the output is a straight
     /// line: where a play starts to move, or the weighted sum passes a dead zone's threshold;
-    /// `input` where all of the way is.
+    /// `input` where all of the way is. Those after the first `used` plays weigh 0.
     #[must_use]
-    pub fn straight(&self, state: &PlayState<f64, PLAYS>, input: f64) -> f64 {
+    pub fn straight(&self, state: &PlayState<f64, PLAYS>, input: f64, used: usize) -> f64 {
         let from = state.input;
         let side = if input < from { -1.0 } else { 1.0 };
+        let plays = || {
+            let settings = self.thresholds.iter().zip(&self.weights);
+            settings.zip(&state.plays).take(used).map(|((r, w), z)| (*r, *w, *z))
+        };
         let mut end = input;
         // What is nearer is a corner that the input stands at, but for a rounding.
         let least = ROUNDING * (from.abs() + input.abs());
-        for ((threshold, weight), play) in
-            self.thresholds.iter().zip(&self.weights).zip(&state.plays)
-        {
+        for (threshold, weight, play) in plays() {
             let corner = play + side * threshold;
-            if side * (corner - from) > least && side * (end - corner) > 0.0 && *weight != 0.0 {
+            if side * (corner - from) > least && side * (end - corner) > 0.0 && weight != 0.0 {
                 end = corner;
             }
         }
         if self.dead_zone_weights.iter().all(|weight| *weight == 0.0) {
             return end;
         }
-        let mut there = *state;
-        self.follow(&mut there, end);
-        let (before, after) = (self.sum(state), self.sum(&there));
+        let (mut before, mut after) = (self.linear * from, self.linear * end);
+        for (threshold, weight, play) in plays() {
+            before += weight * play;
+            after += weight * (end - threshold).max((end + threshold).min(play));
+        }
         let rise = after - before;
         let least = ROUNDING * (before.abs() + after.abs()) / rise.abs();
         let mut share = 1.0;
@@ -175,7 +168,10 @@ impl<N: Number, const PLAYS: usize, const ZONES: usize> Operator<N> for Play<N, 
 
     #[inline(always)]
     fn output(&self, state: &PlayState<N, PLAYS>) -> (N, N) {
-        let value = self.sum(state);
+        let mut value = self.linear * state.input;
+        for (weight, play) in self.weights.iter().zip(&state.plays) {
+            value = value + *weight * *play;
+        }
         let zero = value.like(0.0);
         let (mut bent, mut factor) = (value, one(value));
         for (corner, bend) in self.dead_zone_thresholds.iter().zip(&self.dead_zone_weights) {

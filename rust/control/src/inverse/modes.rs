@@ -208,8 +208,9 @@ fn stable(coefficients: &[f64; STATES + 1], degree: usize) -> bool {
         }
         let ratio = above[0] / below[0];
         let mut next = [0.0; STATES + 2];
-        for i in 0..=STATES {
-            next[i] = above[i + 1] - ratio * below[i + 1];
+        let shifted = above.iter().zip(&below).skip(1);
+        for (entry, (first, second)) in next.iter_mut().zip(shifted) {
+            *entry = first - ratio * second;
         }
         (above, below) = (below, next);
     }

@@ -10,7 +10,8 @@
 //!
 //! Relaxations whose time constants are a decade apart, with about equal shares, make a creep
 //! that grows nearly with the logarithm of time, as that of piezoceramics does. Every step is
-//! exact for an `h` that is linear over the step, of any length.
+//! exact for an `h` that is linear over the step, of any length,
+//! but for dynamics behind creep, for which the creep is taken as linear over the step too.
 
 pub use piezotrack_control::{Creep, Dynamics, MOST_MODES, Mode, Modes};
 
@@ -65,6 +66,7 @@ pub struct RelaxationFlow {
 }
 
 #[derive(Clone, Copy, Debug)]
+#[expect(clippy::large_enum_variant, reason = "one for each length of a step, and no allocation")]
 enum DynamicsFlow {
     None,
     First(Lag),

@@ -394,10 +394,11 @@ impl<O: Segmented> InputStage<O> {
         let InputStageFlow { relaxation, zero, step, deviation } = flow;
         let from = self.operator.input(&state.operator);
         let (mut done, mut parts, mut idle) = (0.0, 1, 0);
-        while self.relaxation.remembers() && parts < MOST_PARTS && idle < MOST_IDLE {
+        let splits = self.relaxation.remembers() && (volts - from).abs() > 0.0;
+        while splits && parts < MOST_PARTS && idle < MOST_IDLE {
             let next = self.operator.straight(&state.operator, volts, *deviation);
             let reached = (next - from) / (volts - from);
-            // NaN where the drive stands still.
+            // Not a number where the drive is none.
             if reached.is_nan() || reached > 1.0 - LEAST_PART {
                 break;
             }

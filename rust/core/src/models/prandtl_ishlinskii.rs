@@ -198,7 +198,7 @@ impl InputOperator for PlayHysteresis {
 
 impl Segmented for PlayHysteresis {
     fn straight(&self, state: &Self::State, volts: f64, _deviation: f64) -> f64 {
-        self.plays.straight(state, volts)
+        self.plays.straight(state, volts, self.count)
     }
 
     fn bend(&self) -> f64 {
