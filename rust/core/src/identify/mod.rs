@@ -28,8 +28,8 @@ pub use cross_talk::{CrossTalk, cross_talk};
 pub use history::{History, visited};
 pub use identification::{Identification, identify};
 pub use least_squares::{
-    CreepKind, DynamicsKind, LeastSquaresFit, PlaysKind, Settings as WeightsSettings, WeightsRecord,
-    identify_weights,
+    CreepKind, DynamicsKind, LeastSquaresFit, PlaysKind, Settings as WeightsSettings,
+    WeightsRecord, identify_weights,
 };
 pub use levenberg_marquardt::{LocalRefinement, Polished, Sensitivity};
 pub use problem::{Delay, Problem, Spec};

@@ -76,7 +76,7 @@ pub(super) fn search<'a, M: WeightedPlays>(
     fit.every = 1;
     fit.settle(1e-4)?;
     fit.exact = true;
-    fit.settle(1e-6)?;
+    fit.settle(1e-8)?;
     Some((fit, lags))
 }
 
@@ -393,7 +393,8 @@ fn smallest_lag<'a, M: WeightedPlays>(
 fn unseen_mode<'a, M: WeightedPlays>(fit: &Fit<'a, M>) -> Option<Fit<'a, M>> {
     let dt = fit.common.record.drive.dt;
     let mut best: Option<Fit<'a, M>> = None;
-    for (frequency, damping_ratio) in [(0.4, 0.1), (0.4, 1.0), (0.1, 0.1), (0.1, 1.0), (0.02, 1.0)] {
+    for (frequency, damping_ratio) in [(0.4, 0.1), (0.4, 1.0), (0.1, 0.1), (0.1, 1.0), (0.02, 1.0)]
+    {
         let mut trial = fit.clone();
         trial.set_poles(Form::Modes(1), &[libm::log(frequency / dt), libm::log(damping_ratio)]);
         trial.settle(ROUGH)?;
