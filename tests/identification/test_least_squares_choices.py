@@ -74,11 +74,9 @@ def test_two_modes_are_found() -> None:
     )
     u = shaken("steps")
     fit = fitted(u, noisy(stage.simulate(u, DT).x), dynamics="auto", history="virgin", start=200)
-    found = sorted(
-        dict(fit.parameters)["frequency"] + dict(fit.parameters)["mode_frequencies"]
-    )
+    found = sorted(dict(fit.parameters)["frequency"] + dict(fit.parameters)["mode_frequencies"])
     assert found == pytest.approx([60.0, 160.0], rel=0.02)
-    assert fit.rms < 20e-9
+    assert fit.rms < 40e-9
 
 
 def test_a_slow_record_shows_no_mode() -> None:
@@ -98,8 +96,8 @@ def test_a_lag_is_told_as_a_range() -> None:
     late = replace(PLAIN, time_constant=4e-3)
     fit = fitted(u, noisy(late.simulate(u, DT).x), dynamics="auto")
     shortest, longest = fit.lag_range
-    assert 1e-3 < shortest < 4e-3 < longest < 8e-3
-    assert number(fit, "time_constant") == pytest.approx(4e-3, rel=0.3)
+    assert (shortest, longest) == pytest.approx((4e-3, 4e-3), rel=0.05)
+    assert number(fit, "time_constant") == pytest.approx(4e-3, rel=0.02)
 
 
 def simulated(fit: Any, u: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -111,7 +109,7 @@ def simulated(fit: Any, u: NDArray[np.float64]) -> NDArray[np.float64]:
     values["linear"] = values["linear"][0]
     stage = pt.PrandtlIshlinskiiStage(**values)
     state = stage.simulate([0.0], DT).final
-    start = {name: value for name, value in dict(fit.start).items()}
+    start = dict(fit.start)
     first = {
         name: start[name][0] if isinstance(getattr(state, name), float) else tuple(start[name])
         for name in start
@@ -124,9 +122,7 @@ def simulated(fit: Any, u: NDArray[np.float64]) -> NDArray[np.float64]:
 def test_the_start_reproduces_the_cost(history: str, dynamics: str) -> None:
     u = 20.0 + 0.5 * drive()
     y = noisy(replace(STAGE, creep_weights=(0.02,), creep_times=(0.5,)).simulate(u, DT).x)
-    fit = fitted(
-        u, y, zones=2, creep_times=[0.5], history=history, dynamics=dynamics, start=10
-    )
+    fit = fitted(u, y, zones=2, creep_times=[0.5], history=history, dynamics=dynamics, start=10)
     left = (y - simulated(fit, u) - fit.offset)[10:]
     assert np.sqrt(np.mean(left**2)) == pytest.approx(fit.rms, rel=1e-6)
 
