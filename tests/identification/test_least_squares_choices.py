@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import piezotrack as pt
 from piezotrack import _core
 from play_records import PLAIN, STAGE, drive, record
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 MODE = replace(PLAIN, frequency=160.0, damping_ratio=0.03)
 DT = 1e-3
