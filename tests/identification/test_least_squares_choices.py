@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import piezotrack as pt
 from piezotrack import _core
 from play_records import PLAIN, STAGE, drive, record
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 MODE = replace(PLAIN, frequency=160.0, damping_ratio=0.03)
 DT = 1e-3
@@ -76,7 +78,7 @@ def test_two_modes_are_found() -> None:
     fit = fitted(u, noisy(stage.simulate(u, DT).x), dynamics="auto", history="virgin", start=200)
     found = sorted(dict(fit.parameters)["frequency"] + dict(fit.parameters)["mode_frequencies"])
     assert found == pytest.approx([60.0, 160.0], rel=0.02)
-    assert fit.rms < 20e-9
+    assert fit.rms < 40e-9
 
 
 def test_a_slow_record_shows_no_mode() -> None:
@@ -96,8 +98,8 @@ def test_a_lag_is_told_as_a_range() -> None:
     late = replace(PLAIN, time_constant=4e-3)
     fit = fitted(u, noisy(late.simulate(u, DT).x), dynamics="auto")
     shortest, longest = fit.lag_range
-    assert 1e-3 < shortest < 4e-3 < longest < 8e-3
-    assert number(fit, "time_constant") == pytest.approx(4e-3, rel=0.3)
+    assert (shortest, longest) == pytest.approx((4e-3, 4e-3), rel=0.05)
+    assert number(fit, "time_constant") == pytest.approx(4e-3, rel=0.02)
 
 
 def simulated(fit: Any, u: NDArray[np.float64]) -> NDArray[np.float64]:

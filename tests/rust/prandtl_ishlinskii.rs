@@ -4,7 +4,9 @@
 use nalgebra::{DMatrix, DVector};
 use piezotrack_control::PlayInverse;
 use piezotrack_control::hysteresis::{Operator, Play};
-use piezotrack_core::identify::{DynamicsKind, WeightsRecord, WeightsSettings, identify_weights};
+use piezotrack_core::identify::{
+    CreepKind, DynamicsKind, History, PlaysKind, WeightsRecord, WeightsSettings, identify_weights,
+};
 use piezotrack_core::math::{NOT_NEGATIVE, Rows, bounded};
 use piezotrack_core::models::{
     Dynamics, Experiment, Mode, Model, Plant, PlayHysteresis, PrandtlIshlinskiiStage, Relaxation,
@@ -178,10 +180,11 @@ fn a_fit_finds_what_the_record_was_made_with() {
         let drive = Drive::new(&u, 0.01, hold).unwrap();
         let y = stage.simulate(&Experiment::of(&drive, NEVER)).unwrap().unwrap().x;
         let settings = WeightsSettings {
-            thresholds: vec![4.0, 10.0, 20.0],
+            plays: PlaysKind::Thresholds(vec![4.0, 10.0, 20.0]),
             zones: 0,
-            times: vec![],
+            creep: CreepKind::Times(vec![]),
             dynamics: DynamicsKind::First,
+            history: Some(History::Virgin),
             offset: true,
         };
         let record = WeightsRecord { drive, y: &y, start: 500 };

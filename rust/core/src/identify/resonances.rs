@@ -263,7 +263,10 @@ impl<'a> Trial<'a> {
         let [_, u] = &self.few;
         let Some(steps) = Steps::new(mode.dynamics(), &self.drive) else { return 0.0 };
         let last = u.len() - 1;
-        let rate = |k: usize| u[(k + 1).min(last)] - u[k.saturating_sub(1)];
+        let rate = |k: usize| {
+            let (before, after) = (k.saturating_sub(1), (k + 1).min(last));
+            (u[after] - u[before]) / index(after - before)
+        };
         let (moved, mut rows) = (steps.of(u), Rows::new(3));
         for &k in &self.rows {
             rows.push(&[u[k], rate(k), 1.0], moved[k]);

@@ -69,14 +69,23 @@ pub(super) fn search<'a, M: WeightedPlays>(
         fit.restructure(|fit| fit.times.clone_from(times));
         fit.settle(ROUGH)?;
     }
+    // With a lag, or what it does would be taken for a history.
+    let lags = matches!(settings.dynamics, DynamicsKind::First | DynamicsKind::Auto) && !mode;
+    if lags {
+        fit = best_lag(&fit)?;
+    }
     choose_history(&mut fit, settings)?;
+    if lags {
+        fit.set_poles(Form::None, &[]);
+        fit.settle(ROUGH)?;
+    }
     choose_creep(&mut fit, settings)?;
     let lags = choose_dynamics(&mut fit, settings, mode)?;
     choose_plays(&mut fit, settings)?;
     fit.every = 1;
     fit.settle(1e-4)?;
     fit.exact = true;
-    fit.settle(1e-6)?;
+    fit.settle(1e-8)?;
     Some((fit, lags))
 }
 

@@ -31,6 +31,8 @@ const STEPS: usize = 60;
 pub(super) struct Common<'a> {
     pub record: &'a WeightsRecord<'a>,
     pub offset: bool,
+    /// Whether the record is the mirror image of one that falls.
+    pub falls: bool,
     pub stop: Stop<'a>,
     /// Range of the drive in the window, V.
     pub drive: (f64, f64),
@@ -40,10 +42,10 @@ pub(super) struct Common<'a> {
 }
 
 impl<'a> Common<'a> {
-    pub fn new(record: &'a WeightsRecord<'a>, offset: bool, stop: Stop<'a>) -> Self {
+    pub fn new(record: &'a WeightsRecord<'a>, offset: bool, falls: bool, stop: Stop<'a>) -> Self {
         let (least, most) = range(&record.y[record.start..]);
         let drive = range(&record.drive.u[record.start..]);
-        Self { record, offset, stop, drive, stroke: most - least, evaluations: Cell::new(0) }
+        Self { record, offset, falls, stop, drive, stroke: most - least, evaluations: Cell::new(0) }
     }
 
     fn least_linear(&self) -> f64 {
@@ -315,7 +317,7 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         let relaxation = self.relaxation()?;
         let drive = self.common.record.drive;
         if self.exact {
-            let (values, start) = self.stage()?;
+            let (values, start) = self.stage(false)?;
             let experiment =
                 Experiment { initial: Some(&start), ..Experiment::of(&drive, self.common.stop) };
             let stopped = || Error::Numerical("the simulation was stopped".into());
@@ -474,14 +476,21 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         (0..self.layout().poles).map(of).collect()
     }
 
-    /// Parameters of the stage, and its state before the first sample.
-    fn stage(&self) -> Result<(Values, Values)> {
+    /// Parameters of the stage, and its state before the first sample; those of its mirror image
+    /// where it is to fall.
+    fn stage(&self, falls: bool) -> Result<(Values, Values)> {
         let layout = self.layout();
+        let sign = if falls { -1.0 } else { 1.0 };
+        // Either the drive was turned or the displacement.
+        let (of_drive, of_motion) = if M::DEAD_ZONES { (sign, 1.0) } else { (1.0, sign) };
         let relaxation = self.relaxation()?;
         let fitted = FittedPlays {
-            linear: self.common.least_linear() + self.x[0],
+            linear: sign * (self.common.least_linear() + self.x[0]),
             thresholds: self.thresholds.clone(),
-            weights: self.x[1..layout.weights].iter().map(|weight| weight.max(0.0)).collect(),
+            weights: self.x[1..layout.weights]
+                .iter()
+                .map(|weight| sign * weight.max(0.0))
+                .collect(),
             dead_zone_thresholds: self.corners().to_vec(),
             dead_zone_weights: self.x[layout.bends()].to_vec(),
             shape: self.shape.clone(),
@@ -494,17 +503,21 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         let creep = &self.creep_before(1)[0];
         let rest = Follower::at_rest(&relaxation, self.bent(self.sum(&plays)), creep).state.x;
         let modes = self.dynamics().further().len();
-        Ok((M::values(&fitted), M::start(rest, first, &plays, creep, modes)))
+        plays.iter_mut().for_each(|play| *play *= of_drive);
+        let creep: Vec<f64> = creep.iter().map(|q| of_motion * q).collect();
+        let start = M::start(of_motion * rest, of_drive * first, &plays, &creep, modes);
+        Ok((M::values(&fitted), start))
     }
 
     /// What was found.
     pub fn result(&self) -> Result<LeastSquaresFit> {
         let layout = self.layout();
-        let (values, start) = self.stage()?;
+        let (values, start) = self.stage(self.common.falls)?;
+        let of_motion = if self.common.falls && !M::DEAD_ZONES { -1.0 } else { 1.0 };
         M::build(&values)?;
         Ok(LeastSquaresFit {
             values,
-            offset: self.x[layout.offset()].iter().sum(),
+            offset: of_motion * self.x[layout.offset()].iter().sum::<f64>(),
             rms: self.rms,
             evaluations: self.common.evaluations.get(),
             at_bound: layout.at_bound(&self.x, self.form, &self.pole_ranges()),

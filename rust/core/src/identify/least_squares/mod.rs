@@ -143,8 +143,8 @@ pub fn identify_weights(
     PlayHysteresis::new(1.0, &thresholds, &zeros(thresholds.len()), &zones, &zones)?;
     let times = settings.creep.times();
     Relaxation::new(&zeros(times.len()), times, Dynamics::None)?;
-    check(record, settings)?;
-    model.weighted(Search { record, settings, stop }).unwrap_or_else(|| {
+    let falls = check(record, settings)?;
+    model.weighted(Search { record, settings, falls, stop }).unwrap_or_else(|| {
         let found = format!("'{}'", model.info().name);
         Err(Error::parameter("model", found, "one whose weights least squares find"))
     })
@@ -154,6 +154,8 @@ pub fn identify_weights(
 struct Search<'a> {
     record: &'a WeightsRecord<'a>,
     settings: &'a Settings,
+    /// Whether the displacement falls as the drive rises.
+    falls: bool,
     stop: Stop<'a>,
 }
 
@@ -165,7 +167,17 @@ impl WeightedVisitor for Search<'_> {
             let expected = format!("0: {} has no dead zones", M::INFO.title);
             return Err(Error::parameter("dead_zones", self.settings.zones, expected));
         }
-        let common = Common::new(self.record, self.settings.offset, self.stop);
+        // A falling displacement is fitted as a rising one: under the negative drive, or negative
+        // itself where an envelope bends the drive.
+        let negative = |values: &[f64]| values.iter().map(|value| -value).collect::<Vec<f64>>();
+        let WeightsRecord { drive, y, start } = *self.record;
+        let (u, y) = match (self.falls, M::DEAD_ZONES) {
+            (true, true) => (negative(drive.u), y.to_vec()),
+            (true, false) => (drive.u.to_vec(), negative(y)),
+            (false, _) => (drive.u.to_vec(), y.to_vec()),
+        };
+        let record = WeightsRecord { drive: Drive { u: &u, ..drive }, y: &y, start };
+        let common = Common::new(&record, self.settings.offset, self.falls, self.stop);
         let found = choices::search::<M>(&common, self.settings);
         let result =
             |(fit, lag_range): (Fit<'_, M>, _)| Ok(LeastSquaresFit { lag_range, ..fit.result()? });
@@ -173,8 +185,9 @@ impl WeightedVisitor for Search<'_> {
     }
 }
 
-/// Refuses records that tell nothing of a hysteresis.
-fn check(record: &WeightsRecord<'_>, settings: &Settings) -> Result<()> {
+/// Refuses records that tell nothing of a hysteresis; true where the displacement falls as the
+/// drive rises.
+fn check(record: &WeightsRecord<'_>, settings: &Settings) -> Result<bool> {
     let WeightsRecord { drive, y, start } = *record;
     if y.len() != drive.u.len() {
         return Err(Error::Shape {
@@ -212,10 +225,5 @@ fn check(record: &WeightsRecord<'_>, settings: &Settings) -> Result<()> {
     let mean = |values: &[f64]| values.iter().sum::<f64>() / index(values.len());
     let (middle, centre) = (mean(u), mean(y));
     let together: f64 = u.iter().zip(y).map(|(u, y)| (u - middle) * (y - centre)).sum();
-    if together <= 0.0 {
-        return Err(Error::Data(
-            "the displacement falls as the drive rises: turn the sign of one of them".into(),
-        ));
-    }
-    Ok(())
+    Ok(together < 0.0)
 }
