@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -72,7 +73,9 @@ def test_nothing_is_said_of_measured_logs() -> None:
         for record in (whole, whole[3.0:], whole[3.0:23.0]):
             diagnostics.check_record(record, searches_hysteresis=True)
             assert diagnostics.record_warnings(record) == []
-    assert pt.identify(pt.read(MEASURED / "training.csv")[3.0:23.0], "dahl", seed=1).notes == []
+    # Of one slow sine, the Dahl model takes damping for a part of the loop's width.
+    (note,) = pt.identify(pt.read(MEASURED / "training.csv")[3.0:23.0], "dahl", seed=1).notes
+    assert re.match(r"a lag of .* ms makes .* of the travel at this rate", note)
 
 
 # Refusals.
