@@ -144,8 +144,9 @@ def of_lags(lags: LagRange | None, frequency: float) -> list[str]:
             "the model has the least: a record at another rate would tell"
         ]
     return [
-        f"a lag of {1e3 * lags.least:.3g} ms makes {100 * share:.2g} % of the travel at this rate: "
-        "this model takes the width of the loop for damping, and holds at this rate only"
+        f"a lag of {1e3 * lags.least:.3g} ms makes {100 * share:.2g} % of the travel at this rate, "
+        "and no shorter one fits: the model holds at this rate only; whether it is due to damping, "
+        "creep or a late reading, a record at another rate would tell"
     ]
 
 

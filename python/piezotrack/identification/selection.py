@@ -115,6 +115,9 @@ def identify_best(
             continue
         score = fit.score(rest, offset=fit.offset) if rest is not part else fit.fitted
         found.append((Trial(info.name, info.title, score.rms), info))
+        if fit.start is not None and not info.searched:
+            # What least squares have found of the history holds for all kinds.
+            common["history"] = history or fit.start.history
         if score.rms < AS_NOISE * noise:
             break
     if not found:

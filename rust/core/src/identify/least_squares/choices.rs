@@ -24,6 +24,11 @@ const CREEP_GAIN: f64 = 0.015;
 const MODE_GAIN: f64 = 0.02;
 const PLAYS_GAIN: f64 = 0.03;
 
+/// Plays of a record of many samples, and of another one.
+const MANY_SAMPLES: usize = 800;
+const PLAYS: usize = 20;
+const FEW_PLAYS: usize = 10;
+
 /// Deviations that differ by less than this share tell nothing.
 const SAME: f64 = 1.01;
 
@@ -56,7 +61,7 @@ pub(super) fn search<'a, M: WeightedPlays>(
     let thresholds = match &settings.plays {
         PlaysKind::Thresholds(thresholds) => thresholds.clone(),
         PlaysKind::Spread(count) => spread(common, *count, 1.0),
-        PlaysKind::Auto => spread(common, 10, 1.0),
+        PlaysKind::Auto => spread(common, plays_for(common), 1.0),
     };
     let mut fit = Fit::<M>::new(common, &thresholds, settings.history.unwrap_or(History::Virgin));
     fit.every = (common.record.y.len() - common.record.start).div_ceil(ROWS);
@@ -87,6 +92,11 @@ pub(super) fn search<'a, M: WeightedPlays>(
     fit.exact = true;
     fit.settle(1e-8)?;
     Some((fit, lags))
+}
+
+/// Plays to begin with: few take a rounded loop for a lag, many need samples.
+fn plays_for(common: &Common<'_>) -> usize {
+    if common.record.y.len() - common.record.start < MANY_SAMPLES { FEW_PLAYS } else { PLAYS }
 }
 
 /// Thresholds up to half of the drive's range; a `power` above 1 has more of them near 0.
@@ -430,7 +440,7 @@ fn choose_plays<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -> 
     };
     let mut least = (1.0 - PLAYS_GAIN) * foretold(fit)?;
     let here = fit.clone();
-    for (count, power) in [(20, 1.0), (20, 1.5)] {
+    for (count, power) in [(PLAYS, 1.0), (PLAYS, 1.5)] {
         let mut trial = here.clone();
         trial.restructure(|trial| trial.thresholds = spread(trial.common, count, power));
         trial.settle(ROUGH)?;
