@@ -36,8 +36,8 @@ OF_FORCE = ("bouc-wen-oscillator", "prandtl-ishlinskii")
 OF_ONE_MODEL = ("free", "fixed", "initial", "bounds")
 # Share of the window that is fitted, and turns of the drive that each part needs.
 FITTED, TURNS = 0.6, 2
-# A residual of so many times the noise on what was not fitted cannot be bettered.
-AS_NOISE = 1.15
+# A residual of so many times the noise, on what was not fitted, is good enough to try no more.
+AS_NOISE = 1.5
 # Another kind has to be better by this share than one before it in the list.
 BETTER = 0.03
 # The descent finds the bottom: swarms that only have to find the basin can be short.
