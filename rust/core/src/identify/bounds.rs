@@ -44,8 +44,7 @@ pub fn derive(
             (None, Some(&(_, (low, high)))) if low < high => {
                 Coordinate::between(info.name, low, high)?
             }
-            (None, Some(&(_, (value, _)))) => Coordinate::Fixed(value),
-            (None, None) => Coordinate::Fixed(0.0),
+            (None, range) => Coordinate::Fixed(range.map_or(0.0, |(_, (value, _))| *value)),
         };
     }
     Ok(coordinates)

@@ -194,7 +194,7 @@ impl Problem {
         let slow =
             !wants_mode && !chosen("damping") && bounds::measures(record).excited().is_none();
         let problem =
-            Self { model, coordinates, scale_assumed, offset, history, creep_times, slow };
+            Self { model, coordinates, scale_assumed, offset, history, slow, creep_times };
         problem.check_corners()?;
         Ok(problem)
     }

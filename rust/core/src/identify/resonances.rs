@@ -469,6 +469,8 @@ fn mix(a: Mode, b: Mode, part: f64) -> Mode {
 /// A signal less its mean.
 fn centred(mut signal: Vec<f64>) -> Vec<f64> {
     let mean = signal.iter().sum::<f64>() / index(signal.len());
-    signal.iter_mut().for_each(|value| *value -= mean);
+    for value in &mut signal {
+        *value -= mean;
+    }
     signal
 }

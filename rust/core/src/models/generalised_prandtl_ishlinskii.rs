@@ -32,24 +32,21 @@ use piezotrack_control::hysteresis::{Operator, PlayState};
 use piezotrack_control::{InputInverse, InputInverseState, OperatorInverse};
 
 use super::creep::{MOST_RELAXATIONS, Relaxation};
-use super::input_stage::{
-    DYNAMICS, InputOperator, InputStage, PLAYS_STATE, Segmented, inverse_state,
-};
+use super::dynamics_parameters::DYNAMICS;
+use super::input_stage::{InputOperator, InputStage, PLAYS_STATE, Segmented, inverse_state};
 use super::prandtl_ishlinskii::{MOST_PLAYS, PlayHysteresis};
+use super::tanh_envelope::{MOST_BEND, TanhEnvelope};
 use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
 use super::values::{ParameterInfo, Values};
 use super::weighted_plays::{FittedPlays, WeightedPlays};
 use crate::design::{Gains, LoopPlant};
-use crate::error::{Result, finite, positive};
+use crate::error::Result;
 
 /// Room for the play of threshold 0 and the others.
 const SLOTS: usize = MOST_PLAYS + 1;
 
 /// Distances below this are roundings, relative to the voltages that they are between.
 const ROUNDING: f64 = 1e-12;
-
-/// Largest second derivative of tanh, 4 / (3 sqrt(3)).
-const MOST_BEND: f64 = 0.769_800_358_919_501;
 
 /// Why a fit has neither scale nor level.
 const NORMALISED: &str = "weights and offset could be traded for it";
@@ -75,54 +72,6 @@ const PARAMETERS: &[ParameterInfo] = &[
     DYNAMICS[6],
     DYNAMICS[7],
 ];
-
-/// An envelope: c0 tanh(c1 u + c2) + c3, V of V.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TanhEnvelope {
-    /// Half of its range, c0, V, above 0.
-    pub scale: f64,
-    /// Its slope relative to c0 where it is steepest, c1, 1/V, above 0.
-    pub slope: f64,
-    /// Its argument at 0 V, c2.
-    pub shift: f64,
-    /// The middle of its range, c3, V.
-    pub level: f64,
-}
-
-impl TanhEnvelope {
-    /// Where it takes an input, V.
-    #[must_use]
-    #[inline]
-    pub fn at(&self, volts: f64) -> f64 {
-        self.with_slope(volts).0
-    }
-
-    /// Where it takes an input, V, and its slope there.
-    #[must_use]
-    #[inline]
-    pub fn with_slope(&self, volts: f64) -> (f64, f64) {
-        let bend = libm::tanh(self.slope * volts + self.shift);
-        let slope = self.scale * self.slope * (1.0 - bend) * (1.0 + bend);
-        (self.scale * bend + self.level, slope)
-    }
-
-    /// The input that it takes to `edge`, V; NaN or infinity beyond its range.
-    #[must_use]
-    #[inline]
-    pub fn inverse(&self, edge: f64) -> f64 {
-        (libm::atanh((edge - self.level) / self.scale) - self.shift) / self.slope
-    }
-
-    /// Of its four numbers, named after `prefix`.
-    fn checked(prefix: &str, [scale, slope, shift, level]: [f64; 4]) -> Result<Self> {
-        Ok(Self {
-            scale: positive(&format!("{prefix}scale"), scale, "V")?,
-            slope: positive(&format!("{prefix}slope"), slope, "1/V")?,
-            shift: finite(&format!("{prefix}shift"), shift, "")?,
-            level: finite(&format!("{prefix}level"), level, "V")?,
-        })
-    }
-}
 
 /// The operator: plays between two envelopes, V to m.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,6 +5,7 @@ mod bouc_wen_oscillator;
 mod creep;
 mod creeping;
 pub mod dahl;
+mod dynamics_parameters;
 mod first_order_dahl;
 mod generalised_prandtl_ishlinskii;
 mod input_stage;
@@ -13,6 +14,7 @@ mod plant;
 mod prandtl_ishlinskii;
 mod registry;
 mod search_ranges;
+mod tanh_envelope;
 mod traits;
 mod values;
 mod weighted_plays;
@@ -29,7 +31,7 @@ pub use dahl::{DahlStage, DahlStageState};
 pub use first_order_dahl::{FirstOrderDahlKernel, FirstOrderDahlStage};
 pub use generalised_prandtl_ishlinskii::{
     GeneralisedPlays, GeneralisedPlaysInverse, GeneralisedPlaysInverseState, GeneralisedPlaysState,
-    GeneralisedPrandtlIshlinskiiStage, TanhEnvelope,
+    GeneralisedPrandtlIshlinskiiStage,
 };
 pub use input_stage::{InputOperator, InputStage, InputStageFlow, InputStageState, Segmented};
 pub use parallel_dahl::{ParallelDahlKernel, ParallelDahlStage};
@@ -39,6 +41,7 @@ pub use prandtl_ishlinskii::{
 };
 pub use registry::{FoundBy, Model, Stage, StageFlow, StageInverse, StageInverseState, StageState};
 pub use search_ranges::{Measures, NOMINAL_STIFFNESS, Range, Ranges};
+pub use tanh_envelope::TanhEnvelope;
 pub use traits::{
     Experiment, Invertible, KernelVisitor, Method, ModelInfo, Response, Searchable, StageModel,
 };

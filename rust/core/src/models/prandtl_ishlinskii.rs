@@ -16,9 +16,8 @@ use piezotrack_control::hysteresis::{Operator, Play, PlayState};
 use piezotrack_control::{InputInverseState, PlayInverse, PrandtlIshlinskiiInverse};
 
 use super::creep::{MOST_RELAXATIONS, Relaxation};
-use super::input_stage::{
-    DYNAMICS, InputOperator, InputStage, PLAYS_STATE, Segmented, inverse_state, same_length,
-};
+use super::dynamics_parameters::{DYNAMICS, same_length};
+use super::input_stage::{InputOperator, InputStage, PLAYS_STATE, Segmented, inverse_state};
 use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
 use super::values::{ParameterInfo, Values};
 use super::weighted_plays::{FittedPlays, WeightedPlays};

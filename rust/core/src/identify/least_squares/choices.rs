@@ -53,11 +53,14 @@ const LAG_SAME: f64 = 1.003;
 /// Share of a fitted creep to start from.
 const FIRST_SHARE: f64 = 0.005;
 
+/// A fit, and the range of lags that explain the record as well.
+type Found<'a, M> = (Fit<'a, M>, Option<(f64, f64)>);
+
 /// The best stage, and the lags that explain the record as well; `None` where stopped.
 pub(super) fn search<'a, M: WeightedPlays>(
     common: &'a Common<'a>,
     settings: &Settings,
-) -> Option<(Fit<'a, M>, Option<(f64, f64)>)> {
+) -> Option<Found<'a, M>> {
     let thresholds = match &settings.plays {
         PlaysKind::Thresholds(thresholds) => thresholds.clone(),
         PlaysKind::Spread(count) => spread(common, *count, 1.0),
@@ -337,7 +340,7 @@ fn choose_dynamics<M: WeightedPlays>(
             if mode && fit.rms < (1.0 - MODE_GAIN) * lagging.rms {
                 return Some(None);
             }
-            let (chosen, lags) = smallest_lag(still, lagging)?;
+            let (chosen, lags) = smallest_lag(still, &lagging)?;
             *fit = chosen;
             Some(Some(lags))
         }
@@ -375,11 +378,11 @@ fn at_lag<'a, M: WeightedPlays>(fit: &Fit<'a, M>, time: f64) -> Option<Fit<'a, M
 /// The smallest lag that explains the record as well as the best one, and the range of such lags.
 fn smallest_lag<'a, M: WeightedPlays>(
     still: Fit<'a, M>,
-    best: Fit<'a, M>,
+    best: &Fit<'a, M>,
 ) -> Option<(Fit<'a, M>, (f64, f64))> {
     let time = libm::exp(best.x[best.layout().poles().start]);
     let enough = SAME * f64::min(best.rms, still.rms);
-    let as_good = |time: f64| Some(at_lag(&best, time)?.rms <= enough);
+    let as_good = |time: f64| Some(at_lag(best, time)?.rms <= enough);
     let longest = libm::exp(best.pole_ranges()[0].1);
     let mut high = time;
     while high < longest && as_good(1.5 * high)? {
@@ -394,7 +397,7 @@ fn smallest_lag<'a, M: WeightedPlays>(
         let (mut low, mut short) = (time, 0.0);
         for _ in 0..6 {
             let middle = 0.5 * (low + short);
-            if at_lag(&best, middle)?.rms <= enough { low = middle } else { short = middle }
+            if at_lag(best, middle)?.rms <= enough { low = middle } else { short = middle }
         }
         Some(low)
     };
@@ -403,7 +406,7 @@ fn smallest_lag<'a, M: WeightedPlays>(
     if still.rms <= least {
         return Some((still, (low, high)));
     }
-    let mut chosen = at_lag(&best, shortest(least)?)?;
+    let mut chosen = at_lag(best, shortest(least)?)?;
     chosen.held = true;
     Some((chosen, (low, high)))
 }

@@ -293,7 +293,7 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
     }
 
     fn counts(&self, k: usize) -> bool {
-        self.window.contains(&k) && (k - self.window.start) % self.every == 0
+        self.window.contains(&k) && (k - self.window.start).is_multiple_of(self.every)
     }
 
     /// RMS deviation in the window, m.
@@ -503,7 +503,9 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         let creep = &self.creep_before(1)[0];
         let rest = Follower::at_rest(&relaxation, self.bent(self.sum(&plays)), creep).state.x;
         let modes = self.dynamics().further().len();
-        plays.iter_mut().for_each(|play| *play *= of_drive);
+        for play in &mut plays {
+            *play *= of_drive;
+        }
         let creep: Vec<f64> = creep.iter().map(|q| of_motion * q).collect();
         let start = M::start(of_motion * rest, of_drive * first, &plays, &creep, modes);
         Ok((M::values(&fitted), start))

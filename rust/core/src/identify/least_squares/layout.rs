@@ -87,7 +87,7 @@ impl Layout {
     ) -> Vec<(f64, f64)> {
         let mut bounds = vec![NOT_NEGATIVE; self.weights];
         bounds.extend(vec![BEND; self.bends]);
-        bounds.extend(self.near(&x[self.corners()], corners));
+        bounds.extend(Self::near(&x[self.corners()], corners));
         bounds.extend(vec![(0.0, MOST_CREEP); self.shares]);
         bounds.extend(vec![(-MOST_DEPARTURE * stroke, MOST_DEPARTURE * stroke); self.departures]);
         bounds.extend(vec![FREE; self.offset]);
@@ -100,7 +100,7 @@ impl Layout {
     }
 
     /// Bounds of corners for a step: they stay apart, and away from the ends of what they bend.
-    fn near(&self, corners: &[f64], (low, high): (f64, f64)) -> Vec<(f64, f64)> {
+    fn near(corners: &[f64], (low, high): (f64, f64)) -> Vec<(f64, f64)> {
         let apart = MARGIN * (high - low);
         let bound = |(j, at): (usize, &f64)| {
             let below = if j == 0 { low + apart } else { 0.5 * (corners[j - 1] + at + apart) };
