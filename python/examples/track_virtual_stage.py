@@ -22,6 +22,7 @@ t = np.arange(60001) * dt
 log = stage.record(37.5 * (1.0 - np.cos(2.0 * np.pi * 0.25 * t)), dt)
 fit = pt.identify(
     log[0:4.0],
+    "dahl",
     fixed={"a1": 121.9874, "a2": 1.1773e6, "b1": 1.8485e6},
     bounds={
         "mass": (0.1, 0.2),

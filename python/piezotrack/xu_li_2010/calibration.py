@@ -48,6 +48,7 @@ def values_of(apparatus: Apparatus) -> dict[str, float]:
     published = DahlStage.xu_li_2010()
     fit = identify(
         thin[:FITTED_SECONDS],
+        "dahl",
         fixed={"a1": published.a1, "a2": published.a2, "b1": published.b1},
         bounds=SEARCH_BOX,
         seed=SEED,

@@ -74,6 +74,7 @@ def identify_demo(
     published = DahlStage.xu_li_2010()
     return identify(
         log[:FITTED_SECONDS],
+        "dahl",
         fixed={"a1": published.a1, "a2": published.a2, "b1": published.b1},
         bounds=SEARCH_BOX,
         seed=seed,

@@ -45,6 +45,7 @@ def search(log: Dataset, seed: int) -> Identification:
     published = DahlStage.xu_li_2010()
     return identify(
         log[:FITTED_SECONDS],
+        "dahl",
         fixed={"a1": published.a1, "a2": published.a2, "b1": published.b1},
         bounds=SEARCH_BOX,
         swarm=ParticleSwarm.xu_li_2010(),

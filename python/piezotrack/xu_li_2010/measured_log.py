@@ -165,7 +165,7 @@ def drives(folder: str | os.PathLike[str]) -> Drives:
     slope, level = np.polyfit(desired, measured, 1)
     line = float(slope) * desired + float(level)
     computed, fits, shifts = {}, {}, {}
-    dahl = identify(training, seed=1, runs=2, progress=False)
+    dahl = identify(training, "dahl", seed=1, runs=2, progress=False)
     found: dict[str, Any] = {"Dahl": dahl, **rivals(training)}
     for name, fit in found.items():
         voltage = fit.inverse().voltage(reference, log.dt)[part]
