@@ -4,6 +4,7 @@
 
 use super::fit::{Common, Fit};
 use super::form::Form;
+use super::thresholds::gather;
 use super::{CreepKind, DynamicsKind, PlaysKind, Settings, WeightsRecord};
 use crate::identify::history::History;
 use crate::identify::resonances::{Resonance, resonances};
@@ -90,6 +91,9 @@ pub(super) fn search<'a, M: WeightedPlays>(
     choose_creep(&mut fit, settings)?;
     let lags = choose_dynamics(&mut fit, settings, mode)?;
     choose_plays(&mut fit, settings)?;
+    if settings.plays == PlaysKind::Auto {
+        gather(&mut fit)?;
+    }
     fit.every = 1;
     fit.settle(1e-4)?;
     fit.exact = true;

@@ -12,6 +12,7 @@ mod fit;
 mod follower;
 mod form;
 mod layout;
+mod thresholds;
 
 use super::history::History;
 use crate::error::{Error, Result};
