@@ -43,6 +43,7 @@ __all__ = [
     "spread",
     "tracking_metrics",
     "turns",
+    "visited",
 ]
 
 __version__: str

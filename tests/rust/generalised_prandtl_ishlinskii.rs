@@ -2,7 +2,9 @@
 #![allow(missing_docs, clippy::unwrap_used, clippy::panic, clippy::float_cmp)]
 
 use piezotrack_control::{OperatorInverse, PlayInverse};
-use piezotrack_core::identify::{DynamicsKind, WeightsRecord, WeightsSettings, identify_weights};
+use piezotrack_core::identify::{
+    CreepKind, DynamicsKind, History, PlaysKind, WeightsRecord, WeightsSettings, identify_weights,
+};
 use piezotrack_core::models::{
     Dynamics, Experiment, GeneralisedPlays, GeneralisedPlaysInverse,
     GeneralisedPrandtlIshlinskiiStage, InputOperator, Invertible, Model, Plant, PlayHysteresis,
@@ -271,10 +273,11 @@ fn an_envelope_has_the_ratio_of_slopes_that_was_asked_for() {
 
 fn settings() -> WeightsSettings {
     WeightsSettings {
-        thresholds: THRESHOLDS.to_vec(),
+        plays: PlaysKind::Thresholds(THRESHOLDS.to_vec()),
         zones: 0,
-        times: vec![],
+        creep: CreepKind::Times(vec![]),
         dynamics: DynamicsKind::None,
+        history: Some(History::Virgin),
         offset: true,
     }
 }

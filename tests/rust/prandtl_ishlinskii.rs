@@ -80,6 +80,8 @@ fn a_stage_can_begin_in_equilibrium() {
         let stage = stage(dynamics);
         assert_eq!(stage.settled_at(&[]), stage.at_rest());
         let mut state = stage.settled_at(&[40.0, -10.0, 25.0]);
+        let values = stage.equilibrium(&[40.0, -10.0, 25.0]).unwrap();
+        assert_eq!(stage.state(Some(&values)).unwrap().relaxation, state.relaxation);
         // The same, slowly, as a simulation has it.
         let slowly = Drive::new(&[0.0, 40.0, -10.0, 25.0, 25.0], 1e3, Hold::First).unwrap();
         let run = stage.simulate(&Experiment::of(&slowly, NEVER)).unwrap().unwrap();

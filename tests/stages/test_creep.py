@@ -107,7 +107,8 @@ def test_a_jump_of_the_reference_is_reached_in_equilibrium() -> None:
 
 def test_creeps_in_a_closed_loop_as_it_does_under_the_same_voltage() -> None:
     # Slower than the steps of the loop.
-    stage = replace(STAGES["first-order-dahl"], creep_weights=(0.02, 0.04), creep_times=(0.05, 1.5))
+    bare: Any = STAGES["first-order-dahl"]
+    stage = replace(bare, creep_weights=(0.02, 0.04), creep_times=(0.05, 1.5))
     reference = pt.sine(frequency=1.0, low=0.0, high=50e-6, duration=2.0)
     controller = pt.Controller(dt=0.01, limits=(0.0, 75.0), feedforward=stage.inverse())
     run = pt.track(stage, controller, reference)

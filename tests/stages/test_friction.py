@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -187,8 +188,9 @@ def test_a_reversal_just_after_a_sample(
 ) -> None:
     """The velocity settles in a small part of the step, in which it turns: no cubic shows when."""
     names = ("mass", "damping", "stiffness", "piezo_coefficient", "a1", "a2", "b1", "b0", "up")
-    stage = pt.DahlStage(**dict(zip(names, mechanics + hysteresis, strict=True)))
-    start = pt.stages.DahlState(**dict(zip(("x", "v", "q1", "q2"), state, strict=True)))
+    values: dict[str, Any] = dict(zip(names, mechanics + hysteresis, strict=True))
+    beginning: dict[str, Any] = dict(zip(("x", "v", "q1", "q2"), state, strict=True))
+    stage, start = pt.DahlStage(**values), pt.stages.DahlState(**beginning)
     run = stage.simulate([*u, u[1]], dt, initial=start)
     fine = stage.simulate([*u, u[1]], dt, initial=start, accuracy=1e-13)
     assert np.abs(run.x - fine.x).max() < 1e-10

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -112,7 +112,8 @@ def test_elements_with_equal_paths_are_one() -> None:
 def test_elements_without_force_do_nothing(others: tuple[int, int]) -> None:
     """What is left is one first-order Dahl element, with the path of its place."""
     (left,) = {1, 2, 3} - {*others}
-    alone = dataclasses.replace(STAGE, **{f"rest_stiffness_{j}": 0.0 for j in others})
+    none: dict[str, Any] = {f"rest_stiffness_{j}": 0.0 for j in others}
+    alone = dataclasses.replace(STAGE, **none)
     one = pt.FirstOrderDahlStage(
         mass=STAGE.mass,
         damping=STAGE.damping,
@@ -199,4 +200,4 @@ def test_identification_finds_the_motion(tmp_path: Path) -> None:
 def test_refusals(name: str, value: float, expected: str) -> None:
     """By name, with the value and the unit."""
     with pytest.raises(pt.ParameterError, match=expected):
-        dataclasses.replace(STAGE, **{name: value})
+        dataclasses.replace(STAGE, **{name: value})  # type: ignore[arg-type]

@@ -111,6 +111,3 @@ class GeneralisedPrandtlIshlinskiiStage(Stage):
     mode_weights: tuple[float, ...] = ()
     mode_frequencies: tuple[float, ...] = ()
     mode_damping_ratios: tuple[float, ...] = ()
-    mode_weights: tuple[float, ...] = ()
-    mode_frequencies: tuple[float, ...] = ()
-    mode_damping_ratios: tuple[float, ...] = ()

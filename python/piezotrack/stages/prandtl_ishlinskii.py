@@ -132,9 +132,6 @@ class PrandtlIshlinskiiStage(Stage):
     mode_weights: tuple[float, ...] = ()
     mode_frequencies: tuple[float, ...] = ()
     mode_damping_ratios: tuple[float, ...] = ()
-    mode_weights: tuple[float, ...] = ()
-    mode_frequencies: tuple[float, ...] = ()
-    mode_damping_ratios: tuple[float, ...] = ()
 
     def _notes(self, response: Callable[[], Response]) -> list[str]:
         del response

@@ -90,9 +90,10 @@ pub struct OnlineFeedforwardState<S> {
     /// The last two references, the older one first, m; `None` before the first sample.
     past: Option<[f64; 2]>,
     inverse: S,
-    /// The inverse before the last sample, and what that asked of it.
+    /// The inverse before the last sample, and what that asked of it; `None` without a last sample,
+    /// or where it is not finite.
     before: S,
-    target: [f64; 3],
+    target: Option<[f64; 3]>,
 }
 
 crate::snapshot!(
@@ -133,7 +134,7 @@ impl<I: Inverse> OnlineFeedforward<I> {
     /// moved before.
     #[must_use]
     pub fn start(&self, inverse: I::State) -> OnlineFeedforwardState<I::State> {
-        OnlineFeedforwardState { past: None, inverse, before: inverse, target: [f64::NAN; 3] }
+        OnlineFeedforwardState { past: None, inverse, before: inverse, target: None }
     }
 
     /// The drive (V for a piezo stage) for the next sample of the reference.
@@ -162,8 +163,10 @@ impl<I: Inverse> OnlineFeedforward<I> {
         let lead = self.delay;
         let x = reference + lead * (v + 0.5 * lead * a) - self.offset;
         state.before = state.inverse;
-        state.target = [x, v + lead * a, a];
-        let drive = self.inverse.step(&mut state.inverse, x, v + lead * a, a);
+        let target = [x, v + lead * a, a];
+        state.target = target.iter().all(|value| value.is_finite()).then_some(target);
+        let [x, v, a] = target;
+        let drive = self.inverse.step(&mut state.inverse, x, v, a);
         if reference.is_finite() {
             state.past = Some([before, reference]);
         } else if state.past.is_some() {
@@ -197,7 +200,8 @@ impl<I: Inverse> OnlineFeedforward<I> {
     /// takes some hundred times as long as a step. Without a last drive, and where no displacement
     /// has this one, nothing changes.
     pub fn applied(&self, state: &mut OnlineFeedforwardState<I::State>, volts: f64) {
-        if let Some(inverse) = after_drive(&self.inverse, &state.before, state.target, volts) {
+        let Some(target) = state.target else { return };
+        if let Some(inverse) = after_drive(&self.inverse, &state.before, target, volts) {
             state.inverse = inverse;
         }
     }
