@@ -10,7 +10,8 @@ use piezotrack_control::{
     ReferenceSample,
 };
 use piezotrack_core::models::{
-    Experiment, Invertible, PlayHysteresis, PrandtlIshlinskiiStage, Relaxation, StageModel,
+    Experiment, InputOperator, InputStageState, Invertible, PlayHysteresis, PrandtlIshlinskiiStage,
+    Relaxation, StageModel,
 };
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 
@@ -271,19 +272,64 @@ fn stage() -> PrandtlIshlinskiiStage {
     }
 }
 
+/// Displacements of a stage whose hysteresis goes in a straight line from sample to sample, as its
+/// inverse has it: of the hysteresis of a straight drive where no play starts to move, m.
+fn straight(
+    stage: &PrandtlIshlinskiiStage,
+    mut state: InputStageState<<PlayHysteresis as InputOperator>::State>,
+    u: &[f64],
+    dt: f64,
+) -> Vec<f64> {
+    let flow = stage.relaxation.flow(dt);
+    let follow = |(k, volts): (usize, &f64)| {
+        let h = stage.operator.follow(&mut state.operator, *volts) - stage.zero();
+        if k == 0 {
+            stage.relaxation.jump(&mut state.relaxation, h);
+        } else {
+            stage.relaxation.step(&flow, &mut state.relaxation, h);
+        }
+        state.relaxation.x
+    };
+    u.iter().enumerate().map(follow).collect()
+}
+
+#[test]
+fn corners_between_samples_are_the_only_error_of_an_inverse() {
+    // Of second order: each corner lies in a part of a step, in which hysteresis rises by a part.
+    let error = |every: u32| {
+        let (stage, dt) = (stage(), 0.01 / f64::from(every));
+        let u: Vec<f64> = (0..5000 * every)
+            .map(|k| f64::from(k) * dt)
+            .map(|t| 25.0 * t.sin() + 12.0 * (2.7 * t).sin() + 3.0 * (17.3 * t).sin())
+            .collect();
+        let drive = Drive::new(&u, dt, Hold::First).unwrap();
+        let run = stage.simulate(&Experiment::of(&drive, NEVER)).unwrap().unwrap();
+        let (inverse, mut state) = stage.inverse(dt, None).unwrap();
+        let off = run.x.iter().zip(&u).map(|(&x, volts)| {
+            let found = inverse.step(&mut state, x, 0.0, 0.0);
+            (found - volts).abs()
+        });
+        off.fold(0.0, f64::max)
+    };
+    let errors = [1, 4, 16].map(error);
+    assert!(errors[0] < 1e-4 * 40.0, "{errors:?}");
+    for pair in errors.windows(2) {
+        assert!(pair[1] < pair[0] / 10.0, "{errors:?}");
+    }
+}
+
 #[test]
 fn hysteresis_and_creep_are_undone_to_rounding() {
     let (stage, dt) = (stage(), 0.01);
     let u = path(5000);
-    let drive = Drive::new(&u, dt, Hold::First).unwrap();
-    let run = stage.simulate(&Experiment::of(&drive, NEVER)).unwrap().unwrap();
+    let displacements = straight(&stage, stage.at_rest(), &u, dt);
     // The simulation's inverse with room for more, and one of just the size that is needed.
     let (roomy, mut first) = stage.inverse(dt, None).unwrap();
     let exact =
         PrandtlIshlinskiiInverse::<3, 1, 2>::new(&PLAY, &CREEP, Dynamics::None, dt).unwrap();
     let mut second = exact.rest();
     let largest = u.iter().fold(0.0, |most, volts| f64::max(most, volts.abs()));
-    for (&x, &volts) in run.x.iter().zip(&u) {
+    for (&x, &volts) in displacements.iter().zip(&u) {
         for found in [roomy.step(&mut first, x, 0.0, 0.0), exact.step(&mut second, x, 0.0, 0.0)] {
             assert!((found - volts).abs() < 1e-12 * largest, "{found} for {volts}");
         }
@@ -297,15 +343,11 @@ fn an_inverse_goes_on_from_where_a_stage_is() {
     let (before, after) = u.split_at(1111);
     let drive = Drive::new(before, dt, Hold::First).unwrap();
     let middle = stage.simulate(&Experiment::of(&drive, NEVER)).unwrap().unwrap().last;
-    let drive = Drive::new(after, dt, Hold::First).unwrap();
-    let run = stage
-        .simulate(&Experiment { initial: Some(&middle), ..Experiment::of(&drive, NEVER) })
-        .unwrap()
-        .unwrap();
+    let displacements = straight(&stage, stage.state(Some(&middle)).unwrap(), after, dt);
     let (inverse, memory) = stage.inverse(dt, Some(&middle)).unwrap();
     let feedforward = OnlineFeedforward::new(inverse, dt, 0.0, 0.0).unwrap();
     let mut state = feedforward.start(memory);
-    for (&x, &volts) in run.x.iter().zip(after) {
+    for (&x, &volts) in displacements.iter().zip(after) {
         let found = feedforward.step(&mut state, &ReferenceSample::new(x));
         assert!((found - volts).abs() < 1e-12 * 40.0, "{found} for {volts}");
     }
