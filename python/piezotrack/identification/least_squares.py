@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..data.dataset import Dataset
     from ..stages.model_info import ModelInfo
 
-__all__ = ["LeastSquares", "shown_history", "solve_least_squares"]
+__all__ = ["BY_PLAYS", "LeastSquares", "shown_history", "solve_least_squares"]
 
 History = Literal["virgin", "settled", "fit"]
 

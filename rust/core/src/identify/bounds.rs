@@ -2,13 +2,25 @@
 
 use super::coordinate::Coordinate;
 use super::record::Record;
+use super::resonances::resonances;
 use crate::error::{Error, Result, shown};
 use crate::integrator::MOST_PARAMETERS;
 use crate::models::{Held, Measures, Model};
+use crate::signal::Stop;
 
 /// What the bounds are built from.
 pub(super) fn measures(record: &Record<'_>) -> Measures {
     Measures::of(&record.drive, record.y, record.window.clone())
+}
+
+/// Least share of the deviation that a mode has to take away before the search keeps to it.
+const CLEAR: f64 = 0.05;
+
+/// Natural frequency of the mode that a record shows, rad/s; `None` where it shows none.
+fn shown_mode(record: &Record<'_>, stop: Stop<'_>) -> Option<f64> {
+    let found = resonances(&record.drive, record.y, record.window.start, 1, stop)?;
+    let clear = found.first().filter(|mode| mode.gain > CLEAR)?;
+    Some(core::f64::consts::TAU * clear.frequency)
 }
 
 /// Coordinates of all parameters: the fixed ones as given, the others between derived bounds.
@@ -21,8 +33,9 @@ pub fn derive(
     model: Model,
     fixed: &[Option<f64>; MOST_PARAMETERS],
     wants_mode: bool,
+    stop: Stop<'_>,
 ) -> Result<[Coordinate; MOST_PARAMETERS]> {
-    let of = Measures { wants_mode, ..measures(record) };
+    let mut of = Measures { wants_mode, ..measures(record) };
     if !of.usable() {
         return Err(Error::Data(format!(
             "a stroke of {} m, {} m/V and a drive of {} rad/s cannot be computed with: check \
@@ -31,6 +44,9 @@ pub fn derive(
             shown(of.gain),
             shown(of.frequency)
         )));
+    }
+    if of.excited().is_some() {
+        of.mode = shown_mode(record, stop);
     }
     let infos = model.scalars();
     let mut held = Held::defaults(infos);

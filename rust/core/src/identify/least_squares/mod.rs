@@ -12,7 +12,7 @@ mod fit;
 mod follower;
 mod form;
 mod layout;
-mod thresholds;
+mod plays;
 
 use super::history::History;
 use crate::error::{Error, Result};
