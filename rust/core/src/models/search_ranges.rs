@@ -14,6 +14,10 @@ pub const NOMINAL_STIFFNESS: f64 = 1e6;
 /// Least lag D/K that is searched, as a share of the sampling interval.
 const LEAST_LAG: f64 = 0.05;
 
+/// Quickness of a drive over its frequency up to which it is one sine: a chirp has 1.3, whatever
+/// its ends.
+const SINE: f64 = 1.15;
+
 /// Lower and upper end of a range.
 pub type Range = (f64, f64);
 
@@ -63,14 +67,16 @@ impl Measures {
         let together: f64 = u.iter().zip(y).map(|(u, y)| (u - mean) * (y - level)).sum();
         let gain = stroke / (high - low);
         let twice = 2.0 * core::f64::consts::TAU / (index(u.len()) * dt);
-        let slow = frequency.min(twice);
+        let quickness = quickness(u, dt);
+        // One sine moves at its own rate, however long it is.
+        let slow = if quickness < SINE * frequency { frequency } else { frequency.min(twice) };
         Self {
             stroke,
             gain,
             inverted: together < 0.0,
             frequency,
             slow,
-            quickness: quickness(u, dt),
+            quickness,
             wants_mode: false,
             dt,
             drive_size,
