@@ -35,7 +35,7 @@ def tracking() -> pt.Dataset:
 
 @cache
 def fit(seed: int) -> pt.identification.Identification:
-    return pt.identify(training(), seed=seed)
+    return pt.identify(training(), "dahl", seed=seed)
 
 
 def test_the_figures_of_the_readme() -> None:
