@@ -19,6 +19,9 @@ const NEAR_MODE: Range = (0.6, 1.3);
 
 /// Damping ratios of a mode which the record shows.
 const MODE_DAMPING: Range = (0.003, 2.0);
+/// Quickness of a drive over its frequency up to which it is one sine: a chirp has 1.3, whatever
+/// its ends.
+const SINE: f64 = 1.15;
 
 /// Lower and upper end of a range.
 pub type Range = (f64, f64);
@@ -71,14 +74,16 @@ impl Measures {
         let together: f64 = u.iter().zip(y).map(|(u, y)| (u - mean) * (y - level)).sum();
         let gain = stroke / (high - low);
         let twice = 2.0 * core::f64::consts::TAU / (index(u.len()) * dt);
-        let slow = frequency.min(twice);
+        let quickness = quickness(u, dt);
+        // One sine moves at its own rate, however long it is.
+        let slow = if quickness < SINE * frequency { frequency } else { frequency.min(twice) };
         Self {
             stroke,
             gain,
             inverted: together < 0.0,
             frequency,
             slow,
-            quickness: quickness(u, dt),
+            quickness,
             wants_mode: false,
             mode: None,
             dt,
