@@ -16,9 +16,9 @@ threading.Thread(target=lambda: {call}, daemon=True).start()
 time.sleep({seconds})
 """
 CALLS = {
-    "identify": "pt.identify(log)",
-    "callback": "pt.identify(log, callback=lambda progress: None)",
-    "progress": "pt.identify(log, progress=True)",
+    "identify": "pt.identify(log, 'dahl')",
+    "callback": "pt.identify(log, 'dahl', callback=lambda progress: None)",
+    "progress": "pt.identify(log, 'dahl', progress=True)",
     "simulate": "pt.VirtualStage.xu_li_2010().simulate(np.zeros(3_000_000), 1 / 5000.0)",
 }
 

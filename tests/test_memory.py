@@ -48,8 +48,8 @@ NONE = {
     "loop": "pt.track(stage, loop, reference, substeps=90)",
     "circle": "circle.errors(many, many)",
     "path": "figure.errors(many, many)",
-    "swarm": "pt.identify(log, swarm=swarm, runs=10)",
-    "refinement": "pt.identify(long, threads=16)",
+    "swarm": "pt.identify(log, 'dahl', swarm=swarm, runs=10)",
+    "refinement": "pt.identify(long, 'dahl', threads=16)",
 }
 
 
@@ -82,7 +82,7 @@ TOO_MANY = {
         "ParameterError period is 990 s: expected from 2 to 1e7 sampling intervals",
     ),
     "particles": (
-        "pt.identify(log, swarm=swarm, runs=10_000)",
+        "pt.identify(log, 'dahl', swarm=swarm, runs=10_000)",
         "ParameterError runs is 10000: expected 10 at most with 100000 particles in each: "
         "1000000 together",
     ),

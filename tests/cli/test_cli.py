@@ -46,7 +46,7 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_identify_writes_what_python_finds() -> None:
     printed = ran("identify", "log.csv", *PAPER, "--seed", "3")
-    fit = pt.identify(pt.read("log.csv"), fixed=HELD, bounds=BOX, seed=3)
+    fit = pt.identify(pt.read("log.csv"), "dahl", fixed=HELD, bounds=BOX, seed=3)
     assert names("results") == RESULTS
     model = pt.load("results/dahl.json")
     assert model.model == fit.model
@@ -66,6 +66,7 @@ def test_every_option_of_a_fit_reaches_it() -> None:
     ran("identify", "log.csv", *options.split(), "--free", "damping,piezo_coefficient, b1")
     fit = pt.identify(
         pt.read("log.csv", hold="zoh")[1.0:3.0],
+        "dahl",
         fixed={"a1": 121.9874, "a2": 1177300.0, "mass": 0.1828},
         bounds={"damping": (1000.0, 5000.0)},
         free=["damping", "piezo_coefficient", "b1"],
@@ -101,7 +102,7 @@ def test_columns_and_units_can_be_named() -> None:
 def test_a_window_may_be_open(window: str) -> None:
     ran("identify", "log.csv", *PAPER, "--window", window, "--threads", "1")
     start, stop = (float(text) if text else None for text in window.split(":"))
-    fit = pt.identify(pt.read("log.csv")[start:stop], fixed=HELD, bounds=BOX)
+    fit = pt.identify(pt.read("log.csv")[start:stop], "dahl", fixed=HELD, bounds=BOX)
     assert pt.load("results/dahl.json").model == fit.model
 
 
@@ -124,11 +125,21 @@ def test_several_kinds_are_identified_in_one_go() -> None:
     printed = ran("identify", "log.csv", *models, "--window", "1:", "--seed", "2", "--runs", "1")
     assert names("results") == ["dahl.json", "prandtl-ishlinskii.json"]
     log = pt.read("log.csv")[1.0:]
-    for fit in (pt.identify(log, "prandtl-ishlinskii"), pt.identify(log, seed=2, runs=1)):
+    for fit in (pt.identify(log, "prandtl-ishlinskii"), pt.identify(log, "dahl", seed=2, runs=1)):
         assert fit.summary() in printed
         expected = fit.save("expected.json").read_bytes()
         assert Path("results", f"{fit.model.info.name}.json").read_bytes() == expected
     assert printed.index("Prandtl-Ishlinskii: stage") < printed.index("Dahl, second order: stage")
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_by_default_the_kind_that_suits_the_log_is_found() -> None:
+    printed = ran("identify", "log.csv", "--seed", "2", "--runs", "1")
+    fit = pt.identify(pt.read("log.csv"), seed=2, runs=1)
+    assert fit.summary() in printed
+    expected = fit.save("expected.json").read_bytes()
+    assert names("results") == [f"{fit.model.info.name}.json"]
+    assert Path("results", f"{fit.model.info.name}.json").read_bytes() == expected
 
 
 def test_pictures_of_several_kinds_do_not_collide() -> None:
@@ -255,7 +266,7 @@ def test_the_installed_command_works_and_repeats_itself() -> None:
 @pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C in another way")
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_keeps_the_best_so_far(number: signal.Signals, code: int) -> None:
-    search = ["identify", "log.csv", "--runs", "500", "--out", "out"]
+    search = ["identify", "log.csv", "--model", "dahl", "--runs", "500", "--out", "out"]
     with subprocess.Popen(
         [*COMMAND, *search], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:

@@ -24,7 +24,10 @@ pytestmark = pytest.mark.skipif(
 WORK = {
     "track": ["track", "dahl.json", "--reference", "sine:0.5Hz,0..50um,4s"],
     "contour": ["contour", "dahl.json", "--path", "circle:1Hz,5um"],
-    "identify": ["identify", "log.csv", "--runs", "1", "--validate", "log.csv"],
+    "identify": [
+        *("identify", "log.csv", "--model", "dahl"),
+        *("--runs", "1", "--validate", "log.csv"),
+    ],
     "compare": [
         "compare",
         "log.csv",

@@ -54,7 +54,7 @@ def test_a_signal_while_modules_are_imported_is_one_line(
     number: signal.Signals, code: int, word: str, after: float
 ) -> None:
     Path("log.csv").write_text(log_text(), encoding="utf-8")
-    search = ["identify", "log.csv", "--runs", "500"]
+    search = ["identify", "log.csv", "--model", "dahl", "--runs", "500"]
     found = stopped([*BEGUN, *search], after, number)
     assert found[:2] == (code, "")
     assert re.fullmatch(rf"piezotrack: (interrupted|{word})[^\n]*\n", found[2]), found[2]

@@ -22,6 +22,7 @@ PICTURES = [
 ]
 RESULTS = sorted(["dahl.json", *(f"dahl_{picture}" for picture in PICTURES)])
 PAPER = [
+    *("--model", "dahl"),
     *(part for name, value in HELD.items() for part in ("--fix", f"{name}={value}")),
     *(part for name, (low, high) in BOX.items() for part in ("--bound", f"{name}={low}:{high}")),
 ]

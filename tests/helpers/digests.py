@@ -32,7 +32,7 @@ def digests(threads: int) -> list[str]:
     lines += [f"{kind} {digest(pt.identify(data, kind))}" for kind in PLAYS]
     for update, topology in product(UPDATES, TOPOLOGIES):
         swarm = pt.ParticleSwarm(particles=9, iterations=8, update=update, topology=topology)
-        fit = pt.identify(data, swarm=swarm, seed=3, threads=threads, runs=2)
+        fit = pt.identify(data, "dahl", swarm=swarm, seed=3, threads=threads, runs=2)
         lines.append(f"{update} {topology} {digest(fit)}")
     return lines
 

@@ -98,6 +98,7 @@ def quick(seed: int = 0) -> pt.Dataset:
 def quick_fit(**arguments: Any) -> pt.identification.Identification:
     """Search the paper's box on the quick record with a small swarm."""
     wanted: dict[str, Any] = {
+        "model": "dahl",
         "fixed": HELD,
         "bounds": BOX,
         "swarm": pt.ParticleSwarm(particles=12, iterations=30),

@@ -148,7 +148,7 @@ BAD = [*BAD_ARGUMENTS, *WRONG_TYPES]
 
 def refused(arguments: dict[str, Any]) -> str:
     """The message with which arguments of `identify` are refused."""
-    arguments = {"data": quick(), "swarm": SMALL, **arguments}
+    arguments = {"data": quick(), "model": "dahl", "swarm": SMALL, **arguments}
     with pytest.raises(pt.ParameterError) as caught:
         pt.identify(arguments.pop("data"), **arguments)
     return str(caught.value)

@@ -462,7 +462,7 @@ SWARM = slots_of(
 def swarm(script: Script, draw: Draw) -> None:
     made = script.new("pt.ParticleSwarm", **arguments(draw, SWARM))
     if made is not None:
-        use_fit(script, script.new("pt.identify", LOG, swarm=made, runs=1, seed=3), LOG)
+        use_fit(script, script.new("pt.identify", LOG, "dahl", swarm=made, runs=1, seed=3), LOG)
 
 
 # Name, body, and its share of the calls: what is slow has less.

@@ -127,6 +127,7 @@ def test_b0_is_found() -> None:
     noise = 20e-9 * np.random.default_rng(1).standard_normal(x.size)
     fit = pt.identify(
         pt.Dataset(u=u, y=x + noise, dt=dt),
+        "dahl",
         free=["damping", "piezo_coefficient", "b1", "b0"],
         fixed={"mass": 0.1828, "a1": TABLE_1.a1, "a2": TABLE_1.a2},
         stiffness=TABLE_1.stiffness,

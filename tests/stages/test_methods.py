@@ -77,6 +77,7 @@ def test_a_decimated_log_identifies_the_same_stage() -> None:
     log = pt.Dataset(u=u, y=stage.simulate(u, 2e-4).x + noise, dt=2e-4)
     fit = pt.identify(
         log.decimate(25),
+        "dahl",
         fixed={"mass": stage.mass, "a1": stage.a1, "a2": stage.a2, "b1": stage.b1},
         seed=1,
     )

@@ -156,7 +156,12 @@ def test_its_log_can_be_identified() -> None:
     assert (len(log), log.dt, log.hold) == (1001, 1 / 250.0, "foh")
     assert np.array_equal(log.y, STAGE.simulate(log.u, log.dt).y)
     fit = pt.identify(
-        log, fixed=HELD, bounds=BOX, swarm=pt.ParticleSwarm(particles=12, iterations=60), seed=1
+        log,
+        "dahl",
+        fixed=HELD,
+        bounds=BOX,
+        swarm=pt.ParticleSwarm(particles=12, iterations=60),
+        seed=1,
     )
     assert fit.fitted.max_error < 5e-6
     assert STAGE.record(log.u, log.dt, hold="zoh").hold == "zoh"

@@ -47,7 +47,10 @@ def identify_command(
     window: Seconds = None,
     model: Annotated[
         list[str] | None,
-        typer.Option(metavar="MODEL", help="Stage model, as dahl or bouc-wen. Repeatable."),
+        typer.Option(
+            metavar="MODEL",
+            help="Stage model, as dahl or bouc-wen, repeatable; default auto, the best of them.",
+        ),
     ] = None,
     out: Out = Path("results"),
     time: TimeColumn = None,
@@ -101,10 +104,8 @@ def identify_command(
     validate_window: Seconds = None,
 ) -> None:
     """Identify stage models from a log: a table, the model as JSON, pictures."""
-    from ..stages.registry import model_named
-
     kinds = _kinds(model)
-    if not any(model_named(kind).searched for kind in kinds):
+    if not any(_searched(kind) for kind in kinds):
         refuse_without_effect(
             context,
             ("seed", "runs", "threads"),
@@ -141,6 +142,8 @@ def identify_command(
             fit = _search(log, out, kind, **_of_model(kind, kinds, arguments))
         score = None if second is None else fit.score(second)
         written += _write(fit, out, second, score)
+        # The result is complete: remove the file of an interrupted search.
+        (out / _partial(kind)).unlink(missing_ok=True)
         printed.append(fit.summary())
         if second is not None and score is not None:
             own = ", with an offset of its own" if offset else ""
@@ -152,21 +155,29 @@ def identify_command(
 
 def _kinds(given: list[str] | None) -> list[str]:
     """Check the names of the models before the first is identified."""
+    from ..identification.selection import AUTO
     from ..stages.registry import model_named
 
-    kinds = given or ["dahl"]
+    kinds = given or [AUTO]
     for i, name in enumerate(kinds):
-        model_named(name)
+        if name != AUTO:
+            model_named(name)
         if name in kinds[:i]:
             raise ParameterError(f"--model names {name} twice: expected it once")
     return kinds
 
 
-def _of_model(name: str, names: list[str], arguments: dict[str, Any]) -> dict[str, Any]:
-    """Leave out the effort of a search where another of the models named is searched."""
+def _searched(name: str) -> bool:
+    """Whether a swarm searches the model, or one of those that are tried."""
+    from ..identification.selection import AUTO
     from ..stages.registry import model_named
 
-    if model_named(name).searched or not any(model_named(one).searched for one in names):
+    return name == AUTO or model_named(name).searched
+
+
+def _of_model(name: str, names: list[str], arguments: dict[str, Any]) -> dict[str, Any]:
+    """Leave out the effort of a search where another of the models named is searched."""
+    if _searched(name) or not any(_searched(one) for one in names):
         return arguments
     return {key: arguments[key] for key in arguments if key not in ("seed", "runs", "threads")}
 
@@ -219,8 +230,6 @@ def _write(
     with together(make_folder(out)) as folder:
         written = save_identification(fit, folder)
         written += save_figures(figures, folder)  # type: ignore[arg-type]
-    # The result is complete: remove the file of an interrupted search.
-    (out / _partial(kind.name)).unlink(missing_ok=True)
     return written
 
 

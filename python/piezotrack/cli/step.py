@@ -68,7 +68,7 @@ def step_command(
         written = [_write(step, folder), *save_figures({"step": step.plot()}, folder)]
     print(step.summary())
     options = " ".join(f"--fix {name}={value:.8g}" for name, value in step.hysteresis.items())
-    print(f"\nto hold these in a search: piezotrack identify LOG {options}")
+    print(f"\nto hold these in a search: piezotrack identify LOG --model dahl {options}")
     list_files(written)
 
 
