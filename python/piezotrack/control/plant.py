@@ -54,15 +54,17 @@ def run_closed_loop(
     reference: Array,
     feedforward: Array,
     sampling: tuple[float, float, int],
+    visited: tuple[float, ...] = (),
 ) -> _core.TrackingRun:
-    """Simulate a closed loop from rest, with reference [m] and feedforward [V] at the samples.
+    """Simulate a closed loop, with reference [m] and feedforward [V] at the samples.
 
+    The stage is at rest, or in equilibrium after slow visits to the voltages `visited` [V].
     `sampling` is delay and jitter [s], and the substeps kept in each sampling interval.
     """
     run = (controller._core, reference, feedforward, sampling)
     if isinstance(stage, VirtualStage):
         return stage._core.track(*run)
-    return stage._core.track(min(MODEL_STEP, controller.dt / 4), *run)
+    return stage._core.track(min(MODEL_STEP, controller.dt / 4), *run, visited)
 
 
 def reach(stage: Plant, limits: tuple[float, float], dt: float) -> tuple[float, float]:

@@ -10,16 +10,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from .._support.arguments import not_negative
+from .._support.arguments import not_negative, one_or_more_numbers
 from .._support.statistics import FIGURES, ErrorStatistics
 from ..errors import ParameterError
 from ..references.reference import Reference, SampledReference
 from ..stages.inverse import PlayedVoltage
+from ..stages.virtual import VirtualStage
 from .controller import Controller
 from .plant import reach, run_closed_loop, settled_bottom, unwrap
 from .stability import check_loop
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
@@ -249,6 +252,7 @@ def track(
     delay: float = 0.0,
     jitter: float = 0.0,
     substeps: int = 10,
+    visited: float | Sequence[float] = (),
     beyond_reach: bool = False,
     unstable: bool = False,
 ) -> Tracking:
@@ -275,6 +279,10 @@ def track(
         interval. The draws depend on the seed of the stage's sensor.
     substeps : int, optional
         Instants kept in each sampling interval, for plots; up to 100000.
+    visited : float or sequence of float, optional
+        Voltages that a stage model visits slowly before the run, in turn [V]: it begins in
+        equilibrium at the last, with the memory of the others, as ``(75.0, 0.0)``. By default it
+        never moved before. A `VirtualStage` has its own preconditioning.
     beyond_reach : bool, optional
         Whether the reference may exceed the reach of the stage within the voltage limits, as to
         study saturation.
@@ -321,7 +329,12 @@ def track(
         check_within_reach(plant, controller, samples, offset)
     voltage, note = feedforward_of(controller, reference, samples)
     sampling = (delay, not_negative("jitter", jitter, "s"), substeps)
-    run = run_closed_loop(plant, controller, samples.x - offset, voltage, sampling)
+    before = one_or_more_numbers("visited", visited)
+    if before and isinstance(plant, VirtualStage):
+        raise ParameterError(
+            f"visited is {before}: expected none, a virtual stage has its preconditioning"
+        )
+    run = run_closed_loop(plant, controller, samples.x - offset, voltage, sampling, before)
     return collected(run, controller, reference, samples, note, substeps, offset)
 
 

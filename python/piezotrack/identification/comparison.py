@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from .history import History
+
     Array = NDArray[np.float64]
 
 __all__ = ["Comparison", "ModelScore", "compare"]
@@ -211,6 +213,7 @@ def compare(
     *,
     train: Window | None = None,
     test: Window | Dataset | None = None,
+    history: History | None = None,
     seed: int = 0,
     runs: int = 4,
     threads: int | None = None,
@@ -246,6 +249,8 @@ def compare(
     test : (float, float) or Dataset, optional
         Window of the same record to validate on [s], or another record. By default the part after
         `train`.
+    history : {"virgin", "settled", "fit"}, optional
+        What the stage went through before the record, as for `identify`.
     seed, runs, threads, progress : optional
         As for `identify`, for the models that a swarm searches.
 
@@ -287,7 +292,7 @@ def compare(
         found: IdentifiedModel
         if isinstance(source, ModelInfo):
             options: dict[str, Any] = of_swarm if source.searched else {}
-            found = identify(first, source.name, **options)
+            found = identify(first, source.name, history=history, **options)
         else:
             found = source
         rows.append(_compared(name, title, found, first, second, carried))

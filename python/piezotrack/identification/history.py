@@ -199,7 +199,12 @@ def start_of_fit(data: Dataset, history: History, state: StageState) -> Start:
 
 
 def start_after(
-    model: Stage, data: Dataset, history: History, voltage: float | None = None
+    model: Stage,
+    data: Dataset,
+    history: History,
+    voltage: float | None = None,
+    *,
+    creeps: bool = True,
 ) -> Start:
     """State of a stage at the first sample of a record after a history.
 
@@ -213,6 +218,8 @@ def start_after(
         What it went through before.
     voltage : float, optional
         The voltage that it came from, for ``"fit"`` [V].
+    creeps : bool, optional
+        Whether the creep of a settled stage repeats, as its hysteresis does; else it is complete.
 
     Returns
     -------
@@ -223,7 +230,7 @@ def start_after(
     before = 0.0 if voltage is None else voltage
     visited = _core.visited(full.u, data.dt, data.hold, history, before)
     state = model.equilibrium(visited.tolist())
-    if history == "settled" and len(getattr(state, "creep", ())):
+    if creeps and history == "settled" and len(getattr(state, "creep", ())):
         state = _repeating(model, data, state)
     return Start(history=history, state=state, voltage=voltage, record=fingerprint(data))
 

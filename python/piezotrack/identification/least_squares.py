@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..data.dataset import Dataset
     from ..stages.model_info import ModelInfo
 
-__all__ = ["LeastSquares", "shown_history", "solve_least_squares"]
+__all__ = ["BY_PLAYS", "LeastSquares", "shown_history", "solve_least_squares"]
 
 History = Literal["virgin", "settled", "fit"]
 
@@ -49,7 +49,8 @@ class LeastSquares:
     ----------
     count : int, optional
         Number of plays, 1 to 32, with thresholds spread evenly up to half of the drive's range.
-        None: 10, or 20 where these foretell a third of the window better that was left out.
+        None: 20; with fewer than 800 samples 10, or 20 where these foretell a third of the window
+        better that was left out.
     thresholds : sequence of float, optional
         Thresholds of the plays [V], in place of `count`.
     dead_zones : bool or int, optional

@@ -132,20 +132,17 @@ def of_lags(lags: LagRange | None, frequency: float) -> list[str]:
     """
     if lags is None:
         return []
-    if lags.from_zero:
-        return [
-            f"any lag from 0 to {1e3 * lags.most:.2g} ms fits as well, and the model has the "
-            "least: a record at another rate would tell"
-        ]
     share = lags.least * frequency
-    if share < VISCOUS:
+    if lags.from_zero or share < VISCOUS:
+        least = 0.0 if lags.from_zero else lags.least
         return [
-            f"any lag from {1e3 * lags.least:.2g} to {1e3 * lags.most:.2g} ms fits as well, and "
-            "the model has the least: a record at another rate would tell"
+            f"any lag from {1e3 * least:.2g} to {1e3 * lags.most:.2g} ms fits as well: a record at "
+            "another rate would tell"
         ]
     return [
-        f"a lag of {1e3 * lags.least:.3g} ms makes {100 * share:.2g} % of the travel at this rate: "
-        "this model takes the width of the loop for damping, and holds at this rate only"
+        f"a lag of {1e3 * lags.least:.3g} ms makes {100 * share:.2g} % of the travel at this rate, "
+        "and no shorter one fits: the model holds at this rate only; whether it is due to damping, "
+        "creep or a late reading, a record at another rate would tell"
     ]
 
 

@@ -258,7 +258,7 @@ def _identification(
     return Identification(
         lags=None if found.lags is None else LagRange(*found.lags),
         model=model,
-        start=start_after(model, data, history, before),
+        start=start_after(model, data, history, before, creeps=False),
         delay=delay,
         offset=found.offset,
         offset_fitted=offset,

@@ -12,6 +12,7 @@ from .._support.messages import quoted
 from ..errors import DataError, NumericalError, ParameterError
 from ..stages.registry import model_named
 from .kinds import identify_kind
+from .least_squares import BY_PLAYS
 from .swarm import ParticleSwarm
 
 if TYPE_CHECKING:
@@ -36,8 +37,11 @@ OF_FORCE = ("bouc-wen-oscillator", "prandtl-ishlinskii")
 OF_ONE_MODEL = ("free", "fixed", "initial", "bounds")
 # Share of the window that is fitted, and turns of the drive that each part needs.
 FITTED, TURNS = 0.6, 2
-# A residual of so many times the noise on what was not fitted cannot be bettered.
-AS_NOISE = 1.15
+# A residual of so many times the noise, on what was not fitted, is good enough to try no more.
+AS_NOISE = 1.5
+# Correlation of residuals up to so many samples apart that is that of noise; and what chance makes
+# of it, in standard deviations.
+APART, CORRELATED, CHANCE = 10, 0.1, 4.0
 # Another kind has to be better by this share than one before it in the list.
 BETTER = 0.03
 # The descent finds the bottom: swarms that only have to find the basin can be short.
@@ -110,12 +114,21 @@ def identify_best(
     for info in infos:
         try:
             fit = identify_kind(part, info, of_swarm=swarm, **common)
+            if info.name == BY_PLAYS and fit.start is not None:
+                # What swarms would ask a stage with plays for, each time again.
+                common["history"] = fit.start.history
         except (DataError, NumericalError) as error:
             refused = refused or error
             continue
         score = fit.score(rest, offset=fit.offset) if rest is not part else fit.fitted
         found.append((Trial(info.name, info.title, score.rms), info))
-        if score.rms < AS_NOISE * noise:
+        if fit.start is not None and not info.searched:
+            # What least squares have found of the history holds for all kinds.
+            common["history"] = history or fit.start.history
+        # Of a quick motion, differences from sample to sample are not the noise's alone.
+        if score.rms < AS_NOISE * noise and _white(
+            rest.y - fit.simulate(rest, offset=fit.offset).x
+        ):
             break
     if not found:
         raise refused or DataError("no kind of stage could be fitted")
@@ -161,3 +174,13 @@ def _noise(y: Array) -> float:
     if y.size < 16:
         return 0.0
     return float(1.4826 * np.median(np.abs(np.diff(y, 3))) / np.sqrt(20.0))
+
+
+def _white(rest: Array) -> bool:
+    """Whether residuals are noise from sample to sample: nothing is left to describe."""
+    rest = rest - rest.mean()
+    squares = float(rest @ rest)
+    if rest.size <= APART or squares == 0.0:
+        return True
+    most = max(abs(float(rest[:-k] @ rest[k:])) for k in range(1, APART + 1))
+    return most < max(CORRELATED, CHANCE / np.sqrt(rest.size)) * squares

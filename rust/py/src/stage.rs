@@ -108,7 +108,8 @@ impl PyStage {
         Ok(PyResponse(run))
     }
 
-    /// Simulates the closed loop along a reference from rest, in steps of at most `step` seconds.
+    /// Simulates the closed loop along a reference, after visits to voltages or from rest, in steps
+    /// of at most `step` seconds.
     fn track(
         &self,
         py: Python<'_>,
@@ -117,9 +118,11 @@ impl PyStage {
         reference: &Bound<'_, PyAny>,
         feedforward: &Bound<'_, PyAny>,
         sampling: Sampling,
+        visited: &Bound<'_, PyAny>,
     ) -> PyResult<PyTrackingRun> {
+        let visited = samples("visited", visited)?;
         let input = Arrays::new(reference, feedforward)?;
-        enter(py, |stop| input.run(&self.axis(step), controller, sampling, stop))
+        enter(py, |stop| input.run(&self.axis(step), &visited, controller, sampling, stop))
     }
 
     /// The stage for small motions between two voltages: least, middle and largest gain.

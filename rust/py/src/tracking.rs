@@ -54,17 +54,19 @@ impl Arrays {
         ReferenceSamples { reference: &self.reference, feedforward: &self.feedforward }
     }
 
-    /// Simulates the closed loop of an axis from its start.
+    /// Simulates the closed loop of an axis from its start, or after visits to voltages.
     pub fn run(
         &self,
         axis: &Axis,
+        visited: &[f64],
         controller: &PyController,
         sampling: Sampling,
         stop: Stop<'_>,
     ) -> Result<PyTrackingRun> {
         let timing = timing(controller, self.reference.len(), sampling);
         let (apparatus, input) = (axis.apparatus(), self.input());
-        let run = track(&apparatus, axis.start(), &timing, &controller.controller, input, stop)?;
+        let start = axis.start_after(visited);
+        let run = track(&apparatus, start, &timing, &controller.controller, input, stop)?;
         PyTrackingRun::new(stopped(run)?)
     }
 }

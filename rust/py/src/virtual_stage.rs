@@ -228,6 +228,6 @@ impl PyVirtualStage {
         sampling: Sampling,
     ) -> PyResult<PyTrackingRun> {
         let input = Arrays::new(reference, feedforward)?;
-        enter(py, |stop| input.run(&Axis::Virtual(self.0), controller, sampling, stop))
+        enter(py, |stop| input.run(&Axis::Virtual(self.0), &[], controller, sampling, stop))
     }
 }

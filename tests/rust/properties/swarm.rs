@@ -86,7 +86,7 @@ fn found(plan: &Plan, threads: usize) -> Vec<(Vec<u64>, Vec<u64>, usize)> {
         offset: true,
         ..Spec::of(Model::Dahl)
     };
-    let problem = Problem::new(&record, &spec).unwrap();
+    let problem = Problem::new(&record, &spec, NEVER).unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let outcomes = pool.install(|| {
         let evaluator = Evaluator::new(&record, &problem, NEVER);

@@ -2,13 +2,53 @@
 
 use super::coordinate::Coordinate;
 use super::record::Record;
+use super::resonances::resonances;
 use crate::error::{Error, Result, shown};
 use crate::integrator::MOST_PARAMETERS;
 use crate::models::{Held, Measures, Model};
+use crate::signal::{Drive, Stop, index, range};
 
 /// What the bounds are built from.
 pub(super) fn measures(record: &Record<'_>) -> Measures {
     Measures::of(&record.drive, record.y, record.window.clone())
+}
+
+/// Least share of the deviation that a mode has to take away before the search keeps to it.
+const CLEAR: f64 = 0.05;
+
+/// Natural frequency of the mode that a record shows, rad/s; `None` where it shows none.
+fn shown_mode(record: &Record<'_>, stop: Stop<'_>) -> Option<f64> {
+    let found = resonances(&record.drive, record.y, record.window.start, 1, stop)?;
+    let clear = found.first().filter(|mode| mode.gain > CLEAR)?;
+    Some(core::f64::consts::TAU * clear.frequency)
+}
+
+/// Least range of the drive's means, relative to that of the drive, that tells a gain.
+const SLOW_PART: f64 = 0.2;
+
+/// Takes gain and stroke from means over two cycles of the mode, which its swinging does not
+/// enlarge, where the drive moves slowly enough besides.
+fn steady(of: &mut Measures, record: &Record<'_>, mode: f64) {
+    let (u, y) = (&record.drive.u[record.window.clone()], &record.y[record.window.clone()]);
+    let cycles = 2.0 * core::f64::consts::TAU / (mode * record.drive.dt);
+    let Some(length) = (1..=u.len() / 4).find(|&length| index(length) >= cycles) else { return };
+    let means = |values: &[f64]| -> Vec<f64> {
+        let mean = |part: &[f64]| part.iter().sum::<f64>() / index(part.len());
+        values.chunks_exact(length).map(mean).collect()
+    };
+    let (u_means, y_means) = (means(u), means(y));
+    let (low, high) = range(u);
+    let (least, most) = range(&u_means);
+    let slow = most - least > SLOW_PART * (high - low);
+    let Ok(drive) = Drive::new(&u_means, record.drive.dt, record.drive.hold) else { return };
+    if slow && u_means.len() > 3 {
+        let found = Measures::of(&drive, &y_means, 0..u_means.len());
+        if found.gain > 0.0 && found.gain < of.gain {
+            of.stroke *= found.gain / of.gain;
+            of.gain = found.gain;
+        }
+        of.inverted = found.inverted;
+    }
 }
 
 /// Coordinates of all parameters: the fixed ones as given, the others between derived bounds.
@@ -21,8 +61,9 @@ pub fn derive(
     model: Model,
     fixed: &[Option<f64>; MOST_PARAMETERS],
     wants_mode: bool,
+    stop: Stop<'_>,
 ) -> Result<[Coordinate; MOST_PARAMETERS]> {
-    let of = Measures { wants_mode, ..measures(record) };
+    let mut of = Measures { wants_mode, ..measures(record) };
     if !of.usable() {
         return Err(Error::Data(format!(
             "a stroke of {} m, {} m/V and a drive of {} rad/s cannot be computed with: check \
@@ -31,6 +72,12 @@ pub fn derive(
             shown(of.gain),
             shown(of.frequency)
         )));
+    }
+    if of.excited().is_some() {
+        of.mode = shown_mode(record, stop);
+    }
+    if let Some(mode) = of.mode {
+        steady(&mut of, record, mode);
     }
     let infos = model.scalars();
     let mut held = Held::defaults(infos);

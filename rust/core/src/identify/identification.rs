@@ -43,7 +43,7 @@ pub fn identify(
     stop: Stop<'_>,
 ) -> Result<Identification> {
     plan.validate()?;
-    let problem = Problem::new(record, spec)?;
+    let problem = Problem::new(record, spec, stop)?;
     enough_memory(record, &problem)?;
     let evaluator = Evaluator::new(record, &problem, stop);
     let mut runs = search(&evaluator, &problem, plan, monitor, stop)?;

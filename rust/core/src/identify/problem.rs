@@ -9,7 +9,7 @@ use super::record::Record;
 use crate::error::{Error, Result, positive, shown};
 use crate::integrator::MOST_PARAMETERS;
 use crate::models::{FoundBy, Held, Model, NOMINAL_STIFFNESS, position};
-use crate::signal::index;
+use crate::signal::{Stop, index};
 
 /// Specification by the caller.
 #[derive(Clone, Debug)]
@@ -123,13 +123,14 @@ type Fixed = [Option<f64>; MOST_PARAMETERS];
 type Free = [bool; MOST_PARAMETERS];
 
 impl Problem {
-    /// Settles which parameters are free, and between which bounds.
+    /// Settles which parameters are free, and between which bounds; without what the record shows
+    /// of modes where `stop` said so meanwhile.
     ///
     /// # Errors
     /// [`Error::Parameter`] for an unknown name, a value or bound out of range, a parameter
     /// that is both fixed and free or has no value, and where all the parameters that carry
     /// force are free.
-    pub fn new(record: &Record<'_>, spec: &Spec) -> Result<Self> {
+    pub fn new(record: &Record<'_>, spec: &Spec, stop: Stop<'_>) -> Result<Self> {
         let infos = spec.model.scalars();
         if spec.model.found_by() != FoundBy::Swarm {
             let found = format!("'{}'", spec.model.info().name);
@@ -161,7 +162,7 @@ impl Problem {
         check_fixed(spec.model, &fixed)?;
         let mut coordinates = [Coordinate::Fixed(0.0); PLACES];
         let wants_mode = spec.free.as_ref().is_some_and(|names| names.iter().any(|n| n == "mass"));
-        let derived = bounds::derive(record, spec.model, &fixed, wants_mode)?;
+        let derived = bounds::derive(record, spec.model, &fixed, wants_mode, stop)?;
         coordinates[..DELAY].copy_from_slice(&derived);
         coordinates[DELAY] = spec.delay.coordinate(record)?;
         if spec.history == History::Fitted {

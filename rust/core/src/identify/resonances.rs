@@ -26,6 +26,10 @@ const HIGHEST: f64 = 0.45;
 /// Fewest cycles of a mode in the window.
 const CYCLES: f64 = 3.0;
 
+/// Least frequency of further modes, relative to the first: a slower one stands in for creep and
+/// hysteresis.
+const SLOWEST: f64 = 0.125;
+
 /// Damping ratios of what counts as a mode.
 const DAMPING: (f64, f64) = (1e-3, 0.8);
 
@@ -70,6 +74,8 @@ pub fn resonances(
     let length = drive.dt * index(y.len() - start);
     let edges = (CYCLES / length, HIGHEST / drive.dt);
     while found.len() < most {
+        let first = found.first().map_or(0.0, |mode| mode.frequency);
+        let edges = (f64::max(edges.0, SLOWEST * first), edges.1);
         let known: Vec<Mode> = found.iter().map(Mode::of).collect();
         let before = if known.is_empty() { trial.without(stop)? } else { trial.cost(&known).0 };
         let mut best: Option<(f64, Vec<Mode>)> = None;

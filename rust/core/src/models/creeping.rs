@@ -207,6 +207,12 @@ impl<M: Plant> Plant for Creeping<M> {
         CreepingState { stage, reached }
     }
 
+    fn settled(&self, voltages: &[f64]) -> Self::State {
+        let stage = self.stage.settled(voltages);
+        let reached = [self.stage.displacement(&stage); MOST_RELAXATIONS];
+        CreepingState { stage, reached }
+    }
+
     fn flow(&self, step: f64) -> Self::Flow {
         let lags = self.relaxation.creep.map(|creep| Lag::new(creep.time, step));
         CreepingFlow { stage: self.stage.flow(step), lags }

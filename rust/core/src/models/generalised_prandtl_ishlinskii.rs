@@ -431,6 +431,7 @@ impl Invertible for GeneralisedPrandtlIshlinskiiStage {
 
 impl WeightedPlays for GeneralisedPrandtlIshlinskiiStage {
     const DEAD_ZONES: bool = false;
+    const PLAY_OF_DRIVE: bool = true;
 
     type Envelope = TanhEnvelope;
 
@@ -466,10 +467,6 @@ impl WeightedPlays for GeneralisedPrandtlIshlinskiiStage {
     fn edges(envelope: &TanhEnvelope, volts: f64) -> (f64, f64) {
         let edge = envelope.at(volts);
         (edge, edge)
-    }
-
-    fn kept(plays: &[f64]) -> &[f64] {
-        plays
     }
 
     fn values(fitted: &FittedPlays) -> Values {

@@ -357,6 +357,10 @@ impl<O: Segmented> Plant for InputStage<O> {
         self.at_rest()
     }
 
+    fn settled(&self, voltages: &[f64]) -> Self::State {
+        self.settled_at(voltages)
+    }
+
     fn flow(&self, step: f64) -> InputStageFlow {
         self.steps(step, ACCURACY)
     }

@@ -46,4 +46,4 @@ pub use traits::{
     Experiment, Invertible, KernelVisitor, Method, ModelInfo, Response, Searchable, StageModel,
 };
 pub use values::{Held, ParameterInfo, Values, position};
-pub use weighted_plays::{FittedPlays, WeightedPlays, WeightedVisitor};
+pub use weighted_plays::{FittedPlays, WeightedPlays, WeightedVisitor, state_at_rest};

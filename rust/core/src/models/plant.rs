@@ -12,6 +12,12 @@ pub trait Plant {
     /// The state before any voltage.
     fn rest(&self) -> Self::State;
 
+    /// The state in equilibrium after a slow visit to each voltage in turn, from rest; that at rest
+    /// where the plant has no equilibrium of its own.
+    fn settled(&self, _voltages: &[f64]) -> Self::State {
+        self.rest()
+    }
+
     /// Precomputes steps of `step` seconds.
     fn flow(&self, step: f64) -> Self::Flow;
 
@@ -54,6 +60,10 @@ impl<M: KernelModel> Plant for M {
 
     fn rest(&self) -> Self::State {
         self.lumped().rest()
+    }
+
+    fn settled(&self, voltages: &[f64]) -> Self::State {
+        self.lumped().equilibrium(voltages)
     }
 
     fn flow(&self, step: f64) -> Self::Flow {

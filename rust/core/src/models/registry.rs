@@ -167,6 +167,14 @@ macro_rules! models {
                 match self { $(Self::$variant(stage) => StageState::$variant(Plant::rest(stage)),)* }
             }
 
+            fn settled(&self, voltages: &[f64]) -> StageState {
+                match self {
+                    $(Self::$variant(stage) => {
+                        StageState::$variant(Plant::settled(stage, voltages))
+                    })*
+                }
+            }
+
             fn flow(&self, step: f64) -> StageFlow {
                 match self { $(Self::$variant(stage) => StageFlow::$variant(stage.flow(step)),)* }
             }

@@ -14,6 +14,15 @@ pub const NOMINAL_STIFFNESS: f64 = 1e6;
 /// Least lag D/K that is searched, as a share of the sampling interval.
 const LEAST_LAG: f64 = 0.05;
 
+/// Natural frequencies over that of a mode which the record shows: hysteresis stiffens a stage.
+const NEAR_MODE: Range = (0.6, 1.3);
+
+/// Damping ratios of a mode which the record shows.
+const MODE_DAMPING: Range = (0.003, 2.0);
+/// Quickness of a drive over its frequency up to which it is one sine: a chirp has 1.3, whatever
+/// its ends.
+const SINE: f64 = 1.15;
+
 /// Lower and upper end of a range.
 pub type Range = (f64, f64);
 
@@ -39,6 +48,8 @@ pub struct Measures {
     pub quickness: f64,
     /// Whether the caller asks for a mode, whatever the record shows.
     pub wants_mode: bool,
+    /// Natural frequency of the mode that the record shows, rad/s.
+    pub mode: Option<f64>,
     /// Sampling interval, s.
     pub dt: f64,
     /// RMS of the drive about its mean, V or N.
@@ -63,15 +74,18 @@ impl Measures {
         let together: f64 = u.iter().zip(y).map(|(u, y)| (u - mean) * (y - level)).sum();
         let gain = stroke / (high - low);
         let twice = 2.0 * core::f64::consts::TAU / (index(u.len()) * dt);
-        let slow = frequency.min(twice);
+        let quickness = quickness(u, dt);
+        // One sine moves at its own rate, however long it is.
+        let slow = if quickness < SINE * frequency { frequency } else { frequency.min(twice) };
         Self {
             stroke,
             gain,
             inverted: together < 0.0,
             frequency,
             slow,
-            quickness: quickness(u, dt),
+            quickness,
             wants_mode: false,
+            mode: None,
             dt,
             drive_size,
             displacement_size,
@@ -111,6 +125,16 @@ impl Measures {
     /// matter, and the damping, a lag D/K, down to a twentieth of the sampling interval.
     #[must_use]
     pub fn mechanical(&self, (soft, hard): Range) -> [Range; 3] {
+        if let Some(mode) = self.mode {
+            let (slowest, fastest) = (mode * NEAR_MODE.0, mode * NEAR_MODE.1);
+            let mass = (soft / (fastest * fastest), hard / (slowest * slowest));
+            let (least, most) = MODE_DAMPING;
+            return [
+                mass,
+                (2.0 * least * soft / fastest, 2.0 * most * hard / slowest),
+                (soft, hard),
+            ];
+        }
         let least = (LEAST_LAG * self.dt).min(5e-3 / self.frequency);
         let mass = self.excited().map_or_else(
             || {

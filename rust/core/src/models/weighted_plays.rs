@@ -35,6 +35,9 @@ pub trait WeightedPlays: StageModel {
     /// Whether dead zones may follow the plays.
     const DEAD_ZONES: bool;
 
+    /// Whether a state lists the play of the drive itself, whose threshold is 0, before the others.
+    const PLAY_OF_DRIVE: bool = false;
+
     /// What makes edges of a voltage.
     type Envelope: Clone;
 
@@ -53,22 +56,22 @@ pub trait WeightedPlays: StageModel {
 
     /// The parameters of the stage, as [`StageModel::build`] takes them.
     fn values(fitted: &FittedPlays) -> Values;
+}
 
-    /// Plays of a state, of that of the drive itself and those with thresholds.
-    #[must_use]
-    fn kept(plays: &[f64]) -> &[f64] {
-        plays.get(1..).unwrap_or(&[])
-    }
-
-    /// A state at rest at `x`, m, and `volts` with the plays of the drive and the thresholds, and
-    /// so many further modes.
-    #[must_use]
-    fn start(x: f64, volts: f64, plays: &[f64], creep: &[f64], modes: usize) -> Values {
-        let (plays, creep) = (Self::kept(plays).to_vec(), creep.to_vec());
-        let (mode_x, mode_v) = (vec![x; modes], vec![0.0; modes]);
-        let entries = [vec![x], vec![0.0], vec![volts], plays, creep, mode_x, mode_v];
-        Values::of(PLAYS_STATE, entries)
-    }
+/// A state at rest at `x`, m, and `volts` with the plays of the drive and the thresholds, and so
+/// many further modes.
+#[must_use]
+pub fn state_at_rest<M: WeightedPlays>(
+    x: f64,
+    volts: f64,
+    plays: &[f64],
+    creep: &[f64],
+    modes: usize,
+) -> Values {
+    let kept = plays.get(usize::from(!M::PLAY_OF_DRIVE)..).unwrap_or(&[]).to_vec();
+    let (mode_x, mode_v) = (vec![x; modes], vec![0.0; modes]);
+    let entries = [vec![x], vec![0.0], vec![volts], kept, creep.to_vec(), mode_x, mode_v];
+    Values::of(PLAYS_STATE, entries)
 }
 
 /// An operation on any model of weighted plays.

@@ -50,6 +50,20 @@ impl Axis {
         }
     }
 
+    /// Where an experiment starts with a stage that visited voltages slowly, in turn, and rests
+    /// at the last; a virtual stage has a start of its own.
+    #[must_use]
+    pub fn start_after(&self, voltages: &[f64]) -> ApparatusState<AxisState> {
+        let start = self.start();
+        match (self, voltages.last()) {
+            (Self::Model { stage, .. }, Some(&volts)) => {
+                let plant = AxisState::Model(stage.settled(voltages));
+                ApparatusState { plant, command: volts, applied: volts, ..start }
+            }
+            _ => start,
+        }
+    }
+
     /// Where an experiment starts.
     #[must_use]
     pub fn start(&self) -> ApparatusState<AxisState> {

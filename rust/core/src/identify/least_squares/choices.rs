@@ -4,6 +4,7 @@
 
 use super::fit::{Common, Fit};
 use super::form::Form;
+use super::plays::{choose_plays, plays_for, spread};
 use super::{CreepKind, DynamicsKind, PlaysKind, Settings, WeightsRecord};
 use crate::identify::history::History;
 use crate::identify::resonances::{Resonance, resonances};
@@ -18,17 +19,16 @@ const SHAPE_ROUNDS: usize = 20;
 /// middle of its range: what a record does not determine is not changed.
 const SHAPE_GAIN: f64 = 0.1;
 
-/// Shares of the deviation that histories, creep, modes and more plays have to take away.
+/// Shares of the deviation that histories, creep and modes have to take away.
 const HISTORY_GAIN: f64 = 0.02;
 const CREEP_GAIN: f64 = 0.015;
 const MODE_GAIN: f64 = 0.02;
-const PLAYS_GAIN: f64 = 0.03;
 
 /// Deviations that differ by less than this share tell nothing.
 const SAME: f64 = 1.01;
 
 /// Gain of a step below which a choice is settled.
-const ROUGH: f64 = 1e-3;
+pub(super) const ROUGH: f64 = 1e-3;
 
 /// Rows that choices are made on, about.
 const ROWS: usize = 4000;
@@ -59,7 +59,7 @@ pub(super) fn search<'a, M: WeightedPlays>(
     let thresholds = match &settings.plays {
         PlaysKind::Thresholds(thresholds) => thresholds.clone(),
         PlaysKind::Spread(count) => spread(common, *count, 1.0),
-        PlaysKind::Auto => spread(common, 10, 1.0),
+        PlaysKind::Auto => spread(common, plays_for(common), 1.0),
     };
     let mut fit = Fit::<M>::new(common, &thresholds, settings.history.unwrap_or(History::Virgin));
     fit.every = (common.record.y.len() - common.record.start).div_ceil(ROWS);
@@ -90,14 +90,6 @@ pub(super) fn search<'a, M: WeightedPlays>(
     fit.exact = true;
     fit.settle(1e-8)?;
     Some((fit, lags))
-}
-
-/// Thresholds up to half of the drive's range; a `power` above 1 has more of them near 0.
-fn spread(common: &Common<'_>, count: usize, power: f64) -> Vec<f64> {
-    let (low, high) = range(common.record.drive.u);
-    let reach = 0.5 * (high - low);
-    let part = |i: usize| libm::pow(index(i) / index(count + 1), power);
-    (1..=count).map(|i| reach * part(i)).collect()
 }
 
 /// Spreads the dead zones over what comes out of the plays in the window.
@@ -415,33 +407,4 @@ fn unseen_mode<'a, M: WeightedPlays>(fit: &Fit<'a, M>) -> Option<Fit<'a, M>> {
         }
     }
     best
-}
-
-/// More plays, where they foretell a part of the window that they were not fitted to.
-fn choose_plays<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -> Option<()> {
-    if settings.plays != PlaysKind::Auto {
-        return Some(());
-    }
-    let window = fit.window.clone();
-    let split = window.start + 2 * window.len() / 3;
-    let foretold = |fit: &Fit<'_, M>| {
-        let mut trial = fit.clone();
-        trial.window = window.start..split;
-        trial.settle(ROUGH)?;
-        trial.window = split..window.end;
-        Some(trial.deviation())
-    };
-    let mut least = (1.0 - PLAYS_GAIN) * foretold(fit)?;
-    let here = fit.clone();
-    for (count, power) in [(20, 1.0), (20, 1.5)] {
-        let mut trial = here.clone();
-        trial.restructure(|trial| trial.thresholds = spread(trial.common, count, power));
-        trial.settle(ROUGH)?;
-        let rms = foretold(&trial)?;
-        if rms < least {
-            least = rms;
-            *fit = trial;
-        }
-    }
-    Some(())
 }

@@ -12,6 +12,7 @@ use crate::identify::history::{History, visited};
 use crate::math::Rows;
 use crate::models::{
     Dynamics, Experiment, FittedPlays, Relaxation, RelaxationFlow, Values, WeightedPlays,
+    state_at_rest,
 };
 use crate::signal::{Stop, index, range};
 
@@ -507,7 +508,8 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
             *play *= of_drive;
         }
         let creep: Vec<f64> = creep.iter().map(|q| of_motion * q).collect();
-        let start = M::start(of_motion * rest, of_drive * first, &plays, &creep, modes);
+        let (x, volts) = (of_motion * rest, of_drive * first);
+        let start = state_at_rest::<M>(x, volts, &plays, &creep, modes);
         Ok((M::values(&fitted), start))
     }
 

@@ -12,6 +12,7 @@ mod fit;
 mod follower;
 mod form;
 mod layout;
+mod plays;
 
 use super::history::History;
 use crate::error::{Error, Result};

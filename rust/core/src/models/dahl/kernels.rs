@@ -131,6 +131,17 @@ impl Plant for DahlStage {
         DahlStageState::default()
     }
 
+    fn settled(&self, voltages: &[f64]) -> DahlStageState {
+        let (x, (q1, q2)) = if self.b1 == 0.0 || self.has_friction() {
+            let end = self.lumped(FrictionKernel).equilibrium(voltages);
+            (end.x, (end.memory.operator.force, end.memory.operator.slope))
+        } else {
+            let end = self.lumped(SmoothKernel::<TERMS, true>).equilibrium(voltages);
+            (end.x, self.states(&end.memory))
+        };
+        DahlStageState { x, v: 0.0, q1, q2 }
+    }
+
     fn flow(&self, step: f64) -> DahlFlow {
         let halvings = halvings(self.mechanics.rate(), step);
         let parameters = self.lumped(FrictionKernel).parameters;

@@ -14,6 +14,7 @@ mod virgin_branch;
 use piezotrack_control::hysteresis::DahlState;
 use piezotrack_control::inverse::{DahlInverse, InverseState, SampledDahlInverse};
 
+use super::plant::Plant;
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
     Experiment, Invertible, KernelVisitor, Method, ModelInfo, Response, Searchable, StageModel,
@@ -236,15 +237,8 @@ impl StageModel for DahlStage {
     }
 
     fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
-        let (x, (q1, q2)) = if self.b1 == 0.0 || self.has_friction() {
-            let Instant { x, memory, .. } = self.lumped(FrictionKernel).equilibrium(voltages);
-            (x, (memory.operator.force, memory.operator.slope))
-        } else {
-            let kernel = SmoothKernel::<TERMS, true>;
-            let Instant { x, memory, .. } = self.lumped(kernel).equilibrium(voltages);
-            (x, self.states(&memory))
-        };
-        finite_state(Values::scalars(STATE, &[x, 0.0, q1, q2]), voltages)
+        let DahlStageState { x, v, q1, q2 } = self.settled(voltages);
+        finite_state(Values::scalars(STATE, &[x, v, q1, q2]), voltages)
     }
 
     fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {

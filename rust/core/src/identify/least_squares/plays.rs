@@ -1,0 +1,129 @@
+//! Which plays a fit has: their number and their thresholds.
+
+use super::choices::ROUGH;
+use super::fit::{Common, Fit};
+use super::{PlaysKind, Settings};
+use crate::models::{MOST_PLAYS, WeightedPlays};
+use crate::signal::{index, range};
+
+/// Share of the deviation on what they were not fitted to that other plays have to take away.
+const PLAYS_GAIN: f64 = 0.03;
+
+/// Plays of a record of many samples, and of another one.
+const MANY_SAMPLES: usize = 800;
+const PLAYS: usize = 20;
+const FEW_PLAYS: usize = 10;
+
+/// Numbers of plays that are tried, and the power by which their thresholds are spread.
+const TRIED: [(usize, f64); 3] = [(PLAYS, 1.0), (PLAYS, 1.5), (MOST_PLAYS, 1.0)];
+
+/// Rounds in which plays are gathered: each halves the distance between neighbours.
+const ROUNDS: usize = 5;
+
+/// Weight of a play that counts, as a share of all.
+const LEAST_WEIGHT: f64 = 1e-3;
+
+/// Plays to begin with: few take a rounded loop for a lag, many need samples.
+pub(super) fn plays_for(common: &Common<'_>) -> usize {
+    if common.record.y.len() - common.record.start < MANY_SAMPLES { FEW_PLAYS } else { PLAYS }
+}
+
+/// Thresholds up to half of the drive's range; a `power` above 1 has more of them near 0.
+pub(super) fn spread(common: &Common<'_>, count: usize, power: f64) -> Vec<f64> {
+    let part = |i: usize| libm::pow(index(i) / index(count + 1), power);
+    (1..=count).map(|i| reach(common) * part(i)).collect()
+}
+
+/// Half of the drive's range, V.
+fn reach(common: &Common<'_>) -> f64 {
+    let (low, high) = range(common.record.drive.u);
+    0.5 * (high - low)
+}
+
+/// Other plays, where they foretell a part of the window that they were not fitted to.
+pub(super) fn choose_plays<M: WeightedPlays>(
+    fit: &mut Fit<'_, M>,
+    settings: &Settings,
+) -> Option<()> {
+    if settings.plays != PlaysKind::Auto {
+        return Some(());
+    }
+    let window = fit.window.clone();
+    let split = window.start + 2 * window.len() / 3;
+    let mut here = fit.clone();
+    here.window = window.start..split;
+    here.settle(ROUGH)?;
+    let foretold = |fit: &Fit<'_, M>| {
+        let mut trial = fit.clone();
+        trial.window = split..window.end;
+        trial.deviation()
+    };
+    let mut least = (1.0 - PLAYS_GAIN) * foretold(&here);
+    let mut best = None;
+    for (count, power) in TRIED {
+        let mut trial = here.clone();
+        trial.restructure(|trial| trial.thresholds = spread(trial.common, count, power));
+        trial.settle(ROUGH)?;
+        let few = if count == MOST_PLAYS { gathered(&trial)? } else { None };
+        for trial in [Some(trial), few].into_iter().flatten() {
+            let rms = foretold(&trial);
+            if rms < least {
+                least = (1.0 - PLAYS_GAIN) * rms;
+                best = Some(trial.thresholds);
+            }
+        }
+    }
+    if let Some(thresholds) = best {
+        fit.restructure(|fit| fit.thresholds = thresholds);
+        fit.settle(ROUGH)?;
+    }
+    Some(())
+}
+
+/// Few plays in place of many that are spread evenly, where their weights gather about few
+/// thresholds: two neighbours stand for one play between them. `None` where they do not gather.
+#[expect(clippy::option_option, reason = "stopped, or none")]
+fn gathered<'a, M: WeightedPlays>(fit: &Fit<'a, M>) -> Option<Option<Fit<'a, M>>> {
+    let mut trial = fit.clone();
+    let mut gap = reach(fit.common) / index(fit.thresholds.len() + 1);
+    for _ in 0..ROUNDS {
+        let middle = middles(&trial, 1.1 * gap);
+        if middle.is_empty() || 2 * middle.len() > MOST_PLAYS {
+            return Some(None);
+        }
+        gap *= 0.5;
+        let mut pairs: Vec<f64> =
+            middle.iter().flat_map(|at| [f64::max(at - 0.5 * gap, 0.0), at + 0.5 * gap]).collect();
+        pairs.sort_by(f64::total_cmp);
+        trial.restructure(|trial| trial.thresholds = pairs);
+        trial.settle(ROUGH)?;
+    }
+    let middle = middles(&trial, 1.1 * gap);
+    trial.restructure(|trial| trial.thresholds = middle);
+    trial.settle(ROUGH)?;
+    Some(Some(trial))
+}
+
+/// Thresholds of plays whose weights count, those of two neighbours `width` or less apart as one.
+fn middles<M: WeightedPlays>(fit: &Fit<'_, M>, width: f64) -> Vec<f64> {
+    let weights = &fit.x[1..=fit.thresholds.len()];
+    let least = LEAST_WEIGHT * weights.iter().sum::<f64>();
+    let counts = fit.thresholds.iter().zip(weights).filter(|(_, weight)| **weight > least);
+    let mut found: Vec<f64> = Vec::new();
+    let mut alone: Option<(f64, f64)> = None;
+    for (&at, &weight) in counts {
+        alone = match alone {
+            Some((before, other)) if at - before <= width => {
+                found.push((before * other + at * weight) / (other + weight));
+                None
+            }
+            Some((before, _)) => {
+                found.push(before);
+                Some((at, weight))
+            }
+            None => Some((at, weight)),
+        };
+    }
+    found.extend(alone.map(|(at, _)| at));
+    found
+}

@@ -1,0 +1,133 @@
+"""Where a record begins: in equilibrium, after a history that is given or shown by the record."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezotrack as pt
+
+DT = 1e-3
+NOISE = 10e-9
+STAGE = pt.FirstOrderDahlStage(
+    mass=1e6 / (2.0 * np.pi * 400.0) ** 2,
+    damping=500.0,
+    stiffness=1e6,
+    piezo_coefficient=1.8,
+    rest_stiffness=2.5e5,
+    coulomb_force=8.0,
+)
+QUICK = pt.ParticleSwarm(iterations=30)
+
+
+def record(visited: list[float], seed: int = 0, amplitude: float = 35.0) -> pt.Dataset:
+    """A sine about 40 V, after slow visits to voltages, on a sensor with an offset."""
+    t = DT * np.arange(3000)
+    u = 40.0 + amplitude * np.sin(2.0 * np.pi * t)
+    x = STAGE.simulate(u, DT, initial=STAGE.equilibrium([*visited, u[0]])).x
+    noise = NOISE * np.random.default_rng(seed).normal(size=t.size)
+    return pt.Dataset(u=u, y=x + 3e-6 + noise, dt=DT)
+
+
+def fitted(log: pt.Dataset, **settings: Any) -> pt.identification.Identification:
+    return pt.identify(
+        log, "first-order-dahl", swarm=QUICK, runs=2, seed=1, progress=False, **settings
+    )
+
+
+def test_a_record_at_a_bias_is_fitted_to_its_noise() -> None:
+    log = record([])
+    fit = fitted(log, history="virgin")
+    # A jump from 0 V to its first sample would cost micrometres.
+    assert fit.cost < 3.0 * NOISE
+    assert fit.start is not None
+    assert fit.start.history == "virgin"
+    assert "in equilibrium at 40 V, never moved before" in fit.summary()
+
+
+def test_the_voltage_that_the_stage_came_from_is_found() -> None:
+    log = record([75.0])
+    wrong = fitted(log, history="virgin")
+    fit = fitted(log)
+    assert fit.cost < 3.0 * NOISE < 10.0 * NOISE < wrong.cost
+    assert fit.start is not None
+    assert fit.start.history == "fit"
+    assert fit.start.voltage == pytest.approx(75.0, abs=5.0)
+    assert fit.parameters["voltage_before"].identified
+    assert "which was fitted" in fit.summary()
+    assert any("first" in note for note in wrong.notes)
+
+
+def test_a_settled_stage_repeats() -> None:
+    u = 40.0 + 35.0 * np.sin(2.0 * np.pi * DT * np.arange(6000))
+    x = STAGE.simulate(u, DT, initial=STAGE.equilibrium(40.0)).x
+    log = pt.Dataset(u=u[3000:], y=x[3000:], dt=DT)
+    fit = fitted(log, history="settled")
+    assert fit.cost < 1e-3 * log.stroke
+
+
+def test_the_history_is_kept_with_the_model(tmp_path: Path) -> None:
+    log = record([75.0])
+    fit = fitted(log, history="fit")
+    loaded = pt.load(fit.save(tmp_path / "model.json"))
+    assert loaded.start == fit.start
+    assert loaded.score(log, offset=fit.offset) == fit.fitted
+    # Another window of the record begins as it does.
+    assert loaded.start_on(log[1.0:]) == fit.start
+
+
+def test_another_record_shows_its_own_history() -> None:
+    fit = fitted(record([75.0]))
+    other = record([70.0], seed=1, amplitude=30.0)
+    assert fit.score(other).rms < 3.0 * NOISE
+    assert fit.start_on(other).history == "fit"
+    assert fit.score(other, history="virgin").rms > 10.0 * NOISE
+    with pytest.raises(pt.ParameterError, match="history is 'virgin' beside an initial state"):
+        fit.score(other, history="virgin", initial=STAGE.equilibrium(40.0))
+
+
+def test_creep_of_another_record_is_where_it_fits() -> None:
+    stage = pt.PrandtlIshlinskiiStage(
+        linear=1e-6,
+        thresholds=(5.0, 15.0),
+        weights=(2e-7, 2e-7),
+        creep_weights=(0.05,),
+        creep_times=(1.0,),
+    )
+    model = pt.identification.IdentifiedModel(
+        model=stage, offset=0.0, offset_fitted=True, stroke=1e-4
+    )
+    t = DT * np.arange(3000)
+    u = 40.0 + 20.0 * np.sin(2.0 * np.pi * t)
+    begun = stage.equilibrium([70.0, 40.0])
+    # Not long enough at 40 V for the creep from 70 V to be complete.
+    crept = stage.simulate([40.0] * 500, DT, initial=stage.equilibrium(70.0)).final
+    assert crept.creep != pytest.approx(begun.creep, rel=1e-3)
+    log = pt.Dataset(u=u, y=stage.simulate(u, DT, initial=crept).x, dt=DT)
+    assert model.score(log).rms < 1e-9
+    assert model.start_on(log).history == "fit"
+
+
+@pytest.mark.parametrize("history", ["new", 1, ""])
+def test_a_history_that_there_is_not_is_refused(history: Any) -> None:
+    with pytest.raises(pt.ParameterError, match="expected 'virgin', 'settled', 'fit', or None"):
+        pt.identify(record([]), "first-order-dahl", history=history)
+
+
+def test_a_file_with_another_state_is_refused(tmp_path: Path) -> None:
+    fit = pt.identification.IdentifiedModel(
+        model=STAGE,
+        offset=0.0,
+        offset_fitted=True,
+        stroke=1e-4,
+        start=pt.identification.IdentifiedModel(
+            model=STAGE, offset=0.0, offset_fitted=True, stroke=1e-4
+        ).start_on(record([]), history="virgin"),
+    )
+    path = fit.save(tmp_path / "model.json")
+    text = path.read_text(encoding="utf-8")
+    for old, new in (('"force"', '"plays"'), ('"virgin"', '"never"'), ('"state": {', '"stat": {')):
+        path.write_text(text.replace(old, new), encoding="utf-8")
+        with pytest.raises(pt.DataError, match=r"model\.json"):
+            pt.load(path)

@@ -1,0 +1,40 @@
+"""Lags that a record allows: of slow drives, whatever their length, and of quick ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import piezotrack as pt
+
+DT = 0.02
+STAGE = pt.PrandtlIshlinskiiStage(
+    linear=0.4e-6, thresholds=[2.0, 6.0, 12.0, 20.0], weights=[0.06e-6, 0.05e-6, 0.04e-6, 0.03e-6]
+)
+
+
+def fitted(phase: np.ndarray, swarm: pt.ParticleSwarm) -> pt.identification.Identification:
+    """First-order Dahl on the record of a stage without dynamics."""
+    u = 37.5 * (1.0 - np.cos(phase))
+    noise = 5e-9 * np.random.default_rng(1).standard_normal(u.size)
+    log = pt.Dataset(u=u, y=STAGE.simulate(u, DT).x + noise, dt=DT)
+    return pt.identify(log, "first-order-dahl", swarm=swarm, runs=1, history="virgin")
+
+
+@pytest.mark.parametrize("periods", [3, 6, 20])
+def test_one_slow_sine_of_any_length_shows_no_lag_and_no_mode(periods: int) -> None:
+    t = DT * np.arange(round(2.0 * periods / DT))
+    fit = fitted(np.pi * t, pt.ParticleSwarm(iterations=15))
+    assert not fit.parameters["mass"].free
+    assert fit.lags is not None
+    assert fit.lags.from_zero
+    assert fit.model.damping / fit.model.stiffness == pytest.approx(0.05 * DT)
+    assert any("another rate" in note for note in fit.notes)
+
+
+def test_a_chirp_is_searched_for_a_mode() -> None:
+    t = DT * np.arange(500)
+    swarm = pt.ParticleSwarm(iterations=2, polish=False)
+    fit = fitted(2.0 * np.pi * (0.1 * t + 0.4 * t**2), swarm)
+    assert fit.parameters["mass"].free
+    assert fit.lags is None

@@ -1,0 +1,89 @@
+"""What a record of one rate says of others: lags that fit as well, and use beyond the record."""
+
+import numpy as np
+import pytest
+
+import piezotrack as pt
+from piezotrack.identification import remarks
+
+STAGE = pt.VirtualStage.xu_li_2010(seed=3)
+QUICK = pt.ParticleSwarm(iterations=30)
+
+
+def record(frequency: float, rate: float = 1000.0, cycles: int = 3) -> pt.Dataset:
+    t = np.arange(int(cycles * rate / frequency) + 1) / rate
+    u = 37.5 * (1.0 - np.cos(2.0 * np.pi * frequency * t))
+    return STAGE.record(u, 1.0 / rate)
+
+
+SLOW = record(1.0, cycles=4)[1.0:]
+
+
+def percent(fit: pt.identification.Identification, log: pt.Dataset) -> float:
+    return 100.0 * fit.score(log).rms / SLOW.stroke
+
+
+def test_plays_fitted_at_1_hz_hold_at_others() -> None:
+    fit = pt.identify(SLOW, "prandtl-ishlinskii")
+    assert fit.cost < 1.1 * STAGE.noise
+    assert percent(fit, record(0.1)[10.0:]) < 1.0
+    assert percent(fit, record(3.0)[0.4:]) < 1.0
+    assert percent(fit, record(10.0, rate=5000.0)[0.1:]) < 1.0
+
+
+def test_the_least_lag_is_taken_and_the_range_is_told() -> None:
+    fit = pt.identify(
+        SLOW, "first-order-dahl", swarm=QUICK, runs=2, seed=1, progress=False, history="virgin"
+    )
+    assert fit.lags is not None
+    assert fit.model.damping / fit.model.stiffness == pytest.approx(fit.lags.least, rel=1e-9)
+    # With a free damping this model took 2.9 ms, and was 54 % of the stroke off at 10 Hz.
+    assert fit.lags.least < 1e-3 < fit.lags.most
+    assert percent(fit, record(10.0, rate=5000.0)[0.1:]) < 2.0
+    assert any("fits as well" in note and "another rate" in note for note in fit.notes)
+    # The record shows no mode: the mass is too small to matter, and not searched.
+    assert not fit.parameters["mass"].free
+    natural = np.sqrt(fit.model.stiffness / fit.model.mass) / (2.0 * np.pi)
+    assert natural > 1.0 / SLOW.dt
+
+
+def test_a_loop_that_is_damping_is_told() -> None:
+    fit = pt.identify(SLOW, "dahl", swarm=QUICK, runs=2, seed=1, progress=False, history="virgin")
+    assert any("holds at this rate only" in note for note in fit.notes)
+
+
+def test_a_mass_that_is_asked_for_is_searched() -> None:
+    names = ["mass", "damping", "piezo_coefficient", "rest_stiffness", "coulomb_force"]
+    fit = pt.identify(
+        SLOW,
+        "first-order-dahl",
+        free=names,
+        swarm=pt.ParticleSwarm(iterations=2, polish=False),
+        runs=1,
+        progress=False,
+        history="virgin",
+    )
+    assert fit.parameters["mass"].free
+    assert fit.lags is None
+
+
+def test_use_beyond_the_record_is_remarked() -> None:
+    fit = pt.identify(SLOW, "prandtl-ishlinskii")
+    u = SLOW.u
+    assert fit.beyond_fit(u, SLOW.dt) == []
+    assert "that of the record identified from" in fit.beyond_fit(1.2 * u, SLOW.dt)[0]
+    (rate,) = fit.beyond_fit(u, 0.1 * SLOW.dt)
+    assert "V/s" in rate
+    assert fit.score(record(10.0, rate=5000.0)).notes == (
+        fit.beyond_fit(record(10.0, rate=5000.0).u, 1 / 5000)[0],
+    )
+
+
+def test_first_samples_that_carry_the_cost_are_named() -> None:
+    rest = np.full(len(SLOW), 1e-9)
+    rest[::2] *= -1.0
+    assert remarks.first_samples(rest, SLOW) == []
+    rest[:50] += 1e-6 * np.exp(-np.arange(50) / 10.0)
+    (remark,) = remarks.first_samples(rest, SLOW)
+    assert "of the squared residual is in the first 0.0" in remark
+    assert "log[1.0" in remark

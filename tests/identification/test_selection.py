@@ -1,0 +1,64 @@
+"""`model="auto"`: the kind that is best on what was not fitted."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import piezotrack as pt
+
+DT = 1e-3
+T = DT * np.arange(4000)
+# The amplitude ramps to a quarter: small loops tell the kinds apart.
+U = 37.5 + (37.5 - 7.0 * T) * np.sin(2.0 * np.pi * T - np.pi / 2.0)
+PLAYS = pt.PrandtlIshlinskiiStage(
+    linear=8e-7, thresholds=(3.0, 8.0, 15.0, 25.0), weights=(1e-7, 1e-7, 1e-7, 1e-7)
+)
+SMOOTH = pt.FirstOrderDahlStage(
+    mass=0.02,
+    damping=200.0,
+    stiffness=1e6,
+    piezo_coefficient=1.8,
+    rest_stiffness=2.5e5,
+    coulomb_force=4.0,
+)
+
+
+def record(stage: pt.stages.Stage, noise: float) -> pt.Dataset:
+    x = stage.simulate(U, DT, initial=stage.equilibrium(U[0])).x
+    return pt.Dataset(u=U, y=x + noise * np.random.default_rng(0).normal(size=x.size), dt=DT)
+
+
+def test_plays_are_found_without_a_search() -> None:
+    fit = pt.identify(record(PLAYS, 1e-8), progress=False)
+    assert fit.model.info.name == "prandtl-ishlinskii"
+    assert fit.cost < 3e-8
+    # As good as the noise: no other kind could be better.
+    assert [trial.model for trial in fit.trials] == ["prandtl-ishlinskii"]
+    assert fit.fitted_until is not None
+    assert "chosen by the rms after" in fit.summary()
+
+
+def test_smooth_tips_are_told_from_plays(tmp_path: Path) -> None:
+    fit = pt.identify(record(SMOOTH, 1e-9), seed=1, runs=2, progress=False)
+    assert fit.model.info.name in ("first-order-dahl", "parallel-dahl")
+    assert fit.trials[0].model == fit.model.info.name
+    assert fit.trials[0].rms < 0.5 * next(
+        trial.rms for trial in fit.trials if trial.model == "prandtl-ishlinskii"
+    )
+    document = json.loads(fit.save(tmp_path / "model.json").read_text(encoding="utf-8"))
+    assert set(document["selection"]["models"]) == {trial.model for trial in fit.trials}
+    assert pt.load(tmp_path / "model.json").model == fit.model
+
+
+def test_a_record_too_short_to_be_parted_says_so() -> None:
+    short = record(PLAYS, 1e-8)[:1.5]
+    fit = pt.identify(short, progress=False)
+    assert fit.fitted_until is None
+    assert "too short for another" in fit.summary()
+
+
+def test_parameters_need_a_named_model() -> None:
+    with pytest.raises(pt.ParameterError, match="name the model"):
+        pt.identify(record(PLAYS, 1e-8), fixed={"mass": 0.1})
