@@ -82,10 +82,13 @@ def reach(stage: Plant, limits: tuple[float, float], dt: float) -> tuple[float, 
 def settled_bottom(stage: Plant, limits: tuple[float, float], top: float, dt: float) -> float:
     """Simulate the lowest displacement [m] at the lower of two voltages [V], from `top` [m] down.
 
-    The voltage takes the course of `reach`, but only up to where the displacement is `top`.
+    The voltage takes the course of `reach`, but only up to where the displacement is `top`. A stage
+    that falls as the voltage rises is lowest at the upper one, which it reaches again.
     """
     low, high = limits
     t, u, x = _slow_cycle(stage, low, high, dt)
+    if x[np.searchsorted(t, 5.5)] < x[np.searchsorted(t, 1.0)]:
+        return float(x[t >= 1.0].min())
     rising = (t >= 1.0) & (t < 6.0)
     there = np.flatnonzero(x[rising] >= top)
     if there.size:
