@@ -90,8 +90,8 @@ def test_the_criteria_are_burnham_and_andersons() -> None:
     for one in found().rows:
         error = data.y - one.fit.simulate(data, offset=one.fit.offset).x
         n, rss = error.size, float(np.sum(error**2))
-        # b/k, d, alpha, beta, gamma, as nothing excites a mode of some mass; w0, twenty weights, two
-        # bends, no lag, as there is none; the offset each.
+        # b/k, d, alpha, beta, gamma, as nothing excites a mode of some mass; w0, twenty weights,
+        # two bends, no lag, as there is none; the offset each.
         free = 6 if one.name == "bouc-wen" else 24
         assert one.parameters == free
         likelihood = n * np.log(rss / n)

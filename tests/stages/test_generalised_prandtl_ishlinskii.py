@@ -172,6 +172,8 @@ def test_a_model_file_and_a_controller_take_it_as_any_stage(tmp_path: Path) -> N
     found = pt.load(fit.save(tmp_path / "stage.json"))
     assert found.model == fit.model
     reference = pt.sine(frequency=1.0, low=5e-6, high=35e-6, duration=4.0)
-    loop = pt.Controller(dt=1e-3, limits=(0.0, 3.6), feedforward=found.model.inverse())
+    # Along the whole run: a table of one period does not know creep that goes on.
+    inverse = found.model.inverse(playback="online")
+    loop = pt.Controller(dt=1e-3, limits=(0.0, 3.6), feedforward=inverse)
     run = pt.track(found.model, loop, reference)
     assert run.metrics.rms_error < 0.1e-6

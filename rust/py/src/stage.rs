@@ -110,6 +110,7 @@ impl PyStage {
 
     /// Simulates the closed loop along a reference, after visits to voltages or from rest, in steps
     /// of at most `step` seconds.
+    #[expect(clippy::too_many_arguments, reason = "called from one place")]
     fn track(
         &self,
         py: Python<'_>,
