@@ -321,16 +321,7 @@ impl<O: InputOperator> InputStage<O> {
 
     /// Equilibrium after a slow visit to each voltage in turn, from rest, its creep complete.
     pub(super) fn equilibrium_values(&self, voltages: &[f64]) -> Result<Values> {
-        let mut state = self.at_rest();
-        let mut output = 0.0;
-        for &volts in voltages {
-            output = self.operator.follow(&mut state.operator, volts) - self.zero();
-        }
-        let relaxation = &mut state.relaxation;
-        relaxation.input = output;
-        relaxation.creep[..self.relaxation.count].fill(output);
-        relaxation.x = self.relaxation.target(relaxation);
-        finite_state(self.values_of(&state), voltages)
+        finite_state(self.values_of(&self.settled_at(voltages)), voltages)
     }
 
     /// The operator's output at rest, m.
