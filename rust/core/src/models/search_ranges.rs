@@ -124,7 +124,11 @@ impl Measures {
             let (slowest, fastest) = (mode * NEAR_MODE.0, mode * NEAR_MODE.1);
             let mass = (soft / (fastest * fastest), hard / (slowest * slowest));
             let (least, most) = MODE_DAMPING;
-            return [mass, (2.0 * least * soft / fastest, 2.0 * most * hard / slowest), (soft, hard)];
+            return [
+                mass,
+                (2.0 * least * soft / fastest, 2.0 * most * hard / slowest),
+                (soft, hard),
+            ];
         }
         let least = (LEAST_LAG * self.dt).min(5e-3 / self.frequency);
         let mass = self.excited().map_or_else(
