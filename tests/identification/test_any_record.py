@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
+
+    from piezotrack.identification.result import Identification
+    from piezotrack.stages.base import Stage
 
     Array = NDArray[np.float64]
 
@@ -77,7 +80,9 @@ class Case:
     frequency: float | None
 
 
-def plays(rng: np.random.Generator, frequency: float | None, sign: float) -> pt.Stage:
+def plays(
+    rng: np.random.Generator, frequency: float | None, sign: float
+) -> pt.PrandtlIshlinskiiStage:
     count, zones = int(rng.integers(3, 11)), int(rng.integers(0, 3)) if sign > 0.0 else 0
     return pt.PrandtlIshlinskiiStage(
         linear=sign * 8e-7,
@@ -94,7 +99,7 @@ def damping(rng: np.random.Generator) -> float:
     return float(np.exp(rng.uniform(np.log(0.02), np.log(0.3))))
 
 
-def mechanics(rng: np.random.Generator, frequency: float | None) -> dict[str, float]:
+def mechanics(rng: np.random.Generator, frequency: float | None) -> dict[str, Any]:
     mass = STIFFNESS / (2.0 * np.pi * (frequency or 3000.0)) ** 2
     return {
         "mass": mass,
@@ -103,7 +108,7 @@ def mechanics(rng: np.random.Generator, frequency: float | None) -> dict[str, fl
     }
 
 
-def dahl(rng: np.random.Generator, frequency: float | None, sign: float) -> pt.Stage:
+def dahl(rng: np.random.Generator, frequency: float | None, sign: float) -> Stage:
     return pt.FirstOrderDahlStage(
         **mechanics(rng, frequency),
         piezo_coefficient=sign * 1.6,
@@ -112,7 +117,7 @@ def dahl(rng: np.random.Generator, frequency: float | None, sign: float) -> pt.S
     )
 
 
-def bouc_wen(rng: np.random.Generator, frequency: float | None, sign: float) -> pt.Stage:
+def bouc_wen(rng: np.random.Generator, frequency: float | None, sign: float) -> Stage:
     return pt.BoucWenStage(
         **mechanics(rng, frequency),
         piezo_coefficient=sign * 1.6e-6,
@@ -122,7 +127,7 @@ def bouc_wen(rng: np.random.Generator, frequency: float | None, sign: float) -> 
     )
 
 
-def case(i: int, stage_of: Callable[..., pt.Stage], *, quick: bool) -> Case:
+def case(i: int, stage_of: Callable[..., Stage], *, quick: bool) -> Case:
     """Record of a random stage in equilibrium at its first sample."""
     rng = np.random.default_rng([11, i])
     rate = (1000.0, 5000.0)[i % 2]
@@ -137,14 +142,14 @@ def case(i: int, stage_of: Callable[..., pt.Stage], *, quick: bool) -> Case:
     return Case(pt.Dataset(u=u, y=y, dt=1.0 / rate), size, frequency)
 
 
-def natural_frequency(model: pt.Stage) -> float | None:
+def natural_frequency(model: Stage) -> float | None:
     if isinstance(model, pt.PrandtlIshlinskiiStage):
         return model.frequency
     assert isinstance(model, (pt.FirstOrderDahlStage, pt.BoucWenStage, pt.ParallelDahlStage))
     return float(np.sqrt(model.stiffness / model.mass) / (2.0 * np.pi))
 
 
-def score(cases: list[tuple[Case, pt.Identification]]) -> tuple[int, int]:
+def score(cases: list[tuple[Case, Identification]]) -> tuple[int, int]:
     """How many fits are within three times the noise, and how many have the mode."""
     near = sum(fit.cost < 3.0 * one.noise for one, fit in cases)
     found = [natural_frequency(fit.model) for _, fit in cases]
@@ -169,7 +174,7 @@ def test_plays_on_records_of_plays() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("stage_of", [dahl, bouc_wen])
-def test_the_default_call_on_records_of_other_kinds(stage_of: Callable[..., pt.Stage]) -> None:
+def test_the_default_call_on_records_of_other_kinds(stage_of: Callable[..., Stage]) -> None:
     quick = [case(i, stage_of, quick=True) for i in range(4)]
     slow = [case(i, stage_of, quick=False) for i in range(3)]
     near, modes = score([(one, pt.identify(one.log, progress=False)) for one in quick])
@@ -177,6 +182,29 @@ def test_the_default_call_on_records_of_other_kinds(stage_of: Callable[..., pt.S
     assert near >= 3
     near, _ = score([(one, pt.identify(one.log, progress=False)) for one in slow])
     assert near >= 2
+
+
+@pytest.mark.slow
+def test_two_modes() -> None:
+    both = 0
+    for i in range(6):
+        rng = np.random.default_rng([12, i])
+        t = np.arange(3000) / 1000.0
+        frequency, further = 60.0, rng.uniform(120.0, 200.0)
+        stage = replace(
+            plays(rng, frequency, 1.0),
+            mode_weights=(rng.uniform(0.1, 0.4),),
+            mode_frequencies=(further,),
+            mode_damping_ratios=(rng.uniform(0.02, 0.1),),
+        )
+        u = steps(rng, t)
+        x = stage.simulate(u, 1e-3, initial=stage.equilibrium([float(u[0])])).x
+        y = x + 2e-8 * rng.normal(size=x.size)
+        model = pt.identify(pt.Dataset(u=u, y=y, dt=1e-3), "prandtl-ishlinskii").model
+        assert isinstance(model, pt.PrandtlIshlinskiiStage)
+        found = np.array([model.frequency or np.nan, *model.mode_frequencies])
+        both += all(np.min(np.abs(found / one - 1.0)) < 0.05 for one in (frequency, further))
+    assert both >= 5
 
 
 def test_the_search_keeps_to_the_mode_that_the_record_shows() -> None:

@@ -151,9 +151,9 @@ def test_the_measured_log_and_another_one() -> None:
 @measured
 def test_each_part_of_the_model_earns_its_place() -> None:
     training, tracking = logs()
-    alone = fit_plays(training, dead_zones=False, dynamics=None)
-    late = fit_plays(training, dead_zones=False)
-    bent = fit_plays(training)
-    crept = fit_plays(training, creep=True)
+    alone = fit_plays(training, count=10, dead_zones=False, dynamics=None)
+    late = fit_plays(training, count=10, dead_zones=False)
+    bent = fit_plays(training, count=10)
+    crept = fit_plays(training, count=10, creep=True)
     assert crept.cost < bent.cost < late.cost < alone.cost
     assert alone.score(tracking).rms > late.score(tracking).rms > bent.score(tracking).rms

@@ -37,6 +37,14 @@ ENVELOPE = pt.GeneralisedPrandtlIshlinskiiStage(
 OF_BOTH = pytest.mark.parametrize("stage", [PLAYS, ENVELOPE], ids=["plays", "envelope"])
 
 
+@OF_BOTH
+def test_equilibrium_stays(stage: Any) -> None:
+    start = stage.equilibrium([60.0, 40.0])
+    x = stage.simulate(np.full(200, 40.0), 1e-4, initial=start).x
+    assert x == pytest.approx(x[0], rel=1e-12)
+    assert start.mode_x == pytest.approx([x[0]] * 2, rel=1e-12)
+
+
 def parts(stage: Any) -> list[tuple[float, float, float]]:
     """Weight, rate and damping ratio of each mode, the main one first."""
     weights = (1.0 - sum(stage.mode_weights), *stage.mode_weights)

@@ -49,8 +49,8 @@ class LeastSquares:
     ----------
     count : int, optional
         Number of plays, 1 to 32, with thresholds spread evenly up to half of the drive's range.
-        None: 20; with fewer than 800 samples 10, or 20 where these foretell a third of the window
-        better that was left out.
+        None: 20, or 10 with fewer than 800 samples; others where they foretell a third of the
+        window better that was left out: up to 32, or fewer about which the weights of these gather.
     thresholds : sequence of float, optional
         Thresholds of the plays [V], in place of `count`.
     dead_zones : bool or int, optional

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -44,8 +45,9 @@ AS_NOISE = 1.5
 APART, CORRELATED, CHANCE = 10, 0.1, 4.0
 # Another kind has to be better by this share than one before it in the list.
 BETTER = 0.03
-# The descent finds the bottom: swarms that only have to find the basin can be short.
-ITERATIONS = 40
+# The descent finds the bottom: swarms that only have to find the basin can be short, and those
+# that only have to tell the kinds apart few.
+ITERATIONS, RUNS = 40, 2
 
 
 class Trial(NamedTuple):
@@ -109,11 +111,14 @@ def identify_best(
     infos = _kinds(data, of_swarm)
     part, rest = _parts(data)
     noise = _noise(rest.y)
+    trial = dict(swarm)
+    if rest is not part and trial["runs"] is None:
+        trial["runs"] = RUNS
     found: list[tuple[Trial, ModelInfo]] = []
     refused: Exception | None = None
     for info in infos:
         try:
-            fit = identify_kind(part, info, of_swarm=swarm, **common)
+            fit = identify_kind(part, info, of_swarm=trial, **common)
             if info.name == BY_PLAYS and fit.start is not None:
                 # What swarms would ask a stage with plays for, each time again.
                 common["history"] = fit.start.history
@@ -133,18 +138,18 @@ def identify_best(
     if not found:
         raise refused or DataError("no kind of stage could be fitted")
     best, info = found[0]
-    for trial, other in found[1:]:
-        if trial.rms < (1.0 - BETTER) * best.rms:
-            best, info = trial, other
+    for other, kind in found[1:]:
+        if other.rms < (1.0 - BETTER) * best.rms:
+            best, info = other, kind
     whole = fit if rest is part and best is found[-1][0] else None
     if whole is None:
         whole = identify_kind(data, info, of_swarm=swarm, **common)
-    trials = tuple(sorted((trial for trial, _ in found), key=lambda trial: trial.rms))
+    trials = tuple(sorted((one for one, _ in found), key=lambda one: one.rms))
     until = None if rest is part else float(part.t[-1])
     details = {
         "selection": {
             "fitted_until_s": until,
-            "models": {trial.model: {"rms": trial.rms, "unit": "m"} for trial in trials},
+            "models": {one.model: {"rms": one.rms, "unit": "m"} for one in trials},
         }
     }
     return replace(whole, trials=trials, fitted_until=until, details={**whole.details, **details})
@@ -183,4 +188,4 @@ def _white(rest: Array) -> bool:
     if rest.size <= APART or squares == 0.0:
         return True
     most = max(abs(float(rest[:-k] @ rest[k:])) for k in range(1, APART + 1))
-    return most < max(CORRELATED, CHANCE / np.sqrt(rest.size)) * squares
+    return most < max(CORRELATED, CHANCE / math.sqrt(rest.size)) * squares

@@ -13,14 +13,19 @@ pub(super) fn measures(record: &Record<'_>) -> Measures {
     Measures::of(&record.drive, record.y, record.window.clone())
 }
 
-/// Least share of the deviation that a mode has to take away before the search keeps to it.
-const CLEAR: f64 = 0.05;
+/// Least shares of the deviation that a mode has to take away before the search allows for one,
+/// and before it keeps to that one.
+const FAINT: f64 = 0.05;
+const CLEAR: f64 = 0.3;
 
-/// Natural frequency of the mode that a record shows, rad/s; `None` where it shows none.
-fn shown_mode(record: &Record<'_>, stop: Stop<'_>) -> Option<f64> {
-    let found = resonances(&record.drive, record.y, record.window.start, 1, stop)?;
-    let clear = found.first().filter(|mode| mode.gain > CLEAR)?;
-    Some(core::f64::consts::TAU * clear.frequency)
+/// Looks for a mode in the record: one that is clear, something that may be one, or none.
+fn look_for_mode(of: &mut Measures, record: &Record<'_>, stop: Stop<'_>) {
+    let found = resonances(&record.drive, record.y, record.window.start, 1, stop);
+    let Some(found) = found else { return };
+    let gain = found.first().map_or(0.0, |mode| mode.gain);
+    (of.without_mode, of.faint_mode) = (gain < FAINT, (FAINT..CLEAR).contains(&gain));
+    let clear = found.first().filter(|mode| mode.gain >= CLEAR);
+    of.mode = clear.map(|mode| core::f64::consts::TAU * mode.frequency);
 }
 
 /// Least range of the drive's means, relative to that of the drive, that tells a gain.
@@ -74,7 +79,7 @@ pub fn derive(
         )));
     }
     if of.excited().is_some() {
-        of.mode = shown_mode(record, stop);
+        look_for_mode(&mut of, record, stop);
     }
     if let Some(mode) = of.mode {
         steady(&mut of, record, mode);

@@ -83,6 +83,10 @@ pub fn resonances(
             let mut modes = known.clone();
             modes.push(start);
             let (cost, modes) = trial.refined(modes, edges, stop)?;
+            // Beside a mode that is sure, what is none does not hide another.
+            if !known.is_empty() && !modes.iter().all(|mode| mode.within(edges)) {
+                continue;
+            }
             if best.as_ref().is_none_or(|(least, _)| cost < *least) {
                 best = Some((cost, modes));
             }

@@ -190,8 +190,7 @@ impl<O: InputOperator> InputStage<O> {
 
     /// Equilibrium after a slow visit to each voltage in turn, from rest, its creep complete.
     pub(super) fn equilibrium_values(&self, voltages: &[f64]) -> Result<Values> {
-        let state = self.settled_at(voltages);
-        finite_state(self.values_of(&state), voltages)
+        finite_state(self.values_of(&self.settled_at(voltages)), voltages)
     }
 
     /// The operator's output at rest, m.

@@ -50,6 +50,10 @@ pub struct Measures {
     pub wants_mode: bool,
     /// Natural frequency of the mode that the record shows, rad/s.
     pub mode: Option<f64>,
+    /// Whether the record was looked through for modes and shows none.
+    pub without_mode: bool,
+    /// Whether it shows something that may be a mode.
+    pub faint_mode: bool,
     /// Sampling interval, s.
     pub dt: f64,
     /// RMS of the drive about its mean, V or N.
@@ -86,6 +90,8 @@ impl Measures {
             quickness,
             wants_mode: false,
             mode: None,
+            without_mode: false,
+            faint_mode: false,
             dt,
             drive_size,
             displacement_size,
@@ -108,7 +114,7 @@ impl Measures {
 
     /// Natural frequencies at which the drive could excite a mode, rad/s: from three times the
     /// slowest motion to nine tenths of half the sampling rate. `None` for a drive that is slow
-    /// all the time, whose record does not show a mode.
+    /// all the time, and where the record shows no mode.
     #[must_use]
     pub fn excited(&self) -> Option<Range> {
         let slowest = 3.0 * self.slow;
@@ -116,7 +122,10 @@ impl Measures {
         if self.wants_mode {
             return Some((slowest, fastest.max(8.0 * slowest)));
         }
-        (fastest > 8.0 * slowest).then_some((slowest, fastest))
+        let quick = fastest > 8.0 * slowest && !self.without_mode;
+        // What may be a mode may also be what hysteresis makes of a stage far quicker.
+        let fastest = if self.faint_mode { 0.9 * core::f64::consts::PI / self.dt } else { fastest };
+        quick.then_some((slowest, fastest))
     }
 
     /// Ranges of mass, damping and stiffness between a soft and a hard stiffness, N/m.
