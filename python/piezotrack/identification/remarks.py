@@ -16,14 +16,45 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["beyond_fit", "drive_rate", "first_samples", "of_lags", "of_start"]
+__all__ = ["above_noise", "beyond_fit", "drive_rate", "first_samples", "of_lags", "of_start"]
 
+# A residual of so many times the noise is not due to the noise.
+NOISY = 3.0
 # Share of the travel that a lag makes up from which a loop is due to it.
 VISCOUS = 0.02
 # Share of the window that the first samples may be, and of the squared residual that they carry.
 FIRST, CARRIED = 0.1, 0.5
 # Margin of the drive's range, and factor of its rate, beyond which a model was not fitted.
 MARGIN, FASTER = 0.01, 2.0
+
+
+def above_noise(cost: float, noise: float) -> list[str]:
+    """Say that the best kind leaves more than the noise.
+
+    Parameters
+    ----------
+    cost : float
+        Root mean square of the residual [m].
+    noise : float
+        Noise of the displacement from sample to sample [m].
+
+    Returns
+    -------
+    list of str
+        One sentence, or none.
+
+    Examples
+    --------
+    >>> above_noise(50e-9, 10e-9)
+    ['the residual is 5 times the noise between samples, 10 nm: no kind that was tried describes \
+all of the motion']
+    """
+    if noise <= 0.0 or cost <= NOISY * noise:
+        return []
+    return [
+        f"the residual is {cost / noise:.2g} times the noise between samples, "
+        f"{1e9 * noise:.3g} nm: no kind that was tried describes all of the motion"
+    ]
 
 
 def drive_rate(u: Array, dt: float) -> float:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .._support.statistics import sample_noise
 from ..data import diagnostics
 from . import remarks
 from .identified import IdentifiedModel, Score
@@ -150,6 +151,8 @@ class Identification(IdentifiedModel):
             unit = data.drive_unit
             notes.append(f"the drive is in {unit}: forces are in {unit} too, not in N")
         notes += self.model._notes(lambda: self._response)
+        if self.trials:
+            notes += remarks.above_noise(self.cost, sample_noise(data.y))
         notes += remarks.of_lags(self.lags, 2.0 * math.pi * _frequency(data))
         notes += remarks.first_samples(data.y - self._response.x, data)
         if self.at_bound:

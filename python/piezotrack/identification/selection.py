@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import _core
 from .._support.messages import quoted
+from .._support.statistics import sample_noise
 from ..errors import DataError, NumericalError, ParameterError
 from ..stages.registry import model_named
 from .kinds import identify_kind
@@ -110,7 +111,7 @@ def identify_best(
         swarm["swarm"] = ParticleSwarm(iterations=ITERATIONS)
     infos = _kinds(data, of_swarm)
     part, rest = _parts(data)
-    noise = _noise(rest.y)
+    noise = sample_noise(rest.y)
     trial = dict(swarm)
     if rest is not part and trial["runs"] is None:
         trial["runs"] = RUNS
@@ -172,13 +173,6 @@ def _parts(data: Dataset) -> tuple[Dataset, Dataset]:
             middle = float(data.t[place])
             return data[data.t[0] : middle], data[middle:]
     return data, data
-
-
-def _noise(y: Array) -> float:
-    """Noise of a sensor that is white from sample to sample [m]: from third differences."""
-    if y.size < 16:
-        return 0.0
-    return float(1.4826 * np.median(np.abs(np.diff(y, 3))) / np.sqrt(20.0))
 
 
 def _white(rest: Array) -> bool:
