@@ -41,7 +41,7 @@ fn main() {
     let stage = DahlStage::xu_li_2010();
     let run = stage.simulate(&Experiment::of(&held, NEVER)).unwrap().unwrap();
     let record = Record::new(&u, &run.x, 1.0 / RATE, Hold::First, 0).unwrap();
-    let problem = Problem::new(&record, &paper_spec()).unwrap();
+    let problem = Problem::new(&record, &paper_spec(), NEVER).unwrap();
     let evaluator = Evaluator::new(&record, &problem, NEVER);
     let candidates = candidates(&problem, PARTICLES);
 

@@ -50,7 +50,7 @@ fn throughput(criterion: &mut Criterion) {
     let stage = DahlStage::xu_li_2010();
     let y = stage.simulate(&Experiment::of(&held, NEVER)).unwrap().unwrap().x;
     let record = Record::new(&u, &y, 1.0 / RATE, Hold::First, 0).unwrap();
-    let problem = Problem::new(&record, &paper_spec()).unwrap();
+    let problem = Problem::new(&record, &paper_spec(), NEVER).unwrap();
     let evaluator = || Evaluator::new(&record, &problem, NEVER);
     assert_eq!(evaluator().stepping, Stepping { order: Order::Second, substeps: 1 });
 
