@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -77,7 +77,7 @@ class Case:
     frequency: float | None
 
 
-def plays(rng: np.random.Generator, frequency: float | None, sign: float) -> pt.Stage:
+def plays(rng: np.random.Generator, frequency: float | None, sign: float) -> pt.stages.Stage:
     count, zones = int(rng.integers(3, 11)), int(rng.integers(0, 3)) if sign > 0.0 else 0
     return pt.PrandtlIshlinskiiStage(
         linear=sign * 8e-7,
@@ -94,7 +94,7 @@ def damping(rng: np.random.Generator) -> float:
     return float(np.exp(rng.uniform(np.log(0.02), np.log(0.3))))
 
 
-def mechanics(rng: np.random.Generator, frequency: float | None) -> dict[str, float]:
+def mechanics(rng: np.random.Generator, frequency: float | None) -> dict[str, Any]:
     mass = STIFFNESS / (2.0 * np.pi * (frequency or 3000.0)) ** 2
     return {
         "mass": mass,
@@ -103,7 +103,7 @@ def mechanics(rng: np.random.Generator, frequency: float | None) -> dict[str, fl
     }
 
 
-def dahl(rng: np.random.Generator, frequency: float | None, sign: float) -> pt.Stage:
+def dahl(rng: np.random.Generator, frequency: float | None, sign: float) -> pt.stages.Stage:
     return pt.FirstOrderDahlStage(
         **mechanics(rng, frequency),
         piezo_coefficient=sign * 1.6,
@@ -112,7 +112,7 @@ def dahl(rng: np.random.Generator, frequency: float | None, sign: float) -> pt.S
     )
 
 
-def bouc_wen(rng: np.random.Generator, frequency: float | None, sign: float) -> pt.Stage:
+def bouc_wen(rng: np.random.Generator, frequency: float | None, sign: float) -> pt.stages.Stage:
     return pt.BoucWenStage(
         **mechanics(rng, frequency),
         piezo_coefficient=sign * 1.6e-6,
@@ -122,7 +122,7 @@ def bouc_wen(rng: np.random.Generator, frequency: float | None, sign: float) -> 
     )
 
 
-def case(i: int, stage_of: Callable[..., pt.Stage], *, quick: bool) -> Case:
+def case(i: int, stage_of: Callable[..., pt.stages.Stage], *, quick: bool) -> Case:
     """Record of a random stage in equilibrium at its first sample."""
     rng = np.random.default_rng([11, i])
     rate = (1000.0, 5000.0)[i % 2]
@@ -137,14 +137,14 @@ def case(i: int, stage_of: Callable[..., pt.Stage], *, quick: bool) -> Case:
     return Case(pt.Dataset(u=u, y=y, dt=1.0 / rate), size, frequency)
 
 
-def natural_frequency(model: pt.Stage) -> float | None:
+def natural_frequency(model: pt.stages.Stage) -> float | None:
     if isinstance(model, pt.PrandtlIshlinskiiStage):
         return model.frequency
     assert isinstance(model, (pt.FirstOrderDahlStage, pt.BoucWenStage, pt.ParallelDahlStage))
     return float(np.sqrt(model.stiffness / model.mass) / (2.0 * np.pi))
 
 
-def score(cases: list[tuple[Case, pt.Identification]]) -> tuple[int, int]:
+def score(cases: list[tuple[Case, pt.identification.Identification]]) -> tuple[int, int]:
     """How many fits are within three times the noise, and how many have the mode."""
     near = sum(fit.cost < 3.0 * one.noise for one, fit in cases)
     found = [natural_frequency(fit.model) for _, fit in cases]
@@ -169,7 +169,9 @@ def test_plays_on_records_of_plays() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("stage_of", [dahl, bouc_wen])
-def test_the_default_call_on_records_of_other_kinds(stage_of: Callable[..., pt.Stage]) -> None:
+def test_the_default_call_on_records_of_other_kinds(
+    stage_of: Callable[..., pt.stages.Stage],
+) -> None:
     quick = [case(i, stage_of, quick=True) for i in range(4)]
     slow = [case(i, stage_of, quick=False) for i in range(3)]
     near, modes = score([(one, pt.identify(one.log, progress=False)) for one in quick])
