@@ -74,8 +74,8 @@ def test_nothing_is_said_of_measured_logs() -> None:
             diagnostics.check_record(record, searches_hysteresis=True)
             assert diagnostics.record_warnings(record) == []
     # Of one slow sine, the Dahl model takes damping for a part of the loop's width.
-    (note,) = pt.identify(pt.read(MEASURED / "training.csv")[3.0:23.0], "dahl", seed=1).notes
-    assert re.match(r"a lag of .* ms makes .* of the travel at this rate", note)
+    fit = pt.identify(pt.read(MEASURED / "training.csv")[3.0:23.0], "dahl", seed=1)
+    assert re.match(r"a lag of .* ms makes .* of the travel at this rate", fit.notes[0])
 
 
 # Refusals.

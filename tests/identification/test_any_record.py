@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,9 +14,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
-
-    from piezotrack.identification.result import Identification
-    from piezotrack.stages.base import Stage
 
     Array = NDArray[np.float64]
 
@@ -80,9 +77,7 @@ class Case:
     frequency: float | None
 
 
-def plays(
-    rng: np.random.Generator, frequency: float | None, sign: float
-) -> pt.PrandtlIshlinskiiStage:
+def plays(rng: np.random.Generator, frequency: float | None, sign: float) -> pt.stages.Stage:
     count, zones = int(rng.integers(3, 11)), int(rng.integers(0, 3)) if sign > 0.0 else 0
     return pt.PrandtlIshlinskiiStage(
         linear=sign * 8e-7,
@@ -108,7 +103,7 @@ def mechanics(rng: np.random.Generator, frequency: float | None) -> dict[str, An
     }
 
 
-def dahl(rng: np.random.Generator, frequency: float | None, sign: float) -> Stage:
+def dahl(rng: np.random.Generator, frequency: float | None, sign: float) -> pt.stages.Stage:
     return pt.FirstOrderDahlStage(
         **mechanics(rng, frequency),
         piezo_coefficient=sign * 1.6,
@@ -117,7 +112,7 @@ def dahl(rng: np.random.Generator, frequency: float | None, sign: float) -> Stag
     )
 
 
-def bouc_wen(rng: np.random.Generator, frequency: float | None, sign: float) -> Stage:
+def bouc_wen(rng: np.random.Generator, frequency: float | None, sign: float) -> pt.stages.Stage:
     return pt.BoucWenStage(
         **mechanics(rng, frequency),
         piezo_coefficient=sign * 1.6e-6,
@@ -127,7 +122,7 @@ def bouc_wen(rng: np.random.Generator, frequency: float | None, sign: float) -> 
     )
 
 
-def case(i: int, stage_of: Callable[..., Stage], *, quick: bool) -> Case:
+def case(i: int, stage_of: Callable[..., pt.stages.Stage], *, quick: bool) -> Case:
     """Record of a random stage in equilibrium at its first sample."""
     rng = np.random.default_rng([11, i])
     rate = (1000.0, 5000.0)[i % 2]
@@ -142,14 +137,14 @@ def case(i: int, stage_of: Callable[..., Stage], *, quick: bool) -> Case:
     return Case(pt.Dataset(u=u, y=y, dt=1.0 / rate), size, frequency)
 
 
-def natural_frequency(model: Stage) -> float | None:
+def natural_frequency(model: pt.stages.Stage) -> float | None:
     if isinstance(model, pt.PrandtlIshlinskiiStage):
         return model.frequency
     assert isinstance(model, (pt.FirstOrderDahlStage, pt.BoucWenStage, pt.ParallelDahlStage))
     return float(np.sqrt(model.stiffness / model.mass) / (2.0 * np.pi))
 
 
-def score(cases: list[tuple[Case, Identification]]) -> tuple[int, int]:
+def score(cases: list[tuple[Case, pt.identification.Identification]]) -> tuple[int, int]:
     """How many fits are within three times the noise, and how many have the mode."""
     near = sum(fit.cost < 3.0 * one.noise for one, fit in cases)
     found = [natural_frequency(fit.model) for _, fit in cases]
@@ -174,7 +169,9 @@ def test_plays_on_records_of_plays() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("stage_of", [dahl, bouc_wen])
-def test_the_default_call_on_records_of_other_kinds(stage_of: Callable[..., Stage]) -> None:
+def test_the_default_call_on_records_of_other_kinds(
+    stage_of: Callable[..., pt.stages.Stage],
+) -> None:
     quick = [case(i, stage_of, quick=True) for i in range(4)]
     slow = [case(i, stage_of, quick=False) for i in range(3)]
     near, modes = score([(one, pt.identify(one.log, progress=False)) for one in quick])

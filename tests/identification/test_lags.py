@@ -9,7 +9,7 @@ import piezotrack as pt
 
 DT = 0.02
 STAGE = pt.PrandtlIshlinskiiStage(
-    linear=0.4e-6, thresholds=[2.0, 6.0, 12.0, 20.0], weights=[0.06e-6, 0.05e-6, 0.04e-6, 0.03e-6]
+    linear=0.4e-6, thresholds=(2.0, 6.0, 12.0, 20.0), weights=(0.06e-6, 0.05e-6, 0.04e-6, 0.03e-6)
 )
 
 

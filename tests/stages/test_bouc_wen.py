@@ -277,12 +277,13 @@ def identified(noise: float = 0.05e-6) -> pt.identification.Identification:
 def test_identification_recovers_the_parameters() -> None:
     fit = identified()
     assert isinstance(fit.model, pt.BoucWenStage)
-    assert fit.cost == pytest.approx(0.05e-6, rel=0.05)
+    # The forces of the mass, which is not searched, make 18 nm beside the noise of 50.
+    assert fit.cost == pytest.approx(0.05e-6, rel=0.08)
     for name in ("damping", "piezo_coefficient", "alpha", "beta", "gamma"):
         assert getattr(fit.model, name) == pytest.approx(TRUE[name], rel=0.02), name
         assert fit.parameters[name].identified
     # A slow drive tells nothing of the mass.
-    assert not fit.parameters["mass"].identified
+    assert not fit.parameters["mass"].free
     assert fit.model.exponent == 1.0
     assert fit.simulate(fit.data).x == pytest.approx(fit.data.y, abs=0.3e-6)
 

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from .._support.messages import quoted
 from ..errors import ParameterError
-from .least_squares import LeastSquares, solve_least_squares
+from .history import GAIN
+from .least_squares import LeastSquares, shown_history, solve_least_squares
 from .search import search
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ def identify_kind(
     history: History | None,
     of_swarm: Mapping[str, Any],
     least_squares: object,
+    shown: History | None = None,
 ) -> Identification:
     """Identify a stage of one kind.
 
@@ -40,9 +42,12 @@ def identify_kind(
     offset : bool
         Whether an offset of the sensor is fitted.
     history : {"virgin", "settled", "fit"} or None
-        What the stage went through before.
+        What the stage went through before; None for what the record shows.
     of_swarm, least_squares : mapping, object
         Arguments for one of the two ways, not yet checked; those for the other are not used.
+
+    shown : {"virgin", "settled", "fit"} or None, optional
+        What plays show of the history, where it is known.
 
     Returns
     -------
@@ -54,8 +59,16 @@ def identify_kind(
     ParameterError, DataError, NumericalError, Interrupted
         As for `identify`.
     """
-    if info.searched:
+    if info.searched and history is not None:
         return search(data, info, offset=offset, history=history, **of_swarm)
+    if info.searched:
+        # What plays show may be due to a loop that they cannot make: the kind itself decides.
+        fit = search(data, info, offset=offset, **of_swarm)
+        history = shown or shown_history(data)
+        if history == "virgin":
+            return fit
+        other = search(data, info, offset=offset, history=history, **of_swarm)
+        return other if other.cost < (1.0 - GAIN) * fit.cost else fit
     settings = LeastSquares() if least_squares is None else least_squares
     if not isinstance(settings, LeastSquares):
         raise ParameterError(

@@ -15,7 +15,6 @@ from ..errors import Interrupted, ParameterError
 from ..stages.registry import stage_class
 from .estimates import Estimate, LagRange, Progress, SwarmRun
 from .history import start_after
-from .least_squares import shown_history
 from .model_file import provenance
 from .result import Identification
 from .step_response import StepResult
@@ -44,7 +43,7 @@ def search(
     bounds: object = None,
     stiffness: object = None,
     delay: object = None,
-    history: History | None = None,
+    history: History = "virgin",
     creep: object = None,
     swarm: object = None,
     seed: object = None,
@@ -63,8 +62,8 @@ def search(
         The model.
     offset : bool
         Whether an offset of the sensor is fitted.
-    history : {"virgin", "settled", "fit"} or None
-        What the stage went through before the record; None for what the record shows.
+    history : {"virgin", "settled", "fit"}
+        What the stage went through before the record.
     free, fixed, initial, bounds, stiffness, delay, creep, swarm, seed, runs, threads, progress, \
     callback
         As for `identify`, not yet checked; None stands for the default.
@@ -92,7 +91,6 @@ def search(
     held = _held(initial, fixed, free, bounds)
     diagnostics.check_record(data, searches_hysteresis=bool(set(info.hysteresis) - set(held)))
     full = data.full
-    history = shown_history(data) if history is None else history
     with ProgressBar(progress) as bar:
         found = _core.identify(
             model=info.name,

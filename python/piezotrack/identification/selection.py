@@ -122,15 +122,12 @@ def identify_best(
             fit = identify_kind(part, info, of_swarm=trial, **common)
             if info.name == BY_PLAYS and fit.start is not None:
                 # What swarms would ask a stage with plays for, each time again.
-                common["history"] = fit.start.history
+                common["shown"] = fit.start.history
         except (DataError, NumericalError) as error:
             refused = refused or error
             continue
         score = fit.score(rest, offset=fit.offset) if rest is not part else fit.fitted
         found.append((Trial(info.name, info.title, score.rms), info))
-        if fit.start is not None and not info.searched:
-            # What least squares have found of the history holds for all kinds.
-            common["history"] = history or fit.start.history
         # Of a quick motion, differences from sample to sample are not the noise's alone.
         if score.rms < AS_NOISE * noise and _white(
             rest.y - fit.simulate(rest, offset=fit.offset).x
