@@ -2,7 +2,7 @@
 
 use super::coordinate::Coordinate;
 use super::record::Record;
-use super::resonances::resonances;
+use super::resonances::{Resonance, resonances};
 use crate::error::{Error, Result, shown};
 use crate::integrator::MOST_PARAMETERS;
 use crate::models::{Held, Measures, Model};
@@ -18,13 +18,17 @@ pub(super) fn measures(record: &Record<'_>) -> Measures {
 const FAINT: f64 = 0.05;
 const CLEAR: f64 = 0.3;
 
+/// Damping ratio below which it is a mode for certain: above, a lag looks alike.
+const SWINGING: f64 = 0.5;
+
 /// Looks for a mode in the record: one that is clear, something that may be one, or none.
 fn look_for_mode(of: &mut Measures, record: &Record<'_>, stop: Stop<'_>) {
     let found = resonances(&record.drive, record.y, record.window.start, 1, stop);
     let Some(found) = found else { return };
     let gain = found.first().map_or(0.0, |mode| mode.gain);
-    (of.without_mode, of.faint_mode) = (gain < FAINT, (FAINT..CLEAR).contains(&gain));
-    let clear = found.first().filter(|mode| mode.gain >= CLEAR);
+    let swings = |mode: &&Resonance| mode.gain >= CLEAR && mode.damping_ratio < SWINGING;
+    let clear = found.first().filter(swings);
+    (of.without_mode, of.faint_mode) = (gain < FAINT, gain >= FAINT && clear.is_none());
     of.mode = clear.map(|mode| core::f64::consts::TAU * mode.frequency);
 }
 
