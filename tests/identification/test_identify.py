@@ -80,7 +80,7 @@ def test_spso_2011_finds_it_and_the_descent_sharpens_it(update: Any, seed: int) 
     swarm = replace(pt.ParticleSwarm.spso_2011(), update=update)
     plain = quick_fit(offset=False, swarm=swarm, seed=seed)
     assert plain.npolish == 0
-    assert plain.cost < 1.3 * NOISE
+    assert plain.cost < 1.35 * NOISE
     assert max(off(plain).values()) < 0.02, off(plain)
     polished = quick_fit(offset=False, swarm=replace(swarm, polish=True), seed=seed)
     assert polished.cost == pytest.approx(NOISE, rel=0.05)

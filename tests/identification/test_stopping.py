@@ -38,7 +38,7 @@ def test_the_callback_is_told_of_every_iteration_in_order() -> None:
         offset_fitted=True,
         scale_assumed=False,
         stroke=quick().stroke,
-    ).score(quick())
+    ).score(quick(), history="virgin")
     # A search steps to within 0.2 nm.
     assert score.rms == pytest.approx(seen[-1].cost, abs=2e-10)
     assert bits(fit) == bits(quick_fit(runs=1))
@@ -119,7 +119,9 @@ swarm = pt.ParticleSwarm(
 )
 print("searching", flush=True)
 try:
-    pt.identify(log, swarm=swarm, seed=1, callback=callback)
+    pt.identify(
+        log, "dahl", history="virgin", swarm=swarm, seed=1, callback=callback
+    )
 except KeyboardInterrupt as stopped:
     ended = time.monotonic()
     partial = stopped.partial

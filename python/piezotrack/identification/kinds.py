@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from .._support.messages import quoted
-from ..errors import ParameterError
+from ..errors import Interrupted, ParameterError
 from .history import GAIN
 from .least_squares import LeastSquares, shown_history, solve_least_squares
 from .search import search
@@ -74,7 +74,10 @@ def identify_kind(
         raise ParameterError(
             f"least_squares is {quoted(settings)}: expected a pt.identification.LeastSquares"
         )
-    return solve_least_squares(data, info, settings, offset, history)
+    try:
+        return solve_least_squares(data, info, settings, offset, history)
+    except KeyboardInterrupt:
+        raise Interrupted("interrupted before the weights were found") from None
 
 
 def refuse_given(info: ModelInfo, of_swarm: Mapping[str, object], least_squares: object) -> None:

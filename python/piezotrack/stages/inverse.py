@@ -379,11 +379,11 @@ class InverseSession:
         >>> import piezotrack as pt
         >>> plays = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(5.0,), weights=(5e-7,))
         >>> session = plays.inverse().start(0.001)
-        >>> for reference in (20e-6, 30e-6, 20e-6, 10e-6):
+        >>> for reference in (20e-6, 40e-6, 20e-6):
         ...     asked = session.step(reference)
         ...     session.applied(min(asked, 15.0))
         >>> print(f"{asked:.3f} V")
-        10.000 V
+        15.000 V
         """
         self._core.applied(finite("voltage", voltage, "V"))
 

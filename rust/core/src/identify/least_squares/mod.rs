@@ -209,12 +209,16 @@ fn check(record: &WeightsRecord<'_>, settings: &Settings) -> Result<bool> {
     let (u, y) = (&drive.u[start..], &y[start..]);
     let (low, high) = range(u);
     if high <= low {
-        return Err(Error::Data(format!("the drive stays at {low} V: nothing can be identified")));
+        return Err(Error::Data(format!(
+            "the drive is constant at {low} V in the window: expected a drive that moves the stage, up \
+             and down at least once"
+        )));
     }
     let (least, most) = range(y);
     if most <= least {
         return Err(Error::Data(format!(
-            "the displacement stays at {least:e} m: is the sensor alive?"
+            "the displacement is constant at {least} m in the window while the drive moves: the sensor \
+             seems dead or not connected"
         )));
     }
     if turns(drive.u, 0.01 * (high - low)).is_empty() {
