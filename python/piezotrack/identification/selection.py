@@ -105,6 +105,10 @@ def identify_best(
                 f"{name} is {quoted(of_swarm[name])}: expected none with model='auto'; name the "
                 "model whose parameters these are, as model='dahl'"
             )
+    # Refused also where least squares alone are the answer.
+    for name in ("seed", "runs", "threads"):
+        if of_swarm[name] is not None:
+            _core.as_count(name, of_swarm[name])
     common: dict[str, Any] = {"offset": offset, "history": history, "least_squares": least_squares}
     swarm = dict(of_swarm)
     if swarm["swarm"] is None:

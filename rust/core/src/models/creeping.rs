@@ -13,7 +13,7 @@ use piezotrack_control::CreepingInverse;
 use piezotrack_control::creep::{Creep, CubicLag, Lag, advance, output};
 
 use super::creep::{Dynamics, MOST_RELAXATIONS, Relaxation};
-use super::plant::Plant;
+use super::plant::{Plant, Settling};
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
     Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
@@ -207,12 +207,6 @@ impl<M: Plant> Plant for Creeping<M> {
         CreepingState { stage, reached }
     }
 
-    fn settled(&self, voltages: &[f64]) -> Self::State {
-        let stage = self.stage.settled(voltages);
-        let reached = [self.stage.displacement(&stage); MOST_RELAXATIONS];
-        CreepingState { stage, reached }
-    }
-
     fn flow(&self, step: f64) -> Self::Flow {
         let lags = self.relaxation.creep.map(|creep| Lag::new(creep.time, step));
         CreepingFlow { stage: self.stage.flow(step), lags }
@@ -261,5 +255,13 @@ impl<M: Invertible> Invertible for Creeping<M> {
         let inverse = CreepingInverse::new(inverse, self.creep(), dt)?;
         let state = inverse.start(state);
         Ok((inverse, state))
+    }
+}
+
+impl<M: Settling> Settling for Creeping<M> {
+    fn settled(&self, voltages: &[f64]) -> Self::State {
+        let stage = self.stage.settled(voltages);
+        let reached = [self.stage.displacement(&stage); MOST_RELAXATIONS];
+        CreepingState { stage, reached }
     }
 }

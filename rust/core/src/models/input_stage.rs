@@ -17,7 +17,7 @@ use core::fmt::Debug;
 use piezotrack_control::{CreepState, InputInverse, InputInverseState, OperatorInverse};
 
 use super::creep::{MOST_RELAXATIONS, Relaxation, RelaxationFlow, RelaxationState};
-use super::plant::Plant;
+use super::plant::{Plant, Settling};
 use super::traits::{Experiment, Response, finite_state};
 use super::values::{ParameterInfo, Values};
 use crate::error::{Error, Result, positive};
@@ -356,10 +356,6 @@ impl<O: Segmented> Plant for InputStage<O> {
         self.at_rest()
     }
 
-    fn settled(&self, voltages: &[f64]) -> Self::State {
-        self.settled_at(voltages)
-    }
-
     fn flow(&self, step: f64) -> InputStageFlow {
         self.steps(step, ACCURACY)
     }
@@ -375,5 +371,11 @@ impl<O: Segmented> Plant for InputStage<O> {
     #[inline(always)]
     fn displacement(&self, state: &Self::State) -> f64 {
         state.relaxation.x
+    }
+}
+
+impl<O: Segmented> Settling for InputStage<O> {
+    fn settled(&self, voltages: &[f64]) -> Self::State {
+        self.settled_at(voltages)
     }
 }

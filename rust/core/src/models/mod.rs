@@ -35,7 +35,7 @@ pub use generalised_prandtl_ishlinskii::{
 };
 pub use input_stage::{InputOperator, InputStage, InputStageFlow, InputStageState, Segmented};
 pub use parallel_dahl::{ParallelDahlKernel, ParallelDahlStage};
-pub use plant::{KernelFlow, KernelModel, Plant};
+pub use plant::{KernelFlow, KernelModel, Plant, Settling};
 pub use prandtl_ishlinskii::{
     MOST_PLAYS, MOST_ZONES, PlayHysteresis, Plays, PrandtlIshlinskiiStage,
 };

@@ -12,12 +12,6 @@ pub trait Plant {
     /// The state before any voltage.
     fn rest(&self) -> Self::State;
 
-    /// The state in equilibrium after a slow visit to each voltage in turn, from rest; that at rest
-    /// where the plant has no equilibrium of its own.
-    fn settled(&self, _voltages: &[f64]) -> Self::State {
-        self.rest()
-    }
-
     /// Precomputes steps of `step` seconds.
     fn flow(&self, step: f64) -> Self::Flow;
 
@@ -26,6 +20,12 @@ pub trait Plant {
 
     /// Displacement, m.
     fn displacement(&self, state: &Self::State) -> f64;
+}
+
+/// A plant that can begin in equilibrium.
+pub trait Settling: Plant {
+    /// The state in equilibrium after a slow visit to each voltage in turn, from rest.
+    fn settled(&self, voltages: &[f64]) -> Self::State;
 }
 
 /// A model that one kernel describes, whatever its parameters.
@@ -62,10 +62,6 @@ impl<M: KernelModel> Plant for M {
         self.lumped().rest()
     }
 
-    fn settled(&self, voltages: &[f64]) -> Self::State {
-        self.lumped().equilibrium(voltages)
-    }
-
     fn flow(&self, step: f64) -> Self::Flow {
         let stage = self.lumped();
         let halvings = halvings(stage.mechanics().rate(), step);
@@ -83,5 +79,11 @@ impl<M: KernelModel> Plant for M {
 
     fn displacement(&self, state: &Self::State) -> f64 {
         state.x
+    }
+}
+
+impl<M: KernelModel> Settling for M {
+    fn settled(&self, voltages: &[f64]) -> Self::State {
+        self.lumped().equilibrium(voltages)
     }
 }

@@ -4,7 +4,7 @@ use piezotrack_control::Snapshot;
 use piezotrack_control::inverse::Inverse;
 
 use super::creeping::Creeping;
-use super::plant::Plant;
+use super::plant::{Plant, Settling};
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
     Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
@@ -167,14 +167,6 @@ macro_rules! models {
                 match self { $(Self::$variant(stage) => StageState::$variant(Plant::rest(stage)),)* }
             }
 
-            fn settled(&self, voltages: &[f64]) -> StageState {
-                match self {
-                    $(Self::$variant(stage) => {
-                        StageState::$variant(Plant::settled(stage, voltages))
-                    })*
-                }
-            }
-
             fn flow(&self, step: f64) -> StageFlow {
                 match self { $(Self::$variant(stage) => StageFlow::$variant(stage.flow(step)),)* }
             }
@@ -199,6 +191,16 @@ macro_rules! models {
                         stage.displacement(state)
                     })*
                     _ => f64::NAN,
+                }
+            }
+        }
+
+        impl Settling for Stage {
+            fn settled(&self, voltages: &[f64]) -> StageState {
+                match self {
+                    $(Self::$variant(stage) => {
+                        StageState::$variant(Settling::settled(stage, voltages))
+                    })*
                 }
             }
         }

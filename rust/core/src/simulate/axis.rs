@@ -2,7 +2,7 @@
 
 use super::virtual_stage::{VirtualStage, VirtualState};
 use super::{Apparatus, ApparatusState};
-use crate::models::{Plant, RelaxationFlow, Stage, StageFlow, StageState};
+use crate::models::{Plant, RelaxationFlow, Settling, Stage, StageFlow, StageState};
 
 /// A model, or a virtual stage.
 #[derive(Clone, Copy, Debug)]

@@ -9,7 +9,7 @@ use super::{CreepKind, DynamicsKind, PlaysKind, Settings, WeightsRecord};
 use crate::identify::history::History;
 use crate::identify::resonances::{Resonance, resonances};
 use crate::math::least;
-use crate::models::WeightedPlays;
+use crate::models::{Measures, WeightedPlays};
 use crate::signal::{index, range};
 
 /// Rounds over the numbers of an envelope, at most.
@@ -151,6 +151,12 @@ fn first_mode<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -> Op
     let common = fit.common;
     let record = common.record;
     let most = if settings.dynamics == DynamicsKind::Auto { MOST_SHOWN } else { 1 };
+    let slow =
+        Measures::of(&record.drive, record.y, record.start..record.y.len()).excited().is_none();
+    if slow && settings.dynamics == DynamicsKind::Auto {
+        // What a mode would explain of one slow sine is creep, or what the plays do not.
+        return Some(false);
+    }
     let found = resonances(&record.drive, record.y, record.start, most, common.stop)?;
     let mut better = false;
     for count in 1..=found.len() {

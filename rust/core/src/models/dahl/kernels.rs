@@ -8,7 +8,7 @@ use crate::integrator::{
     Coupling, FeedbackCoupling, FeedbackState, FrictionCoupling, FrictionMemory,
     FrictionParameters, Kernel, Parameters, TERMS, equilibrium, halvings, linear,
 };
-use crate::models::Plant;
+use crate::models::{Plant, Settling};
 
 /// Without dry friction: `T` terms of the operator's series, to second or fourth order.
 #[derive(Clone, Copy, Debug)]
@@ -131,17 +131,6 @@ impl Plant for DahlStage {
         DahlStageState::default()
     }
 
-    fn settled(&self, voltages: &[f64]) -> DahlStageState {
-        let (x, (q1, q2)) = if self.b1 == 0.0 || self.has_friction() {
-            let end = self.lumped(FrictionKernel).equilibrium(voltages);
-            (end.x, (end.memory.operator.force, end.memory.operator.slope))
-        } else {
-            let end = self.lumped(SmoothKernel::<TERMS, true>).equilibrium(voltages);
-            (end.x, self.states(&end.memory))
-        };
-        DahlStageState { x, v: 0.0, q1, q2 }
-    }
-
     fn flow(&self, step: f64) -> DahlFlow {
         let halvings = halvings(self.mechanics.rate(), step);
         let parameters = self.lumped(FrictionKernel).parameters;
@@ -178,5 +167,18 @@ impl Plant for DahlStage {
 
     fn displacement(&self, state: &DahlStageState) -> f64 {
         state.x
+    }
+}
+
+impl Settling for DahlStage {
+    fn settled(&self, voltages: &[f64]) -> DahlStageState {
+        let (x, (q1, q2)) = if self.b1 == 0.0 || self.has_friction() {
+            let end = self.lumped(FrictionKernel).equilibrium(voltages);
+            (end.x, (end.memory.operator.force, end.memory.operator.slope))
+        } else {
+            let end = self.lumped(SmoothKernel::<TERMS, true>).equilibrium(voltages);
+            (end.x, self.states(&end.memory))
+        };
+        DahlStageState { x, v: 0.0, q1, q2 }
     }
 }

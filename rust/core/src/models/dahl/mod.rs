@@ -14,7 +14,7 @@ mod virgin_branch;
 use piezotrack_control::hysteresis::DahlState;
 use piezotrack_control::inverse::{DahlInverse, InverseState, SampledDahlInverse};
 
-use super::plant::Plant;
+use super::plant::Settling;
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
     Experiment, Invertible, KernelVisitor, Method, ModelInfo, Response, Searchable, StageModel,
