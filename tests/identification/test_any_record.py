@@ -234,7 +234,7 @@ def test_kinds_are_told_the_history_that_plays_show(monkeypatch: pytest.MonkeyPa
     def refused(_: pt.Dataset) -> None:
         raise AssertionError("asked again")
 
-    monkeypatch.setattr("piezotrack.identification.search.shown_history", refused)
+    monkeypatch.setattr("piezotrack.identification.kinds.shown_history", refused)
     one = case(0, bouc_wen, quick=False)
     short = pt.ParticleSwarm(particles=4, iterations=1, polish=False)
     fit = pt.identify(one.log, swarm=short, runs=1, progress=False)

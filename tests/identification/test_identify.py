@@ -215,7 +215,8 @@ def test_the_drive_before_the_window_is_remembered() -> None:
     assert remembering.cost == pytest.approx(5e-8, rel=0.05)
     assert little < 0.01
     forgetting, much = wrong(log.cut(2.4))
-    assert forgetting.cost > 5.0 * remembering.cost
+    # A voltage before the record, which is fitted, stands in for a part of what was forgotten.
+    assert forgetting.cost > 2.0 * remembering.cost
     assert much > 0.2
 
 
@@ -279,12 +280,12 @@ def test_a_result_has_scipys_names() -> None:
 
 def test_the_history_falls_and_ends_in_the_cost() -> None:
     plain = replace(pt.ParticleSwarm(), particles=12, iterations=30, polish=False)
-    fit = quick_fit(swarm=plain)
+    fit = quick_fit(swarm=plain, runs=1)
     assert fit.history.shape == (fit.nit + 1,)
     assert (np.diff(fit.history) <= 0.0).all()
     assert fit.history[-1] == fit.cost
     assert fit.npolish == 0
-    polished = quick_fit()
+    polished = quick_fit(runs=1)
     assert polished.history.tobytes() == fit.history.tobytes()
     assert polished.cost < fit.cost
     assert polished.npolish > 0

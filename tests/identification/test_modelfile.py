@@ -133,6 +133,10 @@ def test_a_file_of_version_1_is_read_with_the_names_of_today(tmp_path: Path) -> 
         "creep_weights": "creep_shares",
     }
     for name in known.model.parameter_names():
+        if name.startswith("mode_"):
+            # No model had several modes then.
+            assert getattr(known.model, name) == ()
+            continue
         value = old[names.get(name, name)]["value"]
         assert getattr(known.model, name) == (tuple(value) if isinstance(value, list) else value)
     assert known.offset == json.loads(file.read_text())["offset"]["value"]

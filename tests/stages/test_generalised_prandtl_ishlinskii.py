@@ -104,7 +104,9 @@ def test_the_inverse_undoes_the_stage_along_any_path(
     session = stage.inverse(playback="online").start(0.01)
     x = stage.simulate(u, 0.01).x
     back = np.array([session.step(one, velocity=0.0, acceleration=0.0) for one in x])
-    np.testing.assert_allclose(back, u, rtol=0.0, atol=75.0 * 1e-12)
+    # Creep is of second order where the hysteresis is not straight between samples.
+    atol = 75.0 * 1e-12 if stage is STAGE else 1e-4
+    np.testing.assert_allclose(back, u, rtol=0.0, atol=atol)
 
 
 def test_between_two_envelopes_the_stage_follows_its_inverse() -> None:
@@ -135,8 +137,8 @@ def test_a_record_gives_back_the_stage_that_made_it() -> None:
     found = pt.identify(log, NAME, least_squares=settings)
     assert found.cost < 5e-9
     assert found.offset == pytest.approx(-4e-6, abs=1e-8)
-    # Linear, four weights, slope, shift and the offset.
-    assert found.free_count == 8
+    # Linear, four weights, slope, shift, two shares of the creep and the offset.
+    assert found.free_count == 10
     again = np.linspace(75.0, 0.0, 300)
     moved = found.model.simulate(again, 1e-3).x - STAGE.simulate(again, 1e-3).x
     assert np.abs(moved).max() < 5e-8

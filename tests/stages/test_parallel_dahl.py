@@ -175,7 +175,7 @@ def test_identification_finds_the_motion(tmp_path: Path) -> None:
     u = slow_drive(1000, dt)
     noise = 20e-9 * np.random.default_rng(5).standard_normal(u.size)
     log = pt.Dataset(u=u, y=STAGE.simulate(u, dt).x + noise, dt=dt)
-    fit = pt.identify(log, "parallel-dahl", seed=2, runs=1)
+    fit = pt.identify(log, "parallel-dahl", seed=2)
     assert fit.cost == pytest.approx(20e-9, rel=0.1)
     other = 0.4 * u[::-1] + 10.0
     expected, found = STAGE.simulate(other, dt).x, fit.model.simulate(other, dt).x

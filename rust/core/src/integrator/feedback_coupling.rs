@@ -150,26 +150,27 @@ pub(super) fn advance_operator<N: Number, O: Operator<N>>(
     w: N,
 ) -> O::State {
     let turned = from.w * w;
-    if turned.any_negative() {
+    let velocity = CubicVelocity::between(from, x, w);
+    // A lane that turns does not go back besides; each lane takes its own way, whatever the others.
+    let dips = turned.where_negative(x.like(1.0), velocity.dips());
+    if dips.any_negative() {
+        // Lanes without a leg go to its end before; it then has length 0.
+        let [first, second] = velocity.dip().map(|part| between(from.x, from.w, x, w, part));
+        let first = dips.where_negative(first, x);
+        let first = turned.where_negative(turning_point(from, x, w), first);
+        let second = dips.where_negative(second, x);
+        let there = operator.along(branch, first - from.x);
+        let back = dips.where_negative(-velocity.direction, sign(w));
+        let there = operator.along(&operator.branch(&there, back), second - first);
+        let on = dips.where_negative(velocity.direction, sign(w));
+        operator.along(&operator.branch(&there, on), x - second)
+    } else if turned.any_negative() {
         // Lanes that did not turn go to the end on the first leg; their second has length 0.
         let turning = turned.where_negative(turning_point(from, x, w), x);
         let there = operator.along(branch, turning - from.x);
         operator.along(&operator.branch(&there, sign(w)), x - turning)
     } else {
-        let velocity = CubicVelocity::between(from, x, w);
-        let dips = velocity.dips();
-        if dips.any_negative() {
-            // Lanes that do not dip go to the end on the first leg, the others back and on again.
-            let [first, second] = velocity.dip().map(|part| between(from.x, from.w, x, w, part));
-            let first = dips.where_negative(first, x);
-            let second = dips.where_negative(second, x);
-            let there = operator.along(branch, first - from.x);
-            let back = operator.branch(&there, -velocity.direction);
-            let there = operator.along(&back, second - first);
-            operator.along(&operator.branch(&there, velocity.direction), x - second)
-        } else {
-            operator.along(branch, x - from.x)
-        }
+        operator.along(branch, x - from.x)
     }
 }
 

@@ -163,7 +163,9 @@ fn first_mode<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -> Op
         let mut trial = fit.clone();
         trial.set_poles(Form::Modes(count), &poles(&found[..count]));
         trial.settle(ROUGH)?;
-        if trial.rms < (1.0 - MODE_GAIN) * fit.rms {
+        // A further mode on a bound stands for something else.
+        let proper = count == 1 || trial.poles_within();
+        if proper && trial.rms < (1.0 - MODE_GAIN) * fit.rms {
             *fit = trial;
             better = true;
         }

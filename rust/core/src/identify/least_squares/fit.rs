@@ -174,6 +174,13 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         self.form.dynamics(&self.x[self.layout().poles()])
     }
 
+    /// Whether no number of the dynamics lies on a bound.
+    pub fn poles_within(&self) -> bool {
+        let poles = &self.x[self.layout().poles()];
+        let inside = |(at, (low, high)): (&f64, &(f64, f64))| at - low > 0.05 && high - at > 0.05;
+        poles.iter().zip(&self.pole_ranges()).all(inside)
+    }
+
     pub fn pole_ranges(&self) -> Vec<(f64, f64)> {
         self.form.ranges(&self.common.record.drive, self.common.record.start)
     }
