@@ -86,10 +86,14 @@ impl Trial<'_> {
     }
 }
 
-/// The candidates that have to be accurate: where the force has kinks, the middle of the box.
+/// The candidates that have to be accurate: where the force has kinks, or the drive is slow, the
+/// middle of the box.
 fn representatives(problem: &Problem) -> Vec<Theta> {
     let all = corners(problem);
-    if problem.model.is_nonsmooth() { all.last().copied().into_iter().collect() } else { all }
+    // Of a slow drive too: at the least lag beside a soft spring, where no stage is, the hysteresis
+    // is stiffer than what holds it, and asks for hundreds of steps.
+    let middle = problem.model.is_nonsmooth() || problem.slow;
+    if middle { all.last().copied().into_iter().collect() } else { all }
 }
 
 /// The corners of the box of free parameters, and its middle.
