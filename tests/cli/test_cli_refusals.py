@@ -93,7 +93,11 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "identify log.csv --window 3:1": ("--window", "3 s to 1 s", "start < stop"),
     "identify log.csv --window nan:3": ("start is nan",),
     "identify log.csv --window 1:1.02": ("the window has 5 samples",),
-    "identify log.csv --model dahl --bound mass=0.2:0.1": ("bounds of mass", "(0.2, 0.1)", "lower one first"),
+    "identify log.csv --model dahl --bound mass=0.2:0.1": (
+        "bounds of mass",
+        "(0.2, 0.1)",
+        "lower one first",
+    ),
     "identify log.csv --bound mass=1": ("--bound", "'1'", "LOW:HIGH"),
     "identify log.csv --bound mass=a:b": ("--bound has 'a'", "number"),
     "identify log.csv --bound mass": ("--bound is 'mass'", "NAME="),

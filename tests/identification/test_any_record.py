@@ -77,7 +77,9 @@ class Case:
     frequency: float | None
 
 
-def plays(rng: np.random.Generator, frequency: float | None, sign: float) -> pt.stages.Stage:
+def plays(
+    rng: np.random.Generator, frequency: float | None, sign: float
+) -> pt.PrandtlIshlinskiiStage:
     count, zones = int(rng.integers(3, 11)), int(rng.integers(0, 3)) if sign > 0.0 else 0
     return pt.PrandtlIshlinskiiStage(
         linear=sign * 8e-7,

@@ -247,7 +247,8 @@ def test_what_has_no_meaning_for_plays_is_refused(name: str) -> None:
 
 
 def test_the_number_of_values_fitted_counts_the_offset() -> None:
-    # 1 + 4 weights: of 32 plays those about which the weights gather; 2 bends, 2 shares of the creep, a time constant, an offset.
+    # 1 + 4 weights: of 32 plays those about which the weights gather; 2 bends, 2 shares of the
+    # creep, a time constant, an offset.
     assert fitted().free_count == 1 + 4 + 2 + 2 + 1 + 1
 
 

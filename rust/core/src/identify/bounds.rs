@@ -2,10 +2,10 @@
 
 use super::coordinate::Coordinate;
 use super::record::Record;
-use super::resonances::{Resonance, resonances};
+use super::resonances::resonances;
 use crate::error::{Error, Result, shown};
 use crate::integrator::MOST_PARAMETERS;
-use crate::models::{Held, Measures, Model};
+use crate::models::{Held, Measures, ModeShown, Model};
 use crate::signal::{Drive, Stop, index, range};
 
 /// What the bounds are built from.
@@ -25,11 +25,13 @@ const SWINGING: f64 = 0.5;
 fn look_for_mode(of: &mut Measures, record: &Record<'_>, stop: Stop<'_>) {
     let found = resonances(&record.drive, record.y, record.window.start, 1, stop);
     let Some(found) = found else { return };
-    let gain = found.first().map_or(0.0, |mode| mode.gain);
-    let swings = |mode: &&Resonance| mode.gain >= CLEAR && mode.damping_ratio < SWINGING;
-    let clear = found.first().filter(swings);
-    (of.without_mode, of.faint_mode) = (gain < FAINT, gain >= FAINT && clear.is_none());
-    of.mode = clear.map(|mode| core::f64::consts::TAU * mode.frequency);
+    of.mode = match found.first() {
+        Some(mode) if mode.gain >= CLEAR && mode.damping_ratio < SWINGING => {
+            ModeShown::Clear(core::f64::consts::TAU * mode.frequency)
+        }
+        Some(mode) if mode.gain >= FAINT => ModeShown::Faint,
+        _ => ModeShown::Absent,
+    };
 }
 
 /// Least range of the drive's means, relative to that of the drive, that tells a gain.
@@ -85,7 +87,7 @@ pub fn derive(
     if of.excited().is_some() {
         look_for_mode(&mut of, record, stop);
     }
-    if let Some(mode) = of.mode {
+    if let ModeShown::Clear(mode) = of.mode {
         steady(&mut of, record, mode);
     }
     let infos = model.scalars();

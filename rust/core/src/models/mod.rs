@@ -40,7 +40,7 @@ pub use prandtl_ishlinskii::{
     MOST_PLAYS, MOST_ZONES, PlayHysteresis, Plays, PrandtlIshlinskiiStage,
 };
 pub use registry::{FoundBy, Model, Stage, StageFlow, StageInverse, StageInverseState, StageState};
-pub use search_ranges::{Measures, NOMINAL_STIFFNESS, Range, Ranges};
+pub use search_ranges::{Measures, ModeShown, NOMINAL_STIFFNESS, Range, Ranges};
 pub use tanh_envelope::TanhEnvelope;
 pub use traits::{
     Experiment, Invertible, KernelVisitor, Method, ModelInfo, Response, Searchable, StageModel,

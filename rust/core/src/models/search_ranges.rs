@@ -29,6 +29,19 @@ pub type Range = (f64, f64);
 /// Ranges by the names of the parameters.
 pub type Ranges = Vec<(&'static str, Range)>;
 
+/// What a record shows of a mode.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ModeShown {
+    /// It was not looked through for one.
+    NotLooked,
+    /// No mode.
+    Absent,
+    /// Something that may be one.
+    Faint,
+    /// A mode, of this natural frequency, rad/s.
+    Clear(f64),
+}
+
 /// What the ranges are built from.
 #[derive(Clone, Copy, Debug)]
 pub struct Measures {
@@ -48,12 +61,8 @@ pub struct Measures {
     pub quickness: f64,
     /// Whether the caller asks for a mode, whatever the record shows.
     pub wants_mode: bool,
-    /// Natural frequency of the mode that the record shows, rad/s.
-    pub mode: Option<f64>,
-    /// Whether the record was looked through for modes and shows none.
-    pub without_mode: bool,
-    /// Whether it shows something that may be a mode.
-    pub faint_mode: bool,
+    /// What the record shows of a mode.
+    pub mode: ModeShown,
     /// Sampling interval, s.
     pub dt: f64,
     /// RMS of the drive about its mean, V or N.
@@ -89,9 +98,7 @@ impl Measures {
             slow,
             quickness,
             wants_mode: false,
-            mode: None,
-            without_mode: false,
-            faint_mode: false,
+            mode: ModeShown::NotLooked,
             dt,
             drive_size,
             displacement_size,
@@ -122,9 +129,10 @@ impl Measures {
         if self.wants_mode {
             return Some((slowest, fastest.max(8.0 * slowest)));
         }
-        let quick = fastest > 8.0 * slowest && !self.without_mode;
+        let quick = fastest > 8.0 * slowest && self.mode != ModeShown::Absent;
         // What may be a mode may also be what hysteresis makes of a stage far quicker.
-        let fastest = if self.faint_mode { 0.9 * core::f64::consts::PI / self.dt } else { fastest };
+        let faint = self.mode == ModeShown::Faint;
+        let fastest = if faint { 0.9 * core::f64::consts::PI / self.dt } else { fastest };
         quick.then_some((slowest, fastest))
     }
 
@@ -134,7 +142,7 @@ impl Measures {
     /// matter, and the damping, a lag D/K, down to a twentieth of the sampling interval.
     #[must_use]
     pub fn mechanical(&self, (soft, hard): Range) -> [Range; 3] {
-        if let Some(mode) = self.mode {
+        if let ModeShown::Clear(mode) = self.mode {
             let (slowest, fastest) = (mode * NEAR_MODE.0, mode * NEAR_MODE.1);
             let mass = (soft / (fastest * fastest), hard / (slowest * slowest));
             let (least, most) = MODE_DAMPING;
