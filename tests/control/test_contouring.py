@@ -366,51 +366,6 @@ def test_the_table_has_words_and_a_picture() -> None:
     plt.close(figure)
 
 
-# Noise.
-
-
-def test_noise_is_found_again_and_given_to_a_stage() -> None:
-    """Fig. 3: 0.097 um rms, steps of 0.038 um."""
-    assert STAGE.x == ALONG_X
-    record = ALONG_X.record(np.zeros(50000), 1 / 5000.0)
-    found = pt.identification.identify_noise(record)
-    assert found.rms == pytest.approx(0.097 * UM, rel=0.02)
-    assert found.resolution == pytest.approx(0.038 * UM, rel=0.01)
-    assert found.bandwidth == pytest.approx(200.0, rel=0.05)
-    again = pt.identification.identify_noise(
-        found.of_stage(TWIN).record(np.zeros(50000), 1 / 5000.0)
-    )
-    assert again.rms == pytest.approx(found.rms, rel=0.03)
-    assert again.resolution == pytest.approx(found.resolution, rel=1e-6)
-    # Parseval: the spectra hold the variance, and the model's is Welch's.
-    f, density = found.spectrum()
-    assert np.sum(density**2) * (f[1] - f[0]) == pytest.approx(found.rms**2, rel=0.05)
-    for low, high in ((20, 100), (300, 600), (1500, 2400)):
-        part = (f > low) & (f < high)
-        ratio = np.mean(density[part] ** 2) / np.mean(found.density(f[part]) ** 2)
-        assert ratio == pytest.approx(1.0, abs=0.15)
-    figure = found.plot()
-    figure.canvas.draw()
-    assert [ax.get_xlabel() for ax in figure.axes] == ["time [ms]", "frequency [Hz]"]
-    plt.close(figure)
-
-
-TWIN = dataclasses.replace(ALONG_X, seed=77, noise=0.0, resolution=1e-9, noise_bandwidth=1.0)
-
-
-def test_the_grid_is_found_where_few_levels_show() -> None:
-    random = np.random.default_rng(2)
-    for step, noise in ((0.15 * UM, 0.1 * UM), (0.01 * UM, 0.1 * UM)):
-        y = step * np.round(random.normal(3 * UM, noise, 5000) / step)
-        log = pt.Dataset(u=np.zeros(5000), y=y, dt=1e-3)
-        found = pt.identification.identify_noise(log)
-        assert found.resolution == pytest.approx(step, rel=1e-6)
-        assert found.noise == pytest.approx(noise, rel=0.1)
-        assert found.bandwidth_sd is None
-        assert math.isinf(found.bandwidth)
-        assert "white" in found.summary()
-
-
 # Refusals.
 
 PATH = pt.circle(frequency=0.5, radius=10 * UM)
@@ -449,6 +404,7 @@ BAD: dict[str, tuple[Callable[[], object], str]] = {
         "flyback",
     ),
     "pitch": (lambda: pt.spiral(frequency=1.0, radius=UM, pitch=2 * UM), "pitch"),
+    "turns": (lambda: pt.spiral(frequency=0.5, radius=20 * UM, pitch=1e-12), "pitch"),
     "common": (
         lambda: pt.lissajous(frequencies=(1.0, 2**0.5), sizes=(UM, UM)),
         "frequencies",
@@ -509,12 +465,3 @@ def test_the_way_home_is_not_scored() -> None:
     run = pt.contour(stage, (loop, loop), circle)
     assert run.settled == pytest.approx(2.0)
     assert run.metrics.peak_to_peak < 5e-6
-
-
-def test_a_record_that_moves_is_not_at_rest() -> None:
-    t = np.arange(5000) / 1000.0
-    u = 10.0 * np.sin(2 * np.pi * t)
-    with pytest.raises(pt.DataError, match="the displacement follows the drive"):
-        pt.identification.identify_noise(pt.Dataset(u=u, y=1e-6 * u, t=t))
-    with pytest.raises(pt.ParameterError, match="expected at most 10000"):
-        pt.spiral(frequency=0.5, radius=20e-6, pitch=1e-12)

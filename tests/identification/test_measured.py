@@ -54,6 +54,7 @@ def test_the_model_follows_the_record_and_another_one() -> None:
     assert found.fitted.rms == pytest.approx(found.cost, abs=2e-10)
 
 
+@pytest.mark.slow
 def test_the_table_of_all_kinds() -> None:
     log = datasets.dbo_training()
     on_other = pt.compare(log, train=(3.0, 23.0), test=tracking(), seed=1)
@@ -85,7 +86,7 @@ def test_three_seeds_end_in_the_same_minimum() -> None:
 def test_it_says_what_it_does_not_know() -> None:
     assert fit(1).scale_assumed
     assert not fit(1).parameters["mass"].identified
-    assert "mass" in fit(1).summary().rpartition("Not fixed by this record:")[2]
+    assert "mass" in fit(1).summary().rpartition("Not determined by this record:")[2]
 
 
 def test_the_papers_swarm_does_better_than_a_straight_line() -> None:

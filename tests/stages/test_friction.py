@@ -122,7 +122,7 @@ def test_runge_kutta_is_refused(method: str) -> None:
 def test_b0_is_found() -> None:
     parameters = replace(TABLE_1, b0=120.0)
     dt = 2e-3
-    u = multisine(1000, dt, 0.5)
+    u = multisine(1000, dt, 0.5) * np.minimum(10.0 * dt * np.arange(1000), 1.0)
     x, _ = friction_reference(parameters, u, dt)
     noise = 20e-9 * np.random.default_rng(1).standard_normal(x.size)
     fit = pt.identify(

@@ -341,7 +341,7 @@ def test_the_wording_of_a_refusal() -> None:
 
 
 LOGS: dict[str, tuple[Any, Any, str]] = {
-    "still": (lambda u: 0.0 * u, lambda y: y, "the drive stays at 0 V"),
+    "still": (lambda u: 0.0 * u, lambda y: y, "the drive is constant at 0 V"),
     "dead": (lambda u: u, lambda y: 0.0 * y, "sensor seems dead"),
     "one way": (np.sort, np.sort, "the drive never reverses"),
 }

@@ -54,7 +54,8 @@ class Estimate(NamedTuple):
     deviation : float or None
         Standard deviation from the residuals and the sensitivity of the model (Cramer-Rao bound),
         for independent residuals. Where the model is not exact, the residuals are correlated and
-        the true spread is larger.
+        the true spread is larger. Infinite where the parameter has no effect on the data, such as
+        a mass that a record does not show and that was held for that.
     at_bound : bool
         Whether the value lies on a bound.
     """
@@ -69,8 +70,8 @@ class Estimate(NamedTuple):
 
     @property
     def precise(self) -> bool:
-        """Whether the standard deviation is below half of the value, or the value is held."""
-        if not self.free:
+        """Whether the standard deviation is below half of the value, or the value was given."""
+        if not self.free and self.deviation is None:
             return True
         return self.deviation is not None and self.deviation < 0.5 * abs(self.value)
 

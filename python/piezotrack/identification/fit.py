@@ -166,8 +166,8 @@ def identify(
     ...     fixed={"mass": 0.1828, "a1": 121.9874, "a2": 1.1773e6, "b1": 1.8485e6},
     ...     seed=1,
     ... )
-    >>> print(f"K = {fit.model.stiffness:.0f} N/m, {fit.nit > 0}")
-    K = 26065 N/m, True
+    >>> print(f"K = {1e-3 * fit.model.stiffness:.1f} kN/m, {fit.nit > 0}")
+    K = 26.1 kN/m, True
     """
     if not isinstance(data, Dataset):
         raise ParameterError(f"data is {type(data).__name__}: expected a Dataset, see pt.read")

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from .. import _core
+from .._support.arrays import check_dt, signal_of
 from .._support.files import write_document
 from ..data.dataset import Dataset
-from ..errors import ParameterError
+from ..errors import ParameterError, ShapeError
 from .history import begin, checked_history, same_beginning
 from .model_file import document_of, read_model, sensor_number
 from .remarks import beyond_fit
@@ -149,9 +150,16 @@ class IdentifiedModel:
         -------
         list of str
             One sentence for each; none for a model without a record.
+
+        Raises
+        ------
+        DataError, ShapeError, ParameterError
+            If `u` is no sequence of finite numbers, or `dt` no interval.
         """
         rate = self._record.get("drive_rate")
-        drive = np.asarray(u, dtype=np.float64)
+        drive, dt = signal_of("u", u), check_dt(dt)
+        if not drive.size:
+            raise ShapeError("u has no samples: expected at least one")
         return beyond_fit(drive, dt, self.drive_range, None if rate is None else float(rate))
 
     def fitted_on(self, data: Dataset) -> bool:

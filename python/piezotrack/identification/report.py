@@ -171,7 +171,7 @@ def _ratios(fit: Identification) -> list[tuple[str, str, float, str]]:
 
 def _row(name: str, estimate: Estimate, width: int) -> str:
     if not estimate.free:
-        note = "held"
+        note = "held" if estimate.deviation is None else "held: no effect on the data"
     elif estimate.deviation is None:
         note = "unknown"
     elif not math.isfinite(estimate.deviation):

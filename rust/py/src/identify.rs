@@ -38,7 +38,7 @@ struct Estimate {
     value: f64,
     /// Bounds of the search; None for a parameter that was held.
     bounds: Option<(f64, f64)>,
-    /// Standard deviation; None where it was not computed.
+    /// Standard deviation; None where it was not computed, infinite where the value has no effect.
     deviation: Option<f64>,
     at_bound: bool,
 }
@@ -58,6 +58,9 @@ impl PySearch {
         let problem = &self.found.problem;
         let names = problem.model.scalars().iter().map(|info| info.name);
         let places = names.enumerate().chain([(DELAY, "delay"), (BEFORE, "voltage_before")]);
+        // A mass that the record does not show is held where it has no effect.
+        let held = problem.mass_if_shown.is_some();
+        let unseen = |name| (held && name == "mass").then_some(f64::INFINITY);
         let estimate = |(place, name)| {
             let bounds = match problem.coordinates[place] {
                 Coordinate::Fixed(_) => None,
@@ -68,7 +71,7 @@ impl PySearch {
                 name,
                 value: self.outcome.theta.0[place],
                 bounds,
-                deviation: found.map(|found| found.deviation),
+                deviation: found.map(|found| found.deviation).or_else(|| unseen(name)),
                 at_bound: found.is_some_and(|found| found.at_bound),
             }
         };

@@ -1,6 +1,7 @@
 //! Identification of a stage from a record: bounds, search, local refinement, standard deviations.
 
 use super::cost::Evaluator;
+use super::inertia::with_mass;
 use super::lag::{LagRange, lag_range};
 use super::levenberg_marquardt::{LocalRefinement, Sensitivity};
 use super::problem::{Problem, Spec};
@@ -61,19 +62,14 @@ pub fn identify(
     let best = (0..runs.len())
         .filter(|&i| runs[i].costs.rms.is_finite())
         .min_by(|&i, &j| runs[i].costs.rms.total_cmp(&runs[j].costs.rms));
-    let mut lags = None;
-    if let Some(i) = best.filter(|_| ended && plan.settings.polish && problem.slow) {
-        lags = lag_range(&local, &runs[i].place, runs[i].costs);
-        if let Some(found) = &lags {
-            let run = &mut runs[i];
-            (run.place, run.costs) = (found.place.clone(), found.costs);
-            run.theta = problem.theta(&run.place);
-            run.polish_evaluations += found.evaluations;
-        }
-    }
-    let mut sensitivities = Vec::new();
-    if let Some(run) = best.map(|i| &runs[i]).filter(|_| ended) {
-        sensitivities = local.sensitivities(&run.place, run.costs.rms);
+    let mut told = Told::default();
+    if let Some(i) = best.filter(|_| ended) {
+        told = if plan.settings.polish {
+            told_by(&local, &mut runs[i])
+        } else {
+            let sensitivities = local.sensitivities(&runs[i].place, runs[i].costs.rms);
+            Told { sensitivities, ..Told::default() }
+        };
     }
     if stop() {
         for run in &mut runs {
@@ -81,7 +77,40 @@ pub fn identify(
         }
     }
     let stepping = evaluator.stepping;
+    let Told { lags, sensitivities, with_mass } = told;
+    let problem = with_mass.unwrap_or(problem);
     Ok(Identification { problem, stepping, runs, best, lags, sensitivities })
+}
+
+/// What the record tells of the best candidate.
+#[derive(Default)]
+struct Told {
+    lags: Option<LagRange>,
+    sensitivities: Vec<Sensitivity>,
+    /// The problem with the mass free, where the record shows it.
+    with_mass: Option<Problem>,
+}
+
+/// Takes the mass where the record shows it, else under a slow drive the least lag that fits.
+fn told_by(local: &LocalRefinement<'_>, run: &mut Outcome) -> Told {
+    if let Some((problem, polished)) = with_mass(local, &run.place, run.costs) {
+        run.polish_evaluations += polished.evaluations;
+        (run.place, run.costs) = (polished.place, polished.costs);
+        run.theta = problem.theta(&run.place);
+        let evaluator = local.evaluator.of(&problem);
+        let freed = LocalRefinement { problem: &problem, evaluator: &evaluator, ..*local };
+        let sensitivities = freed.sensitivities(&run.place, run.costs.rms);
+        return Told { sensitivities, with_mass: Some(problem), lags: None };
+    }
+    let slow = local.problem.slow;
+    let lags = slow.then(|| lag_range(local, &run.place, run.costs)).flatten();
+    if let Some(found) = &lags {
+        (run.place, run.costs) = (found.place.clone(), found.costs);
+        run.theta = local.problem.theta(&run.place);
+        run.polish_evaluations += found.evaluations;
+    }
+    let sensitivities = local.sensitivities(&run.place, run.costs.rms);
+    Told { lags, sensitivities, with_mass: None }
 }
 
 /// Bytes of a thread for each sample: five motions' columns in the refinement.

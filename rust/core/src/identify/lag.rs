@@ -2,15 +2,21 @@
 //!
 //! Under one slow sine the loop of a lag D/K and that of hysteresis or creep are alike. The cost is
 //! followed along the damping, all else fitted again: a profile (Pawitan 2001, In All Likelihood,
-//! section 3.4), here with a tolerance on the cost, as residuals of an inexact model are correlated.
+//! section 3.4), with a tolerance on the cost where the residuals are correlated, as those of an
+//! inexact model are. Where they are white, chance decides, and a lag that differs from 0 is kept.
 
 use super::coordinate::Coordinate;
+use super::inertia::WHITE;
 use super::levenberg_marquardt::LocalRefinement;
 use super::residual_sums::Costs;
 use crate::models::position;
+use crate::signal::index;
 
 /// Share by which the cost may rise.
 const AS_WELL: f64 = 0.01;
+
+/// Rise of twice the logarithm of the likelihood within which a parameter lies in 95 of 100 cases.
+const LIKELY: f64 = 3.84;
 
 /// Bisections towards an end of the range.
 const BISECTIONS: usize = 7;
@@ -39,7 +45,8 @@ struct Profile<'a> {
     evaluations: usize,
 }
 
-/// Follows the cost along the damping from the best candidate; `None` where it is not searched.
+/// Follows the cost along the damping from the best candidate; `None` where it is not searched, or
+/// where the deviations are white and a lag of 0 is unlikely.
 pub(super) fn lag_range(
     local: &LocalRefinement<'_>,
     place: &[f64],
@@ -48,9 +55,15 @@ pub(super) fn lag_range(
     let infos = local.problem.model.info().parameters;
     let parameter = position(infos, "parameters", "damping").ok()?;
     let damping = local.problem.free().position(|free| free == parameter)?;
-    let limit = costs.rms * (1.0 + AS_WELL);
+    let by_chance = libm::exp(0.5 * LIKELY / index(local.record.window.len())) - 1.0;
+    let white = local.whiteness(place).is_some_and(|ratio| ratio > WHITE);
+    let limit = costs.rms * (1.0 + if white { by_chance.min(AS_WELL) } else { AS_WELL });
     let mut profile = Profile { local: *local, damping, limit, evaluations: 0 };
-    let (least, costs) = profile.towards(place, costs, 0.0);
+    let (least, least_costs) = profile.towards(place, costs, 0.0);
+    let from_zero = least[damping] <= 0.0;
+    if white && !from_zero {
+        return None;
+    }
     let (most, _) = profile.towards(place, costs, 1.0);
     let lag = |place: &[f64]| {
         let [_, damping, stiffness, ..] = local.problem.theta(place).parameters();
@@ -58,8 +71,8 @@ pub(super) fn lag_range(
     };
     Some(LagRange {
         lags: (lag(&least), lag(&most)),
-        from_zero: least[damping] <= 0.0,
-        costs,
+        from_zero,
+        costs: least_costs,
         place: least,
         evaluations: profile.evaluations,
     })

@@ -128,14 +128,10 @@ impl LocalRefinement<'_> {
 
     /// Normal equations at a place; `None` where a neighbour cannot be simulated.
     fn normal(&self, place: &[f64]) -> Option<Normal> {
-        let window = &self.record.window;
-        let stride = window.len().div_ceil(MOST_ROWS);
+        let stride = self.record.window.len().div_ceil(MOST_ROWS);
         let pairs: Vec<(f64, f64)> =
             place.iter().map(|z| ((z - CHANGE).max(0.0), (z + CHANGE).min(1.0))).collect();
-        let mut residual = self.displacement(place, stride)?;
-        let measured = self.record.y[window.clone()].iter().step_by(stride);
-        residual.iter_mut().zip(measured).for_each(|(x, y)| *x = y - *x);
-        self.centre(&mut residual);
+        let residual = self.residual(place, stride)?;
         let columns: Option<Vec<Vec<f64>>> = pairs
             .par_iter()
             .enumerate()
@@ -159,6 +155,28 @@ impl LocalRefinement<'_> {
             slope: DVector::from_fn(count, |i, _| product(&columns[i], &residual)),
             rows: residual.len(),
         })
+    }
+
+    /// How white the deviations of a candidate are: half the mean square of their differences from
+    /// sample to sample over their variance, 1 for white ones and less for correlated ones (von
+    /// Neumann 1941, doi 10.1214/aoms/1177731677). `None` where it cannot be simulated.
+    #[must_use]
+    pub fn whiteness(&self, place: &[f64]) -> Option<f64> {
+        let residual = self.residual(place, 1)?;
+        let squares = product(&residual, &residual);
+        let differences = residual.windows(2).map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0]));
+        let ratio = 0.5 * differences.sum::<f64>() / squares;
+        ratio.is_finite().then_some(ratio)
+    }
+
+    /// Measured less simulated at every stride-th sample, the mean taken off where an offset is
+    /// fitted.
+    fn residual(&self, place: &[f64], stride: usize) -> Option<Vec<f64>> {
+        let mut residual = self.displacement(place, stride)?;
+        let measured = self.record.y[self.record.window.clone()].iter().step_by(stride);
+        residual.iter_mut().zip(measured).for_each(|(x, y)| *x = y - *x);
+        self.centre(&mut residual);
+        Some(residual)
     }
 
     /// Every stride-th sample of the window, simulated as the search does, with the shares of the

@@ -8,6 +8,7 @@ mod creep_shares;
 mod cross_talk;
 mod history;
 mod identification;
+mod inertia;
 mod lag;
 mod least_squares;
 mod levenberg_marquardt;

@@ -8,7 +8,7 @@ use super::history::{History, came_from};
 use super::record::Record;
 use crate::error::{Error, Result, positive, shown};
 use crate::integrator::MOST_PARAMETERS;
-use crate::models::{FoundBy, Held, Model, NOMINAL_STIFFNESS, position};
+use crate::models::{FoundBy, Held, Measures, Model, NOMINAL_STIFFNESS, position};
 use crate::signal::{Stop, index};
 
 /// Specification by the caller.
@@ -112,6 +112,8 @@ pub struct Problem {
     /// Whether the drive is so slow that any lag is as likely as another that fits: the least is
     /// taken.
     pub slow: bool,
+    /// Where the mass, which is held where it has no effect, may be where the record shows it.
+    pub mass_if_shown: Option<Coordinate>,
     /// Time constants of the creep whose shares are fitted, s.
     pub creep_times: Vec<f64>,
 }
@@ -192,10 +194,19 @@ impl Problem {
         let Spec { model, offset, history, .. } = *spec;
         let creep_times = spec.creep_times.clone();
         let chosen = |name: &str| spec.bounds.iter().any(|(other, _)| other == name);
-        let slow =
-            !wants_mode && !chosen("damping") && bounds::measures(record).excited().is_none();
-        let problem =
-            Self { model, coordinates, scale_assumed, offset, history, slow, creep_times };
+        let measures = bounds::measures(record);
+        let slow = !wants_mode && !chosen("damping") && measures.excited().is_none();
+        let mass_if_shown = mass_if_shown(&measures, model, &fixed, &coordinates);
+        let problem = Self {
+            model,
+            coordinates,
+            scale_assumed,
+            offset,
+            history,
+            slow,
+            mass_if_shown,
+            creep_times,
+        };
         problem.check_corners()?;
         Ok(problem)
     }
@@ -253,6 +264,22 @@ impl Problem {
         }
         Ok(())
     }
+}
+
+/// Range of a mass that nobody held, from where it is held up to a mode at three times the slowest
+/// motion.
+fn mass_if_shown(
+    of: &Measures,
+    model: Model,
+    fixed: &Fixed,
+    coordinates: &[Coordinate; PLACES],
+) -> Option<Coordinate> {
+    let place = |name| position(model.scalars(), "parameters", name).ok();
+    let (mass, stiffness) = (place("mass")?, place("stiffness")?);
+    let Coordinate::Fixed(least) = coordinates[mass] else { return None };
+    let slowest = 3.0 * of.slow;
+    let most = coordinates[stiffness].value(1.0) / (slowest * slowest);
+    fixed[mass].is_none().then(|| Coordinate::between("mass", least, most).ok())?
 }
 
 /// Values of `fixed=` and `stiffness=`, with the model's defaults.

@@ -11,6 +11,7 @@ use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{BoucWen, BoucWenState, Operator};
 use piezotrack_control::inverse::{BoucWenInverse, BoucWenInverseState};
 
+use super::mechanics_parameters::{V, X};
 use super::plant::KernelModel;
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
@@ -39,12 +40,8 @@ const PARAMETERS: &[ParameterInfo] = &[
         .never_searched("exponent held, in fixed=: it decides the unit of beta and gamma"),
 ];
 
-const STATE: &[ParameterInfo] = &[
-    ParameterInfo::new("x", "x", "m"),
-    ParameterInfo::new("v", "x'", "m/s"),
-    ParameterInfo::new("u", "u", "V"),
-    ParameterInfo::new("h", "h", "m"),
-];
+const STATE: &[ParameterInfo] =
+    &[X, V, ParameterInfo::new("u", "u", "V"), ParameterInfo::new("h", "h", "m")];
 
 /// A stage with Bouc-Wen hysteresis at its input.
 ///

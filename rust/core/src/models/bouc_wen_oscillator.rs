@@ -12,6 +12,7 @@ use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{BoucWen, BoucWenState, Operator};
 use piezotrack_control::inverse::{FeedbackInverseState, OscillatorInverse};
 
+use super::mechanics_parameters::{V, X};
 use super::plant::KernelModel;
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
@@ -42,11 +43,7 @@ const PARAMETERS: &[ParameterInfo] = &[
         .never_searched("exponent held, in fixed=: it decides the unit of gamma and delta"),
 ];
 
-const STATE: &[ParameterInfo] = &[
-    ParameterInfo::new("x", "x", "m"),
-    ParameterInfo::new("v", "x'", "m/s"),
-    ParameterInfo::new("force", "z", "N"),
-];
+const STATE: &[ParameterInfo] = &[X, V, ParameterInfo::new("force", "z", "N")];
 
 /// Largest exponent, as for [`super::BoucWenStage`].
 const MOST_EXPONENT: f64 = 20.0;

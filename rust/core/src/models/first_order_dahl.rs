@@ -13,6 +13,7 @@ use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{BoucWenState, FirstOrderDahl, Operator};
 use piezotrack_control::inverse::{FeedbackInverseState, FirstOrderDahlInverse};
 
+use super::mechanics_parameters::{DAMPING, MASS, PIEZO_COEFFICIENT, STIFFNESS, V, X};
 use super::plant::KernelModel;
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
@@ -27,10 +28,10 @@ use crate::integrator::{
 };
 
 const PARAMETERS: &[ParameterInfo] = &[
-    ParameterInfo::new("mass", "M", "kg").force(),
-    ParameterInfo::new("damping", "D", "N s/m").force(),
-    ParameterInfo::new("stiffness", "K", "N/m").force(),
-    ParameterInfo::new("piezo_coefficient", "T", "N/V").force(),
+    MASS,
+    DAMPING,
+    STIFFNESS,
+    PIEZO_COEFFICIENT,
     ParameterInfo::new("rest_stiffness", "sigma", "N/m").force(),
     ParameterInfo::new("coulomb_force", "Fc", "N").force(),
     ParameterInfo::new("exponent", "i", "")
@@ -38,11 +39,7 @@ const PARAMETERS: &[ParameterInfo] = &[
         .never_searched("exponent held, in fixed=: all candidates of a search share it"),
 ];
 
-const STATE: &[ParameterInfo] = &[
-    ParameterInfo::new("x", "x", "m"),
-    ParameterInfo::new("v", "x'", "m/s"),
-    ParameterInfo::new("force", "F", "N"),
-];
+const STATE: &[ParameterInfo] = &[X, V, ParameterInfo::new("force", "F", "N")];
 
 /// Largest exponent: far beyond it the force hardly leaves the rest stiffness, and then stands.
 const MOST_EXPONENT: f64 = 20.0;

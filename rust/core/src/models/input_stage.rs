@@ -17,6 +17,7 @@ use core::fmt::Debug;
 use piezotrack_control::{CreepState, InputInverse, InputInverseState, OperatorInverse};
 
 use super::creep::{MOST_RELAXATIONS, Relaxation, RelaxationFlow, RelaxationState};
+use super::mechanics_parameters::{V, X};
 use super::plant::{Plant, Settling};
 use super::traits::{Experiment, Response, finite_state};
 use super::values::{ParameterInfo, Values};
@@ -41,8 +42,8 @@ const POLL: usize = 4096;
 
 /// State of a stage whose operator has plays.
 pub(super) const PLAYS_STATE: &[ParameterInfo] = &[
-    ParameterInfo::new("x", "x", "m"),
-    ParameterInfo::new("v", "x'", "m/s"),
+    X,
+    V,
     ParameterInfo::new("u", "u", "V"),
     ParameterInfo::list("plays", "z", "V"),
     ParameterInfo::list("creep", "q", "m"),

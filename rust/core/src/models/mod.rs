@@ -9,6 +9,7 @@ mod dynamics_parameters;
 mod first_order_dahl;
 mod generalised_prandtl_ishlinskii;
 mod input_stage;
+mod mechanics_parameters;
 mod parallel_dahl;
 mod plant;
 mod prandtl_ishlinskii;

@@ -17,6 +17,7 @@ use piezotrack_control::inverse::{FeedbackInverseState, ParallelDahlInverse};
 use piezotrack_control::unfused::Unfused;
 
 use super::first_order_dahl::plants_with_friction;
+use super::mechanics_parameters::{DAMPING, MASS, PIEZO_COEFFICIENT, STIFFNESS, V, X};
 use super::plant::KernelModel;
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
@@ -31,10 +32,10 @@ use crate::integrator::{
 };
 
 const PARAMETERS: &[ParameterInfo] = &[
-    ParameterInfo::new("mass", "M", "kg").force(),
-    ParameterInfo::new("damping", "D", "N s/m").force(),
-    ParameterInfo::new("stiffness", "K", "N/m").force(),
-    ParameterInfo::new("piezo_coefficient", "T", "N/V").force(),
+    MASS,
+    DAMPING,
+    STIFFNESS,
+    PIEZO_COEFFICIENT,
     ParameterInfo::new(REST_STIFFNESS[0], "sigma1", "N/m").force(),
     ParameterInfo::new(REST_STIFFNESS[1], "sigma2", "N/m").force(),
     ParameterInfo::new(REST_STIFFNESS[2], "sigma3", "N/m").force(),
@@ -46,8 +47,8 @@ const REST_STIFFNESS: [&str; FRICTION_ELEMENTS] =
     ["rest_stiffness_1", "rest_stiffness_2", "rest_stiffness_3"];
 
 const STATE: &[ParameterInfo] = &[
-    ParameterInfo::new("x", "x", "m"),
-    ParameterInfo::new("v", "x'", "m/s"),
+    X,
+    V,
     ParameterInfo::new("force_1", "F1", "N"),
     ParameterInfo::new("force_2", "F2", "N"),
     ParameterInfo::new("force_3", "F3", "N"),

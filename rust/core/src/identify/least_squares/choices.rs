@@ -89,6 +89,7 @@ pub(super) fn search<'a, M: WeightedPlays>(
     fit.settle(1e-4)?;
     fit.exact = true;
     fit.settle(1e-8)?;
+    drop_modes(&mut fit)?;
     Some((fit, lags))
 }
 
@@ -171,6 +172,22 @@ fn first_mode<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -> Op
         }
     }
     Some(better)
+}
+
+/// Leaves out further modes that the stepping between the samples has made needless.
+fn drop_modes<M: WeightedPlays>(fit: &mut Fit<'_, M>) -> Option<()> {
+    while let Form::Modes(count @ 2..) = fit.form {
+        let mut trial = fit.clone();
+        let poles = fit.x[fit.layout().poles()].to_vec();
+        let fewer = Form::Modes(count - 1);
+        trial.set_poles(fewer, &poles[..fewer.numbers()]);
+        trial.settle(1e-8)?;
+        if fit.poles_within() && fit.rms < (1.0 - MODE_GAIN) * trial.rms {
+            break;
+        }
+        *fit = trial;
+    }
+    Some(())
 }
 
 /// Numbers of modes in the order of [`Form::names`].

@@ -1,4 +1,4 @@
-//! Gauss-Newton method whose steps are least squares within bounds.
+//! A stage of plays on its way to the record, and how far it is from it.
 
 use core::cell::Cell;
 use core::ops::Range;
@@ -9,24 +9,13 @@ use super::layout::Layout;
 use super::{LeastSquaresFit, WeightsRecord};
 use crate::error::{Error, Result};
 use crate::identify::history::{History, visited};
-use crate::math::Rows;
 use crate::models::{
-    Dynamics, Experiment, FittedPlays, Relaxation, RelaxationFlow, Values, WeightedPlays,
-    state_at_rest,
+    Dynamics, Experiment, FittedPlays, Relaxation, Values, WeightedPlays, state_at_rest,
 };
 use crate::signal::{Stop, index, range};
 
 /// Least share of the mean slope that passes without memory: with less the inverse is no use.
 const LEAST_LINEAR: f64 = 1e-3;
-
-/// Change of a logarithm for a derivative by differences.
-const NUDGE: f64 = 1e-5;
-
-/// Weight of a row that holds a sum at its bound, relative to all others together.
-const STIFF: f64 = 1e4;
-
-/// Most steps.
-const STEPS: usize = 60;
 
 /// What all fits of a record share.
 pub(super) struct Common<'a> {
@@ -217,7 +206,7 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
 
     /// What the dead zones make of it.
     #[inline(always)]
-    fn bent(&self, value: f64) -> f64 {
+    pub fn bent(&self, value: f64) -> f64 {
         let zones = self.corners().iter().zip(&self.x[self.layout().bends()]);
         value + zones.map(|(corner, bend)| bend * beyond(value, *corner)).sum::<f64>()
     }
@@ -231,7 +220,7 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
 
     /// Inputs of the columns of weights and dead zones, then that of the stage.
     #[inline(always)]
-    fn inputs(&self, plays: &[f64], signals: &mut [f64]) {
+    pub fn inputs(&self, plays: &[f64], signals: &mut [f64]) {
         let value = self.sum(plays);
         let bends = &self.x[self.layout().bends()];
         let passed = |(corner, bend): (&f64, &f64)| if value > *corner { *bend } else { 0.0 };
@@ -254,7 +243,7 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
     }
 
     /// Where the creep stands before the record behind each of the inputs.
-    fn creep_before(&self, width: usize) -> Vec<Vec<f64>> {
+    pub fn creep_before(&self, width: usize) -> Vec<Vec<f64>> {
         let drive = self.common.record.drive;
         let mut plays = self.plays_before();
         let mut signals = vec![0.0; width];
@@ -300,7 +289,7 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         followers.iter().map(of).collect()
     }
 
-    fn counts(&self, k: usize) -> bool {
+    pub fn counts(&self, k: usize) -> bool {
         self.window.contains(&k) && (k - self.window.start).is_multiple_of(self.every)
     }
 
@@ -321,7 +310,7 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
     }
 
     /// Displacement up to the end of the window, m.
-    fn motion(&self) -> Result<Vec<f64>> {
+    pub fn motion(&self) -> Result<Vec<f64>> {
         let relaxation = self.relaxation()?;
         let drive = self.common.record.drive;
         if self.exact {
@@ -344,144 +333,6 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
             }
         };
         Ok(drive.u.iter().take(self.window.end).map(through).collect())
-    }
-
-    /// Gauss and Newton's method until a step gains less than `gain`; `None` where stopped.
-    pub fn settle(&mut self, gain: f64) -> Option<()> {
-        self.rms = self.deviation();
-        for _ in 0..STEPS {
-            if (self.common.stop)() {
-                return None;
-            }
-            let (before, start) = (self.rms, self.x.clone());
-            let goal = self.goal();
-            let mut part = 1.0;
-            loop {
-                self.x = start.iter().zip(&goal).map(|(a, b)| a + part * (b - a)).collect();
-                self.rms =
-                    if self.layout().admits(&self.x) { self.deviation() } else { f64::INFINITY };
-                if self.rms < before || part < 1e-3 {
-                    break;
-                }
-                part *= 0.5;
-            }
-            if self.rms >= before || self.rms.is_nan() {
-                (self.rms, self.x) = (before, start);
-                break;
-            }
-            if before - self.rms <= gain * before {
-                break;
-            }
-        }
-        Some(())
-    }
-
-    /// The solution of the problem linearised about the present unknowns.
-    fn goal(&self) -> Vec<f64> {
-        let Ok(rows) = self.linearised() else { return self.x.clone() };
-        let layout = self.layout();
-        let ranges = self.pole_ranges();
-        let bounds = layout.bounds(&self.x, self.held, self.bent, &ranges, self.common.stroke);
-        let mut held = rows.clone();
-        let mut x = held.solve(&bounds);
-        // Sums beyond their bounds are held there, one more each time.
-        let sums = layout.sums();
-        for _ in 0..sums.len() {
-            let sum = |part: &Range<usize>| x[part.clone()].iter().sum::<f64>();
-            let beyond = sums.iter().find_map(|(part, (low, high))| {
-                let sum = sum(part);
-                let bound = if sum < low - 1e-9 { low } else { high };
-                (sum < low - 1e-9 || sum > high + 1e-9).then(|| (part.clone(), *bound))
-            });
-            let Some((part, bound)) = beyond else { break };
-            let mut row = vec![0.0; layout.count()];
-            let stiff = STIFF * held.size();
-            row[part].fill(stiff);
-            held.push(&row, stiff * bound);
-            x = held.solve(&bounds);
-        }
-        x
-    }
-
-    /// The rows of the linearised problem.
-    fn linearised(&self) -> Result<Rows> {
-        self.common.evaluations.set(self.common.evaluations.get() + 1);
-        let WeightsRecord { drive, y, .. } = *self.common.record;
-        let (layout, relaxation) = (self.layout(), self.relaxation()?);
-        let flow = relaxation.flow(drive.dt);
-        // Behind the creep: what its relaxations have reached goes through the dynamics alone.
-        let bare = Relaxation::new(&[], &[], self.dynamics())?;
-        let bare_flow = bare.flow(drive.dt);
-        let (nudged, motion) = (self.nudged()?, self.motion()?);
-        let decay: Vec<f64> = self.times.iter().map(|time| libm::exp(-drive.dt / time)).collect();
-        let inner = layout.weights + layout.bends + layout.corners;
-        let mut signals = vec![0.0; inner + 1];
-        let mut plays = self.plays_before();
-        let creep = self.creep_before(inner + 1);
-        let shares = &self.x[layout.shares()];
-        let mut fading: Vec<f64> = shares[..layout.departures].to_vec();
-        let mut columns: Vec<Follower> = Vec::new();
-        let (mut reached, mut faded) = (Vec::new(), Vec::new());
-        let mut changed: Vec<Follower> = Vec::new();
-        let mut rows = Rows::new(layout.count());
-        let mut row = vec![1.0; layout.count()];
-        for (k, &volts) in drive.u.iter().enumerate().take(self.window.end) {
-            self.push(&mut plays, volts);
-            self.inputs(&plays, &mut signals);
-            if k == 0 {
-                let ready =
-                    |(input, q): (&f64, &Vec<f64>)| Follower::at_rest(&relaxation, *input, q);
-                columns = signals.iter().zip(&creep).map(ready).collect();
-                let bare = |q: &f64| Follower::at_rest(&bare, *q, &[]);
-                reached = creep[inner].iter().map(bare).collect();
-                faded = fading.iter().map(bare).collect();
-                changed = vec![columns[inner]; nudged.len()];
-            } else {
-                for (column, signal) in columns.iter_mut().zip(&signals) {
-                    column.next(&relaxation, &flow, drive.hold, *signal);
-                }
-                // These move from sample to sample whatever the hold.
-                for (column, q) in reached.iter_mut().zip(columns[inner].state.creep) {
-                    bare.step(&bare_flow, &mut column.state, q);
-                }
-                for ((column, left), factor) in faded.iter_mut().zip(&mut fading).zip(&decay) {
-                    *left *= factor;
-                    bare.step(&bare_flow, &mut column.state, *left);
-                }
-                for (column, (part, flow)) in changed.iter_mut().zip(&nudged) {
-                    column.next(part, flow, drive.hold, signals[inner]);
-                }
-            }
-            if !self.counts(k) {
-                continue;
-            }
-            let x = columns[inner].state.x;
-            let linear =
-                columns[..inner].iter().chain(&reached).chain(&faded).map(|one| one.state.x);
-            for (slot, value) in row.iter_mut().zip(linear) {
-                *slot = value;
-            }
-            for (slot, column) in row[layout.poles()].iter_mut().zip(&changed) {
-                *slot = (column.state.x - x) / NUDGE;
-            }
-            let known: f64 = row.iter().zip(&self.x).map(|(a, b)| a * b).sum();
-            let offset: f64 = self.x[layout.offset()].iter().sum();
-            rows.push(&row, y[k] - motion[k] - offset + known);
-        }
-        Ok(rows)
-    }
-
-    /// Creep and dynamics with each number of the dynamics changed a little.
-    fn nudged(&self) -> Result<Vec<(Relaxation, RelaxationFlow)>> {
-        let dt = self.common.record.drive.dt;
-        let of = |i: usize| {
-            let mut other = self.clone();
-            let slot = other.layout().poles().start + i;
-            other.x[slot] += NUDGE;
-            let part = other.relaxation()?;
-            Ok((part, part.flow(dt)))
-        };
-        (0..self.layout().poles).map(of).collect()
     }
 
     /// Parameters of the stage, and its state before the first sample; those of its mirror image

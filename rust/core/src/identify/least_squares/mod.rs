@@ -11,6 +11,7 @@ mod choices;
 mod fit;
 mod follower;
 mod form;
+mod gauss_newton;
 mod layout;
 mod plays;
 

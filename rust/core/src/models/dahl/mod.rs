@@ -14,6 +14,7 @@ mod virgin_branch;
 use piezotrack_control::hysteresis::DahlState;
 use piezotrack_control::inverse::{DahlInverse, InverseState, SampledDahlInverse};
 
+use super::mechanics_parameters::{DAMPING, MASS, PIEZO_COEFFICIENT, STIFFNESS, V, X};
 use super::plant::Settling;
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
@@ -32,10 +33,10 @@ pub use kernels::{DahlFlow, FrictionKernel, SmoothKernel};
 pub use virgin_branch::{extremes, linearised};
 
 const PARAMETERS: &[ParameterInfo] = &[
-    ParameterInfo::new("mass", "M", "kg").force(),
-    ParameterInfo::new("damping", "D", "N s/m").force(),
-    ParameterInfo::new("stiffness", "K", "N/m").force(),
-    ParameterInfo::new("piezo_coefficient", "T", "N/V").force(),
+    MASS,
+    DAMPING,
+    STIFFNESS,
+    PIEZO_COEFFICIENT,
     ParameterInfo::new("a1", "a1", "1/m"),
     ParameterInfo::new("a2", "a2", "1/m^2"),
     ParameterInfo::new("b1", "b1", "N/m^2").force(),
@@ -45,12 +46,8 @@ const PARAMETERS: &[ParameterInfo] = &[
         .never_searched("up held: only the products b1 up and b0 up show in the data"),
 ];
 
-const STATE: &[ParameterInfo] = &[
-    ParameterInfo::new("x", "x", "m"),
-    ParameterInfo::new("v", "x'", "m/s"),
-    ParameterInfo::new("q1", "q1", ""),
-    ParameterInfo::new("q2", "q2", "1/m"),
-];
+const STATE: &[ParameterInfo] =
+    &[X, V, ParameterInfo::new("q1", "q1", ""), ParameterInfo::new("q2", "q2", "1/m")];
 
 /// A stage with second-order Dahl hysteresis.
 ///

@@ -1,0 +1,55 @@
+//! Whether a record without a visible mode shows the mass after all.
+//!
+//! A search on such a record holds the mass where it has no effect, as what it would take for a
+//! mode is mostly creep or what the model lacks. Where the record is fitted down to white noise
+//! with the mass free, and not without, the mass is what was missing.
+
+use super::candidate::Candidate;
+use super::levenberg_marquardt::{LocalRefinement, Polished};
+use super::problem::Problem;
+use super::residual_sums::Costs;
+use crate::models::position;
+use crate::signal::index;
+
+/// Least whiteness of deviations of which an inexact model has no part worth the name.
+pub(super) const WHITE: f64 = 0.9;
+
+/// Least twice the logarithm of a likelihood that the mass has to gain: chance alone gives 1.
+const GAIN: f64 = 25.0;
+
+/// Masses from which the best one is refined.
+const STARTS: usize = 32;
+
+/// The problem with the mass free and its best candidate next to `place`, where the mass shows.
+pub(super) fn with_mass(
+    local: &LocalRefinement<'_>,
+    place: &[f64],
+    costs: Costs,
+) -> Option<(Problem, Polished)> {
+    let range = local.problem.mass_if_shown?;
+    let infos = local.problem.model.info().parameters;
+    let mass = position(infos, "parameters", "mass").ok()?;
+    let mut problem = local.problem.clone();
+    (problem.mass_if_shown, problem.slow) = (None, false);
+    problem.coordinates[mass] = range;
+    let slot = problem.free().position(|free| free == mass)?;
+    let evaluator = local.evaluator.of(&problem);
+    let freed = LocalRefinement { problem: &problem, evaluator: &evaluator, ..*local };
+    let beside = |k: usize| {
+        let mut start = place.to_vec();
+        start.insert(slot, index(k) / index(STARTS - 1));
+        start
+    };
+    let candidate = |k| Candidate { theta: problem.theta(&beside(k)), limit: f64::INFINITY };
+    let starts: Vec<Candidate> = (0..STARTS).map(candidate).collect();
+    let found = evaluator.costs(&starts, local.stop);
+    let (k, costs_beside) =
+        found.into_iter().enumerate().min_by(|(_, a), (_, b)| a.rms.total_cmp(&b.rms))?;
+    let best = freed.polish(&beside(k), costs_beside);
+    let samples = index(local.record.window.len());
+    let gain = 2.0 * samples * libm::log(costs.rms / best.costs.rms);
+    if gain > GAIN && freed.whiteness(&best.place)? > WHITE {
+        return Some((problem, Polished { evaluations: best.evaluations + STARTS, ..best }));
+    }
+    None
+}
