@@ -59,7 +59,7 @@ no-std: ## The control crate where there is no std and no allocator
 	fi
 
 python-test: $(VENV)/installed $(VENV)/tools ## Tests of the package, its docstrings and pages
-	$(BIN)/pytest -n auto -m "not slow"
+	$(BIN)/pytest -n auto --dist worksteal -m "not slow"
 
 bench: ## Criterion benches: throughput of the swarm, latency of a step
 	cargo bench --locked

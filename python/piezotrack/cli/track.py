@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -124,7 +123,7 @@ def track_command(
     print(run.summary())
     if feedforward:
         # A loop's voltage has the noise of the sensor, whose rate says nothing.
-        _list_remarks(known.beyond_fit(run.voltage, math.inf))
+        _list_remarks(known.beyond_fit(run.voltage))
     if loop.feedback is not None or loop.repetitive is not None:
         print(f"loop at {check_loop(plant, loop, delay=delay).middle}")
     list_files(written)

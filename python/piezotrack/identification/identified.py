@@ -136,15 +136,15 @@ class IdentifiedModel:
         delay = bool(self.details.get("delay", {}).get("free", False))
         return sum(_count(getattr(self.model, name)) for name in free) + delay + self.offset_fitted
 
-    def beyond_fit(self, u: ArrayLike, dt: float) -> list[str]:
+    def beyond_fit(self, u: ArrayLike, dt: float | None = None) -> list[str]:
         """Remarks on a drive that goes beyond the range or the rate of the record identified.
 
         Parameters
         ----------
         u : array_like, shape (n,)
             Drive [V].
-        dt : float
-            Sampling interval [s].
+        dt : float, optional
+            Sampling interval [s]; without it the rate is not judged.
 
         Returns
         -------
@@ -157,10 +157,11 @@ class IdentifiedModel:
             If `u` is no sequence of finite numbers, or `dt` no interval.
         """
         rate = self._record.get("drive_rate")
-        drive, dt = signal_of("u", u), check_dt(dt)
+        drive = signal_of("u", u)
+        interval = None if dt is None else check_dt(dt)
         if not drive.size:
             raise ShapeError("u has no samples: expected at least one")
-        return beyond_fit(drive, dt, self.drive_range, None if rate is None else float(rate))
+        return beyond_fit(drive, interval, self.drive_range, None if rate is None else float(rate))
 
     def fitted_on(self, data: Dataset) -> bool:
         """Return whether a record is the one identified, sample by sample.

@@ -76,7 +76,7 @@ def drive_rate(u: Array, dt: float) -> float:
 
 
 def beyond_fit(
-    u: Array, dt: float, fitted: tuple[float, float] | None, rate: float | None
+    u: Array, dt: float | None, fitted: tuple[float, float] | None, rate: float | None
 ) -> list[str]:
     """Remarks on a drive that goes beyond the record identified.
 
@@ -84,8 +84,8 @@ def beyond_fit(
     ----------
     u : ndarray, shape (n,)
         Drive [V].
-    dt : float
-        Sampling interval [s].
+    dt : float or None
+        Sampling interval [s]; None where the rate is not to be judged.
     fitted : (float, float) or None
         Range of the drive of the record identified [V].
     rate : float or None
@@ -110,7 +110,7 @@ def beyond_fit(
                 f"the drive goes from {low:.4g} to {high:.4g} V, that of the record identified "
                 f"from {fitted[0]:.4g} to {fitted[1]:.4g} V"
             )
-    if rate and (found := drive_rate(u, dt)) > FASTER * rate:
+    if rate and dt is not None and (found := drive_rate(u, dt)) > FASTER * rate:
         remarks.append(
             f"the drive moves at up to {found:.3g} V/s, that of the record identified at "
             f"{rate:.3g} V/s: the dynamics beyond that rate were not fitted"

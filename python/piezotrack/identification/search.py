@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -281,10 +282,11 @@ def _identification(
 
 
 def _details(estimate: Estimate) -> dict[str, Any]:
-    """Entries of the file for a parameter."""
+    """Entries of the file for a parameter; JSON has no infinity."""
+    known = estimate.deviation is not None and math.isfinite(estimate.deviation)
     return {
         "free": estimate.free,
         "bounds": estimate.bounds,
-        "standard_deviation": estimate.deviation,
+        "standard_deviation": estimate.deviation if known else None,
         "at_bound": estimate.at_bound,
     }

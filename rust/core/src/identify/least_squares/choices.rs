@@ -4,7 +4,7 @@
 
 use super::fit::{Common, Fit};
 use super::form::Form;
-use super::plays::{choose_plays, plays_for, spread};
+use super::plays::{add_once, choose_plays, plays_for, spread};
 use super::{CreepKind, DynamicsKind, PlaysKind, Settings, WeightsRecord};
 use crate::identify::history::History;
 use crate::identify::resonances::{Resonance, resonances};
@@ -58,8 +58,8 @@ pub(super) fn search<'a, M: WeightedPlays>(
 ) -> Option<Found<'a, M>> {
     let thresholds = match &settings.plays {
         PlaysKind::Thresholds(thresholds) => thresholds.clone(),
-        PlaysKind::Spread(count) => spread(common, *count, 1.0),
-        PlaysKind::Auto => spread(common, plays_for(common), 1.0),
+        PlaysKind::Spread(count) => spread(common, (*count, 1.0), false),
+        PlaysKind::Auto => spread(common, (plays_for(common), 1.0), false),
     };
     let mut fit = Fit::<M>::new(common, &thresholds, settings.history.unwrap_or(History::Virgin));
     fit.every = (common.record.y.len() - common.record.start).div_ceil(ROWS);
@@ -244,9 +244,16 @@ fn fitted_history<'a, M: WeightedPlays>(fit: &Fit<'a, M>) -> Option<Fit<'a, M>> 
 
 /// The history that was set, or the simplest one that explains the record.
 fn choose_history<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -> Option<()> {
+    let with_once = |fit: &mut Fit<'_, M>| {
+        if settings.plays == PlaysKind::Auto { add_once(fit, HISTORY_GAIN) } else { Some(()) }
+    };
     match settings.history {
-        Some(History::Fitted) => *fit = fitted_history(fit)?,
-        Some(_) => {}
+        Some(History::Settled) => {}
+        Some(History::Virgin) => with_once(fit)?,
+        Some(History::Fitted) => {
+            *fit = fitted_history(fit)?;
+            with_once(fit)?;
+        }
         None => {
             // With creep, or what it does would be taken for a history.
             if settings.creep == CreepKind::Auto {
@@ -254,13 +261,15 @@ fn choose_history<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -
                 fit.restructure(|fit| fit.times = times);
                 fit.settle(ROUGH)?;
             }
-            let settled = with_history(fit, History::Settled, 0.0)?;
-            if settled.rms < (1.0 - HISTORY_GAIN) * fit.rms {
-                *fit = settled;
-            }
-            let fitted = fitted_history(fit)?;
-            if fitted.rms < (1.0 - HISTORY_GAIN) * fit.rms {
-                *fit = fitted;
+            let mut virgin = fit.clone();
+            with_once(&mut virgin)?;
+            let mut fitted = fitted_history(fit)?;
+            with_once(&mut fitted)?;
+            let other = if virgin.rms < fitted.rms { virgin } else { fitted };
+            for trial in [with_history(fit, History::Settled, 0.0)?, other] {
+                if trial.rms < (1.0 - HISTORY_GAIN) * fit.rms {
+                    *fit = trial;
+                }
             }
         }
     }

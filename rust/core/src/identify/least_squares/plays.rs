@@ -15,7 +15,10 @@ const PLAYS: usize = 20;
 const FEW_PLAYS: usize = 10;
 
 /// Numbers of plays that are tried, and the power by which their thresholds are spread.
-const TRIED: [(usize, f64); 3] = [(PLAYS, 1.0), (PLAYS, 1.5), (MOST_PLAYS, 1.0)];
+const TRIED: [(usize, f64); 3] = [(PLAYS, 1.0), (PLAYS, 1.5), (MANY_PLAYS, 1.0)];
+
+/// As many as there can be, and one.
+const MANY_PLAYS: usize = MOST_PLAYS - 1;
 
 /// Rounds in which plays are gathered: each halves the distance between neighbours.
 const ROUNDS: usize = 5;
@@ -29,9 +32,31 @@ pub(super) fn plays_for(common: &Common<'_>) -> usize {
 }
 
 /// Thresholds up to half of the drive's range; a `power` above 1 has more of them near 0.
-pub(super) fn spread(common: &Common<'_>, count: usize, power: f64) -> Vec<f64> {
+///
+/// Where the stage goes beyond where it was before, plays of half of the range and more move once
+/// and never back: with `once` one further threshold stands for all of them.
+pub(super) fn spread(common: &Common<'_>, (count, power): (usize, f64), once: bool) -> Vec<f64> {
     let part = |i: usize| libm::pow(index(i) / index(count + 1), power);
-    (1..=count).map(|i| reach(common) * part(i)).collect()
+    (1..=count + usize::from(once)).map(|i| reach(common) * part(i)).collect()
+}
+
+/// Whether one of the plays moves once and never back.
+fn has_once<M: WeightedPlays>(fit: &Fit<'_, M>) -> bool {
+    fit.thresholds.last().is_some_and(|last| *last >= reach(fit.common))
+}
+
+/// Adds the play that moves once where it explains more than a share `gain` of the deviation: less
+/// would give it a weight by chance.
+pub(super) fn add_once<M: WeightedPlays>(fit: &mut Fit<'_, M>, gain: f64) -> Option<()> {
+    let mut trial = fit.clone();
+    let kept = fit.x[fit.layout().weights()].to_vec();
+    trial.restructure(|trial| trial.thresholds.push(reach(trial.common)));
+    trial.x[..kept.len()].copy_from_slice(&kept);
+    trial.settle(ROUGH)?;
+    if trial.rms < (1.0 - gain) * fit.rms {
+        *fit = trial;
+    }
+    Some(())
 }
 
 /// Half of the drive's range, V.
@@ -62,9 +87,10 @@ pub(super) fn choose_plays<M: WeightedPlays>(
     let mut best = None;
     for (count, power) in TRIED {
         let mut trial = here.clone();
-        trial.restructure(|trial| trial.thresholds = spread(trial.common, count, power));
+        let thresholds = spread(trial.common, (count, power), has_once(fit));
+        trial.restructure(|trial| trial.thresholds = thresholds);
         trial.settle(ROUGH)?;
-        let few = if count == MOST_PLAYS { gathered(&trial)? } else { None };
+        let few = if count == MANY_PLAYS { gathered(&trial)? } else { None };
         for trial in [Some(trial), few].into_iter().flatten() {
             let rms = foretold(&trial);
             if rms < least {
