@@ -59,6 +59,24 @@ def test_the_voltage_that_the_stage_came_from_is_found() -> None:
     assert any("first" in note for note in wrong.notes)
 
 
+def test_plays_beyond_half_of_the_range_move_once() -> None:
+    """A stage that was never moved: its widest plays move up to the first peak, and never again."""
+    stage = pt.PrandtlIshlinskiiStage(
+        linear=8e-7, thresholds=(3.0, 12.0, 27.0, 33.0), weights=(1e-7, 1e-7, 1e-7, 1e-7)
+    )
+    t = DT * np.arange(2000)
+    u = 40.0 + 25.0 * np.sin(2.0 * np.pi * t)
+    x = stage.simulate(u, DT, initial=stage.equilibrium([40.0])).x
+    noise = NOISE * np.random.default_rng(1).normal(size=t.size)
+    log = pt.Dataset(u=u, y=x + noise, dt=DT)
+    fit = pt.identify(log, "prandtl-ishlinskii", history="virgin")
+    assert fit.cost < 1.5 * NOISE
+    # The two wide ones as one of half of the range.
+    assert isinstance(fit.model, pt.PrandtlIshlinskiiStage)
+    assert 24.9 < fit.model.thresholds[-1] < 27.0
+    assert fit.model.weights[-1] == pytest.approx(2e-7, rel=0.05)
+
+
 def test_a_settled_stage_repeats() -> None:
     u = 40.0 + 35.0 * np.sin(2.0 * np.pi * DT * np.arange(6000))
     x = STAGE.simulate(u, DT, initial=STAGE.equilibrium(40.0)).x

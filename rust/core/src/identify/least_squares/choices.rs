@@ -4,13 +4,14 @@
 
 use super::fit::{Common, Fit};
 use super::form::Form;
+use super::gauss_newton::STEPS;
+use super::modes::{drop_modes, first_mode};
 use super::plays::{add_once, choose_plays, plays_for, spread};
 use super::{CreepKind, DynamicsKind, PlaysKind, Settings, WeightsRecord};
 use crate::identify::history::History;
-use crate::identify::resonances::{Resonance, resonances};
 use crate::math::least;
 use crate::models::{Measures, WeightedPlays};
-use crate::signal::{index, range};
+use crate::signal::{Drive, index, range};
 
 /// Rounds over the numbers of an envelope, at most.
 const SHAPE_ROUNDS: usize = 20;
@@ -22,7 +23,7 @@ const SHAPE_GAIN: f64 = 0.1;
 /// Shares of the deviation that histories, creep and modes have to take away.
 const HISTORY_GAIN: f64 = 0.02;
 const CREEP_GAIN: f64 = 0.015;
-const MODE_GAIN: f64 = 0.02;
+pub(super) const MODE_GAIN: f64 = 0.02;
 
 /// Deviations that differ by less than this share tell nothing.
 const SAME: f64 = 1.01;
@@ -33,8 +34,12 @@ pub(super) const ROUGH: f64 = 1e-3;
 /// Rows that choices are made on, about.
 const ROWS: usize = 4000;
 
-/// Modes that are looked for.
-const MOST_SHOWN: usize = 2;
+/// Longest interval of a thinned record, as a phase of the drive, rad: its peaks are then known to
+/// a thousandth of the travel.
+const PERIOD: f64 = 0.06;
+
+/// Steps of a trial among many: the best one is settled.
+const FEW_STEPS: usize = 4;
 
 /// Least time constant of the creep, relative to that of the drive.
 const SLOWER: f64 = 0.5;
@@ -53,6 +58,40 @@ type Found<'a, M> = (Fit<'a, M>, Option<(f64, f64)>);
 
 /// The best stage, and the lags that explain the record as well; `None` where stopped.
 pub(super) fn search<'a, M: WeightedPlays>(
+    common: &'a Common<'a>,
+    settings: &Settings,
+) -> Option<Found<'a, M>> {
+    let WeightsRecord { drive, y, start } = *common.record;
+    let every = thinning(common.record);
+    let thin = |values: &[f64]| values.iter().copied().step_by(every).collect::<Vec<f64>>();
+    let (u, y) = (thin(drive.u), thin(y));
+    let drive = Drive { u: &u, dt: drive.dt * index(every), ..drive };
+    let record = WeightsRecord { drive, y: &y, start: start.div_ceil(every) };
+    let few = Common::new(&record, common.offset, common.falls, common.stop);
+    let (chosen, lags) = choose::<M>(if every > 1 { &few } else { common }, settings)?;
+    let mut fit = chosen.on(common);
+    common.evaluations.set(common.evaluations.get() + few.evaluations.get());
+    fit.settle(1e-4)?;
+    fit.exact = true;
+    fit.settle(1e-8)?;
+    drop_modes(&mut fit)?;
+    Some((fit, lags))
+}
+
+/// Every how many samples the choices are made on: where the drive is slow all the time, as many as
+/// leave [`ROWS`].
+fn thinning(record: &WeightsRecord<'_>) -> usize {
+    let WeightsRecord { drive, y, start } = *record;
+    let of = Measures::of(&drive, y, start..y.len());
+    // A period of the drive keeps many samples.
+    let most = PERIOD / (of.frequency * drive.dt);
+    let every = (y.len() - start) / ROWS;
+    let few = of.excited().is_none() && index(every) < most;
+    if few { every.max(1) } else { 1 }
+}
+
+/// The structure, on a record that may be thinned.
+fn choose<'a, M: WeightedPlays>(
     common: &'a Common<'a>,
     settings: &Settings,
 ) -> Option<Found<'a, M>> {
@@ -85,11 +124,6 @@ pub(super) fn search<'a, M: WeightedPlays>(
     choose_creep(&mut fit, settings)?;
     let lags = choose_dynamics(&mut fit, settings, mode)?;
     choose_plays(&mut fit, settings)?;
-    fit.every = 1;
-    fit.settle(1e-4)?;
-    fit.exact = true;
-    fit.settle(1e-8)?;
-    drop_modes(&mut fit)?;
     Some((fit, lags))
 }
 
@@ -144,66 +178,11 @@ fn search_shape<M: WeightedPlays>(fit: &mut Fit<'_, M>) -> Option<()> {
     Some(())
 }
 
-/// Whether a mode was found, which is then part of the fit.
-fn first_mode<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -> Option<bool> {
-    if !matches!(settings.dynamics, DynamicsKind::Auto | DynamicsKind::Second) {
-        return Some(false);
-    }
-    let common = fit.common;
-    let record = common.record;
-    let most = if settings.dynamics == DynamicsKind::Auto { MOST_SHOWN } else { 1 };
-    let slow =
-        Measures::of(&record.drive, record.y, record.start..record.y.len()).excited().is_none();
-    if slow && settings.dynamics == DynamicsKind::Auto {
-        // What a mode would explain of one slow sine is creep, or what the plays do not.
-        return Some(false);
-    }
-    let found = resonances(&record.drive, record.y, record.start, most, common.stop)?;
-    let mut better = false;
-    for count in 1..=found.len() {
-        let mut trial = fit.clone();
-        trial.set_poles(Form::Modes(count), &poles(&found[..count]));
-        trial.settle(ROUGH)?;
-        // A further mode on a bound stands for something else.
-        let proper = count == 1 || trial.poles_within();
-        if proper && trial.rms < (1.0 - MODE_GAIN) * fit.rms {
-            *fit = trial;
-            better = true;
-        }
-    }
-    Some(better)
-}
-
-/// Leaves out further modes that the stepping between the samples has made needless.
-fn drop_modes<M: WeightedPlays>(fit: &mut Fit<'_, M>) -> Option<()> {
-    while let Form::Modes(count @ 2..) = fit.form {
-        let mut trial = fit.clone();
-        let poles = fit.x[fit.layout().poles()].to_vec();
-        let fewer = Form::Modes(count - 1);
-        trial.set_poles(fewer, &poles[..fewer.numbers()]);
-        trial.settle(1e-8)?;
-        if fit.poles_within() && fit.rms < (1.0 - MODE_GAIN) * trial.rms {
-            break;
-        }
-        *fit = trial;
-    }
-    Some(())
-}
-
-/// Numbers of modes in the order of [`Form::names`].
-fn poles(modes: &[Resonance]) -> Vec<f64> {
-    let numbers = |(k, mode): (usize, &Resonance)| {
-        let logarithms = [libm::log(mode.frequency), libm::log(mode.damping_ratio)];
-        if k == 0 { logarithms.to_vec() } else { [&[mode.weight], &logarithms[..]].concat() }
-    };
-    modes.iter().enumerate().flat_map(numbers).collect()
-}
-
 /// The fit with another history, as good as it gets.
 fn with_history<'a, M: WeightedPlays>(
     fit: &Fit<'a, M>,
-    history: History,
-    from: f64,
+    (history, from): (History, f64),
+    steps: usize,
 ) -> Option<Fit<'a, M>> {
     let mut trial = fit.clone();
     trial.restructure(|trial| (trial.history, trial.from) = (history, from));
@@ -212,7 +191,7 @@ fn with_history<'a, M: WeightedPlays>(
             trial.x[share] = trial.x[share].max(FIRST_SHARE);
         }
     }
-    trial.settle(ROUGH)?;
+    trial.settle_within(steps, ROUGH)?;
     Some(trial)
 }
 
@@ -222,10 +201,11 @@ fn fitted_history<'a, M: WeightedPlays>(fit: &Fit<'a, M>) -> Option<Fit<'a, M>> 
     let (low, high) = range(drive.u);
     let (first, reach) = (drive.u[0], high - low);
     let parts = 16;
-    let mut best = with_history(fit, History::Fitted, first)?;
+    let mut best = with_history(fit, (History::Fitted, first), STEPS)?;
     let mut width = 2.0 * reach / index(parts);
     for i in 0..=parts {
-        let trial = with_history(&best, History::Fitted, first - reach + width * index(i))?;
+        let from = first - reach + width * index(i);
+        let trial = with_history(&best, (History::Fitted, from), FEW_STEPS)?;
         if trial.rms < best.rms {
             best = trial;
         }
@@ -233,12 +213,13 @@ fn fitted_history<'a, M: WeightedPlays>(fit: &Fit<'a, M>) -> Option<Fit<'a, M>> 
     for _ in 0..7 {
         width *= 0.5;
         for from in [best.from - width, best.from + width] {
-            let trial = with_history(&best, History::Fitted, from)?;
+            let trial = with_history(&best, (History::Fitted, from), FEW_STEPS)?;
             if trial.rms < best.rms {
                 best = trial;
             }
         }
     }
+    best.settle(ROUGH)?;
     Some(best)
 }
 
@@ -266,7 +247,7 @@ fn choose_history<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -
             let mut fitted = fitted_history(fit)?;
             with_once(&mut fitted)?;
             let other = if virgin.rms < fitted.rms { virgin } else { fitted };
-            for trial in [with_history(fit, History::Settled, 0.0)?, other] {
+            for trial in [with_history(fit, (History::Settled, 0.0), STEPS)?, other] {
                 if trial.rms < (1.0 - HISTORY_GAIN) * fit.rms {
                     *fit = trial;
                 }

@@ -111,6 +111,28 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
         fit
     }
 
+    /// The same on all samples of another record.
+    pub fn on<'b>(self, common: &'b Common<'b>) -> Fit<'b, M> {
+        Fit {
+            common,
+            envelope: M::envelope(&self.shape, common.drive),
+            thresholds: self.thresholds,
+            times: self.times,
+            shape: self.shape,
+            window: common.record.start..common.record.y.len(),
+            every: 1,
+            x: self.x,
+            zones: self.zones,
+            bent: self.bent,
+            form: self.form,
+            held: self.held,
+            history: self.history,
+            from: self.from,
+            exact: false,
+            rms: f64::INFINITY,
+        }
+    }
+
     pub fn layout(&self) -> Layout {
         let departing = self.history == History::Fitted;
         Layout {
@@ -307,6 +329,13 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
             }
         }
         libm::sqrt(sum / index(count))
+    }
+
+    /// What is left of the displacement, m.
+    pub fn rest(&self) -> Result<Vec<f64>> {
+        let offset: f64 = self.x[self.layout().offset()].iter().sum();
+        let left = self.common.record.y.iter().zip(self.motion()?);
+        Ok(left.map(|(y, x)| y - x - offset).collect())
     }
 
     /// Displacement up to the end of the window, m.

@@ -17,13 +17,18 @@ const NUDGE: f64 = 1e-5;
 const STIFF: f64 = 1e4;
 
 /// Most steps.
-const STEPS: usize = 60;
+pub(super) const STEPS: usize = 60;
 
 impl<M: WeightedPlays> Fit<'_, M> {
     /// Gauss and Newton's method until a step gains less than `gain`; `None` where stopped.
     pub fn settle(&mut self, gain: f64) -> Option<()> {
+        self.settle_within(STEPS, gain)
+    }
+
+    /// The same with so many steps at most.
+    pub fn settle_within(&mut self, steps: usize, gain: f64) -> Option<()> {
         self.rms = self.deviation();
-        for _ in 0..STEPS {
+        for _ in 0..steps {
             if (self.common.stop)() {
                 return None;
             }

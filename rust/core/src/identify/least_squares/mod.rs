@@ -13,6 +13,7 @@ mod follower;
 mod form;
 mod gauss_newton;
 mod layout;
+mod modes;
 mod plays;
 
 use super::history::History;
