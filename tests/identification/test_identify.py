@@ -55,7 +55,7 @@ def test_two_solvers_agree_on_the_records(drive: str) -> None:
 
 
 @pytest.mark.parametrize("drive", ["slow sine", "two tones"])
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_the_papers_search_finds_what_scipy_simulated(drive: str, seed: int) -> None:
     # A single swarm of these settings does not get there from every seed (docs/identification.md
     # has the shares); the lowest cost of the four runs of a search tells which one to take.
@@ -90,7 +90,7 @@ def test_spso_2011_finds_it_and_the_descent_sharpens_it(update: Any, seed: int) 
 
 
 @pytest.mark.parametrize("drive", ["slow sine", "two tones"])
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 3))])
 def test_the_default_search_finds_it_from_any_seed(drive: str, seed: int) -> None:
     fit = pt.identify(noisy(drive), "dahl", fixed=HELD, bounds=BOX, offset=False, seed=seed)
     assert max(off(fit).values()) < 0.001, off(fit)

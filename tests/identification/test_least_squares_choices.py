@@ -81,6 +81,41 @@ def test_two_modes_are_found() -> None:
     assert fit.rms < 40e-9
 
 
+def test_a_mode_beyond_the_sweep_shows_in_what_the_first_leaves() -> None:
+    stage = replace(
+        PLAIN,
+        frequency=60.0,
+        damping_ratio=0.16,
+        mode_weights=(0.11,),
+        mode_frequencies=(210.0,),
+        mode_damping_ratios=(0.09,),
+    )
+    t = DT * np.arange(3000)
+    u = 37.5 + 35.0 * np.sin(2.0 * np.pi * (1.0 + 13.0 * t) * t) / (1.0 + 0.5 * t)
+    fit = fitted(u, noisy(stage.simulate(u, DT).x), dynamics="auto", history="virgin", start=200)
+    found = sorted(dict(fit.parameters)["frequency"] + dict(fit.parameters)["mode_frequencies"])
+    assert found == pytest.approx([60.0, 210.0], rel=0.02)
+    assert fit.rms < 15e-9
+
+
+def test_choices_on_a_thinned_record_are_those_of_the_whole() -> None:
+    stage = replace(PLAIN, creep_weights=(0.01, 0.01), creep_times=(0.5, 5.0))
+    short, long = np.arange(3000) / 1e3, np.arange(15000) / 5e3
+
+    def fit(t: NDArray[np.float64]) -> Any:
+        u = 37.5 - 30.0 * np.cos(2.0 * np.pi * 1.3 * t)
+        start = stage.equilibrium([70.0, float(u[0])])
+        y = noisy(stage.simulate(u, t[1], initial=start).x)
+        free = {"thresholds": None, "creep_times": None, "dynamics": "auto"}
+        return fitted(u, y, dt=t[1], **free)
+
+    few, many = fit(short), fit(long)
+    assert few.history == many.history == "fit"
+    assert len(dict(few.parameters)["creep_times"]) == len(dict(many.parameters)["creep_times"])
+    assert few.rms < 15e-9
+    assert many.rms < 15e-9
+
+
 def test_a_slow_record_shows_no_mode() -> None:
     u = drive()
     for stage in (MODE, replace(PLAIN, creep_weights=(0.01, 0.01), creep_times=(0.1, 1.0))):
