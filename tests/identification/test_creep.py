@@ -98,7 +98,7 @@ def test_the_weights_stay_below_a_half() -> None:
     slow = replace(STAGE, creep_weights=(2.0,), creep_times=(1.0,))
     fit = pt.identify(
         record(slow), "first-order-dahl", fixed=HELD, creep=[0.5, 1.0], runs=1,
-        swarm=pt.ParticleSwarm(iterations=5, particles=8, polish=False),
+        swarm=pt.ParticleSwarm(iterations=20, particles=16),
     )  # fmt: skip
     assert min(fit.model.creep_weights) >= 0.0
     assert sum(fit.model.creep_weights) == pytest.approx(0.5, abs=1e-9)

@@ -86,13 +86,14 @@ impl Trial<'_> {
     }
 }
 
-/// The candidates that have to be accurate: where the force has kinks, or the drive is slow, the
-/// middle of the box.
+/// The candidates that have to be accurate: where the force has kinks, or the record shows no mode,
+/// the middle of the box.
 fn representatives(problem: &Problem) -> Vec<Theta> {
     let all = corners(problem);
-    // Of a slow drive too: at the least lag beside a soft spring, where no stage is, the hysteresis
+    // Without a mode too: at the least lag beside a soft spring, where no stage is, the hysteresis
     // is stiffer than what holds it, and asks for hundreds of steps.
-    let middle = problem.model.is_nonsmooth() || problem.slow;
+    let held = problem.slow || problem.mass_if_shown.is_some();
+    let middle = problem.model.is_nonsmooth() || held;
     if middle { all.last().copied().into_iter().collect() } else { all }
 }
 

@@ -14,6 +14,9 @@ pub const NOMINAL_STIFFNESS: f64 = 1e6;
 /// Least lag D/K that is searched, as a share of the sampling interval.
 const LEAST_LAG: f64 = 0.05;
 
+/// Least phase of a lag under the drive, rad: its part of the travel.
+const LEAST_PHASE: f64 = 1e-4;
+
 /// Natural frequencies over that of a mode which the record shows: hysteresis stiffens a stage.
 const NEAR_MODE: Range = (0.6, 1.3);
 
@@ -152,7 +155,7 @@ impl Measures {
                 (soft, hard),
             ];
         }
-        let least = (LEAST_LAG * self.dt).min(5e-3 / self.frequency);
+        let least = (LEAST_LAG * self.dt).min(LEAST_PHASE / self.frequency);
         let mass = self.excited().map_or_else(
             || {
                 let mass = libm::sqrt(soft * hard) * (0.5 * least) * (0.5 * least);
