@@ -238,8 +238,9 @@ def _periods(data: Dataset) -> list[str]:
     if turning <= 1 and open_end:
         return [
             f"the window, {data.duration:.4g} s, is shorter than a period of the drive, which "
-            f"goes from {u[0]:.4g} to {u[-1]:.4g} {data.drive_unit}: the loop is not closed, and "
-            "a fit to a part of it may not hold for the rest"
+            f"begins at {u[0]:.4g} {data.drive_unit} and ends at {u[-1]:.4g}, within {u.min():.4g} "
+            f"to {u.max():.4g}: the loop is not closed, and a fit to a part of it may not hold for "
+            "the rest"
         ]
     return []
 
