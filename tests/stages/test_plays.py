@@ -232,10 +232,6 @@ REFUSED_BY_NAME: dict[str, Any] = {
     "swarm": pt.ParticleSwarm(),
     "callback": print,
     "initial": 5,
-    "seed": 0,
-    "runs": 4,
-    "threads": 1,
-    "progress": False,
 }
 
 
@@ -244,6 +240,15 @@ def test_what_has_no_meaning_for_plays_is_refused(name: str) -> None:
     arguments: dict[str, Any] = {name: REFUSED_BY_NAME[name]}
     with pytest.raises(pt.ParameterError, match=f"^{name} is .*: expected none with the model"):
         pt.identify(record(PLAIN, samples=1000), model="prandtl-ishlinskii", **arguments)
+
+
+def test_how_a_search_is_run_may_be_said_of_plays_too() -> None:
+    log = record(PLAIN, samples=1000)
+    plain = pt.identify(log, "prandtl-ishlinskii")
+    run = pt.identify(log, "prandtl-ishlinskii", seed=3, runs=2, threads=1, progress=False)
+    assert run.model == plain.model
+    with pytest.raises(pt.ParameterError, match="seed is -1"):
+        pt.identify(log, "prandtl-ishlinskii", seed=-1)
 
 
 def test_the_number_of_values_fitted_counts_the_offset() -> None:

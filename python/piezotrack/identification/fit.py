@@ -122,7 +122,8 @@ def identify(
         Settings of the least squares: ``pt.identification.LeastSquares``.
     seed : int, optional
         0 or above, 0 where not given. The same seed gives the same bits, for any number of
-        threads.
+        threads. Least squares, which need neither, take `seed`, `runs`, `threads` and `progress`
+        too, for calls in a loop over models.
     runs : int, optional
         Number of independent restarts, 4 where not given, each with its own random numbers;
         different final costs show that there are several local minima. The restarts are simulated

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from .. import _core
 from .._support.messages import quoted
 from ..errors import Interrupted, ParameterError
 from .history import GAIN
@@ -18,7 +19,10 @@ if TYPE_CHECKING:
     from .history import History
     from .result import Identification
 
-__all__ = ["identify_kind", "refuse_given"]
+__all__ = ["check_counts", "identify_kind", "refuse_given"]
+
+# How a search is run, not what it finds.
+RUNNING = ("seed", "runs", "threads", "progress")
 
 
 def identify_kind(
@@ -83,6 +87,9 @@ def identify_kind(
 def refuse_given(info: ModelInfo, of_swarm: Mapping[str, object], least_squares: object) -> None:
     """Refuse arguments that do not apply to a kind.
 
+    How a search is run may be said of every kind, for calls in a loop over kinds: least squares
+    give the same answer from any seed and on any number of threads.
+
     Parameters
     ----------
     info : ModelInfo
@@ -96,10 +103,29 @@ def refuse_given(info: ModelInfo, of_swarm: Mapping[str, object], least_squares:
         One is given for the other way.
     """
     how = "a swarm searches" if info.searched else "least squares find"
+    check_counts(of_swarm)
     given = {"least_squares": least_squares} if info.searched else of_swarm
     for name, value in given.items():
-        if value is not None:
+        if value is not None and name not in RUNNING:
             raise ParameterError(
                 f"{name} is {quoted(value)}: expected none with the model {info.name!r}, whose "
                 f"parameters {how}"
             )
+
+
+def check_counts(of_swarm: Mapping[str, object]) -> None:
+    """Refuse counts that are none, also where least squares alone are the answer.
+
+    Parameters
+    ----------
+    of_swarm : mapping
+        Arguments of a search; None where not given.
+
+    Raises
+    ------
+    ParameterError
+        ``seed``, ``runs`` or ``threads`` is no count.
+    """
+    for name in ("seed", "runs", "threads"):
+        if of_swarm[name] is not None:
+            _core.as_count(name, of_swarm[name])

@@ -13,7 +13,7 @@ from .._support.messages import quoted
 from .._support.statistics import sample_noise
 from ..errors import DataError, NumericalError, ParameterError
 from ..stages.registry import model_named
-from .kinds import identify_kind
+from .kinds import check_counts, identify_kind
 from .least_squares import BY_PLAYS
 from .swarm import ParticleSwarm
 
@@ -105,10 +105,7 @@ def identify_best(
                 f"{name} is {quoted(of_swarm[name])}: expected none with model='auto'; name the "
                 "model whose parameters these are, as model='dahl'"
             )
-    # Refused also where least squares alone are the answer.
-    for name in ("seed", "runs", "threads"):
-        if of_swarm[name] is not None:
-            _core.as_count(name, of_swarm[name])
+    check_counts(of_swarm)
     common: dict[str, Any] = {"offset": offset, "history": history, "least_squares": least_squares}
     swarm = dict(of_swarm)
     if swarm["swarm"] is None:
