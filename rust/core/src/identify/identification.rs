@@ -62,22 +62,16 @@ pub fn identify(
     let best = (0..runs.len())
         .filter(|&i| runs[i].costs.rms.is_finite())
         .min_by(|&i, &j| runs[i].costs.rms.total_cmp(&runs[j].costs.rms));
-    let mut told = Told::default();
-    if let Some(i) = best.filter(|_| ended) {
-        told = if plan.settings.polish {
-            told_by(&local, &mut runs[i])
-        } else {
-            let sensitivities = local.sensitivities(&runs[i].place, runs[i].costs.rms);
-            Told { sensitivities, ..Told::default() }
-        };
-    }
+    let Told { lags, sensitivities, with_mass } = best
+        .filter(|_| ended)
+        .map(|i| told_by(&local, &mut runs[i], plan.settings.polish))
+        .unwrap_or_default();
     if stop() {
         for run in &mut runs {
             run.reason = StopReason::Interrupted;
         }
     }
     let stepping = evaluator.stepping;
-    let Told { lags, sensitivities, with_mass } = told;
     let problem = with_mass.unwrap_or(problem);
     Ok(Identification { problem, stepping, runs, best, lags, sensitivities })
 }
@@ -91,9 +85,10 @@ struct Told {
     with_mass: Option<Problem>,
 }
 
-/// Takes the mass where the record shows it, else under a slow drive the least lag that fits.
-fn told_by(local: &LocalRefinement<'_>, run: &mut Outcome) -> Told {
-    if let Some((problem, polished)) = with_mass(local, &run.place, run.costs) {
+/// Standard deviations of a candidate; of a `polished` one first the mass is taken where the record
+/// shows it, else under a slow drive the least lag that fits.
+fn told_by(local: &LocalRefinement<'_>, run: &mut Outcome, polished: bool) -> Told {
+    if polished && let Some((problem, polished)) = with_mass(local, &run.place, run.costs) {
         run.polish_evaluations += polished.evaluations;
         (run.place, run.costs) = (polished.place, polished.costs);
         run.theta = problem.theta(&run.place);
@@ -102,7 +97,7 @@ fn told_by(local: &LocalRefinement<'_>, run: &mut Outcome) -> Told {
         let sensitivities = freed.sensitivities(&run.place, run.costs.rms);
         return Told { sensitivities, with_mass: Some(problem), lags: None };
     }
-    let slow = local.problem.slow;
+    let slow = polished && local.problem.slow;
     let lags = slow.then(|| lag_range(local, &run.place, run.costs)).flatten();
     if let Some(found) = &lags {
         (run.place, run.costs) = (found.place.clone(), found.costs);

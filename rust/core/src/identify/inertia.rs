@@ -11,9 +11,6 @@ use super::residual_sums::Costs;
 use crate::models::position;
 use crate::signal::index;
 
-/// Least whiteness of deviations of which an inexact model has no part worth the name.
-pub(super) const WHITE: f64 = 0.9;
-
 /// Least twice the logarithm of a likelihood that the mass has to gain: chance alone gives 1.
 const GAIN: f64 = 25.0;
 
@@ -48,7 +45,7 @@ pub(super) fn with_mass(
     let best = freed.polish(&beside(k), costs_beside);
     let samples = index(local.record.window.len());
     let gain = 2.0 * samples * libm::log(costs.rms / best.costs.rms);
-    if gain > GAIN && freed.whiteness(&best.place)? > WHITE {
+    if gain > GAIN && freed.is_white(&best.place) {
         return Some((problem, Polished { evaluations: best.evaluations + STARTS, ..best }));
     }
     None

@@ -6,7 +6,6 @@
 //! inexact model are. Where they are white, chance decides, and a lag that differs from 0 is kept.
 
 use super::coordinate::Coordinate;
-use super::inertia::WHITE;
 use super::levenberg_marquardt::LocalRefinement;
 use super::residual_sums::Costs;
 use crate::models::position;
@@ -56,7 +55,7 @@ pub(super) fn lag_range(
     let parameter = position(infos, "parameters", "damping").ok()?;
     let damping = local.problem.free().position(|free| free == parameter)?;
     let by_chance = libm::exp(0.5 * LIKELY / index(local.record.window.len())) - 1.0;
-    let white = local.whiteness(place).is_some_and(|ratio| ratio > WHITE);
+    let white = local.is_white(place);
     let limit = costs.rms * (1.0 + if white { by_chance.min(AS_WELL) } else { AS_WELL });
     let mut profile = Profile { local: *local, damping, limit, evaluations: 0 };
     let (least, least_costs) = profile.towards(place, costs, 0.0);

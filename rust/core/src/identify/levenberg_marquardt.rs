@@ -23,6 +23,10 @@ const MOST_ROWS: usize = 200_000;
 /// Change of a coordinate of the unit box, for the differences.
 const CHANGE: f64 = 1e-4;
 
+/// Least ratio of half the mean square of the differences to the variance: of what an inexact model
+/// leaves, white deviations have no part worth the name.
+const WHITE: f64 = 0.9;
+
 /// Most iterations of the polish.
 const ITERATIONS: usize = 60;
 
@@ -157,16 +161,15 @@ impl LocalRefinement<'_> {
         })
     }
 
-    /// How white the deviations of a candidate are: half the mean square of their differences from
-    /// sample to sample over their variance, 1 for white ones and less for correlated ones (von
-    /// Neumann 1941, doi 10.1214/aoms/1177731677). `None` where it cannot be simulated.
+    /// Whether the deviations of a candidate are white: half the mean square of their differences
+    /// from sample to sample is near their variance, and less of correlated ones (von Neumann 1941,
+    /// doi 10.1214/aoms/1177731677).
     #[must_use]
-    pub fn whiteness(&self, place: &[f64]) -> Option<f64> {
-        let residual = self.residual(place, 1)?;
+    pub fn is_white(&self, place: &[f64]) -> bool {
+        let Some(residual) = self.residual(place, 1) else { return false };
         let squares = product(&residual, &residual);
         let differences = residual.windows(2).map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0]));
-        let ratio = 0.5 * differences.sum::<f64>() / squares;
-        ratio.is_finite().then_some(ratio)
+        0.5 * differences.sum::<f64>() / squares > WHITE
     }
 
     /// Measured less simulated at every stride-th sample, the mean taken off where an offset is

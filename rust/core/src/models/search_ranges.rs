@@ -142,7 +142,8 @@ impl Measures {
     /// Ranges of mass, damping and stiffness between a soft and a hard stiffness, N/m.
     ///
     /// Where the record does not show a mode, the mass is that of a mode so fast that it does not
-    /// matter, and the damping, a lag D/K, down to a twentieth of the sampling interval.
+    /// matter, and the damping, a lag D/K, down to a twentieth of the sampling interval
+    /// or to what hardly moves the phase of the drive.
     #[must_use]
     pub fn mechanical(&self, (soft, hard): Range) -> [Range; 3] {
         if let ModeShown::Clear(mode) = self.mode {

@@ -10,7 +10,7 @@ use super::plays::{add_once, choose_plays, plays_for, spread};
 use super::{CreepKind, DynamicsKind, PlaysKind, Settings, WeightsRecord};
 use crate::identify::history::History;
 use crate::math::least;
-use crate::models::{Measures, WeightedPlays};
+use crate::models::WeightedPlays;
 use crate::signal::{Drive, index, range};
 
 /// Rounds over the numbers of an envelope, at most.
@@ -36,7 +36,7 @@ const ROWS: usize = 4000;
 
 /// Longest interval of a thinned record, as a phase of the drive, rad: its peaks are then known to
 /// a thousandth of the travel.
-const PERIOD: f64 = 0.06;
+const LONGEST_PHASE: f64 = 0.06;
 
 /// Steps of a trial among many: the best one is settled.
 const FEW_STEPS: usize = 4;
@@ -61,16 +61,13 @@ pub(super) fn search<'a, M: WeightedPlays>(
     common: &'a Common<'a>,
     settings: &Settings,
 ) -> Option<Found<'a, M>> {
-    let WeightsRecord { drive, y, start } = *common.record;
     let every = thinning(common.record);
-    let thin = |values: &[f64]| values.iter().copied().step_by(every).collect::<Vec<f64>>();
-    let (u, y) = (thin(drive.u), thin(y));
-    let drive = Drive { u: &u, dt: drive.dt * index(every), ..drive };
-    let record = WeightsRecord { drive, y: &y, start: start.div_ceil(every) };
-    let few = Common::new(&record, common.offset, common.falls, common.stop);
-    let (chosen, lags) = choose::<M>(if every > 1 { &few } else { common }, settings)?;
-    let mut fit = chosen.on(common);
-    common.evaluations.set(common.evaluations.get() + few.evaluations.get());
+    let (mut fit, lags) = if every > 1 {
+        choose_thinned(common, settings, every)?
+    } else {
+        let (chosen, lags) = choose::<M>(common, settings)?;
+        (chosen.on(common), lags)
+    };
     fit.settle(1e-4)?;
     fit.exact = true;
     fit.settle(1e-8)?;
@@ -78,14 +75,29 @@ pub(super) fn search<'a, M: WeightedPlays>(
     Some((fit, lags))
 }
 
+/// The structure that every so many of the samples ask for, on all of them.
+fn choose_thinned<'a, M: WeightedPlays>(
+    common: &'a Common<'a>,
+    settings: &Settings,
+    every: usize,
+) -> Option<Found<'a, M>> {
+    let WeightsRecord { drive, y, start } = *common.record;
+    let thin = |values: &[f64]| values.iter().copied().step_by(every).collect::<Vec<f64>>();
+    let (u, y) = (thin(drive.u), thin(y));
+    let drive = Drive { u: &u, dt: drive.dt * index(every), ..drive };
+    let record = WeightsRecord { drive, y: &y, start: start.div_ceil(every) };
+    let few = Common::new(&record, common.offset, common.falls, common.stop);
+    let (chosen, lags) = choose::<M>(&few, settings)?;
+    common.evaluations.set(common.evaluations.get() + few.evaluations.get());
+    Some((chosen.on(common), lags))
+}
+
 /// Every how many samples the choices are made on: where the drive is slow all the time, as many as
 /// leave [`ROWS`].
 fn thinning(record: &WeightsRecord<'_>) -> usize {
-    let WeightsRecord { drive, y, start } = *record;
-    let of = Measures::of(&drive, y, start..y.len());
-    // A period of the drive keeps many samples.
-    let most = PERIOD / (of.frequency * drive.dt);
-    let every = (y.len() - start) / ROWS;
+    let of = record.measures();
+    let most = LONGEST_PHASE / (of.frequency * record.drive.dt);
+    let every = (record.y.len() - record.start) / ROWS;
     let few = of.excited().is_none() && index(every) < most;
     if few { every.max(1) } else { 1 }
 }

@@ -19,7 +19,7 @@ mod plays;
 use super::history::History;
 use crate::error::{Error, Result};
 use crate::models::{
-    Dynamics, Model, PlayHysteresis, Relaxation, Values, WeightedPlays, WeightedVisitor,
+    Dynamics, Measures, Model, PlayHysteresis, Relaxation, Values, WeightedPlays, WeightedVisitor,
 };
 use crate::signal::{Drive, Stop, index, range, turns};
 
@@ -105,6 +105,13 @@ pub struct WeightsRecord<'a> {
     pub y: &'a [f64],
     /// First sample that counts; those before are warm-up.
     pub start: usize,
+}
+
+impl WeightsRecord<'_> {
+    /// Measures of the samples that count.
+    fn measures(&self) -> Measures {
+        Measures::of(&self.drive, self.y, self.start..self.y.len())
+    }
 }
 
 /// What was found.

@@ -5,7 +5,7 @@ use super::fit::Fit;
 use super::form::Form;
 use super::{DynamicsKind, Settings, WeightsRecord};
 use crate::identify::resonances::{Resonance, resonances};
-use crate::models::{Measures, WeightedPlays};
+use crate::models::WeightedPlays;
 
 /// Modes that are looked for.
 const MOST_SHOWN: usize = 2;
@@ -24,9 +24,7 @@ pub(super) fn first_mode<M: WeightedPlays>(
     let common = fit.common;
     let record = common.record;
     let most = if settings.dynamics == DynamicsKind::Auto { MOST_SHOWN } else { 1 };
-    let slow =
-        Measures::of(&record.drive, record.y, record.start..record.y.len()).excited().is_none();
-    if slow && settings.dynamics == DynamicsKind::Auto {
+    if record.measures().excited().is_none() && settings.dynamics == DynamicsKind::Auto {
         // What a mode would explain of one slow sine is creep, or what the plays do not.
         return Some(false);
     }
