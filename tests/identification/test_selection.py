@@ -1,5 +1,6 @@
 """`model="auto"`: the kind that is best on what was not fitted."""
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -7,6 +8,8 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
+from piezotrack._support.statistics import sample_noise
+from piezotrack.identification.selection import Trial
 
 DT = 1e-3
 T = DT * np.arange(4000)
@@ -57,6 +60,19 @@ def test_a_record_too_short_to_be_parted_says_so() -> None:
     fit = pt.identify(short, progress=False)
     assert fit.fitted_until is None
     assert "too short for another" in fit.summary()
+
+
+def test_the_swing_of_a_mode_does_not_hide_what_is_left() -> None:
+    swinging = dataclasses.replace(PLAYS, frequency=150.0, damping_ratio=0.1)
+    u = 37.5 - 30.0 * np.cos(2.0 * np.pi * (1.0 + 20.0 * T) * T)
+    y = swinging.simulate(u, DT).x + 1e-8 * np.random.default_rng(0).normal(size=T.size)
+    few = pt.identification.LeastSquares(count=1, dead_zones=False, creep=False, dynamics="second")
+    fit = pt.identify(pt.Dataset(u=u, y=y, dt=DT), "prandtl-ishlinskii", least_squares=few)
+    # The motion between samples is no less than the residual, which is far above the noise.
+    assert 3e-8 < fit.cost < 3.0 * sample_noise(y)
+    trial = Trial("prandtl-ishlinskii", "Prandtl-Ishlinskii", fit.cost)
+    chosen = dataclasses.replace(fit, trials=(trial,))
+    assert any("times the noise between samples" in note for note in chosen.notes)
 
 
 def test_parameters_need_a_named_model() -> None:

@@ -152,7 +152,9 @@ class Identification(IdentifiedModel):
             notes.append(f"the drive is in {unit}: forces are in {unit} too, not in N")
         notes += self.model._notes(lambda: self._response)
         if self.trials:
-            notes += remarks.above_noise(self.cost, sample_noise(data.y))
+            # A mode moves from sample to sample as noise does; what is left of it hardly does.
+            noise = min(sample_noise(data.y), sample_noise(data.y - self._response.x))
+            notes += remarks.above_noise(self.cost, noise)
         notes += remarks.of_lags(self.lags, 2.0 * math.pi * _frequency(data))
         notes += remarks.first_samples(data.y - self._response.x, data)
         if self.at_bound:
