@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import piezotrack as pt
-from piezotrack.xu_li_2010.demo import write_log
+from piezotrack.data.log_file import write_log
 
 if TYPE_CHECKING:
     from pathlib import Path

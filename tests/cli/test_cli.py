@@ -31,7 +31,7 @@ from commands import (
     write_model,
 )
 from piezotrack.cli.commands import app
-from piezotrack.xu_li_2010.demo import write_log
+from piezotrack.data.log_file import write_log
 from records import BOX, HELD, quick
 
 
@@ -170,8 +170,8 @@ def test_simulate_writes_the_displacement() -> None:
     assert found is not None
 
 
-def test_the_demonstration_tells_the_whole_story() -> None:
-    printed = ran("demo")
+def test_the_demonstration_of_the_paper_tells_the_whole_story() -> None:
+    printed = ran("demo", "--paper")
     pictures = [f"dahl_{picture}" for picture in PICTURES]
     tracked = ("feedforward", "pid", "all")
     pictures += [f"track_{name}.{ending}" for name in tracked for ending in ("png", "svg")]

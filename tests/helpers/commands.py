@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 import piezotrack as pt
 from piezotrack.cli.commands import app
-from piezotrack.xu_li_2010.demo import write_log
+from piezotrack.data.log_file import write_log
 from records import BOX, HELD, quick
 
 HEADER = "time_s,voltage_V,displacement_um"

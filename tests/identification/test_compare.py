@@ -15,8 +15,8 @@ from matplotlib.patches import Rectangle
 import piezotrack as pt
 from commands import names, ran, refusal
 from folders import MEASURED
+from piezotrack.data.log_file import write_log
 from piezotrack.stages.registry import MODELS as LISTED
-from piezotrack.xu_li_2010.demo import write_log
 from play_records import fit_plays
 
 TIMES = np.arange(1600) / 200.0

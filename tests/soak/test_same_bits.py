@@ -45,7 +45,7 @@ def test_files_of_the_command(tmp_path: Path) -> None:
         # Under the same name, which some results mention.
         folder.mkdir()
         subprocess.run(
-            [*COMMAND, "demo", "--out", "demo", "--seed", "1"], cwd=folder, check=True,
+            [*COMMAND, "demo", "--paper", "--out", "demo", "--seed", "1"], cwd=folder, check=True,
             capture_output=True, env={**os.environ, "PYTHONHASHSEED": seed}, timeout=300.0,
         )  # fmt: skip
         folders.append({p.relative_to(folder): p.read_bytes() for p in sorted(folder.rglob("*.*"))})

@@ -1,4 +1,4 @@
-"""The demonstration: a log of the virtual stage, a model from it, and a tracked reference."""
+"""The paper's demonstration: a log of its virtual stage, a model, and a tracked reference."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._support.files import write_columns
 from ..control.components import Pid, Repetitive
 from ..control.controller import Controller
 from ..control.tracking import Tracking, track
@@ -18,13 +17,12 @@ from .procedure import FITTED_SECONDS, SEARCH_BOX
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from ..data.dataset import Dataset
     from ..identification.estimates import Progress
     from ..identification.result import Identification
 
-__all__ = ["demo_log", "identify_demo", "track_demo", "write_log"]
+__all__ = ["demo_log", "identify_demo", "track_demo"]
 
 
 def demo_log(seed: int = 1) -> Dataset:
@@ -110,23 +108,3 @@ def track_demo(fit: Identification, seed: int = 1) -> dict[str, Tracking]:
         ),
     }
     return {name: track(stage, loop, reference) for name, loop in loops.items()}
-
-
-def write_log(log: Dataset, path: Path) -> Path:
-    """Write a log as a CSV file for `read`.
-
-    Parameters
-    ----------
-    log : Dataset
-        The record; its warm-up is left out.
-    path : pathlib.Path
-        The file.
-
-    Returns
-    -------
-    pathlib.Path
-        The file.
-    """
-    return write_columns(
-        path, {"time_s": log.t, "voltage_V": log.u, "displacement_um": 1e6 * log.y}
-    )

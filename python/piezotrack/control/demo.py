@@ -1,0 +1,109 @@
+"""The demonstration: a model of a measured log, judged on another, and tracking with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ..data import datasets
+from ..data.dataset import Dataset
+from ..identification.fit import identify
+from ..references.waveforms import triangle
+from ..stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
+from .components import Pid
+from .controller import Controller
+from .tracking import Tracking, track
+
+if TYPE_CHECKING:
+    from ..identification.identified import Score
+    from ..identification.result import Identification
+    from ..stages.inverse import Inverse
+
+__all__ = ["FEEDBACK", "REFERENCE", "WINDOW", "Demonstration", "demo_logs", "run_demo"]
+
+# Seconds of the log that the model is fitted to, and from which the other one is scored.
+WINDOW = (3.0, 23.0)
+# As a text for `--reference`.
+REFERENCE = "triangle:1Hz,5..42um"
+FEEDBACK = Pid.from_um(kp=0.03, ti=0.02, td=0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Demonstration:
+    """What the demonstration computes.
+
+    Attributes
+    ----------
+    log, other : Dataset
+        The log identified, and another record of the same stage.
+    fit : Identification
+        The model of `log`.
+    score : Score
+        Its deviation from `other`, to which it was not fitted.
+    runs : dict of str to Tracking
+        The reference tracked on a stage that is identified from `other`: without compensation,
+        with the inverse of `fit`, and with PID feedback as well.
+    """
+
+    log: Dataset
+    other: Dataset
+    fit: Identification
+    score: Score
+    runs: dict[str, Tracking]
+
+
+def demo_logs() -> tuple[Dataset, Dataset]:
+    """Load the two measured logs of the package, with the sensor set to 0 at the lowest reading.
+
+    Returns
+    -------
+    tuple of two Dataset
+        The log to identify, and the other.
+    """
+    first, other = datasets.dbo_training(), datasets.dbo_tracking()
+    lowest = first[slice(*WINDOW)].y.min()
+    log, other = (
+        Dataset(u=one.u, y=one.y - lowest, t=one.t, source=one.source) for one in (first, other)
+    )
+    return log, other
+
+
+def run_demo(seed: int = 1) -> Demonstration:
+    """Identify a model from one log, score it on the other, and track a reference.
+
+    The stage that is controlled is not the controller's model: it is identified from the other log,
+    so that the feedforward is off by about as much as on the real stage.
+
+    Parameters
+    ----------
+    seed : int, optional
+        Seed of the search.
+
+    Returns
+    -------
+    Demonstration
+        The model, its score, and the runs.
+    """
+    log, other = demo_logs()
+    fit = identify(log[slice(*WINDOW)], seed=seed)
+    later = other[WINDOW[0] :]
+    plant = identify(later, "prandtl-ishlinskii")
+    low, high = fit.drive_range or (0.0, 0.0)
+    gain = fit.data.stroke / (high - low)
+    line = PrandtlIshlinskiiStage(linear=gain, thresholds=(high - low,), weights=(0.0,)).inverse()
+    reference = triangle(frequency=1.0, low=5e-6, high=42e-6, duration=4.0)
+    parts: dict[str, tuple[Inverse, Pid | None]] = {
+        "without compensation": (line, None),
+        "inverse": (fit.inverse(), None),
+        "inverse and PID": (fit.inverse(), FEEDBACK),
+    }
+    runs = {
+        name: track(
+            plant,
+            Controller(dt=log.dt, limits=(low, high), feedforward=feedforward, feedback=feedback),
+            reference,
+            visited=(high, low),
+        )
+        for name, (feedforward, feedback) in parts.items()
+    }
+    return Demonstration(log=log, other=later, fit=fit, score=fit.score(later), runs=runs)
