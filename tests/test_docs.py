@@ -1,4 +1,4 @@
-"""What is written to be read: every example runs, every parameter is documented."""
+"""Docstrings: every example runs, every parameter is documented."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ import ast
 import doctest
 import importlib
 import inspect
-import os
 import pkgutil
-import re
 import subprocess
 import sys
 import types
@@ -32,7 +30,6 @@ MODULES = sorted(
         if module.name != "piezotrack._core"
     }
 )
-PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
 
 
 # Examples.
@@ -45,52 +42,6 @@ def test_the_examples_in_docstrings_run(
     monkeypatch.chdir(tmp_path)
     result = doctest.testmod(importlib.import_module(name))
     assert result.failed == 0
-
-
-FENCED = re.compile(r"^```python[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
-BLOCKS = [
-    pytest.param(
-        page, match[1], id=f"{page.name}:{page.read_text()[: match.start()].count(chr(10)) + 1}"
-    )
-    for page in PAGES
-    for match in FENCED.finditer(page.read_text(encoding="utf-8"))
-]
-
-
-def failures(page: Path, code: str) -> str:
-    """Run a block with prompts, and return what doctest has to say about it."""
-    report: list[str] = []
-    test = doctest.DocTestParser().get_doctest(code, {}, page.name, str(page), 0)
-    doctest.DocTestRunner(verbose=False).run(test, out=report.append)
-    return "".join(report)
-
-
-@pytest.mark.parametrize(("page", "code"), BLOCKS)
-def test_the_examples_on_the_pages_run(
-    page: Path, code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if ">>>" in code:
-        monkeypatch.chdir(tmp_path)
-        assert failures(page, code) == ""
-        return
-    # Without prompts it is a script, which stands alone.
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=60.0,
-        check=False,
-        env={**os.environ, "MPLBACKEND": "Agg"},
-    )
-    assert done.returncode == 0, done.stderr
-
-
-@pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
-def test_the_pages_link_to_what_is_there(page: Path) -> None:
-    for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text(encoding="utf-8")):
-        if "://" not in target:
-            assert (page.parent / target).exists(), target
 
 
 # Docstrings.

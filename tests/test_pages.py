@@ -1,0 +1,130 @@
+"""README and pages: what they show is typed, in order, and what they link to is there."""
+
+from __future__ import annotations
+
+import contextlib
+import doctest
+import io
+import re
+import shlex
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import matplotlib.pyplot as plt
+import pytest
+
+from commands import run
+from folders import ROOT
+from piezotrack.control.demo import demo_logs
+from piezotrack.data.log_file import write_log
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
+NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
+
+
+class Block(NamedTuple):
+    """A fenced block of a page: its language, and the line of the page it begins on."""
+
+    language: str
+    code: str
+    line: int
+
+
+def blocks(page: Path) -> list[Block]:
+    text = page.read_text(encoding="utf-8")
+    return [
+        Block(found[1], found[2], text[: found.start()].count("\n") + 1)
+        for found in re.finditer(r"^```(\w*)[^\n]*\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    ]
+
+
+TYPED = [page for page in PAGES if any(b.language in ("python", "console") for b in blocks(page))]
+
+
+@pytest.mark.parametrize("page", TYPED, ids=lambda page: page.name)
+def test_what_a_page_shows_runs(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Type all blocks of a page in one folder: `piezotrack demo` has been there before.
+
+    A block without a language that follows is what is printed: each of its lines has to be.
+    """
+    monkeypatch.chdir(tmp_path)
+    Path("demo").mkdir()
+    for log, name in zip(demo_logs(), ("log", "other"), strict=True):
+        write_log(log, Path("demo", f"{name}.csv"))
+    names: dict[str, Any] = {"__name__": "__main__"}
+    printed = ""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for block in blocks(page):
+            where = f"{page.name}:{block.line}"
+            if block.language == "python":
+                printed = python(block, names, where)
+            elif block.language == "console":
+                printed = "".join(console(block, where))
+            elif block.language == "text":
+                for line in block.code.splitlines():
+                    assert line.strip() in printed, f"{where}: {line}\nis not printed:\n{printed}"
+            plt.close("all")
+
+
+def python(block: Block, names: dict[str, Any], where: str) -> str:
+    """Run a block, with prompts or without; return what it prints."""
+    if ">>>" in block.code:
+        report: list[str] = []
+        test = doctest.DocTestParser().get_doctest(block.code, names, where, where, 0)
+        doctest.DocTestRunner(verbose=False).run(test, out=report.append, clear_globs=False)
+        names.update(test.globs)
+        assert not report, "".join(report)
+        return ""
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        exec(compile(block.code, where, "exec"), names)
+    return out.getvalue()
+
+
+def console(block: Block, where: str) -> Iterator[str]:
+    """Type the commands of a block, the lines behind a dollar sign; what they print."""
+    for line in block.code.replace("\\\n", "").splitlines():
+        if not line.startswith("$ "):
+            continue
+        name, *arguments = shlex.split(line.removeprefix("$ "), comments=True)
+        # Other commands, as pip and make, are not those of the package.
+        if name == "piezotrack":
+            done = run(*arguments)
+            assert done.exit_code == 0, f"{where}: {line}\n{done.output}"
+            yield done.stdout
+
+
+def anchors(page: Path) -> set[str]:
+    """The anchors that a page's headings get where it is shown."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+    titles = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles} | set(
+        re.findall(r'<a id="([^"]+)">', text)
+    )
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_the_pages_link_to_what_is_there(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
+        if "://" in target:
+            continue
+        name, _, anchor = target.partition("#")
+        there = (page.parent / name) if name else page
+        assert there.exists(), target
+        if anchor and there.suffix == ".md":
+            assert anchor in anchors(there), target
+
+
+def test_every_page_is_reached_from_the_readme() -> None:
+    found = [ROOT / "README.md"]
+    for page in found:
+        for target in re.findall(r"\]\(([^)#\s]+\.md)", page.read_text(encoding="utf-8")):
+            if "://" not in target and (there := (page.parent / target).resolve()) not in found:
+                found.append(there)
+    assert set(PAGES) <= set(found)
