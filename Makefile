@@ -1,6 +1,6 @@
 # What a person types. Needs a Rust toolchain and Python 3.11 or newer; all else is put in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo reproduce test soak fuzz lint rust-test no-std python-test bench docs clean
+.PHONY: help demo reproduce test soak fuzz lint rust-test no-std python-test bench docs reference clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -66,6 +66,9 @@ bench: ## Criterion benches: throughput of the swarm, latency of a step
 
 docs: ## The crates' pages
 	cargo doc --locked --no-deps
+
+reference: $(VENV)/installed ## Write docs/reference from the commands and docstrings
+	$(BIN)/python docs/make_reference.py
 
 clean: ## Remove what was built, not your results
 	rm -rf $(VENV) target demo report
