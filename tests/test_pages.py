@@ -54,7 +54,8 @@ def fitted_once(data: pt.Dataset, *arguments: Any, **options: Any) -> Any:
     """Identify, but the same record once only: README and pages fit the same one."""
     # The command line says what the default is.
     said = {key: value for key, value in options.items() if (key, value) != ("offset", True)}
-    key = f"{data.full.sha256} {data.t[0]} {data.t[-1]} {data.source} {arguments} {sorted(said.items())}"
+    record = (data.full.sha256, data.t[0], data.t[-1], data.source)
+    key = repr((record, arguments, sorted(said.items())))
     if key not in FITS or data.full.duration < 30.0:
         FITS[key] = identify(data, *arguments, **options)
     return FITS[key]
