@@ -2,105 +2,150 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from .error_messages import in_words
-from .options import Out, can_be_folder, list_files
+from .options import Json, Out, Overwrite, Quiet  # noqa: TC001 - read by typer
+from .output import Output
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from ..control.tracking import Tracking
 
 __all__ = ["demo_command"]
+
+UNIT = "errors in m, phase lag in rad, widest loop as a part of the travel"
+# Of the measured logs, and of the paper.
+PICTURES = ("other_loop", "other_time", "before_and_after")
+RUNS = {"feedforward": "feedforward alone", "pid": "PID alone", "all": "both, repetitive"}
 
 
 @in_words
 def demo_command(
     out: Out = Path("demo"),
-    seed: Annotated[int, typer.Option(help="Seed of the search and of simulated noise.")] = 1,
+    overwrite: Overwrite = False,
     paper: Annotated[
         bool,
         typer.Option("--paper", help="The simulated stage of Xu and Li 2010 and its Dahl model."),
     ] = False,
+    seed: Annotated[int, typer.Option(help="Seed of the search and of simulated noise.")] = 1,
+    json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Identify a measured log, test the model on another, track with it."""
-    can_be_folder(out)
-    if paper:
-        _paper(out, seed)
-    else:
-        _measured(out, seed)
+    """Identify a measured log, test on another, track."""
+    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
+    (_paper if paper else _measured)(result, seed)
 
 
-def _measured(out: Path, seed: int) -> None:
+def _measured(result: Output, seed: int) -> None:
     """Run the demonstration on the two measured logs of the package."""
-    from .._support.files import make_folder, save_figures, together
-    from ..control.demo import REFERENCE, WINDOW, run_demo
+    from .._support.files import make_folder, picture_files, save_figures, together
+    from ..control.demo import run_demo
     from ..control.demo_plot import plot_before_and_after
     from ..data.log_file import write_log
     from ..identification.plot import plot_loop, plot_time
-    from ..identification.report import save_identification
+    from ..identification.report import identification_files, save_identification
 
-    found = run_demo(seed)
+    # The logs are known, and so is the kind of model that suits them.
+    model = identification_files("prandtl-ishlinskii", searched=False)
+    result.will_write(["log.csv", "other.csv", *model, *picture_files(*PICTURES)])
+    found = run_demo(seed, progress=result.progress)
     fit, other = found.fit, found.other
     run = fit.simulate(other)
-    figures = {
-        "other_loop": plot_loop(other, run).figure,
-        "other_time": plot_time(other, run, stroke=fit.stroke)[0].figure,
-        "before_and_after": plot_before_and_after(found.runs),
-    }
-    with together(make_folder(out)) as folder:
+    figures = (
+        plot_loop(other, run).figure,
+        plot_time(other, run, stroke=fit.stroke)[0].figure,
+        plot_before_and_after(found.runs),
+    )
+    with together(make_folder(result.out)) as folder:
         written = [
             write_log(found.log, folder / "log.csv"),
             write_log(other.full, folder / "other.csv"),
         ]
         written += save_identification(fit, folder)
-        written += save_figures(figures, folder)  # type: ignore[arg-type]
-    model, limits = written[2], "{:g}:{:g}".format(*fit.drive_range or ())
-    print("Two measured logs of a piezo stack: 0 to 3.6 V, 45 um, 1 Hz, sampled at 200 Hz")
-    print("(Aye and Ang 2018). The model is fitted to 20 s of the first.\n")
-    # The head of the summary: the values of the parameters are in the model file.
-    print(fit.summary().partition("\n\n")[0])
-    print(f"\non the other log, not fitted: {found.score}\n")
-    print(f"Tracking of {REFERENCE} with this model, simulated on a stage identified from the")
-    print("other log:")
-    for name, tracked in found.runs.items():
-        print(f"  {name:<20} {tracked.metrics}")
-    list_files(written)
+        written += save_figures(dict(zip(PICTURES, figures, strict=True)), folder)  # type: ignore[arg-type]
+    words = [
+        "Two measured logs of a piezo stack: 0 to 3.6 V, 45 um, 1 Hz, sampled at 200 Hz",
+        "(Aye and Ang 2018). The model is fitted to 20 s of the first.",
+        "",
+        # The head of the summary: the values of the parameters are in the model file.
+        fit.summary().partition("\n\n")[0],
+        "",
+        f"on the other log, not fitted: {found.score}",
+        "",
+        "Tracking of a 1 Hz triangle from 5 to 42 um with this model, simulated on a stage",
+        "identified from the other log:",
+        *_runs({name: name for name in found.runs}, found.runs),
+        "",
+        "The same by hand, and more:",
+        *(f"  piezotrack {line}" for line in _commands(result.out, fit.drive_range or (0.0, 0.0))),
+    ]
+    document = {
+        "model": {**fit.document(), "notes": fit.notes},
+        "validation": asdict(found.score),
+        "tracking": {name: asdict(one.metrics) for name, one in found.runs.items()},
+        "unit": UNIT,
+    }
+    result.show("\n".join(words), document, written)
+
+
+def _commands(out: Path, limits: tuple[float, float]) -> list[str]:
+    """Return what to type next."""
+    from ..control.demo import REFERENCE, WINDOW
+
+    log, other, model = (out / name for name in ("log.csv", "other.csv", "prandtl-ishlinskii.json"))
     window = "{:g}:{:g}".format(*WINDOW)
-    print("\nThe same by hand, and what else there is:")
-    for line in (
-        f"identify {written[0]} --window {window} --validate {written[1]} --validate-window 3:",
-        f"compare {written[0]} --train {window}",
+    return [
+        f"identify {log} --window {window} --validate {other} --validate-window 3:",
+        f"compare {log} --train {window}",
         f"track {model} --stage model --reference {REFERENCE} \\\n"
-        f"      --dt 0.005 --limits {limits} --kp 0.03 --ti 0.02 --td 0",
+        f"      --dt 0.005 --limits {limits[0]:g}:{limits[1]:g} --kp 0.03 --ti 0.02 --td 0",
         f"feedforward {model} {REFERENCE} --dt 0.005",
-    ):
-        print(f"  piezotrack {line}")
+    ]
 
 
-def _paper(out: Path, seed: int) -> None:
+def _paper(result: Output, seed: int) -> None:
     """Run the demonstration of the paper: its stage, simulated, and its model."""
-    from .._support.files import make_folder, save_figures, together
+    from .._support.files import make_folder, picture_files, save_figures, together
     from ..data.log_file import write_log
-    from ..identification.report import save_identification
+    from ..identification.report import identification_files, save_identification
     from ..xu_li_2010.demo import demo_log, identify_demo, track_demo
 
+    tracked = picture_files(*(f"track_{name}" for name in RUNS))
+    result.will_write(["log.csv", *identification_files("dahl", searched=True), *tracked])
     log = demo_log(seed)
-    fit = identify_demo(log, seed=seed)
+    fit = identify_demo(log, seed=seed, progress=result.progress)
     rest = fit.score(log.full[fit.data.t[-1] :], offset=fit.offset)
     runs = track_demo(fit, seed)
-    with together(make_folder(out)) as folder:
+    with together(make_folder(result.out)) as folder:
         written = [write_log(log, folder / "log.csv")]
         written += save_identification(fit, folder, shown=log)
         written += save_figures({f"track_{name}": run.plot() for name, run in runs.items()}, folder)
-    print("The simulated stage of Xu and Li 2010, which no model matches exactly, is driven 12 s")
-    print("with 0.25 Hz, 0 to 75 V. Mass, damping, stiffness and piezo coefficient are identified")
-    print(
-        "from the first 4 s; the hysteresis parameters are held, which sets the scale of forces.\n"
-    )
-    print(fit.summary())
-    print(f"\nvalidation on the other 8 s: {rest}")
-    print("\nTracking of a 0.2 Hz sine over 110 um, sampled at 50 Hz:")
-    names = {"feedforward": "feedforward alone", "pid": "PID alone", "all": "both, repetitive"}
-    for name, run in runs.items():
-        print(f"  {names[name]:<18} {run.metrics}")
-    list_files(written)
+    words = [
+        "A virtual stage that no model matches exactly is driven for 12 s at 0.25 Hz, 0 to 75 V.",
+        "Mass, damping, stiffness and piezo coefficient are identified from the first 4 s;",
+        "the hysteresis parameters are held fixed, which sets the scale of the forces.",
+        "",
+        fit.summary(),
+        "",
+        f"validation on the other 8 s: {rest}",
+        "",
+        "Tracking of a 0.2 Hz sine over 110 um, sampled at 50 Hz:",
+        *_runs(RUNS, runs),
+    ]
+    document = {
+        "model": {**fit.document(), "notes": fit.notes},
+        "validation": asdict(rest),
+        "tracking": {name: asdict(run.metrics) for name, run in runs.items()},
+        "unit": UNIT,
+    }
+    result.show("\n".join(words), document, written)
+
+
+def _runs(names: Mapping[str, str], runs: Mapping[str, Tracking]) -> list[str]:
+    return [f"  {names[name]:<20} {run.metrics}" for name, run in runs.items()]

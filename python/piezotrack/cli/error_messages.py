@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, ParamSpec
 
 import typer
 
+from .._support.progress_bar import one_clock
 from ..errors import PiezotrackError
 from .interruption import at_rest, at_work, exit_code, stopped
 from .terminal import one_line
@@ -36,7 +37,7 @@ def in_words(command: Callable[P, None]) -> Callable[P, None]:
     @wraps(command)
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
         try:
-            with at_work():
+            with at_work(), one_clock():
                 command(*args, **kwargs)
                 sys.stdout.flush()
         except KeyboardInterrupt as error:

@@ -26,12 +26,18 @@ __all__ = [
     "HoldOption",
     "Interval",
     "Jitter",
+    "Json",
+    "LogFile",
+    "ModelFile",
     "Out",
+    "Overwrite",
     "Period",
+    "Quiet",
     "Seconds",
     "TimeColumn",
     "Units",
     "can_be_folder",
+    "can_be_written",
     "column",
     "list_files",
     "number",
@@ -71,7 +77,14 @@ Duration = Annotated[float | None, typer.Option(help="Length of the reference in
 Period = Annotated[
     float | None, typer.Option(help="Time in s after which a reference from a file repeats.")
 ]
-Out = Annotated[Path, typer.Option(help="Folder for the results.")]
+Out = Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the results.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace results that exist.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the figures as one JSON document.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")]
+LogFile = Annotated[
+    Path, typer.Argument(metavar="FILE", help="Log in CSV, with units in its header.")
+]
+ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file in JSON.")]
 
 
 class Columns:
@@ -141,6 +154,14 @@ def can_be_folder(out: Path) -> None:
         raise ParameterError(f"--out: {out} cannot be made a folder: {there} is a file")
     if not os.access(there, os.W_OK | os.X_OK):
         raise ParameterError(f"--out: {there} cannot be written to: permission denied")
+
+
+def can_be_written(out: Path, names: Iterable[str], *, overwrite: bool) -> None:
+    """Refuse a folder that cannot be written to, or that has a result, before the computation."""
+    can_be_folder(out)
+    for path in [] if overwrite else [out / name for name in names]:
+        if path.exists():
+            raise ParameterError(f"{path} exists: expected --overwrite, or another --out")
 
 
 def list_files(written: Iterable[Path]) -> None:

@@ -68,7 +68,7 @@ def demo_logs() -> tuple[Dataset, Dataset]:
     return log, other
 
 
-def run_demo(seed: int = 1) -> Demonstration:
+def run_demo(seed: int = 1, *, progress: bool | None = None) -> Demonstration:
     """Identify a model from one log, score it on the other, and track a reference.
 
     The stage that is controlled is not the controller's model: it is identified from the other log,
@@ -78,6 +78,8 @@ def run_demo(seed: int = 1) -> Demonstration:
     ----------
     seed : int, optional
         Seed of the search.
+    progress : bool, optional
+        As in `identify`.
 
     Returns
     -------
@@ -85,7 +87,7 @@ def run_demo(seed: int = 1) -> Demonstration:
         The model, its score, and the runs.
     """
     log, other = demo_logs()
-    fit = identify(log[slice(*WINDOW)], seed=seed)
+    fit = identify(log[slice(*WINDOW)], seed=seed, progress=progress)
     later = other[WINDOW[0] :]
     plant = identify(later, "prandtl-ishlinskii")
     low, high = fit.drive_range or (0.0, 0.0)
