@@ -15,9 +15,8 @@ from .._support.statistics import FIGURES, ErrorStatistics
 from ..errors import ParameterError
 from ..references.reference import Reference, SampledReference
 from ..stages.inverse import PlayedVoltage
-from ..stages.virtual import VirtualStage
 from .controller import Controller
-from .plant import reach, run_closed_loop, settled_bottom, unwrap
+from .plant import plant_of, reach, run_closed_loop, settled_bottom
 from .stability import check_loop
 
 if TYPE_CHECKING:
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..identification.identified import IdentifiedModel
+    from ..stages.virtual import VirtualStage
     from .plant import Plant
 
     Array = NDArray[np.float64]
@@ -265,8 +265,8 @@ def track(
     ----------
     stage : Stage, VirtualStage or IdentifiedModel
         The plant: any stage of ``pt.stages``, a `VirtualStage` or an `IdentifiedModel`. A stage
-        model has no noise and no amplifier, and starts at rest; offset and delay of an
-        `IdentifiedModel` are included in the displacement.
+        model has no noise and no amplifier (``VirtualStage.of`` gives it both), and starts at rest;
+        offset and delay of an `IdentifiedModel` are included in the displacement.
     controller : Controller
         The controller.
     reference : Reference
@@ -280,9 +280,10 @@ def track(
     substeps : int, optional
         Instants kept in each sampling interval, for plots; up to 100000.
     visited : float or sequence of float, optional
-        Voltages that a stage model visits slowly before the run, in turn [V]: it begins in
-        equilibrium at the last, with the memory of the others, as ``(75.0, 0.0)``. By default it
-        never moved before. A `VirtualStage` has its own preconditioning.
+        Voltages that the stage visits slowly before the run, in turn [V]: it begins in equilibrium
+        at the last, with the memory of the others, as ``(75.0, 0.0)``. By default it never moved
+        before; where 0 V is not between the limits, it begins at the limit nearest to 0 V. Not with
+        a virtual stage that is preconditioned.
     beyond_reach : bool, optional
         Whether the reference may exceed the reach of the stage within the voltage limits, as to
         study saturation.
@@ -311,31 +312,41 @@ def track(
     >>> print(f"{run.metrics.phase_lag:.2f} rad")
     0.06 rad
     """
-    plant, offset, plant_delay = unwrap(stage)
+    plant = plant_of(stage)
     for name, value, kind in (
         ("controller", controller, Controller),
         ("reference", reference, Reference),
     ):
         if not isinstance(value, kind):
             raise ParameterError(f"{name} is {type(value).__name__}: expected pt.{kind.__name__}")
-    # A delayed displacement and a delayed voltage have the same effect.
-    delay = not_negative("delay", delay, "s") + plant_delay
+    delay = not_negative("delay", delay, "s")
     substeps = _core.as_count("substeps", substeps)
     samples = reference.sample(controller.dt)
     check_period(controller, reference)
     if not _core.as_truth("unstable", unstable):
         check_stable(plant, controller, delay)
     if not _core.as_truth("beyond_reach", beyond_reach):
-        check_within_reach(plant, controller, samples, offset)
+        check_within_reach(plant, controller, samples)
     voltage, note = feedforward_of(controller, reference, samples)
     sampling = (delay, not_negative("jitter", jitter, "s"), substeps)
+    before = _visited(plant, visited, controller.limits)
+    run = run_closed_loop(plant, controller, samples.x, voltage, sampling, before)
+    return collected(run, controller, reference, samples, note, substeps)
+
+
+def _visited(
+    plant: VirtualStage, visited: float | Sequence[float], limits: tuple[float, float]
+) -> tuple[float, ...]:
+    """Voltages before a run [V]: those given, or the limit nearest to 0 V where 0 V is outside."""
     before = one_or_more_numbers("visited", visited)
-    if before and isinstance(plant, VirtualStage):
-        raise ParameterError(
-            f"visited is {before}: expected none, a virtual stage has its preconditioning"
-        )
-    run = run_closed_loop(plant, controller, samples.x - offset, voltage, sampling, before)
-    return collected(run, controller, reference, samples, note, substeps, offset)
+    if plant.preconditioning is not None:
+        if before:
+            raise ParameterError(
+                f"visited is {before}: expected none, this virtual stage has its preconditioning"
+            )
+        return ()
+    low, high = limits
+    return before or (() if low <= 0.0 <= high else (low if low > 0.0 else high,))
 
 
 def feedforward_of(
@@ -356,17 +367,15 @@ def collected(
     samples: SampledReference,
     note: str,
     substeps: int,
-    offset: float = 0.0,
 ) -> Tracking:
-    """Collect the results of one axis, whose sensor has an `offset` [m]."""
+    """Collect the results of one axis."""
     fine_t, fine_displacement, fine_voltage = run.motion()
-    fine_displacement = fine_displacement + offset
     return Tracking(
         reference=reference,
         controller=controller,
         t=samples.t,
         desired=samples.x,
-        measured=run.measured + offset,
+        measured=run.measured,
         displacement=fine_displacement[::substeps],
         loop_error=run.part("error"),
         voltage=run.part("volts"),
@@ -398,7 +407,7 @@ def check_period(controller: Controller, reference: Reference) -> None:
         )
 
 
-def check_stable(stage: Plant, controller: Controller, delay: float) -> None:
+def check_stable(stage: VirtualStage, controller: Controller, delay: float) -> None:
     """Refuse a loop that is unstable at the middle gain of the stage."""
     if controller.feedback is None and controller.repetitive is None:
         return
@@ -421,14 +430,13 @@ def check_stable(stage: Plant, controller: Controller, delay: float) -> None:
 
 
 def check_within_reach(
-    stage: Plant,
+    stage: VirtualStage,
     controller: Controller,
     samples: SampledReference,
-    offset: float,
 ) -> None:
     """Refuse a reference that exceeds the reach of the stage between the limits."""
     low, high = controller.limits
-    bottom, top = (end + offset for end in reach(stage, (low, high), 1e-3))
+    bottom, top = reach(stage, (low, high), 1e-3)
     slack = 0.01 * (top - bottom)
     for value, past, edge in (
         (samples.x.max(), samples.x.max() - top, top),
@@ -444,7 +452,7 @@ def check_within_reach(
     # The loop stays above the curve from rest: once up, the stage no longer comes all the way down.
     k = int(np.argmax(samples.x))
     k += int(np.argmin(samples.x[k:]))
-    lowest = settled_bottom(stage, (low, high), float(samples.x.max()) - offset, 1e-3) + offset
+    lowest = settled_bottom(stage, (low, high), float(samples.x.max()), 1e-3)
     if (past := lowest - samples.x[k]) > slack:
         raise ParameterError(
             f"reference is {1e6 * samples.x[k]:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} "

@@ -3,11 +3,12 @@
 use numpy::PyArray1;
 use piezotrack_core::Error;
 use piezotrack_core::identify::{cross_talk, noise_at_rest};
+use piezotrack_core::models::{Stage, StageState};
 use piezotrack_core::signal::Drive;
 use piezotrack_core::signal::contour_error::{Polyline, radial_errors};
 use piezotrack_core::signal::metrics::Spread;
 use piezotrack_core::simulate::{
-    Axis, AxisState, MissedTicks, TwoAxes, TwoStates, open_loops, track_both,
+    MissedTicks, TwoAxes, TwoStates, VirtualStage, open_loops, track_both,
 };
 use pyo3::prelude::*;
 
@@ -15,7 +16,7 @@ use crate::arrays::{array, samples};
 use crate::control::PyController;
 use crate::enter::enter;
 use crate::errors::raise;
-use crate::stage::{PyStage, hold};
+use crate::stage::hold;
 use crate::tracking::{Arrays, PyTrackingRun, Sampling, stopped, timing};
 use crate::virtual_stage::{OpenLoopArrays, PyVirtualStage, open_loop_arrays};
 
@@ -28,26 +29,10 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(sensor_noise, module)?)
 }
 
-/// An axis as Python gives it: a virtual stage, or a model's stage and its longest step, s.
-#[derive(FromPyObject)]
-enum Given<'py> {
-    Virtual(PyRef<'py, PyVirtualStage>),
-    Model(PyRef<'py, PyStage>, f64),
-}
-
-impl Given<'_> {
-    fn axis(&self) -> Axis {
-        match self {
-            Self::Virtual(stage) => Axis::Virtual(stage.0),
-            Self::Model(stage, step) => stage.axis(*step),
-        }
-    }
-}
-
 /// Two axes on one platform.
 #[pyclass(name = "XYStage", frozen, module = "piezotrack._core")]
 struct PyXyStage {
-    axes: [Axis; 2],
+    axes: [VirtualStage; 2],
     cross_talk: [f64; 2],
     lag: f64,
     missed: MissedTicks,
@@ -55,7 +40,7 @@ struct PyXyStage {
 
 impl PyXyStage {
     /// The axes between their amplifiers and sensors, and where an experiment starts.
-    fn both(&self) -> (TwoAxes<'_, Axis, Axis>, TwoStates<AxisState, AxisState>) {
+    fn both(&self) -> (TwoAxes<'_, Stage, Stage>, TwoStates<StageState, StageState>) {
         let [x, y] = &self.axes;
         let start = (x.start(), y.start());
         let (x, y) = (x.apparatus(), y.apparatus());
@@ -69,14 +54,14 @@ impl PyXyStage {
     #[new]
     #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn new(
-        x: Given<'_>,
-        y: Given<'_>,
+        x: PyRef<'_, PyVirtualStage>,
+        y: PyRef<'_, PyVirtualStage>,
         cross_talk: [f64; 2],
         lag: f64,
         missed: (f64, usize),
     ) -> PyResult<Self> {
         let missed = MissedTicks { chance: missed.0, most: missed.1 };
-        let stage = Self { axes: [x.axis(), y.axis()], cross_talk, lag, missed };
+        let stage = Self { axes: [x.0, y.0], cross_talk, lag, missed };
         stage.both().0.validate().map_err(|error| raise(&error))?;
         Ok(stage)
     }
