@@ -10,13 +10,16 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from commands import names, ran
+from commands import names, ran, run
 
 
 @pytest.fixture(scope="module")
 def printed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     folder = tmp_path_factory.mktemp("demonstration")
-    return folder, ran("demo", "--out", str(folder / "demo"))
+    done = run("demo", "--out", str(folder / "demo"))
+    assert done.exit_code == 0, done.output
+    # Its progress is on stderr.
+    return folder, str(done.stdout)
 
 
 def test_the_files_are_there_and_listed(printed: tuple[Path, str]) -> None:
