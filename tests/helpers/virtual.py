@@ -16,8 +16,8 @@ def changed(stage: pt.VirtualStage, **changes: Any) -> pt.VirtualStage:
     own = {one.name for one in fields(stage)}
     parts = {name: value for name, value in changes.items() if name in own}
     for name in PARTS:
-        part = parts.get(name, getattr(stage, name))
-        if not is_dataclass(part):
+        part: Any = parts.get(name, getattr(stage, name))
+        if not is_dataclass(part) or isinstance(part, type):
             continue
         names = {one.name for one in fields(part)} - own
         inside = {key: value for key, value in changes.items() if key in names}

@@ -331,7 +331,7 @@ fn a_run_stops_when_asked() {
     let stage = VirtualStage::xu_li_2010(1);
     let run =
         closed_loop(&stage.apparatus(), stage.start(), &timing(9, 0.0, 1), |_, _| 0.0, &|| true);
-    assert_eq!(run.unwrap(), None);
+    assert!(run.unwrap().is_none());
 }
 
 #[test]

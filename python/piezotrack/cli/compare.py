@@ -20,6 +20,7 @@ from .options import (
     Out,
     Overwrite,
     Quiet,
+    Resample,
     TimeColumn,
     Units,
     of_file,
@@ -63,6 +64,7 @@ def compare_command(
     displacement: DisplacementColumn = None,
     unit: Units = None,
     dt: Interval = None,
+    resample: Resample = None,
     hold: HoldOption = "foh",
     seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
     runs: Annotated[int, typer.Option(help="Number of independent restarts.")] = 4,
@@ -84,12 +86,12 @@ def compare_command(
 
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     columns = Columns(time, drive, displacement, unit, dt)
-    log = columns.read(file, hold)
+    log = columns.read(file, hold, resample)
     fitted = None if train is None else seconds("--train", train)
     judged = None if test is None else seconds("--test", test)
     second = None
     if test_log is not None:
-        second = windowed(columns.read(test_log, hold), test_log, "--test", test)
+        second = windowed(columns.read(test_log, hold, resample), test_log, "--test", test)
     # A model file that is given is written as it is.
     given = {Path(name).resolve() for name in model or []}
     names = comparison_files(model or None, log.drive_unit)

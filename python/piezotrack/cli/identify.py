@@ -39,6 +39,7 @@ from .options import (
     Out,
     Overwrite,
     Quiet,
+    Resample,
     Seconds,
     TimeColumn,
     Units,
@@ -73,6 +74,7 @@ def identify_command(
     displacement: DisplacementColumn = None,
     unit: Units = None,
     dt: Interval = None,
+    resample: Resample = None,
     hold: HoldOption = "foh",
     free: Free = None,
     fix: Fix = None,
@@ -123,10 +125,10 @@ def identify_command(
     columns = Columns(time, drive, displacement, unit, dt)
     if validate is None and validate_window is not None:
         raise ParameterError("--validate-window is given without --validate")
-    log = windowed(columns.read(file, hold), file, "--window", window)
+    log = windowed(columns.read(file, hold, resample), file, "--window", window)
     second = None
     if validate is not None:
-        whole = columns.read(validate, hold)
+        whole = columns.read(validate, hold, resample)
         second = windowed(whole, validate, "--validate-window", validate_window)
     result.will_write(_files(kinds, log, given, validated=second is not None))
     words: list[str] = []

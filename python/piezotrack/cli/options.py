@@ -33,6 +33,7 @@ __all__ = [
     "Overwrite",
     "Period",
     "Quiet",
+    "Resample",
     "Seconds",
     "TimeColumn",
     "Units",
@@ -51,21 +52,38 @@ __all__ = [
 
 Seconds = Annotated[
     str | None,
-    typer.Option(metavar="A:B", help="Seconds to use; the drive before A is warm-up."),
+    typer.Option(
+        metavar="A:B",
+        help="Seconds to use, default all; the drive before A is simulated as warm-up.",
+    ),
 ]
-TimeColumn = Annotated[str | None, typer.Option(help="Column of the time.")]
-DriveColumn = Annotated[str | None, typer.Option(help="Column of the drive voltage.")]
-DisplacementColumn = Annotated[str | None, typer.Option(help="Column of the displacement.")]
+TimeColumn = Annotated[
+    str | None, typer.Option(metavar="COLUMN", help="Column of the time; default by its title.")
+]
+DriveColumn = Annotated[
+    str | None, typer.Option(metavar="COLUMN", help="Column of the drive; default by its title.")
+]
+DisplacementColumn = Annotated[
+    str | None,
+    typer.Option(metavar="COLUMN", help="Column of the displacement; default by its title."),
+]
 Units = Annotated[
     list[str] | None,
     typer.Option(
         "--unit",
         metavar="NAME=UNIT",
-        help="Unit of a column, or of time, drive, displacement. Repeatable.",
+        help="Unit of a column, or of time, drive, displacement; default as in its title. "
+        "Repeatable.",
     ),
 ]
 Interval = Annotated[
-    float | None, typer.Option(help="Sampling interval in s, in place of a time column.")
+    float | None, typer.Option(help="Sampling interval in s; default from the column of the time.")
+]
+Resample = Annotated[
+    float | None,
+    typer.Option(
+        help="Put a log with gaps or jitter on even times, at this interval in s; default not."
+    ),
 ]
 HoldOption = Annotated[
     Literal["foh", "zoh"],
@@ -73,9 +91,12 @@ HoldOption = Annotated[
 ]
 ControlInterval = Annotated[float, typer.Option(help="Sampling interval of the controller in s.")]
 Jitter = Annotated[float, typer.Option(help="Mean sampling jitter in s (truncated exponential).")]
-Duration = Annotated[float | None, typer.Option(help="Length of the reference in s.")]
+Duration = Annotated[
+    float | None, typer.Option(help="Length of the reference in s; default as the reference says.")
+]
 Period = Annotated[
-    float | None, typer.Option(help="Time in s after which a reference from a file repeats.")
+    float | None,
+    typer.Option(help="Time in s after which a reference from a file repeats; default never."),
 ]
 Out = Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the results.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace results that exist.")]
@@ -102,7 +123,7 @@ class Columns:
         self.units = {column(name) or name: text for name, text in pairs("--unit", unit)}
         self.dt = dt
 
-    def read(self, file: Path, hold: Hold) -> Dataset:
+    def read(self, file: Path, hold: Hold, resample: float | None = None) -> Dataset:
         """Read a log with these columns."""
         from ..data.reader import read
 
@@ -113,6 +134,7 @@ class Columns:
             displacement=self.displacement,
             units=self.units,
             dt=self.dt,
+            resample=resample,
             hold=hold,
         )
 

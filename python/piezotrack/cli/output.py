@@ -6,6 +6,7 @@ import json as json_text
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ParameterError
+from .advice import as_options
 from .options import can_be_written, list_files
 
 if TYPE_CHECKING:
@@ -78,5 +79,5 @@ class Output:
             whole = json_ready({**document, "written": [str(path) for path in files]})
             print(json_text.dumps(whole, indent=2, allow_nan=False))
         elif not self._quiet:
-            print(words)
+            print(as_options(words))
             list_files(files)

@@ -20,6 +20,7 @@ from .options import (
     Out,
     Overwrite,
     Quiet,
+    Resample,
     TimeColumn,
     Units,
     number,
@@ -48,6 +49,7 @@ def step_command(
     displacement: DisplacementColumn = None,
     unit: Units = None,
     dt: Interval = None,
+    resample: Resample = None,
     hold: HoldOption = "zoh",
     stiffness: Annotated[
         float | None, typer.Option(help="Stiffness in N/m; default unknown.")
@@ -76,7 +78,7 @@ def step_command(
     )
     from ..identification.step_response import identify_step
 
-    log = Columns(time, drive, displacement, unit, dt).read(file, hold)
+    log = Columns(time, drive, displacement, unit, dt).read(file, hold, resample)
     log = windowed(log, file, "--window", window)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write(["step.json", *picture_files("step")])

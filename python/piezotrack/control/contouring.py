@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from .. import _core
 from .._support.arguments import not_negative
+from .._support.frames import frame_of
 from .._support.statistics import ErrorStatistics
 from ..errors import ParameterError
 from ..references.xy_reference import XYReference, square_matrix
 from ..stages.xy import XYStage
-from .controller import Controller
+from .controller import Controller, number_pair
+from .plant import reach
 from .tracking import (
     Tracking,
     check_period,
@@ -32,7 +34,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Contour", "contour"]
+__all__ = ["Contour", "Workspace", "contour", "workspace"]
 
 # Distance of the path's start from the stage that is noted, as a part of the path's size.
 JUMP = 0.05
@@ -115,6 +117,33 @@ class Contour:
         t, errors = (self.x.fine_t, self.fine_error) if true else (self.t, self.error)
         first = self.settled if start is None else start
         return ErrorStatistics.of(_core.spread(errors[self.x.part(t, first, stop)]))
+
+    @property
+    def table(self) -> dict[str, Array]:
+        """Columns of the run at the control samples, with their units in the names."""
+        table = {"time_s": self.t}
+        for name, axis in (("x", self.x), ("y", self.y)):
+            table |= {
+                f"desired_{name}_um": 1e6 * axis.desired,
+                f"measured_{name}_um": 1e6 * axis.measured,
+                f"voltage_{name}_V": axis.voltage,
+            }
+        return table | {"contour_error_um": 1e6 * self.error}
+
+    def to_frame(self) -> Any:
+        """Return the run as a data frame of pandas.
+
+        Returns
+        -------
+        pandas.DataFrame
+            With the columns of `table`.
+
+        Raises
+        ------
+        ParameterError
+            pandas is not installed.
+        """
+        return frame_of(self.table)
 
     def plot(self) -> Figure:
         """Plot path and positions, the error magnified along the path, and the errors over time.
@@ -271,6 +300,63 @@ def contour(
         )
     )
     return Contour(path=path, x=x, y=y)
+
+
+class Workspace(NamedTuple):
+    """What an XY stage reaches.
+
+    Attributes
+    ----------
+    x, y : (float, float)
+        Lowest and highest displacement along each axis [m].
+    """
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        """The middle [m], for the `centre` of a path."""
+        return 0.5 * sum(self.x), 0.5 * sum(self.y)
+
+
+def workspace(stage: XYStage, limits: tuple[float, float] | Sequence[Controller]) -> Workspace:
+    """Find what an XY stage reaches between voltage limits.
+
+    Parameters
+    ----------
+    stage : XYStage
+        The stage.
+    limits : (float, float) or (Controller, Controller)
+        Lowest and highest voltage of both axes [V], or their controllers.
+
+    Returns
+    -------
+    Workspace
+        Without cross-talk.
+
+    Raises
+    ------
+    ParameterError
+        `stage` is no XY stage, or `limits` are none.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> stage = pt.XYStage(x=pt.DahlStage.xu_li_2010(), y=pt.DahlStage.xu_li_2010())
+    >>> middle = pt.control.workspace(stage, (0.0, 75.0)).centre
+    >>> print(f"{1e6 * middle[0]:.0f} um")
+    60 um
+    """
+    if not isinstance(stage, XYStage):
+        raise ParameterError(f"stage is {type(stage).__name__}: expected pt.XYStage")
+    given = list(limits)
+    if given and isinstance(given[0], Controller):
+        pairs = [one.limits for one in _two(given)]  # type: ignore[arg-type]
+    else:
+        pairs = 2 * [number_pair("limits", limits, "V")]
+    x, y = (reach(one, pair, 1e-3) for one, pair in zip((stage.x, stage.y), pairs, strict=True))
+    return Workspace(x, y)
 
 
 def _two(controllers: Sequence[Controller]) -> tuple[Controller, Controller]:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import _core
 from .._support.arguments import not_negative, one_or_more_numbers
+from .._support.frames import frame_of
 from .._support.statistics import FIGURES, ErrorStatistics
 from ..errors import ParameterError
 from ..references.reference import Reference, SampledReference
@@ -201,6 +202,34 @@ class Tracking:
             return []
         found = _core.period_metrics(self.desired, self.measured, dt, period)
         return [_metrics(figures) for figures in found]
+
+    @property
+    def table(self) -> dict[str, Array]:
+        """Columns of the run at the control samples, with their units in the names."""
+        return {
+            "time_s": self.t,
+            "desired_um": 1e6 * self.desired,
+            "measured_um": 1e6 * self.measured,
+            "voltage_V": self.voltage,
+            "feedforward_V": self.feedforward,
+            "feedback_V": self.feedback,
+            "repetitive_V": self.repetitive,
+        }
+
+    def to_frame(self) -> Any:
+        """Return the run as a data frame of pandas.
+
+        Returns
+        -------
+        pandas.DataFrame
+            With the columns of `table`.
+
+        Raises
+        ------
+        ParameterError
+            pandas is not installed.
+        """
+        return frame_of(self.table)
 
     def plot(self) -> Figure:
         """Desired and actual motion, error, actual against desired, and the parts of the voltage.
@@ -446,8 +475,8 @@ def check_within_reach(
             k = int(np.flatnonzero(samples.x == value)[0])
             raise ParameterError(
                 f"reference is {1e6 * value:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} um "
-                f"beyond {1e6 * edge:.4g} um: expected what the stage reaches from {low:g} to "
-                f"{high:g} V, or beyond_reach=True"
+                f"beyond {1e6 * edge:.4g} um: expected {1e6 * bottom:.4g} to {1e6 * top:.4g} um, "
+                f"which this stage reaches from {low:g} to {high:g} V, or beyond_reach=True"
             )
     # The loop stays above the curve from rest: once up, the stage no longer comes all the way down.
     k = int(np.argmax(samples.x))
