@@ -19,7 +19,7 @@ SOURCES := $(shell find rust python/piezotrack -name '*.rs' -o -name '*.py' -o -
 help: ## What can be typed
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/'
 
-demo: $(VENV)/installed ## Build, then the way from a log to a model on a built-in stage
+demo: $(VENV)/installed ## Build, then from a measured log to a model, its test and a tracked reference
 	$(BIN)/piezotrack demo --out demo --overwrite
 
 reproduce: $(VENV)/installed ## Every figure and table of the paper, published beside obtained

@@ -10,6 +10,7 @@ from ..data.dataset import Dataset
 from ..identification.fit import identify
 from ..references.waveforms import triangle
 from ..stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
+from ..stages.virtual import VirtualStage
 from .components import Pid
 from .controller import Controller
 from .tracking import Tracking, track
@@ -25,6 +26,8 @@ __all__ = ["FEEDBACK", "REFERENCE", "WINDOW", "Demonstration", "demo_logs", "run
 WINDOW = (3.0, 23.0)
 # As a text for `--reference`.
 REFERENCE = "triangle:1Hz,5..42um"
+# Of the sensor, from the parts of the other log in which the stage is at rest [m].
+NOISE = 65e-9
 FEEDBACK = Pid.from_um(kp=0.03, ti=0.02, td=0.0)
 
 
@@ -72,12 +75,13 @@ def run_demo(seed: int = 1, *, progress: bool | None = None) -> Demonstration:
     """Identify a model from one log, score it on the other, and track a reference.
 
     The stage that is controlled is not the controller's model: it is identified from the other log,
-    so that the feedforward is off by about as much as on the real stage.
+    so that the feedforward is off by about as much as on the real stage, and has the noise of the
+    measured sensor.
 
     Parameters
     ----------
     seed : int, optional
-        Seed of the search.
+        Seed of the search and of the noise.
     progress : bool, optional
         As in `identify`.
 
@@ -89,23 +93,19 @@ def run_demo(seed: int = 1, *, progress: bool | None = None) -> Demonstration:
     log, other = demo_logs()
     fit = identify(log[slice(*WINDOW)], seed=seed, progress=progress)
     later = other[WINDOW[0] :]
-    plant = identify(later, "prandtl-ishlinskii")
+    plant = VirtualStage.of(identify(later, "prandtl-ishlinskii"), noise=NOISE, seed=seed)
+    reference = triangle(frequency=1.0, low=5e-6, high=42e-6, duration=4.0)
+    loops = {
+        "without compensation": Controller.of(fit, feedforward=_straight_line(fit)),
+        "inverse": Controller.of(fit),
+        "inverse and PID": Controller.of(fit, feedback=FEEDBACK),
+    }
+    runs = {name: track(plant, loop, reference) for name, loop in loops.items()}
+    return Demonstration(log=log, other=later, fit=fit, score=fit.score(later), runs=runs)
+
+
+def _straight_line(fit: Identification) -> Inverse:
+    """Make a feedforward of constant gain, stroke over range of the drive."""
     low, high = fit.drive_range or (0.0, 0.0)
     gain = fit.data.stroke / (high - low)
-    line = PrandtlIshlinskiiStage(linear=gain, thresholds=(high - low,), weights=(0.0,)).inverse()
-    reference = triangle(frequency=1.0, low=5e-6, high=42e-6, duration=4.0)
-    parts: dict[str, tuple[Inverse, Pid | None]] = {
-        "without compensation": (line, None),
-        "inverse": (fit.inverse(), None),
-        "inverse and PID": (fit.inverse(), FEEDBACK),
-    }
-    runs = {
-        name: track(
-            plant,
-            Controller(dt=log.dt, limits=(low, high), feedforward=feedforward, feedback=feedback),
-            reference,
-            visited=(high, low),
-        )
-        for name, (feedforward, feedback) in parts.items()
-    }
-    return Demonstration(log=log, other=later, fit=fit, score=fit.score(later), runs=runs)
+    return PrandtlIshlinskiiStage(linear=gain, thresholds=(high - low,), weights=(0.0,)).inverse()
