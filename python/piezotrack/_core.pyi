@@ -315,6 +315,7 @@ class XYStage:
         references: tuple[ArrayLike, ArrayLike],
         feedforwards: tuple[ArrayLike, ArrayLike],
         sampling: _Pace,
+        visited: tuple[Sequence[float], Sequence[float]],
     ) -> tuple[TrackingRun, TrackingRun]: ...
 
 def circle_errors(

@@ -16,7 +16,7 @@ from ..errors import ParameterError
 from ..references.xy_reference import XYReference, square_matrix
 from ..stages.xy import XYStage
 from .controller import Controller, number_pair
-from .plant import reach
+from .plant import reach, resting
 from .tracking import (
     Tracking,
     check_period,
@@ -24,6 +24,7 @@ from .tracking import (
     check_within_reach,
     collected,
     feedforward_of,
+    voltages_before,
 )
 
 if TYPE_CHECKING:
@@ -207,6 +208,7 @@ def contour(
     delay: float = 0.0,
     jitter: float = 0.0,
     substeps: int = 10,
+    visited: Sequence[float] = (),
     beyond_reach: bool = False,
     unstable: bool = False,
 ) -> Contour:
@@ -234,6 +236,8 @@ def contour(
         two models, whose sensors have no seed.
     substeps : int, optional
         Instants kept in each sampling interval.
+    visited : sequence of float, optional
+        Voltages that both stages visit slowly before the run, as for `track`.
     beyond_reach, unstable : bool, optional
         As for `track`.
 
@@ -271,9 +275,10 @@ def contour(
     delay = not_negative("delay", delay, "s")
     jitter = not_negative("jitter", jitter, "s")
     substeps = _core.as_count("substeps", substeps)
-    forward = path if decoupling is None else path.transformed(_inverse(decoupling))
+    offsets = stage.x.sensor.offset, stage.y.sensor.offset
+    forward = path if decoupling is None else path.transformed(_inverse(decoupling), offsets)
     free = (_core.as_truth("unstable", unstable), _core.as_truth("beyond_reach", beyond_reach))
-    samples, voltages = [], []
+    samples, voltages, before = [], [], []
     parts = zip("xy", (stage.x, stage.y), both, path.axes, forward.axes, strict=True)
     for name, axis, controller, reference, ahead in parts:
         samples.append(reference.sample(controller.dt))
@@ -287,11 +292,13 @@ def contour(
             raise ParameterError(f"{name}: {error}") from None
         along = samples[-1] if ahead is reference else ahead.sample(controller.dt)
         voltages.append(feedforward_of(controller, ahead, along))
+        before.append(voltages_before(axis, visited, controller.limits))
     runs = stage._core.track(
         (both[0]._core, both[1]._core),
         (samples[0].x, samples[1].x),
         (voltages[0][0], voltages[1][0]),
         (delay, jitter, substeps),
+        (before[0], before[1]),
     )
     x, y = (
         collected(run, controller, reference, sampled, note, substeps)
@@ -309,10 +316,13 @@ class Workspace(NamedTuple):
     ----------
     x, y : (float, float)
         Lowest and highest displacement along each axis [m].
+    rest : (float, float)
+        Position in which a run begins [m], for the `origin` of a path.
     """
 
     x: tuple[float, float]
     y: tuple[float, float]
+    rest: tuple[float, float]
 
     @property
     def centre(self) -> tuple[float, float]:
@@ -320,15 +330,17 @@ class Workspace(NamedTuple):
         return 0.5 * sum(self.x), 0.5 * sum(self.y)
 
 
-def workspace(stage: XYStage, limits: tuple[float, float] | Sequence[Controller]) -> Workspace:
+def workspace(
+    stage: XYStage, limits: tuple[float, float] | Sequence[tuple[float, float]]
+) -> Workspace:
     """Find what an XY stage reaches between voltage limits.
 
     Parameters
     ----------
     stage : XYStage
         The stage.
-    limits : (float, float) or (Controller, Controller)
-        Lowest and highest voltage of both axes [V], or their controllers.
+    limits : (float, float) or two of them
+        Lowest and highest voltage of both axes [V], or of x and of y.
 
     Returns
     -------
@@ -350,13 +362,12 @@ def workspace(stage: XYStage, limits: tuple[float, float] | Sequence[Controller]
     """
     if not isinstance(stage, XYStage):
         raise ParameterError(f"stage is {type(stage).__name__}: expected pt.XYStage")
-    given = list(limits)
-    if given and isinstance(given[0], Controller):
-        pairs = [one.limits for one in _two(given)]  # type: ignore[arg-type]
-    else:
-        pairs = 2 * [number_pair("limits", limits, "V")]
-    x, y = (reach(one, pair, 1e-3) for one, pair in zip((stage.x, stage.y), pairs, strict=True))
-    return Workspace(x, y)
+    alone = np.ndim(limits[0]) == 0
+    pairs = [number_pair("limits", one, "V") for one in ([limits] * 2 if alone else limits)]
+    axes = list(zip((stage.x, stage.y), pairs, strict=True))
+    x, y = (reach(one, pair, 1e-3) for one, pair in axes)
+    at_x, at_y = (resting(one, voltages_before(one, (), pair)) for one, pair in axes)
+    return Workspace(x, y, (at_x, at_y))
 
 
 def _two(controllers: Sequence[Controller]) -> tuple[Controller, Controller]:

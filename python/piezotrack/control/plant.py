@@ -21,7 +21,15 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Plant", "linearised_plants", "plant_of", "reach", "run_closed_loop", "settled_bottom"]
+__all__ = [
+    "Plant",
+    "linearised_plants",
+    "plant_of",
+    "reach",
+    "resting",
+    "run_closed_loop",
+    "settled_bottom",
+]
 
 # A linearised stage is pickled as its matrices.
 copyreg.pickle(_core.LoopPlant, lambda one: (_core.LoopPlant.from_matrices, one.matrices()))
@@ -84,6 +92,12 @@ def reach(
     t, _, x = _slow_cycle(stage, low, high, dt)
     x = x[t >= 1.0]
     return float(x.min()), float(x.max())
+
+
+def resting(stage: VirtualStage, visited: tuple[float, ...]) -> float:
+    """Return the displacement [m] in which a run begins, after slow visits to voltages [V]."""
+    moved = float(stage.stage.equilibrium(visited).x) if visited else 0.0
+    return moved + stage.sensor.offset
 
 
 def settled_bottom(

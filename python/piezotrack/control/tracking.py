@@ -16,6 +16,7 @@ from .._support.statistics import FIGURES, ErrorStatistics
 from ..errors import ParameterError
 from ..references.reference import Reference, SampledReference
 from ..stages.inverse import PlayedVoltage
+from .components import Pid
 from .controller import Controller
 from .plant import plant_of, reach, run_closed_loop, settled_bottom
 from .stability import check_loop
@@ -358,12 +359,12 @@ def track(
         check_within_reach(plant, controller, samples)
     voltage, note = feedforward_of(controller, reference, samples)
     sampling = (delay, not_negative("jitter", jitter, "s"), substeps)
-    before = _visited(plant, visited, controller.limits)
+    before = voltages_before(plant, visited, controller.limits)
     run = run_closed_loop(plant, controller, samples.x, voltage, sampling, before)
     return collected(run, controller, reference, samples, note, substeps)
 
 
-def _visited(
+def voltages_before(
     plant: VirtualStage, visited: float | Sequence[float], limits: tuple[float, float]
 ) -> tuple[float, ...]:
     """Voltages before a run [V]: those given, or the limit nearest to 0 V where 0 V is outside."""
@@ -445,13 +446,18 @@ def check_stable(stage: VirtualStage, controller: Controller, delay: float) -> N
         return
     one = report.middle
     found = f"the loop is unstable on this stage, {1e6 * one.gain:.3g} um/V"
-    if one.slowest_root is not None:
-        found += f": its largest root is {one.slowest_root:.5g}"
+    law = controller.feedback
     without = one.gain_margin is not None and one.gain_margin < 1.0
     if without and one.stable_gains is not None and one.stable_gains[1] < 1.0:
-        found += f", and {one.stable_gains[1]:.3g} times the gain would be at the limit"
+        low, share = one.stable_gains
+        if isinstance(law, Pid):
+            gains = f"{1e-6 * share * law.kp:.3g} V/um in place of {1e-6 * law.kp:.3g}"
+            found += f"; at the limit kp would be {gains}"
+            found += ", and half of that has a gain margin of 2" if low < 0.5 * share else ""
+        else:
+            found += f"; at the limit the gain would be {share:.3g} times as large"
     elif without:
-        found += f", and {one.gain_margin:.3g} times the gain would be at that of the feedback"
+        found += f"; at the limit the feedback's gain would be {one.gain_margin:.3g} times as large"
     elif controller.repetitive is not None:
         found += "; without the repetitive part it is stable, so lower kq or take another filter"
     hint = f" ({one.hint})" if one.hint else ""

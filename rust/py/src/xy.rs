@@ -29,6 +29,9 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(sensor_noise, module)?)
 }
 
+/// No visits to voltages before an experiment.
+const NOWHERE: [&[f64]; 2] = [&[], &[]];
+
 /// Two axes on one platform.
 #[pyclass(name = "XYStage", frozen, module = "piezotrack._core")]
 struct PyXyStage {
@@ -39,10 +42,11 @@ struct PyXyStage {
 }
 
 impl PyXyStage {
-    /// The axes between their amplifiers and sensors, and where an experiment starts.
-    fn both(&self) -> (TwoAxes<'_, Stage, Stage>, TwoStates<StageState, StageState>) {
+    /// The axes between their amplifiers and sensors, and where an experiment starts, after visits
+    /// to voltages if there are any.
+    fn both(&self, visited: [&[f64]; 2]) -> (TwoAxes<'_, Stage, Stage>, TwoStates<StageState, StageState>) {
         let [x, y] = &self.axes;
-        let start = (x.start(), y.start());
+        let start = (x.start_after(visited[0]), y.start_after(visited[1]));
         let (x, y) = (x.apparatus(), y.apparatus());
         let Self { cross_talk, lag, missed, .. } = *self;
         (TwoAxes { x, y, cross_talk, lag, missed }, start)
@@ -62,7 +66,7 @@ impl PyXyStage {
     ) -> PyResult<Self> {
         let missed = MissedTicks { chance: missed.0, most: missed.1 };
         let stage = Self { axes: [x.0, y.0], cross_talk, lag, missed };
-        stage.both().0.validate().map_err(|error| raise(&error))?;
+        stage.both(NOWHERE).0.validate().map_err(|error| raise(&error))?;
         Ok(stage)
     }
 
@@ -79,7 +83,7 @@ impl PyXyStage {
         let (x, y) = enter(py, |stop| {
             let hold = hold(hold_name)?;
             let drives = [&Drive::new(&ux, dt, hold)?, &Drive::new(&uy, dt, hold)?];
-            let (axes, start) = self.both();
+            let (axes, start) = self.both(NOWHERE);
             stopped(open_loops(&axes, start, drives, stop)?)
         })?;
         Ok([open_loop_arrays(py, &x)?, open_loop_arrays(py, &y)?])
@@ -94,6 +98,7 @@ impl PyXyStage {
         references: [Bound<'_, PyAny>; 2],
         feedforwards: [Bound<'_, PyAny>; 2],
         sampling: Sampling,
+        visited: [Vec<f64>; 2],
     ) -> PyResult<(PyTrackingRun, PyTrackingRun)> {
         let inputs = [
             Arrays::new(&references[0], &feedforwards[0])?,
@@ -101,7 +106,7 @@ impl PyXyStage {
         ];
         let [x, y] = [&*controllers[0], &*controllers[1]];
         enter(py, |stop| {
-            let (axes, start) = self.both();
+            let (axes, start) = self.both([&visited[0], &visited[1]]);
             let timing = timing(x, 0, sampling);
             let inputs = [inputs[0].input(), inputs[1].input()];
             let controllers = (&x.controller, &y.controller);
