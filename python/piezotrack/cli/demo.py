@@ -83,7 +83,7 @@ def _measured(result: Output, seed: int) -> None:
         *_runs({name: name for name in found.runs}, found.runs),
         "",
         "The same by hand, and more:",
-        *(f"  piezotrack {line}" for line in _commands(result.out, fit.drive_range or (0.0, 0.0))),
+        *(f"  piezotrack {line}" for line in _commands(result.out)),
     ]
     document = {
         "model": {**fit.document(), "notes": fit.notes},
@@ -94,18 +94,18 @@ def _measured(result: Output, seed: int) -> None:
     result.show("\n".join(words), document, written)
 
 
-def _commands(out: Path, limits: tuple[float, float]) -> list[str]:
+def _commands(out: Path) -> list[str]:
     """Return what to type next."""
-    from ..control.demo import REFERENCE, WINDOW
+    from ..control.demo import FEEDBACK, NOISE, REFERENCE, WINDOW
 
     log, other, model = (out / name for name in ("log.csv", "other.csv", "prandtl-ishlinskii.json"))
     window = "{:g}:{:g}".format(*WINDOW)
     return [
         f"identify {log} --window {window} --validate {other} --validate-window 3:",
         f"compare {log} --train {window}",
-        f"track {model} --stage model --reference {REFERENCE} \\\n"
-        f"      --dt 0.005 --limits {limits[0]:g}:{limits[1]:g} --kp 0.03 --ti 0.02 --td 0",
-        f"feedforward {model} {REFERENCE} --dt 0.005",
+        f"track {model} --reference {REFERENCE} \\\n"
+        f"      --kp {1e-6 * FEEDBACK.kp:g} --ti {FEEDBACK.ti:g} --noise-nm {1e9 * NOISE:g}",
+        f"feedforward {model} {REFERENCE}",
     ]
 
 

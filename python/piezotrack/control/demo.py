@@ -20,7 +20,15 @@ if TYPE_CHECKING:
     from ..identification.result import Identification
     from ..stages.inverse import Inverse
 
-__all__ = ["FEEDBACK", "REFERENCE", "WINDOW", "Demonstration", "demo_logs", "run_demo"]
+__all__ = [
+    "FEEDBACK",
+    "NOISE",
+    "REFERENCE",
+    "WINDOW",
+    "Demonstration",
+    "demo_logs",
+    "run_demo",
+]
 
 # Seconds of the log that the model is fitted to, and from which the other one is scored.
 WINDOW = (3.0, 23.0)
