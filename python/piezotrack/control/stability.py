@@ -14,7 +14,7 @@ from ..errors import ParameterError
 from .plant import linearised_plants, unwrap
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
     from ..identification.identified import IdentifiedModel
@@ -203,17 +203,22 @@ class LoopReport:
             learning=np.asarray(learning),
         )
 
-    def plot(self) -> Figure:
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Plot open loop, sensitivity and, with a repetitive part, the error left by a period.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
 
         Returns
         -------
         matplotlib.figure.Figure
-            Not yet shown or saved.
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
         """
         from .stability_plot import plot_loop_report
 
-        return plot_loop_report(self)
+        return plot_loop_report(self, fig)
 
 
 def check_loop(

@@ -23,7 +23,7 @@ from .stability import check_loop
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
     from ..identification.identified import IdentifiedModel
@@ -202,17 +202,22 @@ class Tracking:
         found = _core.period_metrics(self.desired, self.measured, dt, period)
         return [_metrics(figures) for figures in found]
 
-    def plot(self) -> Figure:
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Desired and actual motion, error, actual against desired, and the parts of the voltage.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
 
         Returns
         -------
         matplotlib.figure.Figure
-            Not yet shown or saved.
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
         """
         from .tracking_plot import plot_tracking
 
-        return plot_tracking(self)
+        return plot_tracking(self, fig)
 
     def summary(self) -> str:
         """Table of the run: all of it, and period by period.

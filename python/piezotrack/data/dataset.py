@@ -18,6 +18,7 @@ from ..errors import DataError, ParameterError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import ArrayLike, NDArray
 
     Array = NDArray[np.float64]
@@ -371,6 +372,31 @@ class Dataset:
         part._columns = {name: a[first:stop] for name, a in self._columns.items()}
         part._start, part._sha256 = start, None
         return part
+
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
+        """Drive and displacement over time, and the hysteresis loop.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
+
+        Examples
+        --------
+        >>> import piezotrack as pt
+        >>> from matplotlib.figure import Figure
+        >>> figure = pt.datasets.dbo_training()[3.0:23.0].plot(fig=Figure())
+        >>> [ax.get_ylabel() for ax in figure.axes]
+        ['drive [V]', 'displacement [um]', 'displacement [um]']
+        """
+        from .dataset_plot import plot_dataset
+
+        return plot_dataset(self, fig)
 
     def __repr__(self) -> str:
         unit, scale = best_length_unit(self.stroke)
