@@ -145,18 +145,17 @@ def test_numbers_on_an_axis_do_not_touch(name: str) -> None:
         assert all(a.x1 < b.x0 for a, b in pairwise(boxes))
 
 
-def test_a_notebook_shows_an_open_picture_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_notebook_shows_a_picture_once(monkeypatch: pytest.MonkeyPatch) -> None:
     figure: Any = fit().plot()
-    # Outside of a notebook the figure is shown as any other.
+    # Every figure is shown as matplotlib's are, and in a window it stays open.
     with pytest.raises(NotImplementedError):
         figure._ipython_display_()
-    # The inline backend shows all open figures at the end of a cell: this one is not shown again.
+    assert plt.get_fignums() == [figure.number]
+    # The inline backend shows what is open at the end of a cell: what was shown is not open.
     monkeypatch.setattr(mpl, "get_backend", lambda: "module://matplotlib_inline.backend_inline")
-    figure._ipython_display_()
-    # In a later cell it is closed, and shown where its name is the last line.
-    plt.close(figure)
     with pytest.raises(NotImplementedError):
         figure._ipython_display_()
+    assert plt.get_fignums() == []
 
 
 @pytest.mark.parametrize(

@@ -58,7 +58,8 @@ def plot_dataset(data: Dataset, fig: Figure | SubFigure | None = None) -> Figure
     loop.set(xlabel=in_volts, ylabel=in_metres)
     for ax, words in ((drive, "Drive"), (displacement, "Displacement"), (loop, "Hysteresis loop")):
         heading(ax, words)
-    displacement.margins(x=0.0)
+    for ax in (drive, displacement):
+        ax.margins(x=0.0)
     few_ticks(loop)
     figure.suptitle(
         f"{literal(data.source or 'Record')}: {data.duration:.6g} s at {1.0 / data.dt:.6g} Hz, "

@@ -100,6 +100,9 @@ def _loops(comparison: Comparison, loop: Axes, off: Axes) -> None:
     where = "" if comparison.carried else f" of {literal(data.source or 'the other record')}"
     heading(loop, f"Loop with the largest error ({when}{where})")
     heading(off, "Its error = measured - simulated")
+    # Room for the names to the right of the loop's lower end.
+    low, high = loop.get_ylim()
+    loop.set_ylim(bottom=low - 0.07 * len(followed) * (high - low))
     loop.legend(loc="lower right", frameon=False, fontsize="small")
 
 
@@ -172,6 +175,7 @@ def _errors(comparison: Comparison, axes: list[Axes]) -> None:
             ha=side,
             va="top",
             color="0.2",
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
         )
 
 
