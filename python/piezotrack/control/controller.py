@@ -12,6 +12,7 @@ from .._support.arrays import check_dt
 from ..errors import NumericalError, ParameterError
 from ..stages.inverse import Inverse
 from .components import LowPass, Notch, Pid, Repetitive, StateSpace
+from .description import controller_text
 from .plant import reach
 from .session import Session
 
@@ -105,6 +106,9 @@ class Controller:
             filters=[one._settings for one in self.filters],
         )
         object.__setattr__(self, "_core", core)
+
+    def __repr__(self) -> str:
+        return controller_text(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
         # The core's controller is made again.

@@ -162,6 +162,10 @@ class LoopReport:
         """Whether it is stable at all three."""
         return self.low.stable and self.middle.stable and self.high.stable
 
+    def __repr__(self) -> str:
+        elsewhere = "" if self.everywhere == self.stable else "; not at every gain of the stage"
+        return f"<LoopReport at {self.middle}{elsewhere}>"
+
     def __str__(self) -> str:
         lines = [f"{name:<7} {one}" for name, one in self._cases]
         if self.middle.hint:

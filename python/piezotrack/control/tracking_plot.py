@@ -168,6 +168,7 @@ def _end(run: Tracking) -> float:
 def _over_time(ax: Axes, run: Tracking, ncols: int = 3) -> None:
     """Let the time axis end where the run does, and put the legend into the axes."""
     ax.set_xlim(0.0, _end(run))
+    few_ticks(ax)
     legend_inside(ax, ncols)
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from .._support.arrays import real, signal_of, time_axis
+from .._support.html_table import html_table
 from .._support.messages import listed, quoted
 from .._support.units import best_length_unit
 from ..errors import DataError, ParameterError
@@ -408,6 +409,19 @@ class Dataset:
         if self._start:
             parts.append(f"warm-up {self._start} samples")
         return f"Dataset({', '.join(parts)})"
+
+    def _repr_html_(self) -> str:
+        unit, scale = best_length_unit(self.stroke)
+        rows = [
+            ("samples", f"{len(self)}, {self.duration:.6g} s at {1.0 / self._dt:.6g} Hz"),
+            ("time", f"{self.t[0]:.6g} to {self.t[-1]:.6g} s"),
+            ("drive", f"{self.u.min():.4g} to {self.u.max():.4g} {self.drive_unit}, {self.hold}"),
+            ("displacement", f"{scale * self.y.min():.4g} to {scale * self.y.max():.4g} {unit}"),
+            ("stroke", f"{scale * self.stroke:.4g} {unit}"),
+            ("warm-up", f"{self._start} samples"),
+        ]
+        rows += [(name, self._column_units.get(name, "")) for name in self._columns]
+        return html_table(f"Dataset {self._source or ''}".rstrip(), rows)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)

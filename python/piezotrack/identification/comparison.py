@@ -94,6 +94,11 @@ class Comparison:
         scores = "; ".join(f"{row.title} {row.test.rms_percent:.3g} %" for row in self.rows)
         return f"<Comparison, rms on what was not fitted: {scores}; see summary()>"
 
+    def _repr_html_(self) -> str:
+        from .html import comparison_html
+
+        return comparison_html(self)
+
     @property
     def best(self) -> ModelScore:
         """The model with the lowest RMS on the part that was not fitted."""

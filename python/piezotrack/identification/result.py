@@ -107,6 +107,11 @@ class Identification(IdentifiedModel):
             f"{self.cost_percent:.3g} % of stroke; see summary()>"
         )
 
+    def _repr_html_(self) -> str:
+        from .html import identification_html
+
+        return identification_html(self)
+
     @property
     def fun(self) -> float:
         """The cost [m], under SciPy's name."""

@@ -190,7 +190,7 @@ def _draw(diagram: Diagram, ax: Axes) -> None:
     from matplotlib.patches import Circle, Rectangle
 
     heading(ax, diagram.title, width=90)
-    rows = [one.y for one in (*diagram.blocks, *diagram.labels)]
+    rows = [one.y for one in diagram.blocks] + [one.y for one in diagram.labels]
     ax.set(xlim=(0.0, WIDTH), ylim=(min(rows) - 0.9, max(rows) + 0.9), aspect="equal")
     ax.axis("off")
     for block in diagram.blocks:

@@ -83,14 +83,14 @@ def drawn(experiments: Experiments, drives: Drives | None) -> list[Drawn]:
         Drawn(
             "fig_12",
             "Fig. 12: feedforward, PID, both",
-            "0.2 Hz, 0 to 110 um. Left the motion, in the middle the error, right actual over "
+            "0.2 Hz, 0 to 110 um. Left the motion, in the middle the error, right measured over "
             "desired. The first period, with the smooth start, is excluded.",
             _grid(experiments.compensation, TWELVE, ("motion", "error", "following")),
         ),
         Drawn(
             "fig_13",
             "Fig. 13: saturation",
-            f"The reference is a rule: {RULES['13']} Grey where the voltage is clipped.",
+            f"The reference is a rule: {RULES['13']} Shaded where the voltage is clipped.",
             _grid(experiments.antiwindup, THIRTEEN, ("motion", "error", "effort")),
         ),
         Drawn(

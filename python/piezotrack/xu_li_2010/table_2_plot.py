@@ -52,8 +52,9 @@ def plot_table_2(table: Table2, fig: Figure | SubFigure | None = None) -> Figure
     for run in slow:
         plot_magnified(run, circles, factor=5.0)
     heading(circles, "0.1 Hz, contour error \N{MULTIPLICATION SIGN} 5")
-    if legend := circles.get_legend():
-        legend.remove()
+    # One name for the lines of all circles.
+    handles, names = circles.get_legend_handles_labels()
+    circles.legend(handles[:2], names[:2], loc="upper left", frameon=False, fontsize="small")
     _over_angle(slow, figure.add_subplot(grid[0, 3:]))
     for column, name in enumerate(("max", "mean", "SD")):
         _bars(table, name, figure.add_subplot(grid[1, 2 * column : 2 * column + 2]))
