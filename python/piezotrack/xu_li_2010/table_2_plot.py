@@ -52,7 +52,8 @@ def plot_table_2(table: Table2, fig: Figure | SubFigure | None = None) -> Figure
     for run in slow:
         plot_magnified(run, circles, factor=5.0)
     heading(circles, "0.1 Hz, contour error \N{MULTIPLICATION SIGN} 5")
-    # One name for the lines of all circles.
+    # One name for the lines of all circles, and a square as without their legends.
+    circles.set_ylim(top=circles.get_ylim()[0] + float(np.ptp(circles.get_xlim())))
     handles, names = circles.get_legend_handles_labels()
     circles.legend(handles[:2], names[:2], loc="upper left", frameon=False, fontsize="small")
     _over_angle(slow, figure.add_subplot(grid[0, 3:]))
