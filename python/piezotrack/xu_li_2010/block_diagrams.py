@@ -190,8 +190,8 @@ def _draw(diagram: Diagram, ax: Axes) -> None:
     from matplotlib.patches import Circle, Rectangle
 
     heading(ax, diagram.title, width=90)
-    rows = [one.y for one in diagram.blocks] + [one.y for one in diagram.labels]
-    ax.set(xlim=(0.0, WIDTH), ylim=(min(rows) - 0.9, max(rows) + 0.9), aspect="equal")
+    rows = [y for path in diagram.paths for _, y in path]
+    ax.set(xlim=(0.0, WIDTH), ylim=(min(rows) - 0.8, max(rows) + 0.8), aspect="equal")
     ax.axis("off")
     for block in diagram.blocks:
         corner = (block.x - 0.5 * block.width, block.y - 0.5 * TALL)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["pages", "save_report"]
 
 # Lines on a page, and their size in points.
-LINES, TYPE = 70, 7.0
+LINES, TYPE = 66, 7.0
 
 
 def save_report(found: Reproduction, folder: str | os.PathLike[str]) -> list[Path]:
