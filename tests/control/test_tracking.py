@@ -413,7 +413,17 @@ def test_the_pictures_have_labels_with_units_and_no_empty_panel(which: str) -> N
     assert following.get_xlim()[1] > 1e6 * run.desired.max()
     assert error.get_ylim()[1] > 1e6 * run.error.max()
     names = [text.get_text() for text in effort.get_legend().get_texts()]  # type: ignore[union-attr]
-    assert names == ["total", "feedforward", "feedback"]
+    limits = ["limits"] if run.saturated.any() else []
+    assert names == ["command", "feedforward", "feedback", *limits]
+    # One end of time in all panels, and no line without a name but that of zero.
+    end = run.t[-1] + run.controller.dt
+    for ax in (motion, error, effort):
+        assert ax.get_xlim() == pytest.approx((0.0, end))
+    named = [text.get_text() for text in error.get_legend().get_texts()]  # type: ignore[union-attr]
+    clipped = ["voltage clipped"] if run.saturated.any() else []
+    assert named == ["desired - measured", "largest of each period", *clipped]
+    assert run.reference.name in figure.get_suptitle()
+    assert "PID at 50 Hz" in figure.get_suptitle()
     plt.close(figure)
 
 

@@ -53,7 +53,7 @@ Interval = Annotated[
     float | None,
     typer.Option(
         help="Sampling interval of the controller in s; default that of a reference file, or of "
-        "the record identified.",
+        f"the record identified, of {PAPER} 0.02.",
         show_default=False,
     ),
 ]
@@ -62,24 +62,32 @@ Limits = Annotated[
     typer.Option(
         metavar="LOW:HIGH",
         help="Voltage limits of the amplifier in V; default the drive range of the record "
-        "identified.",
+        f"identified, of {PAPER} 0:75.",
         show_default=False,
     ),
 ]
 Feedforward = Annotated[bool, typer.Option(help="Feedforward by the inverse of the model.")]
 Feedback = Annotated[
     bool | None,
-    typer.Option(help="PID feedback; default where --kp is given.", show_default=False),
+    typer.Option(
+        help=f"PID feedback; default where --kp is given, and on {PAPER}.", show_default=False
+    ),
 ]
 Kp = Annotated[
-    float | None, typer.Option(help="Proportional gain of the PID in V/um.", show_default=False)
+    float | None,
+    typer.Option(
+        help=f"Proportional gain of the PID in V/um; on {PAPER} 0.12.", show_default=False
+    ),
 ]
 Ti = Annotated[
-    float | None, typer.Option(help="Integral time of the PID in s.", show_default=False)
+    float | None,
+    typer.Option(help=f"Integral time of the PID in s; on {PAPER} 0.009.", show_default=False),
 ]
 Td = Annotated[
     float | None,
-    typer.Option(help="Derivative time of the PID in s; default 0.", show_default=False),
+    typer.Option(
+        help=f"Derivative time of the PID in s; default 0, on {PAPER} 0.044.", show_default=False
+    ),
 ]
 LoopDelay = Annotated[float, typer.Option(help="Delay in the loop in s, in addition to the hold.")]
 Noise = Annotated[
@@ -149,8 +157,10 @@ class Loop:
 
     def dt(self, model: IdentifiedModel | None, reference: Reference | None) -> float:
         """Return the sampling interval: as given, of the reference's file, or of the record [s]."""
-        of_model = model.dt if self.own and model else PAPER_DT
+        if not self.own:
+            return PAPER_DT if self.interval is None else self.interval
         of_file = None if reference is None else reference.interval
+        of_model = None if model is None else model.dt
         for known in (self.interval, of_file, of_model):
             if known is not None:
                 return known

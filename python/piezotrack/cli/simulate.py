@@ -68,7 +68,10 @@ def simulate_command(
     table = {"time_s": t, "voltage_V": u, "displacement_um": 1e6 * x}
     with together(make_folder(out)) as folder:
         written = [write_columns(folder / "simulated.csv", table)]
-        written += save_figures({"simulated": plot_response(t, u, x)}, folder)
+        picture = plot_response(
+            t, u, x, title=f"{known.model.info.title} driven by {drive_file.name}"
+        )
+        written += save_figures({"simulated": picture}, folder)
     remarks = known.beyond_fit(u, interval)
     words = (
         f"{t.size} samples from rest, drive from {u.min():.4g} to {u.max():.4g} V: displacement "

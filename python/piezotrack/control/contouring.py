@@ -30,7 +30,7 @@ from .tracking import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import ArrayLike, NDArray
 
     Array = NDArray[np.float64]
@@ -146,17 +146,22 @@ class Contour:
         """
         return frame_of(self.table)
 
-    def plot(self) -> Figure:
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Plot path and positions, the error magnified along the path, and the errors over time.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
 
         Returns
         -------
         matplotlib.figure.Figure
-            Not yet shown or saved.
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
         """
         from .contouring_plot import plot_contour
 
-        return plot_contour(self)
+        return plot_contour(self, fig)
 
     @property
     def notes(self) -> list[str]:

@@ -13,6 +13,7 @@ from ..errors import NumericalError, ParameterError
 from ..identification.identified import IdentifiedModel
 from ..stages.inverse import Inverse
 from .components import LowPass, Notch, Pid, Repetitive, StateSpace
+from .description import controller_text
 from .plant import reach
 from .session import Session
 
@@ -163,6 +164,9 @@ class Controller:
                 raise ParameterError(f"{name} is not in the file of this model: expected {name}=")
         feedforward = {"feedforward": model.inverse(playback=playback)}
         return cls(**{**settings, **feedforward, **parts})
+
+    def __repr__(self) -> str:
+        return controller_text(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
         # The core's controller is made again.

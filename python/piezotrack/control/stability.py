@@ -14,7 +14,7 @@ from ..errors import ParameterError
 from .plant import linearised_plants, plant_of
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
     from ..identification.identified import IdentifiedModel
@@ -162,6 +162,10 @@ class LoopReport:
         """Whether it is stable at all three."""
         return self.low.stable and self.middle.stable and self.high.stable
 
+    def __repr__(self) -> str:
+        elsewhere = "" if self.everywhere == self.stable else "; not at every gain of the stage"
+        return f"<LoopReport at {self.middle}{elsewhere}>"
+
     def __str__(self) -> str:
         lines = [f"{name:<7} {one}" for name, one in self._cases]
         if self.middle.hint:
@@ -203,17 +207,22 @@ class LoopReport:
             learning=np.asarray(learning),
         )
 
-    def plot(self) -> Figure:
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Plot open loop, sensitivity and, with a repetitive part, the error left by a period.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
 
         Returns
         -------
         matplotlib.figure.Figure
-            Not yet shown or saved.
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
         """
         from .stability_plot import plot_loop_report
 
-        return plot_loop_report(self)
+        return plot_loop_report(self, fig)
 
 
 def check_loop(

@@ -24,7 +24,7 @@ from .stability import check_loop
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
     from ..identification.identified import IdentifiedModel
@@ -232,17 +232,22 @@ class Tracking:
         """
         return frame_of(self.table)
 
-    def plot(self) -> Figure:
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Desired and actual motion, error, actual against desired, and the parts of the voltage.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
 
         Returns
         -------
         matplotlib.figure.Figure
-            Not yet shown or saved.
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
         """
         from .tracking_plot import plot_tracking
 
-        return plot_tracking(self)
+        return plot_tracking(self, fig)
 
     def summary(self) -> str:
         """Table of the run: all of it, and period by period.

@@ -12,6 +12,7 @@ import numpy as np
 
 from .._support.arrays import real, signal_of, time_axis
 from .._support.frames import frame_of
+from .._support.html_table import html_table
 from .._support.messages import listed, quoted
 from .._support.units import best_length_unit
 from ..errors import DataError, ParameterError
@@ -19,6 +20,7 @@ from ..errors import DataError, ParameterError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import ArrayLike, NDArray
 
     from .frames import Frame
@@ -449,6 +451,31 @@ class Dataset:
         part._start, part._sha256 = start, None
         return part
 
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
+        """Drive and displacement over time, and the hysteresis loop.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
+
+        Examples
+        --------
+        >>> import piezotrack as pt
+        >>> from matplotlib.figure import Figure
+        >>> figure = pt.datasets.dbo_training()[3.0:23.0].plot(fig=Figure())
+        >>> [ax.get_ylabel() for ax in figure.axes]
+        ['drive [V]', 'displacement [um]', 'displacement [um]']
+        """
+        from .dataset_plot import plot_dataset
+
+        return plot_dataset(self, fig)
+
     def __repr__(self) -> str:
         unit, scale = best_length_unit(self.stroke)
         parts = [
@@ -459,6 +486,19 @@ class Dataset:
         if self._start:
             parts.append(f"warm-up {self._start} samples")
         return f"Dataset({', '.join(parts)})"
+
+    def _repr_html_(self) -> str:
+        unit, scale = best_length_unit(self.stroke)
+        rows = [
+            ("samples", f"{len(self)}, {self.duration:.6g} s at {1.0 / self._dt:.6g} Hz"),
+            ("time", f"{self.t[0]:.6g} to {self.t[-1]:.6g} s"),
+            ("drive", f"{self.u.min():.4g} to {self.u.max():.4g} {self.drive_unit}, {self.hold}"),
+            ("displacement", f"{scale * self.y.min():.4g} to {scale * self.y.max():.4g} {unit}"),
+            ("stroke", f"{scale * self.stroke:.4g} {unit}"),
+            ("warm-up", f"{self._start} samples"),
+        ]
+        rows += [(name, self._column_units.get(name, "")) for name in self._columns]
+        return html_table(f"Dataset {self._source or ''}".rstrip(), rows)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)

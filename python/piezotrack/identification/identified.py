@@ -109,6 +109,9 @@ class IdentifiedModel:
     start: Start | None = None
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
+    def __repr__(self) -> str:
+        return f"<IdentifiedModel, stroke {1e6 * self.stroke:.4g} um: {self.model!r}>"
+
     @property
     def drive_range(self) -> tuple[float, float] | None:
         """Lowest and highest drive of the record identified; None if the file has none."""
