@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from commands import names, ran, run
+from commands import names, ran, refusal, run
 
 
 @pytest.fixture(scope="module")
@@ -84,3 +84,9 @@ def test_what_it_advises_to_type_runs(
         assert all(Path(word).exists() for word in words if word.endswith(".csv"))
         options = {word for word in words if word.startswith("--")}
         assert options <= set(re.findall(r"--[a-z-]+", ran(words[0], "--help")))
+
+
+def test_it_does_not_replace_its_results_unasked(printed: tuple[Path, str]) -> None:
+    said = refusal("demo", "--out", str(printed[0] / "demo"))
+    assert "log.csv exists" in said
+    assert "--overwrite" in said
