@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from ..data import datasets
@@ -104,7 +104,7 @@ def run_demo(seed: int = 1, *, progress: bool | None = None) -> Demonstration:
     plant = VirtualStage.of(identify(later, "prandtl-ishlinskii"), noise=NOISE, seed=seed)
     reference = triangle(frequency=1.0, low=5e-6, high=42e-6, duration=4.0)
     loops = {
-        "without compensation": Controller.of(fit, feedforward=_straight_line(fit)),
+        "without compensation": replace(Controller.of(fit), feedforward=_straight_line(fit)),
         "inverse": Controller.of(fit),
         "inverse and PID": Controller.of(fit, feedback=FEEDBACK),
     }
