@@ -10,6 +10,9 @@ from .components import StateSpace as StateSpace
 from .components import ZeroPhase as ZeroPhase
 from .contouring import Contour as Contour
 from .contouring import contour as contour
+from .contouring_plot import plot_contour_error as plot_contour_error
+from .contouring_plot import plot_magnified as plot_magnified
+from .contouring_plot import plot_path as plot_path
 from .controller import Controller as Controller
 from .plant import Plant as Plant
 from .session import Command as Command
@@ -22,3 +25,7 @@ from .stability import check_loop as check_loop
 from .tracking import Metrics as Metrics
 from .tracking import Tracking as Tracking
 from .tracking import track as track
+from .tracking_plot import plot_effort as plot_effort
+from .tracking_plot import plot_error as plot_error
+from .tracking_plot import plot_following as plot_following
+from .tracking_plot import plot_motion as plot_motion

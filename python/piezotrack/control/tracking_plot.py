@@ -61,6 +61,17 @@ def plot_motion(run: Tracking, ax: Axes | None = None) -> Axes:
     -------
     matplotlib.axes.Axes
         With the picture.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> import piezotrack as pt
+    >>> stage = pt.DahlStage.xu_li_2010()
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
+    >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
+    >>> ax = pt.control.plot_motion(run, ax=Figure().subplots())
+    >>> ax.get_ylabel()
+    'displacement [um]'
     """
     (ax,) = axes_or_new(ax, 1)
     kept = thinned(run.fine_displacement)
@@ -85,6 +96,17 @@ def plot_error(run: Tracking, ax: Axes | None = None) -> Axes:
     -------
     matplotlib.axes.Axes
         With the picture.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> import piezotrack as pt
+    >>> stage = pt.DahlStage.xu_li_2010()
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
+    >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
+    >>> ax = pt.control.plot_error(run, ax=Figure().subplots())
+    >>> ax.get_ylabel()
+    'tracking error [um]'
     """
     (ax,) = axes_or_new(ax, 1)
     ax.plot(run.t, 1e6 * run.error, **{**ERROR, "label": "desired - measured"})
@@ -115,6 +137,17 @@ def plot_following(run: Tracking, ax: Axes | None = None) -> Axes:
     -------
     matplotlib.axes.Axes
         With the picture.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> import piezotrack as pt
+    >>> stage = pt.DahlStage.xu_li_2010()
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
+    >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
+    >>> ax = pt.control.plot_following(run, ax=Figure().subplots())
+    >>> ax.get_ylabel()
+    'measured displacement [um]'
     """
     (ax,) = axes_or_new(ax, 1)
     part = run.t >= run.settled
@@ -141,6 +174,17 @@ def plot_effort(run: Tracking, ax: Axes | None = None) -> Axes:
     -------
     matplotlib.axes.Axes
         With the picture.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> import piezotrack as pt
+    >>> stage = pt.DahlStage.xu_li_2010()
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
+    >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
+    >>> ax = pt.control.plot_effort(run, ax=Figure().subplots())
+    >>> ax.get_ylabel()
+    'voltage [V]'
     """
     (ax,) = axes_or_new(ax, 1)
     ax.step(run.t, run.voltage, where="post", **COMMAND)

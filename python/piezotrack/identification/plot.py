@@ -70,6 +70,17 @@ def plot_loop(
     -------
     matplotlib.axes.Axes
         The axes drawn on.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> import piezotrack as pt
+    >>> log = pt.datasets.dbo_training()[3.0:8.0]
+    >>> fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
+    >>> run = fit.simulate(log, offset=fit.offset)
+    >>> ax = pt.identification.plot_loop(log, run, ax=Figure().subplots())
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('drive [V]', 'displacement [um]')
     """
     (ax,) = axes_or_new(ax, 1)
     unit, scale = best_length_unit(data.stroke)
@@ -112,6 +123,17 @@ def plot_time(
     -------
     tuple of two matplotlib.axes.Axes
         Displacement, error.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> import piezotrack as pt
+    >>> log = pt.datasets.dbo_training()[3.0:8.0]
+    >>> fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
+    >>> run = fit.simulate(log, offset=fit.offset)
+    >>> above, below = pt.identification.plot_time(log, run, axes=Figure().subplots(2, 1))
+    >>> below.get_ylabel()
+    'error [nm]'
     """
     above, below = axes_or_new(axes, 2)
     unit, scale = best_length_unit(data.stroke)
@@ -157,6 +179,16 @@ def plot_convergence(fit: Identification, ax: Axes | None = None) -> Axes:
     -------
     matplotlib.axes.Axes
         The axes drawn on.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> import piezotrack as pt
+    >>> log, few = pt.datasets.dbo_training()[3.0:5.0], pt.ParticleSwarm(iterations=3)
+    >>> fit = pt.identify(log, "dahl", swarm=few, runs=1, seed=1, progress=False)
+    >>> ax = pt.identification.plot_convergence(fit, ax=Figure().subplots())
+    >>> ax.get_ylabel()
+    'best cost, rms [um]'
     """
     (ax,) = axes_or_new(ax, 1)
     # A cost of 0 has no place on a logarithmic scale.
