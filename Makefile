@@ -20,10 +20,10 @@ help: ## What can be typed
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/'
 
 demo: $(VENV)/installed ## Build, then the way from a log to a model on a built-in stage
-	$(BIN)/piezotrack demo --out demo
+	$(BIN)/piezotrack demo --out demo --overwrite
 
 reproduce: $(VENV)/installed ## Every figure and table of the paper, published beside obtained
-	$(BIN)/piezotrack reproduce --out report
+	$(BIN)/piezotrack reproduce --out report --overwrite
 
 test: lint rust-test no-std python-test ## Everything that must hold before a change lands
 

@@ -13,6 +13,7 @@ import pytest
 
 import piezotrack as pt
 from loops import DT, PID, STAGE, WINDING, fitted, forward, loop, record, sine
+from virtual import changed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -287,7 +288,7 @@ def test_late_samples_see_the_stage_further_on() -> None:
     again = pt.track(TABLE_1, controller, reference, jitter=2e-3)
     assert (again.measured == late.measured).all()
     stages = [pt.VirtualStage.xu_li_2010(seed=seed) for seed in (1, 2)]
-    quiet = [dataclasses.replace(stage, noise=0.0) for stage in stages]
+    quiet = [changed(stage, noise=0.0) for stage in stages]
     first, second = (pt.track(stage, loop(), sine(0.5, 2.0), jitter=1e-3) for stage in quiet)
     assert (first.measured != second.measured).any()
 

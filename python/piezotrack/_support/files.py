@@ -22,13 +22,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
+    "json_ready",
     "make_folder",
+    "picture_files",
     "replacing",
     "save_figures",
     "together",
     "write_columns",
     "write_document",
 ]
+
+
+# Formats of a picture.
+ENDINGS = ("png", "svg")
 
 
 @contextmanager
@@ -114,7 +120,7 @@ def write_document(path: str | os.PathLike[str], document: Mapping[str, Any]) ->
     """Write a JSON file, whole or not at all; arguments and errors as of `save`."""
     import json
 
-    text = json.dumps(_finite(document), indent=2, allow_nan=False)
+    text = json.dumps(json_ready(document), indent=2, allow_nan=False)
     with replacing(path, synced=True) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
     return Path(path)
@@ -151,6 +157,22 @@ def make_folder(folder: str | os.PathLike[str]) -> Path:
     return path
 
 
+def picture_files(*names: str) -> list[str]:
+    """Return the names of the files that `save_figures` writes.
+
+    Parameters
+    ----------
+    *names : str
+        Names of the figures.
+
+    Returns
+    -------
+    list of str
+        With their endings.
+    """
+    return [f"{name}.{ending}" for name in names for ending in ENDINGS]
+
+
 def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
     """Save figures as PNG and SVG, and close them.
 
@@ -173,10 +195,10 @@ def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
     try:
         with together(folder), without_glyph_warnings():
             for name, figure in figures.items():
-                for ending in ("png", "svg"):
-                    path = folder / f"{name}.{ending}"
+                for file in picture_files(name):
+                    path = folder / file
                     # Without a date and with fixed ids, the same result gives the same file.
-                    stamp = {"Date": None} if ending == "svg" else {}
+                    stamp = {"Date": None} if path.suffix == ".svg" else {}
                     with replacing(path) as temporary, mpl.rc_context({"svg.hashsalt": name}):
                         figure.savefig(temporary, dpi=150, metadata=stamp)
                     written.append(path)
@@ -186,12 +208,23 @@ def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
     return written
 
 
-def _finite(value: Any) -> Any:
-    """Replace NaN and infinity, which JSON does not have, by null."""
+def json_ready(value: Any) -> Any:
+    """Replace NaN and infinity, which JSON does not have, by null.
+
+    Parameters
+    ----------
+    value : object
+        Numbers, texts, lists, tuples and mappings.
+
+    Returns
+    -------
+    object
+        The same, with None in their place.
+    """
     if isinstance(value, Mapping):
-        return {key: _finite(entry) for key, entry in value.items()}
+        return {key: json_ready(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_finite(entry) for entry in value]
+        return [json_ready(entry) for entry in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

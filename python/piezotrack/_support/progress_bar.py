@@ -1,16 +1,27 @@
-"""A progress bar that is silent in a library and shown in a terminal or notebook."""
+"""Progress on stderr: a bar in a terminal or notebook, lines of words elsewhere on request."""
 
 from __future__ import annotations
 
 import sys
+import time
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from threading import Event, Thread
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
     from types import TracebackType
+    from typing import Self, TextIO
 
     from rich.console import Console
 
-__all__ = ["ProgressBar", "console"]
+    Updater = Callable[[int, int, int, float, list[float]], None]
+
+__all__ = ["ProgressBar", "console", "one_clock"]
+
+# Seconds before the first line of words, and between two.
+FIRST, EVERY = 3.0, 5.0
 
 
 def console() -> Console:
@@ -20,46 +31,92 @@ def console() -> Console:
     return Console(file=getattr(sys.stderr, "unescaped", None), stderr=True)
 
 
+class _Clock:
+    """Says when the next line is due, to all computations of one command."""
+
+    def __init__(self) -> None:
+        self._begun = time.monotonic()
+        self._due = self._begun + FIRST
+
+    @property
+    def elapsed(self) -> float:
+        """Seconds since the first computation began."""
+        return time.monotonic() - self._begun
+
+    @property
+    def wait(self) -> float:
+        """Seconds until the next line is due."""
+        return max(0.0, self._due - time.monotonic())
+
+    def said(self) -> None:
+        """Put the next line off."""
+        self._due = time.monotonic() + EVERY
+
+
+_clock: ContextVar[_Clock | None] = ContextVar("_clock", default=None)
+
+
+@contextmanager
+def one_clock() -> Iterator[None]:
+    """Count the time of all computations within together.
+
+    Yields
+    ------
+    None
+    """
+    token = _clock.set(_Clock())
+    try:
+        yield
+    finally:
+        _clock.reset(token)
+
+
 class ProgressBar:
-    """Shows the iterations of a search and its best cost on stderr.
+    """Shows how far a computation is, on stderr.
 
     Parameters
     ----------
     show : bool or None
-        None: in a terminal or notebook only.
+        None: in a terminal or notebook only. True: elsewhere too, as a line every few seconds.
+    task : str
+        What is computed, as ``"identify: dahl"``.
     """
 
-    def __init__(self, show: bool | None) -> None:
+    def __init__(self, show: bool | None, task: str) -> None:
+        self._view: _Bar | _Words | None = None
+        if show is not None and not show:
+            return
         place = console()
-        looking = place.is_terminal or place.is_jupyter
-        self._bar = None
-        if looking if show is None else show:
-            from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-            self._bar = Progress(
-                TextColumn("searching"),
-                BarColumn(),
-                TextColumn("{task.completed:.0f} of at most {task.total:.0f} iterations"),
-                TextColumn("best {task.fields[cost]} um"),
-                TimeElapsedColumn(),
-                console=place,
-                transient=True,
-            )
-            self._task = self._bar.add_task("search", total=1.0, cost="-")
+        if place.is_terminal or place.is_jupyter:
+            self._view = _Bar(place, task)
+        elif show:
+            self._view = _Words(sys.stderr, task)
 
     @property
     def update(self) -> Updater | None:
         """Callback for the core; None where nothing is shown."""
-        return None if self._bar is None else self._update
+        return None if self._view is None else self._update
 
     def _update(self, nit: int, most: int, nfev: int, cost: float, theta: list[float]) -> None:
         del nfev, theta
-        if self._bar is not None:
-            self._bar.update(self._task, completed=nit, total=most, cost=f"{1e6 * cost:.4g}")
+        self.step(nit, most, f"at most {most} iterations, best {1e6 * cost:.3g} um")
 
-    def __enter__(self) -> ProgressBar:
-        if self._bar is not None:
-            self._bar.start()
+    def step(self, done: int, total: int, words: str) -> None:
+        """Show what has been done.
+
+        Parameters
+        ----------
+        done, total : int
+            Parts of the computation; a total of 0 where they are not known.
+        words : str
+            Of what, as ``"20 seeds"``.
+        """
+        if self._view is not None:
+            self._view.step(done, total, words)
+
+    def __enter__(self) -> Self:
+        if self._view is not None:
+            self._view.start()
         return self
 
     def __exit__(
@@ -69,11 +126,58 @@ class ProgressBar:
         trace: TracebackType | None,
     ) -> None:
         del kind, error, trace
-        if self._bar is not None:
-            self._bar.stop()
+        if self._view is not None:
+            self._view.stop()
 
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+class _Bar:
+    """A bar that is redrawn, and removed at the end."""
 
-    Updater = Callable[[int, int, int, float, list[float]], None]
+    def __init__(self, place: Console, task: str) -> None:
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+        self._bar = Progress(
+            TextColumn("{task.description}", markup=False),
+            BarColumn(bar_width=16),
+            TextColumn("{task.fields[words]}", markup=False),
+            TimeElapsedColumn(),
+            console=place,
+            transient=True,
+        )
+        self._task = self._bar.add_task(task, total=None, words="")
+
+    def start(self) -> None:
+        """Draw nothing yet: what takes no time would leave an empty place in a notebook."""
+
+    def stop(self) -> None:
+        self._bar.stop()
+
+    def step(self, done: int, total: int, words: str) -> None:
+        self._bar.start()
+        self._bar.update(self._task, completed=done, total=total or None, words=words)
+
+
+class _Words:
+    """Lines, written by a thread of their own: least squares call nothing while they compute."""
+
+    def __init__(self, stream: TextIO, task: str) -> None:
+        self._stream, self._task, self._words = stream, task, ""
+        self._clock = _clock.get() or _Clock()
+        self._ended = Event()
+
+    def start(self) -> None:
+        Thread(target=self._write, daemon=True).start()
+
+    def stop(self) -> None:
+        self._ended.set()
+
+    def step(self, done: int, total: int, words: str) -> None:
+        self._words = f"{100.0 * done / total:.0f} % of {words}" if total else words
+
+    def _write(self) -> None:
+        while not self._ended.wait(self._clock.wait):
+            parts = [self._task, self._words, f"{self._clock.elapsed:.0f} s"]
+            # Nobody may be there to read it any more.
+            with suppress(OSError, ValueError):
+                print(", ".join(filter(None, parts)), file=self._stream, flush=True)
+            self._clock.said()

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import matplotlib as mpl
 import typer
+from typer.core import TyperCommand
 
 from .. import __version__
 from .compare import compare_command
@@ -20,6 +21,9 @@ from .simulate import simulate_command
 from .step import step_command
 from .track import feedforward_command, track_command
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
 __all__ = ["app", "run"]
 
 # No window is ever opened.
@@ -28,7 +32,6 @@ mpl.use("Agg")
 app = typer.Typer(
     help="Hysteresis identification and tracking control of piezo nanopositioners.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
@@ -61,13 +64,26 @@ def _options(
     """Declare the options of the command itself."""
 
 
-app.command("identify")(identify_command)
-app.command("compare")(compare_command)
-app.command("step")(step_command)
-app.command("simulate")(simulate_command)
-app.command("feedforward")(feedforward_command)
-app.command("track")(track_command)
-app.command("contour")(contour_command)
-app.command("noise")(noise_command)
-app.command("reproduce")(reproduce_command)
-app.command("demo")(demo_command)
+class Command(TyperCommand):
+    """A command whose usage shows the names of its arguments as its help does."""
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """Write FILE and [MODEL] in place of {FILE} and [[MODEL]]."""
+        pieces = super().collect_usage_pieces(ctx)
+        return [piece.strip("{}").replace("[[", "[").replace("]]", "]") for piece in pieces]
+
+
+COMMANDS: dict[str, Callable[..., None]] = {
+    "identify": identify_command,
+    "compare": compare_command,
+    "step": step_command,
+    "simulate": simulate_command,
+    "feedforward": feedforward_command,
+    "track": track_command,
+    "contour": contour_command,
+    "noise": noise_command,
+    "reproduce": reproduce_command,
+    "demo": demo_command,
+}
+for name, command in COMMANDS.items():
+    app.command(name, cls=Command)(command)

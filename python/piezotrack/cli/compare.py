@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ..stages.model_info import LISTED
 from .error_messages import in_words
 from .options import (
     Columns,
@@ -14,16 +15,20 @@ from .options import (
     DriveColumn,
     HoldOption,
     Interval,
+    Json,
+    LogFile,
     Out,
+    Overwrite,
+    Quiet,
+    Resample,
     TimeColumn,
     Units,
-    can_be_folder,
-    list_files,
     of_file,
     refuse_without_effect,
     seconds,
     windowed,
 )
+from .output import Output
 
 __all__ = ["compare_command"]
 
@@ -31,12 +36,14 @@ __all__ = ["compare_command"]
 @in_words
 def compare_command(
     context: typer.Context,
-    file: Annotated[Path, typer.Argument(help="Log in CSV, with units in its header.")],
+    file: LogFile,
     model: Annotated[
         list[str] | None,
         typer.Option(
             metavar="MODEL|FILE",
-            help="Stage model, as dahl, or a model file in JSON; default all models. Repeatable.",
+            autocompletion=lambda: list(LISTED),
+            help=f"Kind of model to fit ({', '.join(LISTED)}), or a model file in JSON; default "
+            "all kinds. Repeatable.",
         ),
     ] = None,
     train: Annotated[
@@ -47,23 +54,28 @@ def compare_command(
         typer.Option(metavar="A:B", help="Seconds for validation; default the rest after --train."),
     ] = None,
     test_log: Annotated[
-        Path | None, typer.Option(help="Another log for validation, in place of this one.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Another log for validation; default this one."),
     ] = None,
-    out: Out = Path("results"),
+    out: Out = Path("comparison"),
+    overwrite: Overwrite = False,
     time: TimeColumn = None,
     drive: DriveColumn = None,
     displacement: DisplacementColumn = None,
     unit: Units = None,
     dt: Interval = None,
+    resample: Resample = None,
     hold: HoldOption = "foh",
     seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
     runs: Annotated[int, typer.Option(help="Number of independent restarts.")] = 4,
     threads: Annotated[
         int | None, typer.Option(help="Number of threads, up to 256; default all cores.")
     ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Fit several models to a part of a log and validate them on the rest: a table, a picture."""
-    from ..identification.comparison import compare
+    """Fit several models to a log and validate them."""
+    from ..identification.comparison import compare, comparison_files
     from ..stages.registry import MODELS
 
     searched = {one.name for one in MODELS if one.searched}
@@ -72,14 +84,18 @@ def compare_command(
             context, ("seed", "runs", "threads"), f"with {', '.join(model)}: none is searched"
         )
 
+    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     columns = Columns(time, drive, displacement, unit, dt)
-    log = columns.read(file, hold)
+    log = columns.read(file, hold, resample)
     fitted = None if train is None else seconds("--train", train)
     judged = None if test is None else seconds("--test", test)
     second = None
     if test_log is not None:
-        second = windowed(columns.read(test_log, hold), test_log, "--test", test)
-    can_be_folder(out)
+        second = windowed(columns.read(test_log, hold, resample), test_log, "--test", test)
+    # A model file that is given is written as it is.
+    given = {Path(name).resolve() for name in model or []}
+    names = comparison_files(model or None, log.drive_unit)
+    result.will_write(name for name in names if (out / name).resolve() not in given)
     with of_file(file):
         found = compare(
             log,
@@ -89,7 +105,6 @@ def compare_command(
             seed=seed,
             runs=runs,
             threads=threads,
+            progress=result.progress,
         )
-    written = found.save(out)
-    print(found.summary())
-    list_files(written)
+    result.show(found.summary(), {**found.document(), "notes": found.notes}, found.save(out))

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import errno
 import os
-import re
 import sys
 from contextlib import suppress
 from functools import wraps
+from inspect import signature
 from typing import TYPE_CHECKING, ParamSpec
 
 import typer
 
+from .._support.progress_bar import one_clock
 from ..errors import PiezotrackError
+from .advice import as_options, options_named
 from .interruption import at_rest, at_work, exit_code, stopped
 from .terminal import one_line
 
@@ -23,6 +25,8 @@ __all__ = ["in_words", "of_the_system"]
 
 BAD_INPUT = 2
 NOT_PRINTED = 1
+# As of a process that SIGPIPE ends: 128 + 13.
+READER_LEFT = 141
 
 # Reasons for which the output cannot be printed.
 OUTPUT = (errno.ENOSPC, errno.EIO, errno.EBADF, errno.EDQUOT, errno.EFBIG)
@@ -32,11 +36,11 @@ P = ParamSpec("P")
 
 def in_words(command: Callable[P, None]) -> Callable[P, None]:
     """Turn the exceptions of piezotrack into one sentence and an exit code."""
+    parameters = list(signature(command).parameters)
 
-    @wraps(command)
-    def run(*args: P.args, **kwargs: P.kwargs) -> None:
+    def attempt(*args: P.args, **kwargs: P.kwargs) -> None:
         try:
-            with at_work():
+            with at_work(), one_clock():
                 command(*args, **kwargs)
                 sys.stdout.flush()
         except KeyboardInterrupt as error:
@@ -46,7 +50,7 @@ def in_words(command: Callable[P, None]) -> Callable[P, None]:
                 # A module that was being imported has turned the interruption into another error.
                 code = _stopped(KeyboardInterrupt())
             elif isinstance(error, PiezotrackError):
-                _say(_as_options(str(error)))
+                _say(as_options(str(error)))
                 code = BAD_INPUT
             elif isinstance(error, MemoryError):
                 _say(str(error) or "not enough memory")
@@ -58,6 +62,11 @@ def in_words(command: Callable[P, None]) -> Callable[P, None]:
         else:
             return
         raise typer.Exit(code)
+
+    @wraps(command)
+    def run(*args: P.args, **kwargs: P.kwargs) -> None:
+        with options_named(parameters):
+            attempt(*args, **kwargs)
 
     return run
 
@@ -95,30 +104,7 @@ def of_the_system(error: OSError) -> int:
     # discarded, or Python would report an error when it exits.
     with suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    if not isinstance(error, BrokenPipeError):
-        _say(f"cannot print: {reason}" if error.errno in OUTPUT else reason)
+    if isinstance(error, BrokenPipeError):
+        return READER_LEFT
+    _say(f"cannot print: {reason}" if error.errno in OUTPUT else reason)
     return NOT_PRINTED
-
-
-# Advice of the library in Python, and the option that does the same.
-ADVICE = [
-    (
-        re.compile(r"time=0, drive=1, displacement=2, units=\{0: 's', 1: 'V', 2: 'um'\}"),
-        "--time 0 --drive 1 --displacement 2 --unit 0=s --unit 1=V --unit 2=um",
-    ),
-    (re.compile(r"units=\{'?(\w+)'?: \.\.\.\}"), r"--unit \1=..."),
-    (re.compile(r"\bfixed="), "--fix"),
-    (re.compile(r"\bbeyond_reach=True"), "--beyond-reach"),
-    (re.compile(r"\bunstable=True"), "--unstable"),
-    (re.compile(r"pt\.\w+\.from_um\(k[pq]=.*\)"), "a value in V/um"),
-    (
-        re.compile(r"(?<!--unit )\b(time|drive|displacement|dt|stiffness|runs|train|test)=(?!\d)"),
-        r"--\1",
-    ),
-]
-
-
-def _as_options(sentence: str) -> str:
-    for python, option in ADVICE:
-        sentence = python.sub(option, sentence)
-    return sentence

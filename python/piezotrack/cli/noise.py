@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,14 +13,16 @@ from .options import (
     Columns,
     DisplacementColumn,
     Interval,
+    Json,
     Out,
+    Overwrite,
+    Quiet,
     TimeColumn,
     Units,
-    can_be_folder,
-    list_files,
     of_file,
     windowed,
 )
+from .output import Output
 
 if TYPE_CHECKING:
     from ..identification.sensor_noise import Noise
@@ -30,18 +32,33 @@ __all__ = ["noise_command"]
 
 @in_words
 def noise_command(
-    file: Annotated[Path, typer.Argument(help="Log in CSV, of a sensor at rest.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Log in CSV, of a sensor at rest.")],
     window: Annotated[
-        str | None, typer.Option(metavar="A:B", help="Seconds in which the stage is at rest.")
+        str | None,
+        typer.Option(
+            metavar="A:B", help="Seconds in which the stage is at rest; default the whole log."
+        ),
     ] = None,
     out: Out = Path("results"),
+    overwrite: Overwrite = False,
     time: TimeColumn = None,
     displacement: DisplacementColumn = None,
     unit: Units = None,
     dt: Interval = None,
+    json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Analyse a record at rest: rms, resolution, spectrum and a model of the noise."""
-    from .._support.files import make_folder, save_figures, together
+    """Analyse the noise of a sensor at rest.
+
+    Its rms, resolution and spectrum, and a model of it.
+    """
+    from .._support.files import (
+        make_folder,
+        picture_files,
+        save_figures,
+        together,
+        write_document,
+    )
     from ..data.reader import read_displacement
     from ..identification.sensor_noise import identify_noise
 
@@ -49,22 +66,23 @@ def noise_command(
     log = read_displacement(
         file, time=columns.time, displacement=columns.displacement, units=columns.units, dt=dt
     )
-    can_be_folder(out)
+    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
+    result.will_write(["noise.json", *picture_files("noise")])
     log = windowed(log, file, "--window", window)
     with of_file(file):
         found = identify_noise(log)
+    document = _document(found)
     with together(make_folder(out)) as folder:
-        written = [_write(found, folder), *save_figures({"noise": found.plot()}, folder)]
-    print(found.summary())
-    list_files(written)
+        written = [write_document(folder / "noise.json", document)]
+        written += save_figures({"noise": found.plot()}, folder)
+    result.show(found.summary(), document, written)
 
 
-def _write(found: Noise, folder: Path) -> Path:
-    """Write the figures as JSON."""
+def _document(found: Noise) -> dict[str, Any]:
+    """Content of the JSON file."""
     from .. import __version__
-    from .._support.files import write_document
 
-    document = {
+    return {
         "format": "piezotrack-noise",
         "schema_version": 1,
         "unit": "m, Hz",
@@ -79,4 +97,3 @@ def _write(found: Noise, folder: Path) -> Path:
         "data": {"source": found.data.source, "sha256": found.data.sha256},
         "provenance": {"package": "piezotrack", "version": __version__},
     }
-    return write_document(folder / "noise.json", document)

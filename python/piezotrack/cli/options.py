@@ -26,12 +26,19 @@ __all__ = [
     "HoldOption",
     "Interval",
     "Jitter",
+    "Json",
+    "LogFile",
+    "ModelFile",
     "Out",
+    "Overwrite",
     "Period",
+    "Quiet",
+    "Resample",
     "Seconds",
     "TimeColumn",
     "Units",
     "can_be_folder",
+    "can_be_written",
     "column",
     "list_files",
     "number",
@@ -45,21 +52,38 @@ __all__ = [
 
 Seconds = Annotated[
     str | None,
-    typer.Option(metavar="A:B", help="Seconds to use; the drive before A is warm-up."),
+    typer.Option(
+        metavar="A:B",
+        help="Seconds to use, default all; the drive before A is simulated as warm-up.",
+    ),
 ]
-TimeColumn = Annotated[str | None, typer.Option(help="Column of the time.")]
-DriveColumn = Annotated[str | None, typer.Option(help="Column of the drive voltage.")]
-DisplacementColumn = Annotated[str | None, typer.Option(help="Column of the displacement.")]
+TimeColumn = Annotated[
+    str | None, typer.Option(metavar="COLUMN", help="Column of the time; default by its title.")
+]
+DriveColumn = Annotated[
+    str | None, typer.Option(metavar="COLUMN", help="Column of the drive; default by its title.")
+]
+DisplacementColumn = Annotated[
+    str | None,
+    typer.Option(metavar="COLUMN", help="Column of the displacement; default by its title."),
+]
 Units = Annotated[
     list[str] | None,
     typer.Option(
         "--unit",
         metavar="NAME=UNIT",
-        help="Unit of a column, or of time, drive, displacement. Repeatable.",
+        help="Unit of a column, or of time, drive, displacement; default as in its title. "
+        "Repeatable.",
     ),
 ]
 Interval = Annotated[
-    float | None, typer.Option(help="Sampling interval in s, in place of a time column.")
+    float | None, typer.Option(help="Sampling interval in s; default from the column of the time.")
+]
+Resample = Annotated[
+    float | None,
+    typer.Option(
+        help="Put a log with gaps or jitter on even times, at this interval in s; default not."
+    ),
 ]
 HoldOption = Annotated[
     Literal["foh", "zoh"],
@@ -67,11 +91,21 @@ HoldOption = Annotated[
 ]
 ControlInterval = Annotated[float, typer.Option(help="Sampling interval of the controller in s.")]
 Jitter = Annotated[float, typer.Option(help="Mean sampling jitter in s (truncated exponential).")]
-Duration = Annotated[float | None, typer.Option(help="Length of the reference in s.")]
-Period = Annotated[
-    float | None, typer.Option(help="Time in s after which a reference from a file repeats.")
+Duration = Annotated[
+    float | None, typer.Option(help="Length of the reference in s; default as the reference says.")
 ]
-Out = Annotated[Path, typer.Option(help="Folder for the results.")]
+Period = Annotated[
+    float | None,
+    typer.Option(help="Time in s after which a reference from a file repeats; default never."),
+]
+Out = Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the results.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace results that exist.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the figures as one JSON document.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")]
+LogFile = Annotated[
+    Path, typer.Argument(metavar="FILE", help="Log in CSV, with units in its header.")
+]
+ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file in JSON.")]
 
 
 class Columns:
@@ -89,7 +123,7 @@ class Columns:
         self.units = {column(name) or name: text for name, text in pairs("--unit", unit)}
         self.dt = dt
 
-    def read(self, file: Path, hold: Hold) -> Dataset:
+    def read(self, file: Path, hold: Hold, resample: float | None = None) -> Dataset:
         """Read a log with these columns."""
         from ..data.reader import read
 
@@ -100,6 +134,7 @@ class Columns:
             displacement=self.displacement,
             units=self.units,
             dt=self.dt,
+            resample=resample,
             hold=hold,
         )
 
@@ -141,6 +176,14 @@ def can_be_folder(out: Path) -> None:
         raise ParameterError(f"--out: {out} cannot be made a folder: {there} is a file")
     if not os.access(there, os.W_OK | os.X_OK):
         raise ParameterError(f"--out: {there} cannot be written to: permission denied")
+
+
+def can_be_written(out: Path, names: Iterable[str], *, overwrite: bool) -> None:
+    """Refuse a folder that cannot be written to, or that has a result, before the computation."""
+    can_be_folder(out)
+    for path in [] if overwrite else [out / name for name in names]:
+        if path.exists():
+            raise ParameterError(f"{path} exists: expected --overwrite, or another --out")
 
 
 def list_files(written: Iterable[Path]) -> None:

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from .error_messages import in_words
-from .options import Out, can_be_folder, list_files, refuse_without_effect
+from .options import Json, Out, Overwrite, Quiet, refuse_without_effect
+from .output import Output
 
 __all__ = ["reproduce_command"]
 
@@ -17,6 +18,7 @@ __all__ = ["reproduce_command"]
 def reproduce_command(
     context: typer.Context,
     out: Out = Path("report"),
+    overwrite: Overwrite = False,
     seeds: Annotated[
         int,
         typer.Option(
@@ -28,17 +30,23 @@ def reproduce_command(
         Path | None,
         typer.Option(
             metavar="FOLDER",
-            help="Folder of the measured DBO log, with training.csv and tracking.csv.",
+            help="Folder of the measured DBO log, with training.csv and tracking.csv; default "
+            "none.",
         ),
     ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Repeat the experiments of Xu and Li 2010 on a simulated stage: HTML, PDF and JSON."""
+    """Repeat the experiments of Xu and Li 2010.
+
+    On a simulated stage, with a report as HTML, PDF and JSON.
+    """
+    from ..xu_li_2010.report_files import REPORT
     from ..xu_li_2010.reproduction import reproduce
 
     if quick:
         refuse_without_effect(context, ("seeds",), "with --quick")
-    can_be_folder(out)
-    found = reproduce(seeds=2 if quick else seeds, dbo=dbo)
-    written = found.save(out)
-    print(found.summary())
-    list_files(written)
+    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
+    result.will_write(REPORT)
+    found = reproduce(seeds=2 if quick else seeds, dbo=dbo, progress=result.progress)
+    result.show(found.summary(), found.document(), found.save(out))

@@ -13,32 +13,44 @@ from .options import (
     DriveColumn,
     HoldOption,
     Interval,
+    Json,
+    ModelFile,
     Out,
+    Overwrite,
+    Quiet,
     TimeColumn,
     Units,
-    can_be_folder,
-    list_files,
     of_file,
 )
+from .output import Output
 
 __all__ = ["simulate_command"]
 
 
 @in_words
 def simulate_command(
-    model: Annotated[Path, typer.Argument(help="Model file in JSON.")],
+    model: ModelFile,
     drive_file: Annotated[
         Path, typer.Argument(metavar="DRIVE", help="CSV with time and drive voltage.")
     ],
     out: Out = Path("results"),
+    overwrite: Overwrite = False,
     time: TimeColumn = None,
     drive: DriveColumn = None,
     unit: Units = None,
     dt: Interval = None,
     hold: HoldOption = "foh",
+    json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Simulate the response of a model to a drive: a CSV with the displacement, and a picture."""
-    from .._support.files import make_folder, save_figures, together, write_columns
+    """Simulate the response of a model to a drive."""
+    from .._support.files import (
+        make_folder,
+        picture_files,
+        save_figures,
+        together,
+        write_columns,
+    )
     from ..data.reader import read_drive
     from ..identification.identified import load
     from ..identification.plot import plot_response
@@ -48,9 +60,11 @@ def simulate_command(
     t, u = read_drive(
         drive_file, time=columns.time, drive=columns.drive, units=columns.units, dt=dt
     )
-    can_be_folder(out)
+    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
+    result.will_write(["simulated.csv", *picture_files("simulated")])
+    interval = float(t[-1] - t[0]) / (t.size - 1)
     with of_file(drive_file):
-        x = known.displacement(u, float(t[-1] - t[0]) / (t.size - 1), hold=hold)
+        x = known.displacement(u, interval, hold=hold)
     table = {"time_s": t, "voltage_V": u, "displacement_um": 1e6 * x}
     with together(make_folder(out)) as folder:
         written = [write_columns(folder / "simulated.csv", table)]
@@ -58,10 +72,17 @@ def simulate_command(
             t, u, x, title=f"{known.model.info.title} driven by {drive_file.name}"
         )
         written += save_figures({"simulated": picture}, folder)
-    print(
+    remarks = known.beyond_fit(u, interval)
+    words = (
         f"{t.size} samples from rest, drive from {u.min():.4g} to {u.max():.4g} V: displacement "
         f"from {1e6 * x.min():.4g} to {1e6 * x.max():.4g} um"
     )
-    for remark in known.beyond_fit(u, float(t[-1] - t[0]) / (t.size - 1)):
-        print(f"note  {remark}")
-    list_files(written)
+    document = {
+        "samples": t.size,
+        "dt": {"value": interval, "unit": "s"},
+        "drive_range": {"value": [float(u.min()), float(u.max())], "unit": "V"},
+        "displacement_range": {"value": [float(x.min()), float(x.max())], "unit": "m"},
+        "notes": remarks,
+    }
+    notes = [f"note  {remark}" for remark in remarks]
+    result.show("\n".join([words, *notes]), document, written)

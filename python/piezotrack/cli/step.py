@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,15 +16,18 @@ from .options import (
     DriveColumn,
     HoldOption,
     Interval,
+    Json,
     Out,
+    Overwrite,
+    Quiet,
+    Resample,
     TimeColumn,
     Units,
-    can_be_folder,
-    list_files,
     number,
     of_file,
     windowed,
 )
+from .output import Output
 
 if TYPE_CHECKING:
     from ..identification.step_response import StepResult
@@ -34,50 +37,68 @@ __all__ = ["step_command"]
 
 @in_words
 def step_command(
-    file: Annotated[Path, typer.Argument(help="Log in CSV of a step response.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Log in CSV of a step response.")],
     window: Annotated[
-        str | None, typer.Option(metavar="A:B", help="Seconds with the step.")
+        str | None,
+        typer.Option(metavar="A:B", help="Seconds with the step; default the whole log."),
     ] = None,
     out: Out = Path("results"),
+    overwrite: Overwrite = False,
     time: TimeColumn = None,
     drive: DriveColumn = None,
     displacement: DisplacementColumn = None,
     unit: Units = None,
     dt: Interval = None,
+    resample: Resample = None,
     hold: HoldOption = "zoh",
-    stiffness: Annotated[float | None, typer.Option(help="Stiffness in N/m, if known.")] = None,
-    mass: Annotated[float | None, typer.Option(help="Moving mass in kg, if known.")] = None,
+    stiffness: Annotated[
+        float | None, typer.Option(help="Stiffness in N/m; default unknown.")
+    ] = None,
+    mass: Annotated[float | None, typer.Option(help="Moving mass in kg; default unknown.")] = None,
     second_level: Annotated[
         str | None,
         typer.Option(
-            metavar="V:UM", help="Voltage in V and displacement in um at the end of another step."
+            metavar="V:UM",
+            help="Voltage in V and displacement in um at the end of another step; default none.",
         ),
     ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Identify frequency, damping and hysteresis parameters from a step response."""
-    from .._support.files import make_folder, save_figures, together
+    """Identify frequency and damping from a step response.
+
+    And the hysteresis parameters of the Dahl model, as in section 3.3 of Xu and Li 2010.
+    """
+    from .._support.files import (
+        make_folder,
+        picture_files,
+        save_figures,
+        together,
+        write_document,
+    )
     from ..identification.step_response import identify_step
 
-    log = Columns(time, drive, displacement, unit, dt).read(file, hold)
+    log = Columns(time, drive, displacement, unit, dt).read(file, hold, resample)
     log = windowed(log, file, "--window", window)
-    can_be_folder(out)
+    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
+    result.will_write(["step.json", *picture_files("step")])
     level = None if second_level is None else _level(second_level)
     with of_file(file):
         step = identify_step(log, stiffness=stiffness, mass=mass, second_level=level)
+    document = _document(step)
     with together(make_folder(out)) as folder:
-        written = [_write(step, folder), *save_figures({"step": step.plot()}, folder)]
-    print(step.summary())
+        written = [write_document(folder / "step.json", document)]
+        written += save_figures({"step": step.plot()}, folder)
     options = " ".join(f"--fix {name}={value:.8g}" for name, value in step.hysteresis.items())
-    print(f"\nto hold these in a search: piezotrack identify LOG --model dahl {options}")
-    list_files(written)
+    hint = f"to hold these in a search: piezotrack identify LOG --model dahl {options}"
+    result.show(f"{step.summary()}\n\n{hint}", document, written)
 
 
-def _write(step: StepResult, folder: Path) -> Path:
-    """Write readings and results as JSON, SI."""
+def _document(step: StepResult) -> dict[str, Any]:
+    """Content of the JSON file: readings and results, SI."""
     from .. import __version__
-    from .._support.files import write_document
 
-    document = {
+    return {
         "format": "piezotrack-step",
         "schema_version": 1,
         "unit": "V, m, s, Hz, rad/s; a1 1/m, a2 1/m^2, b1 N/m^2, b0 N/m",
@@ -90,7 +111,6 @@ def _write(step: StepResult, folder: Path) -> Path:
         "ratios": step.ratios,
         "provenance": {"package": "piezotrack", "version": __version__},
     }
-    return write_document(folder / "step.json", document)
 
 
 def _level(text: str) -> tuple[float, float]:

@@ -11,7 +11,7 @@ import numpy as np
 from .. import _core
 from .._support.arguments import not_negative
 from ..errors import ParameterError
-from .plant import linearised_plants, unwrap
+from .plant import linearised_plants, plant_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
@@ -233,11 +233,11 @@ def check_loop(
 ) -> LoopReport:
     """Stability and margins of a controller on a stage.
 
-    The stage is linearised for small motions: a virtual stage as its mode with the amplifier; a
-    stage with hysteresis in feedback with the slope of the hysteresis force as a spring; a stage
-    with hysteresis at the input with the slope of its output on the settled loop between the
-    limits, without creep. The voltage is held between samples, and the repetitive part is that of
-    the implementation, with all its taps.
+    The stage is linearised for small motions: one with hysteresis in feedback with the slope of
+    the hysteresis force as a spring; one with hysteresis at the input with the slope of its output
+    on the settled loop between the limits, without creep. Bandwidth of the amplifier and delay of
+    the sensor of a virtual stage are included. The voltage is held between samples, and the
+    repetitive part is that of the implementation, with all its taps.
 
     Parameters
     ----------
@@ -262,10 +262,8 @@ def check_loop(
     >>> report.stable
     True
     """
-    plant, _, plant_delay = unwrap(stage)
-    plants = linearised_plants(
-        plant, controller.limits, not_negative("delay", delay, "s") + plant_delay
-    )
+    more = not_negative("delay", delay, "s")
+    plants = linearised_plants(plant_of(stage), controller.limits, more)
     cases = [_check(controller, linear) for linear in plants]
     return LoopReport(
         controller=controller, low=cases[0], middle=cases[1], high=cases[2], plant=plants[1]

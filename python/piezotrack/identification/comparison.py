@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from .. import _core
-from .._support.files import write_document
+from .._support.files import picture_files, write_document
 from ..data.dataset import Dataset
 from ..errors import ParameterError
 from ..stages.registry import MODELS, ModelInfo
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Comparison", "ModelScore", "compare"]
+__all__ = ["Comparison", "ModelScore", "compare", "comparison_files"]
 
 FORMAT = "piezotrack-comparison"
 SCHEMA_VERSION = 1
@@ -296,17 +296,40 @@ def compare(
         raise ParameterError(f"data is {type(data).__name__}: expected a Dataset, see pt.read")
     wanted = _wanted(models, data.drive_unit)
     first, second, carried = _parts(data, train, test)
-    of_swarm = {"seed": seed, "runs": runs, "threads": threads, "progress": progress}
+    of_swarm: dict[str, Any] = {
+        "seed": seed,
+        "runs": runs,
+        "threads": threads,
+        "progress": progress,
+    }
     rows = []
     for name, title, source in wanted:
         found: IdentifiedModel
         if isinstance(source, ModelInfo):
-            options: dict[str, Any] = of_swarm if source.searched else {}
-            found = identify(first, source.name, history=history, **options)
+            found = identify(first, source.name, history=history, **of_swarm)
         else:
             found = source
         rows.append(_compared(name, title, found, first, second, carried))
     return Comparison(rows=tuple(rows), train=first, test=second, carried=carried)
+
+
+def comparison_files(models: object, drive_unit: str) -> list[str]:
+    """Return the names of the files that `Comparison.save` writes.
+
+    Parameters
+    ----------
+    models : iterable or None
+        As for `compare`.
+    drive_unit : str
+        Unit of the record's drive.
+
+    Returns
+    -------
+    list of str
+        The figures, the models and the picture.
+    """
+    named = [f"{name}.json" for name, _, _ in _wanted(models, drive_unit)]
+    return ["comparison.json", *named, *picture_files("comparison")]
 
 
 def _wanted(models: object, drive_unit: str) -> list[tuple[str, str, ModelInfo | IdentifiedModel]]:

@@ -131,7 +131,8 @@ def identify(
     threads : int, optional
         Up to 256; all cores where it is 0 or not given.
     progress : bool, optional
-        Whether a progress bar is shown; where not given, in a terminal or notebook only.
+        Whether progress is shown: a bar in a terminal or notebook, elsewhere a line on stderr
+        every few seconds; where not given, the bar only.
     callback : callable, optional
         Called with a `Progress` after every iteration; a true return value, or StopIteration,
         stops the search.

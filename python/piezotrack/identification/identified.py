@@ -119,6 +119,12 @@ class IdentifiedModel:
         return (float(found[0]), float(found[1])) if found else None
 
     @property
+    def dt(self) -> float | None:
+        """Sampling interval of the record identified [s]; None if the file has none."""
+        found = self._record.get("dt_s")
+        return None if found is None else float(found)
+
+    @property
     def _record(self) -> Mapping[str, Any]:
         """Entries of the file on the record identified."""
         origin: Mapping[str, Any] = self.details.get("provenance") or {}

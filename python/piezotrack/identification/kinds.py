@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import _core
 from .._support.messages import quoted
+from .._support.progress_bar import ProgressBar
 from ..errors import Interrupted, ParameterError
 from .history import GAIN
 from .least_squares import LeastSquares, shown_history, solve_least_squares
@@ -79,7 +80,8 @@ def identify_kind(
             f"least_squares is {quoted(settings)}: expected a pt.identification.LeastSquares"
         )
     try:
-        return solve_least_squares(data, info, settings, offset, history)
+        with ProgressBar(of_swarm["progress"], f"identify: {info.name}, least squares"):
+            return solve_least_squares(data, info, settings, offset, history)
     except KeyboardInterrupt:
         raise Interrupted("interrupted before the weights were found") from None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from .._support.files import make_folder, save_figures, together
+from .._support.files import make_folder, picture_files, save_figures, together
 from .remarks import of_start
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .estimates import Estimate
     from .result import Identification
 
-__all__ = ["save_identification", "summary_text"]
+__all__ = ["identification_files", "save_identification", "summary_text"]
 
 # SI units that tables show in micrometres, and the factor.
 SHOWN_UNITS = {"m": ("um", 1e6), "m/V": ("um/V", 1e6)}
@@ -185,6 +185,25 @@ def _row(name: str, estimate: Estimate, width: int) -> str:
     return (
         f"  {name:<18}{estimate.symbol:<{width}}{estimate.value:>13.6g}  {estimate.unit:<9}{note}"
     ).rstrip()
+
+
+def identification_files(name: str, *, searched: bool) -> list[str]:
+    """Return the names of the files that `save_identification` writes.
+
+    Parameters
+    ----------
+    name : str
+        Beginning of the file names.
+    searched : bool
+        Whether a swarm searches the model.
+
+    Returns
+    -------
+    list of str
+        The model and its pictures.
+    """
+    pictures = ("loop", "time", "convergence") if searched else ("loop", "time")
+    return [f"{name}.json", *picture_files(*(f"{name}_{picture}" for picture in pictures))]
 
 
 def save_identification(

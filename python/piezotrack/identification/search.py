@@ -92,7 +92,7 @@ def search(
     held = _held(initial, fixed, free, bounds)
     diagnostics.check_record(data, searches_hysteresis=bool(set(info.hysteresis) - set(held)))
     full = data.full
-    with ProgressBar(progress) as bar:
+    with ProgressBar(progress, f"identify: {info.name}") as bar:
         found = _core.identify(
             model=info.name,
             u=full.u,

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["AUTO", "Trial", "identify_best"]
+__all__ = ["AUTO", "Trial", "identify_best", "kinds_tried"]
 
 AUTO = "auto"
 # Kinds that are tried for a drive in volts, and for a force.
@@ -37,6 +37,8 @@ OF_VOLTS = ("prandtl-ishlinskii", "first-order-dahl", "parallel-dahl", "bouc-wen
 OF_FORCE = ("bouc-wen-oscillator", "prandtl-ishlinskii")
 # Arguments that name parameters of one model.
 OF_ONE_MODEL = ("free", "fixed", "initial", "bounds")
+# Arguments that least squares cannot follow.
+OF_SWARM_ONLY = ("delay", "stiffness")
 # Share of the window that is fitted, and turns of the drive that each part needs.
 FITTED, TURNS = 0.6, 2
 # A residual of so many times the noise, on what was not fitted, is good enough to try no more.
@@ -110,7 +112,7 @@ def identify_best(
     swarm = dict(of_swarm)
     if swarm["swarm"] is None:
         swarm["swarm"] = ParticleSwarm(iterations=ITERATIONS)
-    infos = _kinds(data, of_swarm)
+    infos = kinds_tried(data, of_swarm)
     part, rest = _parts(data)
     noise = sample_noise(rest.y)
     trial = dict(swarm)
@@ -154,11 +156,24 @@ def identify_best(
     return replace(whole, trials=trials, fitted_until=until, details={**whole.details, **details})
 
 
-def _kinds(data: Dataset, of_swarm: Mapping[str, Any]) -> list[ModelInfo]:
-    """Kinds that can be fitted with what the caller gives."""
+def kinds_tried(data: Dataset, of_swarm: Mapping[str, Any]) -> list[ModelInfo]:
+    """Return the kinds that can be fitted with what the caller gives.
+
+    Parameters
+    ----------
+    data : Dataset
+        The record.
+    of_swarm : mapping
+        As for `identify_best`.
+
+    Returns
+    -------
+    list of ModelInfo
+        In the order in which they are tried.
+    """
     names = OF_FORCE if data.drive_unit == "N" else OF_VOLTS
     infos = [model_named(name) for name in names]
-    needs_swarm = of_swarm["delay"] is not None or of_swarm["stiffness"] is not None
+    needs_swarm = any(of_swarm.get(name) is not None for name in OF_SWARM_ONLY)
     return [info for info in infos if info.searched or not needs_swarm]
 
 

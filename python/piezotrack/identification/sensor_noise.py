@@ -88,9 +88,13 @@ class Noise:
         VirtualStage
             The same with this noise, bandwidth and resolution.
         """
-        return replace(
-            stage, noise=self.noise, noise_bandwidth=self.bandwidth, resolution=self.resolution
+        sensor = replace(
+            stage.sensor,
+            noise=self.noise,
+            noise_bandwidth=self.bandwidth,
+            resolution=self.resolution,
         )
+        return replace(stage, sensor=sensor)
 
     def spectrum(self) -> tuple[Array, Array]:
         """Amplitude spectral density of the record by Welch's method.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from difflib import get_close_matches
 from importlib import import_module
 
 from .._support.messages import quoted
@@ -13,6 +15,8 @@ __all__ = ["MODELS", "ModelInfo", "Stage", "model_named", "model_of", "stage_cla
 
 # The models as the core lists them, in its order.
 MODELS: tuple[ModelInfo, ...] = tuple(LISTED.values())
+# A longer text is no misspelt name.
+LONGEST_NAME = 100
 
 
 def model_named(name: object) -> ModelInfo:
@@ -31,13 +35,27 @@ def model_named(name: object) -> ModelInfo:
     Raises
     ------
     ParameterError
-        There is no such model.
+        There is no such model. The message names the one that is probably meant.
     """
     for model in MODELS:
         if model.name == name:
             return model
-    expected = " or ".join(repr(model.name) for model in MODELS)
-    raise ParameterError(f"model is {quoted(name)}: expected {expected}")
+    expected = ", ".join(repr(model.name) for model in MODELS)
+    hint = "" if (near := _meant(name)) is None else f". Did you mean {near!r}?"
+    raise ParameterError(f"model is {quoted(name)}: expected one of {expected}{hint}")
+
+
+def _meant(name: object) -> str | None:
+    """Return the model that a wrong name is nearest to: its initials, as PI, or almost its name."""
+    if not isinstance(name, str) or len(name) > LONGEST_NAME:
+        return None
+    plain = "-".join(re.split(r"[\s_-]+", name.strip().lower()))
+    names = [model.name for model in MODELS]
+    initials = ["".join(word[0] for word in name.split("-")) for name in names]
+    if plain in initials:
+        return names[initials.index(plain)]
+    begun = [name for name in names if len(plain) > 2 and name.startswith(plain)]
+    return next(iter(begun or get_close_matches(plain, names, n=1)), None)
 
 
 def stage_class(model: ModelInfo) -> type[Stage]:

@@ -19,7 +19,10 @@ if TYPE_CHECKING:
 
     from .reproduction import Reproduction
 
-__all__ = ["pages", "save_report"]
+__all__ = ["REPORT", "pages", "save_report"]
+
+# The files.
+REPORT = ("report.html", "report.pdf", "report.json")
 
 # Lines on a page, and their size in points.
 LINES, TYPE = 66, 7.0
@@ -33,12 +36,13 @@ def save_report(found: Reproduction, folder: str | os.PathLike[str]) -> list[Pat
     try:
         with together(make_folder(folder)) as path, without_glyph_warnings():
             page = html_text(found, figures)
-            with replacing(path / "report.html") as temporary:
+            written = [path / name for name in REPORT]
+            with replacing(written[0]) as temporary:
                 temporary.write_text(page, encoding="utf-8")
-            with replacing(path / "report.pdf") as temporary:
+            with replacing(written[1]) as temporary:
                 _write_pdf(found, figures, temporary)
-            document = write_document(path / "report.json", found.document())
-            return [path / "report.html", path / "report.pdf", document]
+            write_document(written[2], found.document())
+            return written
     finally:
         for one in figures:
             plt.close(one.figure)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
-from .._support.progress_bar import console
+from .._support.progress_bar import ProgressBar
 from .._support.two_threads import two_threads
 from ..errors import ParameterError
 from .apparatus import Apparatus, calibration_file
@@ -192,7 +192,8 @@ def reproduce(
         github.com/yan9a/DiscreteBacklashOperator, with times and units added: analysed in the
         same way, up to the feedforward.
     progress : bool, optional
-        Whether a progress bar is shown; where not given, in a terminal only.
+        Whether progress is shown: a bar in a terminal or notebook, elsewhere a line on stderr
+        every few seconds; where not given, the bar only.
 
     Returns
     -------
@@ -225,9 +226,12 @@ def reproduce(
     chosen = tuple(range(FIRST_SEED, FIRST_SEED + count))
     # A missing file is reported before the computation.
     log = None if dbo is None else drives(dbo)
-    experiments = run_experiments(apparatus, chosen[0])
-    more = sections(apparatus.seeded(chosen[0]), experiments)
-    rest = _scored(apparatus, chosen[1:], progress)
+    with ProgressBar(progress, "reproduce") as bar:
+        bar.step(0, 0, f"the first of {count} seeds, with its figures")
+        experiments = run_experiments(apparatus, chosen[0])
+        bar.step(0, 0, "results beyond the paper")
+        more = sections(apparatus.seeded(chosen[0]), experiments)
+        rest = _scored(apparatus, chosen[1:], bar)
     values, true = zip((experiments.values, experiments.true_values), *rest, strict=True)
     return Reproduction(
         experiments=experiments,
@@ -241,7 +245,7 @@ def reproduce(
 
 
 def _scored(
-    apparatus: Apparatus, seeds: Sequence[int], progress: bool | None
+    apparatus: Apparatus, seeds: Sequence[int], bar: ProgressBar
 ) -> list[tuple[dict[str, float], dict[str, float]]]:
     """Repeat the experiments with other seeds, and keep the numbers only."""
 
@@ -249,18 +253,9 @@ def _scored(
         experiments = run_experiments(apparatus, seed)
         return experiments.values, experiments.true_values
 
-    from rich.progress import track
-
-    place = console()
-    shown = place.is_terminal if progress is None else progress
+    found = []
     with two_threads() as pool:
-        return list(
-            track(
-                pool.map(score, seeds),
-                total=len(seeds),
-                description="seeds",
-                console=place,
-                transient=True,
-                disable=not shown,
-            )
-        )
+        for one in pool.map(score, seeds):
+            found.append(one)
+            bar.step(1 + len(found), 1 + len(seeds), f"{1 + len(seeds)} seeds")
+    return found

@@ -1,0 +1,253 @@
+"""Options of ``piezotrack identify`` that say how a model is found, as arguments of the library."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from ..errors import ParameterError
+from ..stages.model_info import LISTED
+from .options import number, number_range, pairs, refuse_without_effect
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from ..identification.swarm import ParticleSwarm
+
+__all__ = [
+    "AUTO",
+    "Asymmetry",
+    "Bound",
+    "Creep",
+    "Delay",
+    "Dynamics",
+    "Fix",
+    "Free",
+    "History",
+    "Kinds",
+    "KindsNamed",
+    "Plays",
+    "Swarm",
+    "fit_options",
+    "searched",
+]
+
+AUTO = "auto"
+
+KindsNamed = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--model",
+        metavar="MODEL",
+        autocompletion=lambda: list(LISTED),
+        help=f"Kind of model: {', '.join(LISTED)}; default auto, the best of them. Repeatable.",
+    ),
+]
+Free = Annotated[
+    str | None, typer.Option(metavar="A,B,...", help="Parameters to identify; default all.")
+]
+Fix = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME=VALUE",
+        help="Parameter to hold fixed, in SI units; default none. Repeatable.",
+    ),
+]
+Bound = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME=LOW:HIGH",
+        help="Bounds of a parameter, in SI units; default from the log. Repeatable.",
+    ),
+]
+Delay = Annotated[
+    str | None,
+    typer.Option(
+        metavar="fit|S|LOW:HIGH",
+        help="Sensor delay: fit it, a known value in s, or bounds in s; default none.",
+    ),
+]
+History = Annotated[
+    str | None,
+    typer.Option(
+        metavar="virgin|settled|fit",
+        help="What the stage went through before the log; default what the log shows.",
+    ),
+]
+Creep = Annotated[
+    str | None,
+    typer.Option(
+        metavar="none|fit|S,S,...",
+        help="Creep: none, fit it, or its known time constants in s; default none for models that "
+        "a swarm searches, what the log shows for the Prandtl-Ishlinskii models.",
+    ),
+]
+Plays = Annotated[
+    int | None,
+    typer.Option(
+        metavar="N",
+        help="Number of plays of a Prandtl-Ishlinskii model, 1 to 32; default 20, or what "
+        "predicts the log better.",
+    ),
+]
+Asymmetry = Annotated[
+    int | None,
+    typer.Option(
+        metavar="N",
+        help="Number of dead zones that make a Prandtl-Ishlinskii loop asymmetric, 0 to 8; "
+        "default 2.",
+    ),
+]
+Dynamics = Annotated[
+    Literal["auto", "none", "lag", "mode"] | None,
+    typer.Option(
+        help="Dynamics of a Prandtl-Ishlinskii model: none, a first-order lag or a resonance "
+        "(mode); default auto, what the log shows.",
+    ),
+]
+Swarm = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME", help="Swarm settings: xu-li-2010 or spso-2011; default settings of our own."
+    ),
+]
+
+# How a swarm is run.
+RUNNING = ("seed", "runs", "threads")
+# Options of least squares.
+OF_PLAYS = ("plays", "asymmetry", "dynamics")
+# The library's words for the dynamics.
+DYNAMICS = {"auto": "auto", "none": None, "lag": "first", "mode": "second"}
+
+
+@dataclass(frozen=True)
+class Kinds:
+    """The kinds of model that one call of ``piezotrack identify`` is to identify."""
+
+    names: tuple[str, ...]
+
+    @classmethod
+    def checked(cls, given: list[str] | None) -> Kinds:
+        """Check the names before the first model is identified."""
+        from ..stages.registry import model_named
+
+        names = tuple(given or [AUTO])
+        for i, name in enumerate(names):
+            if name != AUTO:
+                model_named(name)
+            if name in names[:i]:
+                raise ParameterError(f"--model names {name} twice: expected it once")
+        return cls(names)
+
+    def refuse_without_effect(self, context: typer.Context) -> None:
+        """Refuse options that none of the kinds has."""
+        named = ", ".join(self.names)
+        if not any(map(searched, self.names)):
+            refuse_without_effect(
+                context,
+                RUNNING,
+                f"with the model {named}, whose parameters follow by least squares",
+            )
+        if not any(map(_of_plays, self.names)):
+            refuse_without_effect(
+                context, OF_PLAYS, f"with the model {named}, whose parameters a swarm searches"
+            )
+        for given in ("delay", "stiffness"):
+            if context.params[given] is not None and self.names == (AUTO,):
+                refuse_without_effect(
+                    context, OF_PLAYS, f"with --{given}, for which a swarm has to search"
+                )
+
+    def arguments_of(self, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
+        """Arguments of `identify` for one of the kinds, without those of the others only."""
+        arguments = {key: value for key, value in given.items() if value is not None}
+        if not _of_plays(name):
+            arguments.pop("least_squares", None)
+        elif not searched(name):
+            # Its creep is a setting of the least squares.
+            arguments.pop("creep", None)
+        if not searched(name) and any(map(searched, self.names)):
+            for key in RUNNING:
+                arguments.pop(key, None)
+        return arguments
+
+
+def searched(name: str) -> bool:
+    """Whether a swarm searches a kind, or one of those that are tried."""
+    return name == AUTO or LISTED[name].searched
+
+
+def _of_plays(name: str) -> bool:
+    return name == AUTO or not LISTED[name].searched
+
+
+def fit_options(
+    *,
+    free: str | None,
+    fix: list[str] | None,
+    bound: list[str] | None,
+    delay: str | None,
+    creep: str | None,
+    plays: int | None,
+    asymmetry: int | None,
+    dynamics: str | None,
+    swarm: str | None,
+) -> dict[str, Any]:
+    """Parse the options of a fit; None stands for what was not given."""
+    relaxations = _creep(creep)
+    return {
+        "free": None if free is None else [name.strip() for name in free.split(",")],
+        "fixed": {name: number("--fix", text) for name, text in pairs("--fix", fix)} or None,
+        "bounds": {name: number_range("--bound", text) for name, text in pairs("--bound", bound)}
+        or None,
+        "delay": _delay(delay),
+        "creep": relaxations,
+        "least_squares": _least_squares(plays, asymmetry, dynamics, relaxations),
+        "swarm": _swarm(swarm),
+    }
+
+
+def _least_squares(
+    plays: int | None, asymmetry: int | None, dynamics: str | None, creep: bool | list[float] | None
+) -> Any:
+    from ..identification.least_squares import LeastSquares
+
+    settings: dict[str, Any] = {}
+    if plays is not None:
+        settings["count"] = plays
+    if asymmetry is not None:
+        settings["dead_zones"] = asymmetry
+    if dynamics is not None:
+        settings["dynamics"] = DYNAMICS[dynamics]
+    if creep is not None:
+        settings["creep"] = creep
+    return LeastSquares(**settings) if settings else None
+
+
+def _swarm(name: str | None) -> ParticleSwarm | None:
+    from ..identification.swarm import ParticleSwarm
+
+    known = {
+        "default": None,
+        "xu-li-2010": ParticleSwarm.xu_li_2010(),
+        "spso-2011": ParticleSwarm.spso_2011(),
+    }
+    if name is None:
+        return None
+    if name not in known:
+        raise ParameterError(f"--swarm is '{name}': expected {', '.join(known)}")
+    return known[name]
+
+
+def _delay(text: str | None) -> bool | float | tuple[float, float] | None:
+    if text is None or text == "fit":
+        return None if text is None else True
+    return number_range("--delay", text) if ":" in text else number("--delay", text)
+
+
+def _creep(text: str | None) -> bool | list[float] | None:
+    if text is None or text in ("fit", "none"):
+        return None if text is None else text == "fit"
+    return [number("--creep", part) for part in text.split(",")]
