@@ -46,6 +46,9 @@ __all__ = [
     "plot_tracking",
 ]
 
+# Largest error of all, over that of the settled part, from which the picture is cropped.
+CROPPED = 5.0
+
 
 def plot_motion(run: Tracking, ax: Axes | None = None) -> Axes:
     """Plot desired and actual displacement over time.
@@ -118,6 +121,7 @@ def plot_error(run: Tracking, ax: Axes | None = None) -> Axes:
         ax.plot(span, 2 * [1e6 * one.max_error], **{**LEVEL, "label": label})
     ax.axhline(0.0, **GUIDE)
     ax.set(xlabel="time [s]", ylabel="tracking error [um]")
+    _crop_start(ax, run)
     _shade_clipped(ax, run)
     _over_time(ax, run, ncols=2)
     return ax
@@ -207,6 +211,15 @@ def plot_effort(run: Tracking, ax: Axes | None = None) -> Axes:
 def _end(run: Tracking) -> float:
     """Time at which the last voltage ends [s]."""
     return float(run.t[-1]) + run.controller.dt
+
+
+def _crop_start(ax: Axes, run: Tracking) -> None:
+    """Scale the error to the settled one, where that of the way to the reference would hide it."""
+    error = 1e6 * np.abs(run.error)
+    largest, settled = float(error.max()), float(error[run.t >= run.settled].max())
+    if largest > CROPPED * settled > 0.0:
+        ax.set_ylim(-1.6 * settled, 1.6 * settled)
+        heading(ax, f"before {run.settled:g} s up to {largest:.3g} um, cropped")
 
 
 def _over_time(ax: Axes, run: Tracking, ncols: int = 3) -> None:
