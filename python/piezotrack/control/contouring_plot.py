@@ -235,7 +235,7 @@ def _plane(ax: Axes, run: Contour) -> None:
         xlim=(edges[0][0] - room, edges[0][1] + room),
         ylim=(edges[1][0] - room, edges[1][1] + room),
     )
-    few_ticks(ax)
+    few_ticks(ax, "both")
     legend_inside(ax, ncols=3)
 
 
