@@ -13,7 +13,8 @@ import pytest
 from matplotlib.figure import Figure
 
 import piezotrack as pt
-from piezotrack._support.plot_style import legend_inside, plain_log_ticks
+from piezotrack._support import plot_style
+from piezotrack._support.plot_style import folded, legend_inside, plain_log_ticks
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -143,6 +144,27 @@ def test_numbers_on_an_axis_do_not_touch(name: str) -> None:
         boxes = [label.get_window_extent(renderer) for label in labels if label.get_text()]
         boxes.sort(key=lambda box: float(box.x0))
         assert all(a.x1 < b.x0 for a, b in pairwise(boxes))
+
+
+def test_a_colour_means_one_thing() -> None:
+    roles = ("MEASURED", "DESIRED", "ERROR", "FEEDFORWARD", "FEEDBACK", "REPETITIVE", "CLIPPED")
+    colours = [getattr(plot_style, role)["color"] for role in (*roles, "SIMULATED")]
+    assert len(set(colours)) == len(colours)
+    # What a simulation of a record and what a simulated loop does is the same thing.
+    assert plot_style.ACTUAL["color"] == plot_style.SIMULATED["color"]
+    # No model of a comparison looks like an error.
+    assert plot_style.ERROR["color"] not in [line["color"] for line in plot_style.MODELS]
+
+
+def test_a_title_is_broken_evenly() -> None:
+    words = "Dahl, second order, on dbo_training, 3 to 23 s: 0.486 % of stroke rms"
+    assert folded(words, 80) == words
+    first, second = folded(words, 68).splitlines()
+    assert f"{first} {second}" == words
+    assert abs(len(first) - len(second)) < 12
+    # A word that is too long is not broken, and lines that are given are kept.
+    assert folded("x" * 100, 68) == "x" * 100
+    assert folded("one\ntwo", 68) == "one\ntwo"
 
 
 def test_a_notebook_shows_a_picture_once(monkeypatch: pytest.MonkeyPatch) -> None:

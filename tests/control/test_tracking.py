@@ -392,6 +392,20 @@ def test_the_summary_tells_the_run() -> None:
     assert "no feedforward" in fig_12("FB").summary()
 
 
+def test_the_way_to_a_reference_does_not_hide_the_settled_error() -> None:
+    # It begins 30 um above the stage at rest.
+    high = pt.sine(frequency=0.5, low=30 * UM, high=60 * UM, duration=8.0)
+    run = pt.track(STAGE, loop(feedback=PID), high)
+    largest, settled = np.abs(run.error).max(), run.metrics.max_error
+    assert largest > 5.0 * settled
+    *_, error, _ = run.plot().axes
+    low, top = error.get_ylim()
+    assert 1e6 * settled < top < 3e6 * settled
+    assert low < -1e6 * settled
+    assert f"up to {1e6 * largest:.3g} um, cropped" in error.get_title()
+    plt.close("all")
+
+
 @pytest.mark.parametrize("which", ["FF FB", "saturated"])
 def test_the_pictures_have_labels_with_units_and_no_empty_panel(which: str) -> None:
     run = fig_13(PID) if which == "saturated" else fig_12(which)

@@ -42,6 +42,7 @@ __all__ = [
     "SIMULATED",
     "axes_or_new",
     "few_ticks",
+    "folded",
     "heading",
     "legend_inside",
     "literal",
@@ -176,12 +177,21 @@ def few_ticks(ax: Axes, axis: str = "x") -> None:
 
 def heading(ax: Axes, words: str, width: int = 68) -> None:
     """Write a title in lines that fit the axes; `words` may hold line breaks."""
-    lines = [part for line in words.splitlines() for part in _folded(line, width)]
-    ax.set_title("\n".join(lines), fontsize="medium")
+    ax.set_title(folded(words, width), fontsize="medium")
 
 
-def _folded(line: str, width: int) -> list[str]:
-    return wrap(line, width, break_long_words=False, break_on_hyphens=False)
+def folded(words: str, width: int) -> str:
+    """Break lines that are too long, into parts of about one length."""
+    return "\n".join(part for line in words.splitlines() for part in _evenly(line, width))
+
+
+def _evenly(line: str, width: int) -> list[str]:
+    def parts(most: int) -> list[str]:
+        return wrap(line, most, break_long_words=False, break_on_hyphens=False)
+
+    # The shortest lines of which there are as few; no single word on the last one.
+    needed = len(parts(width))
+    return next((parts(most) for most in range(20, width) if len(parts(most)) == needed), [line])
 
 
 def literal(words: str) -> str:

@@ -216,7 +216,8 @@ def feedforward_command(
     table = {"time_s": samples.t, "voltage_V": voltage, "displacement_um": 1e6 * samples.x}
     with together(make_folder(out)) as folder:
         written = [write_columns(folder / "feedforward.csv", table)]
-        picture = plot_feedforward(samples.t, voltage, samples.x)
+        title = f"feedforward ({known.model.info.title}) for {desired.name}"
+        picture = plot_feedforward(samples.t, voltage, samples.x, title=title)
         written += save_figures({"feedforward": picture}, folder)
     notes = known.beyond_fit(voltage, interval)
     lines = [

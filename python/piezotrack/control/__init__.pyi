@@ -12,6 +12,9 @@ from .contouring import Contour as Contour
 from .contouring import Workspace as Workspace
 from .contouring import contour as contour
 from .contouring import workspace as workspace
+from .contouring_plot import plot_contour_error as plot_contour_error
+from .contouring_plot import plot_magnified as plot_magnified
+from .contouring_plot import plot_path as plot_path
 from .controller import Controller as Controller
 from .linear_systems import to_control as to_control
 from .plant import Plant as Plant
@@ -25,3 +28,7 @@ from .stability import check_loop as check_loop
 from .tracking import Metrics as Metrics
 from .tracking import Tracking as Tracking
 from .tracking import track as track
+from .tracking_plot import plot_effort as plot_effort
+from .tracking_plot import plot_error as plot_error
+from .tracking_plot import plot_following as plot_following
+from .tracking_plot import plot_motion as plot_motion

@@ -149,6 +149,8 @@ class Contour:
     def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Plot path and positions, the error magnified along the path, and the errors over time.
 
+        One panel alone, in axes of your own: `plot_path`, `plot_magnified`, `plot_contour_error`.
+
         Parameters
         ----------
         fig : matplotlib.figure.Figure or SubFigure, optional

@@ -57,6 +57,17 @@ def plot_path(run: Contour, ax: Axes | None = None) -> Axes:
     -------
     matplotlib.axes.Axes
         With the picture.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> import piezotrack as pt
+    >>> stage = pt.XYStage.xu_li_2010(seed=1)
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+    >>> run = pt.contour(stage, (loop, loop), pt.circle(frequency=0.5, radius=10e-6))
+    >>> ax = pt.control.plot_path(run, ax=Figure().subplots())
+    >>> ax.get_ylabel()
+    'y [um]'
     """
     (ax,) = axes_or_new(ax, 1)
     start, part = run.t < run.settled, last_turn(run)
@@ -86,6 +97,17 @@ def plot_magnified(run: Contour, ax: Axes | None = None, factor: float | None = 
     -------
     matplotlib.axes.Axes
         With the picture.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> import piezotrack as pt
+    >>> stage = pt.XYStage.xu_li_2010(seed=1)
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+    >>> run = pt.contour(stage, (loop, loop), pt.circle(frequency=0.5, radius=10e-6))
+    >>> ax = pt.control.plot_magnified(run, ax=Figure().subplots())
+    >>> ax.get_ylabel()
+    'y [um]'
     """
     (ax,) = axes_or_new(ax, 1)
     part = last_turn(run)
@@ -121,6 +143,17 @@ def plot_contour_error(run: Contour, ax: Axes | None = None) -> Axes:
     -------
     matplotlib.axes.Axes
         With the picture.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> import piezotrack as pt
+    >>> stage = pt.XYStage.xu_li_2010(seed=1)
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+    >>> run = pt.contour(stage, (loop, loop), pt.circle(frequency=0.5, radius=10e-6))
+    >>> ax = pt.control.plot_contour_error(run, ax=Figure().subplots())
+    >>> ax.get_ylabel()
+    'contour error [um]'
     """
     (ax,) = axes_or_new(ax, 1)
     part = last_turn(run)
@@ -202,7 +235,7 @@ def _plane(ax: Axes, run: Contour) -> None:
         xlim=(edges[0][0] - room, edges[0][1] + room),
         ylim=(edges[1][0] - room, edges[1][1] + room),
     )
-    few_ticks(ax)
+    few_ticks(ax, "both")
     legend_inside(ax, ncols=3)
 
 

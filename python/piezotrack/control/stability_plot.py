@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +13,7 @@ from .._support.plot_style import (
     GUIDE,
     LEVEL,
     REPETITIVE,
+    folded,
     legend_inside,
     panels,
     whole,
@@ -76,7 +76,7 @@ def plot_loop_report(report: LoopReport, fig: Figure | SubFigure | None = None) 
     legend_inside(phase)
     gain, verdict = str(report.middle).split(": ", 1)
     words = f"{parts_text(report.controller)} on a stage of {gain}: {verdict}"
-    figure.suptitle("\n".join(wrap(words, 78)), fontsize="medium")
+    figure.suptitle(folded(words, 78), fontsize="medium")
     return whole(figure)
 
 

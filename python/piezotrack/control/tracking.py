@@ -235,6 +235,9 @@ class Tracking:
     def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Desired and actual motion, error, actual against desired, and the parts of the voltage.
 
+        One panel alone, in axes of your own: `plot_motion`, `plot_error`, `plot_following`,
+        `plot_effort`.
+
         Parameters
         ----------
         fig : matplotlib.figure.Figure or SubFigure, optional

@@ -46,6 +46,9 @@ __all__ = [
     "plot_tracking",
 ]
 
+# Largest error of all, over that of the settled part, from which the picture is cropped.
+CROPPED = 5.0
+
 
 def plot_motion(run: Tracking, ax: Axes | None = None) -> Axes:
     """Plot desired and actual displacement over time.
@@ -61,6 +64,17 @@ def plot_motion(run: Tracking, ax: Axes | None = None) -> Axes:
     -------
     matplotlib.axes.Axes
         With the picture.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> import piezotrack as pt
+    >>> stage = pt.DahlStage.xu_li_2010()
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
+    >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
+    >>> ax = pt.control.plot_motion(run, ax=Figure().subplots())
+    >>> ax.get_ylabel()
+    'displacement [um]'
     """
     (ax,) = axes_or_new(ax, 1)
     kept = thinned(run.fine_displacement)
@@ -85,6 +99,17 @@ def plot_error(run: Tracking, ax: Axes | None = None) -> Axes:
     -------
     matplotlib.axes.Axes
         With the picture.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> import piezotrack as pt
+    >>> stage = pt.DahlStage.xu_li_2010()
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
+    >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
+    >>> ax = pt.control.plot_error(run, ax=Figure().subplots())
+    >>> ax.get_ylabel()
+    'tracking error [um]'
     """
     (ax,) = axes_or_new(ax, 1)
     ax.plot(run.t, 1e6 * run.error, **{**ERROR, "label": "desired - measured"})
@@ -96,6 +121,7 @@ def plot_error(run: Tracking, ax: Axes | None = None) -> Axes:
         ax.plot(span, 2 * [1e6 * one.max_error], **{**LEVEL, "label": label})
     ax.axhline(0.0, **GUIDE)
     ax.set(xlabel="time [s]", ylabel="tracking error [um]")
+    _crop_start(ax, run)
     _shade_clipped(ax, run)
     _over_time(ax, run, ncols=2)
     return ax
@@ -115,6 +141,17 @@ def plot_following(run: Tracking, ax: Axes | None = None) -> Axes:
     -------
     matplotlib.axes.Axes
         With the picture.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> import piezotrack as pt
+    >>> stage = pt.DahlStage.xu_li_2010()
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
+    >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
+    >>> ax = pt.control.plot_following(run, ax=Figure().subplots())
+    >>> ax.get_ylabel()
+    'measured displacement [um]'
     """
     (ax,) = axes_or_new(ax, 1)
     part = run.t >= run.settled
@@ -141,6 +178,17 @@ def plot_effort(run: Tracking, ax: Axes | None = None) -> Axes:
     -------
     matplotlib.axes.Axes
         With the picture.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> import piezotrack as pt
+    >>> stage = pt.DahlStage.xu_li_2010()
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
+    >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
+    >>> ax = pt.control.plot_effort(run, ax=Figure().subplots())
+    >>> ax.get_ylabel()
+    'voltage [V]'
     """
     (ax,) = axes_or_new(ax, 1)
     ax.step(run.t, run.voltage, where="post", **COMMAND)
@@ -163,6 +211,15 @@ def plot_effort(run: Tracking, ax: Axes | None = None) -> Axes:
 def _end(run: Tracking) -> float:
     """Time at which the last voltage ends [s]."""
     return float(run.t[-1]) + run.controller.dt
+
+
+def _crop_start(ax: Axes, run: Tracking) -> None:
+    """Scale the error to the settled one, where that of the way to the reference would hide it."""
+    error = 1e6 * np.abs(run.error)
+    largest, settled = float(error.max()), float(error[run.t >= run.settled].max())
+    if largest > CROPPED * settled > 0.0:
+        ax.set_ylim(-1.6 * settled, 1.6 * settled)
+        heading(ax, f"before {run.settled:g} s up to {largest:.3g} um, cropped")
 
 
 def _over_time(ax: Axes, run: Tracking, ncols: int = 3) -> None:

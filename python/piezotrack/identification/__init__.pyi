@@ -15,10 +15,15 @@ from .identified import IdentifiedModel as IdentifiedModel
 from .identified import Score as Score
 from .identified import load as load
 from .least_squares import LeastSquares as LeastSquares
+from .plot import plot_convergence as plot_convergence
+from .plot import plot_loop as plot_loop
+from .plot import plot_time as plot_time
 from .result import Identification as Identification
 from .selection import Trial as Trial
 from .sensor_noise import Noise as Noise
 from .sensor_noise import identify_noise as identify_noise
+from .step_plot import plot_spectrum as plot_spectrum
+from .step_plot import plot_step as plot_step
 from .step_readings import StepReadings as StepReadings
 from .step_response import StepResult as StepResult
 from .step_response import StepTrace as StepTrace

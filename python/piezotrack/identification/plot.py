@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 __all__ = [
+    "named",
     "plot_convergence",
     "plot_identification",
     "plot_loop",
@@ -70,6 +71,17 @@ def plot_loop(
     -------
     matplotlib.axes.Axes
         The axes drawn on.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> import piezotrack as pt
+    >>> log = pt.datasets.dbo_training()[3.0:8.0]
+    >>> fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
+    >>> run = fit.simulate(log, offset=fit.offset)
+    >>> ax = pt.identification.plot_loop(log, run, ax=Figure().subplots())
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('drive [V]', 'displacement [um]')
     """
     (ax,) = axes_or_new(ax, 1)
     unit, scale = best_length_unit(data.stroke)
@@ -112,6 +124,17 @@ def plot_time(
     -------
     tuple of two matplotlib.axes.Axes
         Displacement, error.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> import piezotrack as pt
+    >>> log = pt.datasets.dbo_training()[3.0:8.0]
+    >>> fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
+    >>> run = fit.simulate(log, offset=fit.offset)
+    >>> above, below = pt.identification.plot_time(log, run, axes=Figure().subplots(2, 1))
+    >>> below.get_ylabel()
+    'error [nm]'
     """
     above, below = axes_or_new(axes, 2)
     unit, scale = best_length_unit(data.stroke)
@@ -143,7 +166,9 @@ def plot_time(
     return above, below
 
 
-def plot_convergence(fit: Identification, ax: Axes | None = None) -> Axes:
+def plot_convergence(
+    fit: Identification, ax: Axes | None = None, *, title: str = "Convergence"
+) -> Axes:
     """Draw the best cost of the swarm after each iteration, and where the other restarts ended.
 
     Parameters
@@ -152,11 +177,23 @@ def plot_convergence(fit: Identification, ax: Axes | None = None) -> Axes:
         Result of a search.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure where not given.
+    title : str, optional
+        What ran.
 
     Returns
     -------
     matplotlib.axes.Axes
         The axes drawn on.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> import piezotrack as pt
+    >>> log, few = pt.datasets.dbo_training()[3.0:5.0], pt.ParticleSwarm(iterations=3)
+    >>> fit = pt.identify(log, "dahl", swarm=few, runs=1, seed=1, progress=False)
+    >>> ax = pt.identification.plot_convergence(fit, ax=Figure().subplots())
+    >>> ax.get_ylabel()
+    'best cost, rms [um]'
     """
     (ax,) = axes_or_new(ax, 1)
     # A cost of 0 has no place on a logarithmic scale.
@@ -182,7 +219,7 @@ def plot_convergence(fit: Identification, ax: Axes | None = None) -> Axes:
     ax.margins(x=0.02)
     heading(
         ax,
-        f"Convergence: {fit.nit} iterations, {fit.nfev} simulations",
+        f"{title}: {fit.nit} iterations, {fit.nfev} simulations",
     )
     legend_inside(ax, ncols=2)
     if finite.any():
@@ -264,17 +301,17 @@ def plot_identification(
         title = what_was_fitted(fit)
     else:
         rms = 100.0 * float(np.sqrt(np.mean((record.y - run.x) ** 2))) / fit.stroke
-        title = f"{_named(fit, record)}, not fitted: {rms:.3g} % of stroke rms"
+        title = f"{named(fit, record)}, not fitted: {rms:.3g} % of stroke rms"
     figure.suptitle(title, fontsize="large")
     return whole(figure)
 
 
 def what_was_fitted(fit: Identification) -> str:
     """Write model, record, window and error of a fit, as the title of its pictures."""
-    return f"{_named(fit, fit.data)}: {fit.cost_percent:.3g} % of stroke rms"
+    return f"{named(fit, fit.data)}: {fit.cost_percent:.3g} % of stroke rms"
 
 
-def _named(fit: Identification, record: Dataset) -> str:
+def named(fit: Identification, record: Dataset) -> str:
     """Write model, record and window."""
     first, last = float(record.t[0]), float(record.t[-1]) + record.dt
     source = literal(record.source) if record.source else "the record"

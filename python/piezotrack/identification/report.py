@@ -232,7 +232,7 @@ def save_identification(
         ``{name}.json``, and as PNG and SVG ``{name}_loop``, ``{name}_time`` and, after a swarm
         search, ``{name}_convergence``.
     """
-    from .plot import plot_convergence, plot_loop, plot_time, what_was_fitted
+    from .plot import named, plot_convergence, plot_loop, plot_time, what_was_fitted
 
     name = fit.model.info.name if name is None else name
     record = fit.data if shown is None else shown
@@ -245,6 +245,6 @@ def save_identification(
         f"{name}_time": above.figure,
     }
     if fit.swarm is not None:
-        figures[f"{name}_convergence"] = plot_convergence(fit).figure
+        figures[f"{name}_convergence"] = plot_convergence(fit, title=named(fit, fit.data)).figure
     with together(make_folder(folder)) as path:
         return [fit.save(path / f"{name}.json"), *save_figures(figures, path)]  # type: ignore[arg-type]

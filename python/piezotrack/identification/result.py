@@ -211,6 +211,8 @@ class Identification(IdentifiedModel):
     def plot(self, data: Dataset | None = None, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Loop, displacement with its error over time, and convergence of a swarm.
 
+        One panel alone, in axes of your own: `plot_loop`, `plot_time`, `plot_convergence`.
+
         Parameters
         ----------
         data : Dataset, optional

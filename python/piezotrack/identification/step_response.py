@@ -262,6 +262,8 @@ class StepResult:
     def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Draw the step with its peaks marked, and the spectrum with its resonance.
 
+        One panel alone, in axes of your own: `plot_step`, `plot_spectrum`.
+
         Parameters
         ----------
         fig : matplotlib.figure.Figure or SubFigure, optional
