@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._support.plot_style import MEASURED, literal, thinned
-from .._support.units import best_length_unit
+from .._support.units import best_length_unit, shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -71,10 +71,13 @@ def _loops(comparison: Comparison, ax: Axes) -> None:
     off: Array = np.max([np.abs(data.y - x) for x in followed], axis=0)
     part = _cycle(data.u, off)
     unit, scale = best_length_unit(data.stroke)
-    ax.plot(data.u[part], scale * data.y[part], **MEASURED)
+    drive, times = shown_unit(data.drive_unit)
+    ax.plot(times * data.u[part], scale * data.y[part], **MEASURED)
     for row, x, line in zip(comparison.rows, followed, _lines(comparison), strict=True):
-        ax.plot(data.u[part], scale * x[part], label=literal(row.title), linewidth=1.1, **line)
-    ax.set(xlabel=f"drive [{literal(data.drive_unit)}]", ylabel=f"displacement [{unit}]")
+        ax.plot(
+            times * data.u[part], scale * x[part], label=literal(row.title), linewidth=1.1, **line
+        )
+    ax.set(xlabel=f"drive [{literal(drive)}]", ylabel=f"displacement [{unit}]")
     when = f"{data.t[part][0]:.4g} to {data.t[part][-1]:.4g} s"
     where = "" if comparison.carried else f" of {literal(data.source or 'the other record')}"
     ax.set_title(f"Largest error: {when}{where}", fontsize="medium")

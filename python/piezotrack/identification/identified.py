@@ -14,7 +14,7 @@ from .._support.files import write_document
 from ..data.dataset import Dataset
 from ..errors import ParameterError, ShapeError
 from .history import begin, checked_history, same_beginning
-from .model_file import document_of, read_model, sensor_number
+from .model_file import document_of, drive_unit_of, read_model, sensor_number
 from .remarks import beyond_fit
 
 if TYPE_CHECKING:
@@ -116,6 +116,11 @@ class IdentifiedModel:
         return (float(found[0]), float(found[1])) if found else None
 
     @property
+    def drive_unit(self) -> str:
+        """Unit of the drive, SI: ``"V"``, ``"N"``, or ``"m"`` where the drive is a position."""
+        return drive_unit_of(self.details, self.model.info)
+
+    @property
     def _record(self) -> Mapping[str, Any]:
         """Entries of the file on the record identified."""
         origin: Mapping[str, Any] = self.details.get("provenance") or {}
@@ -161,7 +166,8 @@ class IdentifiedModel:
         interval = None if dt is None else check_dt(dt)
         if not drive.size:
             raise ShapeError("u has no samples: expected at least one")
-        return beyond_fit(drive, interval, self.drive_range, None if rate is None else float(rate))
+        most = None if rate is None else float(rate)
+        return beyond_fit(drive, interval, self.drive_range, most, self.drive_unit)
 
     def fitted_on(self, data: Dataset) -> bool:
         """Return whether a record is the one identified, sample by sample.
@@ -279,6 +285,11 @@ class IdentifiedModel:
         """
         if not isinstance(data, Dataset):
             raise ParameterError(f"data is {type(data).__name__}: expected a Dataset")
+        if data.drive_unit != (unit := self.drive_unit) and "m" in (unit, data.drive_unit):
+            raise ParameterError(
+                f"the drive of the record is in {data.drive_unit}: expected {unit}, as that of the "
+                "record identified"
+            )
         state = self._begins(data, history, initial)
         start = data.warmup
         run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)

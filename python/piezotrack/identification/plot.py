@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._support.plot_style import MEASURED, axes_or_new, literal, plain_log_ticks, thinned
-from .._support.units import best_length_unit
+from .._support.units import best_length_unit, shown_unit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -57,10 +57,11 @@ def plot_loop(data: Dataset, run: Response, ax: Axes | None = None) -> Axes:
     """
     (ax,) = axes_or_new(ax, 1)
     unit, scale = best_length_unit(data.stroke)
+    drive, times = shown_unit(data.drive_unit)
     for y, style in ((data.y, MEASURED), (run.x, SIMULATED)):
         kept = thinned(y)
-        ax.plot(data.u[kept], scale * y[kept], **style)
-    ax.set(xlabel=f"drive [{literal(data.drive_unit)}]", ylabel=f"displacement [{unit}]")
+        ax.plot(times * data.u[kept], scale * y[kept], **style)
+    ax.set(xlabel=f"drive [{literal(drive)}]", ylabel=f"displacement [{unit}]")
     ax.set_title("Hysteresis loop")
     ax.legend(loc="upper left", frameon=False)
     return ax
@@ -172,13 +173,15 @@ def plot_convergence(fit: Identification, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def plot_response(t: Array, u: Array, x: Array) -> Figure:
+def plot_response(t: Array, u: Array, x: Array, drive_unit: str = "V") -> Figure:
     """Draw a simulated displacement over time and over the drive.
 
     Parameters
     ----------
     t, u, x : ndarray, shape (n,)
         Time [s], drive [V], displacement [m].
+    drive_unit : str, optional
+        Unit of the drive, SI.
 
     Returns
     -------
@@ -193,8 +196,11 @@ def plot_response(t: Array, u: Array, x: Array) -> Figure:
     left.plot(t[kept], scale * x[kept], **SIMULATED)
     left.set(xlabel="time [s]", ylabel=f"displacement [{unit}]", title="Displacement over time")
     left.margins(x=0.0)
-    right.plot(u[kept], scale * x[kept], **SIMULATED)
-    right.set(xlabel="drive [V]", ylabel=f"displacement [{unit}]", title="Hysteresis loop")
+    drive, times = shown_unit(drive_unit)
+    right.plot(times * u[kept], scale * x[kept], **SIMULATED)
+    right.set(
+        xlabel=f"drive [{literal(drive)}]", ylabel=f"displacement [{unit}]", title="Hysteresis loop"
+    )
     return figure
 
 

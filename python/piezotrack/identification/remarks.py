@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .._support.units import drive_text, shown_unit
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -76,7 +78,11 @@ def drive_rate(u: Array, dt: float) -> float:
 
 
 def beyond_fit(
-    u: Array, dt: float | None, fitted: tuple[float, float] | None, rate: float | None
+    u: Array,
+    dt: float | None,
+    fitted: tuple[float, float] | None,
+    rate: float | None,
+    unit: str = "V",
 ) -> list[str]:
     """Remarks on a drive that goes beyond the record identified.
 
@@ -90,6 +96,8 @@ def beyond_fit(
         Range of the drive of the record identified [V].
     rate : float or None
         Its rate [V/s].
+    unit : str, optional
+        Unit of the drive, SI.
 
     Returns
     -------
@@ -102,18 +110,19 @@ def beyond_fit(
     ['the drive goes from 0 to 90 V, that of the record identified from 0 to 75 V']
     """
     remarks = []
+    name, scale = shown_unit(unit)
     low, high = float(u.min()), float(u.max())
     if fitted is not None:
         margin = MARGIN * (fitted[1] - fitted[0])
         if low < fitted[0] - margin or high > fitted[1] + margin:
             remarks.append(
-                f"the drive goes from {low:.4g} to {high:.4g} V, that of the record identified "
-                f"from {fitted[0]:.4g} to {fitted[1]:.4g} V"
+                f"the drive goes from {scale * low:.4g} to {scale * high:.4g} {name}, that of the "
+                f"record identified from {scale * fitted[0]:.4g} to {scale * fitted[1]:.4g} {name}"
             )
     if rate and dt is not None and (found := drive_rate(u, dt)) > FASTER * rate:
         remarks.append(
-            f"the drive moves at up to {found:.3g} V/s, that of the record identified at "
-            f"{rate:.3g} V/s: the dynamics beyond that rate were not fitted"
+            f"the drive moves at up to {scale * found:.3g} {name}/s, that of the record identified "
+            f"at {scale * rate:.3g} {name}/s: the dynamics beyond that rate were not fitted"
         )
     return remarks
 
@@ -136,14 +145,14 @@ def of_start(start: Start | None, data: Dataset) -> str | None:
     if start is None:
         return None
     unit, first = data.drive_unit, float(data.full.u[0])
-    volts = start.voltage
-    came_from = "another voltage" if volts is None else f"{volts:.4g} {unit}"
+    other = start.voltage
+    came_from = "another drive" if other is None else drive_text(other, unit)
     before = {
         "virgin": "never moved before",
         "settled": "settled under the record's own drive",
         "fit": f"having come from {came_from}, which was fitted",
     }[start.history]
-    return f"in equilibrium at {first:.4g} {unit}, {before}"
+    return f"in equilibrium at {drive_text(first, unit)}, {before}"
 
 
 def of_lags(lags: LagRange | None, frequency: float) -> list[str]:

@@ -11,6 +11,7 @@ from .. import _core
 from .._support.arguments import as_numbers
 from .._support.messages import quoted
 from .._support.progress_bar import ProgressBar
+from .._support.units import of_drive
 from ..data import diagnostics
 from ..errors import Interrupted, ParameterError
 from ..stages.registry import stage_class
@@ -216,6 +217,7 @@ def _identification(
     history: History,
 ) -> Identification:
     facts = {one.name: (one.unit, one.symbol) for one in info.parameters} | SENSOR
+    facts = {name: (of_drive(unit, data.drive_unit), sign) for name, (unit, sign) in facts.items()}
     parameters = {}
     for one in found.estimates:
         unit, symbol = facts[one["name"]]
