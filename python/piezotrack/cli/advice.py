@@ -100,4 +100,4 @@ def as_options(text: str) -> str:
         if needed in options:
             text = re.sub(python, option, text)
     # An option at the end of a sentence or before a comma.
-    return re.sub(r"(--[a-z-]+) (?=[,;:)\n]|$)", r"\1", text)
+    return re.sub(r"(--[a-z-]+) (?=[,;:)\n]|\.(?:\s|$)|$)", r"\1", text)

@@ -15,7 +15,7 @@ from ..data.dataset import Dataset
 from ..errors import ParameterError, ShapeError
 from .history import begin, checked_history, same_beginning
 from .model_file import document_of, drive_unit_of, read_model, sensor_number
-from .remarks import beyond_fit
+from .remarks import beyond_fit, fit_percent
 
 if TYPE_CHECKING:
     import os
@@ -46,6 +46,8 @@ class Score:
         Stroke that the percentages refer to [m].
     offset : float
         Offset added to the simulated displacement [m].
+    spread : float
+        Standard deviation of the measured displacement [m], to which `fit_percent` refers.
     notes : tuple of str
         Remarks on a record that goes beyond the one identified.
     """
@@ -54,6 +56,7 @@ class Score:
     max_error: float
     stroke: float
     offset: float
+    spread: float = math.nan
     notes: tuple[str, ...] = ()
 
     @property
@@ -66,10 +69,19 @@ class Score:
         """`max_error` in per cent of the stroke."""
         return 100.0 * self.max_error / self.stroke
 
+    @property
+    def fit_percent(self) -> float:
+        """Share of the motion that the model explains, 100 (1 - |y - x| / |y - mean y|) [%].
+
+        100 for an exact model; 0 for one that is no better than the mean of the record.
+        """
+        return fit_percent(self.rms, self.spread)
+
     def __str__(self) -> str:
+        fit = "" if math.isnan(self.spread) else f", fit {self.fit_percent:.4g} %"
         return (
             f"rms {1e6 * self.rms:.4g} um ({self.rms_percent:.3g} % of stroke), "
-            f"max {1e6 * self.max_error:.4g} um ({self.max_percent:.3g} %)"
+            f"max {1e6 * self.max_error:.4g} um ({self.max_percent:.3g} %){fit}"
         )
 
 
@@ -337,6 +349,7 @@ class IdentifiedModel:
             max_error=float(np.abs(error).max()),
             stroke=self.stroke,
             offset=shift,
+            spread=float(np.std(data.y)),
             notes=tuple(self.beyond_fit(data.u, data.dt)),
         )
 

@@ -13,7 +13,7 @@ from .._support.units import of_drive
 from ..errors import DataError, ParameterError, PiezotrackError
 from ..stages.registry import model_named, stage_class
 from .history import start_entry, start_of
-from .remarks import drive_rate
+from .remarks import drive_rate, fit_percent
 
 if TYPE_CHECKING:
     import os
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..stages.model_info import ModelInfo
     from .identified import IdentifiedModel
 
-__all__ = ["document_of", "drive_unit_of", "provenance", "read_model", "sensor_number"]
+__all__ = ["document_of", "drive_unit_of", "fit_entry", "provenance", "read_model", "sensor_number"]
 
 FORMAT = "piezotrack-model"
 SCHEMA_VERSION = 2
@@ -256,6 +256,27 @@ def entries_of(name: str) -> Iterator[None]:
         raise DataError(f"{name}: an entry is not of the form that 'save' writes") from None
     except PiezotrackError as error:
         raise DataError(f"{name}: {error}") from None
+
+
+def fit_entry(cost: float, data: Dataset) -> dict[str, Any]:
+    """Entries of a file on the residual of a fit.
+
+    Parameters
+    ----------
+    cost : float
+        Its root mean square [m].
+    data : Dataset
+        The record.
+
+    Returns
+    -------
+    dict
+        Of numbers, texts and dicts only.
+    """
+    return {
+        "cost": {"value": cost, "unit": "m"},
+        "fit_percent": {"value": fit_percent(cost, float(data.y.std())), "unit": "%"},
+    }
 
 
 def provenance(data: Dataset, **settings: Any) -> dict[str, Any]:

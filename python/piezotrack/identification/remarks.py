@@ -18,7 +18,15 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["above_noise", "beyond_fit", "drive_rate", "first_samples", "of_lags", "of_start"]
+__all__ = [
+    "above_noise",
+    "beyond_fit",
+    "drive_rate",
+    "first_samples",
+    "fit_percent",
+    "of_lags",
+    "of_start",
+]
 
 # A residual of so many times the noise is not due to the noise.
 NOISY = 3.0
@@ -28,6 +36,29 @@ VISCOUS = 0.02
 FIRST, CARRIED = 0.1, 0.5
 # Margin of the drive's range, and factor of its rate, beyond which a model was not fitted.
 MARGIN, FASTER = 0.01, 2.0
+
+
+def fit_percent(rms: float, spread: float) -> float:
+    """Return the share of a motion that a model explains [%].
+
+    Parameters
+    ----------
+    rms : float
+        Root mean square of the residual [m].
+    spread : float
+        Standard deviation of the measured displacement [m].
+
+    Returns
+    -------
+    float
+        100 for an exact model, 0 or less for one that is no better than the mean.
+
+    Examples
+    --------
+    >>> fit_percent(1e-6, 20e-6)
+    95.0
+    """
+    return 100.0 * (1.0 - rms / spread) if spread else -math.inf
 
 
 def above_noise(cost: float, noise: float) -> list[str]:

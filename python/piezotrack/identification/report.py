@@ -43,7 +43,8 @@ def summary_text(fit: Identification) -> str:
         f"{fit.model.info.title}: stage identified from {data.source or 'a record'}, "
         f"{len(data)} samples, {data.duration:.4g} s at {1 / data.dt:.6g} Hz, "
         f"stroke {1e6 * data.stroke:.4g} um",
-        f"cost  {fit.cost_um:.4g} um rms = {fit.cost_percent:.3g} % of stroke"
+        f"cost  {fit.cost_um:.4g} um rms = {fit.cost_percent:.3g} % of stroke, "
+        f"fit {fit.fit_percent:.4g} %"
         + (f", offset {1e6 * fit.offset:.5g} um fitted" if fit.offset_fitted else ""),
     ]
     if begun := of_start(fit.start, data):
@@ -69,7 +70,7 @@ def _trials(fit: Identification) -> list[str]:
     where = (
         "on the part fitted, as the window is too short for another"
         if fit.fitted_until is None
-        else f"after {fit.fitted_until:.4g} s, fitted before"
+        else f"after {fit.fitted_until:.4g} s, fitted before that"
     )
     return [f"      chosen by the rms {where}: {scores}"]
 
@@ -79,9 +80,9 @@ def _estimates(fit: Identification) -> list[str]:
     lines = [*_known(fit), ""]
     if fit.scale_assumed:
         lines += [
-            f"parameters, scale assumed: K = {fit.model.stiffness:g} N/m is nominal. Voltage and",
-            "displacement do not determine forces; the true stiffness= would scale "
-            f"{fit.model.info.force_symbols}.",
+            "parameters, scale assumed: a log of drive and displacement determines no force, so",
+            f"K = {fit.model.stiffness:g} N/m was assumed. {fit.model.info.force_symbols} scale "
+            "with it; for real values give stiffness=.",
         ]
     else:
         lines.append("parameters")
@@ -137,7 +138,7 @@ def _scaled(fit: Identification, one: Parameter) -> list[float]:
 def _runs(fit: Identification) -> list[str]:
     """Say whether several runs agree."""
     if len(fit.runs) == 1:
-        return ["      one run: several (runs=4) would show whether there are other local minima"]
+        return ["      one run: runs=4 would show whether there are other local minima"]
     costs = ", ".join(f"{1e6 * cost:.4g}" for cost in sorted(run.cost for run in fit.runs)[:4])
     more = ", ..." if len(fit.runs) > 4 else ""
     verdict = f"{fit.agreeing} of {len(fit.runs)} runs end within 0.1 % of the best"

@@ -17,7 +17,7 @@ from ..errors import Interrupted, ParameterError
 from ..stages.registry import stage_class
 from .estimates import Estimate, LagRange, Progress, SwarmRun
 from .history import start_after
-from .model_file import provenance
+from .model_file import fit_entry, provenance
 from .result import Identification
 from .step_response import StepResult
 from .swarm import ParticleSwarm
@@ -244,7 +244,7 @@ def _identification(
         | {"creep_weights": {"free": True}, "creep_times": {"free": False}},
         "delay": _details(parameters["delay"]) if "delay" in parameters else {},
         "fit": {
-            "cost": {"value": found.rms, "unit": "m"},
+            **fit_entry(found.rms, data),
             "iterations": found.iterations,
             "simulations": sum(nfev for _, _, nfev, _ in found.runs),
             "polish_simulations": found.polish_evaluations,
