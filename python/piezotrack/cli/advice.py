@@ -30,7 +30,7 @@ ADVICE = [
     (r"\bunstable=True", "--unstable", "--unstable"),
     (r"pt\.\w+\.from_um\(k[pq]=.*\)", "a value in V/um", "--kp"),
     (r"\bcreep=False", "--creep none", "--creep"),
-    (r"\bmodel='(\w+)'", r"--model \1", "--model"),
+    (r"\bmodel='([\w-]+)'", r"--model \1", "--model"),
     (r"\bcount is (?=\d+: expected 1 to)", "--plays is ", "--plays"),
     (r"\bdead_zones is ", "--asymmetry is ", "--asymmetry"),
     (r"\blog\[([^\]]*)\]", r"--window \1", "--window"),
