@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 DT = 0.01
 CIRCLE = pt.circle(frequency=0.1, radius=10e-6)
 FIGURE = pt.lissajous(frequencies=(0.2, 0.3), sizes=(20e-6, 20e-6))
-VIRTUAL = dataclasses.replace(pt.VirtualStage.xu_li_2010(), preconditioned=False, step=1e-3)
+VIRTUAL = dataclasses.replace(pt.VirtualStage.xu_li_2010(), preconditioning=None, step=1e-3)
 XY = pt.XYStage(x=VIRTUAL, y=VIRTUAL, cross_talk=(0.01, 0.02))
 MODEL = pt.identification.IdentifiedModel(
     model=STAGES["prandtl-ishlinskii"],

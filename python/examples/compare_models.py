@@ -50,7 +50,7 @@ def main() -> None:
         )
         print(f"| {own.title} | {own.parameters} | {scores} |")
     print(f"\n{found.summary()}")
-    found.plot().savefig(out / "comparison.png", dpi=70)
+    found.plot().savefig(out / "comparison.png", dpi=150)
 
 
 if __name__ == "__main__":

@@ -43,7 +43,7 @@ def drive(cycles: int) -> np.ndarray:
 def main(folder: Path) -> None:
     """Simulate both, print and draw."""
     u = drive(CYCLES)
-    figure, axes = plt.subplots(1, 3, figsize=(11, 3.6), layout="constrained")
+    figure, axes = plt.subplots(1, 3, figsize=(11, 4.0), layout="constrained")
     print("lowest displacement of a cycle [um]")
     print("  cycle" + " " * 19 + "".join(f"{cycle:>10}" for cycle in SHOWN))
     for (name, stage), ax, marker in zip(stages().items(), axes, "os", strict=False):
@@ -64,9 +64,13 @@ def main(folder: Path) -> None:
             lw=1,
             label=name,
         )
-    axes[2].set(title="creep of the loop", xlabel="cycle", ylabel="lowest, from cycle 2 on [um]")
+    axes[2].set(
+        title="drift of the loop",
+        xlabel="cycle",
+        ylabel="lowest displacement - that of cycle 2 [um]",
+    )
     axes[2].legend(frameon=False, fontsize="small")
-    figure.savefig(folder / "drift.png", dpi=110)
+    figure.savefig(folder / "drift.png", dpi=150)
 
 
 if __name__ == "__main__":

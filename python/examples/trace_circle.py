@@ -22,8 +22,8 @@ loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=inverse, feedback=
 
 table = pt.xu_li_2010.run_table_2(stage, (loop, loop))
 print(table)
-table.plot().savefig(folder / "table_2.png", dpi=100)
-table.runs[0].plot().savefig(folder / "circle_10um_0.1Hz.png", dpi=100)
+table.plot().savefig(folder / "table_2.png", dpi=150)
+table.runs[0].plot().savefig(folder / "circle_10um_0.1Hz.png", dpi=150)
 
 # Cross-talk ten times as large, identified from two logs: visible with feedforward alone.
 stage = replace(stage, cross_talk=(0.10, -0.08), lag=0.0)

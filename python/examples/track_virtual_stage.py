@@ -44,7 +44,7 @@ def run(name, reference, limits=(0.0, 75.0), **parts):
     """Track a reference, keep a picture, return the run."""
     loop = pt.Controller(dt=0.02, limits=limits, **parts)
     result = pt.track(stage, loop, reference, beyond_reach=limits != (0.0, 75.0))
-    result.plot().savefig(folder / f"{name}.png", dpi=100)
+    result.plot().savefig(folder / f"{name}.png", dpi=150)
     return result
 
 

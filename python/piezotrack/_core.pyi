@@ -97,15 +97,6 @@ class Stage:
         method: str,
         accuracy: float,
     ) -> Response: ...
-    def track(
-        self,
-        step: float,
-        controller: Controller,
-        reference: ArrayLike,
-        feedforward: ArrayLike,
-        sampling: _Pace,
-        visited: ArrayLike,
-    ) -> TrackingRun: ...
     def equilibrium(self, voltages: ArrayLike) -> _Named: ...
     def loop_plants(self, low: float, high: float, delay: float) -> list[LoopPlant]: ...
     def inverse(
@@ -235,10 +226,6 @@ def loop_response(
 @final
 class LoopPlant:
     @staticmethod
-    def mode(
-        gain: float, frequency: float, damping_ratio: float, bandwidth: float, delay: float
-    ) -> LoopPlant: ...
-    @staticmethod
     def from_matrices(
         a: Sequence[float], b: Sequence[float], c: Sequence[float], d: float, delay: float
     ) -> LoopPlant: ...
@@ -279,12 +266,19 @@ class Session:
 
 @final
 class VirtualStage:
-    def __new__(cls, settings: dict[str, Any]) -> VirtualStage: ...
+    def __new__(
+        cls,
+        stage: Stage,
+        of_amplifier: tuple[float, float, float, float],
+        of_sensor: tuple[float, float, float, float, float, float, int],
+        cycles: tuple[float, float] | None,
+        step: float,
+    ) -> VirtualStage: ...
     @staticmethod
-    def xu_li_2010(seed: int) -> dict[str, Any]: ...
+    def xu_li_2010(seed: int) -> tuple[Any, ...]: ...
     @staticmethod
-    def xu_li_2010_y(seed: int) -> dict[str, Any]: ...
-    def gains(self) -> list[float]: ...
+    def xu_li_2010_y(seed: int) -> tuple[Any, ...]: ...
+    def loop_plants(self, low: float, high: float, delay: float) -> list[LoopPlant]: ...
     def simulate(
         self, u: ArrayLike, dt: float, hold_name: str
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
@@ -294,11 +288,11 @@ class VirtualStage:
         reference: ArrayLike,
         feedforward: ArrayLike,
         sampling: _Pace,
+        visited: ArrayLike,
     ) -> TrackingRun: ...
 
 # Delay and jitter [s], and instants kept in each control interval.
 _Pace = tuple[float, float, int]
-_Axis = VirtualStage | tuple[Stage, float]
 _Motion = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 _Spread = tuple[float, float, float, float, float]
 
@@ -306,8 +300,8 @@ _Spread = tuple[float, float, float, float, float]
 class XYStage:
     def __new__(
         cls,
-        x: _Axis,
-        y: _Axis,
+        x: VirtualStage,
+        y: VirtualStage,
         cross_talk: tuple[float, float],
         lag: float,
         missed: tuple[float, int],
@@ -321,6 +315,7 @@ class XYStage:
         references: tuple[ArrayLike, ArrayLike],
         feedforwards: tuple[ArrayLike, ArrayLike],
         sampling: _Pace,
+        visited: tuple[Sequence[float], Sequence[float]],
     ) -> tuple[TrackingRun, TrackingRun]: ...
 
 def circle_errors(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from commands import ran, refusal, table
 from loops import PID, fitted, loop, model_text
 
 STAGE = pt.XYStage.xu_li_2010(seed=1)
+PAPER = ("--stage", "xu-li-2010")
 
 
 @pytest.fixture(autouse=True)
@@ -22,13 +24,15 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_contour_writes_what_python_finds() -> None:
-    printed = ran("contour", "dahl.json", "--path", "circle:0.5Hz,10um")
+    printed = ran("contour", "dahl.json", "--path", "circle:0.5Hz,10um", *PAPER)
     written = sorted(path.name for path in Path("results").iterdir())
     assert written == ["contour.csv", "contour.json", "contour.png", "contour.svg"]
     one = loop(feedforward=fitted().inverse(), feedback=PID)
     expected = pt.contour(STAGE, (one, one), pt.circle(frequency=0.5, radius=10e-6))
     assert expected.summary() in printed
-    assert printed.startswith("the virtual XY stage: y lags by 0.01 s, 1.5 % of y in x")
+    assert printed.startswith(
+        "stage: the virtual XY stage of Xu and Li 2010: y lags by 0.01 s, 1.5 %"
+    )
     rows = table("results/contour.csv")
     assert np.allclose(rows["measured_y_um"], 1e6 * expected.y.measured, rtol=1e-9, atol=1e-9)
     radial = 10.0 - np.hypot(rows["measured_x_um"] - 58.5, rows["measured_y_um"] - 58.5)
@@ -37,6 +41,32 @@ def test_contour_writes_what_python_finds() -> None:
     assert document["format"] == "piezotrack-contour"
     assert document["contour"]["sd_error"] == expected.metrics.sd_error
     assert document["y"]["max_error"] == expected.y.metrics.max_error
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_two_models_are_the_two_axes() -> None:
+    """In the middle of their workspace, from where they rest, with the interval of the record."""
+    other = replace(pt.load("dahl.json"), offset=5e-6)
+    other.save("other.json")
+    course = ("--path", "circle:1Hz,10um,4s", "--dt", "0.002", "--cross-talk", "0.05:0.02")
+    printed = ran("contour", "dahl.json", "other.json", *course)
+    assert printed.startswith("stage: dahl.json and other.json: y lags by 0 s, 5 % of y in x")
+    fits = [pt.load("dahl.json"), other]
+    stage = pt.XYStage(x=fits[0], y=fits[1], cross_talk=(0.05, 0.02))
+    limits = [fit.drive_range for fit in fits]
+    found = pt.control.workspace(stage, [one for one in limits if one is not None])
+    middle = 1e6 * np.array(found.centre)
+    assert middle[1] - middle[0] == pytest.approx(5.0 - 1e6 * fits[0].offset, abs=0.1)
+    rows = table("results/contour.csv")
+    late = rows["time_s"] > 1.999
+    for axis, at in zip("xy", middle, strict=True):
+        assert rows[f"desired_{axis}_um"][late].mean() == pytest.approx(at, abs=0.01)
+    mixed = np.ptp(rows["contour_error_um"][late])
+    # Decoupled about the offsets, the circle is one again, but for the hold.
+    ran("contour", "dahl.json", "other.json", *course, "--decouple", "--overwrite")
+    rows = table("results/contour.csv")
+    assert np.ptp(rows["contour_error_um"][late]) < 0.05 * mixed
+    assert abs(rows["contour_error_um"][late].mean()) < 0.05
 
 
 def test_the_options_reach_the_stage_and_the_loops() -> None:
@@ -68,7 +98,7 @@ def test_a_file_is_run_again_and_again() -> None:
 def test_a_path_may_have_the_name_of_a_formula() -> None:
     rows = "\n".join(f"{k / 50:.2f},{10 + 0.01 * k:.6f},{10 - 0.01 * k:.6f}" for k in range(60))
     Path(r"$\foo$.csv").write_text("time_s,x_um,y_um\n" + rows + "\n", encoding="utf-8")
-    printed = ran("contour", "dahl.json", "--path", r"$\foo$.csv", "--beyond-reach")
+    printed = ran("contour", "dahl.json", "--path", r"$\foo$.csv", "--beyond-reach", *PAPER)
     assert r"$\foo$.csv" in printed
     written = sorted(path.name for path in Path("results").iterdir())
     assert written == ["contour.csv", "contour.json", "contour.png", "contour.svg"]
@@ -128,7 +158,16 @@ def test_what_cannot_be_done_is_refused_in_one_sentence() -> None:
     assert "LOW:HIGH" in refusal("contour", "--path", "circle:0.1Hz,1um", "--cross-talk", "3")
     assert "lag is -1" in refusal("contour", "--path", "circle:0.1Hz,1um", "--lag", "-1")
     assert "x: the loop is unstable" in refusal(
-        "contour", "dahl.json", "--path", "circle:0.1Hz,1um", "--kp", "0.9"
+        "contour", "dahl.json", "--path", "circle:0.1Hz,1um", "--kp", "0.9", *PAPER
+    )
+    assert "3 model files are given: expected two at most" in refusal(
+        "contour", *("dahl.json",) * 3, "--path", "circle:0.1Hz,1um"
+    )
+    assert "expected one model file with --stage xu-li-2010" in refusal(
+        "contour", "dahl.json", "dahl.json", "--path", "circle:0.1Hz,1um", *PAPER
+    )
+    assert "--stage is model without a model file" in refusal(
+        "contour", "--path", "circle:0.1Hz,1um", "--stage", "model"
     )
     Path("still.csv").write_text(
         "time_s,x_um\n" + "\n".join(f"{k / 100},1.0" for k in range(200)), encoding="utf-8"
@@ -148,7 +187,7 @@ def test_a_path_of_two_columns_needs_an_interval() -> None:
     words = refusal("contour", "dahl.json", "--path", "path.csv")
     assert words.startswith("path.csv:1: no column is known to be the time: expected time_s")
     assert "--path-dt" in words
-    printed = ran("contour", "dahl.json", "--path", "path.csv", "--path-dt", "0.05")
+    printed = ran("contour", "dahl.json", "--path", "path.csv", "--path-dt", "0.05", *PAPER)
     assert "XYReference(path.csv, 40 to 60 by 40 to 60 um, 10" in printed
     assert "note  the path begins 78 um from the stage" in printed
     assert "expected none" in refusal("contour", "--path", "circle:1Hz,10um", "--path-dt", "0.05")

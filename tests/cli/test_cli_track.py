@@ -11,9 +11,10 @@ import pytest
 
 import piezotrack as pt
 from commands import ran, refusal, table
-from loops import PID, STAGE, fitted, loop, model_text, sine
+from loops import PID, STAGE, fitted, loop, model_text, record, sine
 
 COURSE = "sine:0.5Hz,0..110um,6s"
+PAPER = ("--stage", "xu-li-2010")
 ROWS = "time_s,desired_um,measured_um,voltage_V,feedforward_V,feedback_V,repetitive_V"
 
 
@@ -37,12 +38,12 @@ def report(folder: str = "results") -> dict[str, Any]:
 
 
 def test_track_writes_what_python_finds() -> None:
-    printed = ran("track", "dahl.json", "--reference", COURSE)
+    printed = ran("track", "dahl.json", "--reference", COURSE, *PAPER)
     written = sorted(path.name for path in Path("results").iterdir())
     assert written == ["tracking.csv", "tracking.json", "tracking.png", "tracking.svg"]
     expected = pt.track(STAGE, loop(feedforward=fitted().inverse(), feedback=PID), sine(0.5, 6.0))
     assert expected.summary() in printed
-    assert printed.startswith("the virtual stage, Reference(sine 0.5 Hz, 0 to 110 um, 6 s)")
+    assert printed.startswith("stage: the virtual stage of Xu and Li 2010\nReference(sine 0.5 Hz, ")
     for name in written:
         assert f"  {Path('results', name)}\n" in printed
     assert Path("results/tracking.csv").read_text(encoding="utf-8").startswith(ROWS + "\n")
@@ -69,7 +70,14 @@ LOOP = (
 @pytest.mark.usefixtures("_no_pictures")
 def test_every_option_of_a_loop_reaches_it() -> None:
     ran(
-        "track", "dahl.json", "--reference", "sine:0.5Hz,10..60um,6s", "--out", "a/b", *LOOP.split()
+        "track",
+        "dahl.json",
+        "--reference",
+        "sine:0.5Hz,10..60um,6s",
+        "--out",
+        "a/b",
+        *PAPER,
+        *LOOP.split(),
     )
     expected = pt.track(
         pt.VirtualStage.xu_li_2010(seed=7),
@@ -89,10 +97,10 @@ def test_every_option_of_a_loop_reaches_it() -> None:
 
 @pytest.mark.usefixtures("_no_pictures")
 def test_parts_can_be_left_out() -> None:
-    ran("track", "dahl.json", "--reference", COURSE, "--no-feedback")
+    ran("track", "dahl.json", "--reference", COURSE, *PAPER, "--no-feedback")
     alone = report()
     assert alone["feedback"] is None
-    ran("track", "dahl.json", "--reference", COURSE, "--no-feedforward")
+    ran("track", "dahl.json", "--reference", COURSE, *PAPER, "--no-feedforward", "--overwrite")
     assert report()["feedforward"] == "no feedforward"
     assert not table("results/tracking.csv")["feedforward_V"].any()
     assert report()["metrics"]["rms_error"] > 0.0
@@ -101,10 +109,9 @@ def test_parts_can_be_left_out() -> None:
 @pytest.mark.usefixtures("_no_pictures")
 def test_the_model_itself_is_led_almost_perfectly() -> None:
     """With its offset: what is left is the hold of 0.002 s, half a sample late."""
-    course = "sine:0.5Hz,10..100um,6s"
-    options = ("--stage", "model", "--no-feedback", "--dt", "0.002")
-    printed = ran("track", "dahl.json", "--reference", course, *options)
-    assert printed.startswith("the model itself, Reference(")
+    printed = ran("track", "dahl.json", "--reference", "sine:0.5Hz,10..100um,6s", "--dt", "0.002")
+    assert printed.startswith("stage: dahl.json\nReference(")
+    assert "no feedback: give --kp in V/um and --ti in s" in printed
     metrics = report()["metrics"]
     assert metrics["phase_lag"] == pytest.approx(np.pi * 0.001, rel=0.1)
     assert abs(metrics["mean_error"]) < 0.1e-6
@@ -112,9 +119,45 @@ def test_the_model_itself_is_led_almost_perfectly() -> None:
 
 
 @pytest.mark.usefixtures("_no_pictures")
+def test_interval_and_limits_are_those_of_the_record() -> None:
+    ran("track", "dahl.json", "--reference", COURSE)
+    known = pt.load("dahl.json")
+    assert report()["dt"]["value"] == known.dt == record().dt
+    assert tuple(report()["limits"]["value"]) == known.drive_range
+    assert report()["stage"] == "model"
+    # A reference from a file has its own.
+    t = 0.004 * np.arange(500)
+    rows = [f"{a:.17g},{50.0 - 30.0 * np.cos(np.pi * a):.17g}" for a in t]
+    Path("target.csv").write_text("\n".join(["time_s,displacement_um", *rows]), encoding="utf-8")
+    ran("track", "dahl.json", "--reference", "target.csv", "--overwrite")
+    assert report()["dt"]["value"] == pytest.approx(0.004)
+    ran("feedforward", "dahl.json", "target.csv")
+    assert table("results/feedforward.csv").size == 500
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_noise_bandwidth_and_gains_reach_ones_own_stage() -> None:
+    known = pt.load("dahl.json")
+    course = ("--reference", "sine:0.5Hz,10..100um,6s")
+    options = "--dt 0.01 --noise-nm 30 --bandwidth 80 --kp 0.01 --ti 0.02 --seed 4"
+    printed = ran("track", "dahl.json", *course, *options.split())
+    feedback = pt.Pid.from_um(kp=0.01, ti=0.02)
+    expected = pt.track(
+        pt.VirtualStage.of(known, noise=30e-9, bandwidth=80.0, seed=4),
+        pt.Controller.of(known, dt=0.01, feedback=feedback),
+        sine(0.5, 6.0, 10e-6, 100e-6),
+    )
+    assert report()["metrics"]["rms_error"] == expected.metrics.rms_error
+    assert "loop at" in printed
+    # Half of an error is learnt in a period.
+    ran("track", "dahl.json", *course, *options.split(), "--repetitive", "--overwrite")
+    assert report()["periods"][-1]["rms_error"] < 0.5 * report()["periods"][0]["rms_error"]
+
+
+@pytest.mark.usefixtures("_no_pictures")
 def test_the_same_command_writes_the_same_bytes() -> None:
     for folder in ("one", "two"):
-        ran("track", "dahl.json", "--reference", COURSE, "--out", folder)
+        ran("track", "dahl.json", "--reference", COURSE, *PAPER, "--out", folder)
     for name in ("tracking.csv", "tracking.json"):
         assert Path("one", name).read_bytes() == Path("two", name).read_bytes()
 
@@ -126,14 +169,15 @@ def test_every_kind_of_reference_can_be_reported(course: str) -> None:
         rows = [f"{0.02 * k},{min(0.5 * k, 40.0)}" for k in range(200)]
         Path("levels.csv").write_text("\n".join(["time_s,target_um", *rows]), encoding="utf-8")
         course = "levels.csv"
-    ran("track", "dahl.json", "--reference", course)
+    ran("track", "dahl.json", "--reference", course, *PAPER)
     document = report()
     assert document["metrics"]["phase_lag"] is None
     assert document["periods"] == []
 
 
 def test_feedforward_writes_the_table_that_python_computes() -> None:
-    printed = ran("feedforward", "dahl.json", "sine:0.5Hz,0..110um,6s", "--out", "ff")
+    given = ("sine:0.5Hz,0..110um,6s", "--dt", "0.02", "--out", "ff")
+    printed = ran("feedforward", "dahl.json", *given)
     names = sorted(path.name for path in Path("ff").iterdir())
     assert names == ["feedforward.csv", "feedforward.png", "feedforward.svg"]
     rows = table("ff/feedforward.csv")
@@ -167,7 +211,8 @@ def test_feedforward_says_where_the_model_was_not_fitted() -> None:
 
 # What they refuse.
 
-TRACK = ("track", "dahl.json", "--reference", COURSE)
+TRACK = ("track", "dahl.json", "--reference", COURSE, *PAPER)
+OWN = ("track", "dahl.json", "--reference", COURSE)
 REFUSED: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "no model": (("track", "none.json", "--reference", COURSE), ("none.json", "no such file")),
     "not a model": (("track", "log.txt", "--reference", COURSE), ("log.txt", "not JSON")),
@@ -194,7 +239,17 @@ REFUSED: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("--repetitive", "does not repeat"),
     ),
     "a period twice": ((*TRACK, "--period", "2"), ("--period", "from a file")),
-    "stage": ((*TRACK, "--stage", "real"), ("--stage is 'real'", "virtual or model")),
+    "stage": ((*OWN, "--stage", "real"), ("--stage is 'real'", "model or xu-li-2010")),
+    "gains without feedback": (
+        (*OWN, "--ti", "0.01"),
+        ("--ti has no effect without --kp: expected it left out",),
+    ),
+    "half of the gains": ((*OWN, "--kp", "0.01"), ("--ti is missing", "--kp in V/um and --ti")),
+    "noise of the paper's stage": ((*TRACK, "--noise-nm", "3"), ("--noise-nm has no effect",)),
+    "unstable": (
+        (*OWN, "--kp", "5", "--ti", "0.1", "--dt", "0.02"),
+        ("the loop is unstable on this stage", "at the limit kp would be", "V/um in place of 5"),
+    ),
     "delay": ((*TRACK, "--delay", "-1"), ("delay is -1",)),
     "seed": ((*TRACK, "--seed", "-1"), ("seed is -1",)),
     "duration": (

@@ -14,6 +14,7 @@ import pytest
 import piezotrack as pt
 from loops import DT, PID, fitted, loop
 from piezotrack.xu_li_2010.table_2 import PUBLISHED
+from virtual import changed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -248,7 +249,7 @@ def test_the_mean_error_of_a_viscous_stage_under_pid_is_as_computed() -> None:
 
 def test_record_gives_a_dataset_for_each_axis() -> None:
     u = np.linspace(0.0, 75.0, 200)
-    stage = dataclasses.replace(STAGE, x=dataclasses.replace(ALONG_X, **QUIET))
+    stage = dataclasses.replace(STAGE, x=changed(ALONG_X, **QUIET))
     x, y = stage.record(u, np.zeros(200), 1e-3)
     assert isinstance(x, pt.Dataset)
     assert np.array_equal(x.u, u)
@@ -372,7 +373,7 @@ PATH = pt.circle(frequency=0.5, radius=10 * UM)
 # Errors about the content of a record; all others are about an argument.
 KINDS = {"driven": pt.DataError, "still": pt.DataError, "short": pt.ShapeError}
 BAD: dict[str, tuple[Callable[[], object], str]] = {
-    "stage": (lambda: pt.contour(STAGE.x, led(), PATH), "stage"),  # type: ignore[arg-type]
+    "stage": (lambda: pt.contour(STAGE.x, led(), PATH), "stage"),
     "path": (lambda: pt.contour(STAGE, led(), PATH.x), "path"),  # type: ignore[arg-type]
     "one": (lambda: pt.contour(STAGE, led()[:1], PATH), "controllers"),
     "bare": (lambda: pt.contour(STAGE, led()[0], PATH), "controllers"),  # type: ignore[arg-type]
@@ -386,7 +387,7 @@ BAD: dict[str, tuple[Callable[[], object], str]] = {
         lambda: pt.contour(STAGE, both(feedback=pt.Pid.from_um(kp=0.5, ti=0.009, td=0.044)), PATH),
         "x: the loop",
     ),
-    "axis": (lambda: pt.XYStage(x=STAGE.x, y=3), "y"),  # type: ignore[arg-type]
+    "axis": (lambda: pt.XYStage(x=STAGE.x, y=3), "y"),
     "shares": (lambda: pt.XYStage(x=TABLE_1, y=TABLE_1, cross_talk=(0.1,)), "cross_talk"),  # type: ignore[arg-type]
     "diagonal": (
         lambda: pt.XYStage(x=TABLE_1, y=TABLE_1, cross_talk=[[2, 0], [0, 1]]),  # type: ignore[arg-type]

@@ -13,6 +13,7 @@ import pytest
 
 import piezotrack as pt
 from loops import DT, PID, STAGE, WINDING, fitted, forward, loop, record, sine
+from virtual import changed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -287,7 +288,7 @@ def test_late_samples_see_the_stage_further_on() -> None:
     again = pt.track(TABLE_1, controller, reference, jitter=2e-3)
     assert (again.measured == late.measured).all()
     stages = [pt.VirtualStage.xu_li_2010(seed=seed) for seed in (1, 2)]
-    quiet = [dataclasses.replace(stage, noise=0.0) for stage in stages]
+    quiet = [changed(stage, noise=0.0) for stage in stages]
     first, second = (pt.track(stage, loop(), sine(0.5, 2.0), jitter=1e-3) for stage in quiet)
     assert (first.measured != second.measured).any()
 
@@ -412,7 +413,17 @@ def test_the_pictures_have_labels_with_units_and_no_empty_panel(which: str) -> N
     assert following.get_xlim()[1] > 1e6 * run.desired.max()
     assert error.get_ylim()[1] > 1e6 * run.error.max()
     names = [text.get_text() for text in effort.get_legend().get_texts()]  # type: ignore[union-attr]
-    assert names == ["total", "feedforward", "feedback"]
+    limits = ["limits"] if run.saturated.any() else []
+    assert names == ["command", "feedforward", "feedback", *limits]
+    # One end of time in all panels, and no line without a name but that of zero.
+    end = run.t[-1] + run.controller.dt
+    for ax in (motion, error, effort):
+        assert ax.get_xlim() == pytest.approx((0.0, end))
+    named = [text.get_text() for text in error.get_legend().get_texts()]  # type: ignore[union-attr]
+    clipped = ["voltage clipped"] if run.saturated.any() else []
+    assert named == ["desired - measured", "largest of each period", *clipped]
+    assert run.reference.name in figure.get_suptitle()
+    assert "PID at 50 Hz" in figure.get_suptitle()
     plt.close(figure)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ from folders import MEASURED
 from piezotrack.data import diagnostics
 from piezotrack.xu_li_2010.demo import demo_log
 from records import BOX, HELD, quick
+from virtual import changed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -182,11 +182,12 @@ def test_a_sensor_at_its_end_is_named() -> None:
 def lopsided() -> pt.Dataset:
     """A loop that is wide below and narrow above: strong plays, a bend between."""
     stage = pt.VirtualStage.xu_li_2010(seed=1)
-    stage = replace(
+    gain = stage.stage.linear / 0.8
+    stage = changed(
         stage,
-        dead_zone_thresholds=(20.0, 50.0),
+        dead_zone_thresholds=(20.0 * gain, 50.0 * gain),
         dead_zone_weights=(0.9, -1.2),
-        weights=tuple(3.0 * weight for weight in stage.weights),
+        weights=tuple(3.0 * weight for weight in stage.stage.weights),
     )
     u = 37.5 * (1.0 - np.cos(0.5 * np.pi * np.arange(8001) / RATE))
     return stage.record(u, 1 / RATE)

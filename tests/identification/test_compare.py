@@ -238,8 +238,8 @@ def test_an_exact_fit_can_be_told_and_drawn() -> None:
 
 def test_the_picture_has_loops_bars_and_an_error_for_each() -> None:
     figure = found().plot()
-    loops, bars, *errors = figure.axes
-    assert loops.get_xlabel() == "drive [V]"
+    loops, off, bars, *errors = figure.axes
+    assert off.get_xlabel() == "drive [V]"
     assert loops.get_ylabel() == "displacement [um]"
     labels = [line.get_label() for line in loops.lines]
     assert labels == ["measured", "Bouc-Wen", "Prandtl-Ishlinskii"]
@@ -248,6 +248,12 @@ def test_the_picture_has_loops_bars_and_an_error_for_each() -> None:
     # The loop is one cycle of what was not fitted, where one of them is furthest off.
     drawn = 1e-6 * np.asarray(loops.lines[0].get_ydata())
     assert np.isin(np.round(drawn, 12), np.round(found().test.y, 12)).all()
+    # Below it the difference of what is drawn above, over the same drive.
+    for error, loop in zip(off.lines, loops.lines[1:], strict=False):
+        unit = 1e-3 if "[nm]" in off.get_ylabel() else 1.0
+        simulated = np.asarray(loop.get_ydata())
+        assert np.allclose(unit * np.asarray(error.get_ydata()), 1e6 * drawn - simulated)
+        assert np.allclose(np.asarray(error.get_xdata()), np.asarray(loop.get_xdata()))
     lengths = [patch.get_width() for patch in bars.patches if isinstance(patch, Rectangle)]
     scores = [one.train for one in found().rows] + [one.test for one in found().rows]
     assert lengths == pytest.approx([score.rms_percent for score in scores])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import matplotlib.pyplot as plt
@@ -10,11 +9,12 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
+from virtual import changed
 
 UM = 1e-6
 ALONG_X = pt.VirtualStage.xu_li_2010(seed=1)
 STAGE = pt.XYStage.xu_li_2010(seed=1)
-TWIN = dataclasses.replace(ALONG_X, seed=77, noise=0.0, resolution=1e-9, noise_bandwidth=1.0)
+TWIN = changed(ALONG_X, seed=77, noise=0.0, resolution=1e-9, noise_bandwidth=1.0)
 
 
 def test_noise_is_found_again_and_given_to_a_stage() -> None:

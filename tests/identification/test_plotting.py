@@ -108,6 +108,11 @@ def test_what_is_drawn_is_what_was_measured_and_simulated() -> None:
     assert np.allclose(points(below, 0)[1], 1e9 * (log.y - run.x), rtol=1e-9, atol=1e-9)
     assert np.allclose(points(convergence, 0)[1], 1e6 * fitted().history, rtol=1e-12)
     assert f"rms {1e9 * fitted().fitted.rms:.3g} nm" in below.get_title()
+    # What ran: model, record, window, error.
+    title = fitted().plot().get_suptitle()
+    assert title.startswith(fitted().model.info.title)
+    assert title.endswith(f"{fitted().cost_percent:.3g} % of stroke rms")
+    assert f"{log.t[0]:g} to {log.t[-1] + log.dt:g} s" in title
     assert "% of stroke" in below.get_title()
 
 
@@ -153,7 +158,9 @@ def test_the_end_of_the_fit_is_marked() -> None:
     above, below = plot_time(quick(), response(), fitted_until=2.0)
     for ax in (above, below):
         assert any(np.allclose(line.get_xdata(), 2.0) for line in ax.get_lines())
-    assert any("fitted before" in text.get_text() for text in above.texts)
+    legend = above.get_legend()
+    assert legend is not None
+    assert "fitted before, predicted after" in [text.get_text() for text in legend.get_texts()]
 
 
 def test_a_long_record_is_thinned_but_keeps_its_ends_and_shape() -> None:
@@ -188,7 +195,7 @@ def test_a_search_that_was_stopped_early_can_be_drawn(stop: int) -> None:
 def test_an_exact_fit_can_be_drawn() -> None:
     log = pt.Dataset(u=quick().u, y=response().x, dt=quick().dt)
     above, below = plot_time(log, response())
-    assert below.get_title().startswith("Measured less simulated: rms 0 ")
+    assert below.get_title().startswith("error = measured - simulated: rms 0 ")
     above.figure.canvas.draw()
     flat = replace(fitted(), history=np.zeros(31), cost=0.0)
     plot_convergence(flat).figure.canvas.draw()

@@ -25,7 +25,7 @@ def percent(fit: pt.identification.Identification, log: pt.Dataset) -> float:
 
 def test_plays_fitted_at_1_hz_hold_at_others() -> None:
     fit = pt.identify(SLOW, "prandtl-ishlinskii")
-    assert fit.cost < 1.1 * STAGE.noise
+    assert fit.cost < 1.1 * STAGE.sensor.noise
     assert percent(fit, record(0.1)[10.0:]) < 1.0
     assert percent(fit, record(3.0)[0.4:]) < 1.0
     assert percent(fit, record(10.0, rate=5000.0)[0.1:]) < 1.0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ from folders import SHARED
 from piezotrack._support.files import write_columns
 from piezotrack.cli.commands import app
 from records import BOX, TABLE_1, quick
+from virtual import changed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -251,7 +251,7 @@ def test_the_virtual_stages_amplifier_shows_in_the_gains_only() -> None:
     assert step.damping_by_decrement == pytest.approx(0.065, rel=0.1)
     assert step.overshoot_ratio == pytest.approx(0.63, abs=0.01)  # as published
     assert any("a lag of the amplifier" in note for note in step.notes)
-    quick_one = replace(stage, bandwidth=math.inf)
+    quick_one = changed(stage, bandwidth=math.inf)
     alone = pt.identify_step(quick_one.record(drive, 1 / 5000.0))
     assert alone.damping_ratio == pytest.approx(0.065, rel=0.1)
     assert alone.notes == []

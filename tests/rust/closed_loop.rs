@@ -3,12 +3,14 @@
 
 use core::f64::consts::TAU;
 
-use piezotrack_core::models::{BoucWenStage, Creep, DahlStage, Experiment, Plant, StageModel};
+use piezotrack_core::models::{
+    BoucWenStage, DahlStage, Dynamics, Experiment, InputStage, Plant, PlayHysteresis, Relaxation,
+    Stage, StageModel, StageState,
+};
 use piezotrack_core::signal::metrics::{each_period, tracking};
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 use piezotrack_core::simulate::{
-    Amplifier, Apparatus, ClosedLoop, DEAD_ZONES, PLAYS, RELAXATIONS, Sensor, Timing,
-    VirtualSettings, VirtualStage, VirtualState, closed_loop, open_loop,
+    Amplifier, Apparatus, ClosedLoop, Timing, VirtualStage, closed_loop, open_loop,
 };
 
 const UM: f64 = 1e-6;
@@ -42,7 +44,7 @@ fn timing(samples: usize, delay: f64, substeps: usize) -> Timing {
     Timing { interval: TS, samples, delay, jitter: 0.0, substeps }
 }
 
-fn tracked(stage: &VirtualStage, reference: &[f64], timing: &Timing) -> ClosedLoop<VirtualState> {
+fn tracked(stage: &VirtualStage, reference: &[f64], timing: &Timing) -> ClosedLoop<StageState> {
     let apparatus = stage.apparatus();
     closed_loop(&apparatus, stage.start(), timing, pid(reference, (0.0, 75.0)), NEVER)
         .unwrap()
@@ -69,10 +71,13 @@ fn the_loop_is_safely_stable() {
     // A fifth more gain, and amplifiers slower and faster than the one chosen, are stable too.
     let reference = sine(110.0 * UM, 0.2, 1000);
     for (gain, bandwidth) in [(1.2, 225.0), (1.0, 100.0), (1.0, 1000.0)] {
-        let mut settings = VirtualSettings::xu_li_2010(1);
-        settings.gain *= gain;
-        settings.amplifier.bandwidth = bandwidth;
-        let stage = VirtualStage::new(&settings).unwrap();
+        let mut stage = VirtualStage::xu_li_2010(1);
+        let Stage::PrandtlIshlinskii(plays) = &mut stage.stage else { panic!() };
+        let plays = &mut plays.operator.plays;
+        plays.linear *= gain;
+        plays.weights.iter_mut().for_each(|weight| *weight *= gain);
+        plays.dead_zone_thresholds.iter_mut().for_each(|threshold| *threshold *= gain);
+        stage.amplifier.bandwidth = bandwidth;
         let run = tracked(&stage, &reference, &timing(1000, 0.0, 1));
         let whole = tracking(&reference, &run.displacement, TS, Some(0.2)).unwrap();
         assert!(whole.max_error < 4.44 * UM, "{gain} {bandwidth}: {}", whole.max_error);
@@ -81,18 +86,14 @@ fn the_loop_is_safely_stable() {
 
 /// Error at the end of a small step, as a multiple of the step, without hysteresis or noise.
 fn ringing(gain: f64, frequency: f64, lag: f64) -> f64 {
-    let mut settings = VirtualSettings::xu_li_2010(1);
-    settings.gain = gain * UM;
-    settings.frequency = frequency;
-    settings.play.linear = 1.0;
-    settings.play.weights = [0.0; PLAYS];
-    settings.play.dead_zone_weights = [0.0; DEAD_ZONES];
-    settings.creep = [Creep { share: 0.0, time: 1.0 }; RELAXATIONS];
-    settings.amplifier = Amplifier { bandwidth: 1.0 / (TAU * lag), ..Amplifier::IDEAL };
-    settings.sensor = Sensor::IDEAL;
-    settings.preconditioned = false;
-    settings.step = if lag > 0.0 { 1e-4 } else { 1e-2 };
-    let stage = VirtualStage::new(&settings).unwrap();
+    let dynamics = Dynamics::Second { frequency, damping_ratio: 0.065 };
+    let plays = InputStage {
+        operator: PlayHysteresis::new(gain * UM, &[], &[], &[], &[]).unwrap(),
+        relaxation: Relaxation::new(&[], &[], dynamics).unwrap(),
+    };
+    let step = if lag > 0.0 { 1e-4 } else { 1e-2 };
+    let mut stage = VirtualStage::bare(Stage::PrandtlIshlinskii(plays), step);
+    stage.amplifier = Amplifier { bandwidth: 1.0 / (TAU * lag), ..Amplifier::IDEAL };
     let reference = vec![UM; 4000];
     let controller = pid(&reference, (f64::NEG_INFINITY, f64::INFINITY));
     let run =
@@ -330,7 +331,7 @@ fn a_run_stops_when_asked() {
     let stage = VirtualStage::xu_li_2010(1);
     let run =
         closed_loop(&stage.apparatus(), stage.start(), &timing(9, 0.0, 1), |_, _| 0.0, &|| true);
-    assert_eq!(run.unwrap(), None);
+    assert!(run.unwrap().is_none());
 }
 
 #[test]
@@ -352,4 +353,15 @@ fn a_kernel_led_step_by_step_moves_as_it_does_alone() {
         assert!(short < 1e-12, "{hold:?}: {short:e}");
         assert!(if hold == Hold::Zero { long < 1e-15 } else { long > 100.0 * short }, "{long:e}");
     }
+}
+
+#[test]
+fn the_delay_of_a_sensor_is_a_delay_of_the_loop() {
+    let reference = sine(50.0 * UM, 0.5, 100);
+    let mut stage = VirtualStage::xu_li_2010(1);
+    let late = tracked(&stage, &reference, &timing(100, 1.5e-3, 3));
+    stage.sensor.delay = 0.5e-3;
+    let shared = tracked(&stage, &reference, &timing(100, 1e-3, 3));
+    assert_eq!(late.displacement, shared.displacement);
+    assert_eq!(late.measured, shared.measured);
 }

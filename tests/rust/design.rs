@@ -479,7 +479,7 @@ fn bad_input_is_named() {
     named(mode(160.0).with_delay(-1.0).unwrap_err(), "delay");
     named(mode(160.0).with_amplifier(0.0).unwrap_err(), "bandwidth");
     named(LoopPlant::state_space(&[1.0], &[1.0, 2.0], &[1.0], 0.0).unwrap_err(), "a has");
-    named(LoopPlant::state_space(&[0.0; 81], &[0.0; 9], &[0.0; 9], 0.0).unwrap_err(), "b has");
+    named(LoopPlant::state_space(&[0.0; 121], &[0.0; 11], &[0.0; 11], 0.0).unwrap_err(), "b has");
     let stage = DahlStage::xu_li_2010();
     named(linearised(&stage, f64::NAN).unwrap_err(), "at");
     named(linearised(&stage, -2e-3).unwrap_err(), "K + dFh/dx");

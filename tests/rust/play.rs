@@ -2,7 +2,8 @@
 #![allow(missing_docs, clippy::unwrap_used, clippy::float_cmp)]
 
 use piezotrack_control::hysteresis::{Operator, Play};
-use piezotrack_core::simulate::{StagePlay, VirtualSettings};
+use piezotrack_core::models::{Plays, Stage};
+use piezotrack_core::simulate::VirtualStage;
 
 type Single = Play<f64, 1, 0>;
 
@@ -14,12 +15,18 @@ const ONE: Single = Single {
     dead_zone_weights: [],
 };
 
-fn stage_play() -> StagePlay {
-    VirtualSettings::xu_li_2010(1).play
+/// Those of the published stage, V to um.
+fn stage_play() -> Plays {
+    let Stage::PrandtlIshlinskii(stage) = VirtualStage::xu_li_2010(1).stage else { panic!() };
+    let mut plays = stage.operator.plays;
+    plays.linear *= 1e6;
+    plays.weights.iter_mut().for_each(|weight| *weight *= 1e6);
+    plays.dead_zone_thresholds.iter_mut().for_each(|threshold| *threshold *= 1e6);
+    plays
 }
 
 /// Output after a path through `turns`, each stretch in `pieces` steps.
-fn led(play: &StagePlay, turns: &[f64], pieces: u32) -> f64 {
+fn led(play: &Plays, turns: &[f64], pieces: u32) -> f64 {
     let mut state = play.rest();
     let mut output = 0.0;
     let mut from = 0.0;
@@ -90,7 +97,7 @@ fn the_slope_is_the_derivative_along_the_way() {
 }
 
 /// Rising at `u` above the bottom, and falling at `u` below the top, of the settled loop.
-fn ends(play: &StagePlay, u: f64) -> (f64, f64) {
+fn ends(play: &Plays, u: f64) -> (f64, f64) {
     let bottom = led(play, &[75.0, 0.0], 1);
     let top = led(play, &[75.0], 1);
     (led(play, &[75.0, 0.0, u], 1) - bottom, top - led(play, &[75.0, 75.0 - u], 1))
@@ -101,7 +108,7 @@ fn dead_zones_alone_break_the_symmetry() {
     let mut play = stage_play();
     let (rising, falling) = ends(&play, 25.0);
     assert!((rising - falling).abs() > 0.5, "{rising} {falling}");
-    play.dead_zone_weights = [0.0, 0.0];
+    play.dead_zone_weights.fill(0.0);
     let (rising, falling) = ends(&play, 25.0);
     assert!((rising - falling).abs() < 1e-12);
 }

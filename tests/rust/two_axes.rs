@@ -10,8 +10,8 @@ use piezotrack_core::signal::contour_error::radial_errors;
 use piezotrack_core::signal::metrics::Spread;
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 use piezotrack_core::simulate::{
-    Apparatus, ApparatusState, Law, MissedTicks, ReferenceSamples, Timing, TwoAxes,
-    VirtualSettings, VirtualStage, open_loops, track, track_both,
+    Apparatus, ApparatusState, ClosedLoop, Law, MissedTicks, ReferenceSamples, Timing, TwoAxes,
+    VirtualStage, open_loops, track, track_both,
 };
 
 const UM: f64 = 1e-6;
@@ -83,6 +83,15 @@ fn timing(delay: f64, substeps: usize) -> Timing {
     Timing { interval: TS, samples: 0, delay, jitter: 0.0, substeps }
 }
 
+/// Two motions bit by bit.
+fn same<S>(one: &ClosedLoop<S>, other: &ClosedLoop<S>) {
+    assert_eq!(one.time, other.time);
+    assert_eq!(one.displacement, other.displacement);
+    assert_eq!(one.measured, other.measured);
+    assert_eq!(one.command, other.command);
+    assert_eq!(one.applied, other.applied);
+}
+
 #[test]
 fn without_cross_talk_and_lag_each_axis_is_alone() {
     // Bit by bit, whatever the delay, and for different plants.
@@ -101,10 +110,10 @@ fn without_cross_talk_and_lag_each_axis_is_alone() {
         let (along_x, along_y) = both.unwrap().unwrap();
         let alone = track(&x, stage.start(), &timing, &pid(), courses[0], NEVER);
         let alone = alone.unwrap().unwrap();
-        assert_eq!(along_x.motion, alone.motion);
+        same(&along_x.motion, &alone.motion);
         assert_eq!(along_x.commands, alone.commands);
         let alone = track(&y, y.rest(), &timing, &pid(), courses[1], NEVER).unwrap().unwrap();
-        assert_eq!(along_y.motion, alone.motion);
+        same(&along_y.motion, &alone.motion);
         assert_eq!(along_y.commands, alone.commands);
     }
 }
@@ -184,7 +193,7 @@ fn each_axis_is_late_by_its_own_time() {
     let plant = Rolling;
     let seeded = |stage: &VirtualStage| {
         let mut apparatus = Apparatus::ideal(&plant, 1.0);
-        apparatus.sensor.seed = stage.settings().sensor.seed;
+        apparatus.sensor.seed = stage.sensor.seed;
         apparatus
     };
     let axes = TwoAxes {
@@ -336,15 +345,14 @@ fn identified_cross_talk_is_the_stage_s_within_its_deviation() {
 #[test]
 fn noise_is_found_again_beside_the_creep() {
     for (noise, bandwidth, seed) in [(0.0964, 200.0, 1), (0.05, 50.0, 2), (0.2, 800.0, 3)] {
-        let mut settings = VirtualSettings::xu_li_2010(seed);
-        settings.sensor.noise = noise * UM;
-        settings.sensor.bandwidth = bandwidth;
-        let stage = VirtualStage::new(&settings).unwrap();
+        let mut stage = VirtualStage::xu_li_2010(seed);
+        stage.sensor.noise = noise * UM;
+        stage.sensor.bandwidth = bandwidth;
         let held = vec![0.0; 50_000];
         let run = stage.simulate(&Drive::new(&held, 2e-4, Hold::Zero).unwrap(), NEVER);
         let found = noise_at_rest(&run.unwrap().unwrap().measured, 2e-4).unwrap();
         assert!((found.noise / (noise * UM) - 1.0).abs() < 0.05, "{found:?}");
-        assert!((found.resolution / settings.sensor.resolution - 1.0).abs() < 1e-9);
+        assert!((found.resolution / stage.sensor.resolution - 1.0).abs() < 1e-9);
         let sd = found.bandwidth_sd.unwrap();
         assert!((found.bandwidth - bandwidth).abs() < 4.0 * sd, "{found:?}");
         assert!(sd < 0.05 * bandwidth);
@@ -353,10 +361,9 @@ fn noise_is_found_again_beside_the_creep() {
 
 #[test]
 fn white_noise_and_numbers_on_no_grid_are_told_as_such() {
-    let mut settings = VirtualSettings::xu_li_2010(1);
-    settings.sensor.bandwidth = f64::INFINITY;
-    settings.sensor.resolution = 0.0;
-    let stage = VirtualStage::new(&settings).unwrap();
+    let mut stage = VirtualStage::xu_li_2010(1);
+    stage.sensor.bandwidth = f64::INFINITY;
+    stage.sensor.resolution = 0.0;
     let held = vec![0.0; 5000];
     let run = stage.simulate(&Drive::new(&held, 2e-4, Hold::Zero).unwrap(), NEVER);
     let found = noise_at_rest(&run.unwrap().unwrap().measured, 2e-4).unwrap();

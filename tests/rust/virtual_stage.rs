@@ -3,33 +3,37 @@
 
 use core::f64::consts::TAU;
 
-use piezotrack_core::models::Creep;
+use piezotrack_core::models::{
+    Creep, DahlStage, MOST_RELAXATIONS, Model, PrandtlIshlinskiiStage, Stage, StageState, Values,
+};
 use piezotrack_core::signal::metrics::widest_loop;
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 use piezotrack_core::simulate::{
-    Amplifier, OpenLoop, Sensor, VirtualSettings, VirtualStage, VirtualState, open_loop,
+    Amplifier, MissedTicks, OpenLoop, Preconditioning, Sensor, TwoAxes, VirtualStage, open_loop,
+    open_loops,
 };
 
 const UM: f64 = 1e-6;
 
-fn published() -> VirtualSettings {
-    VirtualSettings::xu_li_2010(1)
+fn published() -> VirtualStage {
+    VirtualStage::xu_li_2010(1)
+}
+
+/// The play operators, creep and mode of a stage.
+fn plays(stage: &VirtualStage) -> PrandtlIshlinskiiStage {
+    let Stage::PrandtlIshlinskii(plays) = stage.stage else { panic!("{stage:?}") };
+    plays
 }
 
 /// The mode alone: no lag, no creep, no noise, from the virgin state.
-fn bare() -> VirtualSettings {
-    let none = Creep { share: 0.0, time: 1.0 };
-    VirtualSettings {
-        amplifier: Amplifier::IDEAL,
-        creep: [none; 3],
-        sensor: Sensor::IDEAL,
-        preconditioned: false,
-        ..published()
-    }
+fn bare() -> VirtualStage {
+    let mut stage = plays(&published());
+    stage.relaxation.creep = [Creep { share: 0.0, time: 1.0 }; MOST_RELAXATIONS];
+    VirtualStage::bare(Stage::PrandtlIshlinskii(stage), published().step)
 }
 
-fn drive(settings: &VirtualSettings, u: &[f64], dt: f64, hold: Hold) -> OpenLoop<VirtualState> {
-    let stage = VirtualStage::new(settings).unwrap();
+fn drive(stage: &VirtualStage, u: &[f64], dt: f64, hold: Hold) -> OpenLoop<StageState> {
+    stage.validate().unwrap();
     let drive = Drive::new(u, dt, hold).unwrap();
     open_loop(&stage.apparatus(), stage.start(), &drive, NEVER).unwrap().unwrap()
 }
@@ -60,7 +64,7 @@ fn the_mode_rings_at_its_frequency_and_decays_with_its_damping() {
     let dt = 2e-5;
     let run = drive(&bare(), &[1.0; 2000], dt, Hold::Zero);
     let peaks = peaks(&run.displacement, dt);
-    let end = bare().gain * bare().play.linear;
+    let end = plays(&bare()).operator.plays.linear;
     let zeta: f64 = 0.065;
     let period = 1.0 / (160.0 * (1.0 - zeta * zeta).sqrt());
     assert!(((peaks[1].0 - peaks[0].0) / period - 1.0).abs() < 1e-4);
@@ -70,9 +74,8 @@ fn the_mode_rings_at_its_frequency_and_decays_with_its_damping() {
 
 #[test]
 fn creep_grows_with_the_logarithm_of_time_to_its_share() {
-    let mut settings = bare();
-    settings.creep = published().creep;
-    let run = drive(&settings, &vec![50.0; 10_001], 1e-2, Hold::Zero);
+    let stage = VirtualStage { stage: published().stage, ..bare() };
+    let run = drive(&stage, &vec![50.0; 10_001], 1e-2, Hold::Zero);
     let x = &run.displacement;
     // The mode has died away after 0.2 s.
     assert!(x[20..].windows(2).all(|pair| pair[1] >= pair[0] - 1e-15));
@@ -110,7 +113,7 @@ fn the_settled_loop_closes_and_is_a_tenth_of_the_travel_wide() {
 
 #[test]
 fn a_virgin_stage_does_not_come_back_to_its_zero() {
-    let settings = VirtualSettings { preconditioned: false, ..published() };
+    let settings = VirtualStage { preconditioning: None, ..published() };
     let u = cosine(75.0, 0.25, 20_005);
     let run = drive(&settings, &u, 2e-4, Hold::First);
     assert_eq!(run.displacement[0], 0.0);
@@ -120,7 +123,8 @@ fn a_virgin_stage_does_not_come_back_to_its_zero() {
 #[test]
 fn a_rest_before_the_experiment_leaves_no_drift() {
     let drift = |rest: f64| {
-        let settings = VirtualSettings { rest, ..published() };
+        let cycles = Some(Preconditioning { swing: 75.0, rest });
+        let settings = VirtualStage { preconditioning: cycles, ..published() };
         let run = drive(&settings, &[0.0; 11], 1.0, Hold::Zero);
         (run.displacement[10] - run.displacement[0]).abs()
     };
@@ -131,7 +135,7 @@ fn a_rest_before_the_experiment_leaves_no_drift() {
 #[test]
 fn half_the_step_changes_little() {
     let coarse = published();
-    let fine = VirtualSettings { step: 0.5 * coarse.step, ..coarse };
+    let fine = VirtualStage { step: 0.5 * coarse.step, ..coarse };
     let most = |u: &[f64], hold| {
         let (a, b) = (drive(&coarse, u, 2e-4, hold), drive(&fine, u, 2e-4, hold));
         let differences = a.displacement.iter().zip(&b.displacement).map(|(a, b)| (a - b).abs());
@@ -145,7 +149,7 @@ fn half_the_step_changes_little() {
 
 /// Readings of the published sensor on a stage at rest, and their moments.
 fn at_rest(seed: u64, n: usize, dt: f64) -> (Vec<f64>, f64, f64) {
-    let settings = VirtualSettings { preconditioned: false, ..VirtualSettings::xu_li_2010(seed) };
+    let settings = VirtualStage { preconditioning: None, ..VirtualStage::xu_li_2010(seed) };
     let y = drive(&settings, &vec![0.0; n], dt, Hold::Zero).measured;
     let square = y.iter().map(|y| y * y).sum::<f64>() / n as f64;
     let product = y.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / (n - 1) as f64;
@@ -189,9 +193,10 @@ fn readings_stop_at_the_end_of_the_range() {
 #[test]
 fn a_seed_is_an_experiment() {
     let u = cosine(75.0, 1.0, 2500);
-    let run = |seed| drive(&VirtualSettings::xu_li_2010(seed), &u, 2e-4, Hold::First);
+    let run = |seed| drive(&VirtualStage::xu_li_2010(seed), &u, 2e-4, Hold::First);
     let (one, again, other) = (run(1), run(1), run(2));
-    assert_eq!(one, again);
+    assert_eq!(one.displacement, again.displacement);
+    assert_eq!(one.measured, again.measured);
     assert_eq!(one.displacement, other.displacement);
     let same = one.measured.iter().zip(&other.measured).filter(|(a, b)| a == b).count();
     assert!(same < one.measured.len() / 4, "{same}");
@@ -209,7 +214,7 @@ fn an_experiment_goes_on_where_it_ended() {
     let half = run(&u[..=2500], stage.start());
     let rest = run(&u[2500..], half.last);
     assert_eq!(whole.displacement[2500..], rest.displacement[..]);
-    assert_eq!(whole.last.plant, rest.last.plant);
+    assert_eq!(whole.last.applied, rest.last.applied);
 }
 
 #[test]
@@ -241,28 +246,126 @@ fn a_ramp_is_followed_at_a_distance_of_the_lag() {
 
 #[test]
 fn settings_out_of_range_are_named() {
-    let refused = |change: fn(&mut VirtualSettings)| {
-        let mut settings = published();
-        change(&mut settings);
-        VirtualStage::new(&settings).unwrap_err().to_string()
+    let refused = |change: fn(&mut VirtualStage)| {
+        let mut stage = published();
+        change(&mut stage);
+        stage.validate().unwrap_err().to_string()
     };
-    assert!(refused(|s| s.gain = 0.0).starts_with("gain is 0 m/V"));
-    assert!(refused(|s| s.play.weights[3] = -1.0).starts_with("weights[3] is -1"));
-    assert!(
-        refused(|s| s.play.dead_zone_weights[1] = -1.06)
-            .starts_with("dead_zone_weights[1] is -1.06")
-    );
-    assert!(
-        refused(|s| s.play.dead_zone_thresholds[1] = 1.0)
-            .starts_with("dead_zone_thresholds[1] is 1 V")
-    );
-    assert!(refused(|s| s.creep[2].time = f64::NAN).starts_with("creep_times[2] is NaN s"));
     assert!(refused(|s| s.amplifier.slew = 0.0).starts_with("slew is 0 V/s"));
     assert!(refused(|s| s.amplifier.low = 80.0).starts_with("limits is 80 V to 75 V"));
     assert!(refused(|s| s.sensor.range = 0.0).starts_with("range is 0 m"));
-    assert!(refused(|s| s.rest = 1e9).starts_with("rest is"));
+    assert!(refused(|s| s.sensor.delay = -1.0).starts_with("delay is -1 s"));
+    assert!(refused(|s| s.sensor.offset = f64::NAN).starts_with("offset is NaN m"));
+    assert!(refused(|s| s.step = 0.0).starts_with("step is 0 s"));
+    let cycles = |swing, rest| Some(Preconditioning { swing, rest });
+    let with = |preconditioning| VirtualStage { preconditioning, ..published() };
+    let refused = |cycles| with(cycles).validate().unwrap_err().to_string();
+    assert!(refused(cycles(75.0, 1e9)).starts_with("rest is"));
+    assert!(refused(cycles(0.0, 0.0)).starts_with("swing is 0 V"));
 
     let stage = VirtualStage::xu_li_2010(1);
     let drive = Drive { u: &[0.0, f64::NAN], dt: 1e-3, hold: Hold::Zero };
     assert!(open_loop(&stage.apparatus(), stage.start(), &drive, NEVER).is_err());
+}
+
+/// A stage with first-order Dahl friction, whose loops close.
+fn friction() -> Stage {
+    let model = Model::named("first-order-dahl").unwrap();
+    let values = [
+        ("mass", 0.2),
+        ("damping", 300.0),
+        ("stiffness", 26065.0),
+        ("piezo_coefficient", 0.05),
+        ("rest_stiffness", 2e4),
+        ("coulomb_force", 0.3),
+        ("exponent", 1.0),
+    ];
+    let named = values.map(|(name, value)| (name.to_owned(), vec![value]));
+    let creep = ["creep_weights", "creep_times"].map(|name| (name.to_owned(), vec![]));
+    let parameters = model.info().parameters;
+    model.build(&Values::named(parameters, named.into_iter().chain(creep)).unwrap()).unwrap()
+}
+
+#[test]
+fn any_model_is_preconditioned_onto_its_settled_loop() {
+    let cycles = Some(Preconditioning { swing: 75.0, rest: 1.0 });
+    let virgin = VirtualStage::bare(friction(), 5e-5);
+    let settled = VirtualStage { preconditioning: cycles, ..virgin };
+    let u = cosine(75.0, 0.25, 20_001);
+    let ends = |stage: &VirtualStage| {
+        let x = drive(stage, &u, 2e-4, Hold::First).displacement;
+        (x[0], (x[20_000] - x[0]).abs())
+    };
+    let (start, left) = ends(&settled);
+    assert_eq!(start, 0.0);
+    assert!(left < 0.1 * UM, "{left:e}");
+    assert!(ends(&virgin).1 > UM);
+}
+
+#[test]
+fn an_offset_is_added_to_what_the_sensor_shows() {
+    let with = |offset: f64| {
+        let mut stage = published();
+        stage.sensor = Sensor { offset, ..Sensor::IDEAL };
+        drive(&stage, &cosine(75.0, 1.0, 500), 2e-4, Hold::First)
+    };
+    let (plain, shifted) = (with(0.0), with(3.0 * UM));
+    for (a, b) in plain.measured.iter().zip(&shifted.measured) {
+        assert!((b - a - 3.0 * UM).abs() < 1e-15);
+    }
+}
+
+#[test]
+fn a_delayed_sensor_shows_what_was() {
+    // Of a ramp through the amplifier alone, by any part of a sample and by several.
+    let u: Vec<f64> = (0..200).map(|k| 0.1 * f64::from(k)).collect();
+    let dt = 1e-3;
+    let late = |delay: f64| {
+        let mut stage = bare();
+        stage.sensor.delay = delay;
+        drive(&stage, &u, dt, Hold::First)
+    };
+    let prompt = late(0.0);
+    assert_eq!(prompt.measured, prompt.displacement);
+    for samples in [1.0, 2.0, 7.0] {
+        let run = late(samples * dt);
+        let back = samples as usize;
+        assert!(run.measured[..=back].iter().all(|y| *y == 0.0));
+        for k in back..200 {
+            assert!((run.measured[k] - prompt.displacement[k - back]).abs() < 1e-15);
+        }
+    }
+    // The same drive sampled four times as often has the instant between two samples among its own.
+    let fine: Vec<f64> = (0..797).map(|k| 0.025 * f64::from(k)).collect();
+    let truth = drive(&bare(), &fine, 0.25 * dt, Hold::First).displacement;
+    let run = late(1.25 * dt);
+    for k in 2..200 {
+        assert!((run.measured[k] - truth[4 * k - 5]).abs() < 1e-13, "{k}");
+    }
+}
+
+#[test]
+fn each_of_two_axes_has_its_own_sensor_delay() {
+    let u: Vec<f64> = (0..100).map(|k| 0.2 * f64::from(k)).collect();
+    let drives = [&u, &u].map(|u| Drive::new(u, 1e-3, Hold::First).unwrap());
+    let (mut x, mut y) = (bare(), bare());
+    (x.sensor.delay, y.sensor.delay) = (2.5e-3, 1e-3);
+    let run = |x: &VirtualStage, y: &VirtualStage| {
+        let axes = TwoAxes {
+            x: x.apparatus(),
+            y: y.apparatus(),
+            cross_talk: [0.1, 0.0],
+            lag: 0.0,
+            missed: MissedTicks::NONE,
+        };
+        let both = open_loops(&axes, (x.start(), y.start()), [&drives[0], &drives[1]], NEVER);
+        both.unwrap().unwrap()
+    };
+    let (along_x, along_y) = run(&x, &y);
+    let alone = |stage: &VirtualStage| drive(stage, &u, 1e-3, Hold::First).measured;
+    for k in 0..100 {
+        // What of y shows in x is as old as x's own reading.
+        assert!((along_x.measured[k] - 1.1 * alone(&x)[k]).abs() < 1e-13, "{k}");
+        assert!((along_y.measured[k] - alone(&y)[k]).abs() < 1e-13, "{k}");
+    }
 }

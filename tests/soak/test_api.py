@@ -164,8 +164,26 @@ def invert(script: Script, draw: Draw) -> None:
 PREVIEWS = {"velocity": None, "acceleration": None, "preview": None}
 
 
+CYCLES = {"swing": number(30.0), "rest": number(0.0, near=1.0)}
+AROUND = {
+    "noise": number(0.0, near=1e-8), "noise_bandwidth": number(200.0),
+    "resolution": number(0.0, near=1e-8), "delay": number(None, near=1e-3),
+    "bandwidth": number(500.0), "slew": number(1e5), "limits": numbers(-20.0, 120.0),
+    "creep": anything(None, {}, {0.1: 0.01}, {1.0: 0.01, 10.0: -1.0}, [0.1], {"a": 0.1}),
+    "mode": Slot(None, numbers(160.0, 0.065).other), "seed": count(1),
+}  # fmt: skip
+
+
 def virtual(script: Script, draw: Draw) -> None:
-    made = script.new("pt.VirtualStage", **arguments(draw, slots_of(VIRTUAL)))
+    _, model = stage(script, draw, most=1)
+    amplifier = script.new("pt.stages.Amplifier", **arguments(draw, slots_of(VIRTUAL.amplifier)))
+    sensor = script.new("pt.stages.Sensor", **arguments(draw, slots_of(VIRTUAL.sensor)))
+    if draw(st.booleans()):
+        made = script.new("pt.VirtualStage.of", model, **arguments(draw, AROUND))
+    else:
+        cycles = script.new("pt.stages.Preconditioning", **arguments(draw, CYCLES))
+        parts = {"stage": model, "amplifier": amplifier, "sensor": sensor}
+        made = script.new("pt.VirtualStage", **parts, preconditioning=cycles, step=5e-5)
     if made is not None:
         slots = {k: v for k, v in SIMULATE.items() if k != "accuracy"}
         given = arguments(draw, slots, most=1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import pickle
 from typing import Any
 
 import numpy as np
@@ -11,37 +12,40 @@ import pytest
 
 import piezotrack as pt
 from records import BOX, HELD
+from virtual import changed
 
 STAGE = pt.VirtualStage.xu_li_2010(seed=1)
 FAST = 1 / 5000.0
+FIELDS = [one.name for one in dataclasses.fields(STAGE)]
 
 
 def quiet(**other: Any) -> pt.VirtualStage:
     changes: dict[str, Any] = {"noise": 0.0, "resolution": 0.0, **other}
-    return dataclasses.replace(STAGE, **changes)
+    return changed(STAGE, **changes)
 
 
 def test_it_is_a_record_of_plain_numbers() -> None:
-    again = pt.VirtualStage(**dataclasses.asdict(STAGE))
+    again = pt.VirtualStage(**{name: getattr(STAGE, name) for name in FIELDS})
     assert again == STAGE
     assert hash(again) == hash(STAGE)
     assert dataclasses.replace(STAGE) == STAGE
-    other = quiet(resolution=STAGE.resolution, weights=list(STAGE.weights))
+    assert pickle.loads(pickle.dumps(STAGE)) == STAGE
+    other = quiet(resolution=STAGE.sensor.resolution, weights=list(STAGE.stage.weights))
     assert other != STAGE
-    assert dataclasses.replace(other, noise=STAGE.noise) == STAGE
+    assert changed(other, noise=STAGE.sensor.noise) == STAGE
     # Whole numbers are numbers too.
-    whole = quiet(limits=[0, 75], frequency=160, rest=0)
+    whole = quiet(limits=[0, 75], frequency=160)
     assert whole == quiet()
-    assert isinstance(whole.frequency, float)
+    assert isinstance(whole.stage.frequency, float)
 
 
 def test_what_is_published_of_it() -> None:
-    assert STAGE.limits == (0.0, 75.0)
-    assert STAGE.frequency == 160.0
-    assert STAGE.damping_ratio == 0.065
+    assert STAGE.amplifier.limits == (0.0, 75.0)
+    assert STAGE.stage.frequency == 160.0
+    assert STAGE.stage.damping_ratio == 0.065
     # 2.5 mm in 16 bit.
-    assert STAGE.resolution == pytest.approx(0.038e-6, rel=0.005)
-    assert STAGE.sensor_range == pytest.approx(1.25e-3)
+    assert STAGE.sensor.resolution == pytest.approx(0.038e-6, rel=0.005)
+    assert STAGE.sensor.range == pytest.approx(1.25e-3)
 
 
 def test_the_step_is_near_the_published_one() -> None:
@@ -63,12 +67,12 @@ def test_the_step_is_near_the_published_one() -> None:
 def test_the_noise_at_rest_is_the_published_one() -> None:
     """Fig. 3: 0.097 um rms in steps of 0.038 um, band-limited."""
     run = STAGE.simulate(np.zeros(50000), FAST)
-    steps = run.y / STAGE.resolution
+    steps = run.y / STAGE.sensor.resolution
     assert np.abs(steps - np.round(steps)).max() < 1e-6
     noise = run.y - run.x
     assert noise.std() == pytest.approx(0.097e-6, rel=0.03)
     neighbours = np.mean(noise[1:] * noise[:-1]) / noise.var()
-    expected = math.exp(-2 * math.pi * STAGE.noise_bandwidth * FAST)
+    expected = math.exp(-2 * math.pi * STAGE.sensor.noise_bandwidth * FAST)
     assert neighbours == pytest.approx(expected, abs=0.05)
     # Preconditioned, with the sensor at zero: only creep is left.
     assert np.abs(run.x).max() < 1e-6
@@ -94,7 +98,7 @@ def test_shapes_units_and_times() -> None:
 
 
 def test_without_an_amplifier_and_a_sensor_it_shows_what_it_is() -> None:
-    bare = quiet(bandwidth=math.inf, slew=math.inf, sensor_range=math.inf)
+    bare = quiet(bandwidth=math.inf, slew=math.inf, range=math.inf)
     u = 37.5 - 37.5 * np.cos(2 * np.pi * np.arange(2000) / 2000)
     run = bare.simulate(u, 1e-3)
     assert np.array_equal(run.applied, u)
@@ -136,7 +140,7 @@ def test_the_loop_is_rate_independent_and_a_tenth_wide() -> None:
 
 def test_creep_goes_on_after_a_step() -> None:
     """0.4 % of the displacement with each of 0.1, 1 and 10 s, on a stage that never moved."""
-    virgin = quiet(preconditioned=False)
+    virgin = quiet(preconditioning=None)
     run = virgin.simulate(np.full(20001, 75.0), 1e-3, hold="zoh")
 
     def crept(t: float) -> float:
@@ -173,28 +177,24 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"limits": (75.0, 0.0)}, "expected the lower one below"),
     ({"limits": (0.0, 1.0, 2.0)}, r"limits are \(0.0, 1.0, 2.0\): expected \(low, high\) in V"),
     ({"limits": 75.0}, "limits are"),
-    ({"linear": 0.0}, "linear is 0"),
-    ({"thresholds": None}, r"thresholds\[0\] is None"),
-    ({"thresholds": (-1.0,) * 10}, r"thresholds\[0\] is -1 V"),
-    ({"weights": (math.nan,) * 10}, r"weights\[0\] is NaN"),
-    ({"dead_zone_weights": (-2.0, 0.0)}, r"dead_zone_weights\[0\] is -2"),
-    ({"thresholds": (1.0,) * 11, "weights": (0.1,) * 11}, "thresholds is 11 numbers"),
-    ({"gain": 0.0}, "gain is 0 m/V"),
-    ({"creep_times": (0.0, 1.0, 10.0)}, r"creep_times\[0\] is 0 s"),
-    ({"frequency": 0.0}, "frequency is 0 Hz"),
-    ({"frequency": None}, "frequency is None"),
-    ({"damping_ratio": -0.1}, "damping_ratio is -0.1"),
+    ({"stage": None}, "stage is NoneType: expected a stage of a model"),
+    ({"amplifier": 225.0}, "amplifier is float: expected pt.stages.Amplifier"),
+    ({"preconditioning": True}, "preconditioning is bool: expected pt.stages.Preconditioning"),
     ({"noise": -1e-9}, "noise is .* m"),
     ({"noise": math.nan}, "noise is NaN"),
     ({"noise": "0"}, "noise is '0'"),
     ({"noise_bandwidth": 0.0}, "noise_bandwidth is 0 Hz"),
     ({"resolution": -1.0}, "resolution is -1 m"),
-    ({"sensor_range": 0.0}, "range is 0 m"),
+    ({"range": 0.0}, "range is 0 m"),
+    ({"delay": -1.0}, "delay is -1 s"),
+    ({"offset": math.inf}, "offset is inf m"),
     ({"seed": -1}, "seed is -1"),
     ({"seed": 1.5}, "seed is 1.5"),
-    ({"preconditioned": "yes"}, "preconditioned is 'yes'"),
-    ({"swing": 0.0}, "swing is 0 V"),
-    ({"rest": 1e9}, "rest is 1000000000 s"),
+    ({"preconditioning": pt.stages.Preconditioning(swing=0.0)}, "swing is 0 V"),
+    (
+        {"preconditioning": pt.stages.Preconditioning(swing=75.0, rest=1e9)},
+        "rest is 1000000000 s",
+    ),
     ({"step": 0.0}, "step is 0 s"),
 ]
 
@@ -202,13 +202,72 @@ BAD: list[tuple[dict[str, Any], str]] = [
 @pytest.mark.parametrize(("changes", "message"), BAD, ids=[message for _, message in BAD])
 def test_refuses_a_bad_number(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(pt.ParameterError, match=message):
-        dataclasses.replace(STAGE, **changes)
+        changed(STAGE, **changes)
 
 
-@pytest.mark.parametrize("name", ["weights", "dead_zone_weights", "creep_weights"])
-def test_refuses_pairs_that_differ_in_length(name: str) -> None:
-    with pytest.raises(pt.ShapeError, match=f"{name} has 1 numbers: expected"):
-        quiet(**{name: (0.1,)})
+# Of an identified model.
+
+PLAYS = pt.PrandtlIshlinskiiStage(
+    linear=1e-6, thresholds=(5.0, 20.0), weights=(0.2e-6, 0.1e-6), time_constant=2e-3
+)
+MODEL = pt.identification.IdentifiedModel(
+    model=PLAYS, offset=3e-6, offset_fitted=True, stroke=60e-6, delay=4e-3
+)
+WAVE = 30.0 - 30.0 * np.cos(2 * np.pi * 1e-3 * np.arange(3000))
+
+
+def test_an_identified_model_is_a_virtual_stage_with_its_offset_and_delay() -> None:
+    stage = pt.VirtualStage.of(MODEL)
+    assert stage.stage is PLAYS
+    assert (stage.sensor.offset, stage.sensor.delay) == (3e-6, 4e-3)
+    found = stage.record(WAVE, 1e-3)
+    assert np.abs(found.y - MODEL.displacement(WAVE, 1e-3)).max() < 1e-9
+    # Its own delay stays where no other is named.
+    assert pt.VirtualStage.of(MODEL, delay=0.0).sensor.delay == 0.0
+
+
+def test_noise_is_added_to_the_reading_alone() -> None:
+    clean = pt.VirtualStage.of(MODEL).simulate(WAVE, 1e-3)
+    noisy = pt.VirtualStage.of(MODEL, noise=20e-9, seed=3).simulate(WAVE, 1e-3)
+    assert np.array_equal(noisy.x, clean.x)
+    assert (noisy.y - clean.y).std() == pytest.approx(20e-9, rel=0.05)
+
+
+def test_creep_and_a_mode_take_the_place_of_the_models_own() -> None:
+    stage = pt.VirtualStage.of(MODEL, creep={0.1: 0.01, 1.0: 0.02}, mode=(80.0, 0.1))
+    assert stage.stage.creep_times == (0.1, 1.0)
+    assert stage.stage.creep_weights == (0.01, 0.02)
+    assert stage.stage.time_constant is None
+    ringing = stage.simulate([10.0] * 4000, 1e-4, hold="zoh").x
+    peak = 1e-4 * int(np.argmax(ringing))
+    assert peak == pytest.approx(0.5 / (80.0 * math.sqrt(1 - 0.1**2)), rel=0.02)
+    # Mass and damping of a stage that has them; its stiffness, and so its stroke, stay.
+    dahl = pt.DahlStage.xu_li_2010()
+    other = pt.VirtualStage.of(dahl, mode=(50.0, 0.2)).stage
+    assert other.stiffness == dahl.stiffness
+    assert math.sqrt(other.stiffness / other.mass) == pytest.approx(2 * math.pi * 50.0)
+    assert other.damping == pytest.approx(2 * 0.2 * math.sqrt(other.stiffness * other.mass))
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"stage": 3}, "stage is int: expected an identified model"),
+        ({"creep": 0.01}, "creep is 0.01: expected the share of each time constant in s"),
+        ({"mode": 160.0}, r"mode is \(160.0,\): expected \(frequency in Hz, damping ratio\)"),
+        ({"stage": pt.DahlStage.xu_li_2010(), "mode": (0.0, 0.1)}, "mode has 0 Hz"),
+        ({"noise": -1.0}, "noise is -1 m"),
+    ],
+)
+def test_of_refuses_what_it_cannot_make(given: dict[str, Any], message: str) -> None:
+    with pytest.raises(pt.ParameterError, match=message):
+        pt.VirtualStage.of(**{"stage": MODEL, **given})
+
+
+def test_a_short_name_is_printed() -> None:
+    assert repr(STAGE) == (
+        "<VirtualStage, Prandtl-Ishlinskii, amplifier 225 Hz, noise 96.4 nm rms, preconditioned>"
+    )
 
 
 @pytest.mark.parametrize(

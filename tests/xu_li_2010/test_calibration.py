@@ -19,7 +19,8 @@ def test_the_file_is_what_the_calibration_gives() -> None:
     theta = {one["name"]: one["value"] for one in document["free"]}
     apparatus = apparatus_at(theta)
     # The file has what the report loads.
-    assert Apparatus.calibrated().x.weights == pytest.approx(apparatus.x.weights, rel=1e-9)
+    loaded, made = Apparatus.calibrated().plays_of_x, apparatus.plays_of_x
+    assert loaded.weights == pytest.approx(made.weights, rel=1e-9)
     values = medians(theta, document["provenance"]["sensor_seeds"])
     for one in document["observables"]:
         assert values[one["key"]] == pytest.approx(one["obtained"], rel=1e-6), one["key"]

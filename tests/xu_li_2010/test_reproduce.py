@@ -132,9 +132,10 @@ def test_what_is_put_in_is_what_the_stage_is_set_to() -> None:
     # Whatever the free parameters are: y's own displacement apart, they move none of the three.
     theta = {one.name: one.at(0.3) for one in FREE}
     x = apparatus_at(theta).x
-    assert x.resolution == pytest.approx(2.5e-3 / 2**16)
+    noise, step = x.sensor.noise, x.sensor.resolution
+    assert step == pytest.approx(2.5e-3 / 2**16)
     # With the steps, the noise makes 0.097 um.
-    assert math.hypot(x.noise, x.resolution / math.sqrt(12.0)) == pytest.approx(0.097e-6, rel=1e-3)
+    assert math.hypot(noise, step / math.sqrt(12.0)) == pytest.approx(0.097e-6, rel=1e-3)
     end = x.simulate(np.full(300, 75.0), 1e-3, hold="zoh").x[-100:].mean()
     assert end == pytest.approx(117.7622e-6, rel=1e-3)
 
@@ -254,7 +255,7 @@ def test_the_same_seeds_give_the_same_numbers() -> None:
 def test_an_apparatus_survives_its_file() -> None:
     apparatus = Apparatus.calibrated()
     assert Apparatus.of(json.loads(json.dumps(apparatus.document()))) == apparatus
-    assert apparatus.seeded(3).x.seed != apparatus.seeded(3).y.seed
+    assert apparatus.seeded(3).x.sensor.seed != apparatus.seeded(3).y.sensor.seed
     stage = dataclasses.replace(apparatus.stage, missed_ticks=0.1, most_behind=4)
     late = dataclasses.replace(apparatus, stage=stage)
     assert Apparatus.of(json.loads(json.dumps(late.document()))) == late != apparatus

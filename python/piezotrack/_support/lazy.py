@@ -56,7 +56,8 @@ def attach(
         return value
 
     def listed() -> list[str]:
-        return sorted({*namespace, *names})
+        # Not what the package itself imports.
+        return sorted({*names, *(name for name in namespace if name.startswith("__"))})
 
     return get, listed, names
 

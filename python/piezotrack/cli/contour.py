@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,25 +11,44 @@ import typer
 
 from ..errors import DataError, ParameterError
 from .error_messages import in_words
+from .loop_options import (
+    MODEL,
+    PAPER,
+    AmplifierBandwidth,
+    Feedback,
+    Feedforward,
+    Interval,
+    Kp,
+    Limits,
+    Loop,
+    LoopDelay,
+    Noise,
+    StageName,
+    Td,
+    Ti,
+    refuse_of_other_stage,
+)
 from .options import (
-    ControlInterval,
     Duration,
     Jitter,
+    Json,
     Out,
+    Overwrite,
     Period,
-    can_be_folder,
-    list_files,
+    Quiet,
     number_range,
     refuse_without_effect,
 )
+from .output import Output
+from .xy_stages import OwnStage, PaperStage
 
 if TYPE_CHECKING:
     from ..control.contouring import Contour
+    from ..control.controller import Controller
     from ..identification.cross_talk import CrossTalk
     from ..references.xy_reference import XYReference
-    from ..stages.inverse import Inverse
     from ..stages.xy import XYStage
-    from ..xu_li_2010.table_2 import Table2
+    from ..xu_li_2010.table_2 import Published, Table2
 
 __all__ = ["contour_command"]
 
@@ -36,120 +56,160 @@ __all__ = ["contour_command"]
 @in_words
 def contour_command(
     context: typer.Context,
-    model: Annotated[
-        Path | None,
+    models: Annotated[
+        list[Path] | None,
         typer.Argument(
-            metavar="[MODEL]",
-            help="Model file in JSON for the feedforward of both axes; default a model identified "
-            "from a simulated log of x.",
+            metavar="[MODEL_X [MODEL_Y]]",
+            help="Model files in JSON of x and y, or one for both. Without any, the virtual stage "
+            "of the paper is simulated, with a model identified from a log of its x axis.",
         ),
     ] = None,
     path: Annotated[
         str | None,
         typer.Option(
-            metavar="TEXT",
-            help="As circle:0.1Hz,10um, lissajous:, raster:, spiral:, or a CSV file with x and y.",
+            metavar="TEXT|FILE",
+            help="Path: circle:0.1Hz,10um, lissajous:, raster:, spiral:, or a CSV file with x and "
+            "y. Its centre is by default the middle of the workspace.",
         ),
     ] = None,
     table_2: Annotated[
         bool, typer.Option("--table-2", help="The nine circles of Table 2 of Xu and Li 2010.")
     ] = False,
+    stage: StageName = None,
     out: Out = Path("results"),
+    overwrite: Overwrite = False,
     lag: Annotated[
-        float | None, typer.Option(help="Time in s between the samples of x and y.")
+        float | None,
+        typer.Option(
+            help=f"Time in s from sampling x to sampling y; default 0, of {PAPER} 0.01.",
+            show_default=False,
+        ),
     ] = None,
     cross_talk: Annotated[
-        str | None, typer.Option(metavar="XY:YX", help="Cross-talk: share of y in x and of x in y.")
+        str | None,
+        typer.Option(
+            metavar="XY:YX",
+            help=f"Cross-talk: share of y in x and of x in y; default none, of {PAPER} 0.015:0.01.",
+            show_default=False,
+        ),
     ] = None,
     decouple: Annotated[
         bool,
         typer.Option("--decouple", help="Identify the cross-talk and decouple the feedforward."),
     ] = False,
-    dt: ControlInterval = 0.02,
-    limits: Annotated[
-        str, typer.Option(metavar="LOW:HIGH", help="Voltage limits of the amplifiers in V.")
-    ] = "0:75",
-    feedforward: Annotated[
-        bool, typer.Option(help="Feedforward by the inverse of the model.")
-    ] = True,
-    feedback: Annotated[bool, typer.Option(help="PID feedback.")] = True,
-    kp: Annotated[float, typer.Option(help="Proportional gain in V/um.")] = 0.120,
-    ti: Annotated[float, typer.Option(help="Integral time in s.")] = 0.009,
-    td: Annotated[float, typer.Option(help="Derivative time in s.")] = 0.044,
-    delay: Annotated[
-        float, typer.Option(help="Delay in the loops in s, in addition to the hold.")
-    ] = 0.0,
+    dt: Interval = None,
+    limits: Limits = None,
+    feedforward: Feedforward = True,
+    feedback: Feedback = None,
+    kp: Kp = None,
+    ti: Ti = None,
+    td: Td = None,
+    delay: LoopDelay = 0.0,
     jitter: Jitter = 0.0,
+    noise_nm: Noise = 0.0,
+    bandwidth: AmplifierBandwidth = math.inf,
     duration: Duration = None,
     period: Period = None,
     path_dt: Annotated[
         float | None, typer.Option(help="Sampling interval in s of a path file without times.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the sensors' noise.")] = 1,
+    seed: Annotated[int, typer.Option(help="Random seed of the noise of both sensors.")] = 1,
     beyond_reach: Annotated[
         bool, typer.Option("--beyond-reach", help="Allow a path beyond the reach of the stage.")
     ] = False,
     unstable: Annotated[
         bool, typer.Option("--unstable", help="Allow loops that are unstable for small motions.")
     ] = False,
+    json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Simulate contouring of a path with the virtual XY stage: errors, CSV, pictures."""
-    from ..control.components import Pid
+    """Simulate contouring of a path with an XY stage."""
     from ..control.contouring import contour
-    from ..control.controller import Controller
     from ..xu_li_2010.table_2 import run_table_2
 
+    own = _is_own(stage, models, table_2)
+    loop = Loop(own, dt, limits, feedback, kp, ti, td)
+    loop.check(context)
+    refuse_of_other_stage(context, own)
+    _check(context, models, path, table_2, feedforward, own)
+    xy = OwnStage(models, loop) if own else PaperStage(models, loop, seed)
+    plant = _changed(xy.stage(1e-9 * noise_nm, bandwidth, seed), lag, cross_talk)
+    desired = None if path is None else _path(path, duration, period, path_dt, xy.place(plant))
+    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
+    result.will_write(_names(table_2))
+    loops = xy.controllers(desired, feedforward)
+    how = xy.words if feedforward else "no feedforward"
+    mixing: dict[str, Any] = {"delay": delay, "jitter": jitter}
+    if decouple:
+        found = _cross_talk(plant, loops)
+        mixing["decoupling"] = found.matrix
+        how += f"\ncross-talk identified: {found}"
+    if desired is None:
+        table = run_table_2(plant, loops, **mixing)
+        written, words, document = _write_table(table, out), str(table), _table_document(table)
+    else:
+        run = contour(plant, loops, desired, **mixing, beyond_reach=beyond_reach, unstable=unstable)
+        document = _document(run)
+        written, words = _write(run, document, out), run.summary()
+    shares = [f"{100 * share:g} %" for share in plant.cross_talk]
+    between = f"y lags by {plant.lag:g} s, {shares[0]} of y in x, {shares[1]} of x in y"
+    lines = [f"stage: {xy.name}: {between}; {how}", words]
+    if own and not loop.has_feedback:
+        lines.append("no feedback: give --kp in V/um and --ti in s for a PID controller")
+    result.show("\n".join(lines), document | {"stage": MODEL if own else PAPER}, written)
+
+
+def _is_own(stage: str | None, models: list[Path] | None, table_2: bool) -> bool:
+    """Whether the models themselves are simulated."""
+    if stage not in (None, MODEL, PAPER):
+        raise ParameterError(f"--stage is '{stage}': expected {MODEL} or {PAPER}")
+    if stage == MODEL and (not models or table_2):
+        reason = "with --table-2" if table_2 else "without a model file"
+        raise ParameterError(f"--stage is {MODEL} {reason}: expected {PAPER}")
+    return bool(models) and stage != PAPER and not table_2
+
+
+def _check(
+    context: typer.Context,
+    models: list[Path] | None,
+    path: str | None,
+    table_2: bool,
+    feedforward: bool,
+    own: bool,
+) -> None:
+    """Refuse options that exclude each other."""
     if table_2 == (path is not None):
         given = "both are" if table_2 else "neither is"
         raise ParameterError(f"--path and --table-2: expected one of them, {given} given")
     if table_2:
         of_a_path = ["duration", "period", "path_dt", "beyond_reach", "unstable"]
         refuse_without_effect(context, of_a_path, "with --table-2")
+    if models and len(models) > 2:
+        raise ParameterError(f"{len(models)} model files are given: expected two at most, x and y")
     if not feedforward:
         refuse_without_effect(context, ["decouple"], "with --no-feedforward")
-        if model is not None:
+        if models and not own:
             raise ParameterError(
-                f"MODEL is {model}: expected none with --no-feedforward, where it has no effect"
+                f"MODEL_X is {models[0]}: expected none with --no-feedforward, where it has no "
+                "effect"
             )
-    if not feedback:
-        refuse_without_effect(context, ["kp", "ti", "td"], "with --no-feedback")
-    desired = None if path is None else _path(path, duration, period, path_dt)
-    stage = _stage(seed, lag, cross_talk)
-    can_be_folder(out)
-    inverse, how = _inverse(model, seed) if feedforward else (None, "no feedforward")
-    loop = Controller(
-        dt=dt,
-        limits=number_range("--limits", limits),
-        feedforward=inverse,
-        feedback=Pid.from_um(kp=kp, ti=ti, td=td) if feedback else None,
-    )
-    mixing: dict[str, Any] = {"delay": delay, "jitter": jitter}
-    if decouple:
-        found = _cross_talk(stage)
-        mixing["decoupling"] = found.matrix
-        how += f"\ncross-talk identified: {found}"
-    loops = (loop, loop)
-    free = {"beyond_reach": beyond_reach, "unstable": unstable}
-    if desired is None:
-        table = run_table_2(stage, loops, **mixing)
-        written, words = _write_table(table, out), str(table)
-    else:
-        run = contour(stage, loops, desired, **mixing, **free)
-        written, words = _write(run, out), run.summary()
-    xy, yx = (f"{100 * share:g} %" for share in stage.cross_talk)
-    print(f"the virtual XY stage: y lags by {stage.lag:g} s, {xy} of y in x, {yx} of x in y; {how}")
-    print(words)
-    list_files(written)
 
 
-def _path(text: str, duration: float | None, period: float | None, dt: float | None) -> XYReference:
+def _path(
+    text: str,
+    duration: float | None,
+    period: float | None,
+    dt: float | None,
+    place: dict[str, Any],
+) -> XYReference:
     """Read the path from a file if the text names one, else parse the text."""
     from ..references.parse import parse_path
     from ..references.xy_reference import read_path
 
     if Path(text).is_file():
         try:
-            return read_path(text, duration=duration, period=period, dt=dt)
+            own = {key: place[key] for key in place if key == "origin"}
+            return read_path(text, duration=duration, period=period, dt=dt, **own)
         except DataError as error:
             # Here --time and --dt do not belong to the path.
             words = str(error).replace("name it with time=, or give the", "expected time_s, or the")
@@ -157,14 +217,11 @@ def _path(text: str, duration: float | None, period: float | None, dt: float | N
     for option, value in (("--period", period), ("--path-dt", dt)):
         if value is not None:
             raise ParameterError(f"{option} is for a path from a file: expected none with {text}")
-    return parse_path(text, duration=duration)
+    return parse_path(text, duration=duration, **place)
 
 
-def _stage(seed: int, lag: float | None, cross_talk: str | None) -> XYStage:
-    """Make the virtual stage with the changes of the options."""
-    from ..stages.xy import XYStage
-
-    stage = XYStage.xu_li_2010(seed=seed)
+def _changed(stage: XYStage, lag: float | None, cross_talk: str | None) -> XYStage:
+    """Change the stage as the options say."""
     if lag is not None:
         stage = replace(stage, lag=lag)
     if cross_talk is not None:
@@ -172,49 +229,29 @@ def _stage(seed: int, lag: float | None, cross_talk: str | None) -> XYStage:
     return stage
 
 
-def _inverse(model: Path | None, seed: int) -> tuple[Inverse, str]:
-    """Invert the model, or one identified as in the paper."""
-    from ..identification.identified import load
-    from ..xu_li_2010.demo import demo_log, identify_demo
-
-    if model is not None:
-        return load(model).inverse(), f"feedforward by {model.name} on both axes"
-    fit = identify_demo(demo_log(seed), seed=seed, progress=False)
-    words = f"feedforward on both axes by a model of x, fitted to {fit.cost_um:.3g} um rms"
-    return fit.inverse(), words
-
-
-def _cross_talk(stage: XYStage) -> CrossTalk:
-    """Identify the cross-talk from records with one axis driven at a time."""
+def _cross_talk(stage: XYStage, loops: tuple[Controller, Controller]) -> CrossTalk:
+    """Identify the cross-talk from records with one axis driven at a time between its limits."""
     import numpy as np
 
     from ..identification.cross_talk import identify_cross_talk
 
     t = np.arange(8000) / 1000.0
-    slow, held = 37.5 * (1.0 - np.cos(2.0 * np.pi * 0.25 * t)), np.zeros(t.size)
-    return identify_cross_talk(stage.record(slow, held, 1e-3), stage.record(held, slow, 1e-3))
-
-
-def _write(run: Contour, out: Path) -> list[Path]:
-    """Write the samples as CSV, the metrics as JSON, and the picture."""
-    from .. import __version__
-    from .._support.files import (
-        make_folder,
-        save_figures,
-        together,
-        write_columns,
-        write_document,
+    lows, highs = zip(*(loop.limits for loop in loops), strict=True)
+    slow = [
+        low + 0.5 * (high - low) * (1.0 - np.cos(2.0 * np.pi * 0.25 * t))
+        for low, high in zip(lows, highs, strict=True)
+    ]
+    held = [np.full(t.size, low) for low in lows]
+    return identify_cross_talk(
+        stage.record(slow[0], held[1], 1e-3), stage.record(held[0], slow[1], 1e-3)
     )
 
-    table = {"time_s": run.t}
-    for name, axis in (("x", run.x), ("y", run.y)):
-        table |= {
-            f"desired_{name}_um": 1e6 * axis.desired,
-            f"measured_{name}_um": 1e6 * axis.measured,
-            f"voltage_{name}_V": axis.voltage,
-        }
-    table["contour_error_um"] = 1e6 * run.error
-    document = {
+
+def _document(run: Contour) -> dict[str, Any]:
+    """Content of the JSON file: the metrics."""
+    from .. import __version__
+
+    return {
         "format": "piezotrack-contour",
         "schema_version": 1,
         "path": repr(run.path),
@@ -225,14 +262,61 @@ def _write(run: Contour, out: Path) -> list[Path]:
         "x": asdict(run.x.metrics),
         "y": asdict(run.y.metrics),
         "feedforward": run.x.note,
+        "notes": run.notes,
         "provenance": {"package": "piezotrack", "version": __version__},
     }
+
+
+def _write(run: Contour, document: dict[str, Any], out: Path) -> list[Path]:
+    """Write the samples as CSV, the metrics as JSON, and the picture."""
+    from .._support.files import (
+        make_folder,
+        save_figures,
+        together,
+        write_columns,
+        write_document,
+    )
+
     with together(make_folder(out)) as folder:
         return [
-            write_columns(folder / "contour.csv", table),
+            write_columns(folder / "contour.csv", run.table),
             write_document(folder / "contour.json", document),
             *save_figures({"contour": run.plot()}, folder),
         ]
+
+
+def _names(table_2: bool) -> list[str]:
+    """Files that the command writes."""
+    from .._support.files import picture_files
+    from ..xu_li_2010.table_2 import PUBLISHED
+
+    if not table_2:
+        return ["contour.csv", "contour.json", *picture_files("contour")]
+    return ["table_2.csv", *picture_files("table_2", *map(_circle, PUBLISHED))]
+
+
+def _circle(case: Published) -> str:
+    return f"circle_{1e6 * case.radius:.0f}um_{case.frequency:g}Hz"
+
+
+def _table_document(table: Table2) -> dict[str, Any]:
+    """Return published and obtained contour errors, for a program."""
+    from ..xu_li_2010.table_2 import PUBLISHED
+
+    rows = [
+        {
+            "radius": {"value": case.radius, "unit": "m"},
+            "frequency": {"value": case.frequency, "unit": "Hz"},
+            "published": {
+                "peak_to_peak": case.peak_to_peak,
+                "mean_error": case.mean,
+                "sd_error": case.sd,
+            },
+            "obtained": asdict(run.metrics),
+        }
+        for case, run in zip(PUBLISHED, table.runs, strict=True)
+    ]
+    return {"unit": "errors in m", "circles": rows}
 
 
 def _write_table(table: Table2, out: Path) -> list[Path]:
@@ -256,7 +340,7 @@ def _write_table(table: Table2, out: Path) -> list[Path]:
     arrays = {name: np.array(values) for name, values in columns.items()}
     figures = {"table_2": table.plot()}
     for case, run in zip(PUBLISHED, table.runs, strict=True):
-        figures[f"circle_{1e6 * case.radius:.0f}um_{case.frequency:g}Hz"] = run.plot()
+        figures[_circle(case)] = run.plot()
     with together(make_folder(out)) as folder:
         written = write_columns(folder / "table_2.csv", arrays)
         return [written, *save_figures(figures, folder)]

@@ -73,7 +73,12 @@ def simulate_command(
     table = {"time_s": t, f"{title}_{name}": scale * u, "displacement_um": 1e6 * x}
     with together(make_folder(out)) as folder:
         written = [write_columns(folder / "simulated.csv", table)]
-        written += save_figures({"simulated": plot_response(t, u, x, known.drive_unit)}, folder)
+        picture = plot_response(
+            *(t, u, x),
+            title=f"{known.model.info.title} driven by {drive_file.name}",
+            drive_unit=known.drive_unit,
+        )
+        written += save_figures({"simulated": picture}, folder)
     remarks = known.beyond_fit(u, interval)
     words = (
         f"{t.size} samples from rest, drive from {scale * u.min():.4g} to {scale * u.max():.4g} "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -10,17 +11,35 @@ import typer
 
 from ..errors import ParameterError
 from .error_messages import in_words
+from .loop_options import (
+    MODEL,
+    PAPER,
+    AmplifierBandwidth,
+    Feedback,
+    Feedforward,
+    Interval,
+    Kp,
+    Limits,
+    Loop,
+    LoopDelay,
+    Noise,
+    StageName,
+    Td,
+    Ti,
+    refuse_of_other_stage,
+)
 from .options import (
-    ControlInterval,
     Duration,
     Jitter,
+    Json,
+    ModelFile,
     Out,
+    Overwrite,
     Period,
-    can_be_folder,
-    list_files,
-    number_range,
+    Quiet,
     refuse_without_effect,
 )
+from .output import Output
 
 if TYPE_CHECKING:
     from ..control.controller import Controller
@@ -30,12 +49,11 @@ if TYPE_CHECKING:
 
 __all__ = ["feedforward_command", "track_command"]
 
-ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file in JSON.")]
 Online = Annotated[
     bool,
     typer.Option(
         "--online",
-        help="Compute the feedforward along the whole run; default a table of one period.",
+        help="Compute the feedforward at every sample; default a stored table of one period.",
     ),
 ]
 
@@ -47,42 +65,53 @@ def track_command(
     reference: Annotated[
         str,
         typer.Option(
-            metavar="TEXT", help="As sine:0.2Hz,0..110um, triangle:, chirp:, ..., or a CSV file."
+            metavar="TEXT|FILE",
+            help="Reference: sine:0.2Hz,0..110um, triangle:, staircase:, chirp:, multisine:, or a "
+            "CSV file with time and displacement.",
         ),
     ],
-    stage: Annotated[
-        str, typer.Option(help="Plant: virtual, or model for the model itself.")
-    ] = "virtual",
+    stage: StageName = None,
     out: Out = Path("results"),
-    dt: ControlInterval = 0.02,
-    limits: Annotated[
-        str, typer.Option(metavar="LOW:HIGH", help="Voltage limits of the amplifier in V.")
-    ] = "0:75",
-    feedforward: Annotated[
-        bool, typer.Option(help="Feedforward by the inverse of the model.")
-    ] = True,
+    overwrite: Overwrite = False,
+    dt: Interval = None,
+    limits: Limits = None,
+    feedforward: Feedforward = True,
     online: Online = False,
-    feedback: Annotated[bool, typer.Option(help="PID feedback.")] = True,
-    kp: Annotated[float, typer.Option(help="Proportional gain in V/um.")] = 0.120,
-    ti: Annotated[float, typer.Option(help="Integral time in s.")] = 0.009,
-    td: Annotated[float, typer.Option(help="Derivative time in s.")] = 0.044,
+    feedback: Feedback = None,
+    kp: Kp = None,
+    ti: Ti = None,
+    td: Td = None,
     tt: Annotated[
-        float | None, typer.Option(help="Tracking time of the antiwindup in s; inf for none.")
+        float | None,
+        typer.Option(
+            help="Tracking time of the antiwindup in s, inf for none; default sqrt(ti td), or ti.",
+            show_default=False,
+        ),
     ] = None,
     repetitive: Annotated[bool, typer.Option(help="Repetitive control.")] = False,
     kq: Annotated[
-        float, typer.Option(help="Learning gain of the repetitive control in V/um.")
-    ] = 1.0,
+        float | None,
+        typer.Option(
+            help="Learning gain of the repetitive control in V/um; default half of the inverse of "
+            f"the stage's gain, of {PAPER} 1.",
+            show_default=False,
+        ),
+    ] = None,
     tq: Annotated[
-        float, typer.Option(help="Time constant of the repetitive control's filter in s.")
-    ] = 0.2,
-    delay: Annotated[
-        float, typer.Option(help="Delay in the loop in s, in addition to the hold.")
-    ] = 0.0,
+        float | None,
+        typer.Option(
+            help="Time constant of the repetitive control's filter in s; default a 25th of the "
+            f"period, of {PAPER} 0.2.",
+            show_default=False,
+        ),
+    ] = None,
+    delay: LoopDelay = 0.0,
     jitter: Jitter = 0.0,
+    noise_nm: Noise = 0.0,
+    bandwidth: AmplifierBandwidth = math.inf,
     duration: Duration = None,
     period: Period = None,
-    seed: Annotated[int, typer.Option(help="Seed of the virtual stage's sensor noise.")] = 1,
+    seed: Annotated[int, typer.Option(help="Random seed of the sensor noise.")] = 1,
     beyond_reach: Annotated[
         bool,
         typer.Option("--beyond-reach", help="Allow a reference beyond the reach of the stage."),
@@ -90,66 +119,100 @@ def track_command(
     unstable: Annotated[
         bool, typer.Option("--unstable", help="Allow a loop that is unstable for small motions.")
     ] = False,
+    json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Simulate closed-loop tracking of a reference: errors, samples as CSV, pictures."""
-    from ..control.components import Pid, Repetitive
+    """Simulate closed-loop tracking of a reference."""
+    from .._support.files import picture_files
     from ..control.controller import Controller
     from ..control.stability import check_loop
     from ..control.tracking import track
     from ..identification.identified import load
     from ..stages.virtual import VirtualStage
 
-    _refuse_without_effect(context, feedforward, feedback, repetitive, stage)
+    own = _is_own(stage)
+    settings = Loop(own, dt, limits, feedback, kp, ti, td, tt)
+    settings.check(context)
+    refuse_of_other_stage(context, own)
+    if not feedforward:
+        refuse_without_effect(context, ["online"], "with --no-feedforward")
+    if not repetitive:
+        refuse_without_effect(context, ["kq", "tq"], "without --repetitive")
     known = load(model)
     desired = _reference(reference, duration, period)
-    if repetitive and desired.period is None:
-        raise ParameterError(f"--repetitive: the reference ({desired.name}) does not repeat")
     playback: Literal["table", "online"] = "online" if online else "table"
     loop = Controller(
-        dt=dt,
-        limits=number_range("--limits", limits),
+        dt=settings.dt(known, desired),
+        limits=settings.volts(known),
         feedforward=known.inverse(playback=playback) if feedforward else None,
-        feedback=Pid.from_um(kp=kp, ti=ti, td=td, tt=tt) if feedback else None,
-        repetitive=Repetitive.from_um(period=desired.period or 0.0, tq=tq, kq=kq)
-        if repetitive
-        else None,
+        feedback=settings.pid(),
+        repetitive=settings.repetitive(known, desired, kq, tq) if repetitive else None,
     )
-    plant = VirtualStage.xu_li_2010(seed=seed) if stage == "virtual" else known
-    can_be_folder(out)
+    plant = (
+        VirtualStage.of(known, noise=1e-9 * noise_nm, bandwidth=bandwidth, seed=seed)
+        if own
+        else VirtualStage.xu_li_2010(seed=seed)
+    )
+    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
+    result.will_write(["tracking.csv", "tracking.json", *picture_files("tracking")])
     free = {"beyond_reach": beyond_reach, "unstable": unstable}
     run = track(plant, loop, desired, delay=delay, jitter=jitter, **free)
-    written = _write(run, known, loop, out)
-    print(f"the {stage} stage" if stage == "virtual" else "the model itself", end=", ")
-    print(run.summary())
-    if feedforward:
-        # A loop's voltage has the noise of the sensor, whose rate says nothing.
-        _list_remarks(known.beyond_fit(run.voltage))
+    name = f"stage: {model.name}" if own else "stage: the virtual stage of Xu and Li 2010"
+    lines = [name, run.summary()]
+    # A loop's voltage has the noise of the sensor, whose rate says nothing.
+    notes = known.beyond_fit(run.voltage) if feedforward else []
+    lines += [f"note  {note}" for note in notes]
     if loop.feedback is not None or loop.repetitive is not None:
-        print(f"loop at {check_loop(plant, loop, delay=delay).middle}")
-    list_files(written)
+        lines.append(f"loop at {check_loop(plant, loop, delay=delay).middle}")
+    elif own:
+        lines.append("no feedback: give --kp in V/um and --ti in s for a PID controller")
+    document = _document(run, known, loop, notes) | {"stage": MODEL if own else PAPER}
+    result.show("\n".join(lines), document, _write(run, document, out))
+
+
+def _is_own(stage: str | None) -> bool:
+    """Whether the model itself is simulated."""
+    if stage not in (None, MODEL, PAPER):
+        raise ParameterError(f"--stage is '{stage}': expected {MODEL} or {PAPER}")
+    return stage != PAPER
 
 
 @in_words
 def feedforward_command(
     model: ModelFile,
     reference: Annotated[
-        str, typer.Argument(metavar="REFERENCE", help="CSV with time and displacement, or a text.")
+        str,
+        typer.Argument(
+            metavar="REFERENCE",
+            help="CSV file with time and displacement, or a text, as sine:0.2Hz,0..110um.",
+        ),
     ],
     out: Out = Path("results"),
-    dt: Annotated[float | None, typer.Option(help="Sampling interval of the table in s.")] = None,
+    overwrite: Overwrite = False,
+    dt: Annotated[
+        float | None,
+        typer.Option(
+            help="Sampling interval of the table in s; default that of the reference file, or of "
+            "the record identified.",
+            show_default=False,
+        ),
+    ] = None,
     online: Online = False,
     duration: Duration = None,
     period: Period = None,
+    json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Compute the feedforward voltage for a reference: a CSV and a picture."""
-    from .._support.files import make_folder, save_figures, together, write_columns
+    """Compute the feedforward voltage for a reference."""
+    from .._support.files import make_folder, picture_files, save_figures, together, write_columns
     from ..control.tracking_plot import plot_feedforward
     from ..identification.identified import load
 
     known = load(model)
     desired = _reference(reference, duration, period)
-    interval = 0.02 if dt is None else dt
-    can_be_folder(out)
+    interval = Loop(True, dt, None, None, None, None, None).dt(known, desired)
+    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
+    result.will_write(["feedforward.csv", *picture_files("feedforward")])
     samples = desired.sample(interval)
     voltage, how = known.inverse(playback="online" if online else "table").played(
         desired, interval, samples=samples
@@ -159,31 +222,21 @@ def feedforward_command(
         written = [write_columns(folder / "feedforward.csv", table)]
         picture = plot_feedforward(samples.t, voltage, samples.x)
         written += save_figures({"feedforward": picture}, folder)
-    print(f"{desired!r} at {1.0 / interval:g} Hz; {how}")
-    print(f"{voltage.size} samples, voltage from {voltage.min():.4g} to {voltage.max():.4g} V")
-    _list_remarks(known.beyond_fit(voltage, interval))
-    list_files(written)
-
-
-def _refuse_without_effect(
-    context: typer.Context, feedforward: bool, feedback: bool, repetitive: bool, stage: str
-) -> None:
-    """Refuse an unknown stage, and options of parts that are left out."""
-    if stage not in ("virtual", "model"):
-        raise ParameterError(f"--stage is '{stage}': expected virtual or model")
-    if not feedforward:
-        refuse_without_effect(context, ["online"], "with --no-feedforward")
-    if not feedback:
-        refuse_without_effect(context, ["kp", "ti", "td", "tt"], "with --no-feedback")
-    if not repetitive:
-        refuse_without_effect(context, ["kq", "tq"], "without --repetitive")
-    if stage == "model":
-        refuse_without_effect(context, ["seed"], "with --stage model, which has no sensor noise")
-
-
-def _list_remarks(remarks: list[str]) -> None:
-    for remark in remarks:
-        print(f"note  {remark}")
+    notes = known.beyond_fit(voltage, interval)
+    lines = [
+        f"{desired!r} at {1.0 / interval:g} Hz; {how}",
+        f"{voltage.size} samples, voltage from {voltage.min():.4g} to {voltage.max():.4g} V",
+        *(f"note  {note}" for note in notes),
+    ]
+    document = {
+        "reference": repr(desired),
+        "samples": voltage.size,
+        "dt": {"value": interval, "unit": "s"},
+        "voltage_range": {"value": [float(voltage.min()), float(voltage.max())], "unit": "V"},
+        "feedforward": how,
+        "notes": notes,
+    }
+    result.show("\n".join(lines), document, written)
 
 
 def _reference(text: str, duration: float | None, period: float | None) -> Reference:
@@ -198,27 +251,13 @@ def _reference(text: str, duration: float | None, period: float | None) -> Refer
     return parse_reference(text, duration=duration)
 
 
-def _write(run: Tracking, known: IdentifiedModel, loop: Controller, out: Path) -> list[Path]:
-    """Write the samples as CSV, the metrics as JSON, and the pictures."""
+def _document(
+    run: Tracking, known: IdentifiedModel, loop: Controller, notes: list[str]
+) -> dict[str, Any]:
+    """Content of the JSON file: the loop and its metrics."""
     from .. import __version__
-    from .._support.files import (
-        make_folder,
-        save_figures,
-        together,
-        write_columns,
-        write_document,
-    )
 
-    table = {
-        "time_s": run.t,
-        "desired_um": 1e6 * run.desired,
-        "measured_um": 1e6 * run.measured,
-        "voltage_V": run.voltage,
-        "feedforward_V": run.feedforward,
-        "feedback_V": run.feedback,
-        "repetitive_V": run.repetitive,
-    }
-    document: dict[str, Any] = {
+    return {
         "format": "piezotrack-tracking",
         "schema_version": 1,
         "reference": repr(run.reference),
@@ -232,11 +271,24 @@ def _write(run: Tracking, known: IdentifiedModel, loop: Controller, out: Path) -
         "metrics": asdict(run.metrics),
         "periods": [asdict(one) for one in run.periods],
         "model_drive_range": known.drive_range,
+        "notes": notes,
         "provenance": {"package": "piezotrack", "version": __version__},
     }
+
+
+def _write(run: Tracking, document: dict[str, Any], out: Path) -> list[Path]:
+    """Write the samples as CSV, the metrics as JSON, and the pictures."""
+    from .._support.files import (
+        make_folder,
+        save_figures,
+        together,
+        write_columns,
+        write_document,
+    )
+
     with together(make_folder(out)) as folder:
         return [
-            write_columns(folder / "tracking.csv", table),
+            write_columns(folder / "tracking.csv", run.table),
             write_document(folder / "tracking.json", document),
             *save_figures({"tracking": run.plot()}, folder),
         ]

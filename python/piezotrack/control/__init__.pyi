@@ -9,8 +9,11 @@ from .components import Repetitive as Repetitive
 from .components import StateSpace as StateSpace
 from .components import ZeroPhase as ZeroPhase
 from .contouring import Contour as Contour
+from .contouring import Workspace as Workspace
 from .contouring import contour as contour
+from .contouring import workspace as workspace
 from .controller import Controller as Controller
+from .linear_systems import to_control as to_control
 from .plant import Plant as Plant
 from .session import Command as Command
 from .session import RefusedReadings as RefusedReadings

@@ -106,11 +106,11 @@ class StateSpace:
     ----------
     a : array_like, shape (n, n)
         A, with n up to 16.
-    b : array_like, shape (n,)
+    b : array_like, shape (n,) or (n, 1)
         B.
-    c : array_like, shape (n,)
+    c : array_like, shape (n,) or (1, n)
         C.
-    d : float, optional
+    d : float or array_like of shape (1, 1), optional
         D [V/m].
     back : array_like, shape (n,), optional
         Gain l of back-calculation: the voltage of the amplifier less the command [V] enters the
@@ -121,12 +121,15 @@ class StateSpace:
     --------
     >>> import piezotrack as pt
     >>> integrator = pt.control.StateSpace([[1.0]], [2000.0], [1.0])
+
+    The matrices of a system of python-control, ``StateSpace(G.A, G.B, G.C, G.D)``, are taken as
+    they are.
     """
 
     a: ArrayLike
     b: ArrayLike
     c: ArrayLike
-    d: float = 0.0
+    d: ArrayLike = 0.0
     back: ArrayLike | None = None
 
     def __post_init__(self) -> None:
@@ -144,7 +147,13 @@ class StateSpace:
                 f"a, b and c have {a.size}, {n} and {c.size} entries: expected n x n, n and n"
             )
         back = None if self.back is None else _matrix("back", self.back).tolist()
-        return a.tolist(), b.tolist(), c.tolist(), finite("d", self.d, "V/m"), back
+        return a.tolist(), b.tolist(), c.tolist(), finite("d", _single("d", self.d), "V/m"), back
+
+
+def _single(name: str, value: object) -> object:
+    """Take a matrix of one entry as that entry, as other libraries write a gain."""
+    is_array = getattr(value, "size", 0) == 1 and getattr(value, "shape", ())
+    return _matrix(name, value)[0] if is_array else value  # type: ignore[arg-type]
 
 
 def _matrix(name: str, value: ArrayLike) -> NDArray[np.float64]:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from .. import _core
 from .._support.arguments import not_negative
+from .._support.frames import frame_of
 from .._support.statistics import ErrorStatistics
 from ..errors import ParameterError
 from ..references.xy_reference import XYReference, square_matrix
 from ..stages.xy import XYStage
-from .controller import Controller
+from .controller import Controller, number_pair
+from .plant import reach, resting
 from .tracking import (
     Tracking,
     check_period,
@@ -22,17 +24,18 @@ from .tracking import (
     check_within_reach,
     collected,
     feedforward_of,
+    voltages_before,
 )
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import ArrayLike, NDArray
 
     Array = NDArray[np.float64]
 
-__all__ = ["Contour", "contour"]
+__all__ = ["Contour", "Workspace", "contour", "workspace"]
 
 # Distance of the path's start from the stage that is noted, as a part of the path's size.
 JUMP = 0.05
@@ -116,17 +119,49 @@ class Contour:
         first = self.settled if start is None else start
         return ErrorStatistics.of(_core.spread(errors[self.x.part(t, first, stop)]))
 
-    def plot(self) -> Figure:
+    @property
+    def table(self) -> dict[str, Array]:
+        """Columns of the run at the control samples, with their units in the names."""
+        table = {"time_s": self.t}
+        for name, axis in (("x", self.x), ("y", self.y)):
+            table |= {
+                f"desired_{name}_um": 1e6 * axis.desired,
+                f"measured_{name}_um": 1e6 * axis.measured,
+                f"voltage_{name}_V": axis.voltage,
+            }
+        return table | {"contour_error_um": 1e6 * self.error}
+
+    def to_frame(self) -> Any:
+        """Return the run as a data frame of pandas.
+
+        Returns
+        -------
+        pandas.DataFrame
+            With the columns of `table`.
+
+        Raises
+        ------
+        ParameterError
+            pandas is not installed.
+        """
+        return frame_of(self.table)
+
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Plot path and positions, the error magnified along the path, and the errors over time.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
 
         Returns
         -------
         matplotlib.figure.Figure
-            Not yet shown or saved.
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
         """
         from .contouring_plot import plot_contour
 
-        return plot_contour(self)
+        return plot_contour(self, fig)
 
     @property
     def notes(self) -> list[str]:
@@ -178,6 +213,7 @@ def contour(
     delay: float = 0.0,
     jitter: float = 0.0,
     substeps: int = 10,
+    visited: Sequence[float] = (),
     beyond_reach: bool = False,
     unstable: bool = False,
 ) -> Contour:
@@ -205,6 +241,8 @@ def contour(
         two models, whose sensors have no seed.
     substeps : int, optional
         Instants kept in each sampling interval.
+    visited : sequence of float, optional
+        Voltages that both stages visit slowly before the run, as for `track`.
     beyond_reach, unstable : bool, optional
         As for `track`.
 
@@ -242,9 +280,10 @@ def contour(
     delay = not_negative("delay", delay, "s")
     jitter = not_negative("jitter", jitter, "s")
     substeps = _core.as_count("substeps", substeps)
-    forward = path if decoupling is None else path.transformed(_inverse(decoupling))
+    offsets = stage.x.sensor.offset, stage.y.sensor.offset
+    forward = path if decoupling is None else path.transformed(_inverse(decoupling), offsets)
     free = (_core.as_truth("unstable", unstable), _core.as_truth("beyond_reach", beyond_reach))
-    samples, voltages = [], []
+    samples, voltages, before = [], [], []
     parts = zip("xy", (stage.x, stage.y), both, path.axes, forward.axes, strict=True)
     for name, axis, controller, reference, ahead in parts:
         samples.append(reference.sample(controller.dt))
@@ -253,16 +292,18 @@ def contour(
             if not free[0]:
                 check_stable(axis, controller, delay)
             if not free[1]:
-                check_within_reach(axis, controller, samples[-1], 0.0)
+                check_within_reach(axis, controller, samples[-1])
         except ParameterError as error:
             raise ParameterError(f"{name}: {error}") from None
         along = samples[-1] if ahead is reference else ahead.sample(controller.dt)
         voltages.append(feedforward_of(controller, ahead, along))
+        before.append(voltages_before(axis, visited, controller.limits))
     runs = stage._core.track(
         (both[0]._core, both[1]._core),
         (samples[0].x, samples[1].x),
         (voltages[0][0], voltages[1][0]),
         (delay, jitter, substeps),
+        (before[0], before[1]),
     )
     x, y = (
         collected(run, controller, reference, sampled, note, substeps)
@@ -271,6 +312,67 @@ def contour(
         )
     )
     return Contour(path=path, x=x, y=y)
+
+
+class Workspace(NamedTuple):
+    """What an XY stage reaches.
+
+    Attributes
+    ----------
+    x, y : (float, float)
+        Lowest and highest displacement along each axis [m].
+    rest : (float, float)
+        Position in which a run begins [m], for the `origin` of a path.
+    """
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+    rest: tuple[float, float]
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        """The middle [m], for the `centre` of a path."""
+        return 0.5 * sum(self.x), 0.5 * sum(self.y)
+
+
+def workspace(
+    stage: XYStage, limits: tuple[float, float] | Sequence[tuple[float, float]]
+) -> Workspace:
+    """Find what an XY stage reaches between voltage limits.
+
+    Parameters
+    ----------
+    stage : XYStage
+        The stage.
+    limits : (float, float) or two of them
+        Lowest and highest voltage of both axes [V], or of x and of y.
+
+    Returns
+    -------
+    Workspace
+        Without cross-talk.
+
+    Raises
+    ------
+    ParameterError
+        `stage` is no XY stage, or `limits` are none.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> stage = pt.XYStage(x=pt.DahlStage.xu_li_2010(), y=pt.DahlStage.xu_li_2010())
+    >>> middle = pt.control.workspace(stage, (0.0, 75.0)).centre
+    >>> print(f"{1e6 * middle[0]:.0f} um")
+    60 um
+    """
+    if not isinstance(stage, XYStage):
+        raise ParameterError(f"stage is {type(stage).__name__}: expected pt.XYStage")
+    alone = np.ndim(limits[0]) == 0
+    pairs = [number_pair("limits", one, "V") for one in ([limits] * 2 if alone else limits)]
+    axes = list(zip((stage.x, stage.y), pairs, strict=True))
+    x, y = (reach(one, pair, 1e-3) for one, pair in axes)
+    at_x, at_y = (resting(one, voltages_before(one, (), pair)) for one, pair in axes)
+    return Workspace(x, y, (at_x, at_y))
 
 
 def _two(controllers: Sequence[Controller]) -> tuple[Controller, Controller]:

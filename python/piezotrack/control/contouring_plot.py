@@ -4,14 +4,27 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import matplotlib.pyplot as plt
 import numpy as np
 
-from .._support.plot_style import ACTUAL, DESIRED, above, axes_or_new, literal
+from .._support.plot_style import (
+    ACTUAL,
+    DESIRED,
+    ERROR,
+    GUIDE,
+    LEVEL,
+    QUIET,
+    axes_or_new,
+    few_ticks,
+    legend_inside,
+    literal,
+    panels,
+    whole,
+)
+from .description import parts_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
     from .contouring import Contour
@@ -46,15 +59,14 @@ def plot_path(run: Contour, ax: Axes | None = None) -> Axes:
         With the picture.
     """
     (ax,) = axes_or_new(ax, 1)
-    x, y = run.path.outline
-    ax.plot(1e6 * x, 1e6 * y, **{**DESIRED, "linewidth": 2.6, "color": "0.72"})
     start, part = run.t < run.settled, last_turn(run)
-    ax.plot(
-        1e6 * run.x.measured[start], 1e6 * run.y.measured[start], color="0.5", linewidth=0.6, ls=":"
-    )
-    ax.plot(1e6 * run.x.measured[part], 1e6 * run.y.measured[part], **{**ACTUAL, "linewidth": 0.9})
+    if start.any():
+        mark = {**QUIET, "label": "approach"}
+        ax.plot(1e6 * run.x.measured[start], 1e6 * run.y.measured[start], **mark)
+    ax.plot(1e6 * run.x.measured[part], 1e6 * run.y.measured[part], **ACTUAL)
+    x, y = run.path.outline
+    ax.plot(1e6 * x, 1e6 * y, **DESIRED)
     _plane(ax, run)
-    above(ax)
     return ax
 
 
@@ -81,7 +93,7 @@ def plot_magnified(run: Contour, ax: Axes | None = None, factor: float | None = 
         side = min(float(np.ptp(axis)) for axis in run.path.outline)
         factor = _round_down(SHOWN * side / run.metrics.max_error)
     x, y = run.path.outline
-    ax.plot(1e6 * x, 1e6 * y, color="0.72", linewidth=1.6, label="path")
+    ax.plot(1e6 * x, 1e6 * y, **{**DESIRED, "label": "path"})
     # The point of the path where the motion should be, and the normal to the left.
     (px, vx, _), (py, vy, _) = (axis.at(run.t[part]) for axis in run.path.axes)
     speed = np.maximum(np.hypot(vx, vy), 1e-30)
@@ -89,12 +101,9 @@ def plot_magnified(run: Contour, ax: Axes | None = None, factor: float | None = 
     ax.plot(
         1e6 * (px - off * vy / speed),
         1e6 * (py + off * vx / speed),
-        color="C3",
-        linewidth=0.8,
-        label=f"contour error x {factor:g}",
+        **{**ERROR, "label": f"contour error \N{MULTIPLICATION SIGN} {factor:g}"},
     )
     _plane(ax, run)
-    above(ax)
     return ax
 
 
@@ -117,29 +126,31 @@ def plot_contour_error(run: Contour, ax: Axes | None = None) -> Axes:
     part = last_turn(run)
     found = run.metrics
     mean, sd = 1e6 * found.mean_error, 1e6 * found.sd_error
-    ax.axhspan(mean - sd, mean + sd, color="0.9", label="mean +- SD")
-    ax.plot(run.t[part], 1e6 * run.error[part], color="C3", linewidth=0.8, label="contour error")
-    ax.axhline(mean, color="0.4", linewidth=0.8, linestyle="--")
+    ax.plot(run.t[part], 1e6 * run.error[part], **{**ERROR, "label": "contour error"})
+    ax.axhline(mean, **{**LEVEL, "label": "mean"})
+    ax.axhspan(mean - sd, mean + sd, color="0.9", zorder=0, label="mean \N{PLUS-MINUS SIGN} SD")
     ax.set(xlabel="time [s]", ylabel="contour error [um]")
-    above(ax)
     ax.margins(x=0)
+    legend_inside(ax, ncols=3)
     return ax
 
 
-def plot_contour(run: Contour) -> Figure:
+def plot_contour(run: Contour, fig: Figure | SubFigure | None = None) -> Figure:
     """Plot all four: path, magnified error, errors of the axes and contour error, in the last turn.
 
     Parameters
     ----------
     run : Contour
         The run.
+    fig : matplotlib.figure.Figure or SubFigure, optional
+        Figure to draw in; default a new one.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Not yet shown or saved.
+        The figure drawn in.
     """
-    figure = plt.figure(figsize=(11.0, 8.4), layout="constrained")
+    figure = panels(fig, (11.0, 8.4))
     grid = figure.add_gridspec(2, 2, height_ratios=[1.6, 1.0])
     plot_path(run, figure.add_subplot(grid[0, 0]))
     plot_magnified(run, figure.add_subplot(grid[0, 1]))
@@ -147,8 +158,8 @@ def plot_contour(run: Contour) -> Figure:
     inner = grid[1, 0].subgridspec(2, 1, hspace=0.1)
     for row, (name, axis) in enumerate((("x", run.x), ("y", run.y))):
         ax = figure.add_subplot(inner[row], sharex=shared, sharey=shared)
-        ax.plot(run.t[part], 1e6 * axis.error[part], color="C0", linewidth=0.8)
-        ax.axhline(0.0, color="0.7", linewidth=0.6)
+        ax.plot(run.t[part], 1e6 * axis.error[part], **ERROR)
+        ax.axhline(0.0, **GUIDE)
         ax.set(xlabel="time [s]" if row else "", ylabel=f"error of {name} [um]")
         ax.tick_params(labelbottom=bool(row))
         ax.locator_params(axis="y", nbins=4, prune="both")
@@ -158,10 +169,18 @@ def plot_contour(run: Contour) -> Figure:
     plot_contour_error(run, contour)
     found = run.metrics
     figure.suptitle(
-        f"{literal(run.path.name)}: contour error {1e6 * found.peak_to_peak:.3f} um peak to peak, "
-        f"mean {1e6 * found.mean_error:.3f} um, SD {1e6 * found.sd_error:.3f} um"
+        f"{literal(run.path.name)}: {_parts(run)} at {1.0 / run.x.controller.dt:.6g} Hz\n"
+        f"contour error {1e6 * found.peak_to_peak:.3f} um peak to peak, "
+        f"mean {1e6 * found.mean_error:.3f} um, SD {1e6 * found.sd_error:.3f} um",
+        fontsize="medium",
     )
-    return figure
+    return whole(figure)
+
+
+def _parts(run: Contour) -> str:
+    """Name the parts of the controllers, once where those of both axes are the same."""
+    x, y = parts_text(run.x.controller), parts_text(run.y.controller)
+    return x if x == y else f"x {x}, y {y}"
 
 
 def last_turn(run: Contour) -> NDArray[np.bool_]:
@@ -183,6 +202,8 @@ def _plane(ax: Axes, run: Contour) -> None:
         xlim=(edges[0][0] - room, edges[0][1] + room),
         ylim=(edges[1][0] - room, edges[1][1] + room),
     )
+    few_ticks(ax)
+    legend_inside(ax, ncols=3)
 
 
 def _round_down(value: float) -> float:

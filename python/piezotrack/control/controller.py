@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, Literal
 
 from .. import _core
 from .._support.arguments import TOO_FAR, finite
 from .._support.arrays import check_dt
 from ..errors import NumericalError, ParameterError
+from ..identification.identified import IdentifiedModel
 from ..stages.inverse import Inverse
 from .components import LowPass, Notch, Pid, Repetitive, StateSpace
+from .description import controller_text
 from .plant import reach
 from .session import Session
 
-__all__ = ["Controller"]
+__all__ = ["Controller", "number_pair"]
 
 # Sampling interval for the reach of a stage [s]: its drive takes seconds.
 REACH_STEP = 0.05
@@ -79,7 +81,7 @@ class Controller:
 
     def __post_init__(self) -> None:
         dt = check_dt(self.dt)
-        low, high = _pair("limits", self.limits, "V")
+        low, high = number_pair("limits", self.limits, "V")
         object.__setattr__(self, "limits", (low, high))
         _check_part("feedforward", self.feedforward, Inverse, "pt.Inverse")
         _check_part("feedback", self.feedback, (Pid, StateSpace), "pt.Pid or pt.control.StateSpace")
@@ -106,6 +108,66 @@ class Controller:
         )
         object.__setattr__(self, "_core", core)
 
+    @classmethod
+    def of(
+        cls,
+        model: IdentifiedModel,
+        *,
+        dt: float | None = None,
+        limits: tuple[float, float] | None = None,
+        playback: Literal["table", "online"] = "table",
+        **parts: Any,
+    ) -> Controller:
+        """Make a controller with the feedforward of an identified model, for its stage.
+
+        Parameters
+        ----------
+        model : IdentifiedModel
+            What ``pt.identify`` or ``pt.load`` returns.
+        dt : float, optional
+            Sampling interval [s]; default that of the record identified.
+        limits : (float, float), optional
+            Lowest and highest voltage [V]; default the range of the drive of that record.
+        playback : {"table", "online"}, optional
+            As in `Inverse`.
+        **parts
+            Other parameters of the class: `feedback`, `repetitive`, `filters`, `span`, `max_jump`,
+            or another `feedforward`.
+
+        Returns
+        -------
+        Controller
+            With these parts.
+
+        Raises
+        ------
+        ParameterError
+            The file of the model has no record, and `dt` or `limits` is not given.
+
+        Examples
+        --------
+        >>> import piezotrack as pt
+        >>> fit = pt.identify(pt.datasets.dbo_training()[3.0:23.0], "prandtl-ishlinskii")
+        >>> loop = pt.Controller.of(fit)
+        >>> loop.dt, loop.limits
+        (0.005, (0.0, 3.600098))
+        """
+        if not isinstance(model, IdentifiedModel):
+            raise ParameterError(
+                f"model is {type(model).__name__}: expected what pt.identify or pt.load returns"
+            )
+        known = {"dt": model.dt, "limits": model.drive_range}
+        given = {"dt": dt, "limits": limits}
+        settings = {name: known[name] if one is None else one for name, one in given.items()}
+        for name, value in settings.items():
+            if value is None:
+                raise ParameterError(f"{name} is not in the file of this model: expected {name}=")
+        feedforward = {"feedforward": model.inverse(playback=playback)}
+        return cls(**{**settings, **feedforward, **parts})
+
+    def __repr__(self) -> str:
+        return controller_text(self)
+
     def __reduce__(self) -> tuple[Any, ...]:
         # The core's controller is made again.
         given = {one.name: getattr(self, one.name) for one in fields(self) if one.init}
@@ -114,7 +176,7 @@ class Controller:
     def _span(self, low: float, high: float) -> tuple[float, float] | None:
         """Range of valid readings [m] for limits [V]; None for that of the core."""
         if self.span is not None:
-            return _pair("span", self.span, "m")
+            return number_pair("span", self.span, "m")
         if self.feedforward is None:
             return None
         try:
@@ -152,7 +214,8 @@ def _made(kind: type[Controller], settings: dict[str, Any]) -> Controller:
     return kind(**settings)
 
 
-def _pair(name: str, ends: object, unit: str) -> tuple[float, float]:
+def number_pair(name: str, ends: object, unit: str) -> tuple[float, float]:
+    """Take two finite numbers, the lower one first."""
     # An array is accepted too.
     listed = ends.tolist() if hasattr(ends, "tolist") else ends
     pair = list(listed) if isinstance(listed, Sequence) and not isinstance(listed, str) else []

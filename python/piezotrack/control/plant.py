@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copyreg
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from .. import _core
 from ..errors import ParameterError
 from ..identification.identified import IdentifiedModel
-from ..stages.base import MODEL_STEP, Stage
+from ..stages.base import Stage
 from ..stages.virtual import VirtualStage
 
 if TYPE_CHECKING:
@@ -20,7 +21,15 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Plant", "linearised_plants", "reach", "run_closed_loop", "settled_bottom", "unwrap"]
+__all__ = [
+    "Plant",
+    "linearised_plants",
+    "plant_of",
+    "reach",
+    "resting",
+    "run_closed_loop",
+    "settled_bottom",
+]
 
 # A linearised stage is pickled as its matrices.
 copyreg.pickle(_core.LoopPlant, lambda one: (_core.LoopPlant.from_matrices, one.matrices()))
@@ -29,27 +38,26 @@ copyreg.pickle(_core.LoopPlant, lambda one: (_core.LoopPlant.from_matrices, one.
 Plant = VirtualStage | Stage
 
 
-def unwrap(stage: Plant | IdentifiedModel) -> tuple[Plant, float, float]:
-    """Return the stage itself, and the offset [m] and delay [s] that its sensor shows.
+def plant_of(stage: Plant | IdentifiedModel) -> VirtualStage:
+    """Return a stage as a virtual stage: an identified one with its offset and delay.
 
     Raises
     ------
     ParameterError
         It is neither a stage model nor an identified one.
     """
-    offset = delay = 0.0
-    if isinstance(stage, IdentifiedModel):
-        offset, delay, stage = stage.offset, stage.delay, stage.model
-    if not isinstance(stage, Plant):
+    if isinstance(stage, VirtualStage):
+        return stage
+    if not isinstance(stage, (Stage, IdentifiedModel)):
         raise ParameterError(
             f"stage is {type(stage).__name__}: expected a pt.VirtualStage, a stage of a model, as "
             "a pt.DahlStage, or an identified one"
         )
-    return stage, offset, delay
+    return VirtualStage.of(stage)
 
 
 def run_closed_loop(
-    stage: Plant,
+    stage: VirtualStage,
     controller: Controller,
     reference: Array,
     feedforward: Array,
@@ -58,16 +66,23 @@ def run_closed_loop(
 ) -> _core.TrackingRun:
     """Simulate a closed loop, with reference [m] and feedforward [V] at the samples.
 
-    The stage is at rest, or in equilibrium after slow visits to the voltages `visited` [V].
-    `sampling` is delay and jitter [s], and the substeps kept in each sampling interval.
+    The stage is where its experiments start, or in equilibrium after slow visits to the voltages
+    `visited` [V]. `sampling` is delay and jitter [s], and the substeps kept in each sampling
+    interval.
     """
-    run = (controller._core, reference, feedforward, sampling)
-    if isinstance(stage, VirtualStage):
-        return stage._core.track(*run)
-    return stage._core.track(min(MODEL_STEP, controller.dt / 4), *run, visited)
+    stage = stepped(stage, controller)
+    return stage._core.track(controller._core, reference, feedforward, sampling, visited)
 
 
-def reach(stage: Plant, limits: tuple[float, float], dt: float) -> tuple[float, float]:
+def stepped(stage: VirtualStage, controller: Controller) -> VirtualStage:
+    """Return the stage with four steps at least in each sampling interval of a controller."""
+    step = min(stage.step, controller.dt / 4)
+    return stage if step == stage.step else replace(stage, step=step)
+
+
+def reach(
+    stage: VirtualStage | Stage, limits: tuple[float, float], dt: float
+) -> tuple[float, float]:
     """Simulate the lowest and the highest displacement [m] between two voltages [V].
 
     The voltage goes to the lower limit, then slowly to the upper one and back: 4 s each way, with
@@ -79,7 +94,15 @@ def reach(stage: Plant, limits: tuple[float, float], dt: float) -> tuple[float, 
     return float(x.min()), float(x.max())
 
 
-def settled_bottom(stage: Plant, limits: tuple[float, float], top: float, dt: float) -> float:
+def resting(stage: VirtualStage, visited: tuple[float, ...]) -> float:
+    """Return the displacement [m] in which a run begins, after slow visits to voltages [V]."""
+    moved = float(stage.stage.equilibrium(visited).x) if visited else 0.0
+    return moved + stage.sensor.offset
+
+
+def settled_bottom(
+    stage: VirtualStage, limits: tuple[float, float], top: float, dt: float
+) -> float:
     """Simulate the lowest displacement [m] at the lower of two voltages [V], from `top` [m] down.
 
     The voltage takes the course of `reach`, but only up to where the displacement is `top`. A stage
@@ -97,19 +120,22 @@ def settled_bottom(stage: Plant, limits: tuple[float, float], top: float, dt: fl
     return float(x[t >= 6.0].min())
 
 
-def _slow_cycle(stage: Plant, low: float, high: float, dt: float) -> tuple[Array, Array, Array]:
+def _slow_cycle(
+    stage: VirtualStage | Stage, low: float, high: float, dt: float
+) -> tuple[Array, Array, Array]:
     """Simulate from `low` slowly to `high` and back [V]: times [s], voltages and displacements."""
     t = np.arange(0.0, 11.0, dt)
     u = np.interp(t, [0, 0.5, 1, 5, 6, 10], [0.0, low, low, high, high, low])
+    if isinstance(stage, VirtualStage) and stage.preconditioning is None:
+        # An amplifier that lags changes nothing here, and the model alone takes fewer steps.
+        applied = np.clip(u, *stage.amplifier.limits)
+        return t, u, stage.stage.simulate(applied, dt).x + stage.sensor.offset
     return t, u, stage.simulate(u, dt).x
 
 
 def linearised_plants(
-    stage: Plant, limits: tuple[float, float], delay: float
+    stage: VirtualStage, limits: tuple[float, float], delay: float
 ) -> list[_core.LoopPlant]:
     """Linearise a stage for small motions: at its lowest, a middle and its highest gain."""
     low, high = (float(limit) for limit in limits)
-    if isinstance(stage, VirtualStage):
-        mode = (stage.frequency, stage.damping_ratio, stage.bandwidth, delay)
-        return [_core.LoopPlant.mode(gain, *mode) for gain in stage._core.gains()]
     return stage._core.loop_plants(low, high, delay)

@@ -190,6 +190,14 @@ class Session:
             feedforward=feedforward,
         )
 
+    def __repr__(self) -> str:
+        last, controller = self.last, self._controller
+        low, high = controller.limits
+        return (
+            f"<Session, {1.0 / controller.dt:.6g} Hz, {low:g} to {high:g} V: "
+            f"last {last.voltage:.4g} V, error {1e6 * last.error:.4g} um>"
+        )
+
     @property
     def last(self) -> Command:
         """The last command with its parts."""

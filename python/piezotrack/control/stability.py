@@ -11,10 +11,10 @@ import numpy as np
 from .. import _core
 from .._support.arguments import not_negative
 from ..errors import ParameterError
-from .plant import linearised_plants, unwrap
+from .plant import linearised_plants, plant_of
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
     from ..identification.identified import IdentifiedModel
@@ -162,6 +162,10 @@ class LoopReport:
         """Whether it is stable at all three."""
         return self.low.stable and self.middle.stable and self.high.stable
 
+    def __repr__(self) -> str:
+        elsewhere = "" if self.everywhere == self.stable else "; not at every gain of the stage"
+        return f"<LoopReport at {self.middle}{elsewhere}>"
+
     def __str__(self) -> str:
         lines = [f"{name:<7} {one}" for name, one in self._cases]
         if self.middle.hint:
@@ -203,17 +207,22 @@ class LoopReport:
             learning=np.asarray(learning),
         )
 
-    def plot(self) -> Figure:
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Plot open loop, sensitivity and, with a repetitive part, the error left by a period.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
 
         Returns
         -------
         matplotlib.figure.Figure
-            Not yet shown or saved.
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
         """
         from .stability_plot import plot_loop_report
 
-        return plot_loop_report(self)
+        return plot_loop_report(self, fig)
 
 
 def check_loop(
@@ -224,11 +233,11 @@ def check_loop(
 ) -> LoopReport:
     """Stability and margins of a controller on a stage.
 
-    The stage is linearised for small motions: a virtual stage as its mode with the amplifier; a
-    stage with hysteresis in feedback with the slope of the hysteresis force as a spring; a stage
-    with hysteresis at the input with the slope of its output on the settled loop between the
-    limits, without creep. The voltage is held between samples, and the repetitive part is that of
-    the implementation, with all its taps.
+    The stage is linearised for small motions: one with hysteresis in feedback with the slope of
+    the hysteresis force as a spring; one with hysteresis at the input with the slope of its output
+    on the settled loop between the limits, without creep. Bandwidth of the amplifier and delay of
+    the sensor of a virtual stage are included. The voltage is held between samples, and the
+    repetitive part is that of the implementation, with all its taps.
 
     Parameters
     ----------
@@ -253,10 +262,8 @@ def check_loop(
     >>> report.stable
     True
     """
-    plant, _, plant_delay = unwrap(stage)
-    plants = linearised_plants(
-        plant, controller.limits, not_negative("delay", delay, "s") + plant_delay
-    )
+    more = not_negative("delay", delay, "s")
+    plants = linearised_plants(plant_of(stage), controller.limits, more)
     cases = [_check(controller, linear) for linear in plants]
     return LoopReport(
         controller=controller, low=cases[0], middle=cases[1], high=cases[2], plant=plants[1]

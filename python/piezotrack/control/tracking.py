@@ -5,28 +5,30 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import _core
 from .._support.arguments import not_negative, one_or_more_numbers
+from .._support.frames import frame_of
 from .._support.statistics import FIGURES, ErrorStatistics
 from ..errors import ParameterError
 from ..references.reference import Reference, SampledReference
 from ..stages.inverse import PlayedVoltage
-from ..stages.virtual import VirtualStage
+from .components import Pid
 from .controller import Controller
-from .plant import reach, run_closed_loop, settled_bottom, unwrap
+from .plant import plant_of, reach, run_closed_loop, settled_bottom
 from .stability import check_loop
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
     from ..identification.identified import IdentifiedModel
+    from ..stages.virtual import VirtualStage
     from .plant import Plant
 
     Array = NDArray[np.float64]
@@ -202,17 +204,50 @@ class Tracking:
         found = _core.period_metrics(self.desired, self.measured, dt, period)
         return [_metrics(figures) for figures in found]
 
-    def plot(self) -> Figure:
+    @property
+    def table(self) -> dict[str, Array]:
+        """Columns of the run at the control samples, with their units in the names."""
+        return {
+            "time_s": self.t,
+            "desired_um": 1e6 * self.desired,
+            "measured_um": 1e6 * self.measured,
+            "voltage_V": self.voltage,
+            "feedforward_V": self.feedforward,
+            "feedback_V": self.feedback,
+            "repetitive_V": self.repetitive,
+        }
+
+    def to_frame(self) -> Any:
+        """Return the run as a data frame of pandas.
+
+        Returns
+        -------
+        pandas.DataFrame
+            With the columns of `table`.
+
+        Raises
+        ------
+        ParameterError
+            pandas is not installed.
+        """
+        return frame_of(self.table)
+
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Desired and actual motion, error, actual against desired, and the parts of the voltage.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
 
         Returns
         -------
         matplotlib.figure.Figure
-            Not yet shown or saved.
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
         """
         from .tracking_plot import plot_tracking
 
-        return plot_tracking(self)
+        return plot_tracking(self, fig)
 
     def summary(self) -> str:
         """Table of the run: all of it, and period by period.
@@ -265,8 +300,8 @@ def track(
     ----------
     stage : Stage, VirtualStage or IdentifiedModel
         The plant: any stage of ``pt.stages``, a `VirtualStage` or an `IdentifiedModel`. A stage
-        model has no noise and no amplifier, and starts at rest; offset and delay of an
-        `IdentifiedModel` are included in the displacement.
+        model has no noise and no amplifier (``VirtualStage.of`` gives it both), and starts at rest;
+        offset and delay of an `IdentifiedModel` are included in the displacement.
     controller : Controller
         The controller.
     reference : Reference
@@ -280,9 +315,10 @@ def track(
     substeps : int, optional
         Instants kept in each sampling interval, for plots; up to 100000.
     visited : float or sequence of float, optional
-        Voltages that a stage model visits slowly before the run, in turn [V]: it begins in
-        equilibrium at the last, with the memory of the others, as ``(75.0, 0.0)``. By default it
-        never moved before. A `VirtualStage` has its own preconditioning.
+        Voltages that the stage visits slowly before the run, in turn [V]: it begins in equilibrium
+        at the last, with the memory of the others, as ``(75.0, 0.0)``. By default it never moved
+        before; where 0 V is not between the limits, it begins at the limit nearest to 0 V. Not with
+        a virtual stage that is preconditioned.
     beyond_reach : bool, optional
         Whether the reference may exceed the reach of the stage within the voltage limits, as to
         study saturation.
@@ -311,31 +347,41 @@ def track(
     >>> print(f"{run.metrics.phase_lag:.2f} rad")
     0.06 rad
     """
-    plant, offset, plant_delay = unwrap(stage)
+    plant = plant_of(stage)
     for name, value, kind in (
         ("controller", controller, Controller),
         ("reference", reference, Reference),
     ):
         if not isinstance(value, kind):
             raise ParameterError(f"{name} is {type(value).__name__}: expected pt.{kind.__name__}")
-    # A delayed displacement and a delayed voltage have the same effect.
-    delay = not_negative("delay", delay, "s") + plant_delay
+    delay = not_negative("delay", delay, "s")
     substeps = _core.as_count("substeps", substeps)
     samples = reference.sample(controller.dt)
     check_period(controller, reference)
     if not _core.as_truth("unstable", unstable):
         check_stable(plant, controller, delay)
     if not _core.as_truth("beyond_reach", beyond_reach):
-        check_within_reach(plant, controller, samples, offset)
+        check_within_reach(plant, controller, samples)
     voltage, note = feedforward_of(controller, reference, samples)
     sampling = (delay, not_negative("jitter", jitter, "s"), substeps)
+    before = voltages_before(plant, visited, controller.limits)
+    run = run_closed_loop(plant, controller, samples.x, voltage, sampling, before)
+    return collected(run, controller, reference, samples, note, substeps)
+
+
+def voltages_before(
+    plant: VirtualStage, visited: float | Sequence[float], limits: tuple[float, float]
+) -> tuple[float, ...]:
+    """Voltages before a run [V]: those given, or the limit nearest to 0 V where 0 V is outside."""
     before = one_or_more_numbers("visited", visited)
-    if before and isinstance(plant, VirtualStage):
-        raise ParameterError(
-            f"visited is {before}: expected none, a virtual stage has its preconditioning"
-        )
-    run = run_closed_loop(plant, controller, samples.x - offset, voltage, sampling, before)
-    return collected(run, controller, reference, samples, note, substeps, offset)
+    if plant.preconditioning is not None:
+        if before:
+            raise ParameterError(
+                f"visited is {before}: expected none, this virtual stage has its preconditioning"
+            )
+        return ()
+    low, high = limits
+    return before or (() if low <= 0.0 <= high else (low if low > 0.0 else high,))
 
 
 def feedforward_of(
@@ -356,17 +402,15 @@ def collected(
     samples: SampledReference,
     note: str,
     substeps: int,
-    offset: float = 0.0,
 ) -> Tracking:
-    """Collect the results of one axis, whose sensor has an `offset` [m]."""
+    """Collect the results of one axis."""
     fine_t, fine_displacement, fine_voltage = run.motion()
-    fine_displacement = fine_displacement + offset
     return Tracking(
         reference=reference,
         controller=controller,
         t=samples.t,
         desired=samples.x,
-        measured=run.measured + offset,
+        measured=run.measured,
         displacement=fine_displacement[::substeps],
         loop_error=run.part("error"),
         voltage=run.part("volts"),
@@ -398,7 +442,7 @@ def check_period(controller: Controller, reference: Reference) -> None:
         )
 
 
-def check_stable(stage: Plant, controller: Controller, delay: float) -> None:
+def check_stable(stage: VirtualStage, controller: Controller, delay: float) -> None:
     """Refuse a loop that is unstable at the middle gain of the stage."""
     if controller.feedback is None and controller.repetitive is None:
         return
@@ -407,13 +451,18 @@ def check_stable(stage: Plant, controller: Controller, delay: float) -> None:
         return
     one = report.middle
     found = f"the loop is unstable on this stage, {1e6 * one.gain:.3g} um/V"
-    if one.slowest_root is not None:
-        found += f": its largest root is {one.slowest_root:.5g}"
+    law = controller.feedback
     without = one.gain_margin is not None and one.gain_margin < 1.0
     if without and one.stable_gains is not None and one.stable_gains[1] < 1.0:
-        found += f", and {one.stable_gains[1]:.3g} times the gain would be at the limit"
+        low, share = one.stable_gains
+        if isinstance(law, Pid):
+            gains = f"{1e-6 * share * law.kp:.3g} V/um in place of {1e-6 * law.kp:.3g}"
+            found += f"; at the limit kp would be {gains}"
+            found += ", and half of that has a gain margin of 2" if low < 0.5 * share else ""
+        else:
+            found += f"; at the limit the gain would be {share:.3g} times as large"
     elif without:
-        found += f", and {one.gain_margin:.3g} times the gain would be at that of the feedback"
+        found += f"; at the limit the feedback's gain would be {one.gain_margin:.3g} times as large"
     elif controller.repetitive is not None:
         found += "; without the repetitive part it is stable, so lower kq or take another filter"
     hint = f" ({one.hint})" if one.hint else ""
@@ -421,14 +470,13 @@ def check_stable(stage: Plant, controller: Controller, delay: float) -> None:
 
 
 def check_within_reach(
-    stage: Plant,
+    stage: VirtualStage,
     controller: Controller,
     samples: SampledReference,
-    offset: float,
 ) -> None:
     """Refuse a reference that exceeds the reach of the stage between the limits."""
     low, high = controller.limits
-    bottom, top = (end + offset for end in reach(stage, (low, high), 1e-3))
+    bottom, top = reach(stage, (low, high), 1e-3)
     slack = 0.01 * (top - bottom)
     for value, past, edge in (
         (samples.x.max(), samples.x.max() - top, top),
@@ -438,13 +486,13 @@ def check_within_reach(
             k = int(np.flatnonzero(samples.x == value)[0])
             raise ParameterError(
                 f"reference is {1e6 * value:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} um "
-                f"beyond {1e6 * edge:.4g} um: expected what the stage reaches from {low:g} to "
-                f"{high:g} V, or beyond_reach=True"
+                f"beyond {1e6 * edge:.4g} um: expected {1e6 * bottom:.4g} to {1e6 * top:.4g} um, "
+                f"which this stage reaches from {low:g} to {high:g} V, or beyond_reach=True"
             )
     # The loop stays above the curve from rest: once up, the stage no longer comes all the way down.
     k = int(np.argmax(samples.x))
     k += int(np.argmin(samples.x[k:]))
-    lowest = settled_bottom(stage, (low, high), float(samples.x.max()) - offset, 1e-3) + offset
+    lowest = settled_bottom(stage, (low, high), float(samples.x.max()), 1e-3)
     if (past := lowest - samples.x[k]) > slack:
         raise ParameterError(
             f"reference is {1e6 * samples.x[k]:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} "

@@ -4,14 +4,34 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import matplotlib.pyplot as plt
 import numpy as np
 
-from .._support.plot_style import ACTUAL, DESIRED, above, axes_or_new
+from .._support.plot_style import (
+    ACTUAL,
+    CLIPPED,
+    COMMAND,
+    DESIRED,
+    ERROR,
+    FEEDBACK,
+    FEEDFORWARD,
+    GUIDE,
+    LEVEL,
+    LIMITS,
+    REPETITIVE,
+    axes_or_new,
+    few_ticks,
+    heading,
+    legend_inside,
+    literal,
+    panels,
+    thinned,
+    whole,
+)
+from .description import run_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
     from .tracking import Tracking
@@ -43,11 +63,11 @@ def plot_motion(run: Tracking, ax: Axes | None = None) -> Axes:
         With the picture.
     """
     (ax,) = axes_or_new(ax, 1)
+    kept = thinned(run.fine_displacement)
+    ax.plot(run.fine_t[kept], 1e6 * run.fine_displacement[kept], **ACTUAL)
     ax.plot(run.t, 1e6 * run.desired, **DESIRED)
-    ax.plot(run.fine_t, 1e6 * run.fine_displacement, **ACTUAL)
     ax.set(xlabel="time [s]", ylabel="displacement [um]")
-    above(ax)
-    ax.margins(x=0)
+    _over_time(ax, run)
     return ax
 
 
@@ -67,22 +87,17 @@ def plot_error(run: Tracking, ax: Axes | None = None) -> Axes:
         With the picture.
     """
     (ax,) = axes_or_new(ax, 1)
-    ax.plot(run.t, 1e6 * run.error, color="C3", linewidth=0.9)
-    if run.saturated.any():
-        low, high = ax.get_ylim()
-        ax.fill_between(
-            run.t, low, high, where=run.saturated, color="0.85", zorder=0, label="voltage clipped"
-        )
-        ax.set_ylim(low, high)
-        above(ax)
+    ax.plot(run.t, 1e6 * run.error, **{**ERROR, "label": "desired - measured"})
     period = run.reference.period
     for i, one in enumerate(run.periods):
         assert period is not None
-        span = (i * period, (i + 1) * period)
-        ax.plot(span, 2 * [1e6 * one.max_error], color="0.5", linewidth=0.8, linestyle="--")
-    ax.axhline(0.0, color="0.7", linewidth=0.6)
+        span = (i * period, min((i + 1) * period, _end(run)))
+        label = None if i else "largest of each period"
+        ax.plot(span, 2 * [1e6 * one.max_error], **{**LEVEL, "label": label})
+    ax.axhline(0.0, **GUIDE)
     ax.set(xlabel="time [s]", ylabel="tracking error [um]")
-    ax.margins(x=0)
+    _shade_clipped(ax, run)
+    _over_time(ax, run, ncols=2)
     return ax
 
 
@@ -103,12 +118,12 @@ def plot_following(run: Tracking, ax: Axes | None = None) -> Axes:
     """
     (ax,) = axes_or_new(ax, 1)
     part = run.t >= run.settled
-    ax.plot(1e6 * run.desired[part], 1e6 * run.measured[part], color="C0", linewidth=0.9)
+    ax.plot(1e6 * run.desired[part], 1e6 * run.measured[part], **{**ACTUAL, "label": "measured"})
     ends = np.array([run.desired.min(), run.desired.max()]) * 1e6
-    ax.plot(ends, ends, color="0.35", linewidth=0.8, linestyle="--")
-    ax.set(xlabel="desired displacement [um]", ylabel="actual displacement [um]")
-    # Fewer numbers than chosen by itself, which touch where they are long.
-    ax.locator_params(axis="x", nbins=6)
+    ax.plot(ends, ends, **{**DESIRED, "label": "measured = desired"})
+    ax.set(xlabel="desired displacement [um]", ylabel="measured displacement [um]")
+    few_ticks(ax)
+    ax.legend(loc="upper left", frameon=False, fontsize="small")
     return ax
 
 
@@ -128,62 +143,105 @@ def plot_effort(run: Tracking, ax: Axes | None = None) -> Axes:
         With the picture.
     """
     (ax,) = axes_or_new(ax, 1)
-    ax.step(run.t, run.voltage, where="post", color="0.55", linewidth=2.4, label="total")
-    parts = {
-        "feedforward": (run.feedforward, "C0"),
-        "feedback": (run.feedback, "C1"),
-        "repetitive": (run.repetitive, "C2"),
-    }
-    for name, (voltage, colour) in parts.items():
+    ax.step(run.t, run.voltage, where="post", **COMMAND)
+    parts = (
+        (run.feedforward, FEEDFORWARD),
+        (run.feedback, FEEDBACK),
+        (run.repetitive, REPETITIVE),
+    )
+    for voltage, style in parts:
         if np.any(voltage):
-            ax.step(run.t, voltage, where="post", color=colour, linewidth=1.0, label=name)
+            ax.step(run.t, voltage, where="post", **style)
     ax.set(xlabel="time [s]", ylabel="voltage [V]")
-    above(ax)
-    ax.margins(x=0)
+    if run.saturated.any():
+        for i, limit in enumerate(run.controller.limits):
+            ax.axhline(limit, **{**LIMITS, "label": None if i else "limits"})
+    _over_time(ax, run)
     return ax
 
 
-def plot_feedforward(t: Array, voltage: Array, x: Array) -> Figure:
+def _end(run: Tracking) -> float:
+    """Time at which the last voltage ends [s]."""
+    return float(run.t[-1]) + run.controller.dt
+
+
+def _over_time(ax: Axes, run: Tracking, ncols: int = 3) -> None:
+    """Let the time axis end where the run does, and put the legend into the axes."""
+    ax.set_xlim(0.0, _end(run))
+    few_ticks(ax)
+    legend_inside(ax, ncols)
+
+
+def _shade_clipped(ax: Axes, run: Tracking) -> None:
+    """Shade the intervals in which the voltage was clipped, also one of a single sample."""
+    changes = np.flatnonzero(np.diff(np.concatenate([[False], run.saturated, [False]])))
+    times = np.append(run.t, _end(run))
+    for i, (first, last) in enumerate(changes.reshape(-1, 2)):
+        style = {**CLIPPED, "label": None if i else "voltage clipped"}
+        ax.axvspan(times[first], times[last], **style)
+
+
+def plot_feedforward(
+    t: Array,
+    voltage: Array,
+    x: Array,
+    fig: Figure | SubFigure | None = None,
+    *,
+    title: str = "Feedforward",
+) -> Figure:
     """Plot a voltage table over time and over the reference.
 
     Parameters
     ----------
     t, voltage, x : ndarray, shape (n,)
         Time [s], voltage [V], reference [m].
+    fig : matplotlib.figure.Figure or SubFigure, optional
+        Figure to draw in; default a new one.
+    title : str, optional
+        What ran.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Two panels.
+        The figure drawn in.
     """
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.2), layout="constrained")
-    left.step(t, voltage, where="post", color="C0", linewidth=1.1)
-    left.set(xlabel="time [s]", ylabel="feedforward [V]", title="Voltage over time")
+    figure = panels(fig, (11.0, 4.2))
+    left, right = figure.subplots(1, 2)
+    left.step(t, voltage, where="post", **FEEDFORWARD)
+    left.set(xlabel="time [s]", ylabel="feedforward [V]")
+    heading(left, "Voltage over time")
     left.margins(x=0)
-    right.plot(1e6 * x, voltage, color="C0", linewidth=1.0)
-    right.set(xlabel="reference [um]", ylabel="feedforward [V]", title="Voltage over reference")
-    return figure
+    right.plot(1e6 * x, voltage, **FEEDFORWARD)
+    right.set(xlabel="reference [um]", ylabel="feedforward [V]")
+    heading(right, "Voltage over reference")
+    few_ticks(right)
+    figure.suptitle(literal(title), fontsize="large")
+    return whole(figure)
 
 
-def plot_tracking(run: Tracking) -> Figure:
+def plot_tracking(run: Tracking, fig: Figure | SubFigure | None = None) -> Figure:
     """Plot all four: motion, error, actual against desired, voltage.
 
     Parameters
     ----------
     run : Tracking
         A tracked motion.
+    fig : matplotlib.figure.Figure or SubFigure, optional
+        Figure to draw in; default a new one.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Not yet shown or saved.
+        The figure drawn in.
     """
-    figure = plt.figure(figsize=(11.0, 7.0), layout="constrained")
+    figure = panels(fig, (11.0, 7.0))
     axes = figure.subplots(2, 2)
     plot_motion(run, axes[0, 0])
     plot_following(run, axes[0, 1])
     plot_error(run, axes[1, 0])
     plot_effort(run, axes[1, 1])
     since = f"from {run.settled:g} s on: " if run.settled else ""
-    figure.suptitle(f"{since}{run.metrics}")
-    return figure
+    figure.suptitle(
+        f"{run_text(run.controller, run.reference)}\n{since}{run.metrics}", fontsize="medium"
+    )
+    return whole(figure)

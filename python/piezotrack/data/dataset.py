@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from .._support.arrays import real, signal_of, time_axis
+from .._support.frames import frame_of
+from .._support.html_table import html_table
 from .._support.messages import listed, quoted
 from .._support.units import best_length_unit
 from ..errors import DataError, ParameterError
@@ -18,7 +20,10 @@ from ..errors import DataError, ParameterError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import ArrayLike, NDArray
+
+    from .frames import Frame
 
     Array = NDArray[np.float64]
 
@@ -119,6 +124,80 @@ class Dataset:
         self._hold, self._drive_unit, self._source = hold, drive_unit, source
         self._start = 0
         self._sha256: str | None = None
+
+    @classmethod
+    def from_frame(
+        cls,
+        frame: Frame,
+        *,
+        time: str | int | None = None,
+        drive: str | int | None = None,
+        displacement: str | int | None = None,
+        units: Mapping[str | int, str] | None = None,
+        dt: float | None = None,
+        hold: Hold = "foh",
+    ) -> Dataset:
+        """Make a record of a data frame, of pandas or polars.
+
+        Parameters
+        ----------
+        frame : DataFrame
+            With one row for each sample. Titles have units, as in a text log: ``voltage_V``,
+            ``x (um)``.
+        time, drive, displacement, units, dt, hold
+            As in `piezotrack.read`.
+
+        Returns
+        -------
+        Dataset
+            The record in seconds, volts and metres.
+
+        Raises
+        ------
+        DataError, ParameterError
+            As in `piezotrack.read`.
+
+        Examples
+        --------
+        >>> import pandas as pd
+        >>> import piezotrack as pt
+        >>> frame = pd.DataFrame({"t_ms": [0, 5, 10], "u_V": [0, 10, 20], "x_um": [0, 1.5, 3.5]})
+        >>> pt.Dataset.from_frame(frame)
+        Dataset(3 samples, 0.015 s at 200 Hz, stroke 3.5 um)
+        """
+        from .frames import dataset_of_frame
+
+        return dataset_of_frame(
+            frame,
+            time=time,
+            drive=drive,
+            displacement=displacement,
+            units=units,
+            dt=dt,
+            hold=hold,
+        )
+
+    def to_frame(self) -> Any:
+        """Return the window as a data frame of pandas.
+
+        Returns
+        -------
+        pandas.DataFrame
+            ``time_s``, the drive in its unit and ``displacement_um``.
+
+        Raises
+        ------
+        ParameterError
+            pandas is not installed.
+
+        Examples
+        --------
+        >>> import piezotrack as pt
+        >>> list(pt.datasets.dbo_training()[3.0:4.0].to_frame().columns)
+        ['time_s', 'drive_V', 'displacement_um']
+        """
+        drive = {f"drive_{self.drive_unit}": self.u}
+        return frame_of({"time_s": self.t, **drive, "displacement_um": 1e6 * self.y})
 
     @property
     def t(self) -> Array:
@@ -373,6 +452,31 @@ class Dataset:
         part._start, part._sha256 = start, None
         return part
 
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
+        """Drive and displacement over time, and the hysteresis loop.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
+
+        Examples
+        --------
+        >>> import piezotrack as pt
+        >>> from matplotlib.figure import Figure
+        >>> figure = pt.datasets.dbo_training()[3.0:23.0].plot(fig=Figure())
+        >>> [ax.get_ylabel() for ax in figure.axes]
+        ['drive [V]', 'displacement [um]', 'displacement [um]']
+        """
+        from .dataset_plot import plot_dataset
+
+        return plot_dataset(self, fig)
+
     def __repr__(self) -> str:
         unit, scale = best_length_unit(self.stroke)
         parts = [
@@ -383,6 +487,19 @@ class Dataset:
         if self._start:
             parts.append(f"warm-up {self._start} samples")
         return f"Dataset({', '.join(parts)})"
+
+    def _repr_html_(self) -> str:
+        unit, scale = best_length_unit(self.stroke)
+        rows = [
+            ("samples", f"{len(self)}, {self.duration:.6g} s at {1.0 / self._dt:.6g} Hz"),
+            ("time", f"{self.t[0]:.6g} to {self.t[-1]:.6g} s"),
+            ("drive", f"{self.u.min():.4g} to {self.u.max():.4g} {self.drive_unit}, {self.hold}"),
+            ("displacement", f"{scale * self.y.min():.4g} to {scale * self.y.max():.4g} {unit}"),
+            ("stroke", f"{scale * self.stroke:.4g} {unit}"),
+            ("warm-up", f"{self._start} samples"),
+        ]
+        rows += [(name, self._column_units.get(name, "")) for name in self._columns]
+        return html_table(f"Dataset {self._source or ''}".rstrip(), rows)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)

@@ -20,7 +20,7 @@ from .identified import IdentifiedModel, Score, load
 from .model_file import provenance
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
     from .history import History
@@ -94,6 +94,11 @@ class Comparison:
         scores = "; ".join(f"{row.title} {row.test.rms_percent:.3g} %" for row in self.rows)
         return f"<Comparison, rms on what was not fitted: {scores}; see summary()>"
 
+    def _repr_html_(self) -> str:
+        from .html import comparison_html
+
+        return comparison_html(self)
+
     @property
     def best(self) -> ModelScore:
         """The model with the lowest RMS on the part that was not fitted."""
@@ -146,17 +151,22 @@ class Comparison:
 
         return comparison_text(self)
 
-    def plot(self) -> Figure:
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Loops in one panel, errors over time with the split marked, and the RMS as bars.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
 
         Returns
         -------
         matplotlib.figure.Figure
-            Not yet shown or saved.
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
         """
         from .comparison_plot import plot_comparison
 
-        return plot_comparison(self)
+        return plot_comparison(self, fig)
 
     def document(self) -> dict[str, Any]:
         """Content of the JSON file.

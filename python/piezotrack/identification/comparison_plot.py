@@ -1,4 +1,4 @@
-"""Picture of a comparison: loops over each other, errors over time, RMS as bars."""
+"""Picture of a comparison: loops and errors in the worst cycle, RMS as bars, errors over time."""
 
 from __future__ import annotations
 
@@ -8,12 +8,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._support.plot_style import MEASURED, literal, thinned
+from .._support.plot_style import (
+    GUIDE,
+    MEASURED,
+    MODELS,
+    QUIET,
+    few_ticks,
+    heading,
+    literal,
+    panels,
+    thinned,
+    whole,
+)
 from .._support.units import best_length_unit, shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
     from .comparison import Comparison, ModelScore
@@ -22,66 +33,78 @@ if TYPE_CHECKING:
 
 __all__ = ["plot_comparison"]
 
-# Distinct in black and white as well.
-LINES: tuple[dict[str, Any], ...] = (
-    {"color": "#b3400a", "linestyle": "-"},
-    {"color": "#1b6ca8", "linestyle": "--"},
-    {"color": "#1d7a3a", "linestyle": "-."},
-    {"color": "#7a3b8f", "linestyle": ":"},
-    {"color": "#8a6d00", "linestyle": (0, (6, 1.5, 1, 1.5, 1, 1.5))},
-    {"color": "#000000", "linestyle": (0, (8, 3))},
-)
 FITTED: dict[str, Any] = {"color": "0.8", "edgecolor": "0.3", "hatch": "///", "label": "fitted"}
 JUDGED: dict[str, Any] = {"color": "0.35", "edgecolor": "0.2", "label": "not fitted"}
 # Letters of a name in a line beside its bars.
 LABEL = 20
 
 
-def plot_comparison(comparison: Comparison) -> Figure:
+def plot_comparison(comparison: Comparison, fig: Figure | SubFigure | None = None) -> Figure:
     """Put loops, errors and bars on one sheet.
 
     Parameters
     ----------
     comparison : Comparison
         The models, compared.
+    fig : matplotlib.figure.Figure or SubFigure, optional
+        Where to draw; a new figure where not given.
 
     Returns
     -------
     matplotlib.figure.Figure
-        A loop, bars, and the error of each model.
+        The figure drawn in: a loop and its errors, bars, and the error of each model.
     """
-    import matplotlib.pyplot as plt
-
     rows = comparison.rows
-    height = max(6.0, 1.25 * len(rows) + 1.6)
-    figure = plt.figure(figsize=(11.0, height), layout="constrained")
+    figure = panels(fig, (11.0, max(7.4, 1.25 * len(rows) + 2.2)))
     grid = figure.add_gridspec(1, 2, width_ratios=[1.0, 1.35])
-    left = grid[0].subgridspec(2, 1, height_ratios=[2.2, 1.0])
+    left = grid[0].subgridspec(3, 1, height_ratios=[1.5, 1.1, 0.6 + 0.16 * len(rows)])
     right = grid[1].subgridspec(len(rows), 1)
-    _loops(comparison, figure.add_subplot(left[0]))
-    _bars(comparison, figure.add_subplot(left[1]))
+    loop = figure.add_subplot(left[0])
+    _loops(comparison, loop, figure.add_subplot(left[1], sharex=loop))
+    _bars(comparison, figure.add_subplot(left[2]))
     _errors(comparison, [figure.add_subplot(right[i]) for i in range(len(rows))])
-    return figure
+    figure.suptitle(_title(comparison), fontsize="large")
+    return whole(figure)
 
 
-def _loops(comparison: Comparison, ax: Axes) -> None:
-    """Draw the cycle on which a model is furthest off, measured and by each model."""
+def _title(comparison: Comparison) -> str:
+    """Write what was compared, and which model was best."""
+    best, count = comparison.best, len(comparison.rows)
+    where = "" if comparison.carried else f", {literal(comparison.test.source or 'other record')}"
+    return (
+        f"{count} {'model' if count == 1 else 'models'} fitted to "
+        f"{literal(comparison.train.source or 'one record')}; best where not fitted{where}:\n"
+        f"{literal(best.title)}, {best.test.rms_percent:.3g} % of stroke rms"
+    )
+
+
+def _loops(comparison: Comparison, loop: Axes, off: Axes) -> None:
+    """Draw the cycle on which a model is furthest off: loops, and errors over the drive."""
     data = comparison.test
     followed = [comparison.followed(row, "test") for row in comparison.rows]
-    off: Array = np.max([np.abs(data.y - x) for x in followed], axis=0)
-    part = _cycle(data.u, off)
-    unit, scale = best_length_unit(data.stroke)
+    part = _cycle(data.u, np.max([np.abs(data.y - x) for x in followed], axis=0))
     drive, times = shown_unit(data.drive_unit)
-    ax.plot(times * data.u[part], scale * data.y[part], **MEASURED)
+    u, y = times * data.u[part], data.y[part]
+    unit, scale = best_length_unit(data.stroke)
+    worst = max(float(np.abs(y - x[part]).max()) for x in followed)
+    small, fine = best_length_unit(worst)
+    loop.plot(u, scale * y, **MEASURED)
     for row, x, line in zip(comparison.rows, followed, _lines(comparison), strict=True):
-        ax.plot(
-            times * data.u[part], scale * x[part], label=literal(row.title), linewidth=1.1, **line
-        )
-    ax.set(xlabel=f"drive [{literal(drive)}]", ylabel=f"displacement [{unit}]")
+        loop.plot(u, scale * x[part], label=literal(row.title), linewidth=1.1, **line)
+        off.plot(u, fine * (y - x[part]), label=literal(row.title), linewidth=1.1, **line)
+    off.axhline(0.0, **GUIDE)
+    loop.set(ylabel=f"displacement [{unit}]")
+    loop.tick_params(labelbottom=False)
+    off.set(xlabel=f"drive [{literal(drive)}]", ylabel=f"error [{small}]")
+    few_ticks(off)
     when = f"{data.t[part][0]:.4g} to {data.t[part][-1]:.4g} s"
     where = "" if comparison.carried else f" of {literal(data.source or 'the other record')}"
-    ax.set_title(f"Largest error: {when}{where}", fontsize="medium")
-    ax.legend(loc="lower right", frameon=False, fontsize="small")
+    heading(loop, f"Loop with the largest error ({when}{where})")
+    heading(off, "Its error = measured - simulated")
+    # Room for the names to the right of the loop's lower end.
+    low, high = loop.get_ylim()
+    loop.set_ylim(bottom=low - 0.07 * len(followed) * (high - low))
+    loop.legend(loc="lower right", frameon=False, fontsize="small")
 
 
 def _cycle(u: Array, off: Array) -> slice:
@@ -131,8 +154,8 @@ def _errors(comparison: Comparison, axes: list[Axes]) -> None:
         ):
             shown = thinned(error)
             ax.plot(t[shown], scale * error[shown], color=line["color"], linewidth=0.7)
-        ax.axhline(0.0, color="0.7", linewidth=0.8, zorder=0)
-        ax.axvline(split, color="0.2", linestyle=":", linewidth=1.4)
+        ax.axhline(0.0, **GUIDE)
+        ax.axvline(split, **QUIET)
         ax.set_ylim(-reach, reach)
         ax.margins(x=0.0)
         ax.set_ylabel(f"error [{unit}]")
@@ -153,6 +176,7 @@ def _errors(comparison: Comparison, axes: list[Axes]) -> None:
             ha=side,
             va="top",
             color="0.2",
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
         )
 
 
@@ -163,4 +187,4 @@ def _heading(row: ModelScore) -> str:
 
 def _lines(comparison: Comparison) -> list[dict[str, Any]]:
     """Give each model its line."""
-    return [LINES[i % len(LINES)] for i in range(len(comparison.rows))]
+    return [MODELS[i % len(MODELS)] for i in range(len(comparison.rows))]

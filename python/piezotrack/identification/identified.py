@@ -121,6 +121,9 @@ class IdentifiedModel:
     start: Start | None = None
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
+    def __repr__(self) -> str:
+        return f"<IdentifiedModel, stroke {1e6 * self.stroke:.4g} um: {self.model!r}>"
+
     @property
     def drive_range(self) -> tuple[float, float] | None:
         """Lowest and highest drive of the record identified; None if the file has none."""
@@ -131,6 +134,12 @@ class IdentifiedModel:
     def drive_unit(self) -> str:
         """Unit of the drive, SI: ``"V"``, ``"N"``, or ``"m"`` where the drive is a position."""
         return drive_unit_of(self.details, self.model.info)
+
+    @property
+    def dt(self) -> float | None:
+        """Sampling interval of the record identified [s]; None if the file has none."""
+        found = self._record.get("dt_s")
+        return None if found is None else float(found)
 
     @property
     def _record(self) -> Mapping[str, Any]:

@@ -159,8 +159,9 @@ def _check_origin(found: Any) -> None:
     record = object_of("provenance: data", object_of("provenance", found).get("data"))
     for name in ("source", "sha256", "drive_unit"):
         text_of(f"provenance: data: {name}", record.get(name))
-    if record.get("drive_rate") is not None:
-        _core.as_number("provenance: data: drive_rate", record["drive_rate"])
+    for name in ("drive_rate", "dt_s"):
+        if record.get(name) is not None:
+            _core.as_number(f"provenance: data: {name}", record[name])
     for name in ("window_s", "drive_range"):
         number_pair(f"provenance: data: {name}", record.get(name))
 

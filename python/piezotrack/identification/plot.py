@@ -5,18 +5,33 @@ Every function takes the axes to draw on and returns them, so that the pictures 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._support.plot_style import MEASURED, axes_or_new, literal, plain_log_ticks, thinned
+from .._support.plot_style import (
+    ERROR,
+    GUIDE,
+    MARKS,
+    MEASURED,
+    QUIET,
+    SIMULATED,
+    axes_or_new,
+    heading,
+    legend_inside,
+    literal,
+    panels,
+    plain_log_ticks,
+    thinned,
+    whole,
+)
 from .._support.units import best_length_unit, shown_unit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
     from ..data.dataset import Dataset
@@ -31,14 +46,13 @@ __all__ = [
     "plot_loop",
     "plot_response",
     "plot_time",
+    "what_was_fitted",
 ]
 
-# Distinct in black and white too, also where many cycles overlap.
-SIMULATED: dict[str, Any] = {"color": "#b3400a", "linewidth": 1.0, "label": "simulated"}
-ERROR: dict[str, Any] = {"color": "#1b6ca8", "linewidth": 0.8}
 
-
-def plot_loop(data: Dataset, run: Response, ax: Axes | None = None) -> Axes:
+def plot_loop(
+    data: Dataset, run: Response, ax: Axes | None = None, *, title: str = "Hysteresis loop"
+) -> Axes:
     """Draw the hysteresis loop: displacement over drive, measured and simulated.
 
     Parameters
@@ -49,6 +63,8 @@ def plot_loop(data: Dataset, run: Response, ax: Axes | None = None) -> Axes:
         Response of the model on that record.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure where not given.
+    title : str, optional
+        What ran.
 
     Returns
     -------
@@ -62,8 +78,8 @@ def plot_loop(data: Dataset, run: Response, ax: Axes | None = None) -> Axes:
         kept = thinned(y)
         ax.plot(times * data.u[kept], scale * y[kept], **style)
     ax.set(xlabel=f"drive [{literal(drive)}]", ylabel=f"displacement [{unit}]")
-    ax.set_title("Hysteresis loop")
-    ax.legend(loc="upper left", frameon=False)
+    heading(ax, title)
+    ax.legend(loc="upper left", frameon=False, fontsize="small")
     return ax
 
 
@@ -74,6 +90,7 @@ def plot_time(
     *,
     stroke: float | None = None,
     fitted_until: float | None = None,
+    title: str = "Displacement over time",
 ) -> tuple[Axes, Axes]:
     """Draw measured and simulated displacement over time, and the error below.
 
@@ -89,6 +106,8 @@ def plot_time(
         Stroke that the percentage refers to [m]; the record's own where not given.
     fitted_until : float, optional
         Time [s] up to which the record was fitted; a line marks it.
+    title : str, optional
+        What ran.
 
     Returns
     -------
@@ -102,38 +121,31 @@ def plot_time(
     for y, style in ((data.y, MEASURED), (run.x, SIMULATED)):
         kept = thinned(y)
         above.plot(data.t[kept], scale * y[kept], **style)
-    above.set(ylabel=f"displacement [{unit}]", title="Displacement over time")
+    above.set(ylabel=f"displacement [{unit}]")
+    heading(above, title, 84)
+    if fitted_until is not None:
+        mark = {**QUIET, "label": "fitted before, predicted after"}
+        above.axvline(fitted_until, **mark)
+        below.axvline(fitted_until, **QUIET)
     above.margins(x=0.0, y=0.05)
-    top = above.get_ylim()[1] - above.get_ylim()[0]
-    above.set_ylim(top=above.get_ylim()[1] + 0.22 * top)
-    above.legend(loc="upper right", ncols=2, frameon=False)
+    legend_inside(above)
     kept = thinned(error)
-    below.plot(data.t[kept], fine * error[kept], **ERROR)
-    below.axhline(0.0, color="0.7", linewidth=0.8, zorder=0)
+    below.plot(data.t[kept], fine * error[kept], **{**ERROR, "linewidth": 0.8})
+    below.axhline(0.0, **GUIDE)
     below.set(xlabel="time [s]", ylabel=f"error [{small}]")
     rms = float(np.sqrt(np.mean(error**2)))
-    below.set_title(
-        f"Measured less simulated: rms {fine * rms:.3g} {small} "
+    heading(
+        below,
+        f"error = measured - simulated: rms {fine * rms:.3g} {small} "
         f"({100 * rms / (stroke or data.stroke):.3g} % of stroke)",
-        fontsize="medium",
+        84,
     )
     below.margins(x=0.0)
-    if fitted_until is not None:
-        for ax in (above, below):
-            ax.axvline(fitted_until, color="0.4", linestyle=":", linewidth=1.2)
-        above.annotate(
-            " fitted before, predicted after",
-            (fitted_until, 0.93),
-            xycoords=("data", "axes fraction"),
-            fontsize="small",
-            va="center",
-            color="0.3",
-        )
     return above, below
 
 
 def plot_convergence(fit: Identification, ax: Axes | None = None) -> Axes:
-    """Draw the best cost of the swarm after each iteration.
+    """Draw the best cost of the swarm after each iteration, and where the other restarts ended.
 
     Parameters
     ----------
@@ -151,60 +163,80 @@ def plot_convergence(fit: Identification, ax: Axes | None = None) -> Axes:
     # A cost of 0 has no place on a logarithmic scale.
     finite = np.isfinite(fit.history) & (fit.history > 0.0)
     iterations = np.arange(fit.history.size)[finite]
-    ax.plot(iterations, 1e6 * fit.history[finite], color="#1b6ca8", linewidth=1.4)
+    best = f"best of {len(fit.runs)} restarts" if len(fit.runs) > 1 else "swarm"
+    ax.plot(
+        iterations,
+        1e6 * fit.history[finite],
+        color=SIMULATED["color"],
+        linewidth=1.4,
+        label=f"{best}: {1e6 * fit.history[-1]:.4g} um",
+    )
+    ends = [(run.nit, 1e6 * run.cost) for run in fit.runs if 0.0 < run.cost < np.inf]
+    if len(ends) > 1:
+        label = "each restart, refined" if fit.npolish else "end of each restart"
+        ax.plot(*zip(*ends, strict=True), **{**MARKS, "marker": "x", "label": label})
+    if fit.npolish and fit.cost > 0.0:
+        ax.plot(fit.nit, fit.cost_um, **{**MARKS, "label": f"refined: {fit.cost_um:.4g} um"})
     if finite.any():
         ax.set_yscale("log")
-    ax.set(xlabel="iteration", ylabel="best cost, rms [um]", title="Convergence of the swarm")
+    ax.set(xlabel="iteration", ylabel="best cost, rms [um]")
     ax.margins(x=0.02)
+    heading(
+        ax,
+        f"Convergence: {fit.nit} iterations, {fit.nfev} simulations",
+    )
+    legend_inside(ax, ncols=2)
     if finite.any():
         plain_log_ticks(ax)
-    caption = f"{1e6 * fit.history[-1]:.4g} um after {fit.nit} iterations,\n{fit.nfev} simulations"
-    if fit.npolish and fit.cost > 0.0:
-        ax.plot(fit.nit, fit.cost_um, "o", color="#b3400a", markersize=5)
-        caption += f";\n{fit.cost_um:.4g} um after local refinement"
-    ax.annotate(
-        caption,
-        (0.97, 0.93),
-        xycoords="axes fraction",
-        ha="right",
-        va="top",
-        fontsize="small",
-    )
     return ax
 
 
-def plot_response(t: Array, u: Array, x: Array, drive_unit: str = "V") -> Figure:
+def plot_response(
+    t: Array,
+    u: Array,
+    x: Array,
+    fig: Figure | SubFigure | None = None,
+    *,
+    title: str = "Simulated response",
+    drive_unit: str = "V",
+) -> Figure:
     """Draw a simulated displacement over time and over the drive.
 
     Parameters
     ----------
     t, u, x : ndarray, shape (n,)
-        Time [s], drive [V], displacement [m].
+        Time [s], drive in `drive_unit`, displacement [m].
+    fig : matplotlib.figure.Figure or SubFigure, optional
+        Where to draw; a new figure where not given.
+    title : str, optional
+        What ran.
     drive_unit : str, optional
         Unit of the drive, SI.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Two panels.
+        The figure drawn in.
     """
-    import matplotlib.pyplot as plt
-
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.2), layout="constrained")
+    figure = panels(fig, (11.0, 4.2))
+    left, right = figure.subplots(1, 2)
     unit, scale = best_length_unit(float(np.ptp(x)))
     kept = thinned(x)
     left.plot(t[kept], scale * x[kept], **SIMULATED)
-    left.set(xlabel="time [s]", ylabel=f"displacement [{unit}]", title="Displacement over time")
+    left.set(xlabel="time [s]", ylabel=f"displacement [{unit}]")
+    heading(left, "Displacement over time")
     left.margins(x=0.0)
     drive, times = shown_unit(drive_unit)
     right.plot(times * u[kept], scale * x[kept], **SIMULATED)
-    right.set(
-        xlabel=f"drive [{literal(drive)}]", ylabel=f"displacement [{unit}]", title="Hysteresis loop"
-    )
-    return figure
+    right.set(xlabel=f"drive [{literal(drive)}]", ylabel=f"displacement [{unit}]")
+    heading(right, "Hysteresis loop")
+    figure.suptitle(literal(title), fontsize="large")
+    return whole(figure)
 
 
-def plot_identification(fit: Identification, data: Dataset | None = None) -> Figure:
+def plot_identification(
+    fit: Identification, data: Dataset | None = None, fig: Figure | SubFigure | None = None
+) -> Figure:
     """Draw loop, displacement, error and, after a swarm search, convergence in one figure.
 
     Parameters
@@ -213,19 +245,19 @@ def plot_identification(fit: Identification, data: Dataset | None = None) -> Fig
         What a fit found.
     data : Dataset, optional
         Another record to show the model on.
+    fig : matplotlib.figure.Figure or SubFigure, optional
+        Where to draw; a new figure where not given.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Four panels, or three.
+        The figure drawn in, with four panels or three.
     """
-    import matplotlib.pyplot as plt
-
     own = data is None
     record = fit.data if data is None else data
     run = fit.simulate(record, offset=fit.offset if own else "own")
     searched = fit.swarm is not None
-    figure = plt.figure(figsize=(11.0, 6.4 if searched else 5.4), layout="constrained")
+    figure = panels(fig, (11.0, 6.6 if searched else 5.6))
     grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.35])
     plot_loop(record, run, figure.add_subplot(grid[0 if searched else slice(None), 0]))
     if searched:
@@ -233,4 +265,24 @@ def plot_identification(fit: Identification, data: Dataset | None = None) -> Fig
     above = figure.add_subplot(grid[0, 1])
     below = figure.add_subplot(grid[1, 1], sharex=above)
     plot_time(record, run, (above, below), stroke=fit.stroke)
-    return figure
+    if own:
+        title = what_was_fitted(fit)
+    else:
+        rms = 100.0 * float(np.sqrt(np.mean((record.y - run.x) ** 2))) / fit.stroke
+        title = f"{_named(fit, record)}, not fitted: {rms:.3g} % of stroke rms"
+    figure.suptitle(title, fontsize="large")
+    return whole(figure)
+
+
+def what_was_fitted(fit: Identification) -> str:
+    """Write model, record, window and error of a fit, as the title of its pictures."""
+    return f"{_named(fit, fit.data)}: {fit.cost_percent:.3g} % of stroke rms"
+
+
+def _named(fit: Identification, record: Dataset) -> str:
+    """Write model, record and window."""
+    first, last = float(record.t[0]), float(record.t[-1]) + record.dt
+    source = literal(record.source) if record.source else "the record"
+    title = fit.model.info.title
+    model = f"{title}," if "," in title else title
+    return f"{model} on {source}, {first:.6g} to {last:.6g} s"

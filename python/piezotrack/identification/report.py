@@ -242,15 +242,17 @@ def save_identification(
         ``{name}.json``, and as PNG and SVG ``{name}_loop``, ``{name}_time`` and, after a swarm
         search, ``{name}_convergence``.
     """
-    from .plot import plot_convergence, plot_loop, plot_time
+    from .plot import plot_convergence, plot_loop, plot_time, what_was_fitted
 
     name = fit.model.info.name if name is None else name
     record = fit.data if shown is None else shown
     run = fit.simulate(record, offset=fit.offset)
     until = None if shown is None else float(fit.data.t[-1])
+    title = what_was_fitted(fit)
+    above, _ = plot_time(record, run, stroke=fit.stroke, fitted_until=until, title=title)
     figures = {
-        f"{name}_loop": plot_loop(record, run).figure,
-        f"{name}_time": plot_time(record, run, stroke=fit.stroke, fitted_until=until)[0].figure,
+        f"{name}_loop": plot_loop(record, run, title=title).figure,
+        f"{name}_time": above.figure,
     }
     if fit.swarm is not None:
         figures[f"{name}_convergence"] = plot_convergence(fit).figure

@@ -17,7 +17,7 @@ from .identified import IdentifiedModel, Score
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
     from ..data.dataset import Dataset
@@ -106,6 +106,11 @@ class Identification(IdentifiedModel):
             f"<Identification, {self.model.info.title}: {self.cost_um:.4g} um rms, "
             f"{self.cost_percent:.3g} % of stroke; see summary()>"
         )
+
+    def _repr_html_(self) -> str:
+        from .html import identification_html
+
+        return identification_html(self)
 
     @property
     def fun(self) -> float:
@@ -208,22 +213,24 @@ class Identification(IdentifiedModel):
 
         return summary_text(self)
 
-    def plot(self, data: Dataset | None = None) -> Figure:
+    def plot(self, data: Dataset | None = None, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Loop, displacement with its error over time, and convergence of a swarm.
 
         Parameters
         ----------
         data : Dataset, optional
             Another record, on which the model is shown.
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
 
         Returns
         -------
         matplotlib.figure.Figure
-            Not yet shown or saved.
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
         """
         from .plot import plot_identification
 
-        return plot_identification(self, data)
+        return plot_identification(self, data, fig)
 
 
 def _frequency(data: Dataset) -> float:

@@ -14,7 +14,7 @@ from ..data.dataset import Dataset
 from ..errors import DataError, ParameterError
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
     from ..stages.virtual import VirtualStage
@@ -88,9 +88,13 @@ class Noise:
         VirtualStage
             The same with this noise, bandwidth and resolution.
         """
-        return replace(
-            stage, noise=self.noise, noise_bandwidth=self.bandwidth, resolution=self.resolution
+        sensor = replace(
+            stage.sensor,
+            noise=self.noise,
+            noise_bandwidth=self.bandwidth,
+            resolution=self.resolution,
         )
+        return replace(stage, sensor=sensor)
 
     def spectrum(self) -> tuple[Array, Array]:
         """Amplitude spectral density of the record by Welch's method.
@@ -165,17 +169,22 @@ class Noise:
             ]
         )
 
-    def plot(self) -> Figure:
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Record in time, and its spectrum with that of the model.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
 
         Returns
         -------
         matplotlib.figure.Figure
-            Not yet shown or saved.
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
         """
         from .sensor_noise_plot import plot_noise
 
-        return plot_noise(self)
+        return plot_noise(self, fig)
 
 
 def identify_noise(log: Dataset) -> Noise:

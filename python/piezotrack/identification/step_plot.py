@@ -2,31 +2,31 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._support.plot_style import axes_or_new, literal
+from .._support.plot_style import (
+    LEVEL,
+    MARKS,
+    RECORDED,
+    axes_or_new,
+    heading,
+    literal,
+    panels,
+    whole,
+)
 from .._support.units import best_length_unit, drive_text, shown_unit
 from ..errors import ParameterError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
     from .step_response import StepResult, StepTrace
 
 __all__ = ["plot_spectrum", "plot_step", "plot_step_result"]
 
-MEASURED: dict[str, Any] = {"color": "#1b6ca8", "linewidth": 1.1, "label": "measured"}
-MARKS: dict[str, Any] = {
-    "color": "#b3400a",
-    "linestyle": "none",
-    "marker": "o",
-    "markersize": 4.5,
-    "markerfacecolor": "none",
-}
-QUIET: dict[str, Any] = {"color": "0.45", "linewidth": 0.9, "linestyle": "--"}
 # Time constants that are shown, and samples at most.
 SHOWN, MOST_POINTS = 8.0, 20000
 MARGIN = 0.06
@@ -62,9 +62,9 @@ def plot_step(step: StepResult, ax: Axes | None = None) -> Axes:
     shown = np.flatnonzero((t >= since) & (t <= until))
     shown = shown[:: max(1, shown.size // MOST_POINTS)]
     ms = 1e3 * (t[shown] - trace.step_time)
-    ax.plot(ms, scale * (trace.data.y[shown] - trace.rest), **MEASURED)
+    ax.plot(ms, scale * (trace.data.y[shown] - trace.rest), **RECORDED)
     steady = scale * read.steady_state
-    ax.axhline(steady, **QUIET, zorder=0, label=f"steady state, {steady:.4g} {unit}")
+    ax.axhline(steady, **LEVEL, zorder=0, label=f"steady state, {steady:.4g} {unit}")
     times = [1e3 * (time - trace.step_time) for time in trace.peak_times]
     ax.plot(times, [scale * peak for peak in read.peaks], **MARKS, label="overshoot peaks")
     for time, peak in list(zip(times, read.peaks, strict=True))[:2]:
@@ -74,14 +74,15 @@ def plot_step(step: StepResult, ax: Axes | None = None) -> Axes:
             xytext=(6, 3),
             textcoords="offset points",
             fontsize="small",
-            color="#b3400a",
+            color="black",
         )
     ax.set(xlabel="time after the step [ms]", ylabel=f"displacement [{unit}]")
     height = literal(drive_text(read.voltage, trace.data.drive_unit))
-    ax.set_title(
-        f"Step of {height}: Td = {1e3 * read.period:.4g} ms, "
+    source = f"{literal(trace.data.source)}: step" if trace.data.source else "Step"
+    heading(
+        ax,
+        f"{source} of {height}, Td = {1e3 * read.period:.4g} ms, "
         f"overshoot {100 * step.overshoot_ratio:.3g} %",
-        fontsize="medium",
     )
     ax.margins(x=0.0, y=0.08)
     ax.legend(loc="lower right" if steady > 0.0 else "upper right", frameon=False)
@@ -118,8 +119,8 @@ def plot_spectrum(step: StepResult, ax: Axes | None = None) -> Axes:
     places = np.append(trace.frequencies, read.frequency)
     gains = np.append(trace.gains, abs(read.resonance_gain))
     order = np.argsort(places)
-    ax.plot(places[order], scale * gains[order], color=MEASURED["color"], linewidth=1.1)
-    ax.axhline(static, **QUIET, zorder=0)
+    ax.plot(places[order], scale * gains[order], **RECORDED)
+    ax.axhline(static, **LEVEL, zorder=0)
     ax.plot([read.frequency], [resonance], **MARKS)
     ax.set_yscale("log")
     low, high = ax.get_ylim()
@@ -132,7 +133,7 @@ def plot_spectrum(step: StepResult, ax: Axes | None = None) -> Axes:
         textcoords="offset points",
         fontsize="small",
         va="center",
-        color="#b3400a",
+        color="black",
     )
     ax.annotate(
         f"static gain {static:.4g} {per_volt}",
@@ -144,40 +145,41 @@ def plot_spectrum(step: StepResult, ax: Axes | None = None) -> Axes:
         color="0.3",
     )
     ax.set(xlabel="frequency [Hz]", ylabel=f"gain [{per_volt}]")
-    ax.set_title(
-        f"Spectrum: zeta = {step.damping_ratio:.3g} by the gains, "
-        f"{step.damping_by_decrement:.3g} by the decrement",
-        fontsize="medium",
+    heading(
+        ax,
+        f"Spectrum: damping ratio {step.damping_ratio:.3g} (gains), "
+        f"{step.damping_by_decrement:.3g} (decrement)",
     )
     ax.set_xlim(0.0, right)
     return ax
 
 
-def plot_step_result(step: StepResult) -> Figure:
+def plot_step_result(step: StepResult, fig: Figure | SubFigure | None = None) -> Figure:
     """Put step and spectrum on one sheet.
 
     Parameters
     ----------
     step : StepResult
         Result of a step response.
+    fig : matplotlib.figure.Figure or SubFigure, optional
+        Where to draw; a new figure where not given.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Two panels.
+        The figure drawn in.
 
     Raises
     ------
     ParameterError
         The readings were entered by hand.
     """
-    import matplotlib.pyplot as plt
-
     _trace(step)
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.4), layout="constrained")
+    figure = panels(fig, (11.0, 4.4))
+    left, right = figure.subplots(1, 2)
     plot_step(step, left)
     plot_spectrum(step, right)
-    return figure
+    return whole(figure)
 
 
 def _trace(step: StepResult) -> StepTrace:

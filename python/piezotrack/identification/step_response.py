@@ -16,7 +16,7 @@ from .step_readings import StepReadings
 
 if TYPE_CHECKING:
     import numpy as np
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -259,13 +259,18 @@ class StepResult:
 
         return step_text(self)
 
-    def plot(self) -> Figure:
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Draw the step with its peaks marked, and the spectrum with its resonance.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
 
         Returns
         -------
         matplotlib.figure.Figure
-            Not yet shown or saved.
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
 
         Raises
         ------
@@ -274,7 +279,7 @@ class StepResult:
         """
         from .step_plot import plot_step_result
 
-        return plot_step_result(self)
+        return plot_step_result(self, fig)
 
 
 def identify_step(

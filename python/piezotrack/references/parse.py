@@ -15,7 +15,7 @@ from ..errors import ParameterError
 from .paths import circle, lissajous, raster, spiral
 from .reference import read_reference
 from .waveforms import chirp, multisine, sine, staircase, triangle
-from .xy_reference import read_path
+from .xy_reference import HOME, read_path
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -173,8 +173,9 @@ def made_from_text(
     kinds: Mapping[str, Kind],
     read: Callable[..., Any],
     duration: float | None,
+    **others: Any,
 ) -> Any:
-    """Parse a text, or read the file that it names."""
+    """Parse a text, or read the file that it names; `others` are values that it may leave out."""
     examples = ", ".join(kind.example for kind in kinds.values())
     if not isinstance(text, str) or not text.strip():
         raise ParameterError(f"{what} is {quoted(text)}: expected a file or one of {examples}")
@@ -195,7 +196,7 @@ def made_from_text(
             f"{examples}"
         )
     try:
-        values = _values(kind, rest)
+        values = {**others, **_values(kind, rest)}
         if duration is not None:
             values.setdefault("duration", duration)
         elif kind.make in (sine, triangle) and values.get("frequency", 0.0) > 0.0:
@@ -321,7 +322,13 @@ PATHS = {
 }
 
 
-def parse_path(text: str, *, duration: float | None = None) -> XYReference:
+def parse_path(
+    text: str,
+    *,
+    duration: float | None = None,
+    centre: tuple[float, float] | None = None,
+    origin: tuple[float, float] | None = HOME,
+) -> XYReference:
     r"""Make a path from a text, as the command line takes it.
 
     =================================  =====================================================
@@ -343,6 +350,10 @@ def parse_path(text: str, *, duration: float | None = None) -> XYReference:
         The kind and its items, as for `parse_reference`.
     duration : float, optional
         Length [s], where `text` has none; not for a spiral, which has its own.
+    centre : (float, float), optional
+        Centre [m], where `text` has none; not for a file.
+    origin : (float, float) or None, optional
+        Position from which the smooth start begins [m], as of `circle`; not for a file.
 
     Returns
     -------
@@ -368,5 +379,8 @@ def parse_path(text: str, *, duration: float | None = None) -> XYReference:
             f"duration is {quoted(duration)}: expected none, as radius, pitch and frequency of a "
             "spiral are its length"
         )
-    path: XYReference = made_from_text("path", text, PATHS, read_path, duration)
+    others: dict[str, Any] = {"origin": origin}
+    if centre is not None:
+        others["centre"] = centre
+    path: XYReference = made_from_text("path", text, PATHS, read_path, duration, **others)
     return path

@@ -91,6 +91,8 @@ class Reference:
     origin : float, optional
         Displacement from which the smooth start begins [m]; default the first displacement of
         `motion`. Used with a smooth start only.
+    interval : float, optional
+        Sampling interval of the samples that it goes through [s], if it does.
 
     Raises
     ------
@@ -130,6 +132,7 @@ class Reference:
     ramp: float = 0.0
     shortest: float = 0.0
     origin: float | None = None
+    interval: float | None = None
 
     def __post_init__(self) -> None:
         duration = positive("duration", self.duration, "s")
@@ -141,6 +144,7 @@ class Reference:
             "ramp": in_range("ramp", self.ramp, duration, "s"),
             "shortest": not_negative("shortest", self.shortest, "s"),
             "origin": None if self.origin is None else finite("origin", self.origin, "m"),
+            "interval": None if self.interval is None else check_dt(self.interval, "interval"),
         }
         for name, number in numbers.items():
             object.__setattr__(self, name, number)
@@ -367,6 +371,7 @@ class Reference:
             period=period,
             ramp=ramp,
             shortest=0.0 if period is None else period,
+            interval=dt,
         )
 
     def __repr__(self) -> str:

@@ -142,13 +142,17 @@ class XYReference:
             return _core.circle_errors(x, y, self.centre, self.radius)
         return _core.path_errors(x, y, *self.outline)
 
-    def transformed(self, matrix: ArrayLike) -> XYReference:
+    def transformed(
+        self, matrix: ArrayLike, about: tuple[float, float] = (0.0, 0.0)
+    ) -> XYReference:
         """Multiply the axes by a matrix, as for a decoupled feedforward.
 
         Parameters
         ----------
         matrix : array_like, shape (2, 2)
             The new x is its first row times (x, y), the new y its second.
+        about : (float, float), optional
+            Point that stays where it is [m].
 
         Returns
         -------
@@ -169,34 +173,35 @@ class XYReference:
         True
         """
         rows = square_matrix("matrix", matrix)
+        shift = np.array(about) - rows @ np.array(about)
         starts = [
             float(axis.motion(np.zeros(1))[0][0]) if axis.origin is None else axis.origin
             for axis in self.axes
         ]
         edges = np.array([[axis.low, axis.high] for axis in self.axes])
         mixed = []
-        for row, axis in zip(rows, self.axes, strict=True):
+        for row, axis, more in zip(rows, self.axes, shift, strict=True):
             # The range of a sum lies within the sum of the ranges.
-            reach = np.sort(row[:, None] * edges, axis=1).sum(axis=0)
+            reach = np.sort(row[:, None] * edges, axis=1).sum(axis=0) + more
             mixed.append(
                 replace(
                     axis,
                     name=f"{axis.name}, mixed",
-                    motion=_mixed(row, self.x.motion, self.y.motion),
+                    motion=_mixed(row, float(more), self.x.motion, self.y.motion),
                     low=float(reach[0]),
                     high=float(reach[1]),
                     shortest=max(axis.shortest for axis in self.axes),
-                    origin=float(row @ starts),
+                    origin=float(row @ starts + more),
                 )
             )
         return XYReference(name=f"{self.name}, mixed", x=mixed[0], y=mixed[1])
 
 
-def _mixed(row: Array, x: Motion, y: Motion) -> Motion:
+def _mixed(row: Array, shift: float, x: Motion, y: Motion) -> Motion:
     def motion(t: Array) -> tuple[Array, Array, Array]:
         parts = zip(x(t), y(t), strict=True)
         place, speed, bend = (row[0] * one + row[1] * other for one, other in parts)
-        return place, speed, bend
+        return place + shift, speed, bend
 
     return motion
 

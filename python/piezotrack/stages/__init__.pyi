@@ -1,5 +1,8 @@
 # The public names and their homes, each written once: type checkers read them here, and
 # _support/lazy.py does at run time. One name a line, as `ruff format` keeps it.
+from .apparatus import Amplifier as Amplifier
+from .apparatus import Preconditioning as Preconditioning
+from .apparatus import Sensor as Sensor
 from .base import ForceState as ForceState
 from .base import Response as Response
 from .base import Stage as Stage

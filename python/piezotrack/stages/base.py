@@ -15,6 +15,7 @@ from .._support.arguments import as_numbers, one_or_more_numbers
 from ..errors import ParameterError
 from .inverse import Inverse
 from .model_info import LISTED, ModelInfo, Parameter
+from .stage_text import stage_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -156,6 +157,14 @@ class Stage:
 
     info: ClassVar[ModelInfo]
     _state: ClassVar[type[StageState]]
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        # Else the decorator of the dataclass would write a repr of every number.
+        cls.__repr__ = Stage.__repr__  # type: ignore[method-assign]
+
+    def __repr__(self) -> str:
+        return stage_text(self)
 
     def __post_init__(self) -> None:
         for one in self.info.parameters:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from .._support.messages import quoted
 from ..data.dataset import Dataset
 from ..errors import ParameterError
 from ..references.xy_reference import square_matrix
-from .base import MODEL_STEP, Stage
 from .virtual import VirtualResponse, VirtualStage
 
 if TYPE_CHECKING:
@@ -65,9 +64,8 @@ class XYStage:
 
     Parameters
     ----------
-    x, y : VirtualStage or Stage
-        Any stage of ``pt.stages`` or a `VirtualStage`; the two may differ. Of an `IdentifiedModel`
-        pass its `model`.
+    x, y : VirtualStage, Stage or IdentifiedModel
+        Two of any kind, which are kept as virtual stages: `VirtualStage.of`.
     cross_talk : (float, float) or array_like of shape (2, 2), optional
         Share of y in x and of x in y, or a matrix with 1 on its diagonal.
     lag : float, optional
@@ -96,8 +94,9 @@ class XYStage:
     116 um and 1.2 um
     """
 
-    x: VirtualStage | Stage
-    y: VirtualStage | Stage
+    # Given as a stage of any kind, kept as a VirtualStage.
+    x: Any
+    y: Any
     cross_talk: tuple[float, float] = (0.0, 0.0)
     lag: float = 0.0
     missed_ticks: float = 0.0
@@ -105,12 +104,7 @@ class XYStage:
 
     def __post_init__(self) -> None:
         for name in ("x", "y"):
-            stage = getattr(self, name)
-            if not isinstance(stage, (VirtualStage, Stage)):
-                raise ParameterError(
-                    f"{name} is {type(stage).__name__}: expected a pt.VirtualStage or a stage of a "
-                    "model, as a pt.DahlStage"
-                )
+            object.__setattr__(self, name, _virtual(name, getattr(self, name)))
         object.__setattr__(self, "cross_talk", _shares(self.cross_talk))
         object.__setattr__(self, "lag", _core.as_number("lag", self.lag))
         chance = _core.as_number("missed_ticks", self.missed_ticks)
@@ -121,11 +115,8 @@ class XYStage:
     @property
     def _core(self) -> CoreStage:
         """The stage in the core, which checks every number."""
-        x, y = (
-            stage._core if isinstance(stage, VirtualStage) else (stage._core, MODEL_STEP)
-            for stage in (self.x, self.y)
-        )
-        return CoreStage(x, y, self.cross_talk, self.lag, (self.missed_ticks, self.most_behind))
+        missed = (self.missed_ticks, self.most_behind)
+        return CoreStage(self.x._core, self.y._core, self.cross_talk, self.lag, missed)
 
     @property
     def matrix(self) -> Array:
@@ -158,7 +149,7 @@ class XYStage:
             Preconditioned, its sensors set to 0 on the settled loops.
         """
         x = VirtualStage.xu_li_2010(seed=seed)
-        y = VirtualStage(**_core.VirtualStage.xu_li_2010_y(_core.as_count("seed", seed)))
+        y = VirtualStage._xu_li_2010_y(seed)
         return cls(x=x, y=y, cross_talk=(0.015, 0.010), lag=0.010)
 
     def simulate(
@@ -218,6 +209,19 @@ class XYStage:
             for axis, run in zip("xy", self.simulate(ux, uy, dt, hold=hold), strict=True)
         )
         return XYLog(x, y)
+
+
+def _virtual(name: str, stage: object) -> VirtualStage:
+    """Take a stage of any kind as a virtual stage."""
+    if isinstance(stage, VirtualStage):
+        return stage
+    try:
+        return VirtualStage.of(stage)  # type: ignore[arg-type]
+    except ParameterError:
+        raise ParameterError(
+            f"{name} is {type(stage).__name__}: expected an identified model, a stage of a model, "
+            "as a pt.DahlStage, or a pt.VirtualStage"
+        ) from None
 
 
 def _shares(cross_talk: Sequence[float] | ArrayLike) -> tuple[float, float]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from .._support.json_text import parse_json
 from ..control.controller import Controller
+from ..stages.apparatus import Amplifier, Preconditioning, Sensor
+from ..stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
 from ..stages.virtual import VirtualStage
 from ..stages.xy import XYStage
 
@@ -55,6 +57,12 @@ class Apparatus:
         return self.stage.y
 
     @property
+    def plays_of_x(self) -> PrandtlIshlinskiiStage:
+        """Play operators, creep and mode of x."""
+        assert isinstance(self.x.stage, PrandtlIshlinskiiStage)
+        return self.x.stage
+
+    @property
     def timing(self) -> dict[str, Any]:
         """Delay and jitter as arguments of `track` and `contour`."""
         return {"delay": self.delay, "jitter": self.jitter}
@@ -72,7 +80,7 @@ class Apparatus:
         Apparatus
             With different noise on x and y.
         """
-        x, y = replace(self.x, seed=seed), replace(self.y, seed=seed + Y_SEEDS)
+        x, y = _seeded(self.x, seed), _seeded(self.y, seed + Y_SEEDS)
         return replace(self, stage=replace(self.stage, x=x, y=y))
 
     def document(self) -> dict[str, Any]:
@@ -102,7 +110,7 @@ class Apparatus:
         Apparatus
             With seed 0.
         """
-        x, y = (VirtualStage(**document[axis], seed=0) for axis in "xy")
+        x, y = (_axis(document[axis]) for axis in "xy")
         # Documents written before ticks were missed have none.
         ticks = {key: document[key] for key in ("missed_ticks", "most_behind") if key in document}
         both = {key: document[key] for key in ("cross_talk", "lag")}
@@ -122,9 +130,26 @@ def calibration_file() -> dict[str, Any]:
     return document
 
 
+def _seeded(stage: VirtualStage, seed: int) -> VirtualStage:
+    return replace(stage, sensor=replace(stage.sensor, seed=seed))
+
+
 def _numbers(stage: VirtualStage) -> dict[str, Any]:
-    """Return all settings except the seed."""
-    return {one.name: getattr(stage, one.name) for one in fields(stage) if one.name != "seed"}
+    """Return the parts with their numbers, without the seed."""
+    numbers = asdict(stage)
+    del numbers["sensor"]["seed"]
+    return numbers
+
+
+def _axis(numbers: Mapping[str, Any]) -> VirtualStage:
+    """Make an axis, a stage with play operators, from its numbers."""
+    return VirtualStage(
+        stage=PrandtlIshlinskiiStage(**numbers["stage"]),
+        amplifier=Amplifier(**numbers["amplifier"]),
+        sensor=Sensor(**numbers["sensor"]),
+        preconditioning=Preconditioning(**numbers["preconditioning"]),
+        step=numbers["step"],
+    )
 
 
 def loop(

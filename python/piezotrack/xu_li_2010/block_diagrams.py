@@ -4,92 +4,168 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from .._support.plot_style import heading, panels, whole
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["draw"]
 
+# Width of a diagram, height of a block and radius of a summing point, in its own units.
+WIDTH, TALL, RADIUS = 12.0, 1.0, 0.26
+MINUS = "\N{MINUS SIGN}"
+INK = "0.15"
+
+Point = tuple[float, float]
+
 
 class Block(NamedTuple):
-    """A block, or a signal where `boxed` is false, at a place in units of a column and a row."""
+    """A block: its middle, its width, and what it does."""
 
-    text: str
     x: float
     y: float
-    boxed: bool = True
+    width: float
+    text: str
+
+
+class Label(NamedTuple):
+    """A signal or a sign: where it stands, and its name."""
+
+    x: float
+    y: float
+    text: str
 
 
 class Diagram(NamedTuple):
-    """Blocks by name, and arrows between them; a sign or a name stands beside an arrow."""
+    """Blocks, summing points, paths of signals that end in an arrow, branches and labels."""
 
     title: str
-    blocks: dict[str, Block]
-    arrows: tuple[tuple[str, str, str], ...]
+    blocks: tuple[Block, ...]
+    sums: tuple[Point, ...]
+    paths: tuple[tuple[Point, ...], ...]
+    branches: tuple[Point, ...]
+    labels: tuple[Label, ...]
 
 
-STAGE = "stage"
-DIAGRAMS = (
-    Diagram(
-        "Fig. 5: Dahl hysteresis in feedback on the mechanics, (2), (7), (8)",
-        {
-            "u": Block("u", 0, 1, False),
-            "T": Block("T", 1, 1),
-            "sum": Block("+", 2, 1),
-            "plant": Block("1 / (M s$^2$ + D s + K)", 3.3, 1),
-            "x": Block("x", 5, 1, False),
-            "dahl": Block("V' = A$_h$ V x' + B$_h$ u$_p$ x',  F$_h$ = C$_h$ V", 3.3, 0),
-        },
-        (("u", "T", ""), ("T", "sum", ""), ("sum", "plant", ""), ("plant", "x", ""),
-         ("plant", "dahl", ""), ("dahl", "sum", "-")),
+DAHL = Diagram(
+    title="Fig. 5: Dahl hysteresis in feedback on the mechanics, (2), (7), (8)",
+    blocks=(
+        Block(2.2, 4.0, 1.2, "$T$"),
+        Block(7.0, 4.0, 3.6, "$1 / (M s^2 + D s + K)$"),
+        Block(7.0, 1.5, 4.6, r"$\dot V = A_h V \dot x + B_h u_p \dot x$,  $F_h = C_h V$"),
     ),
-    Diagram(
-        "Figs. 8 and 9: feedforward by the inverse, (21)",
-        {
-            "xd": Block("x$_d$", 0, 1, False),
-            "mech": Block("M s$^2$ + D s + K", 1.3, 1),
-            "dahl": Block("Dahl along x$_d$", 1.3, 0),
-            "sum": Block("+", 2.5, 1),
-            "T": Block("1 / T", 3.3, 1),
-            STAGE: Block("stage", 4.4, 1),
-            "x": Block("x", 5.4, 1, False),
-        },
-        (("xd", "mech", ""), ("xd", "dahl", ""), ("mech", "sum", ""), ("dahl", "sum", "F$_h$"),
-         ("sum", "T", ""), ("T", STAGE, "u$_{FF}$"), (STAGE, "x", "")),
+    sums=((4.0, 4.0),),
+    paths=(
+        ((0.6, 4.0), (1.6, 4.0)),
+        ((2.8, 4.0), (3.74, 4.0)),
+        ((4.26, 4.0), (5.2, 4.0)),
+        ((8.8, 4.0), (11.4, 4.0)),
+        ((10.4, 4.0), (10.4, 1.5), (9.3, 1.5)),
+        ((4.7, 1.5), (4.0, 1.5), (4.0, 3.74)),
     ),
-    Diagram(
-        "Fig. 10: PID with back-calculation, (22) to (25)",
-        {
-            "e": Block("e", 0, 1, False),
-            "pid": Block("PID, incremental", 1.3, 1),
-            "sum": Block("+", 2.7, 1),
-            "clip": Block("limits", 3.7, 1),
-            "v": Block("v", 5.0, 1, False),
-            "back": Block("T$_s$ / T$_t$", 2.7, 0),
-            "ff": Block("u$_{FF}$ + u$_{RC}$", 2.0, 1.8, False),
-        },
-        (("e", "pid", ""), ("pid", "sum", "u$_{FB}$"), ("ff", "sum", ""), ("sum", "clip", "u"),
-         ("clip", "v", ""), ("clip", "back", "     v - u"), ("back", "pid", "")),
+    branches=((10.4, 4.0),),
+    labels=(
+        Label(0.3, 4.0, "$u$"),
+        Label(11.7, 4.0, "$x$"),
+        Label(4.45, 2.6, "$F_h$"),
+        Label(3.7, 3.45, MINUS),
     ),
-    Diagram(
-        "Fig. 11: feedforward, feedback and the plugged-in repetitive part, (26) to (30)",
-        {
-            "xd": Block("x$_d$", 0, 1, False),
-            "e": Block("-", 1, 1),
-            "inv": Block("inverse", 2.2, 1.9),
-            "pid": Block("PID", 2.2, 1),
-            "rc": Block("K$_q$ Q / (1 - Q)", 2.2, 0.1),
-            "sum": Block("+", 3.3, 1),
-            "clip": Block("limits", 4.1, 1),
-            STAGE: Block("stage, sensor", 5.2, 1),
-            "x": Block("x", 6.2, 1, False),
-            "back": Block("", 5.2, -0.6, False),
-        },
-        (("xd", "e", ""), ("xd", "inv", ""), ("e", "pid", "e"), ("e", "rc", ""),
-         ("inv", "sum", "u$_{FF}$"), ("pid", "sum", "u$_{FB}$"), ("rc", "sum", "u$_{RC}$"),
-         ("sum", "clip", "u"), ("clip", STAGE, "v"), (STAGE, "x", "")),
+)
+FEEDFORWARD = Diagram(
+    title="Figs. 8 and 9: feedforward by the inverse, (21)",
+    blocks=(
+        Block(3.4, 4.0, 3.0, "$M s^2 + D s + K$"),
+        Block(3.4, 1.5, 3.0, "Dahl along $x_d$"),
+        Block(7.4, 4.0, 1.3, "$1 / T$"),
+        Block(10.0, 4.0, 1.6, "stage"),
     ),
-)  # fmt: skip
+    sums=((5.8, 4.0),),
+    paths=(
+        ((0.6, 4.0), (1.9, 4.0)),
+        ((1.3, 4.0), (1.3, 1.5), (1.9, 1.5)),
+        ((4.9, 4.0), (5.54, 4.0)),
+        ((4.9, 1.5), (5.8, 1.5), (5.8, 3.74)),
+        ((6.06, 4.0), (6.75, 4.0)),
+        ((8.05, 4.0), (9.2, 4.0)),
+        ((10.8, 4.0), (11.4, 4.0)),
+    ),
+    branches=((1.3, 4.0),),
+    labels=(
+        Label(0.25, 4.0, "$x_d$"),
+        Label(6.25, 2.6, "$F_h$"),
+        Label(6.15, 3.45, "+"),
+        Label(8.6, 4.4, "$u_{FF}$"),
+        Label(11.7, 4.0, "$x$"),
+    ),
+)
+PID = Diagram(
+    title="Fig. 10: PID with back-calculation, (22) to (25)",
+    blocks=(
+        Block(2.6, 4.0, 2.8, "PID, incremental"),
+        Block(8.6, 4.0, 1.6, "limits"),
+        Block(4.9, 1.2, 1.5, "$T_s / T_t$"),
+    ),
+    sums=((5.8, 4.0), (8.6, 1.2)),
+    paths=(
+        ((0.5, 4.0), (1.2, 4.0)),
+        ((4.0, 4.0), (5.54, 4.0)),
+        ((5.8, 5.4), (5.8, 4.26)),
+        ((6.06, 4.0), (7.8, 4.0)),
+        ((9.4, 4.0), (11.4, 4.0)),
+        ((10.3, 4.0), (10.3, 1.2), (8.86, 1.2)),
+        ((7.0, 4.0), (7.0, 2.4), (8.6, 2.4), (8.6, 1.46)),
+        ((8.34, 1.2), (5.65, 1.2)),
+        ((4.15, 1.2), (2.6, 1.2), (2.6, 3.5)),
+    ),
+    branches=((10.3, 4.0), (7.0, 4.0)),
+    labels=(
+        Label(0.25, 4.0, "$e$"),
+        Label(4.75, 4.4, "$u_{FB}$"),
+        Label(5.8, 5.75, "$u_{FF} + u_{RC}$"),
+        Label(6.5, 4.4, "$u$"),
+        Label(11.7, 4.0, "$v$"),
+        Label(9.2, 0.85, "+"),
+        Label(8.95, 1.8, MINUS),
+        Label(7.0, 1.55, f"$v {MINUS} u$"),
+    ),
+)
+ALL = Diagram(
+    title="Fig. 11: feedforward, feedback and the plugged-in repetitive part, (26) to (30)",
+    blocks=(
+        Block(4.6, 5.3, 1.9, "inverse"),
+        Block(4.6, 3.5, 1.9, "PID"),
+        Block(4.6, 1.7, 2.6, f"$K_q Q / (1 {MINUS} Q)$"),
+        Block(8.3, 3.5, 1.3, "limits"),
+        Block(10.25, 3.5, 1.5, "stage,\nsensor"),
+    ),
+    sums=((1.9, 3.5), (6.7, 3.5)),
+    paths=(
+        ((0.6, 3.5), (1.64, 3.5)),
+        ((1.1, 3.5), (1.1, 5.3), (3.65, 5.3)),
+        ((2.16, 3.5), (3.65, 3.5)),
+        ((2.7, 3.5), (2.7, 1.7), (3.3, 1.7)),
+        ((5.55, 3.5), (6.44, 3.5)),
+        ((5.55, 5.3), (6.7, 5.3), (6.7, 3.76)),
+        ((5.9, 1.7), (6.7, 1.7), (6.7, 3.24)),
+        ((6.96, 3.5), (7.65, 3.5)),
+        ((8.95, 3.5), (9.5, 3.5)),
+        ((11.0, 3.5), (11.6, 3.5)),
+        ((11.25, 3.5), (11.25, 0.5), (1.9, 0.5), (1.9, 3.24)),
+    ),
+    branches=((1.1, 3.5), (2.7, 3.5), (11.25, 3.5)),
+    labels=(
+        Label(0.25, 3.5, "$x_d$"),
+        Label(2.45, 3.85, "$e$"),
+        Label(1.6, 2.95, MINUS),
+        Label(7.15, 4.7, "$u_{FF}$"),
+        Label(6.0, 3.9, "$u_{FB}$"),
+        Label(7.15, 2.3, "$u_{RC}$"),
+        Label(7.25, 3.85, "$u$"),
+        Label(9.22, 3.85, "$v$"),
+        Label(11.8, 3.5, "$x$"),
+    ),
+)
 
 
 def draw() -> Figure:
@@ -100,51 +176,35 @@ def draw() -> Figure:
     matplotlib.figure.Figure
         Two by two.
     """
-    import matplotlib.pyplot as plt
-
-    figure = plt.figure(figsize=(12.0, 5.0), layout="constrained")
-    for diagram, ax in zip(DIAGRAMS, figure.subplots(2, 2).flat, strict=True):
+    figure = panels(None, (12.0, 6.0))
+    for diagram, ax in zip(
+        (DAHL, FEEDFORWARD, PID, ALL),
+        figure.subplots(2, 2, height_ratios=[0.8, 1.0]).flat,
+        strict=True,
+    ):
         _draw(diagram, ax)
-    return figure
+    return whole(figure)
 
 
 def _draw(diagram: Diagram, ax: Axes) -> None:
-    ax.set_title(diagram.title, fontsize="medium", loc="left")
-    ax.set(xlim=(-0.4, 6.5), ylim=(-0.8, 2.3))
+    from matplotlib.patches import Circle, Rectangle
+
+    heading(ax, diagram.title, width=90)
+    rows = [y for path in diagram.paths for _, y in path]
+    ax.set(xlim=(0.0, WIDTH), ylim=(min(rows) - 0.8, max(rows) + 0.8), aspect="equal")
     ax.axis("off")
-    shown = {}
-    for name, block in diagram.blocks.items():
-        frame = {"boxstyle": "round,pad=0.35", "facecolor": "white", "edgecolor": "0.2"}
-        shown[name] = ax.text(
-            block.x,
-            block.y,
-            block.text,
-            ha="center",
-            va="center",
-            fontsize="small",
-            bbox=frame if block.boxed else {"boxstyle": "round,pad=0.2", "alpha": 0.0},
-            zorder=3,
-        )
-    for start, end, label in diagram.arrows:
-        tail, head = diagram.blocks[start], diagram.blocks[end]
-        ax.annotate(
-            "",
-            (head.x, head.y),
-            (tail.x, tail.y),
-            arrowprops={
-                "arrowstyle": "-|>",
-                "color": "0.2",
-                "patchA": shown[start].get_bbox_patch(),
-                "patchB": shown[end].get_bbox_patch(),
-            },
-        )
-        slanted = tail.x != head.x and tail.y != head.y
-        middle = (0.5 * (tail.x + head.x) + 0.3 * slanted, 0.5 * (tail.y + head.y) + 0.2)
-        ax.text(*middle, label, ha="center", va="center", fontsize="small", color="0.2")
-    if "back" in diagram.blocks and not diagram.blocks["back"].boxed:
-        # Around the loop: from the sensor back to the error.
-        below = diagram.blocks["back"]
-        e = diagram.blocks["e"]
-        ax.plot([below.x, below.x, e.x], [0.75, below.y, below.y], color="0.2", linewidth=1.0)
-        arrow = {"arrowstyle": "-|>", "color": "0.2", "patchB": shown["e"].get_bbox_patch()}
-        ax.annotate("", (e.x, e.y), (e.x, below.y), arrowprops=arrow)
+    for block in diagram.blocks:
+        corner = (block.x - 0.5 * block.width, block.y - 0.5 * TALL)
+        ax.add_patch(Rectangle(corner, block.width, TALL, facecolor="white", edgecolor=INK))
+        ax.text(block.x, block.y, block.text, ha="center", va="center", fontsize=9.0)
+    for place in diagram.sums:
+        ax.add_patch(Circle(place, RADIUS, facecolor="white", edgecolor=INK))
+        ax.text(*place, r"$\Sigma$", ha="center", va="center", fontsize=8.0)
+    for path in diagram.paths:
+        ax.plot(*zip(*path, strict=True), color=INK, linewidth=1.0, solid_joinstyle="miter")
+        arrow = {"arrowstyle": "-|>", "color": INK, "shrinkA": 0.0, "shrinkB": 0.0}
+        ax.annotate("", path[-1], path[-2], arrowprops=arrow)
+    for place in diagram.branches:
+        ax.plot(*place, "o", color=INK, markersize=3.5)
+    for label in diagram.labels:
+        ax.text(label.x, label.y, label.text, ha="center", va="center", fontsize=10.0)

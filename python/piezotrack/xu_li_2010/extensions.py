@@ -88,9 +88,11 @@ def _learnt(run: Tracking) -> float:
 def _which_model(apparatus: Apparatus, experiments: Experiments) -> Section:
     """Find the kind of stage on which the Dahl model is better than Bouc-Wen."""
     x = apparatus.x
-    still = replace(x, preconditioned=False)
-    even = replace(x, dead_zone_weights=tuple(0.0 for _ in x.dead_zone_weights))
-    bent = replace(x, dead_zone_weights=tuple(0.6 for _ in x.dead_zone_weights))
+    still = replace(x, preconditioning=None)
+    plays = apparatus.plays_of_x
+    zones = len(plays.dead_zone_weights)
+    even = replace(x, stage=replace(plays, dead_zone_weights=(0.0,) * zones))
+    bent = replace(x, stage=replace(plays, dead_zone_weights=(0.6,) * zones))
     table_1 = DahlStage.xu_li_2010()
     log_of_12_s = experiments.judged.test.full
     u, dt = log_of_12_s.u, log_of_12_s.dt

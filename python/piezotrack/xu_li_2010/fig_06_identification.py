@@ -69,10 +69,9 @@ def observe(fit: Identification) -> dict[str, float]:
 
 def draw(fit: Identification) -> Figure:
     """Draw the convergence of the swarm."""
-    import matplotlib.pyplot as plt
-
+    from .._support.plot_style import panels, whole
     from ..identification.plot import plot_convergence
 
-    figure = plt.figure(figsize=(11.0, 4.2), layout="constrained")
+    figure = panels(None, (11.0, 4.2))
     plot_convergence(fit, figure.add_subplot())
-    return figure
+    return whole(figure)

@@ -83,14 +83,14 @@ def drawn(experiments: Experiments, drives: Drives | None) -> list[Drawn]:
         Drawn(
             "fig_12",
             "Fig. 12: feedforward, PID, both",
-            "0.2 Hz, 0 to 110 um. Left the motion, in the middle the error, right actual over "
+            "0.2 Hz, 0 to 110 um. Left the motion, in the middle the error, right measured over "
             "desired. The first period, with the smooth start, is excluded.",
             _grid(experiments.compensation, TWELVE, ("motion", "error", "following")),
         ),
         Drawn(
             "fig_13",
             "Fig. 13: saturation",
-            f"The reference is a rule: {RULES['13']} Grey where the voltage is clipped.",
+            f"The reference is a rule: {RULES['13']} Shaded where the voltage is clipped.",
             _grid(experiments.antiwindup, THIRTEEN, ("motion", "error", "effort")),
         ),
         Drawn(
@@ -127,8 +127,8 @@ FOURTEEN = {"without": "feedforward and PID", "with": "with repetitive control"}
 
 def _grid(runs: Runs, names: dict[str, str], columns: tuple[str, ...]) -> Figure:
     """Draw each run in a row."""
-    import matplotlib.pyplot as plt
-
+    from .._support.plot_style import legend_inside, whole
+    from .._support.plot_style import panels as sheet
     from ..control.tracking_plot import plot_effort, plot_error, plot_following, plot_motion
 
     panels: dict[str, Callable[[Tracking, Axes], Axes]] = {
@@ -137,7 +137,7 @@ def _grid(runs: Runs, names: dict[str, str], columns: tuple[str, ...]) -> Figure
         "following": plot_following,
         "effort": plot_effort,
     }
-    figure = plt.figure(figsize=(12.0, 3.1 * len(names)), layout="constrained")
+    figure = sheet(None, (12.0, 3.3 * len(names)))
     rows = figure.subfigures(len(names), 1, squeeze=False)[:, 0]
     for (key, title), row in zip(names.items(), rows, strict=True):
         run = runs[key]
@@ -148,8 +148,5 @@ def _grid(runs: Runs, names: dict[str, str], columns: tuple[str, ...]) -> Figure
                 # Scaled to the settled error; the smooth start is cropped.
                 reach = 1.25e6 * run.metrics.max_error
                 ax.set_ylim(-reach, reach)
-            if panel == "effort":
-                # In two lines, to fit the panel.
-                place = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "frameon": False}
-                ax.legend(ncols=2, fontsize="small", borderaxespad=0.2, **place)
-    return figure
+                legend_inside(ax, ncols=2)
+    return whole(figure)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..identification.step_readings import StepReadings
+from ..stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
 from ..stages.virtual import VirtualStage
 from ..stages.xy import XYStage
 from . import fig_04_step_test
@@ -114,8 +115,24 @@ def apparatus_at(theta: Mapping[str, float]) -> Apparatus:
 def _axis(theta: Mapping[str, float], axis: str, end: float) -> VirtualStage:
     known = VirtualStage.xu_li_2010()
     own = {key.removesuffix(f"_{axis}"): value for key, value in theta.items()}
-    swing = known.swing
-    places = own["reach"] * np.array(known.thresholds)
+    # Of unit gain, in um.
+    trial = replace(
+        known,
+        stage=_plays(own, 1e-6),
+        amplifier=replace(known.amplifier, bandwidth=theta["bandwidth"], slew=theta["slew"]),
+        sensor=replace(known.sensor, noise_bandwidth=theta["noise_bandwidth"]),
+        step=STEP,
+    )
+    return replace(trial, stage=_plays(own, 1e-6 * end / _end(trial)))
+
+
+def _plays(own: Mapping[str, float], gain: float) -> PrandtlIshlinskiiStage:
+    """Make plays, creep and mode of an axis, of a mean gain [m/V]."""
+    known = VirtualStage.xu_li_2010()
+    assert isinstance(known.stage, PrandtlIshlinskiiStage)
+    assert known.preconditioning is not None
+    swing = known.preconditioning.swing
+    places = own["reach"] * np.array(known.stage.thresholds)
     # In the middle of a settled swing the branches of a play are min(2 r, swing - 2 r) apart, and
     # its output travels swing - 2 r: the widest loop is `share`, the mean slope 1.
     shape = (places / places.max()) ** own["slope"]
@@ -126,23 +143,17 @@ def _axis(theta: Mapping[str, float], axis: str, end: float) -> VirtualStage:
         / float(np.sum(shape * np.minimum(2 * places, swing - 2 * places)))
     )
     passed = float(np.sum(weights * (1.0 - 2.0 * places / swing)))
-    stage = replace(
-        known,
-        linear=1.0 - passed,
+    return PrandtlIshlinskiiStage(
+        linear=gain * (1.0 - passed),
         thresholds=tuple(places),
-        weights=tuple(weights),
+        weights=tuple(gain * weights),
+        dead_zone_thresholds=(gain * swing / 3.0, gain * 2.0 * swing / 3.0),
         dead_zone_weights=(own["bend"], own["top"]),
         creep_weights=(own["creep_fast"], own["creep_1s"], own["creep_10s"]),
         creep_times=(own["creep_fast_time"], 1.0, 10.0),
         frequency=own["frequency"],
         damping_ratio=own["damping_ratio"],
-        bandwidth=theta["bandwidth"],
-        slew=theta["slew"],
-        noise_bandwidth=theta["noise_bandwidth"],
-        gain=1e-6,
-        step=STEP,
     )
-    return replace(stage, gain=1e-6 * end / _end(stage))
 
 
 def _end(stage: VirtualStage) -> float:

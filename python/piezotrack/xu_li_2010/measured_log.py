@@ -105,28 +105,24 @@ class Drives:
 
     def plot(self) -> Figure:
         """Draw the drives over the reference and, less the line, over time."""
-        import matplotlib.pyplot as plt
+        from .._support.plot_style import MEASURED, MODELS, legend_inside, panels, whole
 
-        from ..identification.comparison_plot import LINES
-
-        figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.6), layout="constrained")
+        figure = panels(None, (11.0, 4.6))
+        left, right = figure.subplots(1, 2)
         # Two periods of 1 Hz.
         part = self.t < self.t[0] + 2.0
         t, um = self.t[part], 1e6 * (self.desired - self.desired.mean())[part]
-        wide = {"color": "0.68", "linewidth": 3.2, "label": "measured"}
-        left.plot(um, (self.measured - self.line)[part], **wide)
-        right.plot(t, (self.measured - self.line)[part], **wide)
-        for (name, voltage), line in zip(self.computed.items(), LINES, strict=False):
+        left.plot(um, (self.measured - self.line)[part], **MEASURED)
+        right.plot(t, (self.measured - self.line)[part], **MEASURED)
+        for (name, voltage), line in zip(self.computed.items(), MODELS, strict=False):
             added = (voltage - self.line)[part]
             left.plot(um, added, linewidth=1.1, label=name, **line)
             right.plot(t, added, linewidth=1.1, label=name, **line)
-        left.set(xlabel="reference [um]", ylabel="drive less a straight line [V]")
-        right.set(xlabel="time [s]", ylabel="drive less a straight line [V]")
+        left.set(xlabel="reference [um]", ylabel="drive - straight line [V]")
+        right.set(xlabel="time [s]", ylabel="drive - straight line [V]")
         right.margins(x=0.0)
-        right.legend(
-            loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, frameon=False, fontsize="small"
-        )
-        return figure
+        legend_inside(right, ncols=2)
+        return whole(figure)
 
 
 def drives(folder: str | os.PathLike[str]) -> Drives:

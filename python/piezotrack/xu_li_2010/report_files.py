@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from textwrap import fill
 from typing import TYPE_CHECKING
 
@@ -18,13 +19,13 @@ if TYPE_CHECKING:
 
     from .reproduction import Reproduction
 
-__all__ = ["REPORT", "save_report"]
+__all__ = ["REPORT", "pages", "save_report"]
 
 # The files.
 REPORT = ("report.html", "report.pdf", "report.json")
 
-# Lines of small type on a page.
-LINES = 58
+# Lines on a page, and their size in points.
+LINES, TYPE = 66, 7.0
 
 
 def save_report(found: Reproduction, folder: str | os.PathLike[str]) -> list[Path]:
@@ -55,13 +56,39 @@ def _write_pdf(found: Reproduction, figures: Sequence[Drawn], file: Path) -> Non
     lines += summary_text(found).splitlines()
     # Without a date the same result gives the same file.
     with PdfPages(file, metadata={"CreationDate": None}) as pdf:
-        for first in range(0, len(lines), LINES):
+        for part in pages(lines):
             page = plt.figure(figsize=(11.7, 8.3))
-            text = "\n".join(lines[first : first + LINES])
-            page.text(0.04, 0.96, text, family="monospace", fontsize=8, va="top")
+            page.text(0.04, 0.96, "\n".join(part), family="monospace", fontsize=TYPE, va="top")
             pdf.savefig(page)
             plt.close(page)
         for one in figures:
             words = f"{one.title}\n{one.caption}"
             one.figure.text(0.01, 1.02, "\n".join(fill(line, 150) for line in words.splitlines()))
             pdf.savefig(one.figure, bbox_inches="tight", pad_inches=0.3)
+
+
+def pages(lines: Sequence[str]) -> list[list[str]]:
+    """Put lines on as few pages as possible, filled alike, with paragraphs and tables whole."""
+    blocks: list[list[str]] = [[]]
+    for line in lines:
+        if not line or len(blocks[-1]) == LINES:
+            blocks.append([])
+        if line:
+            blocks[-1].append(line)
+    blocks = [block for block in blocks if block]
+    # The best way to place the blocks from each one on: pages, unevenness, pages' beginnings.
+    best: list[tuple[int, int, list[int]]] = [(0, 0, [])]
+    for first in reversed(range(len(blocks))):
+        ways, height = [], -1
+        for last in range(first, len(blocks)):
+            height += len(blocks[last]) + 1
+            if height > LINES:
+                break
+            count, uneven, begun = best[last - first]
+            ways.append((count + 1, uneven + (LINES - height) ** 2, [first, *begun]))
+        best.insert(0, min(ways))
+    begins = [*best[0][2], len(blocks)]
+    return [
+        [line for block in blocks[first:last] for line in [*block, ""]][:-1]
+        for first, last in pairwise(begins)
+    ]

@@ -19,6 +19,8 @@ __all__ = ["number", "place", "reading", "seen", "summary_text", "tally"]
 
 # A second harmonic has this peak to peak in units of its SD.
 PURE_ANGLE = 2.0 * math.sqrt(2.0)
+# Characters in a line of text.
+WIDTH = 118
 SIGNS = {"value": "", "about": "about ", "bound": "within "}
 
 
@@ -38,15 +40,20 @@ def summary_text(found: Reproduction) -> str:
             f"{number(one, one.median):>8}{mark}  {low + ' to ' + high:<17}"
             f"{'' if true is None else number(one, true):>8}  {one.ratio:>5.2f}  {use}".rstrip()
         )
-    lines += ["", *(line for part in tally(found) for line in wrap(part, 118))]
+    lines += ["", *(line for part in tally(found) for line in wrap(part, WIDTH))]
     lines += ["* marks numbers that are not reached.", "", "Conclusions of the paper"]
     for conclusion in found.conclusions:
         lines += [
             f"  {'confirmed    ' if conclusion.holds else 'NOT CONFIRMED'}  {conclusion.text}",
-            f"                 {conclusion.words} ({conclusion.seen} of {conclusion.seeds} runs)",
+            *(
+                17 * " " + line
+                for line in wrap(
+                    f"{conclusion.words} ({conclusion.seen} of {conclusion.seeds} runs)", WIDTH - 17
+                )
+            ),
         ]
     for part in found.sections:
-        lines += ["", part.title, *wrap(part.text, 118), *_columns(part)]
+        lines += ["", part.title, *wrap(part.text, WIDTH), *_columns(part)]
     return "\n".join(lines)
 
 

@@ -11,7 +11,7 @@ from ..references.paths import circle
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import ArrayLike
 
     from ..control.controller import Controller
@@ -92,17 +92,22 @@ class Table2:
             lines.append(f"{1e6 * case.radius:>9g}  {case.frequency:>12g}  {cells}  {ratio}")
         return "\n".join(lines)
 
-    def plot(self) -> Figure:
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Plot the circles at 0.1 Hz as in Fig. 15, their errors, and the table as bars.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
 
         Returns
         -------
         matplotlib.figure.Figure
-            Not yet shown or saved.
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
         """
         from .table_2_plot import plot_table_2
 
-        return plot_table_2(self)
+        return plot_table_2(self, fig)
 
 
 def run_table_2(

@@ -4,17 +4,25 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import matplotlib.pyplot as plt
 import numpy as np
 
-from .._support.plot_style import above
+from .._support.plot_style import (
+    ACTUAL,
+    ERROR,
+    GUIDE,
+    MEASURED,
+    heading,
+    legend_inside,
+    panels,
+    whole,
+)
 from ..control.contouring_plot import last_turn, plot_magnified
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
     from ..control.contouring import Contour
     from .table_2 import Table2
@@ -22,32 +30,37 @@ if TYPE_CHECKING:
 __all__ = ["plot_table_2"]
 
 
-def plot_table_2(table: Table2) -> Figure:
+def plot_table_2(table: Table2, fig: Figure | SubFigure | None = None) -> Figure:
     """Plot the circles at 0.1 Hz, their errors over an angle, and published and obtained values.
 
     Parameters
     ----------
     table : Table2
         The nine circles, run.
+    fig : matplotlib.figure.Figure or SubFigure, optional
+        Where to draw; a new figure where not given.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Not yet shown or saved.
+        The figure drawn in.
     """
-    figure = plt.figure(figsize=(11.0, 8.4), layout="constrained")
+    figure = panels(fig, (11.0, 8.4))
     grid = figure.add_gridspec(2, 6, height_ratios=[1.5, 1.0])
     circles = figure.add_subplot(grid[0, :3])
     slow = [run for case, run in table.cases if case.frequency == 0.1]
     for run in slow:
         plot_magnified(run, circles, factor=5.0)
-    circles.set_title("0.1 Hz, contour error x 5")
-    if legend := circles.get_legend():
-        legend.remove()
+    heading(circles, "0.1 Hz, contour error \N{MULTIPLICATION SIGN} 5")
+    # One name for the lines of all circles, and a square as without their legends.
+    circles.set_ylim(top=circles.get_ylim()[0] + float(np.ptp(circles.get_xlim())))
+    handles, names = circles.get_legend_handles_labels()
+    circles.legend(handles[:2], names[:2], loc="upper left", frameon=False, fontsize="small")
     _over_angle(slow, figure.add_subplot(grid[0, 3:]))
     for column, name in enumerate(("max", "mean", "SD")):
         _bars(table, name, figure.add_subplot(grid[1, 2 * column : 2 * column + 2]))
-    return figure
+    figure.suptitle("Circles of Table 2 of Xu and Li 2010", fontsize="large")
+    return whole(figure)
 
 
 def _over_angle(runs: Sequence[Contour], ax: Axes) -> None:
@@ -56,12 +69,13 @@ def _over_angle(runs: Sequence[Contour], ax: Axes) -> None:
     for row, run in enumerate(runs):
         part = last_turn(run)
         angle = 360.0 * np.arange(part.sum()) / part.sum()
-        ax.axhline(row * apart, color="0.75", linewidth=0.8)
-        ax.plot(angle, row * apart + 1e6 * run.error[part], color="C3", linewidth=0.8)
+        ax.axhline(row * apart, **GUIDE)
+        ax.plot(angle, row * apart + 1e6 * run.error[part], **{**ERROR, "linewidth": 0.8})
         label = f"{1e6 * (run.path.radius or 0.0):g} um"
         ax.annotate(label, (362.0, row * apart), va="center", annotation_clip=False)
     ax.set(xlabel="angle [deg]", ylabel="contour error [um], one radius above the other")
-    ax.set(xticks=range(0, 361, 90), xlim=(0, 360), title="0.1 Hz, last turn")
+    ax.set(xticks=range(0, 361, 90), xlim=(0, 360))
+    heading(ax, "0.1 Hz, last turn")
 
 
 def _bars(table: Table2, name: str, ax: Axes) -> None:
@@ -75,11 +89,13 @@ def _bars(table: Table2, name: str, ax: Axes) -> None:
     places = np.arange(len(cases))
     published = [1e6 * case[column] for case in cases]
     found = [1e6 * getattr(run.metrics, attribute) for run in table.runs]
-    ax.bar(places - 0.2, published, 0.4, color="0.75", edgecolor="0.3", label="published")
-    ax.bar(places + 0.2, found, 0.4, color="C0", edgecolor="0.1", label="obtained")
+    ax.bar(
+        places - 0.2, published, 0.4, color=MEASURED["color"], edgecolor="0.3", label="published"
+    )
+    ax.bar(places + 0.2, found, 0.4, color=ACTUAL["color"], edgecolor="0.1", label="obtained")
     what = "peak to peak" if name == "max" else name
     ax.set(ylabel=f"{what} [um]", xlabel="radius [um], and frequency [Hz]")
     labels = [f"{1e6 * case.radius:g}\n{case.frequency:g}" for case in cases]
     ax.set_xticks(places, labels, fontsize="small")
-    ax.axhline(0.0, color="0.4", linewidth=0.6)
-    above(ax)
+    ax.axhline(0.0, **{**GUIDE, "zorder": 2})
+    legend_inside(ax)

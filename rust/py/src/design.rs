@@ -24,22 +24,6 @@ pub struct PyLoopPlant(LoopPlant);
 
 #[pymethods]
 impl PyLoopPlant {
-    /// A mode of a static gain (m/V), with the amplifier's bandwidth and a delay.
-    #[staticmethod]
-    fn mode(
-        gain: f64,
-        frequency: f64,
-        damping_ratio: f64,
-        bandwidth: f64,
-        delay: f64,
-    ) -> PyResult<Self> {
-        let build = || -> Result<LoopPlant> {
-            let plant = LoopPlant::mode(gain, frequency, damping_ratio)?.with_delay(delay)?;
-            if bandwidth.is_finite() { plant.with_amplifier(bandwidth) } else { Ok(plant) }
-        };
-        build().map(Self).map_err(|error| raise(&error))
-    }
-
     /// A row by row, B, C, D and the delay, s: what `from_matrices` takes.
     fn matrices(&self) -> Matrices {
         let (a, b, c, d, delay) = self.0.matrices();

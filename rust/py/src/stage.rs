@@ -5,18 +5,16 @@ use piezotrack_control::OnlineFeedforward;
 use piezotrack_core::error::finite;
 use piezotrack_core::models::{Experiment, Method, Model, Response, Stage, Values};
 use piezotrack_core::signal::{self, Drive, Hold};
-use piezotrack_core::simulate::Axis;
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
 use crate::arrays::{array, samples};
-use crate::control::PyController;
 use crate::design::PyLoopPlant;
 use crate::enter::enter;
 use crate::errors::raise;
 use crate::inverse::PyInverse;
 use crate::models::{Named, named};
-use crate::tracking::{Arrays, PyTrackingRun, Sampling, stopped};
+use crate::tracking::stopped;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyStage>()?;
@@ -58,11 +56,6 @@ impl PyStage {
             }
         }
         Ok(Some(values))
-    }
-
-    /// The stage as a plant, in steps of at most `step` seconds.
-    pub fn axis(&self, step: f64) -> Axis {
-        Axis::Model { stage: self.0, step }
     }
 }
 
@@ -106,24 +99,6 @@ impl PyStage {
             stopped(self.0.simulate(&experiment)?)
         })?;
         Ok(PyResponse(run))
-    }
-
-    /// Simulates the closed loop along a reference, after visits to voltages or from rest, in steps
-    /// of at most `step` seconds.
-    #[expect(clippy::too_many_arguments, reason = "called from one place")]
-    fn track(
-        &self,
-        py: Python<'_>,
-        step: f64,
-        controller: &PyController,
-        reference: &Bound<'_, PyAny>,
-        feedforward: &Bound<'_, PyAny>,
-        sampling: Sampling,
-        visited: &Bound<'_, PyAny>,
-    ) -> PyResult<PyTrackingRun> {
-        let visited = samples("visited", visited)?;
-        let input = Arrays::new(reference, feedforward)?;
-        enter(py, |stop| input.run(&self.axis(step), &visited, controller, sampling, stop))
     }
 
     /// The stage for small motions between two voltages: least, middle and largest gain.

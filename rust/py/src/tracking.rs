@@ -4,7 +4,7 @@ use numpy::PyArray1;
 use piezotrack_core::math::room;
 use piezotrack_core::signal::Stop;
 use piezotrack_core::signal::metrics::{self, Tracking};
-use piezotrack_core::simulate::{Axis, ReferenceSamples, Timing, TrackingRun, track};
+use piezotrack_core::simulate::{ReferenceSamples, Timing, TrackingRun, VirtualStage, track};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
@@ -57,7 +57,7 @@ impl Arrays {
     /// Simulates the closed loop of an axis from its start, or after visits to voltages.
     pub fn run(
         &self,
-        axis: &Axis,
+        axis: &VirtualStage,
         visited: &[f64],
         controller: &PyController,
         sampling: Sampling,

@@ -1,165 +1,62 @@
-//! The virtual stage: its settings, its simulation, a controller on it.
+//! The virtual stage: its parts, its simulation, a controller on it.
 
 use numpy::PyArray1;
-use piezotrack_core::models::Creep;
+use piezotrack_core::models::Stage;
 use piezotrack_core::signal::Drive;
-use piezotrack_core::simulate::{
-    Amplifier, Axis, OpenLoop, RELAXATIONS, Sensor, StagePlay, VirtualSettings, VirtualStage,
-};
-use piezotrack_core::{Error, Result};
+use piezotrack_core::simulate::{Amplifier, OpenLoop, Preconditioning, Sensor, VirtualStage};
 use pyo3::prelude::*;
 
 use crate::arrays::{array, samples};
 use crate::control::PyController;
+use crate::design::PyLoopPlant;
 use crate::enter::enter;
 use crate::errors::raise;
-use crate::stage::hold;
+use crate::models::{Named, named};
+use crate::stage::{PyStage, hold};
 use crate::tracking::{Arrays, PyTrackingRun, Sampling, stopped};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyVirtualStage>()
 }
 
-/// Unfused numbers of a virtual stage, as a dict in Python.
-#[derive(FromPyObject, IntoPyObject)]
-struct Settings {
-    #[pyo3(item)]
-    bandwidth: f64,
-    #[pyo3(item)]
-    slew: f64,
-    #[pyo3(item)]
-    limits: (f64, f64),
-    #[pyo3(item)]
-    linear: f64,
-    #[pyo3(item)]
-    thresholds: Vec<f64>,
-    #[pyo3(item)]
-    weights: Vec<f64>,
-    #[pyo3(item)]
-    dead_zone_thresholds: Vec<f64>,
-    #[pyo3(item)]
-    dead_zone_weights: Vec<f64>,
-    #[pyo3(item)]
-    gain: f64,
-    #[pyo3(item)]
-    creep_weights: Vec<f64>,
-    #[pyo3(item)]
-    creep_times: Vec<f64>,
-    #[pyo3(item)]
-    frequency: f64,
-    #[pyo3(item)]
-    damping_ratio: f64,
-    #[pyo3(item)]
-    noise: f64,
-    #[pyo3(item)]
-    noise_bandwidth: f64,
-    #[pyo3(item)]
-    resolution: f64,
-    #[pyo3(item)]
-    sensor_range: f64,
-    #[pyo3(item)]
-    seed: u64,
-    #[pyo3(item)]
-    preconditioned: bool,
-    #[pyo3(item)]
-    swing: f64,
-    #[pyo3(item)]
-    rest: f64,
-    #[pyo3(item)]
-    step: f64,
+/// Bandwidth, slew rate, lowest and highest output.
+type AmplifierNumbers = (f64, f64, f64, f64);
+
+/// Noise, its bandwidth, resolution, range, delay, offset, seed.
+type SensorNumbers = (f64, f64, f64, f64, f64, f64, u64);
+
+/// Swing and rest of the preconditioning.
+type Cycles = Option<(f64, f64)>;
+
+fn amplifier((bandwidth, slew, low, high): AmplifierNumbers) -> Amplifier {
+    Amplifier { bandwidth, slew, low, high }
 }
 
-/// As many numbers as there is room for, padded with what does nothing.
-fn padded<const N: usize>(name: &str, values: &[f64], filler: f64) -> Result<[f64; N]> {
-    if values.len() > N {
-        let expected = format!("{N} at most");
-        return Err(Error::parameter(name, format!("{} numbers", values.len()), expected));
-    }
-    Ok(core::array::from_fn(|i| values.get(i).copied().unwrap_or(filler)))
+fn sensor(numbers: SensorNumbers) -> Sensor {
+    let (noise, bandwidth, resolution, range, delay, offset, seed) = numbers;
+    Sensor { noise, bandwidth, resolution, range, delay, offset, seed }
 }
 
-fn equally_many(name: &str, values: &[f64], other: &str, others: &[f64]) -> Result<()> {
-    if values.len() == others.len() {
-        return Ok(());
-    }
-    let expected = format!("{}, as many as {other}", others.len());
-    Err(Error::Shape { name: name.into(), found: format!("{} numbers", values.len()), expected })
-}
+/// Name of the model, parameters of the stage, amplifier, sensor, preconditioning and step.
+type Parts = (&'static str, Named, AmplifierNumbers, SensorNumbers, Cycles, f64);
 
-impl Settings {
-    fn core(&self) -> Result<VirtualSettings> {
-        equally_many("weights", &self.weights, "thresholds", &self.thresholds)?;
-        equally_many(
-            "dead_zone_weights",
-            &self.dead_zone_weights,
-            "dead_zone_thresholds",
-            &self.dead_zone_thresholds,
-        )?;
-        equally_many("creep_weights", &self.creep_weights, "creep_times", &self.creep_times)?;
-        let last = self.dead_zone_thresholds.last().copied().unwrap_or(0.0);
-        let shares: [f64; RELAXATIONS] = padded("creep_weights", &self.creep_weights, 0.0)?;
-        let times: [f64; RELAXATIONS] = padded("creep_times", &self.creep_times, 1.0)?;
-        let creep = core::array::from_fn(|j| Creep { share: shares[j], time: times[j] });
-        let play = StagePlay {
-            linear: self.linear,
-            thresholds: padded("thresholds", &self.thresholds, 0.0)?,
-            weights: padded("weights", &self.weights, 0.0)?,
-            dead_zone_thresholds: padded("dead_zone_thresholds", &self.dead_zone_thresholds, last)?,
-            dead_zone_weights: padded("dead_zone_weights", &self.dead_zone_weights, 0.0)?,
-        };
-        Ok(VirtualSettings {
-            amplifier: Amplifier {
-                bandwidth: self.bandwidth,
-                slew: self.slew,
-                low: self.limits.0,
-                high: self.limits.1,
-            },
-            play,
-            gain: self.gain,
-            creep,
-            frequency: self.frequency,
-            damping_ratio: self.damping_ratio,
-            sensor: Sensor {
-                noise: self.noise,
-                bandwidth: self.noise_bandwidth,
-                resolution: self.resolution,
-                range: self.sensor_range,
-                seed: self.seed,
-            },
-            preconditioned: self.preconditioned,
-            swing: self.swing,
-            rest: self.rest,
-            step: self.step,
-        })
-    }
-
-    fn of(settings: &VirtualSettings) -> Self {
-        let VirtualSettings { amplifier, play, sensor, .. } = *settings;
-        Self {
-            bandwidth: amplifier.bandwidth,
-            slew: amplifier.slew,
-            limits: (amplifier.low, amplifier.high),
-            linear: play.linear,
-            thresholds: play.thresholds.to_vec(),
-            weights: play.weights.to_vec(),
-            dead_zone_thresholds: play.dead_zone_thresholds.to_vec(),
-            dead_zone_weights: play.dead_zone_weights.to_vec(),
-            gain: settings.gain,
-            creep_weights: settings.creep.map(|creep| creep.share).to_vec(),
-            creep_times: settings.creep.map(|creep| creep.time).to_vec(),
-            frequency: settings.frequency,
-            damping_ratio: settings.damping_ratio,
-            noise: sensor.noise,
-            noise_bandwidth: sensor.bandwidth,
-            resolution: sensor.resolution,
-            sensor_range: sensor.range,
-            seed: sensor.seed,
-            preconditioned: settings.preconditioned,
-            swing: settings.swing,
-            rest: settings.rest,
-            step: settings.step,
-        }
-    }
+fn parts(of: &VirtualStage) -> Parts {
+    let VirtualStage { stage, amplifier, sensor, preconditioning, step } = of;
+    let Amplifier { bandwidth, slew, low, high } = *amplifier;
+    let Sensor { noise, bandwidth: reach, resolution, range, delay, offset, seed } = *sensor;
+    // The published ones have plays.
+    let parameters = match stage {
+        Stage::PrandtlIshlinskii(plays) => named(&plays.parameters()),
+        _ => Named::new(),
+    };
+    (
+        stage.model().info().name,
+        parameters,
+        (bandwidth, slew, low, high),
+        (noise, reach, resolution, range, delay, offset, seed),
+        preconditioning.map(|cycles| (cycles.swing, cycles.rest)),
+        *step,
+    )
 }
 
 /// True displacement, reading of the sensor and applied voltage.
@@ -182,25 +79,40 @@ pub struct PyVirtualStage(pub VirtualStage);
 #[pymethods]
 impl PyVirtualStage {
     #[new]
-    #[expect(clippy::needless_pass_by_value, reason = "extracted from a dict")]
-    fn new(settings: Settings) -> PyResult<Self> {
-        let stage = settings.core().and_then(|settings| VirtualStage::new(&settings));
-        stage.map(Self).map_err(|error| raise(&error))
+    fn new(
+        stage: &PyStage,
+        of_amplifier: AmplifierNumbers,
+        of_sensor: SensorNumbers,
+        cycles: Cycles,
+        step: f64,
+    ) -> PyResult<Self> {
+        let stage = VirtualStage {
+            stage: stage.0,
+            amplifier: amplifier(of_amplifier),
+            sensor: sensor(of_sensor),
+            preconditioning: cycles.map(|(swing, rest)| Preconditioning { swing, rest }),
+            step,
+        };
+        stage.validate().map_err(|error| raise(&error))?;
+        Ok(Self(stage))
     }
 
+    /// The parts of the stage of Xu and Li 2010.
     #[staticmethod]
-    fn xu_li_2010(seed: u64) -> Settings {
-        Settings::of(&VirtualSettings::xu_li_2010(seed))
+    fn xu_li_2010(seed: u64) -> Parts {
+        parts(&VirtualStage::xu_li_2010(seed))
     }
 
+    /// Those of its other axis.
     #[staticmethod]
-    fn xu_li_2010_y(seed: u64) -> Settings {
-        Settings::of(&VirtualSettings::xu_li_2010_y(seed))
+    fn xu_li_2010_y(seed: u64) -> Parts {
+        parts(&VirtualStage::xu_li_2010_y(seed))
     }
 
-    /// Lowest, mean and highest gain for small motions, m/V.
-    fn gains(&self) -> [f64; 3] {
-        self.0.gains()
+    /// The stage with amplifier and sensor delay for small motions between two voltages: least,
+    /// middle and largest gain.
+    fn loop_plants(&self, low: f64, high: f64, delay: f64) -> PyResult<[PyLoopPlant; 3]> {
+        PyLoopPlant::delayed(self.0.loop_plants(low, high), delay)
     }
 
     fn simulate<'py>(
@@ -218,7 +130,8 @@ impl PyVirtualStage {
         open_loop_arrays(py, &run)
     }
 
-    /// Simulates closed-loop tracking of a reference.
+    /// Simulates closed-loop tracking of a reference, after visits to voltages or from the start,
+    /// in steps of at most `step` seconds.
     fn track(
         &self,
         py: Python<'_>,
@@ -226,8 +139,10 @@ impl PyVirtualStage {
         reference: &Bound<'_, PyAny>,
         feedforward: &Bound<'_, PyAny>,
         sampling: Sampling,
+        visited: &Bound<'_, PyAny>,
     ) -> PyResult<PyTrackingRun> {
+        let visited = samples("visited", visited)?;
         let input = Arrays::new(reference, feedforward)?;
-        enter(py, |stop| input.run(&Axis::Virtual(self.0), &[], controller, sampling, stop))
+        enter(py, |stop| input.run(&self.0, &visited, controller, sampling, stop))
     }
 }

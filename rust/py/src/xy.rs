@@ -3,11 +3,12 @@
 use numpy::PyArray1;
 use piezotrack_core::Error;
 use piezotrack_core::identify::{cross_talk, noise_at_rest};
+use piezotrack_core::models::{Stage, StageState};
 use piezotrack_core::signal::Drive;
 use piezotrack_core::signal::contour_error::{Polyline, radial_errors};
 use piezotrack_core::signal::metrics::Spread;
 use piezotrack_core::simulate::{
-    Axis, AxisState, MissedTicks, TwoAxes, TwoStates, open_loops, track_both,
+    MissedTicks, TwoAxes, TwoStates, VirtualStage, open_loops, track_both,
 };
 use pyo3::prelude::*;
 
@@ -15,7 +16,7 @@ use crate::arrays::{array, samples};
 use crate::control::PyController;
 use crate::enter::enter;
 use crate::errors::raise;
-use crate::stage::{PyStage, hold};
+use crate::stage::hold;
 use crate::tracking::{Arrays, PyTrackingRun, Sampling, stopped, timing};
 use crate::virtual_stage::{OpenLoopArrays, PyVirtualStage, open_loop_arrays};
 
@@ -28,36 +29,24 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(sensor_noise, module)?)
 }
 
-/// An axis as Python gives it: a virtual stage, or a model's stage and its longest step, s.
-#[derive(FromPyObject)]
-enum Given<'py> {
-    Virtual(PyRef<'py, PyVirtualStage>),
-    Model(PyRef<'py, PyStage>, f64),
-}
-
-impl Given<'_> {
-    fn axis(&self) -> Axis {
-        match self {
-            Self::Virtual(stage) => Axis::Virtual(stage.0),
-            Self::Model(stage, step) => stage.axis(*step),
-        }
-    }
-}
+/// No visits to voltages before an experiment.
+const NOWHERE: [&[f64]; 2] = [&[], &[]];
 
 /// Two axes on one platform.
 #[pyclass(name = "XYStage", frozen, module = "piezotrack._core")]
 struct PyXyStage {
-    axes: [Axis; 2],
+    axes: [VirtualStage; 2],
     cross_talk: [f64; 2],
     lag: f64,
     missed: MissedTicks,
 }
 
 impl PyXyStage {
-    /// The axes between their amplifiers and sensors, and where an experiment starts.
-    fn both(&self) -> (TwoAxes<'_, Axis, Axis>, TwoStates<AxisState, AxisState>) {
+    /// The axes between their amplifiers and sensors, and where an experiment starts, after visits
+    /// to voltages if there are any.
+    fn both(&self, visited: [&[f64]; 2]) -> (TwoAxes<'_, Stage, Stage>, TwoStates<StageState, StageState>) {
         let [x, y] = &self.axes;
-        let start = (x.start(), y.start());
+        let start = (x.start_after(visited[0]), y.start_after(visited[1]));
         let (x, y) = (x.apparatus(), y.apparatus());
         let Self { cross_talk, lag, missed, .. } = *self;
         (TwoAxes { x, y, cross_talk, lag, missed }, start)
@@ -69,15 +58,15 @@ impl PyXyStage {
     #[new]
     #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn new(
-        x: Given<'_>,
-        y: Given<'_>,
+        x: PyRef<'_, PyVirtualStage>,
+        y: PyRef<'_, PyVirtualStage>,
         cross_talk: [f64; 2],
         lag: f64,
         missed: (f64, usize),
     ) -> PyResult<Self> {
         let missed = MissedTicks { chance: missed.0, most: missed.1 };
-        let stage = Self { axes: [x.axis(), y.axis()], cross_talk, lag, missed };
-        stage.both().0.validate().map_err(|error| raise(&error))?;
+        let stage = Self { axes: [x.0, y.0], cross_talk, lag, missed };
+        stage.both(NOWHERE).0.validate().map_err(|error| raise(&error))?;
         Ok(stage)
     }
 
@@ -94,7 +83,7 @@ impl PyXyStage {
         let (x, y) = enter(py, |stop| {
             let hold = hold(hold_name)?;
             let drives = [&Drive::new(&ux, dt, hold)?, &Drive::new(&uy, dt, hold)?];
-            let (axes, start) = self.both();
+            let (axes, start) = self.both(NOWHERE);
             stopped(open_loops(&axes, start, drives, stop)?)
         })?;
         Ok([open_loop_arrays(py, &x)?, open_loop_arrays(py, &y)?])
@@ -109,6 +98,7 @@ impl PyXyStage {
         references: [Bound<'_, PyAny>; 2],
         feedforwards: [Bound<'_, PyAny>; 2],
         sampling: Sampling,
+        visited: [Vec<f64>; 2],
     ) -> PyResult<(PyTrackingRun, PyTrackingRun)> {
         let inputs = [
             Arrays::new(&references[0], &feedforwards[0])?,
@@ -116,7 +106,7 @@ impl PyXyStage {
         ];
         let [x, y] = [&*controllers[0], &*controllers[1]];
         enter(py, |stop| {
-            let (axes, start) = self.both();
+            let (axes, start) = self.both([&visited[0], &visited[1]]);
             let timing = timing(x, 0, sampling);
             let inputs = [inputs[0].input(), inputs[1].input()];
             let controllers = (&x.controller, &y.controller);

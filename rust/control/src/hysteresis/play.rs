@@ -115,6 +115,36 @@ impl<N: Number, const PLAYS: usize, const ZONES: usize> Play<N, PLAYS, ZONES> {
 }
 
 impl<const PLAYS: usize, const ZONES: usize> Play<f64, PLAYS, ZONES> {
+    /// As [`Self::follow`], where the plays after the first `used` and the dead zones after the
+    /// first `zones` weigh 0.
+    #[inline(always)]
+    pub fn follow_used(
+        &self,
+        state: &mut PlayState<f64, PLAYS>,
+        input: f64,
+        (used, zones): (usize, usize),
+    ) -> f64 {
+        let falls = input < state.input;
+        let mut value = self.linear * input;
+        let mut slope = self.linear;
+        let settings = self.thresholds.iter().zip(&self.weights);
+        for ((threshold, weight), play) in settings.zip(&mut state.plays).take(used) {
+            let (low, high) = (input - threshold, input + threshold);
+            *play = low.max(high.min(*play));
+            let gap = if falls { *play - high } else { low - *play };
+            slope += if gap < 0.0 { 0.0 } else { *weight };
+            value += weight * *play;
+        }
+        (state.input, state.slope) = (input, slope);
+        let mut bent = value;
+        let settings = self.dead_zone_thresholds.iter().zip(&self.dead_zone_weights);
+        for (corner, bend) in settings.take(zones) {
+            let beyond = value - corner;
+            bent += if beyond < 0.0 { 0.0 } else { bend * beyond };
+        }
+        bent
+    }
+
     /// The end of the first part of the way to `input` (V) along which the output is a straight
     /// line: where a play starts to move, or the weighted sum passes a dead zone's threshold;
     /// `input` where all of the way is. Those after the first `used` plays weigh 0.

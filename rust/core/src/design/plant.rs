@@ -8,8 +8,8 @@ use crate::error::{Error, Result, finite, not_negative, positive, shown};
 use crate::integrator::{Mechanics, halvings};
 use crate::math::Ratio;
 
-/// States of a plant, at most.
-const STATES: usize = 8;
+/// States of a plant, at most: four modes and two lags.
+const STATES: usize = 10;
 /// Delay in samples, at most.
 const DELAY: f64 = 1e3;
 /// Terms of the power series of the matrix exponential, for a norm of 0.5 at most.
@@ -97,14 +97,14 @@ impl LoopPlant {
         Self::state_space(&rows, &[0.0, piezo_coefficient / mass], &[1.0, 0.0], 0.0)
     }
 
-    /// Matrices of `b.len()` states (8 at most), `a` row by row, in SI: 1/s, 1/(V s), m, m/V
+    /// Matrices of `b.len()` states (10 at most), `a` row by row, in SI: 1/s, 1/(V s), m, m/V
     /// where the states have no unit.
     ///
     /// # Errors
     /// Names the matrix that has the wrong number of entries or one that is not finite.
     pub fn state_space(a: &[f64], b: &[f64], c: &[f64], d: f64) -> Result<Self> {
         let n = b.len();
-        entries("b", b, n <= STATES, "8 entries at most")?;
+        entries("b", b, n <= STATES, "10 entries at most")?;
         entries("a", a, a.len() == n * n, "a square of as many rows as b has entries")?;
         entries("c", c, c.len() == n, "as many entries as b")?;
         finite("d", d, "m/V")?;
@@ -131,12 +131,12 @@ impl LoopPlant {
     /// A lag of t seconds is a bandwidth of 1/(2 pi t).
     ///
     /// # Errors
-    /// Names `bandwidth` where it is not above 0; where the plant has 8 states already.
+    /// Names `bandwidth` where it is not above 0; where the plant has 10 states already.
     pub fn with_amplifier(self, bandwidth: f64) -> Result<Self> {
         let rate = TAU * positive("bandwidth", bandwidth, "Hz")?;
         let n = self.b.len();
         if n >= STATES {
-            return Err(Error::parameter("plant", format!("{n} states"), "7 states at most"));
+            return Err(Error::parameter("plant", format!("{n} states"), "9 states at most"));
         }
         let mut a = self.a.resize(n + 1, n + 1, 0.0);
         a.view_mut((0, n), (n, 1)).copy_from(&self.b);

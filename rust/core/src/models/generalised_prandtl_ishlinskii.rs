@@ -131,7 +131,7 @@ impl GeneralisedPlays {
         rising: TanhEnvelope,
         falling: TanhEnvelope,
     ) -> Result<Self> {
-        let PlayHysteresis { plays, count } =
+        let PlayHysteresis { plays, count, .. } =
             PlayHysteresis::new(linear, thresholds, weights, &[], &[])?;
         let numbers = |of: TanhEnvelope| [of.scale, of.slope, of.shift, of.level];
         let mut all = Self {

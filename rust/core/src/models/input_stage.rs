@@ -77,6 +77,12 @@ pub trait Segmented: InputOperator {
 
     /// Largest second derivative of the output between corners, m/V^2.
     fn bend(&self) -> f64;
+
+    /// Largest change of the slope that all corners together can make, m/V; infinite where it is
+    /// not known.
+    fn kink(&self) -> f64 {
+        f64::INFINITY
+    }
 }
 
 /// A stage with an operator at its input.
@@ -107,6 +113,8 @@ pub struct InputStageFlow {
     step: f64,
     /// Largest deviation of the operator's output from the chords that stand for it, m.
     deviation: f64,
+    /// Change of the drive below which one chord is close enough whatever the corners, V.
+    least: f64,
 }
 
 impl<O: InputOperator> InputStage<O> {
@@ -230,6 +238,7 @@ impl<O: Segmented> InputStage<O> {
             zero: self.zero(),
             step,
             deviation: accuracy / self.relaxation.largest_gain(),
+            least: 0.0,
         }
     }
 
@@ -252,10 +261,10 @@ impl<O: Segmented> InputStage<O> {
         state: &mut InputStageState<O::State>,
         volts: f64,
     ) -> usize {
-        let InputStageFlow { relaxation, zero, step, deviation } = flow;
+        let InputStageFlow { relaxation, zero, step, deviation, least } = flow;
         let from = self.operator.input(&state.operator);
         let (mut done, mut parts, mut idle) = (0.0, 1, 0);
-        let splits = self.relaxation.remembers() && (volts - from).abs() > 0.0;
+        let splits = self.relaxation.remembers() && (volts - from).abs() > *least;
         while splits && parts < MOST_PARTS && idle < MOST_IDLE {
             let next = self.operator.straight(&state.operator, volts, *deviation);
             let reached = (next - from) / (volts - from);
@@ -358,7 +367,9 @@ impl<O: Segmented> Plant for InputStage<O> {
     }
 
     fn flow(&self, step: f64) -> InputStageFlow {
-        self.steps(step, ACCURACY)
+        let flow = self.steps(step, ACCURACY);
+        // A chord across corners deviates by a quarter of kink times its length at most.
+        InputStageFlow { least: 4.0 * flow.deviation / self.operator.kink(), ..flow }
     }
 
     #[inline(always)]

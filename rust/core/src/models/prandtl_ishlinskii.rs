@@ -56,6 +56,8 @@ pub struct PlayHysteresis {
     pub plays: Plays,
     /// Plays that are used.
     pub count: usize,
+    /// Dead zones that are used.
+    pub zones: usize,
 }
 
 /// A stage with play operators at its input.
@@ -131,7 +133,7 @@ impl PlayHysteresis {
             (plays.dead_zone_thresholds[j], plays.dead_zone_weights[j]) =
                 (before, dead_zone_weights[j]);
         }
-        Ok(Self { plays, count })
+        Ok(Self { plays, count, zones: dead_zone_thresholds.len() })
     }
 }
 
@@ -182,7 +184,7 @@ impl InputOperator for PlayHysteresis {
 
     #[inline(always)]
     fn follow(&self, state: &mut Self::State, volts: f64) -> f64 {
-        self.plays.follow(state, volts)
+        self.plays.follow_used(state, volts, (self.count, self.zones))
     }
 
     #[inline(always)]
@@ -202,6 +204,29 @@ impl Segmented for PlayHysteresis {
 
     fn bend(&self) -> f64 {
         0.0
+    }
+
+    fn kink(&self) -> f64 {
+        let Plays { linear, weights, dead_zone_weights, .. } = &self.plays;
+        let moving: f64 = weights.iter().map(|weight| weight.abs()).sum();
+        let bent: f64 = dead_zone_weights.iter().map(|weight| weight.abs()).sum();
+        moving + (linear.abs() + moving) * bent
+    }
+}
+
+impl PrandtlIshlinskiiStage {
+    /// Values of its parameters.
+    #[must_use]
+    pub fn parameters(&self) -> Values {
+        let PlayHysteresis { plays, count, zones } = &self.operator;
+        let operator = [
+            vec![plays.linear],
+            plays.thresholds[..*count].to_vec(),
+            plays.weights[..*count].to_vec(),
+            plays.dead_zone_thresholds[..*zones].to_vec(),
+            plays.dead_zone_weights[..*zones].to_vec(),
+        ];
+        Values::of(PARAMETERS, operator.into_iter().chain(self.relaxation.values()))
     }
 }
 

@@ -55,11 +55,11 @@ impl<'a, P: Plant> Apparatus<'a, P> {
         Self { plant, amplifier: Amplifier::IDEAL, sensor: Sensor::IDEAL, step }
     }
 
-    /// The state before any command, with the sensor at 0.
+    /// The state before any command, with the sensor at its offset.
     #[must_use]
     pub fn rest(&self) -> ApparatusState<P::State> {
         let applied = self.amplifier.within_limits(0.0);
-        let sensor = SensorState::default();
+        let sensor = self.sensor.rest();
         ApparatusState { plant: self.plant.rest(), command: 0.0, applied, sensor }
     }
 
@@ -82,6 +82,16 @@ impl<'a, P: Plant> Apparatus<'a, P> {
         interval: f64,
     ) -> f64 {
         let seen = self.plant.displacement(&state.plant) + other;
+        self.sensor.read(&mut state.sensor, seen, interval)
+    }
+
+    /// Reads a displacement that the sensor saw, m, `interval` seconds after the last reading.
+    pub(super) fn read_seen(
+        &self,
+        state: &mut ApparatusState<P::State>,
+        seen: f64,
+        interval: f64,
+    ) -> f64 {
         self.sensor.read(&mut state.sensor, seen, interval)
     }
 

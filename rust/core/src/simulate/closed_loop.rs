@@ -41,7 +41,8 @@ struct Part<F> {
 ///
 /// `controller` is called with the number of the control sample and the reading, m, and returns
 /// the command, V. Before its first command has an effect, the amplifier keeps the one that it
-/// had at the start. With a delay of 0 a command acts at once, and shows in the next reading.
+/// had at the start. With a delay of 0 a command acts at once, and shows in the next reading. The
+/// delay of the sensor adds to that of the timing.
 ///
 /// ```
 /// use piezotrack_core::signal::NEVER;
@@ -73,6 +74,8 @@ pub fn closed_loop<P: Plant>(
     stop: Stop<'_>,
 ) -> Result<Option<ClosedLoop<P::State>>> {
     apparatus.validate()?;
+    // A delayed reading and a delayed voltage have the same effect.
+    let timing = &Timing { delay: timing.delay + apparatus.sensor.delay, ..*timing };
     let mut record = Record::new(timing, start)?;
     let clock = Clock::new(timing, apparatus.sensor.seed);
     let delay = Delay::new(timing.delay, timing.interval);

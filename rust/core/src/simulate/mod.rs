@@ -6,10 +6,10 @@
 
 mod amplifier;
 mod apparatus;
-mod axis;
 mod closed_loop;
 mod open_loop;
 mod sensor;
+mod sensor_delay;
 mod timing;
 mod tracking;
 mod two_axes;
@@ -17,7 +17,6 @@ mod virtual_stage;
 
 pub use amplifier::{Amplifier, AmplifierFlow};
 pub use apparatus::{Apparatus, ApparatusState};
-pub use axis::{Axis, AxisFlow, AxisState};
 pub use closed_loop::{ClosedLoop, closed_loop};
 pub use open_loop::{OpenLoop, open_loop};
 pub use sensor::{Sensor, SensorState};
@@ -26,6 +25,4 @@ pub use tracking::{DELAY_LINE, Law, LawState, MOST_STATES, ReferenceSamples, Tra
 pub use two_axes::{
     TwoAxes, TwoLogs, TwoMotions, TwoStates, TwoTracked, closed_loops, open_loops, track_both,
 };
-pub use virtual_stage::{
-    DEAD_ZONES, PLAYS, RELAXATIONS, StagePlay, VirtualSettings, VirtualStage, VirtualState,
-};
+pub use virtual_stage::{Preconditioning, VirtualStage};

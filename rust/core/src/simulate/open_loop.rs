@@ -1,6 +1,7 @@
 //! Open-loop simulation of a drive, as in the recording of a log.
 
 use super::apparatus::{Apparatus, ApparatusState, Stretch, instants, still_finite};
+use super::sensor_delay::Looks;
 use crate::error::{Result, finite};
 use crate::math::room;
 use crate::models::Plant;
@@ -37,16 +38,48 @@ pub fn open_loop<P: Plant>(
 ) -> Result<Option<OpenLoop<P::State>>> {
     apparatus.validate()?;
     let n = checked(drive)?;
-    let stretch = apparatus.stretch(drive.dt)?;
+    let mut looks = Looks::new([apparatus.sensor.delay], drive.dt, n)?;
+    let route = Route::new(apparatus, &looks, drive.dt)?;
     let mut run = OpenLoop::from_start(n, start)?;
+    looks.see(0, apparatus.plant.displacement(&run.last.plant));
     for k in 0..n {
-        if !run.drive(apparatus, &stretch, drive, k, stop) || (k % BLOCK == 0 && stop()) {
+        for part in 0..route.parts(k) {
+            if !run.drive(apparatus, &route, drive, (k, part), stop) {
+                return Ok(None);
+            }
+            if looks.is_due(0, part) {
+                looks.see(0, apparatus.plant.displacement(&run.last.plant));
+            }
+        }
+        if k % BLOCK == 0 && stop() {
             return Ok(None);
         }
-        let measured = apparatus.read(&mut run.last, since(drive, k));
+        let measured = apparatus.read_seen(&mut run.last, looks.read_at(0, k), since(drive, k));
         run.keep(apparatus.displacement(&run.last), measured, drive.dt * index(k))?;
     }
     Ok(Some(run))
+}
+
+/// The parts of a sampling interval through which an apparatus is driven.
+pub(super) struct Route<F> {
+    /// Each with where it begins and ends, as parts of the interval.
+    parts: Vec<(Stretch<F>, f64, f64)>,
+}
+
+impl<F> Route<F> {
+    pub(super) fn new<P: Plant<Flow = F>, const AXES: usize>(
+        apparatus: &Apparatus<'_, P>,
+        looks: &Looks<AXES>,
+        dt: f64,
+    ) -> Result<Self> {
+        let part = |(from, to): (f64, f64)| Ok((apparatus.stretch((to - from) * dt)?, from, to));
+        Ok(Self { parts: looks.parts().into_iter().map(part).collect::<Result<_>>()? })
+    }
+
+    /// How many there are before sample `k`: none before the first.
+    pub(super) fn parts(&self, k: usize) -> usize {
+        if k == 0 { 0 } else { self.parts.len() }
+    }
 }
 
 /// Number of samples of a drive that is finite.
@@ -69,19 +102,21 @@ impl<S> OpenLoop<S> {
         Ok(Self { displacement: empty()?, measured: empty()?, applied: empty()?, last })
     }
 
-    /// Leads an apparatus to sample `k`; false where `stop` said so meanwhile.
+    /// Leads an apparatus through a part of the interval before sample `k`; false where `stop` said
+    /// so meanwhile.
     #[must_use]
     pub(super) fn drive<P: Plant<State = S>>(
         &mut self,
         apparatus: &Apparatus<'_, P>,
-        stretch: &Stretch<P::Flow>,
+        route: &Route<P::Flow>,
         drive: &Drive<'_>,
-        k: usize,
+        (k, part): (usize, usize),
         stop: Stop<'_>,
     ) -> bool {
-        let Some(before) = k.checked_sub(1) else { return true };
-        let (from, change) = drive.interval(before);
-        apparatus.drive(stretch, &mut self.last, [from, from + change], stop)
+        let (stretch, from, to) = &route.parts[part];
+        let (volts, change) = drive.interval(k - 1);
+        let at = |place: f64| if place == 1.0 { volts + change } else { volts + place * change };
+        apparatus.drive(stretch, &mut self.last, [at(*from), at(*to)], stop)
     }
 
     /// Keeps the present sample, at `time` s.

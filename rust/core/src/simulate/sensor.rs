@@ -1,6 +1,6 @@
-//! The displacement sensor: noise of a bandwidth, a smallest step, a range, a zero.
+//! The displacement sensor: noise of a bandwidth, a smallest step, a range, a zero, a delay.
 
-use crate::error::{Error, Result, not_negative};
+use crate::error::{Error, Result, finite, not_negative};
 use crate::math::Draws;
 
 /// A displacement sensor.
@@ -15,6 +15,8 @@ use crate::math::Draws;
 /// | `bandwidth` | | Hz | > 0, infinite for white noise |
 /// | `resolution` | | m | >= 0, 0 for none |
 /// | `range` | | m | > `resolution`, may be infinite |
+/// | `delay` | | s | >= 0 |
+/// | `offset` | | m | finite |
 /// | `seed` | | | any |
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensor {
@@ -26,6 +28,10 @@ pub struct Sensor {
     pub resolution: f64,
     /// Displacement that can be read to either side, m.
     pub range: f64,
+    /// Time by which the displacement read is older than the reading, s.
+    pub delay: f64,
+    /// Reading of a stage that has never moved, or is preconditioned, m.
+    pub offset: f64,
     /// Seed of the noise.
     pub seed: u64,
 }
@@ -48,6 +54,8 @@ impl Sensor {
         bandwidth: f64::INFINITY,
         resolution: 0.0,
         range: f64::INFINITY,
+        delay: 0.0,
+        offset: 0.0,
         seed: 0,
     };
 
@@ -66,12 +74,20 @@ impl Sensor {
             let found = format!("{} m", self.range);
             return Err(Error::parameter("range", found, "more than the resolution"));
         }
+        not_negative("delay", self.delay, "s")?;
+        finite("offset", self.offset, "m")?;
         Ok(())
     }
 
-    /// Makes `displacement`, m, read 0, to the nearest step of the sensor.
+    /// The memory before any reading: 0 m read as the offset.
+    #[must_use]
+    pub fn rest(&self) -> SensorState {
+        SensorState { zero: -self.offset, ..SensorState::default() }
+    }
+
+    /// Makes `displacement`, m, read the offset, to the nearest step of the sensor.
     pub fn set_zero(&self, state: &mut SensorState, displacement: f64) {
-        state.zero = self.quantised(displacement);
+        state.zero = self.quantised(displacement) - self.offset;
     }
 
     /// The reading, m, at `displacement`, m, `interval` seconds after the one before.

@@ -11,7 +11,9 @@ use piezotrack_control::{Command, Controller, Feedback};
 
 use super::apparatus::{Apparatus, ApparatusState, Stretch};
 use super::closed_loop::{ClosedLoop, Record, checked};
-use super::open_loop::{BLOCK, OpenLoop, checked as checked_drive, since};
+use super::open_loop::{BLOCK, OpenLoop, Route, checked as checked_drive, since};
+use super::sensor::Sensor;
+use super::sensor_delay::Looks;
 use super::timing::{Clock, Commands, Delay, Event, MissedTicks, SAMPLES, Timing, events};
 use super::tracking::{ControllerRun, ReferenceSamples, TrackingRun};
 use crate::error::{Error, Result, finite, not_negative};
@@ -81,7 +83,10 @@ impl<X: Plant, Y: Plant> TwoAxes<'_, X, Y> {
     #[inline]
     fn added(&self, x: &ApparatusState<X::State>, y: &ApparatusState<Y::State>) -> [f64; 2] {
         let [xy, yx] = self.cross_talk;
-        [xy * self.y.displacement(y), yx * self.x.displacement(x)]
+        // An offset is of the reading only.
+        let moved_x = self.x.displacement(x) - self.x.sensor.offset;
+        let moved_y = self.y.displacement(y) - self.y.sensor.offset;
+        [xy * moved_y, yx * moved_x]
     }
 
     /// True displacement of the platform from the sensors' zeros, m.
@@ -95,15 +100,12 @@ impl<X: Plant, Y: Plant> TwoAxes<'_, X, Y> {
         [self.x.displacement(x) + to_x, self.y.displacement(y) + to_y]
     }
 
-    /// Reads both sensors, each so many seconds after its last reading, m.
-    fn read(
-        &self,
-        x: &mut ApparatusState<X::State>,
-        y: &mut ApparatusState<Y::State>,
-        [since_x, since_y]: [f64; 2],
-    ) -> [f64; 2] {
+    /// What each sensor sees, before its zero, m.
+    fn seen(&self, x: &ApparatusState<X::State>, y: &ApparatusState<Y::State>) -> [f64; 2] {
         let [to_x, to_y] = self.added(x, y);
-        [self.x.read_beside(x, to_x, since_x), self.y.read_beside(y, to_y, since_y)]
+        let (own_x, own_y) =
+            (self.x.plant.displacement(&x.plant), self.y.plant.displacement(&y.plant));
+        [own_x + to_x, own_y + to_y]
     }
 
     /// Cuts control interval `k` at all that happens in it.
@@ -147,14 +149,24 @@ struct Pair<X, Y> {
 }
 
 impl<X, Y> Pair<X, Y> {
-    fn new(timing: &Timing, lag: f64, seeds: [u64; 2], start: TwoStates<X, Y>) -> Result<Self> {
+    fn new(
+        timing: &Timing,
+        lag: f64,
+        sensors: [Sensor; 2],
+        start: TwoStates<X, Y>,
+    ) -> Result<Self> {
         let (x, y) = (Record::new(timing, start.0)?, Record::new(timing, start.1)?);
         let Timing { interval, samples, delay, .. } = *timing;
         let whole = Delay::new(lag, interval);
-        let [clock_x, clock_y] = seeds.map(|seed| Clock::new(timing, seed));
+        let [clock_x, clock_y] = sensors.map(|sensor| Clock::new(timing, sensor.seed));
         let late_y = clock_y.later(whole.fraction);
         let held = [x.run.last.command, y.run.last.command];
-        let acts = [delay, lag + delay].map(|delay| Delay::new(delay, interval));
+        let [of_x, of_y] = sensors.map(|sensor| sensor.delay);
+        let acts = [delay + of_x, lag + delay + of_y];
+        for delay in acts {
+            Timing { delay, ..*timing }.validate()?;
+        }
+        let acts = acts.map(|delay| Delay::new(delay, interval));
         let commands = [
             Commands::new(samples, held[0], acts[0], clock_x, 0)?,
             Commands::new(samples, held[1], acts[1], late_y, whole.whole)?,
@@ -231,7 +243,8 @@ impl<X, Y> Pair<X, Y> {
 /// Lets two controllers move two axes; `None` where `stop` said so meanwhile.
 ///
 /// Each controller is called as in [`super::closed_loop`]; that of y at `lag` after that of x,
-/// with a reading of its own. `timing.delay` counts from each axis's own sampling. The record is of
+/// with a reading of its own. `timing.delay` counts from each axis's own sampling, and the delay of
+/// its sensor adds to it. The record is of
 /// the instants of x: both `measured` are read at once there, whatever the lag, as a recorder
 /// beside the controllers would; with jitter each has its own random delay. Of two axes
 /// without cross-talk, lag and jitter each has the bits of [`super::closed_loop`].
@@ -247,7 +260,7 @@ pub fn closed_loops<X: Plant, Y: Plant>(
     stop: Stop<'_>,
 ) -> Result<Option<TwoMotions<X, Y>>> {
     axes.validate()?;
-    let mut run = Pair::new(timing, axes.lag, [axes.x.sensor.seed, axes.y.sensor.seed], start)?;
+    let mut run = Pair::new(timing, axes.lag, [axes.x.sensor, axes.y.sensor], start)?;
     let mut parts = Vec::new();
     for k in 0..timing.samples {
         if stop() {
@@ -377,16 +390,32 @@ pub fn open_loops<X: Plant, Y: Plant>(
         let expected = format!("{} s, as that of ux", to_x.dt);
         return Err(Error::parameter("interval of uy", format!("{} s", to_y.dt), expected));
     }
-    let (stretch_x, stretch_y) = (axes.x.stretch(to_x.dt)?, axes.y.stretch(to_y.dt)?);
+    let mut looks = Looks::new([axes.x.sensor.delay, axes.y.sensor.delay], to_x.dt, n)?;
+    let (route_x, route_y) =
+        (Route::new(&axes.x, &looks, to_x.dt)?, Route::new(&axes.y, &looks, to_y.dt)?);
     let (mut x, mut y) = (OpenLoop::from_start(n, start.0)?, OpenLoop::from_start(n, start.1)?);
+    for (axis, seen) in axes.seen(&x.last, &y.last).into_iter().enumerate() {
+        looks.see(axis, seen);
+    }
     for k in 0..n {
-        let moved = x.drive(&axes.x, &stretch_x, to_x, k, stop)
-            && y.drive(&axes.y, &stretch_y, to_y, k, stop);
-        if !moved || (k % BLOCK == 0 && stop()) {
+        for part in 0..route_x.parts(k) {
+            let moved = x.drive(&axes.x, &route_x, to_x, (k, part), stop)
+                && y.drive(&axes.y, &route_y, to_y, (k, part), stop);
+            if !moved {
+                return Ok(None);
+            }
+            for (axis, seen) in axes.seen(&x.last, &y.last).into_iter().enumerate() {
+                if looks.is_due(axis, part) {
+                    looks.see(axis, seen);
+                }
+            }
+        }
+        if k % BLOCK == 0 && stop() {
             return Ok(None);
         }
         let passed = since(to_x, k);
-        let [read_x, read_y] = axes.read(&mut x.last, &mut y.last, [passed, passed]);
+        let read_x = axes.x.read_seen(&mut x.last, looks.read_at(0, k), passed);
+        let read_y = axes.y.read_seen(&mut y.last, looks.read_at(1, k), passed);
         let [true_x, true_y] = axes.displacement(&x.last, &y.last);
         let time = to_x.dt * index(k);
         x.keep(true_x, read_x, time)?;

@@ -1,65 +1,33 @@
-//! The virtual stage: a simulated piezo stage, with more effects than the models fitted to it.
+//! The virtual stage: a stage of any model between an amplifier and a sensor.
 //!
 //! ```text
-//! command -> amplifier -> v -> plays with dead zones -> y -> h = gain y
-//!         -> d = h + sum_j c_j q_j,   tau_j q_j' = h - q_j                      creep
-//!         -> x'' + 2 zeta wn x' + wn^2 x = wn^2 d                               mode
-//!         -> sensor
+//! command -> amplifier -> stage -> sensor -> reading
 //! ```
 //!
-//! The hysteresis is rate-independent and at the input, so the ringing of the mode does not go
-//! through it. The plays follow Kuhnen 2003, doi 10.3166/ejc.9.407-418; relaxations whose time
+//! That of Xu and Li 2010 has more effects than the models fitted to it: play operators with dead
+//! zones (Kuhnen 2003, doi 10.3166/ejc.9.407-418), creep and a mode behind them. The hysteresis is
+//! at the input, so the ringing of the mode does not go through it; relaxations whose time
 //! constants are a decade apart make a creep that grows nearly with the logarithm of time.
-
-use piezotrack_control::hysteresis::{Operator, Play, PlayState};
 
 use super::amplifier::Amplifier;
 use super::apparatus::{Apparatus, ApparatusState};
 use super::open_loop::{OpenLoop, open_loop};
 use super::sensor::Sensor;
-use crate::error::{Error, Result, finite, not_negative, positive};
+use crate::design::LoopPlant;
+use crate::error::{Error, Result, not_negative, positive};
 use crate::models::{
-    Creep, Dynamics, MOST_RELAXATIONS, Plant, Relaxation, RelaxationFlow, RelaxationState,
+    Creep, Dynamics, FoundBy, InputStage, MOST_PLAYS, MOST_RELAXATIONS, MOST_ZONES, Plant,
+    PlayHysteresis, Plays, Relaxation, Settling, Stage, StageState,
 };
 use crate::signal::{Drive, Stop};
 
-/// Plays of a virtual stage; those with weight 0 do nothing.
-pub const PLAYS: usize = 10;
-
-/// Dead zones of a virtual stage; those with bend 0 do nothing.
-pub const DEAD_ZONES: usize = 2;
-
-/// Relaxations of its creep; those with share 0 do nothing.
-pub const RELAXATIONS: usize = 3;
-
-/// Its hysteresis operator, voltage in, voltage out.
-pub type StagePlay = Play<f64, PLAYS, DEAD_ZONES>;
-
-/// Everything that makes a virtual stage.
+/// Cycles before an experiment, so that it starts on the settled loop, with the sensor at 0 there.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct VirtualSettings {
-    /// Amplifier between command and stage.
-    pub amplifier: Amplifier,
-    /// Hysteresis, V to V.
-    pub play: StagePlay,
-    /// Immediate displacement for 1 V out of the hysteresis, m/V.
-    pub gain: f64,
-    /// Creep.
-    pub creep: [Creep; RELAXATIONS],
-    /// Undamped frequency of the mode, wn / (2 pi), Hz.
-    pub frequency: f64,
-    /// Damping ratio of the mode, zeta.
-    pub damping_ratio: f64,
-    /// Sensor, with the seed of its noise.
-    pub sensor: Sensor,
-    /// Whether an experiment starts on the settled loop, with the sensor at 0 there.
-    pub preconditioned: bool,
-    /// Voltage up to which it is cycled for that, from 0 V, V.
+pub struct Preconditioning {
+    /// Voltage up to which the stage is cycled, from 0 V, V.
     pub swing: f64,
     /// How long it then rests at 0 V before the sensor is set to 0, s.
     pub rest: f64,
-    /// Longest step of the simulation, s.
-    pub step: f64,
 }
 
 /// A stage to experiment on.
@@ -78,20 +46,18 @@ pub struct VirtualSettings {
 /// # Ok(())
 /// # }
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub struct VirtualStage {
-    settings: VirtualSettings,
-    /// Creep and mode.
-    relaxation: Relaxation,
-}
-
-/// Memory of a virtual stage.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct VirtualState {
-    /// Plays.
-    pub play: PlayState<f64, PLAYS>,
-    /// Creep and mode, with the displacement.
-    pub relaxation: RelaxationState,
+    /// What is moved.
+    pub stage: Stage,
+    /// Amplifier between command and stage.
+    pub amplifier: Amplifier,
+    /// Sensor, with the seed of its noise.
+    pub sensor: Sensor,
+    /// What comes before an experiment; without it the stage has never moved.
+    pub preconditioning: Option<Preconditioning>,
+    /// Longest step of the simulation, s.
+    pub step: f64,
 }
 
 /// Cycles of the preconditioning: after 32 s a creep of 10 s has settled to 4 %.
@@ -100,13 +66,42 @@ const CYCLES: u32 = 8;
 /// Their frequency, Hz: the one at which Xu and Li 2010 identify their stage.
 const CYCLE_FREQUENCY: f64 = 0.25;
 
-/// Steps of the preconditioning, s: the drive is slow, and each step is exact for a ramp.
+/// Steps of the preconditioning of plays at the input, s: each is exact for a ramp.
 const CYCLE_STEP: f64 = 1e-3;
 
 /// Longest rest before an experiment, s: an hour.
 const LONGEST_REST: f64 = 3600.0;
 
-impl VirtualSettings {
+/// Most steps of a rest: nothing moves but the creep, which is exact in a step of any length.
+const REST_STEPS: f64 = 1e6;
+
+/// Plays of the published stage.
+const PLAYS: u8 = 10;
+
+impl Preconditioning {
+    fn validate(&self) -> Result<()> {
+        positive("swing", self.swing, "V")?;
+        if not_negative("rest", self.rest, "s")? > LONGEST_REST {
+            let most = format!("{LONGEST_REST} s at most");
+            return Err(Error::parameter("rest", format!("{} s", self.rest), most));
+        }
+        Ok(())
+    }
+}
+
+impl VirtualStage {
+    /// A stage with nothing around it; `step` is the longest step of the simulation, s.
+    #[must_use]
+    pub fn bare(stage: Stage, step: f64) -> Self {
+        Self {
+            stage,
+            amplifier: Amplifier::IDEAL,
+            sensor: Sensor::IDEAL,
+            preconditioning: None,
+            step,
+        }
+    }
+
     /// Xu and Li 2010, doi 10.1115/1.4001712, as far as published; the rest is chosen.
     ///
     /// Published: 75 V end at 117.7622 um, in a mode of 160 Hz with zeta = 0.065; the sensor's
@@ -152,182 +147,64 @@ impl VirtualSettings {
 
     /// With `share` of hysteresis, reaching `end` m at 75 V.
     fn like_xu_li_2010(share: f64, end: f64, seed: u64) -> Self {
-        let play = spread_plays(share, 75.0);
-        let mut settings = Self {
+        let mut creep = [Creep { share: 0.0, time: 1.0 }; MOST_RELAXATIONS];
+        for (one, time) in creep.iter_mut().zip([0.1, 1.0, 10.0]) {
+            *one = Creep { share: 0.004, time };
+        }
+        let dynamics = Dynamics::Second { frequency: 160.0, damping_ratio: 0.065 };
+        let relaxation = Relaxation { creep, count: 3, dynamics };
+        // The gain that takes a settled stage to the published end of the 75 V step, of which
+        // the creep of the first tenths of a second is taken to be a part.
+        let unity = InputStage { operator: spread_plays(share, 75.0, 1.0), relaxation };
+        let top = |volts: &[f64]| unity.settled_at(volts).relaxation.input;
+        let travel = top(&[75.0, 0.0, 75.0]) - top(&[75.0, 0.0]);
+        let gain = end / (travel * (1.0 + creep[0].share));
+        let operator = spread_plays(share, 75.0, gain);
+        Self {
+            stage: Stage::PrandtlIshlinskii(InputStage { operator, relaxation }),
             amplifier: Amplifier { bandwidth: 225.0, slew: 1e5, low: 0.0, high: 75.0 },
-            play,
-            gain: 1.0,
-            creep: [0.1, 1.0, 10.0].map(|time| Creep { share: 0.004, time }),
-            frequency: 160.0,
-            damping_ratio: 0.065,
             sensor: Sensor {
                 noise: 0.0964e-6,
                 bandwidth: 200.0,
                 resolution: 2.5e-3 / 65536.0,
                 range: 1.25e-3,
                 seed,
+                ..Sensor::IDEAL
             },
-            preconditioned: true,
-            swing: 75.0,
-            rest: 0.0,
+            preconditioning: Some(Preconditioning { swing: 75.0, rest: 0.0 }),
             step: 2e-5,
-        };
-        // The gain that takes a settled stage to the published end of the 75 V step, of which
-        // the creep of the first tenths of a second is taken to be a part.
-        let travel = travel(&play, 75.0);
-        settings.gain = end / (travel * (1.0 + settings.creep[0].share));
-        settings
+        }
     }
 
-    /// Checks every number.
+    /// Checks every number around the stage.
     ///
     /// # Errors
-    /// [`Error::Parameter`] naming the setting, its value and unit.
+    /// [`Error::Parameter`] naming the number that is out of its range.
     pub fn validate(&self) -> Result<()> {
-        self.amplifier.validate()?;
-        self.sensor.validate()?;
-        self.validate_play()?;
-        for (j, creep) in self.creep.iter().enumerate() {
-            not_negative(&format!("creep_weights[{j}]"), creep.share, "")?;
-            positive(&format!("creep_times[{j}]"), creep.time, "s")?;
-        }
-        positive("gain", self.gain, "m/V")?;
-        positive("frequency", self.frequency, "Hz")?;
-        not_negative("damping_ratio", self.damping_ratio, "")?;
-        positive("swing", self.swing, "V")?;
-        if not_negative("rest", self.rest, "s")? > LONGEST_REST {
-            let most = format!("{LONGEST_REST} s at most");
-            return Err(Error::parameter("rest", format!("{} s", self.rest), most));
-        }
-        positive("step", self.step, "s")?;
-        Ok(())
-    }
-
-    fn validate_play(&self) -> Result<()> {
-        let play = &self.play;
-        positive("linear", play.linear, "")?;
-        for i in 0..PLAYS {
-            not_negative(&format!("thresholds[{i}]"), play.thresholds[i], "V")?;
-            not_negative(&format!("weights[{i}]"), play.weights[i], "")?;
-        }
-        let mut slope = 1.0;
-        let mut before = 0.0;
-        for j in 0..DEAD_ZONES {
-            let corner = not_negative(
-                &format!("dead_zone_thresholds[{j}]"),
-                play.dead_zone_thresholds[j],
-                "V",
-            )?;
-            if corner < before {
-                let expected = format!("{before} V or above: dead_zone_thresholds ascend");
-                return Err(Error::parameter(
-                    format!("dead_zone_thresholds[{j}]"),
-                    format!("{corner} V"),
-                    expected,
-                ));
-            }
-            before = corner;
-            slope += finite(&format!("dead_zone_weights[{j}]"), play.dead_zone_weights[j], "")?;
-            if slope <= 0.0 {
-                let expected =
-                    "dead_zone_weights whose sums stay above -1, or the curve turns back";
-                return Err(Error::parameter(
-                    format!("dead_zone_weights[{j}]"),
-                    play.dead_zone_weights[j],
-                    expected,
-                ));
-            }
-        }
-        Ok(())
-    }
-}
-
-/// What a settled hysteresis passes of a swing from 0 V, V.
-fn travel(play: &StagePlay, swing: f64) -> f64 {
-    let mut state = play.rest();
-    for volts in [swing, 0.0] {
-        play.follow(&mut state, volts);
-    }
-    -play.output(&state).0 + play.follow(&mut state, swing)
-}
-
-/// Plays of equal weight with thresholds spread evenly, and dead zones at a third and at two.
-///
-/// Before the dead zones the widest loop of a full swing from 0 to `swing`, V, is `share` of
-/// the travel, and the mean slope is 1: equal weights of sum W make a loop `W / 4` wide, and
-/// let half of W pass over the swing.
-fn spread_plays(share: f64, swing: f64) -> StagePlay {
-    let sum = 4.0 * share;
-    let count = f64::from(u32::try_from(PLAYS).unwrap_or(1));
-    let mut thresholds = [0.0; PLAYS];
-    let mut place = 0.5;
-    for threshold in &mut thresholds {
-        *threshold = 0.5 * swing * place / count;
-        place += 1.0;
-    }
-    StagePlay {
-        linear: 1.0 - 0.5 * sum,
-        thresholds,
-        weights: [sum / count; PLAYS],
-        dead_zone_thresholds: [swing / 3.0, 2.0 * swing / 3.0],
-        dead_zone_weights: [0.05, 0.05],
-    }
-}
-
-impl VirtualStage {
-    /// Checks the settings.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] naming the setting that is out of its range.
-    pub fn new(settings: &VirtualSettings) -> Result<Self> {
-        settings.validate()?;
-        Ok(Self::built(settings))
-    }
-
-    /// A stage like the one of Xu and Li 2010: see [`VirtualSettings::xu_li_2010`].
-    #[must_use]
-    pub fn xu_li_2010(seed: u64) -> Self {
-        Self::built(&VirtualSettings::xu_li_2010(seed))
-    }
-
-    /// The other axis of that stage: see [`VirtualSettings::xu_li_2010_y`].
-    #[must_use]
-    pub fn xu_li_2010_y(seed: u64) -> Self {
-        Self::built(&VirtualSettings::xu_li_2010_y(seed))
-    }
-
-    fn built(settings: &VirtualSettings) -> Self {
-        let VirtualSettings { frequency, damping_ratio, .. } = *settings;
-        let mut creep = [Creep { share: 0.0, time: 1.0 }; MOST_RELAXATIONS];
-        creep[..RELAXATIONS].copy_from_slice(&settings.creep);
-        let dynamics = Dynamics::Second { frequency, damping_ratio };
-        let relaxation = Relaxation { creep, count: RELAXATIONS, dynamics };
-        Self { settings: *settings, relaxation }
-    }
-
-    /// The settings.
-    #[must_use]
-    pub fn settings(&self) -> &VirtualSettings {
-        &self.settings
+        self.apparatus().validate()?;
+        self.preconditioning.map_or(Ok(()), |before| before.validate())
     }
 
     /// The stage between its amplifier and its sensor.
     #[must_use]
-    pub fn apparatus(&self) -> Apparatus<'_, Self> {
-        let VirtualSettings { amplifier, sensor, step, .. } = self.settings;
-        Apparatus { plant: self, amplifier, sensor, step }
+    pub fn apparatus(&self) -> Apparatus<'_, Stage> {
+        let Self { stage, amplifier, sensor, step, .. } = self;
+        Apparatus { plant: stage, amplifier: *amplifier, sensor: *sensor, step: *step }
     }
 
-    /// Gains for small motions, m/V: just after a reversal, the mean over the swing of a settled
-    /// stage, and where all plays move.
-    #[must_use]
-    pub fn gains(&self) -> [f64; 3] {
-        let VirtualSettings { play, gain, swing, .. } = &self.settings;
-        let moving: f64 = play.weights.iter().sum();
-        let dead_zone_weights: f64 = play.dead_zone_weights.iter().sum();
-        let mean = travel(play, *swing) / swing;
-        [play.linear, mean, (play.linear + moving) * (1.0 + dead_zone_weights)]
-            .map(|slope| slope * gain)
+    /// The stage with its amplifier for small motions between two voltages: least, middle and
+    /// largest gain.
+    ///
+    /// # Errors
+    /// Those of [`Stage::loop_plants`].
+    pub fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
+        let plants = self.stage.loop_plants(low, high)?;
+        let Amplifier { bandwidth, .. } = self.amplifier;
+        let [least, middle, largest] = plants.map(|plant| {
+            let plant = plant.with_delay(self.sensor.delay)?;
+            if bandwidth.is_finite() { plant.with_amplifier(bandwidth) } else { Ok(plant) }
+        });
+        Ok([least?, middle?, largest?])
     }
 
     /// Where an experiment starts: preconditioned and zeroed as the settings say.
@@ -335,15 +212,24 @@ impl VirtualStage {
     /// The amplifier has no part in the preconditioning, which is slow: it brings the memory to
     /// where it would be.
     #[must_use]
-    pub fn start(&self) -> ApparatusState<VirtualState> {
+    pub fn start(&self) -> ApparatusState<StageState> {
         let apparatus = self.apparatus();
         let mut state = apparatus.rest();
-        if self.settings.preconditioned {
-            self.cycle(&mut state.plant);
-            self.wait(&mut state.plant);
-            apparatus.sensor.set_zero(&mut state.sensor, state.plant.relaxation.x);
+        if let Some(Preconditioning { swing, rest }) = self.preconditioning {
+            self.cycle(&mut state.plant, swing);
+            self.wait(&mut state.plant, rest);
+            apparatus.sensor.set_zero(&mut state.sensor, self.stage.displacement(&state.plant));
         }
         state
+    }
+
+    /// Where an experiment starts after slow visits to voltages, in turn, with a rest at the last;
+    /// without any as [`Self::start`].
+    #[must_use]
+    pub fn start_after(&self, voltages: &[f64]) -> ApparatusState<StageState> {
+        let Some(&volts) = voltages.last() else { return self.start() };
+        let plant = self.stage.settled(voltages);
+        ApparatusState { plant, command: volts, applied: volts, ..self.apparatus().rest() }
     }
 
     /// Drives the stage from its start: true and measured displacement, for a log.
@@ -356,60 +242,67 @@ impl VirtualStage {
         &self,
         drive: &Drive<'_>,
         stop: Stop<'_>,
-    ) -> Result<Option<OpenLoop<VirtualState>>> {
+    ) -> Result<Option<OpenLoop<StageState>>> {
         open_loop(&self.apparatus(), self.start(), drive, stop)
     }
 
+    /// Whether its steps are exact under a ramp, however long they are.
+    fn has_plays(&self) -> bool {
+        self.stage.model().found_by() == FoundBy::LeastSquares
+    }
+
     /// Full cycles between 0 V and the swing, each `(1 - cos) / 2`.
-    fn cycle(&self, state: &mut VirtualState) {
-        let flow = self.flow(CYCLE_STEP);
-        let turn = CYCLE_FREQUENCY * CYCLE_STEP;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "32000")]
+    fn cycle(&self, state: &mut StageState, swing: f64) {
+        let step = if self.has_plays() { CYCLE_STEP } else { self.step.min(CYCLE_STEP) };
+        let flow = self.stage.flow(step);
+        let turn = CYCLE_FREQUENCY * step;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
         let steps = (f64::from(CYCLES) / turn).round() as u32;
         let mut before = 0.0;
         for k in 1..=steps {
             let phase = (f64::from(k) * turn).fract();
-            let after =
-                0.5 * self.settings.swing * (1.0 - libm::cos(core::f64::consts::TAU * phase));
-            self.advance(&flow, state, before, after);
+            let after = 0.5 * swing * (1.0 - libm::cos(core::f64::consts::TAU * phase));
+            self.stage.advance(&flow, state, before, after);
             before = after;
         }
     }
 
-    /// Rest at 0 V, in one exact step: nothing moves the plays.
-    fn wait(&self, state: &mut VirtualState) {
-        if self.settings.rest > 0.0 {
-            self.advance(&self.flow(self.settings.rest), state, 0.0, 0.0);
+    /// Rest at 0 V; of plays at the input in one exact step.
+    fn wait(&self, state: &mut StageState, rest: f64) {
+        if rest <= 0.0 {
+            return;
+        }
+        let steps = (rest / self.step).ceil().clamp(1.0, REST_STEPS);
+        let steps = if self.has_plays() { 1.0 } else { steps };
+        let flow = self.stage.flow(rest / steps);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 1e6")]
+        for _ in 0..steps as u32 {
+            self.stage.advance(&flow, state, 0.0, 0.0);
         }
     }
 }
 
-impl Plant for VirtualStage {
-    type State = VirtualState;
-    type Flow = RelaxationFlow;
-
-    fn rest(&self) -> VirtualState {
-        let relaxation = RelaxationState::default();
-        VirtualState { play: self.settings.play.rest(), relaxation }
+/// Plays of equal weight with thresholds spread evenly, and dead zones at a third and at two.
+///
+/// Before the dead zones the widest loop of a full swing from 0 to `swing`, V, is `share` of
+/// the travel, and the mean slope is `gain`, m/V: equal weights of sum W make a loop `W / 4` wide,
+/// and let half of W pass over the swing.
+fn spread_plays(share: f64, swing: f64, gain: f64) -> PlayHysteresis {
+    let sum = 4.0 * share;
+    let count = f64::from(PLAYS);
+    let mut plays = Plays {
+        linear: gain * (1.0 - 0.5 * sum),
+        thresholds: [0.5 * swing * (count - 0.5) / count; MOST_PLAYS],
+        weights: [0.0; MOST_PLAYS],
+        dead_zone_thresholds: [gain * 2.0 * swing / 3.0; MOST_ZONES],
+        dead_zone_weights: [0.0; MOST_ZONES],
+    };
+    for i in 0..PLAYS {
+        let place = usize::from(i);
+        plays.thresholds[place] = 0.5 * swing * (f64::from(i) + 0.5) / count;
+        plays.weights[place] = gain * sum / count;
     }
-
-    fn flow(&self, step: f64) -> RelaxationFlow {
-        self.relaxation.flow(step)
-    }
-
-    #[inline(always)]
-    fn advance(&self, flow: &RelaxationFlow, state: &mut VirtualState, from: f64, to: f64) {
-        let Self { settings: VirtualSettings { play, gain, .. }, relaxation } = self;
-        if (from - state.play.input).abs() > 0.0 {
-            // The voltage has jumped, and with it the immediate part of the displacement.
-            relaxation.jump(&mut state.relaxation, gain * play.follow(&mut state.play, from));
-        }
-        let input = gain * play.follow(&mut state.play, to);
-        relaxation.step(flow, &mut state.relaxation, input);
-    }
-
-    #[inline(always)]
-    fn displacement(&self, state: &VirtualState) -> f64 {
-        state.relaxation.x
-    }
+    plays.dead_zone_thresholds[0] = gain * swing / 3.0;
+    plays.dead_zone_weights[..2].copy_from_slice(&[0.05, 0.05]);
+    PlayHysteresis { plays, count: usize::from(PLAYS), zones: 2 }
 }

@@ -1,0 +1,23 @@
+"""Figures that a notebook shows once."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
+
+__all__ = ["Picture"]
+
+
+class Picture(Figure):
+    """A figure of pyplot that is shown once where it is the last line of a notebook's cell.
+
+    The notebook shows the value of the last line, and then the inline backend all open figures:
+    without this the same figure twice.
+    """
+
+    def _ipython_display_(self) -> None:
+        if "inline" in mpl.get_backend():
+            plt.close(self)
+        # It is shown as any other figure.
+        raise NotImplementedError

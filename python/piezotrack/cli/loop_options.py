@@ -1,0 +1,209 @@
+"""Options of the loop that ``track`` and ``contour`` share, and their defaults from a model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..errors import ParameterError
+from .options import number_range, refuse_without_effect
+
+if TYPE_CHECKING:
+    from ..control.components import Pid, Repetitive
+    from ..identification.identified import IdentifiedModel
+    from ..references.reference import Reference
+
+__all__ = [
+    "MODEL",
+    "PAPER",
+    "AmplifierBandwidth",
+    "Feedback",
+    "Feedforward",
+    "Interval",
+    "Kp",
+    "Limits",
+    "Loop",
+    "LoopDelay",
+    "Noise",
+    "StageName",
+    "Td",
+    "Ti",
+    "refuse_of_other_stage",
+]
+
+# Names of the stages that can be simulated: the model itself, and that of the paper.
+MODEL, PAPER = "model", "xu-li-2010"
+# The loop of Xu and Li 2010: sampling interval in s, limits in V, gains in V/um and s.
+PAPER_DT, PAPER_LIMITS = 0.02, (0.0, 75.0)
+PAPER_KQ, PAPER_TQ = 1.0, 0.2
+PAPER_GAINS = {"kp": 0.120, "ti": 0.009, "td": 0.044}
+
+StageName = Annotated[
+    str | None,
+    typer.Option(
+        metavar=f"{MODEL}|{PAPER}",
+        help=f"Stage to simulate: the model itself ({MODEL}), or the virtual stage of the paper "
+        f"({PAPER}). Default {MODEL}.",
+        show_default=False,
+    ),
+]
+Interval = Annotated[
+    float | None,
+    typer.Option(
+        help="Sampling interval of the controller in s; default that of a reference file, or of "
+        f"the record identified, of {PAPER} 0.02.",
+        show_default=False,
+    ),
+]
+Limits = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LOW:HIGH",
+        help="Voltage limits of the amplifier in V; default the drive range of the record "
+        f"identified, of {PAPER} 0:75.",
+        show_default=False,
+    ),
+]
+Feedforward = Annotated[bool, typer.Option(help="Feedforward by the inverse of the model.")]
+Feedback = Annotated[
+    bool | None,
+    typer.Option(
+        help=f"PID feedback; default where --kp is given, and on {PAPER}.", show_default=False
+    ),
+]
+Kp = Annotated[
+    float | None,
+    typer.Option(
+        help=f"Proportional gain of the PID in V/um; on {PAPER} 0.12.", show_default=False
+    ),
+]
+Ti = Annotated[
+    float | None,
+    typer.Option(help=f"Integral time of the PID in s; on {PAPER} 0.009.", show_default=False),
+]
+Td = Annotated[
+    float | None,
+    typer.Option(
+        help=f"Derivative time of the PID in s; default 0, on {PAPER} 0.044.", show_default=False
+    ),
+]
+LoopDelay = Annotated[float, typer.Option(help="Delay in the loop in s, in addition to the hold.")]
+Noise = Annotated[
+    float, typer.Option("--noise-nm", help="Noise of the simulated sensor in nm rms.")
+]
+AmplifierBandwidth = Annotated[
+    float, typer.Option("--bandwidth", help="Bandwidth of the simulated amplifier in Hz.")
+]
+
+
+@dataclass(frozen=True)
+class Loop:
+    """The loop as the options describe it, on one's own stage or on that of the paper.
+
+    Attributes
+    ----------
+    own : bool
+        Whether the model itself is simulated.
+    interval, limits : float, str or None
+        Options ``--dt`` and ``--limits``.
+    feedback : bool or None
+        Option ``--feedback`` or ``--no-feedback``.
+    kp, ti, td, tt : float or None
+        Gains of the PID.
+    """
+
+    own: bool
+    interval: float | None
+    limits: str | None
+    feedback: bool | None
+    kp: float | None
+    ti: float | None
+    td: float | None
+    tt: float | None = None
+
+    def check(self, context: typer.Context) -> None:
+        """Refuse gains of a feedback that is left out."""
+        if not self.has_feedback:
+            gains = [name for name in ("kp", "ti", "td", "tt") if name in context.params]
+            reason = "with --no-feedback" if self.feedback is False else "without --kp"
+            refuse_without_effect(context, gains, reason)
+
+    @property
+    def has_feedback(self) -> bool:
+        """Whether there is feedback: on one's own stage where a gain is given."""
+        if self.feedback is None:
+            return not self.own or self.kp is not None
+        return self.feedback
+
+    def pid(self) -> Pid | None:
+        """Make the feedback; the paper's gains are for its own stage only."""
+        from ..control.components import Pid
+
+        if not self.has_feedback:
+            return None
+        if not self.own:
+            given = {"kp": self.kp, "ti": self.ti, "td": self.td}
+            gains = {key: PAPER_GAINS[key] if one is None else one for key, one in given.items()}
+            return Pid.from_um(**gains, tt=self.tt)
+        if self.kp is None or self.ti is None:
+            missing = "--kp" if self.kp is None else "--ti"
+            raise ParameterError(
+                f"{missing} is missing: expected --kp in V/um and --ti in s for feedback on this "
+                "stage, or --no-feedback"
+            )
+        return Pid.from_um(kp=self.kp, ti=self.ti, td=self.td or 0.0, tt=self.tt)
+
+    def dt(self, model: IdentifiedModel | None, reference: Reference | None) -> float:
+        """Return the sampling interval: as given, of the reference's file, or of the record [s]."""
+        if not self.own:
+            return PAPER_DT if self.interval is None else self.interval
+        of_file = None if reference is None else reference.interval
+        of_model = None if model is None else model.dt
+        for known in (self.interval, of_file, of_model):
+            if known is not None:
+                return known
+        raise _missing("--dt", "the sampling interval in s")
+
+    def volts(self, model: IdentifiedModel | None) -> tuple[float, float]:
+        """Return the voltage limits: as given, or the range of the model's record [V]."""
+        if self.limits is not None:
+            return number_range("--limits", self.limits)
+        known = model.drive_range if self.own and model else PAPER_LIMITS
+        if known is None:
+            raise _missing("--limits", "the voltage limits as LOW:HIGH in V")
+        return known
+
+    def repetitive(
+        self, model: IdentifiedModel, reference: Reference, kq: float | None, tq: float | None
+    ) -> Repetitive:
+        """Make the repetitive part; on one's own stage half of an error is learnt in a period."""
+        from ..control.components import Repetitive
+        from ..control.plant import linearised_plants, plant_of
+
+        period = reference.period
+        if period is None:
+            raise ParameterError(f"--repetitive: the reference ({reference.name}) does not repeat")
+        if kq is None and self.own:
+            _, middle, _ = linearised_plants(plant_of(model), self.volts(model), 0.0)
+            kq = 0.5e-6 / middle.static_gain
+        return Repetitive.from_um(
+            period=period,
+            kq=PAPER_KQ if kq is None else kq,
+            tq=(period / 25.0 if self.own else PAPER_TQ) if tq is None else tq,
+        )
+
+
+def _missing(option: str, expected: str) -> ParameterError:
+    return ParameterError(
+        f"{option} is missing, and the model file has no record: expected {expected}"
+    )
+
+
+def refuse_of_other_stage(context: typer.Context, own: bool) -> None:
+    """Refuse options of the stage that is not simulated."""
+    if not own:
+        refuse_without_effect(
+            context, ["noise_nm", "bandwidth"], f"with --stage {PAPER}, which has its own"
+        )

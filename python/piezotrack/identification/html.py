@@ -1,0 +1,74 @@
+"""A fit and a comparison as tables, as a notebook shows them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from .._support.html_table import html_table
+
+if TYPE_CHECKING:
+    from .comparison import Comparison
+    from .estimates import Estimate
+    from .result import Identification
+
+__all__ = ["comparison_html", "identification_html"]
+
+
+def identification_html(fit: Identification) -> str:
+    """Write model, record, errors, parameters and warnings of a fit."""
+    score = fit.fitted
+    rows = [
+        ("record", f"{fit.data.source or 'unnamed'}: {fit.data!r}"),
+        ("model", repr(fit.model)),
+        ("rms error", f"{fit.cost_um:.4g} um, {fit.cost_percent:.3g} % of stroke"),
+        ("largest error", f"{1e6 * score.max_error:.4g} um"),
+        ("offset", f"{1e6 * fit.offset:.4g} um"),
+    ]
+    if fit.delay:
+        rows.append(("delay", f"{1e3 * fit.delay:.4g} ms"))
+    rows += [("note", note) for note in fit.notes]
+    tables = [html_table(f"Identification: {fit.model.info.title}", rows)]
+    if fit.parameters:
+        found = [_estimate(name, one) for name, one in fit.parameters.items()]
+        heads = ("parameter", "symbol", "value", "unit", "standard deviation")
+        tables.append(html_table("Parameters", found, heads))
+    return "".join(tables)
+
+
+def _estimate(name: str, one: Estimate) -> tuple[str, ...]:
+    if not one.free:
+        deviation = "held"
+    elif one.deviation is None:
+        deviation = "unknown"
+    else:
+        deviation = f"{one.deviation:.2g}" if math.isfinite(one.deviation) else "no effect"
+    if one.at_bound:
+        deviation += ", on a bound"
+    return name, one.symbol, f"{one.value:.6g}", one.unit, deviation
+
+
+def comparison_html(comparison: Comparison) -> str:
+    """Write the errors of each model; the best on what was not fitted in bold."""
+    rows = [
+        (
+            row.title,
+            *(
+                cell
+                for score in (row.train, row.test)
+                for cell in (
+                    f"{1e6 * score.rms:.4g}",
+                    f"{score.rms_percent:.3g}",
+                    f"{1e6 * score.max_error:.4g}",
+                )
+            ),
+        )
+        for row in comparison.rows
+    ]
+    heads = (
+        "model",
+        *(f"{part}: {what}" for part in ("fitted", "not fitted")
+          for what in ("rms [um]", "rms [% of stroke]", "largest [um]")),
+    )  # fmt: skip
+    best = comparison.rows.index(comparison.best)
+    return html_table("Comparison", rows, heads, bold=best)
