@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -99,6 +100,7 @@ def test_no_volt_is_spoken_of(kind: str) -> None:
     fit = pt.identify(height(), kind, seed=1, runs=1)
     words = [fit.summary(), *fit.beyond_fit(3.0 * height().u, 1e-4)]
     assert len(words) == 3
+    assert height().plot().axes[0].get_ylabel() == "drive [um]"
     axes = plot_loop(height(), fit.simulate(height()))
     words += [axes.get_xlabel()]
     assert axes.get_xlabel() == "drive [um]"
@@ -138,6 +140,15 @@ def test_the_commands_take_it() -> None:
     back = pt.read("results/simulated.csv")
     assert np.allclose(back.u, height().u, atol=1e-14)
     assert np.allclose(back.y, height().y, atol=20e-9)
+    model = "results/prandtl-ishlinskii.json"
+    printed = ran("feedforward", model, "sine:1Hz,5..40um", "--dt", "0.002")
+    assert " V" not in printed
+    assert re.search(r"samples, drive from [\d.]+ to [\d.]+ um\n", printed)
+    drive = pt.read("results/feedforward.csv")
+    # What the piezo is asked for brings about what was wanted.
+    assert np.ptp(pt.load(model).simulate(drive).x[500:]) == pytest.approx(35e-6, rel=0.01)
+    said = refusal("track", model, "--reference", "sine:1Hz,5..40um")
+    assert said.startswith("prandtl-ishlinskii.json: the drive of this model is a position")
     Path("volts.csv").write_text("time_s,voltage_V\n0,0\n1,1\n2,0\n3,1\n", encoding="utf-8")
     said = refusal("simulate", "results/prandtl-ishlinskii.json", "volts.csv")
     assert said.startswith("volts.csv: the drive is in V: expected um")
