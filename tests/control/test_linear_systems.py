@@ -28,12 +28,13 @@ def test_the_loop_of_both_systems_is_the_one_simulated(delay: float, dynamics: s
     bandwidth = 200.0 if dynamics == "mode" else np.inf
     stage = pt.VirtualStage.of(model, delay=delay, bandwidth=bandwidth)
     law = replace(PID, kp=0.5 * PID.kp) if dynamics == "none" else PID
-    # From 0 on: the feedback simulated does not see the jump of a reference before its first sample.
+    # From 0 on: the feedback simulated sees no jump at its first sample.
     run = pt.track(stage, loop(dt=DT, limits=(-90.0, 90.0), feedback=law), sine(0.5, 4.0))
     plant = pt.to_control(stage, limits=(0.0, 75.0), dt=DT)
     whole = control.feedback(pt.to_control(law, dt=DT) * plant, 1)
     found = np.asarray(control.forced_response(whole, U=run.desired).outputs)
-    assert np.abs(found - run.measured).max() < 1e-12
+    # The amplifier is simulated in steps.
+    assert np.abs(found - run.measured).max() < 1e-10
 
 
 def test_gains_are_those_of_the_check() -> None:
@@ -104,8 +105,8 @@ def test_a_controller_of_a_model_has_its_range_and_its_interval() -> None:
     assert one.feedback is PID
     assert one.feedforward is not None
     assert one.feedforward.offset == fit.offset
-    other = pt.Controller.of(fit, dt=0.01, limits=(0.0, 2.0), feedforward=None)
-    assert (other.dt, other.limits, other.feedforward) == (0.01, (0.0, 2.0), None)
+    other = pt.Controller.of(fit, dt=0.01, limits=(0.0, 2.0))
+    assert (other.dt, other.limits) == (0.01, (0.0, 2.0))
     bare = replace(fit, details={})
     with pytest.raises(pt.ParameterError, match=r"dt is not in the file of this model"):
         pt.Controller.of(bare)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 PARTS = ("stage", "amplifier", "sensor")
 
 
-def changed(stage: pt.VirtualStage, **changes: Any) -> pt.VirtualStage:
+def changed(stage: pt.VirtualStage, /, **changes: Any) -> pt.VirtualStage:
     """Change numbers of the stage's parts, or parts as a whole."""
     own = {one.name for one in fields(stage)}
     parts = {name: value for name, value in changes.items() if name in own}

@@ -13,6 +13,7 @@ from ..errors import DataError, ParameterError
 from .error_messages import in_words
 from .loop_options import (
     MODEL,
+    NO_FEEDBACK,
     PAPER,
     AmplifierBandwidth,
     Feedback,
@@ -26,6 +27,7 @@ from .loop_options import (
     StageName,
     Td,
     Ti,
+    check_stage,
     refuse_of_other_stage,
 )
 from .options import (
@@ -155,14 +157,13 @@ def contour_command(
     between = f"y lags by {plant.lag:g} s, {shares[0]} of y in x, {shares[1]} of x in y"
     lines = [f"stage: {xy.name}: {between}; {how}", words]
     if own and not loop.has_feedback:
-        lines.append("no feedback: give --kp in V/um and --ti in s for a PID controller")
+        lines.append(NO_FEEDBACK)
     result.show("\n".join(lines), document | {"stage": MODEL if own else PAPER}, written)
 
 
 def _is_own(stage: str | None, models: list[Path] | None, table_2: bool) -> bool:
     """Whether the models themselves are simulated."""
-    if stage not in (None, MODEL, PAPER):
-        raise ParameterError(f"--stage is '{stage}': expected {MODEL} or {PAPER}")
+    check_stage(stage)
     if stage == MODEL and (not models or table_2):
         reason = "with --table-2" if table_2 else "without a model file"
         raise ParameterError(f"--stage is {MODEL} {reason}: expected {PAPER}")

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "MODEL",
+    "NO_FEEDBACK",
     "PAPER",
     "AmplifierBandwidth",
     "Feedback",
@@ -32,12 +33,14 @@ __all__ = [
     "StageName",
     "Td",
     "Ti",
+    "check_stage",
     "driven_by_voltage",
     "refuse_of_other_stage",
 ]
 
 # Names of the stages that can be simulated: the model itself, and that of the paper.
 MODEL, PAPER = "model", "xu-li-2010"
+NO_FEEDBACK = "no feedback: give --kp in V/um and --ti in s for a PID controller"
 # The loop of Xu and Li 2010: sampling interval in s, limits in V, gains in V/um and s.
 PAPER_DT, PAPER_LIMITS = 0.02, (0.0, 75.0)
 PAPER_KQ, PAPER_TQ = 1.0, 0.2
@@ -212,6 +215,12 @@ def _missing(option: str, expected: str) -> ParameterError:
     return ParameterError(
         f"{option} is missing, and the model file has no record: expected {expected}"
     )
+
+
+def check_stage(stage: str | None) -> None:
+    """Refuse a stage of another name."""
+    if stage not in (None, MODEL, PAPER):
+        raise ParameterError(f"--stage is '{stage}': expected {MODEL} or {PAPER}")
 
 
 def refuse_of_other_stage(context: typer.Context, own: bool) -> None:

@@ -13,6 +13,7 @@ from ..errors import ParameterError
 from .error_messages import in_words
 from .loop_options import (
     MODEL,
+    NO_FEEDBACK,
     PAPER,
     AmplifierBandwidth,
     Feedback,
@@ -26,6 +27,7 @@ from .loop_options import (
     StageName,
     Td,
     Ti,
+    check_stage,
     driven_by_voltage,
     refuse_of_other_stage,
 )
@@ -131,7 +133,8 @@ def track_command(
     from ..identification.identified import load
     from ..stages.virtual import VirtualStage
 
-    own = _is_own(stage)
+    check_stage(stage)
+    own = stage != PAPER
     settings = Loop(own, dt, limits, feedback, kp, ti, td, tt)
     settings.check(context)
     refuse_of_other_stage(context, own)
@@ -166,16 +169,9 @@ def track_command(
     if loop.feedback is not None or loop.repetitive is not None:
         lines.append(f"loop at {check_loop(plant, loop, delay=delay).middle}")
     elif own:
-        lines.append("no feedback: give --kp in V/um and --ti in s for a PID controller")
+        lines.append(NO_FEEDBACK)
     document = _document(run, known, loop, notes) | {"stage": MODEL if own else PAPER}
     result.show("\n".join(lines), document, _write(run, document, out))
-
-
-def _is_own(stage: str | None) -> bool:
-    """Whether the model itself is simulated."""
-    if stage not in (None, MODEL, PAPER):
-        raise ParameterError(f"--stage is '{stage}': expected {MODEL} or {PAPER}")
-    return stage != PAPER
 
 
 @in_words

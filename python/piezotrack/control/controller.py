@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from .. import _core
 from .._support.arguments import TOO_FAR, finite
@@ -116,7 +116,11 @@ class Controller:
         dt: float | None = None,
         limits: tuple[float, float] | None = None,
         playback: Literal["table", "online"] = "table",
-        **parts: Any,
+        feedback: Pid | StateSpace | None = None,
+        repetitive: Repetitive | None = None,
+        filters: Sequence[LowPass | Notch] = (),
+        span: tuple[float, float] | None = None,
+        max_jump: float | None = None,
     ) -> Controller:
         """Make a controller with the feedforward of an identified model, for its stage.
 
@@ -130,9 +134,8 @@ class Controller:
             Lowest and highest voltage [V]; default the range of the drive of that record.
         playback : {"table", "online"}, optional
             As in `Inverse`.
-        **parts
-            Other parameters of the class: `feedback`, `repetitive`, `filters`, `span`, `max_jump`,
-            or another `feedforward`.
+        feedback, repetitive, filters, span, max_jump : optional
+            As in the class.
 
         Returns
         -------
@@ -150,20 +153,22 @@ class Controller:
         >>> fit = pt.identify(pt.datasets.dbo_training()[3.0:23.0], "prandtl-ishlinskii")
         >>> loop = pt.Controller.of(fit)
         >>> loop.dt, loop.limits
-        (0.005, (0.0, 3.600098))
+        (0.005, (0.0, 3.6))
         """
         if not isinstance(model, IdentifiedModel):
             raise ParameterError(
                 f"model is {type(model).__name__}: expected what pt.identify or pt.load returns"
             )
-        known = {"dt": model.dt, "limits": model.drive_range}
-        given = {"dt": dt, "limits": limits}
-        settings = {name: known[name] if one is None else one for name, one in given.items()}
-        for name, value in settings.items():
-            if value is None:
-                raise ParameterError(f"{name} is not in the file of this model: expected {name}=")
-        feedforward = {"feedforward": model.inverse(playback=playback)}
-        return cls(**{**settings, **feedforward, **parts})
+        return cls(
+            dt=_of_record("dt", dt, model.dt),
+            limits=_of_record("limits", limits, model.drive_range),
+            feedforward=model.inverse(playback=playback),
+            feedback=feedback,
+            repetitive=repetitive,
+            filters=filters,
+            span=span,
+            max_jump=max_jump,
+        )
 
     def __repr__(self) -> str:
         return controller_text(self)
@@ -203,6 +208,18 @@ class Controller:
             To be stepped once in each sampling interval.
         """
         return Session(self, present)
+
+
+T = TypeVar("T")
+
+
+def _of_record(name: str, given: T | None, known: T | None) -> T:
+    """Take what is given, or what the record of a model has."""
+    if given is not None:
+        return given
+    if known is None:
+        raise ParameterError(f"{name} is not in the file of this model: expected {name}=")
+    return known
 
 
 def _check_part(name: str, part: object, kinds: type | tuple[type, ...], expected: str) -> None:
