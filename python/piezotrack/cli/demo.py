@@ -56,7 +56,7 @@ def demo_command(
     ]
     document = {
         "model": {**fit.document(), "notes": fit.notes},
-        "validation": asdict(rest),
+        "validation": {**asdict(rest), "fit_percent": rest.fit_percent},
         "tracking": {name: asdict(run.metrics) for name, run in runs.items()},
         "unit": "errors in m, phase lag in rad, widest loop as a part of the travel",
     }
