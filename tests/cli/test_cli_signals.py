@@ -80,7 +80,7 @@ main()
 @pytest.mark.parametrize("after", [0.0, 0.03, 0.08, 0.13, 0.18])
 def test_sigterm_while_results_are_put_in_place_leaves_them_whole(after: float) -> None:
     write_model()
-    work = ["feedforward", "dahl.json", "sine:0.5Hz,0..50um,2s"]
+    work = ["feedforward", "dahl.json", "sine:0.5Hz,0..50um,2s", "--dt", "0.02"]
     code, _, errors = stopped([sys.executable, "-c", SLOWLY, *work], after, signal.SIGTERM)
     # It may come when all is done, and the interpreter no longer answers.
     said = {143: "piezotrack: terminated\n", 0: "", -signal.SIGTERM: ""}
@@ -121,7 +121,7 @@ LOST = {
     def later():
         begun.acquire(), begun.acquire(), os.kill(os.getpid(), signal.SIGINT)
     threading.Thread(target=later).start()
-    reproduction._scored(None, range(4), False)""",
+    reproduction._scored(None, range(4), reproduction.ProgressBar(False, "test"))""",
     "while threads compute": """threading.Thread(target=time.sleep, args=(50,)).start()
     press()""",
 }

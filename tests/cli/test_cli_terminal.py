@@ -16,7 +16,7 @@ from commands import COMMAND, names, refusal, write_model
 from piezotrack.cli.terminal import PlainStream, one_line
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="needs a POSIX shell")
-WORK = ["feedforward", "dahl.json", "sine:0.5Hz,0..50um,2s"]
+WORK = ["feedforward", "dahl.json", "sine:0.5Hz,0..50um,2s", "--dt", "0.02"]
 WRITTEN = [f"feedforward.{ending}" for ending in ("csv", "png", "svg")]
 
 
@@ -97,7 +97,7 @@ def test_a_file_without_access_is_named(monkeypatch: pytest.MonkeyPatch) -> None
 def test_the_working_folder_may_be_gone(tmp_path: Path) -> None:
     gone = tmp_path / "gone"
     gone.mkdir()
-    arguments = ["feedforward", str(tmp_path / "dahl.json"), WORK[2], "--out", str(tmp_path / "o")]
+    arguments = [WORK[0], str(tmp_path / "dahl.json"), *WORK[2:], "--out", str(tmp_path / "o")]
     done = subprocess.run(
         ["sh", "-c", f"cd {gone} && rmdir {gone} && {shlex.join([*COMMAND, *arguments])}"],
         capture_output=True,
@@ -116,7 +116,7 @@ def test_the_working_folder_may_be_gone(tmp_path: Path) -> None:
         ["identify", "\x1b[31mred\r\n.csv"],
         ["feedforward", "dahl.json", "\x1b]0;title\x07"],
         [*WORK, "--out", "\x1b[31m\N{RIGHT-TO-LEFT OVERRIDE}[red]"],
-        ["track", "dahl.json", "--reference", WORK[2], "--limits", "\x9b31m"],
+        ["track", "dahl.json", "--reference", *WORK[2:], "--limits", "\x9b31m"],
         ["\x1b[31mred"],
         ["identify", "--\x1b[31mred"],
     ],

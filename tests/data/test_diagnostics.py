@@ -146,7 +146,8 @@ def test_a_wrong_unit_of_a_command_of_a_few_volts_is_named() -> None:
 def test_less_than_a_period_is_named(u: NDArray[np.float64]) -> None:
     (note,) = diagnostics.record_warnings(log(u))
     assert "shorter than a period of the drive" in note
-    ends = f"begins at {u[0]:.4g} V and ends at {u[-1]:.4g}, within {u.min():.4g} to {u.max():.4g}"
+    ends = f"begins at {u[0]:.4g} V and ends at {u[-1]:.4g} V"
+    ends += f", within {u.min():.4g} V to {u.max():.4g} V"
     assert ends in note
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from typer.testing import CliRunner
 
 import piezotrack as pt
+from piezotrack.cli.advice import as_options, options_named
 from piezotrack.cli.commands import app
 from piezotrack.data.log_file import write_log
 from records import BOX, HELD, quick
@@ -50,6 +51,12 @@ def run(*arguments: str) -> Any:
 def without_progress(errors: str) -> str:
     """What was said on stderr beside the lines of progress, which a busy machine brings about."""
     return re.sub(r"(?m)^(identify|reproduce): .*, \d+ s\n", "", errors)
+
+
+def as_printed(text: str) -> str:
+    """A table as `identify` prints it: --runs 4 where Python says runs=4."""
+    with options_named(["runs", "stiffness", "window", "fix"]):
+        return as_options(text)
 
 
 def ran(*arguments: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -163,7 +164,9 @@ def test_a_model_and_a_file_are_taken_as_they_are(tmp_path: Path) -> None:
         assert (one.parameters, one.aic, one.bic) == (None, None, None)
         own = elsewhere.score(log()[1.0:5.0])
         assert (one.train.rms, one.train.offset) == (own.rms, own.offset)
-    assert comparison.summary().count("   -") == 9
+    criteria = [line.split() for line in comparison.summary().splitlines() if " - " in line]
+    assert [words[-4:-1] for words in criteria[:3]] == [["-", "-", "-"]] * 3
+    assert comparison.rows[0].train.fit_percent > 90.0
 
 
 def test_a_model_fitted_on_this_very_part_is_counted(tmp_path: Path) -> None:
@@ -193,13 +196,15 @@ def test_the_table_marks_the_best() -> None:
     lines = found().summary().splitlines()
     assert lines[0] == "fitted on 1 to 4.995 s of plays.csv, 800 samples"
     assert lines[1].endswith("600 samples; state and offset carried over")
-    table = {line[2:20].strip(): line for line in lines if line.startswith(("  B", "* P", "  P"))}
-    assert table["Prandtl-Ishlinskii"].startswith("*")
-    assert table["Bouc-Wen"].startswith(" ")
-    figures = [float(text) for text in table["Bouc-Wen"].split()[1:]]
+    marked = [line[:20] for line in lines if line[2:20].strip() in ("Prandtl-Ishlinskii",)]
+    assert marked == ["* Prandtl-Ishlinskii", "  Prandtl-Ishlinskii"]
+    above, below = (line for line in lines if line.startswith("  Bouc-Wen"))
+    figures = [float(text) for text in (above + below.partition("Wen")[2]).split()[1:]]
     one = row("bouc-wen")
-    scores = [one.train.rms, one.train.max_error, one.test.rms, one.test.max_error]
-    assert [figures[i] for i in (0, 2, 3, 5)] == pytest.approx([1e6 * s for s in scores], rel=1e-3)
+    scores = [one.train.rms, one.test.rms, one.test.max_error]
+    assert [figures[i] for i in (0, 2, 4)] == pytest.approx([1e6 * s for s in scores], rel=1e-3)
+    explained = 100.0 * (1.0 - one.test.rms / float(np.std(found().test.y)))
+    assert figures[5] == pytest.approx(explained, rel=1e-3)
     assert figures[6] == 6
     best = found().best
     assert one.aic is not None
@@ -207,6 +212,16 @@ def test_the_table_marks_the_best() -> None:
     assert figures[7] == pytest.approx(one.aic - best.aic, rel=1e-3)
     assert "doi 10.1007/b97636" in lines[-1]
     assert "Prandtl-Ishlinskii 0.0" in repr(found())
+
+
+def test_large_figures_stay_apart() -> None:
+    rows = tuple(
+        replace(one, aic=aic, bic=aic)
+        for one, aic in zip(found().rows, (-1.0e5, 123456.0), strict=True)
+    )
+    text = replace(found(), rows=rows).summary()
+    assert "     223456     223456" in text
+    assert max(map(len, text.splitlines()[:12])) <= 80
 
 
 def test_an_exact_fit_can_be_told_and_drawn() -> None:
@@ -347,8 +362,8 @@ def test_the_command_writes_what_python_finds() -> None:
     comparison = pt.compare(pt.read("log.csv"), PAIR, train=(1.0, 5.0), seed=1, runs=1)
     assert printed.startswith(comparison.summary())
     for path in comparison.save("expected"):
-        assert Path("results", path.name).read_bytes() == path.read_bytes()
-        assert f"  {Path('results', path.name)}\n" in printed
+        assert Path("comparison", path.name).read_bytes() == path.read_bytes()
+        assert f"  {Path('comparison', path.name)}\n" in printed
 
 
 @pytest.mark.usefixtures("_logs", "_no_pictures")

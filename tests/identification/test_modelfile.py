@@ -327,7 +327,12 @@ def test_offsets_of_a_record_of_its_own() -> None:
     assert none.rms == pytest.approx(2e-6, rel=0.02)
     assert none.rms_percent == pytest.approx(100.0 * none.rms / 119e-6)
     assert none.max_percent == pytest.approx(100.0 * none.max_error / 119e-6)
-    assert re.fullmatch(r"rms [\d.]+ um \(1\.68 % of stroke\), max [\d.]+ um \(.* %\)", str(none))
+    explained = 1.0 - np.linalg.norm(moved.y - published().model.simulate(moved.u, moved.dt).x) / (
+        np.linalg.norm(moved.y - moved.y.mean())
+    )
+    assert none.fit_percent == pytest.approx(100.0 * explained, rel=1e-6)
+    pattern = r"rms [\d.]+ um \(1\.68 % of stroke\), max [\d.]+ um \(.* %\), fit 95\.\d+ %"
+    assert re.fullmatch(pattern, str(none))
 
 
 def test_the_held_are_held(tmp_path: Path) -> None:

@@ -484,10 +484,12 @@ def test_the_command(tmp_path: Path) -> None:
     document = json.loads(Path(out, "step.json").read_text(encoding="utf-8"))
     assert document["hysteresis"] == step.hysteresis
     assert document["damping_ratio"] == step.damping_ratio
-    level = runner.invoke(app, ["step", str(file), "--out", out, "--second-level", "37.5:61"])
+    level = runner.invoke(
+        app, ["step", str(file), "--out", out, "--overwrite", "--second-level", "37.5:61"]
+    )
     assert level.exit_code == 0
     assert "with a second static level" in level.stdout
-    late = runner.invoke(app, ["step", str(file), "--out", out, "--window", "0.1:"])
+    late = runner.invoke(app, ["step", str(file), "--out", out, "--overwrite", "--window", "0.1:"])
     assert late.exit_code == 2
     assert "step.csv: there is no step in the drive" in late.stderr
     for bad in (["--window", "5"], ["--second-level", "37"]):

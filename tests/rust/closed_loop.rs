@@ -1,5 +1,11 @@
 //! A sampled controller on a continuous plant.
-#![allow(missing_docs, clippy::unwrap_used, clippy::float_cmp, clippy::cast_precision_loss)]
+#![allow(
+    missing_docs,
+    clippy::panic,
+    clippy::unwrap_used,
+    clippy::float_cmp,
+    clippy::cast_precision_loss
+)]
 
 use core::f64::consts::TAU;
 

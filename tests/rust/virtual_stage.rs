@@ -1,10 +1,16 @@
 //! The virtual stage: each of its parts against what physics or the paper says of it.
-#![allow(missing_docs, clippy::unwrap_used, clippy::float_cmp, clippy::cast_precision_loss)]
+#![allow(
+    missing_docs,
+    clippy::panic,
+    clippy::unwrap_used,
+    clippy::float_cmp,
+    clippy::cast_precision_loss
+)]
 
 use core::f64::consts::TAU;
 
 use piezotrack_core::models::{
-    Creep, DahlStage, MOST_RELAXATIONS, Model, PrandtlIshlinskiiStage, Stage, StageState, Values,
+    Creep, MOST_RELAXATIONS, Model, PrandtlIshlinskiiStage, Stage, StageState, Values,
 };
 use piezotrack_core::signal::metrics::widest_loop;
 use piezotrack_core::signal::{Drive, Hold, NEVER};
@@ -327,9 +333,8 @@ fn a_delayed_sensor_shows_what_was() {
     };
     let prompt = late(0.0);
     assert_eq!(prompt.measured, prompt.displacement);
-    for samples in [1.0, 2.0, 7.0] {
-        let run = late(samples * dt);
-        let back = samples as usize;
+    for back in [1_usize, 2, 7] {
+        let run = late(back as f64 * dt);
         assert!(run.measured[..=back].iter().all(|y| *y == 0.0));
         for k in back..200 {
             assert!((run.measured[k] - prompt.displacement[k - back]).abs() < 1e-15);

@@ -1,7 +1,8 @@
 """Units of logs and plots.
 
 Everything inside piezotrack is in seconds, volts and metres. The table here is the one place
-where other units are converted.
+where other units are converted. The drive of a stage is in volts, newtons, or metres where a
+closed-loop axis, as the height of an AFM, is given a position.
 """
 
 from __future__ import annotations
@@ -20,9 +21,12 @@ if TYPE_CHECKING:
 __all__ = [
     "Unit",
     "best_length_unit",
+    "drive_text",
     "known_units",
     "lookup",
+    "of_drive",
     "require",
+    "shown_unit",
     "split_unit",
 ]
 
@@ -87,6 +91,11 @@ _BY_NAME = {unit.name: unit for unit in _TABLE} | {
 }
 _BY_LOWER = {name.lower(): unit for name, unit in _BY_NAME.items()}
 
+# What AFM software writes in brackets behind the name of a height.
+_SENSORS = ("piezo", "measured", "smoothed")
+# Units that tables show in place of SI units, and the factor.
+_SHOWN = {"m": ("um", 1e6), "m/V": ("um/V", 1e6), "m/m": ("um/um", 1.0)}
+
 # The micro sign and the Greek letter mu are different characters.
 _MICRO = str.maketrans({"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u"})
 
@@ -114,15 +123,15 @@ def lookup(text: str) -> Unit | None:
     return None if is_mega else unit
 
 
-def require(text: str, quantity: str | None = None) -> Unit:
+def require(text: str, *quantities: str) -> Unit:
     """Return the unit that `text` names.
 
     Parameters
     ----------
     text : str
         The unit, e.g. ``"um"``.
-    quantity : {"time", "voltage", "displacement"}, optional
-        Quantity of the unit; any by default.
+    *quantities : {"time", "voltage", "displacement"}
+        What the unit may measure; anything by default.
 
     Raises
     ------
@@ -138,18 +147,18 @@ def require(text: str, quantity: str | None = None) -> Unit:
     unit = lookup(text)
     if unit is None:
         raise ParameterError(
-            f"unknown unit {quoted(text)}: expected one of {known_units(quantity)}"
+            f"unknown unit {quoted(text)}: expected one of {known_units(*quantities)}"
         )
-    if quantity is not None and unit.quantity != quantity:
+    if quantities and unit.quantity not in quantities:
         raise ParameterError(
-            f"{quoted(text)} is a unit of {unit.quantity}: expected a unit of {quantity}, "
-            f"one of {known_units(quantity)}"
+            f"{quoted(text)} is a unit of {unit.quantity}: expected a unit of "
+            f"{' or '.join(quantities)}, one of {known_units(*quantities)}"
         )
     return unit
 
 
-def known_units(quantity: str | None = None) -> str:
-    """Return the names of the units of `quantity` (of all where None), separated by commas.
+def known_units(*quantities: str) -> str:
+    """Return the names of the units of `quantities` (of all where none), separated by commas.
 
     Examples
     --------
@@ -157,27 +166,32 @@ def known_units(quantity: str | None = None) -> str:
     >>> known_units("voltage")
     'V, mV, uV, kV'
     """
-    return ", ".join(unit.name for unit in _TABLE if quantity in (None, unit.quantity))
+    return ", ".join(
+        unit.name for unit in _TABLE if unit.quantity in (quantities or (unit.quantity,))
+    )
 
 
 def split_unit(header: str) -> tuple[str, str]:
     """Split the title of a column into its name and the text of its unit.
 
-    A unit in brackets or after a slash is taken as it stands. After an underscore or a space it
-    is taken only if it is a known unit: ``sensor_left`` is a name.
+    A unit in brackets or after a slash is taken as it stands, but for ``(piezo)`` and
+    ``(measured)``, which belong to the name of a height. After an underscore or a space it is taken
+    only if it is a known unit: ``sensor_left`` is a name.
 
     Examples
     --------
     >>> from piezotrack._support.units import split_unit
     >>> split_unit("voltage_V"), split_unit("Time (s)"), split_unit("x/um")
     (('voltage', 'V'), ('Time', 's'), ('x', 'um'))
-    >>> split_unit("sensor_left")
-    ('sensor_left', '')
+    >>> split_unit("sensor_left"), split_unit("height (piezo) [um]")
+    (('sensor_left', ''), ('height (piezo)', 'um'))
     """
     title = header.strip()
     if title.endswith((")", "]")):
         opened = max(title.rfind("("), title.rfind("["))
         inside = title[opened + 1 : -1]
+        if inside.lower() in _SENSORS:
+            return title, ""
         if opened >= 0 and ")" not in inside and "]" not in inside:
             return title[: _end(title, opened, "_")].strip(), inside.strip()
     name, slash, unit = title.rpartition("/")
@@ -228,3 +242,78 @@ def best_length_unit(stroke_m: float) -> tuple[str, float]:
     if not math.isfinite(size) or size == 0.0 or 1e-6 <= size < 1e-3:
         return "um", 1e6
     return ("nm", 1e9) if size < 1e-6 else ("mm", 1e3)
+
+
+def of_drive(unit: str, drive: str) -> str:
+    """Return the unit of a parameter of a stage whose drive is not in volts.
+
+    Parameters
+    ----------
+    unit : str
+        Unit for a drive in volts, SI.
+    drive : str
+        Unit of the drive, SI.
+
+    Returns
+    -------
+    str
+        The unit with metres in place of volts for a drive in metres; otherwise as it is.
+
+    Examples
+    --------
+    >>> from piezotrack._support.units import of_drive
+    >>> of_drive("m/V", "m"), of_drive("V", "m"), of_drive("N/V", "V")
+    ('m/m', 'm', 'N/V')
+    """
+    return unit.replace("V", "m") if drive == "m" else unit
+
+
+def shown_unit(unit: str) -> tuple[str, float]:
+    """Return the unit in which tables and pictures show values in an SI unit, and the factor.
+
+    Parameters
+    ----------
+    unit : str
+        SI unit.
+
+    Returns
+    -------
+    name : str
+        Unit shown.
+    scale : float
+        Factor from the SI unit to it.
+
+    Examples
+    --------
+    >>> from piezotrack._support.units import shown_unit
+    >>> shown_unit("m"), shown_unit("V")
+    (('um', 1000000.0), ('V', 1.0))
+    """
+    return _SHOWN.get(unit, (unit, 1.0))
+
+
+def drive_text(value: float, unit: str, digits: int = 4) -> str:
+    """Write a drive with its unit.
+
+    Parameters
+    ----------
+    value : float
+        The drive, SI.
+    unit : str
+        Its unit, SI.
+    digits : int, optional
+        Significant digits.
+
+    Returns
+    -------
+    str
+        Number and unit; micrometres for a drive in metres.
+
+    Examples
+    --------
+    >>> from piezotrack._support.units import drive_text
+    >>> drive_text(75.0, "V"), drive_text(4e-5, "m")
+    ('75 V', '40 um')
+    """
+    name, scale = shown_unit(unit)
+    return f"{scale * value:.{digits}g} {name}"

@@ -30,7 +30,7 @@ ADVICE = [
     (r"\bunstable=True", "--unstable", "--unstable"),
     (r"pt\.\w+\.from_um\(k[pq]=.*\)", "a value in V/um", "--kp"),
     (r"\bcreep=False", "--creep none", "--creep"),
-    (r"\bmodel='(\w+)'", r"--model \1", "--model"),
+    (r"\bmodel='([\w-]+)'", r"--model \1", "--model"),
     (r"\bcount is (?=\d+: expected 1 to)", "--plays is ", "--plays"),
     (r"\bdead_zones is ", "--asymmetry is ", "--asymmetry"),
     (r"\blog\[([^\]]*)\]", r"--window \1", "--window"),
@@ -100,4 +100,4 @@ def as_options(text: str) -> str:
         if needed in options:
             text = re.sub(python, option, text)
     # An option at the end of a sentence or before a comma.
-    return re.sub(r"(--[a-z-]+) (?=[,;:)\n]|$)", r"\1", text)
+    return re.sub(r"(--[a-z-]+) (?=[,;:)\n]|\.(?:\s|$)|$)", r"\1", text)

@@ -94,7 +94,8 @@ def compare_command(
         second = windowed(columns.read(test_log, hold, resample), test_log, "--test", test)
     # A model file that is given is written as it is.
     given = {Path(name).resolve() for name in model or []}
-    names = comparison_files(model or None, log.drive_unit)
+    with of_file(file):
+        names = comparison_files(model or None, log.drive_unit)
     result.will_write(name for name in names if (out / name).resolve() not in given)
     with of_file(file):
         found = compare(

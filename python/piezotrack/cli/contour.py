@@ -133,6 +133,8 @@ def contour_command(
     loop = Loop(own, dt, limits, feedback, kp, ti, td)
     loop.check(context)
     refuse_of_other_stage(context, own)
+    if own and not (noise_nm or jitter):
+        refuse_without_effect(context, ["seed"], "without --noise-nm or --jitter")
     _check(context, models, path, table_2, feedforward, own)
     xy = OwnStage(models, loop) if own else PaperStage(models, loop, seed)
     plant = _changed(xy.stage(1e-9 * noise_nm, bandwidth, seed), lag, cross_talk)

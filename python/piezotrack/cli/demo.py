@@ -140,7 +140,7 @@ def _paper(result: Output, seed: int) -> None:
     ]
     document = {
         "model": {**fit.document(), "notes": fit.notes},
-        "validation": asdict(rest),
+        "validation": {**asdict(rest), "fit_percent": rest.fit_percent},
         "tracking": {name: asdict(run.metrics) for name, run in runs.items()},
         "unit": UNIT,
     }

@@ -199,6 +199,7 @@ def _judged(fit: Identification, second: Dataset | None) -> tuple[Identification
         "window_s": [float(second.t[0]), float(second.t[-1])],
         "rms": {"value": score.rms, "unit": "m"},
         "max_error": {"value": score.max_error, "unit": "m"},
+        "fit_percent": {"value": score.fit_percent, "unit": "%"},
         "offset": {"value": score.offset, "unit": "m"},
     }
     return replace(fit, details={**fit.details, "validation": judged}), score

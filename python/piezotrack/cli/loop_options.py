@@ -11,6 +11,8 @@ from ..errors import ParameterError
 from .options import number_range, refuse_without_effect
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from ..control.components import Pid, Repetitive
     from ..identification.identified import IdentifiedModel
     from ..references.reference import Reference
@@ -32,6 +34,7 @@ __all__ = [
     "Td",
     "Ti",
     "check_stage",
+    "driven_by_voltage",
     "refuse_of_other_stage",
 ]
 
@@ -196,6 +199,16 @@ class Loop:
             kq=PAPER_KQ if kq is None else kq,
             tq=(period / 25.0 if self.own else PAPER_TQ) if tq is None else tq,
         )
+
+
+def driven_by_voltage(model: IdentifiedModel, file: Path) -> IdentifiedModel:
+    """Refuse a model whose drive is a position: limits and gains of a loop are in V and V/um."""
+    if model.drive_unit == "m":
+        raise ParameterError(
+            f"{file.name}: the drive of this model is a position, in um: expected a drive in V; "
+            "piezotrack feedforward computes the drive of this model for a reference"
+        )
+    return model
 
 
 def _missing(option: str, expected: str) -> ParameterError:

@@ -138,6 +138,12 @@ class Columns:
             hold=hold,
         )
 
+    def read_drive(self, file: Path) -> Dataset:
+        """Read a drive with these columns."""
+        from ..data.reader import drive_dataset
+
+        return drive_dataset(file, time=self.time, drive=self.drive, units=self.units, dt=self.dt)
+
 
 def column(text: str | None) -> str | int | None:
     """Parse a column: a number is an index, anything else a name."""

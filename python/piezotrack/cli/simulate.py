@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ..errors import ParameterError
 from .error_messages import in_words
 from .options import (
     Columns,
@@ -30,9 +31,7 @@ __all__ = ["simulate_command"]
 @in_words
 def simulate_command(
     model: ModelFile,
-    drive_file: Annotated[
-        Path, typer.Argument(metavar="DRIVE", help="CSV with time and drive voltage.")
-    ],
+    drive_file: Annotated[Path, typer.Argument(metavar="DRIVE", help="CSV with time and drive.")],
     out: Out = Path("results"),
     overwrite: Overwrite = False,
     time: TimeColumn = None,
@@ -51,36 +50,44 @@ def simulate_command(
         together,
         write_columns,
     )
-    from ..data.reader import read_drive
+    from .._support.units import shown_unit
     from ..identification.identified import load
     from ..identification.plot import plot_response
 
     known = load(model)
     columns = Columns(time, drive, None, unit, dt)
-    t, u = read_drive(
-        drive_file, time=columns.time, drive=columns.drive, units=columns.units, dt=dt
-    )
+    log = columns.read_drive(drive_file)
+    name, scale = shown_unit(known.drive_unit)
+    if log.drive_unit != known.drive_unit and "m" in (log.drive_unit, known.drive_unit):
+        raise ParameterError(
+            f"{drive_file.name}: the drive is in {shown_unit(log.drive_unit)[0]}: expected {name}, "
+            f"as that of {model.name}"
+        )
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write(["simulated.csv", *picture_files("simulated")])
+    t, u = log.t, log.u
     interval = float(t[-1] - t[0]) / (t.size - 1)
     with of_file(drive_file):
         x = known.displacement(u, interval, hold=hold)
-    table = {"time_s": t, "voltage_V": u, "displacement_um": 1e6 * x}
+    title = "voltage" if name == "V" else "drive"
+    table = {"time_s": t, f"{title}_{name}": scale * u, "displacement_um": 1e6 * x}
     with together(make_folder(out)) as folder:
         written = [write_columns(folder / "simulated.csv", table)]
         picture = plot_response(
-            t, u, x, title=f"{known.model.info.title} driven by {drive_file.name}"
+            *(t, u, x),
+            title=f"{known.model.info.title} driven by {drive_file.name}",
+            drive_unit=known.drive_unit,
         )
         written += save_figures({"simulated": picture}, folder)
     remarks = known.beyond_fit(u, interval)
     words = (
-        f"{t.size} samples from rest, drive from {u.min():.4g} to {u.max():.4g} V: displacement "
-        f"from {1e6 * x.min():.4g} to {1e6 * x.max():.4g} um"
+        f"{t.size} samples from rest, drive from {scale * u.min():.4g} to {scale * u.max():.4g} "
+        f"{name}: displacement from {1e6 * x.min():.4g} to {1e6 * x.max():.4g} um"
     )
     document = {
         "samples": t.size,
         "dt": {"value": interval, "unit": "s"},
-        "drive_range": {"value": [float(u.min()), float(u.max())], "unit": "V"},
+        "drive_range": {"value": [float(u.min()), float(u.max())], "unit": known.drive_unit},
         "displacement_range": {"value": [float(x.min()), float(x.max())], "unit": "m"},
         "notes": remarks,
     }

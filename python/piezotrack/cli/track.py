@@ -28,6 +28,7 @@ from .loop_options import (
     Td,
     Ti,
     check_stage,
+    driven_by_voltage,
     refuse_of_other_stage,
 )
 from .options import (
@@ -141,7 +142,9 @@ def track_command(
         refuse_without_effect(context, ["online"], "with --no-feedforward")
     if not repetitive:
         refuse_without_effect(context, ["kq", "tq"], "without --repetitive")
-    known = load(model)
+    if own and not (noise_nm or jitter):
+        refuse_without_effect(context, ["seed"], "without --noise-nm or --jitter")
+    known = driven_by_voltage(load(model), model)
     desired = _reference(reference, duration, period)
     playback: Literal["table", "online"] = "online" if online else "table"
     loop = Controller(
@@ -201,6 +204,7 @@ def feedforward_command(
 ) -> None:
     """Compute the feedforward voltage for a reference."""
     from .._support.files import make_folder, picture_files, save_figures, together, write_columns
+    from .._support.units import shown_unit
     from ..control.tracking_plot import plot_feedforward
     from ..identification.identified import load
 
@@ -213,23 +217,30 @@ def feedforward_command(
     voltage, how = known.inverse(playback="online" if online else "table").played(
         desired, interval, samples=samples
     )
-    table = {"time_s": samples.t, "voltage_V": voltage, "displacement_um": 1e6 * samples.x}
+    unit, scale = shown_unit(known.drive_unit)
+    what = "voltage" if unit == "V" else "drive"
+    shown = scale * voltage
+    table = {"time_s": samples.t, f"{what}_{unit}": shown, "displacement_um": 1e6 * samples.x}
     with together(make_folder(out)) as folder:
         written = [write_columns(folder / "feedforward.csv", table)]
         title = f"feedforward ({known.model.info.title}) for {desired.name}"
-        picture = plot_feedforward(samples.t, voltage, samples.x, title=title)
+        unit = known.drive_unit
+        picture = plot_feedforward(samples.t, voltage, samples.x, title=title, drive_unit=unit)
         written += save_figures({"feedforward": picture}, folder)
     notes = known.beyond_fit(voltage, interval)
     lines = [
         f"{desired!r} at {1.0 / interval:g} Hz; {how}",
-        f"{voltage.size} samples, voltage from {voltage.min():.4g} to {voltage.max():.4g} V",
+        f"{voltage.size} samples, {what} from {shown.min():.4g} to {shown.max():.4g} {unit}",
         *(f"note  {note}" for note in notes),
     ]
     document = {
         "reference": repr(desired),
         "samples": voltage.size,
         "dt": {"value": interval, "unit": "s"},
-        "voltage_range": {"value": [float(voltage.min()), float(voltage.max())], "unit": "V"},
+        f"{what}_range": {
+            "value": [float(voltage.min()), float(voltage.max())],
+            "unit": known.drive_unit,
+        },
         "feedforward": how,
         "notes": notes,
     }

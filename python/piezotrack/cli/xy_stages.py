@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ParameterError
-from .loop_options import PAPER
+from .loop_options import PAPER, driven_by_voltage
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,7 +28,9 @@ class OwnStage:
 
         files = models or []
         self._files = [files[0], files[-1]]
-        self._models: list[IdentifiedModel] = [load(file) for file in self._files]
+        self._models: list[IdentifiedModel] = [
+            driven_by_voltage(load(file), file) for file in self._files
+        ]
         self._loop = loop
         names = dict.fromkeys(file.name for file in self._files)
         self.name = " and ".join(names)
@@ -126,7 +128,7 @@ class PaperStage:
 
         if self._file is not None:
             self.words = f"feedforward by {self._file.name} on both axes"
-            return load(self._file).inverse()
+            return driven_by_voltage(load(self._file), self._file).inverse()
         fit = identify_demo(demo_log(self._seed), seed=self._seed, progress=False)
         self.words = f"feedforward on both axes by a model of x, fitted to {fit.cost_um:.3g} um rms"
         return fit.inverse()

@@ -27,6 +27,7 @@ from .._support.plot_style import (
     thinned,
     whole,
 )
+from .._support.units import shown_unit
 from .description import run_text
 
 if TYPE_CHECKING:
@@ -245,17 +246,20 @@ def plot_feedforward(
     fig: Figure | SubFigure | None = None,
     *,
     title: str = "Feedforward",
+    drive_unit: str = "V",
 ) -> Figure:
-    """Plot a voltage table over time and over the reference.
+    """Plot a feedforward over time and over the reference.
 
     Parameters
     ----------
     t, voltage, x : ndarray, shape (n,)
-        Time [s], voltage [V], reference [m].
+        Time [s], feedforward in `drive_unit`, reference [m].
     fig : matplotlib.figure.Figure or SubFigure, optional
         Figure to draw in; default a new one.
     title : str, optional
         What ran.
+    drive_unit : str, optional
+        Unit of the drive, SI.
 
     Returns
     -------
@@ -264,13 +268,15 @@ def plot_feedforward(
     """
     figure = panels(fig, (11.0, 4.2))
     left, right = figure.subplots(1, 2)
-    left.step(t, voltage, where="post", **FEEDFORWARD)
-    left.set(xlabel="time [s]", ylabel="feedforward [V]")
-    heading(left, "Voltage over time")
+    unit, scale = shown_unit(drive_unit)
+    what = "Voltage" if unit == "V" else "Drive"
+    left.step(t, scale * voltage, where="post", **FEEDFORWARD)
+    left.set(xlabel="time [s]", ylabel=f"feedforward [{literal(unit)}]")
+    heading(left, f"{what} over time")
     left.margins(x=0)
-    right.plot(1e6 * x, voltage, **FEEDFORWARD)
-    right.set(xlabel="reference [um]", ylabel="feedforward [V]")
-    heading(right, "Voltage over reference")
+    right.plot(1e6 * x, scale * voltage, **FEEDFORWARD)
+    right.set(xlabel="reference [um]", ylabel=f"feedforward [{literal(unit)}]")
+    heading(right, f"{what} over reference")
     few_ticks(right)
     figure.suptitle(literal(title), fontsize="large")
     return whole(figure)

@@ -20,13 +20,27 @@ if TYPE_CHECKING:
 
 __all__ = ["Column", "Columns"]
 
-# The roles of columns: their quantity and usual titles.
-QUANTITIES = {"time": "time", "drive": "voltage", "displacement": "displacement"}
+# The roles of columns: their quantities and usual titles.
+QUANTITIES = {
+    "time": ("time",),
+    "drive": ("voltage", "displacement"),
+    "displacement": ("displacement",),
+}
 NAMES = {
     "time": ("time", "t", "timestamp"),
     "drive": ("voltage", "drive", "u", "v", "command", "input", "control", "drive voltage"),
-    "displacement": ("displacement", "position", "pos", "x", "y", "output", "sensor", "measured"),
+    "displacement": (
+        *("displacement", "position", "pos", "x", "y", "output", "sensor", "measured"),
+        *("height (measured)", "measured height"),
+    ),
 }
+# Titles of a drive that cannot be a position.
+VOLTAGES = ("voltage", "v", "drive voltage")
+# Usual titles of a drive that is a position, in logs without a voltage.
+POSITIONS = (
+    *("height (piezo)", "piezo height", "piezo", "drive", "command", "input", "control"),
+    *("setpoint", "set point"),
+)
 # Usual titles of a reference.
 TO_FOLLOW = ("reference", "desired", "target", "setpoint")
 BY_NUMBER = (
@@ -130,17 +144,20 @@ class Columns(list[Column]):
 
     def _candidates(self, role: str, taken: set[int]) -> list[Column]:
         """Return the columns with a usual name for `role`, those whose unit fits if there are."""
-        found, fitting = [], []
+        found, fitting, positions = [], [], []
         for column in self:
-            name = re.sub(r"[\s_-]+", " ", column.name).lower()
-            unit = lookup(column.unit)
-            fits = unit is not None and unit.quantity == QUANTITIES[role]
+            name, unit = _plain(column.name), lookup(column.unit)
+            fits = unit is not None and unit.quantity == QUANTITIES[role][0]
+            if column.index in taken:
+                continue
+            if role == "drive" and name in POSITIONS and (not unit or unit.si == "m"):
+                positions.append(column)
             # Without a unit, v is as likely a velocity.
-            if column.index not in taken and name in NAMES[role] and (fits or name != "v"):
+            if name in NAMES[role] and (fits or name != "v"):
                 found.append(column)
                 if fits or unit is None:
                     fitting.append(column)
-        return fitting or found
+        return fitting or positions or found
 
     def _only(self, found: Sequence[Column], role: str) -> Column:
         if len(found) == 1:
@@ -155,19 +172,24 @@ class Columns(list[Column]):
         raise DataError(f"{nothing}; the columns are {_titles(self)}")
 
 
+def _plain(name: str) -> str:
+    return re.sub(r"[\s_-]+", " ", name).lower()
+
+
 def _titles(columns: Sequence[Column]) -> str:
     return listed([column.title for column in columns])
 
 
 def _check_unit(column: Column, role: str) -> None:
-    quantity = QUANTITIES[role]
+    is_voltage = role == "drive" and _plain(column.name) in VOLTAGES
+    quantities = ("voltage",) if is_voltage else QUANTITIES[role]
     if not column.unit:
         raise DataError(
             f"{column} has no unit: write it into the header, or give it as "
-            f"units={{{role!r}: ...}}, one of {known_units(quantity)}"
+            f"units={{{role!r}: ...}}, one of {known_units(*quantities)}"
         )
     try:
-        require(column.unit, quantity)
+        require(column.unit, *quantities)
     except ParameterError as error:
         kind = ParameterError if column.unit_from_caller else DataError
         raise kind(f"{column}: {error}") from None

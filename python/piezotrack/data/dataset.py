@@ -53,7 +53,8 @@ class Dataset:
         Drive between two samples: ``"foh"`` is linear, ``"zoh"`` is constant, as the output of a
         digital controller.
     drive_unit : str, optional
-        Unit of `u`, for labels.
+        Unit of `u`: ``"V"``, ``"N"`` for a force, ``"m"`` where the drive is a position, as the
+        height (piezo) of an AFM.
     columns : mapping of str to array_like, shape (n,), optional
         Further signals of the same record. They may hold NaN.
     column_units : mapping of str to str, optional
@@ -205,7 +206,7 @@ class Dataset:
 
     @property
     def u(self) -> Array:
-        """Drive in the window [V], shape (n,)."""
+        """Drive in the window [V], in `drive_unit` where that is another; shape (n,)."""
         return self._u[self._start :]
 
     @property

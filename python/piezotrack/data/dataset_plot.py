@@ -14,7 +14,7 @@ from .._support.plot_style import (
     thinned,
     whole,
 )
-from .._support.units import best_length_unit
+from .._support.units import best_length_unit, shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
@@ -45,17 +45,19 @@ def plot_dataset(data: Dataset, fig: Figure | SubFigure | None = None) -> Figure
     displacement = figure.add_subplot(grid[1, 0], sharex=drive)
     loop = figure.add_subplot(grid[:, 1])
     unit, scale = best_length_unit(data.stroke)
-    kept = thinned(data.u)
+    name, times = shown_unit(data.drive_unit)
+    u = times * data.u
+    kept = thinned(u)
     how = "steps-post" if data.hold == "zoh" else "default"
     dark = {**COMMAND, "color": "0.2", "linewidth": 1.1}
-    drive.plot(data.t[kept], data.u[kept], drawstyle=how, **dark)
+    drive.plot(data.t[kept], u[kept], drawstyle=how, **dark)
     kept = thinned(data.y)
     displacement.plot(data.t[kept], scale * data.y[kept], **RECORDED)
-    loop.plot(data.u[kept], scale * data.y[kept], **RECORDED)
-    in_volts, in_metres = f"drive [{literal(data.drive_unit)}]", f"displacement [{unit}]"
-    drive.set(ylabel=in_volts)
+    loop.plot(u[kept], scale * data.y[kept], **RECORDED)
+    of_drive, in_metres = f"drive [{literal(name)}]", f"displacement [{unit}]"
+    drive.set(ylabel=of_drive)
     displacement.set(xlabel="time [s]", ylabel=in_metres)
-    loop.set(xlabel=in_volts, ylabel=in_metres)
+    loop.set(xlabel=of_drive, ylabel=in_metres)
     for ax, words in ((drive, "Drive"), (displacement, "Displacement"), (loop, "Hysteresis loop")):
         heading(ax, words)
     for ax in (drive, displacement):

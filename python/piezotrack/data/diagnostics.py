@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from .._support.units import best_length_unit
+from .._support.units import best_length_unit, drive_text
 from ..errors import DataError
 
 if TYPE_CHECKING:
@@ -65,9 +65,9 @@ def check_record(data: Dataset, *, searches_hysteresis: bool) -> None:
         return
     if not _turns(whole.u) and not _turns(whole.y):
         raise DataError(
-            f"the drive never reverses: it goes from {whole.u[0]:.4g} to {whole.u[-1]:.4g} "
-            f"{data.drive_unit} and never back, where hysteresis does not show; record a drive "
-            "that goes up and down, or hold the parameters of the hysteresis with fixed="
+            f"the drive never reverses: it goes from {_drive(data, whole.u[0])} to "
+            f"{_drive(data, whole.u[-1])} and never back, where hysteresis does not show; record a "
+            "drive that goes up and down, or hold the parameters of the hysteresis with fixed="
         )
 
 
@@ -141,7 +141,7 @@ def fit_warnings(
     unit, scale = best_length_unit(data.stroke)
     where = (
         f"{100 * share:.0f} % of the residual is a function of drive and direction, "
-        f"{scale * means[direction, place]:+.3g} {unit} near {volts:.3g} {data.drive_unit} with "
+        f"{scale * means[direction, place]:+.3g} {unit} near {_drive(data, volts, 3)} with "
         f"the drive going {('up', 'down')[direction]}"
     )
     kept = [name for name in hysteresis if name in held]
@@ -189,7 +189,7 @@ def _steps(u: Array) -> bool:
 
 def _units(data: Dataset) -> list[str]:
     """Warn of voltages, strokes and gains that only a wrong unit explains."""
-    if data.drive_unit == "N":
+    if data.drive_unit != "V":
         return []
     most, swing, stroke = float(np.abs(data.u).max()), float(np.ptp(data.u)), data.stroke
     gain = stroke / swing
@@ -238,9 +238,9 @@ def _periods(data: Dataset) -> list[str]:
     if turning <= 1 and open_end:
         return [
             f"the window, {data.duration:.4g} s, is shorter than a period of the drive, which "
-            f"begins at {u[0]:.4g} {data.drive_unit} and ends at {u[-1]:.4g}, within {u.min():.4g} "
-            f"to {u.max():.4g}: the loop is not closed, and a fit to a part of it may not hold for "
-            "the rest"
+            f"begins at {_drive(data, u[0])} and ends at {_drive(data, u[-1])}, within "
+            f"{_drive(data, u.min())} to {_drive(data, u.max())}: the loop is not closed, "
+            "and a fit to a part of it may not hold for the rest"
         ]
     return []
 
@@ -269,7 +269,7 @@ def _clipping(data: Dataset) -> list[str]:
         share = sum(last - first for first, last in runs) / u.size
         if share >= CLIPPED and rests < 0.1 * share:
             warnings.append(
-                f"the drive is cut off at {level:.4g} {data.drive_unit}, its {end}, for "
+                f"the drive is cut off at {_drive(data, level)}, its {end}, for "
                 f"{100 * share:.0f} % of the window: was it clipped? A constant drive "
                 "does not determine the hysteresis"
             )
@@ -281,7 +281,7 @@ def _clipping(data: Dataset) -> list[str]:
             if last - first >= 10 and further > TURN * swing:
                 warnings.append(
                     f"the displacement stays at {_length(level)} while the drive goes "
-                    f"{further:.3g} {data.drive_unit} further and back: is the sensor or the "
+                    f"{_drive(data, further, 3)} further and back: is the sensor or the "
                     "stage at its end?"
                 )
                 break
@@ -300,6 +300,11 @@ def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return the first sample, and that after the last, of each run of true entries."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _drive(data: Dataset, value: float, digits: int = 4) -> str:
+    """Write a drive of a record with its unit."""
+    return drive_text(value, data.drive_unit, digits)
 
 
 def _length(metres: float) -> str:

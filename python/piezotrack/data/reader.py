@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["DriveRecord", "read", "read_displacement", "read_drive"]
+__all__ = ["DriveRecord", "drive_dataset", "read", "read_displacement", "read_drive"]
 
 NOT_TEXT = {".mat", ".h5", ".hdf5", ".tdms", ".npy", ".npz", ".xls", ".xlsx", ".parquet"}
 
@@ -90,7 +90,8 @@ def read(
     Returns
     -------
     Dataset
-        The record in seconds, volts and metres. Further columns are in its ``columns``, in SI
+        The record in seconds, volts and metres, its ``drive_unit`` ``"m"`` where the drive is a
+        position, as the height (piezo) of an AFM. Further columns are in its ``columns``, in SI
         where their unit is known, and NaN where an entry is not a number.
 
     Raises
@@ -128,7 +129,7 @@ class DriveRecord(NamedTuple):
     t : ndarray, shape (n,)
         Times [s].
     u : ndarray, shape (n,)
-        Drive [V].
+        Drive [V], or [m] where it is a position.
     """
 
     t: Array
@@ -172,9 +173,21 @@ def read_drive(
     array([1.5, 2.5, 3.5])
     >>> folder.cleanup()
     """
-    log = _TextLog(path)
-    record = log.dataset(log.roles({"time": time, "drive": drive}, units, dt), dt, "foh")
+    record = drive_dataset(path, time=time, drive=drive, units=units, dt=dt)
     return DriveRecord(record.t, record.u)
+
+
+def drive_dataset(
+    path: str | os.PathLike[str],
+    *,
+    time: str | int | None = None,
+    drive: str | int | None = None,
+    units: Mapping[str | int, str] | None = None,
+    dt: float | None = None,
+) -> Dataset:
+    """Read a drive as `read_drive`, with its unit; the displacement of the record is 0."""
+    log = _TextLog(path)
+    return log.dataset(log.roles({"time": time, "drive": drive}, units, dt), dt, "foh")
 
 
 def read_displacement(
@@ -372,6 +385,7 @@ class _TextLog:
                 t=signals.get("time"),
                 dt=dt,
                 hold=hold,
+                drive_unit=require(main["drive"].unit).si if "drive" in main else "V",
                 columns=columns,
                 column_units=units,
                 source=self.name,

@@ -20,7 +20,7 @@ from .._support.plot_style import (
     thinned,
     whole,
 )
-from .._support.units import best_length_unit
+from .._support.units import best_length_unit, shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -83,7 +83,8 @@ def _loops(comparison: Comparison, loop: Axes, off: Axes) -> None:
     data = comparison.test
     followed = [comparison.followed(row, "test") for row in comparison.rows]
     part = _cycle(data.u, np.max([np.abs(data.y - x) for x in followed], axis=0))
-    u, y = data.u[part], data.y[part]
+    drive, times = shown_unit(data.drive_unit)
+    u, y = times * data.u[part], data.y[part]
     unit, scale = best_length_unit(data.stroke)
     worst = max(float(np.abs(y - x[part]).max()) for x in followed)
     small, fine = best_length_unit(worst)
@@ -94,7 +95,7 @@ def _loops(comparison: Comparison, loop: Axes, off: Axes) -> None:
     off.axhline(0.0, **GUIDE)
     loop.set(ylabel=f"displacement [{unit}]")
     loop.tick_params(labelbottom=False)
-    off.set(xlabel=f"drive [{literal(data.drive_unit)}]", ylabel=f"error [{small}]")
+    off.set(xlabel=f"drive [{literal(drive)}]", ylabel=f"error [{small}]")
     few_ticks(off)
     when = f"{data.t[part][0]:.4g} to {data.t[part][-1]:.4g} s"
     where = "" if comparison.carried else f" of {literal(data.source or 'the other record')}"

@@ -11,11 +11,10 @@ if TYPE_CHECKING:
 __all__ = ["comparison_text"]
 
 NOTES = """\
-* lowest rms on the part not fitted, which is the criterion to use. K: number of values fitted,
-- for a model that was given. dAIC, dBIC: difference from the lowest of n ln(RSS/n) + 2 (K + 1) and
-of n ln(RSS/n) + (K + 1) ln n. Both assume independent residuals; r1 is the correlation of
-neighbouring ones. Where it is near 1 both favour too many parameters (Burnham and Anderson 2002,
-doi 10.1007/b97636)."""
+* best on the part not fitted, which is the figure to trust. fit %: 100 (1 - |error| / |y - mean|).
+K: values fitted, - for a model that was given. dAIC, dBIC: above the lowest. Both assume
+independent residuals; where r1, the correlation of neighbouring ones, is near 1, they favour too
+many parameters (Burnham and Anderson 2002, doi 10.1007/b97636)."""
 
 
 def comparison_text(comparison: Comparison) -> str:
@@ -37,39 +36,50 @@ def comparison_text(comparison: Comparison) -> str:
     width = max(len(row.title) for row in rows)
     aic = min((row.aic for row in rows if row.aic is not None), default=0.0)
     bic = min((row.bic for row in rows if row.bic is not None), default=0.0)
-    one = f"{'rms um':>9}{'rms %':>8}{'max um':>9}"
     lines = [
         f"fitted on {_span(comparison.train)}",
         f"tested on {_span(comparison.test)}; {how}",
         f"per cent of the stroke fitted, {1e6 * comparison.train.stroke:.4g} um",
         "",
-        f"  {'':<{width}}  {'fitted':^26}  {'not fitted':^26}",
-        f"  {'model':<{width}}  {one}  {one}  {'K':>4}{'dAIC':>9}{'dBIC':>9}{'r1':>7}",
+        f"  {'':<{width}}{'fitted':>12}{'not fitted':>20}",
+        f"  {'model':<{width}}{'rms um':>9}{'rms %':>8}{'rms um':>10}{'rms %':>8}{'max um':>9}"
+        f"{'fit %':>8}",
+        *(f"{_mark(comparison, row)} {row.title:<{width}}{_errors(row)}" for row in rows),
+        "",
+        f"  {'':<{width}}{'K':>6}{'dAIC':>11}{'dBIC':>11}{'r1':>9}",
+        *(f"  {row.title:<{width}}{_criteria(row, aic, bic)}" for row in rows),
     ]
-    for row in rows:
-        mark = "*" if row is comparison.best else " "
-        lines.append(f"{mark} {row.title:<{width}}  {_figures(row, aic, bic)}")
     lines += ["", *(f"note  {note}" for note in comparison.notes)] if comparison.notes else []
     return "\n".join([*(line.rstrip() for line in lines), "", NOTES])
 
 
-def _figures(row: ModelScore, aic: float, bic: float) -> str:
-    """Write the figures of one model; the criteria above their lowest."""
-    scores = "  ".join(
-        f"{1e6 * score.rms:>9.4g}{score.rms_percent:>8.3g}{1e6 * score.max_error:>9.4g}"
-        for score in (row.train, row.test)
+def _mark(comparison: Comparison, row: ModelScore) -> str:
+    return "*" if row is comparison.best else " "
+
+
+def _errors(row: ModelScore) -> str:
+    """Write the errors of one model on both parts."""
+    fitted, test = row.train, row.test
+    return (
+        f"{1e6 * fitted.rms:>9.4g}{fitted.rms_percent:>8.3g}"
+        f"{1e6 * test.rms:>10.4g}{test.rms_percent:>8.3g}{1e6 * test.max_error:>9.4g}"
+        f"{test.fit_percent:>8.4g}"
     )
+
+
+def _criteria(row: ModelScore, aic: float, bic: float) -> str:
+    """Write the number of values fitted, and the criteria above their lowest."""
     if row.parameters is None or row.aic is None or row.bic is None:
-        criteria = f"{'-':>4}{'-':>9}{'-':>9}"
+        figures = f"{'-':>6}{'-':>11}{'-':>11}"
     else:
-        above = (_above(row.aic, aic), _above(row.bic, bic))
-        criteria = f"{row.parameters:>4}{above[0]:>9}{above[1]:>9}"
-    return f"{scores}  {criteria}{row.autocorrelation:>7.3f}"
+        figures = f"{row.parameters:>6}{_above(row.aic, aic):>11}{_above(row.bic, bic):>11}"
+    return f"{figures}{row.autocorrelation:>9.3f}"
 
 
 def _above(value: float, lowest: float) -> str:
     # Both are minus infinity where a fit is exact.
-    return "0" if value == lowest else f"{value - lowest:.4g}"
+    above = 0.0 if value == lowest else value - lowest
+    return f"{above:.0f}" if 1e4 <= above < 1e9 else f"{above:.4g}"
 
 
 def _span(data: Dataset) -> str:

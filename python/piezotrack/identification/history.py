@@ -97,13 +97,15 @@ def checked_history(history: object) -> History | None:
     )
 
 
-def start_entry(start: Start | None) -> dict[str, Any] | None:
+def start_entry(start: Start | None, unit: str) -> dict[str, Any] | None:
     """Entry of a start in the file of a model.
 
     Parameters
     ----------
     start : Start or None
         The start.
+    unit : str
+        Unit of the drive.
 
     Returns
     -------
@@ -115,7 +117,7 @@ def start_entry(start: Start | None) -> dict[str, Any] | None:
     state = asdict(start.state)
     return {
         "history": start.history,
-        "voltage": {"value": start.voltage, "unit": "V"},
+        "voltage": {"value": start.voltage, "unit": unit},
         "state": {key: list(one) if isinstance(one, tuple) else one for key, one in state.items()},
         "record": start.record,
     }

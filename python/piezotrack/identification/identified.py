@@ -14,8 +14,8 @@ from .._support.files import write_document
 from ..data.dataset import Dataset
 from ..errors import ParameterError, ShapeError
 from .history import begin, checked_history, same_beginning
-from .model_file import document_of, read_model, sensor_number
-from .remarks import beyond_fit
+from .model_file import document_of, drive_unit_of, read_model, sensor_number
+from .remarks import beyond_fit, fit_percent
 
 if TYPE_CHECKING:
     import os
@@ -46,6 +46,8 @@ class Score:
         Stroke that the percentages refer to [m].
     offset : float
         Offset added to the simulated displacement [m].
+    spread : float
+        Standard deviation of the measured displacement [m], to which `fit_percent` refers.
     notes : tuple of str
         Remarks on a record that goes beyond the one identified.
     """
@@ -54,6 +56,7 @@ class Score:
     max_error: float
     stroke: float
     offset: float
+    spread: float = math.nan
     notes: tuple[str, ...] = ()
 
     @property
@@ -66,10 +69,19 @@ class Score:
         """`max_error` in per cent of the stroke."""
         return 100.0 * self.max_error / self.stroke
 
+    @property
+    def fit_percent(self) -> float:
+        """Share of the motion that the model explains, 100 (1 - |y - x| / |y - mean y|) [%].
+
+        100 for an exact model; 0 for one that is no better than the mean of the record.
+        """
+        return fit_percent(self.rms, self.spread)
+
     def __str__(self) -> str:
+        fit = "" if math.isnan(self.spread) else f", fit {self.fit_percent:.4g} %"
         return (
             f"rms {1e6 * self.rms:.4g} um ({self.rms_percent:.3g} % of stroke), "
-            f"max {1e6 * self.max_error:.4g} um ({self.max_percent:.3g} %)"
+            f"max {1e6 * self.max_error:.4g} um ({self.max_percent:.3g} %){fit}"
         )
 
 
@@ -117,6 +129,11 @@ class IdentifiedModel:
         """Lowest and highest drive of the record identified; None if the file has none."""
         found = self._record.get("drive_range")
         return (float(found[0]), float(found[1])) if found else None
+
+    @property
+    def drive_unit(self) -> str:
+        """Unit of the drive, SI: ``"V"``, ``"N"``, or ``"m"`` where the drive is a position."""
+        return drive_unit_of(self.details, self.model.info)
 
     @property
     def dt(self) -> float | None:
@@ -170,7 +187,8 @@ class IdentifiedModel:
         interval = None if dt is None else check_dt(dt)
         if not drive.size:
             raise ShapeError("u has no samples: expected at least one")
-        return beyond_fit(drive, interval, self.drive_range, None if rate is None else float(rate))
+        most = None if rate is None else float(rate)
+        return beyond_fit(drive, interval, self.drive_range, most, self.drive_unit)
 
     def fitted_on(self, data: Dataset) -> bool:
         """Return whether a record is the one identified, sample by sample.
@@ -288,6 +306,11 @@ class IdentifiedModel:
         """
         if not isinstance(data, Dataset):
             raise ParameterError(f"data is {type(data).__name__}: expected a Dataset")
+        if data.drive_unit != (unit := self.drive_unit) and "m" in (unit, data.drive_unit):
+            raise ParameterError(
+                f"the drive of the record is in {data.drive_unit}: expected {unit}, as that of the "
+                "record identified"
+            )
         state = self._begins(data, history, initial)
         start = data.warmup
         run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
@@ -335,6 +358,7 @@ class IdentifiedModel:
             max_error=float(np.abs(error).max()),
             stroke=self.stroke,
             offset=shift,
+            spread=float(np.std(data.y)),
             notes=tuple(self.beyond_fit(data.u, data.dt)),
         )
 

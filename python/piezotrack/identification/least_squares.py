@@ -12,7 +12,7 @@ from ..errors import DataError, NumericalError, ParameterError
 from ..stages.registry import model_named, stage_class
 from .estimates import LagRange
 from .history import start_of_fit
-from .model_file import provenance
+from .model_file import fit_entry, provenance
 from .result import Identification
 
 if TYPE_CHECKING:
@@ -196,7 +196,7 @@ def solve_least_squares(
             for one in info.parameters
         },
         "fit": {
-            "cost": {"value": found.rms, "unit": "m"},
+            **fit_entry(found.rms, data),
             "simulations": found.evaluations,
             "at_bound": found.at_bound,
             "lag_range": {"value": found.lag_range, "unit": "s"},

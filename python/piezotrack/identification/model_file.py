@@ -9,19 +9,21 @@ from typing import TYPE_CHECKING, Any
 
 from .. import _core
 from .._support.json_text import number_pair, object_of, parse_json, text_of
+from .._support.units import of_drive
 from ..errors import DataError, ParameterError, PiezotrackError
 from ..stages.registry import model_named, stage_class
 from .history import start_entry, start_of
-from .remarks import drive_rate
+from .remarks import drive_rate, fit_percent
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Callable, Iterator, Mapping
 
     from ..data.dataset import Dataset
+    from ..stages.model_info import ModelInfo
     from .identified import IdentifiedModel
 
-__all__ = ["document_of", "provenance", "read_model", "sensor_number"]
+__all__ = ["document_of", "drive_unit_of", "fit_entry", "provenance", "read_model", "sensor_number"]
 
 FORMAT = "piezotrack-model"
 SCHEMA_VERSION = 2
@@ -72,7 +74,7 @@ def document_of(model: IdentifiedModel) -> dict[str, Any]:
     parameters = {
         one.name: {
             "value": _plain(getattr(model.model, one.name)),
-            "unit": one.unit,
+            "unit": of_drive(one.unit, model.drive_unit),
             "symbol": one.symbol,
         }
         | dict(found.get(one.name, {}))
@@ -87,7 +89,7 @@ def document_of(model: IdentifiedModel) -> dict[str, Any]:
         "offset": {"value": model.offset, "unit": "m", "fitted": model.offset_fitted},
         "stroke": {"value": model.stroke, "unit": "m"},
         "delay": {"value": model.delay, "unit": "s"} | delay,
-        "start": start_entry(model.start),
+        "start": start_entry(model.start, model.drive_unit),
         **details,
     }
 
@@ -123,17 +125,19 @@ def read_model(path: str | os.PathLike[str]) -> dict[str, Any]:
         if document["schema_version"] == 1:
             _from_version_1(document, searched=info.searched)
         parameters = document["parameters"]
+        _check_origin(document.get("provenance"))
+        drive = drive_unit_of(document, info)
         for one in info.parameters:
+            unit = of_drive(one.unit, drive)
             if one.is_list and one.is_optional and one.name not in parameters:
                 # Files of versions without it.
-                parameters[one.name] = {"value": [], "unit": one.unit}
-            require_unit(one.name, parameters[one.name], one.unit)
+                parameters[one.name] = {"value": [], "unit": unit}
+            require_unit(one.name, parameters[one.name], unit)
         values = {one.name: parameters[one.name]["value"] for one in info.parameters}
         for one in info.parameters:
             if one.is_list:
                 values[one.name] = tuple(values[one.name])
         delay = document["delay"]
-        _check_origin(document.get("provenance"))
         return {
             "model": stage_class(info)(**values),
             "offset": file_number("offset", document["offset"]),
@@ -153,13 +157,33 @@ def read_model(path: str | os.PathLike[str]) -> dict[str, Any]:
 def _check_origin(found: Any) -> None:
     """Refuse entries on the record identified that cannot be used."""
     record = object_of("provenance: data", object_of("provenance", found).get("data"))
-    for name in ("source", "sha256"):
+    for name in ("source", "sha256", "drive_unit"):
         text_of(f"provenance: data: {name}", record.get(name))
     for name in ("drive_rate", "dt_s"):
         if record.get(name) is not None:
             _core.as_number(f"provenance: data: {name}", record[name])
     for name in ("window_s", "drive_range"):
         number_pair(f"provenance: data: {name}", record.get(name))
+
+
+def drive_unit_of(details: Mapping[str, Any], info: ModelInfo) -> str:
+    """Return the unit of the drive of a model: that of its record, or else that of its kind.
+
+    Parameters
+    ----------
+    details : mapping
+        Entries of its file.
+    info : ModelInfo
+        The kind.
+
+    Returns
+    -------
+    str
+        ``"V"``, ``"N"`` or ``"m"``.
+    """
+    origin = details.get("provenance") or {}
+    found = (origin.get("data") or {}).get("drive_unit")
+    return info.drive_unit if found is None else str(found)
 
 
 def _fit_details(entry: Mapping[str, Any]) -> dict[str, Any]:
@@ -233,6 +257,27 @@ def entries_of(name: str) -> Iterator[None]:
         raise DataError(f"{name}: an entry is not of the form that 'save' writes") from None
     except PiezotrackError as error:
         raise DataError(f"{name}: {error}") from None
+
+
+def fit_entry(cost: float, data: Dataset) -> dict[str, Any]:
+    """Entries of a file on the residual of a fit.
+
+    Parameters
+    ----------
+    cost : float
+        Its root mean square [m].
+    data : Dataset
+        The record.
+
+    Returns
+    -------
+    dict
+        Of numbers, texts and dicts only.
+    """
+    return {
+        "cost": {"value": cost, "unit": "m"},
+        "fit_percent": {"value": fit_percent(cost, float(data.y.std())), "unit": "%"},
+    }
 
 
 def provenance(data: Dataset, **settings: Any) -> dict[str, Any]:

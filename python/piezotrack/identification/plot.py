@@ -25,7 +25,7 @@ from .._support.plot_style import (
     thinned,
     whole,
 )
-from .._support.units import best_length_unit
+from .._support.units import best_length_unit, shown_unit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -85,10 +85,11 @@ def plot_loop(
     """
     (ax,) = axes_or_new(ax, 1)
     unit, scale = best_length_unit(data.stroke)
+    drive, times = shown_unit(data.drive_unit)
     for y, style in ((data.y, MEASURED), (run.x, SIMULATED)):
         kept = thinned(y)
-        ax.plot(data.u[kept], scale * y[kept], **style)
-    ax.set(xlabel=f"drive [{literal(data.drive_unit)}]", ylabel=f"displacement [{unit}]")
+        ax.plot(times * data.u[kept], scale * y[kept], **style)
+    ax.set(xlabel=f"drive [{literal(drive)}]", ylabel=f"displacement [{unit}]")
     heading(ax, title)
     ax.legend(loc="upper left", frameon=False, fontsize="small")
     return ax
@@ -234,17 +235,20 @@ def plot_response(
     fig: Figure | SubFigure | None = None,
     *,
     title: str = "Simulated response",
+    drive_unit: str = "V",
 ) -> Figure:
     """Draw a simulated displacement over time and over the drive.
 
     Parameters
     ----------
     t, u, x : ndarray, shape (n,)
-        Time [s], drive [V], displacement [m].
+        Time [s], drive in `drive_unit`, displacement [m].
     fig : matplotlib.figure.Figure or SubFigure, optional
         Where to draw; a new figure where not given.
     title : str, optional
         What ran.
+    drive_unit : str, optional
+        Unit of the drive, SI.
 
     Returns
     -------
@@ -259,8 +263,9 @@ def plot_response(
     left.set(xlabel="time [s]", ylabel=f"displacement [{unit}]")
     heading(left, "Displacement over time")
     left.margins(x=0.0)
-    right.plot(u[kept], scale * x[kept], **SIMULATED)
-    right.set(xlabel="drive [V]", ylabel=f"displacement [{unit}]")
+    drive, times = shown_unit(drive_unit)
+    right.plot(times * u[kept], scale * x[kept], **SIMULATED)
+    right.set(xlabel=f"drive [{literal(drive)}]", ylabel=f"displacement [{unit}]")
     heading(right, "Hysteresis loop")
     figure.suptitle(literal(title), fontsize="large")
     return whole(figure)

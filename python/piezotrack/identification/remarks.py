@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .._support.units import drive_text, shown_unit
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -16,7 +18,15 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["above_noise", "beyond_fit", "drive_rate", "first_samples", "of_lags", "of_start"]
+__all__ = [
+    "above_noise",
+    "beyond_fit",
+    "drive_rate",
+    "first_samples",
+    "fit_percent",
+    "of_lags",
+    "of_start",
+]
 
 # A residual of so many times the noise is not due to the noise.
 NOISY = 3.0
@@ -26,6 +36,29 @@ VISCOUS = 0.02
 FIRST, CARRIED = 0.1, 0.5
 # Margin of the drive's range, and factor of its rate, beyond which a model was not fitted.
 MARGIN, FASTER = 0.01, 2.0
+
+
+def fit_percent(rms: float, spread: float) -> float:
+    """Return the share of a motion that a model explains [%].
+
+    Parameters
+    ----------
+    rms : float
+        Root mean square of the residual [m].
+    spread : float
+        Standard deviation of the measured displacement [m].
+
+    Returns
+    -------
+    float
+        100 for an exact model, 0 or less for one that is no better than the mean.
+
+    Examples
+    --------
+    >>> fit_percent(1e-6, 20e-6)
+    95.0
+    """
+    return 100.0 * (1.0 - rms / spread) if spread else -math.inf
 
 
 def above_noise(cost: float, noise: float) -> list[str]:
@@ -76,7 +109,11 @@ def drive_rate(u: Array, dt: float) -> float:
 
 
 def beyond_fit(
-    u: Array, dt: float | None, fitted: tuple[float, float] | None, rate: float | None
+    u: Array,
+    dt: float | None,
+    fitted: tuple[float, float] | None,
+    rate: float | None,
+    unit: str = "V",
 ) -> list[str]:
     """Remarks on a drive that goes beyond the record identified.
 
@@ -90,6 +127,8 @@ def beyond_fit(
         Range of the drive of the record identified [V].
     rate : float or None
         Its rate [V/s].
+    unit : str, optional
+        Unit of the drive, SI.
 
     Returns
     -------
@@ -102,18 +141,19 @@ def beyond_fit(
     ['the drive goes from 0 to 90 V, that of the record identified from 0 to 75 V']
     """
     remarks = []
+    name, scale = shown_unit(unit)
     low, high = float(u.min()), float(u.max())
     if fitted is not None:
         margin = MARGIN * (fitted[1] - fitted[0])
         if low < fitted[0] - margin or high > fitted[1] + margin:
             remarks.append(
-                f"the drive goes from {low:.4g} to {high:.4g} V, that of the record identified "
-                f"from {fitted[0]:.4g} to {fitted[1]:.4g} V"
+                f"the drive goes from {scale * low:.4g} to {scale * high:.4g} {name}, that of the "
+                f"record identified from {scale * fitted[0]:.4g} to {scale * fitted[1]:.4g} {name}"
             )
     if rate and dt is not None and (found := drive_rate(u, dt)) > FASTER * rate:
         remarks.append(
-            f"the drive moves at up to {found:.3g} V/s, that of the record identified at "
-            f"{rate:.3g} V/s: the dynamics beyond that rate were not fitted"
+            f"the drive moves at up to {scale * found:.3g} {name}/s, that of the record identified "
+            f"at {scale * rate:.3g} {name}/s: the dynamics beyond that rate were not fitted"
         )
     return remarks
 
@@ -136,14 +176,14 @@ def of_start(start: Start | None, data: Dataset) -> str | None:
     if start is None:
         return None
     unit, first = data.drive_unit, float(data.full.u[0])
-    volts = start.voltage
-    came_from = "another voltage" if volts is None else f"{volts:.4g} {unit}"
+    other = start.voltage
+    came_from = "another drive" if other is None else drive_text(other, unit)
     before = {
         "virgin": "never moved before",
         "settled": "settled under the record's own drive",
         "fit": f"having come from {came_from}, which was fitted",
     }[start.history]
-    return f"in equilibrium at {first:.4g} {unit}, {before}"
+    return f"in equilibrium at {drive_text(first, unit)}, {before}"
 
 
 def of_lags(lags: LagRange | None, frequency: float) -> list[str]:

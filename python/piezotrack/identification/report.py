@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from .._support.files import make_folder, picture_files, save_figures, together
+from .._support.units import of_drive, shown_unit
 from .remarks import of_start
 
 if TYPE_CHECKING:
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
 
 __all__ = ["identification_files", "save_identification", "summary_text"]
 
-# SI units that tables show in micrometres, and the factor.
-SHOWN_UNITS = {"m": ("um", 1e6), "m/V": ("um/V", 1e6)}
+# Units of values that a stage gives in um, and the factor for a drive in metres.
+PER_METRE = {"um/V": ("um/um", 1e-6), "1/V": ("1/um", 1e-6)}
 
 
 def summary_text(fit: Identification) -> str:
@@ -42,7 +43,8 @@ def summary_text(fit: Identification) -> str:
         f"{fit.model.info.title}: stage identified from {data.source or 'a record'}, "
         f"{len(data)} samples, {data.duration:.4g} s at {1 / data.dt:.6g} Hz, "
         f"stroke {1e6 * data.stroke:.4g} um",
-        f"cost  {fit.cost_um:.4g} um rms = {fit.cost_percent:.3g} % of stroke"
+        f"cost  {fit.cost_um:.4g} um rms = {fit.cost_percent:.3g} % of stroke, "
+        f"fit {fit.fit_percent:.4g} %"
         + (f", offset {1e6 * fit.offset:.5g} um fitted" if fit.offset_fitted else ""),
     ]
     if begun := of_start(fit.start, data):
@@ -68,7 +70,7 @@ def _trials(fit: Identification) -> list[str]:
     where = (
         "on the part fitted, as the window is too short for another"
         if fit.fitted_until is None
-        else f"after {fit.fitted_until:.4g} s, fitted before"
+        else f"after {fit.fitted_until:.4g} s, fitted before that"
     )
     return [f"      chosen by the rms {where}: {scores}"]
 
@@ -78,9 +80,9 @@ def _estimates(fit: Identification) -> list[str]:
     lines = [*_known(fit), ""]
     if fit.scale_assumed:
         lines += [
-            f"parameters, scale assumed: K = {fit.model.stiffness:g} N/m is nominal. Voltage and",
-            "displacement do not determine forces; the true stiffness= would scale "
-            f"{fit.model.info.force_symbols}.",
+            "parameters, scale assumed: a log of drive and displacement determines no force, so",
+            f"K = {fit.model.stiffness:g} N/m was assumed. {fit.model.info.force_symbols} scale "
+            "with it; for real values give stiffness=.",
         ]
     else:
         lines.append("parameters")
@@ -104,34 +106,39 @@ def _values(fit: Identification, parameters: Iterable[Parameter]) -> list[str]:
         if value is None or value == ():
             continue
         if not one.is_list:
-            unit, scale = SHOWN_UNITS.get(one.unit, (one.unit, 1.0))
+            unit, scale = _shown(fit, one)
             row = f"  {one.name:<22}{one.symbol:<6}{scale * value:>12.6g}  {unit}"
             lines.append(row.rstrip())
             continue
         columns = [one]
         if parts and parts[0].is_list and len(getattr(fit.model, parts[0].name)) == len(value):
             columns.append(parts.pop(0))
-        lines += ["", "  " + "".join(f"{_heading(column):>32}" for column in columns)]
+        lines += ["", "  " + "".join(f"{_heading(fit, column):>32}" for column in columns)]
         for row_values in zip(*(_scaled(fit, column) for column in columns), strict=True):
             lines.append("  " + "".join(f"{number:>32.6g}" for number in row_values))
         lines.append("")
     return lines
 
 
-def _heading(one: Parameter) -> str:
-    unit, _ = SHOWN_UNITS.get(one.unit, (one.unit, 1.0))
+def _shown(fit: Identification, one: Parameter) -> tuple[str, float]:
+    """Return the unit in which a parameter is shown, and the factor from SI."""
+    return shown_unit(of_drive(one.unit, fit.data.drive_unit))
+
+
+def _heading(fit: Identification, one: Parameter) -> str:
+    unit, _ = _shown(fit, one)
     return f"{one.name} {one.symbol}" + (f" [{unit}]" if unit else "")
 
 
 def _scaled(fit: Identification, one: Parameter) -> list[float]:
-    _, scale = SHOWN_UNITS.get(one.unit, (one.unit, 1.0))
+    _, scale = _shown(fit, one)
     return [scale * number for number in getattr(fit.model, one.name)]
 
 
 def _runs(fit: Identification) -> list[str]:
     """Say whether several runs agree."""
     if len(fit.runs) == 1:
-        return ["      one run: several (runs=4) would show whether there are other local minima"]
+        return ["      one run: runs=4 would show whether there are other local minima"]
     costs = ", ".join(f"{1e6 * cost:.4g}" for cost in sorted(run.cost for run in fit.runs)[:4])
     more = ", ..." if len(fit.runs) > 4 else ""
     verdict = f"{fit.agreeing} of {len(fit.runs)} runs end within 0.1 % of the best"
@@ -156,7 +163,7 @@ def _known(fit: Identification) -> list[str]:
         if not held:
             (known if sure else unknown).append((symbol, f"{value:>12.6g}  {unit}"))
     lines = ["determined by the data" if known else "the data determine no parameter"]
-    lines += [f"  {symbol:<10} {text}" for symbol, text in known]
+    lines += [f"  {symbol:<10} {text}".rstrip() for symbol, text in known]
     if unknown:
         lines.append("not determined: " + ", ".join(symbol for symbol, _ in unknown))
     return lines
@@ -165,6 +172,9 @@ def _known(fit: Identification) -> list[str]:
 def _ratios(fit: Identification) -> list[tuple[str, str, float, str]]:
     """Parameter, symbol, value and unit of what does not depend on the scale of the forces."""
     ratios = fit.model.force_ratios()
+    if fit.data.drive_unit == "m":
+        per_metre = [PER_METRE.get(unit, (unit, 1.0)) for *_, unit in ratios]
+        ratios = [(*r[:2], s * r[2], unit) for r, (unit, s) in zip(ratios, per_metre, strict=True)]
     # Friction that is 0 and was not searched is left out.
     return [r for r in ratios if r[0] != "b0" or fit.parameters["b0"].free or r[2]]
 

@@ -127,6 +127,11 @@ class Identification(IdentifiedModel):
         """The cost in per cent of the stroke."""
         return 100.0 * self.cost / self.stroke
 
+    @property
+    def fit_percent(self) -> float:
+        """Share of the motion that the model explains, as `Score.fit_percent`."""
+        return remarks.fit_percent(self.cost, float(np.std(self.data.y)))
+
     @cached_property
     def fitted(self) -> Score:
         """Score on the record that was identified, simulated with converged sub-steps."""

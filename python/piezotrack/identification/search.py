@@ -11,12 +11,13 @@ from .. import _core
 from .._support.arguments import as_numbers
 from .._support.messages import quoted
 from .._support.progress_bar import ProgressBar
+from .._support.units import of_drive
 from ..data import diagnostics
 from ..errors import Interrupted, ParameterError
 from ..stages.registry import stage_class
 from .estimates import Estimate, LagRange, Progress, SwarmRun
 from .history import start_after
-from .model_file import provenance
+from .model_file import fit_entry, provenance
 from .result import Identification
 from .step_response import StepResult
 from .swarm import ParticleSwarm
@@ -216,6 +217,7 @@ def _identification(
     history: History,
 ) -> Identification:
     facts = {one.name: (one.unit, one.symbol) for one in info.parameters} | SENSOR
+    facts = {name: (of_drive(unit, data.drive_unit), sign) for name, (unit, sign) in facts.items()}
     parameters = {}
     for one in found.estimates:
         unit, symbol = facts[one["name"]]
@@ -242,7 +244,7 @@ def _identification(
         | {"creep_weights": {"free": True}, "creep_times": {"free": False}},
         "delay": _details(parameters["delay"]) if "delay" in parameters else {},
         "fit": {
-            "cost": {"value": found.rms, "unit": "m"},
+            **fit_entry(found.rms, data),
             "iterations": found.iterations,
             "simulations": sum(nfev for _, _, nfev, _ in found.runs),
             "polish_simulations": found.polish_evaluations,

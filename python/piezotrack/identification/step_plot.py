@@ -16,7 +16,7 @@ from .._support.plot_style import (
     panels,
     whole,
 )
-from .._support.units import best_length_unit
+from .._support.units import best_length_unit, drive_text, shown_unit
 from ..errors import ParameterError
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def plot_step(step: StepResult, ax: Axes | None = None) -> Axes:
             color="black",
         )
     ax.set(xlabel="time after the step [ms]", ylabel=f"displacement [{unit}]")
-    height = f"{read.voltage:.4g} {literal(trace.data.drive_unit)}"
+    height = literal(drive_text(read.voltage, trace.data.drive_unit))
     source = f"{literal(trace.data.source)}: step" if trace.data.source else "Step"
     heading(
         ax,
@@ -134,8 +134,9 @@ def plot_spectrum(step: StepResult, ax: Axes | None = None) -> Axes:
     trace, (ax,) = _trace(step), axes_or_new(ax, 1)
     read = step.readings
     unit, scale = best_length_unit(abs(read.steady_state))
+    drive, times = shown_unit(trace.data.drive_unit)
+    per_volt, scale = f"{unit}/{literal(drive)}", scale / times
     static, resonance = scale * abs(read.static_gain), scale * abs(read.resonance_gain)
-    per_volt = f"{unit}/{literal(trace.data.drive_unit)}"
     # The curve may step over a narrow peak; the peak itself is known.
     places = np.append(trace.frequencies, read.frequency)
     gains = np.append(trace.gains, abs(read.resonance_gain))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from .._support.units import drive_text, of_drive, shown_unit
+
 if TYPE_CHECKING:
     from .step_response import StepResult
 
@@ -30,8 +32,9 @@ def step_text(step: StepResult) -> str:
     if trace is not None:
         where = f"{trace.data.source or 'a record'}, step at {trace.step_time:.4g} s"
     unit = "V" if trace is None else trace.data.drive_unit
+    per_drive, scale = shown_unit(of_drive("m/V", unit))
     lines = [
-        f"Step response of {where}: {read.voltage:.4g} {unit}",
+        f"Step response of {where}: {drive_text(read.voltage, unit)}",
         *(f"note  {note}" for note in step.notes),
         "",
         "readings",
@@ -42,8 +45,8 @@ def step_text(step: StepResult) -> str:
         _row("resonance", f"{read.frequency:.4g}", "Hz"),
         _row(
             "gains",
-            f"{1e6 * read.static_gain:.4f}, {1e6 * read.resonance_gain:.4f}",
-            "um/V, static and at the resonance",
+            f"{scale * read.static_gain:.4f}, {scale * read.resonance_gain:.4f}",
+            f"{per_drive}, static and at the resonance",
         ),
         "",
         "the mode",
@@ -63,7 +66,7 @@ def step_text(step: StepResult) -> str:
         "ratios that one step determines",
         _row("K/M", f"{ratio['K/M']:.5g}", "1/s^2"),
         _row("D/M", f"{ratio['D/M']:.5g}", "1/s"),
-        _row("T/K", f"{1e6 * ratio['T/K']:.5g}", "um/V"),
+        _row("T/K", f"{scale * ratio['T/K']:.5g}", per_drive),
         "",
         *_absolute(step),
         "",

@@ -44,7 +44,10 @@ struct PyXyStage {
 impl PyXyStage {
     /// The axes between their amplifiers and sensors, and where an experiment starts, after visits
     /// to voltages if there are any.
-    fn both(&self, visited: [&[f64]; 2]) -> (TwoAxes<'_, Stage, Stage>, TwoStates<StageState, StageState>) {
+    fn both(
+        &self,
+        visited: [&[f64]; 2],
+    ) -> (TwoAxes<'_, Stage, Stage>, TwoStates<StageState, StageState>) {
         let [x, y] = &self.axes;
         let start = (x.start_after(visited[0]), y.start_after(visited[1]));
         let (x, y) = (x.apparatus(), y.apparatus());

@@ -115,7 +115,7 @@ impl<S> OpenLoop<S> {
     ) -> bool {
         let (stretch, from, to) = &route.parts[part];
         let (volts, change) = drive.interval(k - 1);
-        let at = |place: f64| if place == 1.0 { volts + change } else { volts + place * change };
+        let at = |place: f64| place.mul_add(change, volts);
         apparatus.drive(stretch, &mut self.last, [at(*from), at(*to)], stop)
     }
 

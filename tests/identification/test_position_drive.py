@@ -1,0 +1,163 @@
+"""A drive that is a position, as the height (piezo) of an AFM, is a drive like any other."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import piezotrack as pt
+from commands import names, ran, refusal, run
+from piezotrack.identification.plot import plot_loop
+
+GAIN = 0.9
+THRESHOLDS, WEIGHTS = (2e-6, 6e-6), (0.2, 0.1)
+PLAYS = pt.identification.LeastSquares(
+    thresholds=THRESHOLDS, dead_zones=False, creep=False, dynamics=None
+)
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def height(drive_unit: str = "m", scale: float = 1.0) -> pt.Dataset:
+    """A piezo of 40 um whose sensor shows 50 um, as in the curves of an AFM."""
+    t = np.arange(3000) / 500.0
+    u = 20e-6 * (1.0 - np.cos(np.pi * t)) * np.where(t < 4.0, 1.0, 0.6)
+    stage = pt.PrandtlIshlinskiiStage(linear=GAIN, thresholds=THRESHOLDS, weights=WEIGHTS)
+    y = stage.simulate(u, 1 / 500.0).x
+    return pt.Dataset(u=scale * u, y=y, t=t, drive_unit=drive_unit)
+
+
+def write_log(header: str = "time [s],height (piezo) [um],height (measured) [um]") -> None:
+    log = height()
+    table = np.column_stack([log.t, 1e6 * log.u, 1e6 * log.y])
+    np.savetxt("curve.csv", table, delimiter=",", header=header, comments="", fmt="%.12g")
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "time [s],height (piezo) [um],height (measured) [um]",
+        "time_s,setpoint_um,x_um",
+        "time_s,command (um),measured (um)",
+        "time_s,Drive [um],Position [um]",
+    ],
+)
+def test_a_log_with_two_displacements_is_read(header: str) -> None:
+    write_log(header)
+    log = pt.read("curve.csv")
+    assert log.drive_unit == "m"
+    assert np.allclose(log.u, height().u, rtol=1e-9, atol=1e-15)
+    assert np.allclose(log.y, height().y, rtol=1e-9, atol=1e-15)
+
+
+def test_units_of_heights_can_be_given() -> None:
+    write_log("time_s,height (piezo),height (measured)")
+    with pytest.raises(pt.DataError, match=r"'height \(piezo\)' has no unit"):
+        pt.read("curve.csv")
+    log = pt.read("curve.csv", units={"drive": "um", "displacement": "um"})
+    assert log.drive_unit == "m"
+    assert log.stroke == pytest.approx(height().stroke)
+    # A number that is called nm is a thousandth of one in um.
+    log = pt.read("curve.csv", units={"height (piezo)": "nm", "displacement": "um"})
+    assert log.u.max() == pytest.approx(1e-3 * height().u.max())
+
+
+def test_which_column_is_the_drive_stays_clear() -> None:
+    write_log("time_s,x_um,y_um")
+    with pytest.raises(pt.DataError, match="no column is known to be the drive"):
+        pt.read("curve.csv")
+    write_log("time_s,setpoint_um,command_um")
+    with pytest.raises(pt.DataError, match="several columns could be the drive"):
+        pt.read("curve.csv")
+    # A voltage is the drive, and the position that was asked for is not.
+    Path("closed.csv").write_text(
+        "time_s,setpoint_um,voltage_V,x_um\n0,0,1,0\n1,5,2,4\n2,9,3,8\n", encoding="utf-8"
+    )
+    log = pt.read("closed.csv")
+    assert (log.drive_unit, list(log.u)) == ("V", [1.0, 2.0, 3.0])
+
+
+def test_the_fit_is_that_of_the_same_numbers_in_volts() -> None:
+    fit = pt.identify(height(), "prandtl-ishlinskii", least_squares=PLAYS)
+    assert fit.model.linear == pytest.approx(GAIN, rel=1e-6)
+    assert fit.model.weights == pytest.approx(WEIGHTS, rel=1e-6)
+    for kind in ("dahl", "bouc-wen"):
+        here = pt.identify(height(), kind, seed=1, runs=1)
+        volts = pt.identify(height("V", 1e6), kind, seed=1, runs=1)
+        assert here.cost == pytest.approx(volts.cost, rel=0.01)
+
+
+@pytest.mark.parametrize("kind", ["prandtl-ishlinskii", "dahl", "bouc-wen"])
+def test_no_volt_is_spoken_of(kind: str) -> None:
+    fit = pt.identify(height(), kind, seed=1, runs=1)
+    words = [fit.summary(), *fit.beyond_fit(3.0 * height().u, 1e-4)]
+    assert len(words) == 3
+    assert height().plot().axes[0].get_ylabel() == "drive [um]"
+    axes = plot_loop(height(), fit.simulate(height()))
+    words += [axes.get_xlabel()]
+    assert axes.get_xlabel() == "drive [um]"
+    assert np.max(axes.lines[0].get_xdata()) == pytest.approx(40.0, rel=1e-3)
+    plt.close("all")
+    for text in words:
+        assert "V" not in text.replace("Voltage", ""), text
+    assert "um/um" in fit.summary()
+    assert "from 0 to 120 um, that of the record identified from 0 to 40 um" in words[1]
+
+
+def test_a_model_file_keeps_the_unit() -> None:
+    fit = pt.identify(height(), "prandtl-ishlinskii", least_squares=PLAYS)
+    fit.save("piezo.json")
+    document = json.loads(Path("piezo.json").read_text())
+    units = {name: entry["unit"] for name, entry in document["parameters"].items()}
+    assert (units["thresholds"], units["weights"]) == ("m", "m/m")
+    model = pt.load("piezo.json")
+    assert (model.drive_unit, model.model) == ("m", fit.model)
+    assert model.score(height()).rms < 1e-9
+    with pytest.raises(pt.ParameterError, match="the drive of the record is in V: expected m"):
+        model.score(height("V", 1e6))
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_the_commands_take_it() -> None:
+    write_log()
+    printed = ran(
+        "identify", "curve.csv", "--model", "prandtl-ishlinskii", "--validate", "curve.csv"
+    )
+    assert "V" not in printed
+    assert names("results") == ["prandtl-ishlinskii.json"]
+    table = np.column_stack([height().t, 1e9 * height().u])
+    np.savetxt("drive.csv", table, delimiter=",", header="time_s,setpoint_nm", comments="")
+    printed = ran("simulate", "results/prandtl-ishlinskii.json", "drive.csv")
+    assert "drive from 0 to 40 um: displacement" in printed
+    back = pt.read("results/simulated.csv")
+    assert np.allclose(back.u, height().u, atol=1e-14)
+    assert np.allclose(back.y, height().y, atol=20e-9)
+    model = "results/prandtl-ishlinskii.json"
+    printed = ran("feedforward", model, "sine:1Hz,5..40um", "--dt", "0.002")
+    assert " V" not in printed
+    assert re.search(r"samples, drive from [\d.]+ to [\d.]+ um\n", printed)
+    drive = pt.read("results/feedforward.csv")
+    # What the piezo is asked for brings about what was wanted.
+    assert np.ptp(pt.load(model).simulate(drive).x[500:]) == pytest.approx(35e-6, rel=0.01)
+    said = refusal("track", model, "--reference", "sine:1Hz,5..40um")
+    assert said.startswith("prandtl-ishlinskii.json: the drive of this model is a position")
+    Path("volts.csv").write_text("time_s,voltage_V\n0,0\n1,1\n2,0\n3,1\n", encoding="utf-8")
+    said = refusal("simulate", "results/prandtl-ishlinskii.json", "volts.csv")
+    assert said.startswith("volts.csv: the drive is in V: expected um")
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_auto_takes_it() -> None:
+    write_log()
+    result = run("identify", "curve.csv", "--runs", "1", "--seed", "1")
+    assert result.exit_code == 0
+    assert "prandtl-ishlinskii.json" in names("results")
+    assert "V" not in result.stdout
