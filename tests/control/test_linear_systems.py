@@ -114,6 +114,24 @@ def test_a_controller_of_a_model_has_its_range_and_its_interval() -> None:
         pt.Controller.of(pt.VirtualStage.of(fit))  # type: ignore[arg-type]
 
 
+def test_readings_far_from_0_are_those_of_the_stage() -> None:
+    """The span of valid readings has the offset of the sensor in it."""
+    model = pt.identification.IdentifiedModel(
+        model=replace(MODE, frequency=None, damping_ratio=None),
+        offset=-125e-6,
+        offset_fitted=True,
+        stroke=100e-6,
+    )
+    reference = pt.sine(frequency=0.5, low=-120e-6, high=-60e-6, duration=4.0)
+    feedback = pt.Pid.from_um(kp=0.2, ti=0.01)
+    one = pt.Controller(dt=DT, limits=(0.0, 75.0), feedback=feedback)
+    assert pt.track(model, one, reference).metrics.max_error < 5e-6
+    exact = pt.Controller.of(model, dt=DT, limits=(0.0, 75.0), feedback=feedback)
+    run = pt.track(pt.VirtualStage.of(model, noise=5e-9), exact, reference)
+    assert run.feedback.any()
+    assert run.metrics.rms_error < 0.3e-6
+
+
 def test_a_stage_that_never_sees_0_volts_begins_at_its_nearest_limit() -> None:
     stage = replace(MODE, frequency=None, damping_ratio=None)
     reference = pt.sine(frequency=0.5, low=35e-6, high=70e-6, duration=4.0)

@@ -71,7 +71,7 @@ def to_control(
     >>> stage = pt.VirtualStage.xu_li_2010()
     >>> plant = pt.to_control(stage, limits=(0.0, 75.0))
     >>> print(f"{plant.name}: {1e6 * plant.dcgain().real:.2f} um/V, {plant.nstates} states")
-    Prandtl-Ishlinskii linearised, middle gain, 0 to 75000 mV: 1.56 um/V, 3 states
+    Prandtl-Ishlinskii linearised, middle gain, 0 to 75 V: 1.56 um/V, 3 states
     """
     if isinstance(part, (Controller, Pid, StateSpace)):
         if limits is not None or delay != 0.0 or gain != "middle":
@@ -110,8 +110,10 @@ def _stage(
     linear = linearised_plants(plant, (low, high), delay)[CASES.index(gain)]
     rows, b, c, d, late = linear.matrices()
     a = np.array(rows, dtype=np.float64).reshape(len(b), len(b))
-    # A name may have no point.
-    between = f"{1e3 * low:.0f} to {1e3 * high:.0f} mV"
+    between = f"{low:g} to {high:g} V"
+    if "." in between:
+        # A name may have no point.
+        between = f"{1e3 * low:.0f} to {1e3 * high:.0f} mV"
     name = f"{plant.stage.info.title} linearised, {gain} gain, {between}"
     if dt is None:
         if late > 0.0:
