@@ -277,7 +277,10 @@ BROKEN: dict[str, tuple[Any, str]] = {
     "form": (lambda d: d["parameters"]["weights"].update(value=5.0), "is not of the form"),
     "stroke": (lambda d: d["stroke"].update(value=0.0), "stroke is 0.0 m"),
     "model": (lambda d: d.update(model="dahl"), "the entry 'mass' is missing"),
-    "no model": (lambda d: d.update(model="plays"), "holds a model 'plays': expected 'dahl'"),
+    "no model": (
+        lambda d: d.update(model="plays"),
+        "holds a model 'plays': expected one of 'dahl'",
+    ),
     "version": (lambda d: d.update(schema_version=3), "has schema_version 3"),
 }
 

@@ -224,8 +224,9 @@ def feedforward_command(
     with together(make_folder(out)) as folder:
         written = [write_columns(folder / "feedforward.csv", table)]
         title = f"feedforward ({known.model.info.title}) for {desired.name}"
-        unit = known.drive_unit
-        picture = plot_feedforward(samples.t, voltage, samples.x, title=title, drive_unit=unit)
+        picture = plot_feedforward(
+            samples.t, voltage, samples.x, title=title, drive_unit=known.drive_unit
+        )
         written += save_figures({"feedforward": picture}, folder)
     notes = known.beyond_fit(voltage, interval)
     lines = [
