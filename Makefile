@@ -81,7 +81,7 @@ $(VENV)/pip:
 
 # A release wheel, as a user would install it; the package in python/ is never imported.
 $(VENV)/installed: $(VENV)/pip $(SOURCES)
-	@echo "Compiling: a minute and a half on two cores; after a change, half a minute."
+	@echo "Compiling: two to five minutes, with one line of output for most of it; less after a change."
 	@rm -rf $(WHEELS)
 	$(BIN)/maturin build --release --locked --out $(WHEELS) --interpreter $(BIN)/python
 	$(BIN)/python -m pip install --quiet --force-reinstall --no-deps $(WHEELS)/*.whl

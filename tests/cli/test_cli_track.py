@@ -205,8 +205,35 @@ def test_feedforward_of_a_file_leads_the_model_along_it() -> None:
 
 @pytest.mark.usefixtures("_no_pictures")
 def test_feedforward_says_where_the_model_was_not_fitted() -> None:
-    printed = ran("feedforward", "dahl.json", "sine:0.5Hz,0..200um,6s")
+    course = ("sine:0.5Hz,0..200um,6s", "--limits", "0:150")
+    printed = ran("feedforward", "dahl.json", *course)
     assert ", that of the record identified from 0 to 75 V" in printed
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_a_rate_beyond_that_of_the_record_is_noted() -> None:
+    quick = ("--reference", "sine:20Hz,20..60um,1s", "--dt", "0.0005")
+    printed = ran("track", "dahl.json", *quick, "--limits", "-20:95")
+    assert "note  the drive moves at up to" in printed
+    slow = ("--reference", "sine:0.2Hz,20..60um,5s")
+    assert " moves at " not in ran("track", "dahl.json", *slow, "--overwrite")
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_a_loop_near_its_limit_is_noted() -> None:
+    course = ("--reference", "sine:0.2Hz,20..60um,5s", "--dt", "0.02", "--overwrite")
+    printed = ran("track", "dahl.json", *course, "--kp", "0.01", "--ti", "0.1")
+    assert "close to instability" not in printed
+    printed = ran("track", "dahl.json", *course, "--kp", "1.8", "--ti", "0.03", "--limits", "-5:90")
+    assert "note  the loop is close to instability, its gain margin is below 2" in printed
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_feedforward_keeps_the_limits() -> None:
+    course = "sine:0.5Hz,0..110um,6s"
+    ran("feedforward", "dahl.json", course, "--limits", "2:50", "--beyond-reach")
+    volts = table("results/feedforward.csv")["voltage_V"]
+    assert (volts.min(), volts.max()) == (2.0, 50.0)
 
 
 # What they refuse.
@@ -261,6 +288,11 @@ REFUSED: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("track", "dahl.json", "--reference", "sine:0.5Hz,0..150um,6s"),
         ("150 um at 1 s", "beyond", "--beyond-reach"),
     ),
+    "table out of reach": (
+        ("feedforward", "dahl.json", "sine:0.5Hz,0..150um,6s"),
+        ("150 um at 1 s", "beyond", "on the sensor", "--beyond-reach"),
+    ),
+    "nothing moves it": ((*OWN, "--no-feedforward"), ("--no-feedforward: expected --kp",)),
     "table for no model": (("feedforward", "none.json", COURSE), ("none.json", "no such file")),
     "table of no reference": (("feedforward", "dahl.json", "sinus:1Hz"), ("'sinus",)),
     "table into a file": (("feedforward", "dahl.json", COURSE, "--out", "log.txt"), ("--out",)),

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -78,3 +79,24 @@ def test_the_swing_of_a_mode_does_not_hide_what_is_left() -> None:
 def test_parameters_need_a_named_model() -> None:
     with pytest.raises(pt.ParameterError, match="name the model"):
         pt.identify(record(PLAYS, 1e-8), fixed={"mass": 0.1})
+
+
+def test_a_kind_that_diverges_on_the_rest_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that cannot be simulated on what was not fitted is no reason to give up the others."""
+    t = np.arange(1500) / 250.0
+    u = 40.0 - 40.0 * np.cos(2 * np.pi * 0.5 * t)
+    stage = pt.BoucWenStage.xu_li_2010_corrected()
+    log = pt.Dataset(u=u, y=stage.simulate(u, 1 / 250.0).x, dt=1 / 250.0)
+    scored = pt.identification.IdentifiedModel.score
+    names: list[str] = []
+
+    def diverging(self: pt.identification.IdentifiedModel, *args: Any, **kwargs: Any) -> Any:
+        names.append(self.model.info.name)
+        if len(names) == 1:
+            raise pt.NumericalError("the simulated motion is not finite from sample 9 on")
+        return scored(self, *args, **kwargs)
+
+    monkeypatch.setattr(pt.identification.IdentifiedModel, "score", diverging)
+    fit = pt.identify(log, seed=1, runs=1, swarm=pt.ParticleSwarm(particles=8, iterations=5))
+    assert names[0] not in {trial.model for trial in fit.trials}
+    assert fit.trials

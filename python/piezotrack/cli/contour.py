@@ -120,7 +120,8 @@ def contour_command(
         bool, typer.Option("--beyond-reach", help="Allow a path beyond the reach of the stage.")
     ] = False,
     unstable: Annotated[
-        bool, typer.Option("--unstable", help="Allow loops that are unstable for small motions.")
+        bool,
+        typer.Option("--unstable", help="Simulate although a loop is unstable for small motions."),
     ] = False,
     json: Json = False,
     quiet: Quiet = False,

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ..control.components import Pid, Repetitive
+    from ..control.stability import LoopCheck
     from ..identification.identified import IdentifiedModel
     from ..references.reference import Reference
 
@@ -36,6 +37,7 @@ __all__ = [
     "check_stage",
     "driven_by_voltage",
     "refuse_of_other_stage",
+    "small_margins",
 ]
 
 # Names of the stages that can be simulated: the model itself, and that of the paper.
@@ -215,6 +217,22 @@ def _missing(option: str, expected: str) -> ParameterError:
     return ParameterError(
         f"{option} is missing, and the model file has no record: expected {expected}"
     )
+
+
+# Margins below which a loop is called sensitive.
+LEAST_MARGIN, MOST_SENSITIVITY = 2.0, 2.5
+
+
+def small_margins(loop: LoopCheck) -> list[str]:
+    """Remark on a stable loop near its limit."""
+    small = []
+    if loop.stable_gains is not None and loop.stable_gains[1] < LEAST_MARGIN:
+        small.append(f"its gain margin is below {LEAST_MARGIN:g}")
+    if loop.sensitivity > MOST_SENSITIVITY:
+        small.append(f"Ms is above {MOST_SENSITIVITY:g}")
+    if not loop.stable or not small:
+        return []
+    return [f"the loop is close to instability, {' and '.join(small)}: lower the gain"]
 
 
 def check_stage(stage: str | None) -> None:

@@ -68,7 +68,8 @@ def simulate_command(
     t, u = log.t, log.u
     interval = float(t[-1] - t[0]) / (t.size - 1)
     with of_file(drive_file):
-        x = known.displacement(u, interval, hold=hold)
+        at_first = known.model.equilibrium(float(u[0]))
+        x = known.displacement(u, interval, hold=hold, initial=at_first)
     title = "voltage" if name == "V" else "drive"
     table = {"time_s": t, f"{title}_{name}": scale * u, "displacement_um": 1e6 * x}
     with together(make_folder(out)) as folder:
@@ -81,8 +82,9 @@ def simulate_command(
         written += save_figures({"simulated": picture}, folder)
     remarks = known.beyond_fit(u, interval)
     words = (
-        f"{t.size} samples from rest, drive from {scale * u.min():.4g} to {scale * u.max():.4g} "
-        f"{name}: displacement from {1e6 * x.min():.4g} to {1e6 * x.max():.4g} um"
+        f"{t.size} samples from rest at {scale * u[0]:.4g} {name}, drive from "
+        f"{scale * u.min():.4g} to {scale * u.max():.4g} {name}: displacement "
+        f"from {1e6 * x.min():.4g} to {1e6 * x.max():.4g} um"
     )
     document = {
         "samples": t.size,

@@ -30,6 +30,7 @@ from .loop_options import (
     check_stage,
     driven_by_voltage,
     refuse_of_other_stage,
+    small_margins,
 )
 from .options import (
     Duration,
@@ -58,6 +59,12 @@ Online = Annotated[
         "--online",
         help="Compute the feedforward at every sample; default a stored table of one period.",
     ),
+]
+
+
+BeyondReach = Annotated[
+    bool,
+    typer.Option("--beyond-reach", help="Allow a reference beyond the reach of the stage."),
 ]
 
 
@@ -115,12 +122,12 @@ def track_command(
     duration: Duration = None,
     period: Period = None,
     seed: Annotated[int, typer.Option(help="Random seed of the sensor noise.")] = 1,
-    beyond_reach: Annotated[
-        bool,
-        typer.Option("--beyond-reach", help="Allow a reference beyond the reach of the stage."),
-    ] = False,
+    beyond_reach: BeyondReach = False,
     unstable: Annotated[
-        bool, typer.Option("--unstable", help="Allow a loop that is unstable for small motions.")
+        bool,
+        typer.Option(
+            "--unstable", help="Simulate although the loop is unstable for small motions."
+        ),
     ] = False,
     json: Json = False,
     quiet: Quiet = False,
@@ -140,6 +147,8 @@ def track_command(
     refuse_of_other_stage(context, own)
     if not feedforward:
         refuse_without_effect(context, ["online"], "with --no-feedforward")
+    if not (feedforward or repetitive or settings.has_feedback):
+        raise ParameterError("--no-feedforward: expected --kp and --ti, or nothing moves the stage")
     if not repetitive:
         refuse_without_effect(context, ["kq", "tq"], "without --repetitive")
     if own and not (noise_nm or jitter):
@@ -165,11 +174,15 @@ def track_command(
     run = track(plant, loop, desired, delay=delay, jitter=jitter, **free)
     name = f"stage: {model.name}" if own else "stage: the virtual stage of Xu and Li 2010"
     lines = [name, run.summary()]
-    # A loop's voltage has the noise of the sensor, whose rate says nothing.
-    notes = known.beyond_fit(run.voltage) if feedforward else []
+    notes = known.beyond_fit(run.voltage)
+    # The rate of the feedforward: a loop's voltage has the noise of the sensor.
+    rate = known.beyond_fit(run.feedforward, loop.dt) if feedforward else []
+    notes += [note for note in rate if note not in notes and " moves at " in note]
     lines += [f"note  {note}" for note in notes]
     if loop.feedback is not None or loop.repetitive is not None:
-        lines.append(f"loop at {check_loop(plant, loop, delay=delay).middle}")
+        margins = check_loop(plant, loop, delay=delay).middle
+        lines.append(f"loop at {margins}")
+        lines += [f"note  {note}" for note in small_margins(margins)]
     elif own:
         lines.append(NO_FEEDBACK)
     document = _document(run, known, loop, notes) | {"stage": MODEL if own else PAPER}
@@ -196,27 +209,35 @@ def feedforward_command(
             show_default=False,
         ),
     ] = None,
+    limits: Limits = None,
     online: Online = False,
     duration: Duration = None,
     period: Period = None,
+    beyond_reach: BeyondReach = False,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Compute the feedforward voltage for a reference."""
     from .._support.files import make_folder, picture_files, save_figures, together, write_columns
     from .._support.units import shown_unit
+    from ..control.plant import plant_of
+    from ..control.tracking import check_within_reach
     from ..control.tracking_plot import plot_feedforward
     from ..identification.identified import load
 
     known = load(model)
     desired = _reference(reference, duration, period)
-    interval = Loop(True, dt, None, None, None, None, None).dt(known, desired)
+    settings = Loop(True, dt, limits, None, None, None, None)
+    interval, volts = settings.dt(known, desired), settings.volts(known)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write(["feedforward.csv", *picture_files("feedforward")])
     samples = desired.sample(interval)
+    if not beyond_reach:
+        check_within_reach(plant_of(known), volts, samples)
     voltage, how = known.inverse(playback="online" if online else "table").played(
-        desired, interval, samples=samples
+        desired, interval, samples=samples, limits=volts
     )
+    voltage = voltage.clip(*volts)
     unit, scale = shown_unit(known.drive_unit)
     what = "voltage" if unit == "V" else "drive"
     shown = scale * voltage

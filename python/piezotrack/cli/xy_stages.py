@@ -32,7 +32,7 @@ class OwnStage:
             driven_by_voltage(load(file), file) for file in self._files
         ]
         self._loop = loop
-        names = dict.fromkeys(file.name for file in self._files)
+        names = dict.fromkeys(str(file) for file in self._files)
         self.name = " and ".join(names)
         self.words = "feedforward by the inverse of each"
 

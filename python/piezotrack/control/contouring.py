@@ -294,7 +294,7 @@ def contour(
             if not free[0]:
                 check_stable(axis, controller, delay)
             if not free[1]:
-                check_within_reach(axis, controller, samples[-1])
+                check_within_reach(axis, controller.limits, samples[-1])
         except ParameterError as error:
             raise ParameterError(f"{name}: {error}") from None
         along = samples[-1] if ahead is reference else ahead.sample(controller.dt)

@@ -21,6 +21,8 @@ __all__ = ["Controller", "number_pair"]
 
 # Sampling interval for the reach of a stage [s]: its drive takes seconds.
 REACH_STEP = 0.05
+# Readings are valid up to this distance from 0 where nothing is known of the stage [m].
+WIDEST = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,6 +79,8 @@ class Controller:
     filters: Sequence[LowPass | Notch] = ()
     span: tuple[float, float] | None = None
     max_jump: float | None = None
+    # Readings that are valid [m], also where `span` is not given.
+    _valid: tuple[float, float] = field(init=False, repr=False, compare=False)
     _core: _core.Controller = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -96,10 +100,11 @@ class Controller:
         if isinstance(self.repetitive, Repetitive):
             _check_unit("kq", self.repetitive.kq, high - low, "Repetitive")
         pid, law = self.feedback, self.feedback
+        span = self._span(low, high)
         core = _core.Controller(
             dt=dt,
             limits=(low, high),
-            span=self._span(low, high),
+            span=span,
             max_jump=None if self.max_jump is None else _core.as_number("max_jump", self.max_jump),
             pid=(pid.kp, pid.ti, pid.td, pid.tt) if isinstance(pid, Pid) else None,
             state_space=law._matrices if isinstance(law, StateSpace) else None,
@@ -107,6 +112,7 @@ class Controller:
             filters=[one._settings for one in self.filters],
         )
         object.__setattr__(self, "_core", core)
+        object.__setattr__(self, "_valid", span or (-WIDEST, WIDEST))
 
     @classmethod
     def of(
@@ -199,8 +205,8 @@ class Controller:
         Parameters
         ----------
         present : float, optional
-            Voltage at the stage now [V], for a bumpless start. By default the feedback part begins
-            at 0 V.
+            Voltage at the stage now [V], for a bumpless start of the feedback. By default it begins
+            at 0 V. Without feedback the first command is the feedforward, whatever is there.
 
         Returns
         -------

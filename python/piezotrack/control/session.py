@@ -68,6 +68,10 @@ class RefusedReadings(NamedTuple):
     jumps: int
 
 
+# A feedforward is refused that is this many ranges of the limits beyond them: it is in mV.
+FAR = 10.0
+
+
 class Session:
     """A running controller: one call of `step` in each sampling interval.
 
@@ -126,10 +130,13 @@ class Session:
         Raises
         ------
         ParameterError
-            `reference` is outside of the span, or `measured` is at the first sample where another
-            unit explains it. Nothing has changed then.
+            `reference` or `preview` is outside of the span, or `measured` is at the first sample
+            where another unit explains it; `velocity` or `feedforward` is far beyond what the stage
+            can have. Nothing has changed then.
         """
         voltage = 0.0 if feedforward is None else feedforward
+        if velocity is not None or preview is not None or feedforward is not None:
+            self._check_ahead(velocity, preview, feedforward)
         try:
             if feedforward is None and self._inverse is not None:
                 self._core.check(reference, measured)
@@ -142,6 +149,35 @@ class Session:
             for name, value in given.items():
                 _core.as_number(name, value)
             raise
+
+    def _check_ahead(
+        self, velocity: float | None, preview: float | None, feedforward: float | None
+    ) -> None:
+        """Refuse what only another unit explains, before it reaches the stage."""
+        low, high = self._controller._valid
+        if (
+            preview is not None
+            and not low <= (place := _core.as_number("preview", preview)) <= high
+        ):
+            raise ParameterError(
+                f"preview is {place:g} m: expected {low:.4g} to {high:.4g} m, what the sensor of "
+                "this controller can show"
+            )
+        fastest = (high - low) / self._controller.dt
+        if velocity is not None and abs(speed := _core.as_number("velocity", velocity)) > fastest:
+            raise ParameterError(
+                f"velocity is {speed:g} m/s: expected {fastest:.3g} m/s at most, the span of the "
+                "sensor in one sampling interval"
+            )
+        least, most = self._controller.limits
+        far = FAR * (most - least)
+        if feedforward is not None:
+            volts = _core.as_number("feedforward", feedforward)
+            if volts < least - far or volts > most + far:
+                raise ParameterError(
+                    f"feedforward is {volts:g} V: expected a voltage near the limits, {least:g} to "
+                    f"{most:g} V"
+                )
 
     def step_um(
         self,

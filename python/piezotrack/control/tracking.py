@@ -364,7 +364,7 @@ def track(
     if not _core.as_truth("unstable", unstable):
         check_stable(plant, controller, delay)
     if not _core.as_truth("beyond_reach", beyond_reach):
-        check_within_reach(plant, controller, samples)
+        check_within_reach(plant, controller.limits, samples)
     voltage, note = feedforward_of(controller, reference, samples)
     sampling = (delay, not_negative("jitter", jitter, "s"), substeps)
     before = voltages_before(plant, visited, controller.limits)
@@ -474,11 +474,11 @@ def check_stable(stage: VirtualStage, controller: Controller, delay: float) -> N
 
 def check_within_reach(
     stage: VirtualStage,
-    controller: Controller,
+    limits: tuple[float, float],
     samples: SampledReference,
 ) -> None:
-    """Refuse a reference that exceeds the reach of the stage between the limits."""
-    low, high = controller.limits
+    """Refuse a reference that exceeds the reach of the stage between two voltages [V]."""
+    low, high = limits
     bottom, top = reach(stage, (low, high), 1e-3)
     slack = 0.01 * (top - bottom)
     for value, past, edge in (
@@ -489,8 +489,9 @@ def check_within_reach(
             k = int(np.flatnonzero(samples.x == value)[0])
             raise ParameterError(
                 f"reference is {1e6 * value:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} um "
-                f"beyond {1e6 * edge:.4g} um: expected {1e6 * bottom:.4g} to {1e6 * top:.4g} um, "
-                f"which this stage reaches from {low:g} to {high:g} V, or beyond_reach=True"
+                f"beyond {1e6 * edge:.4g} um: expected {1e6 * bottom:.4g} to {1e6 * top:.4g} um "
+                f"on the sensor, which this stage reaches from {low:g} to {high:g} V, or "
+                "beyond_reach=True"
             )
     # The loop stays above the curve from rest: once up, the stage no longer comes all the way down.
     k = int(np.argmax(samples.x))

@@ -30,6 +30,8 @@ JUMP = 0.2
 CLOSED = 0.1
 # A drive held at its extreme for this share of the window counts as clipped.
 CLIPPED = 0.1
+# Sampling interval of a record whose time is probably in ms [s].
+SELDOM = 0.5
 # Voltages [V], gains [m/V] and strokes [m] beyond which a piezo stage is implausible.
 TOO_MANY_VOLTS = 1500.0
 HIGHEST_GAIN, LONGEST = 2e-4, 5e-3
@@ -97,7 +99,7 @@ would be 40 um if it is 1e6 too large, as um taken as m
     """
     if np.ptp(data.u) == 0.0 or np.ptp(data.y) == 0.0:
         return []
-    return [*_units(data), *_periods(data), *_clipping(data)]
+    return [*_units(data), *_seldom(data), *_periods(data), *_clipping(data)]
 
 
 def fit_warnings(
@@ -185,6 +187,15 @@ def _steps(u: Array) -> bool:
     moves = np.abs(np.diff(u))
     most = float(moves.max())
     return bool(most >= JUMP * np.ptp(u) or np.mean(moves > 0.01 * most) < 0.1)
+
+
+def _seldom(data: Dataset) -> list[str]:
+    """Warn of a sampling interval that only a wrong unit explains."""
+    if data.dt < SELDOM:
+        return []
+    return [
+        f"it is sampled every {data.dt:g} s: is the time in ms? It would be {1e3 / data.dt:g} Hz"
+    ]
 
 
 def _units(data: Dataset) -> list[str]:

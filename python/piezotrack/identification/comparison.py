@@ -14,7 +14,7 @@ from .. import _core
 from .._support.files import picture_files, write_document
 from ..data.dataset import Dataset
 from ..errors import ParameterError
-from ..stages.registry import MODELS, ModelInfo
+from ..stages.registry import MODELS, ModelInfo, model_named
 from .fit import identify
 from .identified import IdentifiedModel, Score, load
 from .model_file import provenance
@@ -384,11 +384,14 @@ def _source(model: object) -> tuple[str | None, ModelInfo | IdentifiedModel]:
                 return None, info
         if Path(model).suffix == ".json":
             return Path(model).stem, load(model)
-    shown = model if isinstance(model, (str, os.PathLike)) else type(model).__name__
-    known = ", ".join(repr(info.name) for info in MODELS)
+        try:
+            model_named(str(model))
+        except ParameterError as error:
+            words = str(error).removeprefix("model is ")
+            raise ParameterError(f"models has {words}; or the JSON file of a model") from None
     raise ParameterError(
-        f"models has {str(shown)!r}: expected {known}, the JSON file of a model, or an identified "
-        "model"
+        f"models has '{type(model).__name__}': expected names of models, JSON files of models, or "
+        "identified models"
     )
 
 

@@ -172,7 +172,10 @@ def identify(
     K = 26.1 kN/m, True
     """
     if not isinstance(data, Dataset):
-        raise ParameterError(f"data is {type(data).__name__}: expected a Dataset, see pt.read")
+        raise ParameterError(
+            f"data is {type(data).__name__}: expected a Dataset, as pt.read "
+            "or pt.Dataset.from_frame make it"
+        )
     offset = _core.as_truth("offset", offset)
     history = checked_history(history)
     of_swarm: dict[str, Any] = {

@@ -250,7 +250,9 @@ class IdentifiedModel:
         inverse: Inverse = self.model.inverse(playback=playback, settle=settle, initial=initial)
         return replace(inverse, offset=self.offset, delay=self.delay)
 
-    def displacement(self, u: ArrayLike, dt: float, *, hold: Hold = "foh") -> Array:
+    def displacement(
+        self, u: ArrayLike, dt: float, *, hold: Hold = "foh", initial: StageState | None = None
+    ) -> Array:
         """Sensor reading under a drive, from rest.
 
         Parameters
@@ -261,13 +263,15 @@ class IdentifiedModel:
             Sampling interval [s].
         hold : {"foh", "zoh"}, optional
             As for `simulate` of the stage.
+        initial : StageState, optional
+            State at the first sample, as ``model.equilibrium(u[0])``; by default never driven.
 
         Returns
         -------
         ndarray, shape (n,)
             Displacement with offset and delay [m].
         """
-        return self._shown(self.model.simulate(u, dt, hold=hold)) + self.offset
+        return self._shown(self.model.simulate(u, dt, hold=hold, initial=initial)) + self.offset
 
     def _shown(self, run: Response) -> Array:
         """Displacement with the delay of the sensor [m]."""

@@ -123,13 +123,13 @@ def identify_best(
     for info in infos:
         try:
             fit = identify_kind(part, info, of_swarm=trial, **common)
+            score = fit.score(rest, offset=fit.offset) if rest is not part else fit.fitted
             if info.name == BY_PLAYS and fit.start is not None:
                 # What swarms would ask a stage with plays for, each time again.
                 common["shown"] = fit.start.history
         except (DataError, NumericalError) as error:
             refused = refused or error
             continue
-        score = fit.score(rest, offset=fit.offset) if rest is not part else fit.fitted
         found.append((Trial(info.name, info.title, score.rms), info))
         # Of a quick motion, differences from sample to sample are not the noise's alone.
         if score.rms < AS_NOISE * noise and _white(

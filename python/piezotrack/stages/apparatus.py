@@ -13,6 +13,10 @@ from ..errors import ParameterError
 __all__ = ["Amplifier", "Preconditioning", "Sensor"]
 
 
+# Noise that is in another unit [m rms].
+NOT_A_SENSOR = 1e-3
+
+
 def _as_numbers(part: object) -> None:
     """Take the fields of a part as numbers, `limits` as two and `seed` as a count."""
     for one in fields(part):  # type: ignore[arg-type]
@@ -110,6 +114,11 @@ class Sensor:
 
     def __post_init__(self) -> None:
         _as_numbers(self)
+        if self.noise >= NOT_A_SENSOR:
+            raise ParameterError(
+                f"noise is {self.noise:g} m rms: expected metres, and no sensor of a piezo stage "
+                f"is so noisy; {self.noise:g} nm is {self.noise:g}e-9"
+            )
 
     @property
     def _numbers(self) -> tuple[float, float, float, float, float, float, int]:
