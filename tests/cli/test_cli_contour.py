@@ -69,6 +69,25 @@ def test_two_models_are_the_two_axes() -> None:
     assert abs(rows["contour_error_um"][late].mean()) < 0.05
 
 
+@pytest.mark.usefixtures("_no_pictures")
+def test_each_axis_may_have_its_own_gain() -> None:
+    """One falls as the voltage rises: no gain is right for both."""
+    stage = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(), weights=(), time_constant=5e-3)
+    for name, linear in (("x.json", 1e-6), ("y.json", -0.2e-6)):
+        pt.identification.IdentifiedModel(
+            model=replace(stage, linear=linear), offset=0.0, offset_fitted=True, stroke=50e-6
+        ).save(name)
+    course = "contour x.json y.json --path circle:0.5Hz,2um --dt 0.005 --limits 0:75 --ti 0.02"
+    printed = ran(*course.split(), "--kp", "0.05,-0.25", "--no-feedforward")
+    assert "contour error" in printed
+    assert "y: the loop is unstable" in refusal(
+        *course.split(), "--kp", "0.05", "--no-feedforward", "--overwrite"
+    )
+    assert "--kp is '1,2,3': expected one gain, or KX,KY" in refusal(
+        *course.split(), "--kp", "1,2,3"
+    )
+
+
 def test_the_options_reach_the_stage_and_the_loops() -> None:
     options = (
         "--path lissajous:0.5/1Hz,5/5um --lag 0.04 --cross-talk 0.1:-0.08 --decouple --kp 0.1 "

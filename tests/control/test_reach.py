@@ -17,7 +17,8 @@ def test_a_reference_out_of_reach_is_told_how_far_and_where() -> None:
     with pytest.raises(
         pt.ParameterError,
         match=r"reference is 150 um at 2\.5 s, 3\d(\.\d)? um beyond 11\d\S* um: expected -0\.\d+ "
-        r"to 11\d\S* um on the sensor, which this stage reaches from 0 to 75 V, or beyond_reach=True",
+        r"to 11\d\S* um on the sensor, which this stage reaches from 0 to 75 V, "
+        r"or beyond_reach=True",
     ):
         pt.track(STAGE, loop(feedback=PID), sine(0.2, 10.0, 0.0, 150 * UM))
     run = pt.track(STAGE, loop(feedback=PID), sine(0.2, 10.0, 0.0, 150 * UM), beyond_reach=True)

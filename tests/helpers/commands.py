@@ -50,7 +50,7 @@ def run(*arguments: str) -> Any:
 
 def without_progress(errors: str) -> str:
     """What was said on stderr beside the lines of progress, which a busy machine brings about."""
-    return re.sub(r"(?m)^(identify|reproduce): .*, \d+ s\n", "", errors)
+    return re.sub(r"(?m)^(identify|compare|reproduce)[:,] .*\d+ s\n", "", errors)
 
 
 def as_printed(text: str) -> str:
@@ -72,8 +72,9 @@ def refusal(*arguments: str) -> str:
     assert result.exit_code == 2, result.output
     assert isinstance(result.exception, SystemExit)
     assert result.stdout == ""
-    assert re.fullmatch(r"piezotrack: [^\n]+\n", result.stderr), result.stderr
-    return str(result.stderr).removeprefix("piezotrack: ").rstrip("\n")
+    said = without_progress(result.stderr)
+    assert re.fullmatch(r"piezotrack: [^\n]+\n", said), said
+    return said.removeprefix("piezotrack: ").rstrip("\n")
 
 
 def write_model() -> None:

@@ -19,7 +19,6 @@ from .loop_options import (
     Feedback,
     Feedforward,
     Interval,
-    Kp,
     Limits,
     Loop,
     LoopDelay,
@@ -38,6 +37,7 @@ from .options import (
     Overwrite,
     Period,
     Quiet,
+    number,
     number_range,
     refuse_without_effect,
 )
@@ -103,7 +103,14 @@ def contour_command(
     limits: Limits = None,
     feedforward: Feedforward = True,
     feedback: Feedback = None,
-    kp: Kp = None,
+    kp: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KP|KX,KY",
+            help=f"Proportional gain of the PID in V/um, or one for each axis; on {PAPER} 0.12.",
+            show_default=False,
+        ),
+    ] = None,
     ti: Ti = None,
     td: Td = None,
     delay: LoopDelay = 0.0,
@@ -131,13 +138,15 @@ def contour_command(
     from ..xu_li_2010.table_2 import run_table_2
 
     own = _is_own(stage, models, table_2)
-    loop = Loop(own, dt, limits, feedback, kp, ti, td)
+    gains = _gains(kp)
+    loop = Loop(own, dt, limits, feedback, gains[0], ti, td)
     loop.check(context)
     refuse_of_other_stage(context, own)
     if own and not (noise_nm or jitter):
         refuse_without_effect(context, ["seed"], "without --noise-nm or --jitter")
     _check(context, models, path, table_2, feedforward, own)
-    xy = OwnStage(models, loop) if own else PaperStage(models, loop, seed)
+    both = loop, replace(loop, kp=gains[1])
+    xy = OwnStage(models, both) if own else PaperStage(models, loop, seed)
     plant = _changed(xy.stage(1e-9 * noise_nm, bandwidth, seed), lag, cross_talk)
     desired = None if path is None else _path(path, duration, period, path_dt, xy.place(plant))
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
@@ -154,14 +163,26 @@ def contour_command(
         written, words, document = _write_table(table, out), str(table), _table_document(table)
     else:
         run = contour(plant, loops, desired, **mixing, beyond_reach=beyond_reach, unstable=unstable)
-        document = _document(run)
-        written, words = _write(run, document, out), run.summary()
+        notes = xy.notes(run)
+        document = _document(run, notes)
+        words = "\n".join([run.summary(), *(f"note  {note}" for note in notes)])
+        written = _write(run, document, out)
     shares = [f"{100 * share:g} %" for share in plant.cross_talk]
     between = f"y lags by {plant.lag:g} s, {shares[0]} of y in x, {shares[1]} of x in y"
     lines = [f"stage: {xy.name}: {between}; {how}", words]
     if own and not loop.has_feedback:
         lines.append(NO_FEEDBACK)
     result.show("\n".join(lines), document | {"stage": MODEL if own else PAPER}, written)
+
+
+def _gains(kp: str | None) -> tuple[float | None, float | None]:
+    """Parse one gain for both axes, or one for each."""
+    if kp is None:
+        return None, None
+    parts = [number("--kp", part) for part in kp.split(",")]
+    if len(parts) > 2:
+        raise ParameterError(f"--kp is '{kp}': expected one gain, or KX,KY")
+    return parts[0], parts[-1]
 
 
 def _is_own(stage: str | None, models: list[Path] | None, table_2: bool) -> bool:
@@ -251,7 +272,7 @@ def _cross_talk(stage: XYStage, loops: tuple[Controller, Controller]) -> CrossTa
     )
 
 
-def _document(run: Contour) -> dict[str, Any]:
+def _document(run: Contour, notes: list[str]) -> dict[str, Any]:
     """Content of the JSON file: the metrics."""
     from .. import __version__
 
@@ -266,7 +287,7 @@ def _document(run: Contour) -> dict[str, Any]:
         "x": asdict(run.x.metrics),
         "y": asdict(run.y.metrics),
         "feedforward": run.x.note,
-        "notes": run.notes,
+        "notes": [*run.notes, *notes],
         "provenance": {"package": "piezotrack", "version": __version__},
     }
 

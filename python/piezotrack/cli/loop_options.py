@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from ..control.components import Pid, Repetitive
     from ..control.stability import LoopCheck
+    from ..control.tracking import Tracking
     from ..identification.identified import IdentifiedModel
     from ..references.reference import Reference
 
@@ -35,6 +36,7 @@ __all__ = [
     "Td",
     "Ti",
     "check_stage",
+    "drive_notes",
     "driven_by_voltage",
     "refuse_of_other_stage",
     "small_margins",
@@ -233,6 +235,16 @@ def small_margins(loop: LoopCheck) -> list[str]:
     if not loop.stable or not small:
         return []
     return [f"the loop is close to instability, {' and '.join(small)}: lower the gain"]
+
+
+def drive_notes(model: IdentifiedModel, run: Tracking) -> list[str]:
+    """Remarks on a run beyond the range or the rate of the record identified."""
+    notes = model.beyond_fit(run.voltage)
+    if run.controller.feedforward is not None:
+        # The rate of the feedforward: a loop's voltage has the noise of the sensor.
+        rate = model.beyond_fit(run.feedforward, run.controller.dt)
+        notes += [note for note in rate if note not in notes and " moves at " in note]
+    return notes
 
 
 def check_stage(stage: str | None) -> None:

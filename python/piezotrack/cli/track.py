@@ -28,6 +28,7 @@ from .loop_options import (
     Td,
     Ti,
     check_stage,
+    drive_notes,
     driven_by_voltage,
     refuse_of_other_stage,
     small_margins,
@@ -174,10 +175,7 @@ def track_command(
     run = track(plant, loop, desired, delay=delay, jitter=jitter, **free)
     name = f"stage: {model.name}" if own else "stage: the virtual stage of Xu and Li 2010"
     lines = [name, run.summary()]
-    notes = known.beyond_fit(run.voltage)
-    # The rate of the feedforward: a loop's voltage has the noise of the sensor.
-    rate = known.beyond_fit(run.feedforward, loop.dt) if feedforward else []
-    notes += [note for note in rate if note not in notes and " moves at " in note]
+    notes = drive_notes(known, run)
     lines += [f"note  {note}" for note in notes]
     if loop.feedback is not None or loop.repetitive is not None:
         margins = check_loop(plant, loop, delay=delay).middle

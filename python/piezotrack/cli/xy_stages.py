@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ParameterError
-from .loop_options import PAPER, driven_by_voltage
+from .loop_options import PAPER, drive_notes, driven_by_voltage
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from ..control.contouring import Contour
     from ..control.controller import Controller
     from ..identification.identified import IdentifiedModel
     from ..references.xy_reference import XYReference
@@ -23,7 +24,7 @@ __all__ = ["OwnStage", "PaperStage"]
 class OwnStage:
     """The stage of one's own models: of x and y, or one for both."""
 
-    def __init__(self, models: list[Path] | None, loop: Loop) -> None:
+    def __init__(self, models: list[Path] | None, loops: tuple[Loop, Loop]) -> None:
         from ..identification.identified import load
 
         files = models or []
@@ -31,7 +32,7 @@ class OwnStage:
         self._models: list[IdentifiedModel] = [
             driven_by_voltage(load(file), file) for file in self._files
         ]
-        self._loop = loop
+        self._loops = loops
         names = dict.fromkeys(str(file) for file in self._files)
         self.name = " and ".join(names)
         self.words = "feedforward by the inverse of each"
@@ -49,7 +50,7 @@ class OwnStage:
         return XYStage(x=x, y=y)
 
     def _limits(self) -> list[tuple[float, float]]:
-        return [self._loop.volts(model) for model in self._models]
+        return [loop.volts(model) for loop, model in zip(self._loops, self._models, strict=True)]
 
     def place(self, stage: XYStage) -> dict[str, Any]:
         """Find centre and origin of a path: the middle of the workspace, where a run begins."""
@@ -67,14 +68,19 @@ class OwnStage:
         assert path is not None
         x, y = (
             Controller(
-                dt=self._loop.dt(self._models[0], path.x),
+                dt=loop.dt(self._models[0], path.x),
                 limits=limits,
                 feedforward=model.inverse() if feedforward else None,
-                feedback=self._loop.pid(),
+                feedback=loop.pid(),
             )
-            for model, limits in zip(self._models, self._limits(), strict=True)
+            for loop, model, limits in zip(self._loops, self._models, self._limits(), strict=True)
         )
         return x, y
+
+    def notes(self, run: Contour) -> list[str]:
+        """Remarks on each axis beyond the range or the rate of its record."""
+        axes = zip("xy", self._models, (run.x, run.y), strict=True)
+        return [f"{axis}: {note}" for axis, model, of in axes for note in drive_notes(model, of)]
 
 
 class PaperStage:
@@ -104,6 +110,11 @@ class PaperStage:
         """Leave centre and origin to the defaults of the paths."""
         del stage
         return {}
+
+    def notes(self, run: Contour) -> list[str]:
+        """Say nothing of the stage of the paper."""
+        del run
+        return []
 
     def controllers(
         self, path: XYReference | None, feedforward: bool

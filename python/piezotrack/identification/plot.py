@@ -91,7 +91,9 @@ def plot_loop(
         ax.plot(times * data.u[kept], scale * y[kept], **style)
     ax.set(xlabel=f"drive [{literal(drive)}]", ylabel=f"displacement [{unit}]")
     heading(ax, title)
-    ax.legend(loc="upper left", frameon=False, fontsize="small")
+    # Beside the loop, which fills the other diagonal.
+    falls = float(np.dot(data.u - data.u.mean(), data.y - data.y.mean())) < 0.0
+    ax.legend(loc="upper right" if falls else "upper left", frameon=False, fontsize="small")
     return ax
 
 
