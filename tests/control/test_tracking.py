@@ -379,7 +379,7 @@ def test_the_summary_tells_the_run() -> None:
     lines = fig_12("FF FB").summary().splitlines()
     assert lines[0] == (
         "Reference(sine 0.2 Hz, 0 to 110 um, 20 s) at 50 Hz; "
-        "feedforward repeated from a table of period no. 2"
+        "feedforward of period 2 repeated from a table"
     )
     assert lines[1].startswith("from 5 s on: max ")
     assert "phase lag" in lines[1]

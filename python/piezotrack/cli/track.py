@@ -226,16 +226,19 @@ def feedforward_command(
     known = load(model)
     desired = _reference(reference, duration, period)
     settings = Loop(True, dt, limits, None, None, None, None)
-    interval, volts = settings.dt(known, desired), settings.volts(known)
+    interval = settings.dt(known, desired)
+    # A file without a record has no range.
+    volts = None if limits is None and known.drive_range is None else settings.volts(known)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write(["feedforward.csv", *picture_files("feedforward")])
     samples = desired.sample(interval)
-    if not beyond_reach:
+    if volts is not None and not beyond_reach:
         check_within_reach(plant_of(known), volts, samples)
     voltage, how = known.inverse(playback="online" if online else "table").played(
         desired, interval, samples=samples, limits=volts
     )
-    voltage = voltage.clip(*volts)
+    if volts is not None:
+        voltage = voltage.clip(*volts)
     unit, scale = shown_unit(known.drive_unit)
     what = "voltage" if unit == "V" else "drive"
     shown = scale * voltage

@@ -173,7 +173,8 @@ class Session:
         far = FAR * (most - least)
         if feedforward is not None:
             volts = _core.as_number("feedforward", feedforward)
-            if volts < least - far or volts > most + far:
+            # One that is not finite is held back by the core.
+            if math.isfinite(volts) and not least - far <= volts <= most + far:
                 raise ParameterError(
                     f"feedforward is {volts:g} V: expected a voltage near the limits, {least:g} to "
                     f"{most:g} V"
