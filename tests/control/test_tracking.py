@@ -434,7 +434,7 @@ def test_the_pictures_have_labels_with_units_and_no_empty_panel(which: str) -> N
     for ax in (motion, error, effort):
         assert ax.get_xlim() == pytest.approx((0.0, end))
     named = [text.get_text() for text in error.get_legend().get_texts()]  # type: ignore[union-attr]
-    clipped = ["voltage clipped"] if run.saturated.any() else []
+    clipped = ["command clipped"] if run.saturated.any() else []
     assert named == ["desired - measured", "largest of each period", *clipped]
     assert run.reference.name in figure.get_suptitle()
     assert "PID at 50 Hz" in figure.get_suptitle()

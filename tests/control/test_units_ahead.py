@@ -29,7 +29,7 @@ def session() -> pt.control.Session:
         ({"preview": 10.0}, "preview is 10 m: expected .* what the sensor of this controller"),
         (
             {"feedforward": 1500.0},
-            "feedforward is 1500 V: expected a voltage near the",
+            "feedforward is 1500 V: expected one near the limits, 0 to 3.6 V",
         ),
         ({"velocity": "fast"}, "velocity is 'fast'"),
     ],

@@ -147,7 +147,8 @@ def test_the_commands_take_it() -> None:
     drive = pt.read("results/feedforward.csv")
     # What the piezo is asked for brings about what was wanted.
     assert np.ptp(pt.load(model).simulate(drive).x[500:]) == pytest.approx(35e-6, rel=0.01)
-    said = refusal("track", model, "--reference", "sine:1Hz,5..40um")
+    paper = ("--stage", "xu-li-2010")
+    said = refusal("track", model, "--reference", "sine:1Hz,5..40um", *paper)
     assert said.startswith("prandtl-ishlinskii.json: the drive of this model is a position")
     Path("volts.csv").write_text("time_s,voltage_V\n0,0\n1,1\n2,0\n3,1\n", encoding="utf-8")
     said = refusal("simulate", "results/prandtl-ishlinskii.json", "volts.csv")
@@ -161,3 +162,37 @@ def test_auto_takes_it() -> None:
     assert result.exit_code == 0
     assert "prandtl-ishlinskii.json" in names("results")
     assert "V" not in result.stdout
+
+
+def test_closed_loops_take_it() -> None:
+    """Limits in um, gains in um/um: the same loop as with the same numbers in volts."""
+    write_log()
+    ran("identify", "curve.csv", "--model", "prandtl-ishlinskii")
+    course = ("--reference", "sine:1Hz,5..40um,4s", "--dt", "0.002", "--kp", "0.1", "--ti", "0.02")
+    model = "results/prandtl-ishlinskii.json"
+    printed = ran("track", model, *course, "--limits", "0:45", "--repetitive")
+    assert not re.search(r"\bV\b", printed)
+    assert re.search(r"loop at [\d.]+ um/um: stable", printed)
+    rows = np.genfromtxt("results/tracking.csv", delimiter=",", names=True)
+    assert {"drive_um", "feedforward_um", "feedback_um"} <= set(rows.dtype.names or ())
+    assert 0.0 <= rows["drive_um"].min() < 20.0 < rows["drive_um"].max() <= 45.0
+    late = rows["time_s"] > 2.0
+    assert np.abs(rows["desired_um"] - rows["measured_um"])[late].max() < 0.5
+    said = refusal("track", model, *course[:2], "--kp", "900", "--ti", "0.02", "--overwrite")
+    assert re.search(r"on this stage, [\d.]+ um/um; at the limit kp would be [\d.]+ um/um", said)
+    said = refusal("track", model, "--reference", "sine:1Hz,5..400um", "--overwrite")
+    assert re.search(r"which this stage reaches from [\d.]+ to [\d.]+ um", said)
+    two = ("contour", model, "--path", "circle:1Hz,5um", "--kp", "0.1", "--ti", "0.02")
+    assert not re.search(r"\bV\b", ran(*two, "--dt", "0.002"))
+
+
+def test_a_session_in_python_has_its_unit() -> None:
+    fit = pt.identify(height(), "prandtl-ishlinskii")
+    loop = pt.Controller.of(fit, feedback=pt.Pid(kp=0.1, ti=0.02))
+    assert loop.drive_unit == "m"
+    assert " V" not in repr(loop) + repr(loop.start()) + str(pt.check_loop(fit, loop))
+    volts = pt.Controller(dt=loop.dt, limits=loop.limits)
+    with pytest.raises(pt.ParameterError, match="controller has the drive_unit 'V': expected that"):
+        pt.track(fit, volts, pt.sine(frequency=1.0, low=5e-6, high=40e-6, duration=2.0))
+    with pytest.raises(pt.ParameterError, match="drive_unit is 'um': expected 'V', 'm' or 'N'"):
+        pt.Controller(dt=0.01, limits=(0.0, 1.0), drive_unit="um")

@@ -19,5 +19,5 @@ class Picture(Figure):
     def _ipython_display_(self) -> None:
         if "inline" in mpl.get_backend():
             plt.close(self)
-        # It is shown as any other figure.
+        # By IPython's protocol: it is shown as any other figure.
         raise NotImplementedError

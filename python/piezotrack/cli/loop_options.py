@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from .._support.units import shown_unit
 from ..errors import ParameterError
 from .options import number_range, refuse_without_effect
 
@@ -40,11 +41,14 @@ __all__ = [
     "driven_by_voltage",
     "refuse_of_other_stage",
     "small_margins",
+    "unit_of",
 ]
 
 # Names of the stages that can be simulated: the model itself, and that of the paper.
 MODEL, PAPER = "model", "xu-li-2010"
-NO_FEEDBACK = "no feedback: give --kp in V/um and --ti in s for a PID controller"
+NO_FEEDBACK = (
+    "no feedback: give --kp in V/um and --ti in s for a PID controller; in um/um for a drive in um"
+)
 # The loop of Xu and Li 2010: sampling interval in s, limits in V, gains in V/um and s.
 PAPER_DT, PAPER_LIMITS = 0.02, (0.0, 75.0)
 PAPER_KQ, PAPER_TQ = 1.0, 0.2
@@ -71,8 +75,8 @@ Limits = Annotated[
     str | None,
     typer.Option(
         metavar="LOW:HIGH",
-        help="Voltage limits of the amplifier in V; default the drive range of the record "
-        f"identified, of {PAPER} 0:75.",
+        help="Limits of the drive in V, or in um where that is its unit; default the drive range "
+        f"of the record identified, of {PAPER} 0:75.",
         show_default=False,
     ),
 ]
@@ -86,7 +90,7 @@ Feedback = Annotated[
 Kp = Annotated[
     float | None,
     typer.Option(
-        help=f"Proportional gain of the PID in V/um; on {PAPER} 0.12.", show_default=False
+        help=f"Proportional gain of the PID in V/um, or um/um; on {PAPER} 0.12.", show_default=False
     ),
 ]
 Ti = Annotated[
@@ -147,7 +151,7 @@ class Loop:
             return not self.own or self.kp is not None
         return self.feedback
 
-    def pid(self) -> Pid | None:
+    def pid(self, model: IdentifiedModel | None) -> Pid | None:
         """Make the feedback; the paper's gains are for its own stage only."""
         from ..control.components import Pid
 
@@ -163,7 +167,7 @@ class Loop:
                 f"{missing} is missing: expected --kp in V/um and --ti in s for feedback on this "
                 "stage, or --no-feedback"
             )
-        return Pid.from_um(kp=self.kp, ti=self.ti, td=self.td or 0.0, tt=self.tt)
+        return Pid(kp=self.kp * _per_um(model), ti=self.ti, td=self.td or 0.0, tt=self.tt)
 
     def dt(self, model: IdentifiedModel | None, reference: Reference | None) -> float:
         """Return the sampling interval: as given, of the reference's file, or of the record [s]."""
@@ -179,7 +183,9 @@ class Loop:
     def volts(self, model: IdentifiedModel | None) -> tuple[float, float]:
         """Return the voltage limits: as given, or the range of the model's record [V]."""
         if self.limits is not None:
-            return number_range("--limits", self.limits)
+            low, high = number_range("--limits", self.limits)
+            _, scale = shown_unit(unit_of(self.own, model))
+            return low / scale, high / scale
         known = model.drive_range if self.own and model else PAPER_LIMITS
         if known is None:
             raise _missing("--limits", "the voltage limits as LOW:HIGH in V")
@@ -198,6 +204,8 @@ class Loop:
         if kq is None and self.own:
             _, middle, _ = linearised_plants(plant_of(model), self.volts(model), 0.0)
             kq = 0.5e-6 / middle.static_gain
+        elif kq is not None and self.own:
+            kq *= 1e-6 * _per_um(model)
         return Repetitive.from_um(
             period=period,
             kq=PAPER_KQ if kq is None else kq,
@@ -206,13 +214,24 @@ class Loop:
 
 
 def driven_by_voltage(model: IdentifiedModel, file: Path) -> IdentifiedModel:
-    """Refuse a model whose drive is a position: limits and gains of a loop are in V and V/um."""
+    """Refuse a model whose drive is a position for the stage of the paper, which has volts."""
     if model.drive_unit == "m":
         raise ParameterError(
-            f"{file.name}: the drive of this model is a position, in um: expected a drive in V; "
-            "piezotrack feedforward computes the drive of this model for a reference"
+            f"{file.name}: the drive of this model is a position, in um: expected a drive in V, "
+            f"which the stage of {PAPER} has"
         )
     return model
+
+
+def unit_of(own: bool, model: IdentifiedModel | None) -> str:
+    """Return the unit of the drive of the loop, SI."""
+    return model.drive_unit if own and model is not None else "V"
+
+
+def _per_um(model: IdentifiedModel | None) -> float:
+    """Factor from a gain in V/um, or in um/um where the drive is a position, to SI."""
+    _, scale = shown_unit(unit_of(True, model))
+    return 1e6 / scale
 
 
 def _missing(option: str, expected: str) -> ParameterError:

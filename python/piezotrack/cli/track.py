@@ -32,6 +32,7 @@ from .loop_options import (
     driven_by_voltage,
     refuse_of_other_stage,
     small_margins,
+    unit_of,
 )
 from .options import (
     Duration,
@@ -154,15 +155,16 @@ def track_command(
         refuse_without_effect(context, ["kq", "tq"], "without --repetitive")
     if own and not (noise_nm or jitter):
         refuse_without_effect(context, ["seed"], "without --noise-nm or --jitter")
-    known = driven_by_voltage(load(model), model)
+    known = load(model) if own else driven_by_voltage(load(model), model)
     desired = _reference(reference, duration, period)
     playback: Literal["table", "online"] = "online" if online else "table"
     loop = Controller(
         dt=settings.dt(known, desired),
         limits=settings.volts(known),
         feedforward=known.inverse(playback=playback) if feedforward else None,
-        feedback=settings.pid(),
+        feedback=settings.pid(known),
         repetitive=settings.repetitive(known, desired, kq, tq) if repetitive else None,
+        drive_unit=unit_of(own, known),
     )
     plant = (
         VirtualStage.of(known, noise=1e-9 * noise_nm, bandwidth=bandwidth, seed=seed)
@@ -233,7 +235,7 @@ def feedforward_command(
     result.will_write(["feedforward.csv", *picture_files("feedforward")])
     samples = desired.sample(interval)
     if volts is not None and not beyond_reach:
-        check_within_reach(plant_of(known), volts, samples)
+        check_within_reach(plant_of(known), volts, samples, known.drive_unit)
     voltage, how = known.inverse(playback="online" if online else "table").played(
         desired, interval, samples=samples, limits=volts
     )
@@ -293,7 +295,7 @@ def _document(
         "schema_version": 1,
         "reference": repr(run.reference),
         "dt": {"value": loop.dt, "unit": "s"},
-        "limits": {"value": list(loop.limits), "unit": "V"},
+        "limits": {"value": list(loop.limits), "unit": loop.drive_unit},
         "feedback": None if loop.feedback is None else repr(loop.feedback),
         "repetitive": None if loop.repetitive is None else repr(loop.repetitive),
         "feedforward": run.note,

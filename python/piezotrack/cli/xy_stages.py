@@ -29,9 +29,7 @@ class OwnStage:
 
         files = models or []
         self._files = [files[0], files[-1]]
-        self._models: list[IdentifiedModel] = [
-            driven_by_voltage(load(file), file) for file in self._files
-        ]
+        self._models: list[IdentifiedModel] = [load(file) for file in self._files]
         self._loops = loops
         names = dict.fromkeys(str(file) for file in self._files)
         self.name = " and ".join(names)
@@ -71,7 +69,8 @@ class OwnStage:
                 dt=loop.dt(self._models[0], path.x),
                 limits=limits,
                 feedforward=model.inverse() if feedforward else None,
-                feedback=loop.pid(),
+                feedback=loop.pid(model),
+                drive_unit=model.drive_unit,
             )
             for loop, model, limits in zip(self._loops, self._models, self._limits(), strict=True)
         )
@@ -128,7 +127,7 @@ class PaperStage:
             dt=self._loop.dt(None, interval),
             limits=self._loop.volts(None),
             feedforward=inverse,
-            feedback=self._loop.pid(),
+            feedback=self._loop.pid(None),
         )
         return one, one
 

@@ -12,6 +12,7 @@ from .. import _core
 from .._support.arguments import not_negative
 from .._support.frames import frame_of
 from .._support.statistics import ErrorStatistics
+from .._support.units import shown_unit
 from ..errors import ParameterError
 from ..references.xy_reference import XYReference, square_matrix
 from ..stages.xy import XYStage
@@ -124,10 +125,12 @@ class Contour:
         """Columns of the run at the control samples, with their units in the names."""
         table = {"time_s": self.t}
         for name, axis in (("x", self.x), ("y", self.y)):
+            unit, scale = shown_unit(axis.controller.drive_unit)
+            command = "voltage" if unit == "V" else "drive"
             table |= {
                 f"desired_{name}_um": 1e6 * axis.desired,
                 f"measured_{name}_um": 1e6 * axis.measured,
-                f"voltage_{name}_V": axis.voltage,
+                f"{command}_{name}_{unit}": scale * axis.voltage,
             }
         return table | {"contour_error_um": 1e6 * self.error}
 
@@ -294,7 +297,7 @@ def contour(
             if not free[0]:
                 check_stable(axis, controller, delay)
             if not free[1]:
-                check_within_reach(axis, controller.limits, samples[-1])
+                check_within_reach(axis, controller.limits, samples[-1], controller.drive_unit)
         except ParameterError as error:
             raise ParameterError(f"{name}: {error}") from None
         along = samples[-1] if ahead is reference else ahead.sample(controller.dt)

@@ -21,6 +21,7 @@ __all__ = ["Controller", "number_pair"]
 
 # Sampling interval for the reach of a stage [s]: its drive takes seconds.
 REACH_STEP = 0.05
+DRIVE_UNITS = ("V", "m", "N")
 # Readings are valid up to this distance from 0 where nothing is known of the stage [m].
 WIDEST = 0.01
 
@@ -54,6 +55,9 @@ class Controller:
         Largest displacement in a sampling interval [m]. A reading further from the last valid one
         is no measurement either; the distance allowed grows with each sample without one. The first
         reading is believed.
+    drive_unit : {"V", "m", "N"}, optional
+        Unit of limits and commands, for what is printed: ``"m"`` where a position is commanded, as
+        the height of a piezo. Gains are then in m/m.
 
     Raises
     ------
@@ -79,13 +83,16 @@ class Controller:
     filters: Sequence[LowPass | Notch] = ()
     span: tuple[float, float] | None = None
     max_jump: float | None = None
+    drive_unit: str = "V"
     # Readings that are valid [m], also where `span` is not given.
     _valid: tuple[float, float] = field(init=False, repr=False, compare=False)
     _core: _core.Controller = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         dt = check_dt(self.dt)
-        low, high = number_pair("limits", self.limits, "V")
+        if self.drive_unit not in DRIVE_UNITS:
+            raise ParameterError(f"drive_unit is {self.drive_unit!r}: expected 'V', 'm' or 'N'")
+        low, high = number_pair("limits", self.limits, self.drive_unit)
         object.__setattr__(self, "limits", (low, high))
         _check_part("feedforward", self.feedforward, Inverse, "pt.Inverse")
         _check_part("feedback", self.feedback, (Pid, StateSpace), "pt.Pid or pt.control.StateSpace")
@@ -96,9 +103,9 @@ class Controller:
             if not isinstance(one, (LowPass, Notch)):
                 raise ParameterError(f"filters has {one!r}: expected pt.LowPass or pt.Notch")
         if isinstance(self.feedback, Pid):
-            _check_unit("kp", self.feedback.kp, high - low, "Pid")
+            _check_unit("kp", self.feedback.kp, high - low, "Pid", self.drive_unit)
         if isinstance(self.repetitive, Repetitive):
-            _check_unit("kq", self.repetitive.kq, high - low, "Repetitive")
+            _check_unit("kq", self.repetitive.kq, high - low, "Repetitive", self.drive_unit)
         pid, law = self.feedback, self.feedback
         span = self._span(low, high)
         core = _core.Controller(
@@ -174,6 +181,7 @@ class Controller:
             filters=filters,
             span=span,
             max_jump=max_jump,
+            drive_unit=model.drive_unit,
         )
 
     def __repr__(self) -> str:
@@ -250,16 +258,17 @@ def number_pair(name: str, ends: object, unit: str) -> tuple[float, float]:
     return low, high
 
 
-def _check_unit(name: str, gain: float, span: float, owner: str) -> None:
+def _check_unit(name: str, gain: float, span: float, owner: str, unit: str) -> None:
     """Refuse a gain that no nanopositioner can have: full span for 10 nm, or a trace for 1 mm."""
     if abs(gain) * 1e-8 > span:
         raise ParameterError(
-            f"{name} is {gain:g} V/m: expected a gain with which 10 nm of error asks for less "
-            f"than the whole range of {span:g} V; {1e-6 * gain:g} V/m is {1e-12 * gain:g} V/um"
+            f"{name} is {gain:g} {unit}/m: expected a gain with which 10 nm of error asks for less "
+            f"than the whole range of {span:g} {unit}; {1e-6 * gain:g} {unit}/m is "
+            f"{1e-12 * gain:g} {unit}/um"
         )
     if 0.0 < abs(gain) * 1e-3 < 1e-3 * span:
         raise ParameterError(
-            f"{name} is {gain:g} V/m: expected a gain with which 1 mm of error asks for more than "
-            "a thousandth of the range; if it is in V/um, write "
+            f"{name} is {gain:g} {unit}/m: expected a gain with which 1 mm of error asks for more "
+            f"than a thousandth of the range; if it is in {unit}/um, write "
             f"pt.{owner}.from_um({name}={gain:g}, ...)"
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from .._support.plot_style import literal
-from .._support.units import best_length_unit
+from .._support.units import best_length_unit, shown_unit
 from .components import Pid
 
 if TYPE_CHECKING:
@@ -31,9 +31,10 @@ def controller_text(controller: Controller) -> str:
     """Write a controller in a line, as its repr."""
     low, high = controller.limits
     filters = f", {len(controller.filters)} filters" if controller.filters else ""
+    unit, scale = shown_unit(controller.drive_unit)
     return (
         f"Controller({parts_text(controller)}, {1.0 / controller.dt:.6g} Hz, "
-        f"{low:g} to {high:g} V{filters})"
+        f"{scale * low:g} to {scale * high:g} {unit}{filters})"
     )
 
 

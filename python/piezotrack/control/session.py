@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .. import _core
 from .._support.arguments import finite
+from .._support.units import shown_unit
 from ..errors import ParameterError
 
 if TYPE_CHECKING:
@@ -170,14 +171,14 @@ class Session:
                 "sensor in one sampling interval"
             )
         least, most = self._controller.limits
-        far = FAR * (most - least)
+        far, unit = FAR * (most - least), self._controller.drive_unit
         if feedforward is not None:
             volts = _core.as_number("feedforward", feedforward)
             # One that is not finite is held back by the core.
             if math.isfinite(volts) and not least - far <= volts <= most + far:
                 raise ParameterError(
-                    f"feedforward is {volts:g} V: expected a voltage near the limits, {least:g} to "
-                    f"{most:g} V"
+                    f"feedforward is {volts:g} {unit}: expected one near the limits, {least:g} to "
+                    f"{most:g} {unit}"
                 )
 
     def step_um(
@@ -230,9 +231,10 @@ class Session:
     def __repr__(self) -> str:
         last, controller = self.last, self._controller
         low, high = controller.limits
+        unit, scale = shown_unit(controller.drive_unit)
         return (
-            f"<Session, {1.0 / controller.dt:.6g} Hz, {low:g} to {high:g} V: "
-            f"last {last.voltage:.4g} V, error {1e6 * last.error:.4g} um>"
+            f"<Session, {1.0 / controller.dt:.6g} Hz, {scale * low:g} to {scale * high:g} {unit}: "
+            f"last {scale * last.voltage:.4g} {unit}, error {1e6 * last.error:.4g} um>"
         )
 
     @property

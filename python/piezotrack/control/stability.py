@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import _core
 from .._support.arguments import not_negative
+from .._support.units import shown_unit
 from ..errors import ParameterError
 from .plant import linearised_plants, plant_of
 
@@ -69,6 +70,8 @@ class LoopCheck:
         other.
     hint : str or None
         What may be wrong with the gain.
+    drive_unit : str
+        Unit of the drive, for what is printed.
     """
 
     gain: float
@@ -85,9 +88,16 @@ class LoopCheck:
     small_gain: float | None
     hidden_roots: int
     hint: str | None
+    drive_unit: str = "V"
+
+    @property
+    def gain_text(self) -> str:
+        """The gain with its unit, such as 1.5 um/V."""
+        unit, scale = shown_unit(self.drive_unit)
+        return f"{1e6 * self.gain / scale:.3g} um/{unit}"
 
     def __str__(self) -> str:
-        text = f"{1e6 * self.gain:.3g} um/V: {'stable' if self.stable else 'UNSTABLE'}"
+        text = f"{self.gain_text}: {'stable' if self.stable else 'UNSTABLE'}"
         text += self._gains()
         # With a repetitive part these are margins of another loop: of the feedback alone.
         of = "" if self.small_gain is None else " of the feedback"
@@ -288,4 +298,5 @@ def _check(controller: Controller, plant: _core.LoopPlant) -> LoopCheck:
         small_gain=found["small_gain"],
         hidden_roots=found["hidden"],
         hint=found["hint"],
+        drive_unit=controller.drive_unit,
     )

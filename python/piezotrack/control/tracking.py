@@ -13,7 +13,9 @@ from .. import _core
 from .._support.arguments import not_negative, one_or_more_numbers
 from .._support.frames import frame_of
 from .._support.statistics import FIGURES, ErrorStatistics
+from .._support.units import shown_unit
 from ..errors import ParameterError
+from ..identification.identified import IdentifiedModel
 from ..references.reference import Reference, SampledReference
 from ..stages.inverse import PlayedVoltage
 from .components import Pid
@@ -27,7 +29,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
-    from ..identification.identified import IdentifiedModel
     from ..stages.virtual import VirtualStage
     from .plant import Plant
 
@@ -207,14 +208,16 @@ class Tracking:
     @property
     def table(self) -> dict[str, Array]:
         """Columns of the run at the control samples, with their units in the names."""
+        unit, scale = shown_unit(self.controller.drive_unit)
+        command = "voltage" if unit == "V" else "drive"
         return {
             "time_s": self.t,
             "desired_um": 1e6 * self.desired,
             "measured_um": 1e6 * self.measured,
-            "voltage_V": self.voltage,
-            "feedforward_V": self.feedforward,
-            "feedback_V": self.feedback,
-            "repetitive_V": self.repetitive,
+            f"{command}_{unit}": scale * self.voltage,
+            f"feedforward_{unit}": scale * self.feedforward,
+            f"feedback_{unit}": scale * self.feedback,
+            f"repetitive_{unit}": scale * self.repetitive,
         }
 
     def to_frame(self) -> Any:
@@ -357,6 +360,7 @@ def track(
     ):
         if not isinstance(value, kind):
             raise ParameterError(f"{name} is {type(value).__name__}: expected pt.{kind.__name__}")
+    check_drive_unit(stage, controller)
     delay = not_negative("delay", delay, "s")
     substeps = _core.as_count("substeps", substeps)
     samples = reference.sample(controller.dt)
@@ -364,12 +368,24 @@ def track(
     if not _core.as_truth("unstable", unstable):
         check_stable(plant, controller, delay)
     if not _core.as_truth("beyond_reach", beyond_reach):
-        check_within_reach(plant, controller.limits, samples)
+        check_within_reach(plant, controller.limits, samples, controller.drive_unit)
     voltage, note = feedforward_of(controller, reference, samples)
     sampling = (delay, not_negative("jitter", jitter, "s"), substeps)
     before = voltages_before(plant, visited, controller.limits)
     run = run_closed_loop(plant, controller, samples.x, voltage, sampling, before)
     return collected(run, controller, reference, samples, note, substeps)
+
+
+def check_drive_unit(stage: object, controller: Controller) -> None:
+    """Refuse a model that is driven by a position under a controller of volts, or the reverse."""
+    if not isinstance(stage, IdentifiedModel):
+        return
+    one, other = stage.drive_unit, controller.drive_unit
+    if "m" in (one, other) and one != other:
+        raise ParameterError(
+            f"controller has the drive_unit {other!r}: expected that of the model, {one!r}, as "
+            "pt.Controller.of gives it"
+        )
 
 
 def voltages_before(
@@ -453,13 +469,15 @@ def check_stable(stage: VirtualStage, controller: Controller, delay: float) -> N
     if report.stable:
         return
     one = report.middle
-    found = f"the loop is unstable on this stage, {1e6 * one.gain:.3g} um/V"
+    found = f"the loop is unstable on this stage, {one.gain_text}"
     law = controller.feedback
     without = one.gain_margin is not None and one.gain_margin < 1.0
     if without and one.stable_gains is not None and one.stable_gains[1] < 1.0:
         low, share = one.stable_gains
         if isinstance(law, Pid):
-            gains = f"{1e-6 * share * law.kp:.3g} V/um in place of {1e-6 * law.kp:.3g}"
+            unit, scale = shown_unit(controller.drive_unit)
+            kp = 1e-6 * scale * law.kp
+            gains = f"{share * kp:.3g} {unit}/um in place of {kp:.3g}"
             found += f"; at the limit kp would be {gains}"
             found += ", and half of that has a gain margin of 2" if low < 0.5 * share else ""
         else:
@@ -476,9 +494,11 @@ def check_within_reach(
     stage: VirtualStage,
     limits: tuple[float, float],
     samples: SampledReference,
+    drive_unit: str = "V",
 ) -> None:
     """Refuse a reference that exceeds the reach of the stage between two voltages [V]."""
     low, high = limits
+    unit, scale = shown_unit(drive_unit)
     bottom, top = reach(stage, (low, high), 1e-3)
     slack = 0.01 * (top - bottom)
     for value, past, edge in (
@@ -490,8 +510,8 @@ def check_within_reach(
             raise ParameterError(
                 f"reference is {1e6 * value:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} um "
                 f"beyond {1e6 * edge:.4g} um: expected {1e6 * bottom:.4g} to {1e6 * top:.4g} um "
-                f"on the sensor, which this stage reaches from {low:g} to {high:g} V, or "
-                "beyond_reach=True"
+                f"on the sensor, which this stage reaches from {scale * low:g} to "
+                f"{scale * high:g} {unit}, or beyond_reach=True"
             )
     # The loop stays above the curve from rest: once up, the stage no longer comes all the way down.
     k = int(np.argmax(samples.x))
@@ -500,6 +520,7 @@ def check_within_reach(
     if (past := lowest - samples.x[k]) > slack:
         raise ParameterError(
             f"reference is {1e6 * samples.x[k]:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} "
-            f"um below {1e6 * lowest:.4g} um: expected what the stage reaches at {low:g} V on the "
-            f"settled loop, from {1e6 * samples.x.max():.4g} um down, or beyond_reach=True"
+            f"um below {1e6 * lowest:.4g} um: expected what the stage reaches at {scale * low:g} "
+            f"{unit} on the settled loop, from {1e6 * samples.x.max():.4g} um down, or "
+            "beyond_reach=True"
         )

@@ -192,7 +192,8 @@ def plot_effort(run: Tracking, ax: Axes | None = None) -> Axes:
     'voltage [V]'
     """
     (ax,) = axes_or_new(ax, 1)
-    ax.step(run.t, run.voltage, where="post", **COMMAND)
+    unit, scale = shown_unit(run.controller.drive_unit)
+    ax.step(run.t, scale * run.voltage, where="post", **COMMAND)
     parts = (
         (run.feedforward, FEEDFORWARD),
         (run.feedback, FEEDBACK),
@@ -200,11 +201,12 @@ def plot_effort(run: Tracking, ax: Axes | None = None) -> Axes:
     )
     for voltage, style in parts:
         if np.any(voltage):
-            ax.step(run.t, voltage, where="post", **style)
-    ax.set(xlabel="time [s]", ylabel="voltage [V]")
+            ax.step(run.t, scale * voltage, where="post", **style)
+    what = "voltage" if unit == "V" else "drive"
+    ax.set(xlabel="time [s]", ylabel=f"{what} [{unit}]")
     if run.saturated.any():
         for i, limit in enumerate(run.controller.limits):
-            ax.axhline(limit, **{**LIMITS, "label": None if i else "limits"})
+            ax.axhline(scale * limit, **{**LIMITS, "label": None if i else "limits"})
     _over_time(ax, run)
     return ax
 
@@ -235,7 +237,7 @@ def _shade_clipped(ax: Axes, run: Tracking) -> None:
     changes = np.flatnonzero(np.diff(np.concatenate([[False], run.saturated, [False]])))
     times = np.append(run.t, _end(run))
     for i, (first, last) in enumerate(changes.reshape(-1, 2)):
-        style = {**CLIPPED, "label": None if i else "voltage clipped"}
+        style = {**CLIPPED, "label": None if i else "command clipped"}
         ax.axvspan(times[first], times[last], **style)
 
 
