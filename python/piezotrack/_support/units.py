@@ -22,6 +22,7 @@ __all__ = [
     "Unit",
     "best_length_unit",
     "drive_text",
+    "drive_word",
     "known_units",
     "lookup",
     "of_drive",
@@ -290,6 +291,18 @@ def shown_unit(unit: str) -> tuple[str, float]:
     (('um', 1000000.0), ('V', 1.0))
     """
     return _SHOWN.get(unit, (unit, 1.0))
+
+
+def drive_word(unit: str) -> str:
+    """Return what a drive in an SI unit is called: ``"voltage"``, or ``"drive"`` in any other.
+
+    Examples
+    --------
+    >>> from piezotrack._support.units import drive_word
+    >>> drive_word("V"), drive_word("m")
+    ('voltage', 'drive')
+    """
+    return "voltage" if unit == "V" else "drive"
 
 
 def drive_text(value: float, unit: str, digits: int = 4) -> str:

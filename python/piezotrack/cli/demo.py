@@ -48,7 +48,7 @@ def _measured(result: Output, seed: int) -> None:
     from ..control.demo import run_demo
     from ..control.demo_plot import plot_before_and_after
     from ..data.log_file import write_log
-    from ..identification.plot import plot_loop, plot_time
+    from ..identification.plot import plot_loop, plot_time, what_was_not_fitted
     from ..identification.report import identification_files, save_identification
 
     # The logs are known, and so is the kind of model that suits them.
@@ -57,9 +57,10 @@ def _measured(result: Output, seed: int) -> None:
     found = run_demo(seed, progress=result.progress)
     fit, other = found.fit, found.other
     run = fit.simulate(other)
+    title = what_was_not_fitted(fit, other, run)
     figures = (
-        plot_loop(other, run).figure,
-        plot_time(other, run, stroke=fit.stroke)[0].figure,
+        plot_loop(other, run, title=title).figure,
+        plot_time(other, run, stroke=fit.stroke, title=title)[0].figure,
         plot_before_and_after(found.runs),
     )
     with together(make_folder(result.out)) as folder:

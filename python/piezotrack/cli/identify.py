@@ -208,14 +208,18 @@ def _judged(fit: Identification, second: Dataset | None) -> tuple[Identification
 def _write(fit: Identification, out: Path, second: Dataset | None) -> list[Path]:
     """Write the model and the pictures, those of a second log too."""
     from .._support.files import make_folder, save_figures, together
-    from ..identification.plot import plot_loop, plot_time
+    from ..identification.plot import plot_loop, plot_time, what_was_not_fitted
     from ..identification.report import save_identification
 
     name = fit.model.info.name
     figures = {}
     if second is not None:
         run = fit.simulate(second)
-        axes = plot_loop(second, run), plot_time(second, run, stroke=fit.stroke)[0]
+        title = what_was_not_fitted(fit, second, run)
+        axes = (
+            plot_loop(second, run, title=title),
+            plot_time(second, run, stroke=fit.stroke, title=title)[0],
+        )
         figures = {
             f"{name}_validation_{panel}": one.figure
             for panel, one in zip(PANELS, axes, strict=True)

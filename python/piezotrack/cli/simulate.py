@@ -50,7 +50,7 @@ def simulate_command(
         together,
         write_columns,
     )
-    from .._support.units import shown_unit
+    from .._support.units import drive_word, shown_unit
     from ..identification.identified import load
     from ..identification.plot import plot_response
 
@@ -70,8 +70,11 @@ def simulate_command(
     with of_file(drive_file):
         at_first = known.model.equilibrium(float(u[0]))
         x = known.displacement(u, interval, hold=hold, initial=at_first)
-    title = "voltage" if name == "V" else "drive"
-    table = {"time_s": t, f"{title}_{name}": scale * u, "displacement_um": 1e6 * x}
+    table = {
+        "time_s": t,
+        f"{drive_word(known.drive_unit)}_{name}": scale * u,
+        "displacement_um": 1e6 * x,
+    }
     with together(make_folder(out)) as folder:
         written = [write_columns(folder / "simulated.csv", table)]
         picture = plot_response(

@@ -219,9 +219,9 @@ def feedforward_command(
 ) -> None:
     """Compute the feedforward voltage for a reference."""
     from .._support.files import make_folder, picture_files, save_figures, together, write_columns
-    from .._support.units import shown_unit
+    from .._support.units import drive_word, shown_unit
+    from ..control.checks import check_within_reach
     from ..control.plant import plant_of
-    from ..control.tracking import check_within_reach
     from ..control.tracking_plot import plot_feedforward
     from ..identification.identified import load
 
@@ -242,7 +242,7 @@ def feedforward_command(
     if volts is not None:
         voltage = voltage.clip(*volts)
     unit, scale = shown_unit(known.drive_unit)
-    what = "voltage" if unit == "V" else "drive"
+    what = drive_word(known.drive_unit)
     shown = scale * voltage
     table = {"time_s": samples.t, f"{what}_{unit}": shown, "displacement_um": 1e6 * samples.x}
     with together(make_folder(out)) as folder:

@@ -12,21 +12,14 @@ from .. import _core
 from .._support.arguments import not_negative
 from .._support.frames import frame_of
 from .._support.statistics import ErrorStatistics
-from .._support.units import shown_unit
+from .._support.units import drive_word, shown_unit
 from ..errors import ParameterError
 from ..references.xy_reference import XYReference, square_matrix
 from ..stages.xy import XYStage
+from .checks import check_period, check_stable, check_within_reach
 from .controller import Controller, number_pair
-from .plant import reach, resting
-from .tracking import (
-    Tracking,
-    check_period,
-    check_stable,
-    check_within_reach,
-    collected,
-    feedforward_of,
-    voltages_before,
-)
+from .plant import reach, resting, voltages_before
+from .tracking import Tracking, collected, feedforward_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -126,7 +119,7 @@ class Contour:
         table = {"time_s": self.t}
         for name, axis in (("x", self.x), ("y", self.y)):
             unit, scale = shown_unit(axis.controller.drive_unit)
-            command = "voltage" if unit == "V" else "drive"
+            command = drive_word(axis.controller.drive_unit)
             table |= {
                 f"desired_{name}_um": 1e6 * axis.desired,
                 f"measured_{name}_um": 1e6 * axis.measured,

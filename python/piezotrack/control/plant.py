@@ -9,12 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
+from .._support.arguments import one_or_more_numbers
 from ..errors import ParameterError
 from ..identification.identified import IdentifiedModel
 from ..stages.base import Stage
 from ..stages.virtual import VirtualStage
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from .controller import Controller
@@ -29,6 +32,7 @@ __all__ = [
     "resting",
     "run_closed_loop",
     "settled_bottom",
+    "voltages_before",
 ]
 
 # A linearised stage is pickled as its matrices.
@@ -98,6 +102,21 @@ def resting(stage: VirtualStage, visited: tuple[float, ...]) -> float:
     """Return the displacement [m] in which a run begins, after slow visits to voltages [V]."""
     moved = float(stage.stage.equilibrium(visited).x) if visited else 0.0
     return moved + stage.sensor.offset
+
+
+def voltages_before(
+    plant: VirtualStage, visited: float | Sequence[float], limits: tuple[float, float]
+) -> tuple[float, ...]:
+    """Voltages before a run [V]: those given, or the limit nearest to 0 V where 0 V is outside."""
+    before = one_or_more_numbers("visited", visited)
+    if plant.preconditioning is not None:
+        if before:
+            raise ParameterError(
+                f"visited is {before}: expected none, this virtual stage has its preconditioning"
+            )
+        return ()
+    low, high = limits
+    return before or (() if low <= 0.0 <= high else (low if low > 0.0 else high,))
 
 
 def settled_bottom(

@@ -10,18 +10,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
-from .._support.arguments import not_negative, one_or_more_numbers
+from .._support.arguments import not_negative
 from .._support.frames import frame_of
 from .._support.statistics import FIGURES, ErrorStatistics
-from .._support.units import shown_unit
+from .._support.units import drive_word, shown_unit
 from ..errors import ParameterError
-from ..identification.identified import IdentifiedModel
 from ..references.reference import Reference, SampledReference
 from ..stages.inverse import PlayedVoltage
-from .components import Pid
+from .checks import check_drive_unit, check_period, check_stable, check_within_reach
 from .controller import Controller
-from .plant import plant_of, reach, run_closed_loop, settled_bottom
-from .stability import check_loop
+from .plant import plant_of, run_closed_loop, voltages_before
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
-    from ..stages.virtual import VirtualStage
+    from ..identification.identified import IdentifiedModel
     from .plant import Plant
 
     Array = NDArray[np.float64]
@@ -209,7 +207,7 @@ class Tracking:
     def table(self) -> dict[str, Array]:
         """Columns of the run at the control samples, with their units in the names."""
         unit, scale = shown_unit(self.controller.drive_unit)
-        command = "voltage" if unit == "V" else "drive"
+        command = drive_word(self.controller.drive_unit)
         return {
             "time_s": self.t,
             "desired_um": 1e6 * self.desired,
@@ -376,33 +374,6 @@ def track(
     return collected(run, controller, reference, samples, note, substeps)
 
 
-def check_drive_unit(stage: object, controller: Controller) -> None:
-    """Refuse a model that is driven by a position under a controller of volts, or the reverse."""
-    if not isinstance(stage, IdentifiedModel):
-        return
-    one, other = stage.drive_unit, controller.drive_unit
-    if "m" in (one, other) and one != other:
-        raise ParameterError(
-            f"controller has the drive_unit {other!r}: expected that of the model, {one!r}, as "
-            "pt.Controller.of gives it"
-        )
-
-
-def voltages_before(
-    plant: VirtualStage, visited: float | Sequence[float], limits: tuple[float, float]
-) -> tuple[float, ...]:
-    """Voltages before a run [V]: those given, or the limit nearest to 0 V where 0 V is outside."""
-    before = one_or_more_numbers("visited", visited)
-    if plant.preconditioning is not None:
-        if before:
-            raise ParameterError(
-                f"visited is {before}: expected none, this virtual stage has its preconditioning"
-            )
-        return ()
-    low, high = limits
-    return before or (() if low <= 0.0 <= high else (low if low > 0.0 else high,))
-
-
 def feedforward_of(
     controller: Controller, reference: Reference, samples: SampledReference
 ) -> PlayedVoltage:
@@ -442,85 +413,3 @@ def collected(
         fine_voltage=fine_voltage,
         note=note,
     )
-
-
-def check_period(controller: Controller, reference: Reference) -> None:
-    """Refuse a repetitive part whose period is not that of the reference."""
-    if controller.repetitive is None:
-        return
-    if reference.period is None:
-        raise ParameterError(
-            f"reference ({reference.name}) does not repeat: expected one that does, for the "
-            "repetitive part"
-        )
-    turns = controller.repetitive.period / reference.period
-    if abs(turns - max(1, round(turns))) > 1e-6 * turns:
-        raise ParameterError(
-            f"repetitive has a period of {controller.repetitive.period:g} s: expected that of the "
-            f"reference ({reference.name}), {reference.period:g} s, or a multiple"
-        )
-
-
-def check_stable(stage: VirtualStage, controller: Controller, delay: float) -> None:
-    """Refuse a loop that is unstable at the middle gain of the stage."""
-    if controller.feedback is None and controller.repetitive is None:
-        return
-    report = check_loop(stage, controller, delay=delay)
-    if report.stable:
-        return
-    one = report.middle
-    found = f"the loop is unstable on this stage, {one.gain_text}"
-    law = controller.feedback
-    without = one.gain_margin is not None and one.gain_margin < 1.0
-    if without and one.stable_gains is not None and one.stable_gains[1] < 1.0:
-        low, share = one.stable_gains
-        if isinstance(law, Pid):
-            unit, scale = shown_unit(controller.drive_unit)
-            kp = 1e-6 * scale * law.kp
-            gains = f"{share * kp:.3g} {unit}/um in place of {kp:.3g}"
-            found += f"; at the limit kp would be {gains}"
-            found += ", and half of that has a gain margin of 2" if low < 0.5 * share else ""
-        else:
-            found += f"; at the limit the gain would be {share:.3g} times as large"
-    elif without:
-        found += f"; at the limit the feedback's gain would be {one.gain_margin:.3g} times as large"
-    elif controller.repetitive is not None:
-        found += "; without the repetitive part it is stable, so lower kq or take another filter"
-    hint = f" ({one.hint})" if one.hint else ""
-    raise ParameterError(f"{found}{hint}: expected a stable one, or unstable=True")
-
-
-def check_within_reach(
-    stage: VirtualStage,
-    limits: tuple[float, float],
-    samples: SampledReference,
-    drive_unit: str = "V",
-) -> None:
-    """Refuse a reference that exceeds the reach of the stage between two voltages [V]."""
-    low, high = limits
-    unit, scale = shown_unit(drive_unit)
-    bottom, top = reach(stage, (low, high), 1e-3)
-    slack = 0.01 * (top - bottom)
-    for value, past, edge in (
-        (samples.x.max(), samples.x.max() - top, top),
-        (samples.x.min(), bottom - samples.x.min(), bottom),
-    ):
-        if past > slack:
-            k = int(np.flatnonzero(samples.x == value)[0])
-            raise ParameterError(
-                f"reference is {1e6 * value:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} um "
-                f"beyond {1e6 * edge:.4g} um: expected {1e6 * bottom:.4g} to {1e6 * top:.4g} um "
-                f"on the sensor, which this stage reaches from {scale * low:g} to "
-                f"{scale * high:g} {unit}, or beyond_reach=True"
-            )
-    # The loop stays above the curve from rest: once up, the stage no longer comes all the way down.
-    k = int(np.argmax(samples.x))
-    k += int(np.argmin(samples.x[k:]))
-    lowest = settled_bottom(stage, (low, high), float(samples.x.max()), 1e-3)
-    if (past := lowest - samples.x[k]) > slack:
-        raise ParameterError(
-            f"reference is {1e6 * samples.x[k]:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} "
-            f"um below {1e6 * lowest:.4g} um: expected what the stage reaches at {scale * low:g} "
-            f"{unit} on the settled loop, from {1e6 * samples.x.max():.4g} um down, or "
-            "beyond_reach=True"
-        )

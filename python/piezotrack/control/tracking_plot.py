@@ -27,7 +27,7 @@ from .._support.plot_style import (
     thinned,
     whole,
 )
-from .._support.units import shown_unit
+from .._support.units import drive_word, shown_unit
 from .description import run_text
 
 if TYPE_CHECKING:
@@ -202,7 +202,7 @@ def plot_effort(run: Tracking, ax: Axes | None = None) -> Axes:
     for voltage, style in parts:
         if np.any(voltage):
             ax.step(run.t, scale * voltage, where="post", **style)
-    what = "voltage" if unit == "V" else "drive"
+    what = drive_word(run.controller.drive_unit)
     ax.set(xlabel="time [s]", ylabel=f"{what} [{unit}]")
     if run.saturated.any():
         for i, limit in enumerate(run.controller.limits):
@@ -271,7 +271,7 @@ def plot_feedforward(
     figure = panels(fig, (11.0, 4.2))
     left, right = figure.subplots(1, 2)
     unit, scale = shown_unit(drive_unit)
-    what = "Voltage" if unit == "V" else "Drive"
+    what = drive_word(drive_unit).capitalize()
     left.step(t, scale * voltage, where="post", **FEEDFORWARD)
     left.set(xlabel="time [s]", ylabel=f"feedforward [{literal(unit)}]")
     heading(left, f"{what} over time")

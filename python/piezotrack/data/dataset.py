@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from numbers import Integral
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from .._support.arrays import real, signal_of, time_axis
+from .._support.arrays import signal_of, time_axis
 from .._support.frames import frame_of
 from .._support.html_table import html_table
-from .._support.messages import listed, quoted
+from .._support.messages import quoted
 from .._support.units import best_length_unit
 from ..errors import DataError, ParameterError
+from .dataset_arguments import decimation_factor, further_columns, time_limit
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import ArrayLike, NDArray
@@ -120,7 +118,7 @@ class Dataset:
         if self._u.size < MIN_SAMPLES:
             raise DataError(f"u has {self._u.size} samples: expected at least {MIN_SAMPLES}")
         self._t, self._dt = time_axis(t, dt, self._u)
-        self._columns, self._column_units = _further(columns, column_units, self._u)
+        self._columns, self._column_units = further_columns(columns, column_units, self._u)
         self._hold, self._drive_unit, self._source = hold, drive_unit, source
         self._start = 0
         self._sha256: str | None = None
@@ -342,7 +340,7 @@ class Dataset:
         """
         from .resampling import low_passed
 
-        factor = _factor(factor)
+        factor = decimation_factor(factor)
         if len(self) < MIN_SAMPLES * factor:
             raise ParameterError(
                 f"factor is {quoted(factor)}: that leaves fewer than {MIN_SAMPLES} of {len(self)} "
@@ -401,7 +399,7 @@ class Dataset:
         """
         from .resampling import interpolated
 
-        factor = _factor(factor)
+        factor = decimation_factor(factor)
         if self._hold == "zoh":
             raise ParameterError("hold is 'zoh': expected 'foh', as nothing is between the samples")
         if (count := (self._t.size - 1) * factor + 1) > MOST_SAMPLES:
@@ -429,8 +427,8 @@ class Dataset:
         # Times and bounds are decimal numbers rounded to binary: equal ones may differ a little.
         slack = max(1e-6 * self._dt, 4.0 * float(np.spacing(np.abs(t).max())))
         low, high = float(t[0]), float(t[-1]) + self._dt
-        begin = low if start is None else _seconds("start", start)
-        end = high if stop is None else _seconds("stop", stop)
+        begin = low if start is None else time_limit("start", start)
+        end = high if stop is None else time_limit("stop", stop)
         window = f"the window from {begin:.10g} s to {end:.10g} s"
         record = f"the record, whose samples go from {low:.10g} s to {float(t[-1]):.10g} s"
         if begin < low - self._dt / 2 or end > high + self._dt / 2:
@@ -506,44 +504,3 @@ class Dataset:
         # Pickles and deep copies do not carry the read-only flag.
         for array in (self._t, self._u, self._y, *self._columns.values()):
             array.setflags(write=False)
-
-
-def _factor(value: object) -> int:
-    if isinstance(value, bool) or not isinstance(value, Integral) or value < 2:
-        raise ParameterError(f"factor is {quoted(value)}: expected a whole number, 2 or more")
-    return int(value)
-
-
-def _seconds(name: str, value: object) -> float:
-    number = real(value)
-    if not math.isfinite(number):
-        raise ParameterError(
-            f"{name} is {quoted(value)}: expected a finite number of seconds or None"
-        )
-    return number
-
-
-def _further(
-    columns: Mapping[str, ArrayLike] | None, units: Mapping[str, str] | None, u: Array
-) -> tuple[dict[str, Array], dict[str, str]]:
-    """Check the further columns and their units; a missing unit becomes an empty text."""
-    columns, units = columns or {}, units or {}
-    for argument, mapping in (("columns", columns), ("column_units", units)):
-        if not isinstance(mapping, Mapping):
-            raise ParameterError(f"{argument} is {quoted(mapping)}: expected a mapping by name")
-    for name in (*columns, *units):
-        if name not in columns or not isinstance(name, str):
-            known = listed(list(columns)) or "none"
-            raise ParameterError(
-                f"{quoted(name)} is not the name of a column: the names are {known}"
-            )
-    for name, unit in units.items():
-        if not isinstance(unit, str):
-            raise ParameterError(
-                f"column_units has {quoted(unit)} for {quoted(name)}: expected text"
-            )
-    kept = {
-        name: signal_of(f"column {quoted(name)}", values, like=u, finite=False)
-        for name, values in columns.items()
-    }
-    return kept, {name: units.get(name, "") for name in kept}

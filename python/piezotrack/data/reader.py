@@ -7,7 +7,6 @@ that is not a number is an error that names the file, the line and the entry.
 from __future__ import annotations
 
 import codecs
-import csv
 import math
 import re
 from collections import Counter
@@ -26,6 +25,7 @@ from ..errors import DataError, ParameterError, ShapeError
 from .columns import Column, Columns
 from .dataset import Dataset
 from .resampling import even_times, evened
+from .text_fields import are_titles, delimiter_of, field_fault, number_of, split_fields
 
 if TYPE_CHECKING:
     import os
@@ -244,12 +244,12 @@ class _TextLog:
         self.lines = self._decode(self._load(file)).split("\n")
         self._check_lines()
         header = self._first_line()
-        self.delimiter = _delimiter(self.lines[header])
-        titles = _split(self.lines[header], self.delimiter, is_header=True)
+        self.delimiter = delimiter_of(self.lines[header])
+        titles = split_fields(self.lines[header], self.delimiter, is_header=True)
         if len(titles) > MOST_COLUMNS:
             found = f"this line has {len(titles)} fields, the first {quoted(titles[0])}"
             raise self.error(f"{found}: expected {MOST_COLUMNS} columns at most", header + 1)
-        has_header = _are_titles(titles)
+        has_header = are_titles(titles)
         self.header = header + 1
         self.first = header + has_header
         if not has_header and (commented := self._commented_titles(header, len(titles))):
@@ -331,8 +331,10 @@ class _TextLog:
         above = [k for k in range(first) if self.lines[k].strip()]
         if not above:
             return None
-        titles = _split(self.lines[above[-1]].strip().lstrip("#% "), self.delimiter, is_header=True)
-        return (above[-1] + 1, titles) if len(titles) == count and _are_titles(titles) else None
+        titles = split_fields(
+            self.lines[above[-1]].strip().lstrip("#% "), self.delimiter, is_header=True
+        )
+        return (above[-1] + 1, titles) if len(titles) == count and are_titles(titles) else None
 
     def _rows(self) -> Iterator[tuple[int, str]]:
         """Yield the lines with samples, each with its number as an editor counts."""
@@ -435,15 +437,15 @@ class _TextLog:
                     f"{self.header}{last if row == shape[0] - 1 else ''}",
                     line,
                 )
-            values = [_number(field.translate(_SWAP) if swap else field) for field in fields]
+            values = [number_of(field.translate(_SWAP) if swap else field) for field in fields]
             for column in main:
                 if not math.isfinite(values[column.index]):
-                    raise self.error(_fault(fields[column.index], column, swap), line)
+                    raise self.error(field_fault(fields[column.index], column, swap), line)
             table[row] = values
         return table
 
     def _fields(self, line: str) -> list[str]:
-        fields = _split(line, self.delimiter)
+        fields = split_fields(line, self.delimiter)
         # Some loggers end each line with a delimiter.
         return fields[:-1] if len(fields) > len(self.columns) and not fields[-1] else fields
 
@@ -457,50 +459,3 @@ class _TextLog:
             if "," in numbers or "." in numbers:
                 return "." not in numbers
         return False
-
-
-def _are_titles(fields: Sequence[str]) -> bool:
-    """Whether a line has titles: a title may contain a number, and a sample a text."""
-    numbers = sum(not math.isnan(_number(field.replace(",", "."))) for field in fields)
-    return 2 * numbers < len(fields)
-
-
-def _delimiter(header: str) -> str | None:
-    """Return the delimiter outside of quotes; None for blanks."""
-    bare = re.sub(r'"[^"]*"', "", header.strip())
-    return next((mark for mark in "\t;," if mark in bare), None)
-
-
-def _split(line: str, delimiter: str | None, *, is_header: bool = False) -> list[str]:
-    if '"' in line:
-        try:
-            [fields] = csv.reader([line.strip()], delimiter=delimiter or " ", skipinitialspace=True)
-        except csv.Error:
-            fields = line.split(delimiter)
-    elif is_header and delimiter is None:
-        # A unit in brackets belongs to the word before it.
-        fields = re.split(r"\s+(?![(\[])", line.strip())
-    else:
-        fields = line.split(delimiter)
-    fields = [field.strip() for field in fields]
-    return fields[:-1] if is_header and len(fields) > 1 and not fields[-1] else fields
-
-
-def _number(text: str) -> float:
-    """Return the number in a field; NaN where there is none."""
-    try:
-        # Python's 1_000 is no number in a log.
-        return math.nan if "_" in text else float(text)
-    except ValueError:
-        return math.nan
-
-
-def _fault(text: str, column: Column, swap: bool) -> str:
-    """Describe the fault of a field without a finite number."""
-    if not text:
-        return f"{column} is empty: expected a number"
-    if text.lower().lstrip("+-") in ("nan", "inf", "infinity") or math.isinf(_number(text)):
-        return f"{quoted(text)} in {column} is not a finite number"
-    mark = "comma" if swap else "point"
-    other = f": the decimal mark of this log is a {mark}" if "." in text or "," in text else ""
-    return f"{quoted(text)} in {column} is not a number{other}"

@@ -48,6 +48,7 @@ __all__ = [
     "plot_response",
     "plot_time",
     "what_was_fitted",
+    "what_was_not_fitted",
 ]
 
 
@@ -304,11 +305,7 @@ def plot_identification(
     above = figure.add_subplot(grid[0, 1])
     below = figure.add_subplot(grid[1, 1], sharex=above)
     plot_time(record, run, (above, below), stroke=fit.stroke)
-    if own:
-        title = what_was_fitted(fit)
-    else:
-        rms = 100.0 * float(np.sqrt(np.mean((record.y - run.x) ** 2))) / fit.stroke
-        title = f"{named(fit, record)}, not fitted: {rms:.3g} % of stroke rms"
+    title = what_was_fitted(fit) if own else what_was_not_fitted(fit, record, run)
     figure.suptitle(title, fontsize="large")
     return whole(figure)
 
@@ -316,6 +313,12 @@ def plot_identification(
 def what_was_fitted(fit: Identification) -> str:
     """Write model, record, window and error of a fit, as the title of its pictures."""
     return f"{named(fit, fit.data)}: {fit.cost_percent:.3g} % of stroke rms"
+
+
+def what_was_not_fitted(fit: Identification, record: Dataset, run: Response) -> str:
+    """Write model, record, window and error on another record, as the title of its pictures."""
+    rms = 100.0 * float(np.sqrt(np.mean((record.y - run.x) ** 2))) / fit.stroke
+    return f"{named(fit, record)}, not fitted: {rms:.3g} % of stroke rms"
 
 
 def named(fit: Identification, record: Dataset) -> str:

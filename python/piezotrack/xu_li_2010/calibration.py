@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import _core
 from .._support.two_threads import two_threads
-from ..control.tracking import check_stable
+from ..control.checks import check_stable
 from ..errors import PiezotrackError
 from ..identification.fit import identify
 from ..identification.swarm import ParticleSwarm
