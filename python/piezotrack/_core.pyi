@@ -73,7 +73,7 @@ def identify(
     delay: tuple[float, float] | None,
     history: str,
     creep: list[float] | None,
-    settings: SwarmSettings,
+    method: SwarmSettings | DescentSettings,
     seed: int,
     runs: int,
     threads: int,
@@ -145,6 +145,12 @@ class Swarm:
     def best(self) -> tuple[list[float], float]: ...
     @property
     def done(self) -> bool: ...
+
+@final
+class DescentSettings:
+    def __new__(
+        cls, *, samples: int, starts: int, agreeing: int, rounds: int
+    ) -> DescentSettings: ...
 
 @final
 class SwarmSettings:

@@ -28,4 +28,5 @@ from .step_readings import StepReadings as StepReadings
 from .step_response import StepResult as StepResult
 from .step_response import StepTrace as StepTrace
 from .step_response import identify_step as identify_step
+from .descents import Descents as Descents
 from .swarm import ParticleSwarm as ParticleSwarm

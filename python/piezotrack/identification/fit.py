@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from .. import _core
 from ..data.dataset import Dataset
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .least_squares import LeastSquares
     from .result import Identification
     from .step_response import StepResult
+    from .descents import Descents
     from .swarm import ParticleSwarm
 
 __all__ = ["identify"]
@@ -38,7 +39,9 @@ def identify(
     delay: bool | float | tuple[float, float] | None = None,
     history: History | None = None,
     creep: bool | Iterable[float] | None = None,
+    method: Literal["descents", "swarm"] | None = None,
     swarm: ParticleSwarm | None = None,
+    descents: Descents | None = None,
     least_squares: LeastSquares | None = None,
     seed: int | None = None,
     runs: int | None = None,
@@ -186,7 +189,9 @@ def identify(
         "stiffness": stiffness,
         "delay": delay,
         "creep": creep,
+        "method": method,
         "swarm": swarm,
+        "descents": descents,
         "seed": seed,
         "runs": runs,
         "threads": threads,

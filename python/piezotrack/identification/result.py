@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from ..data.dataset import Dataset
     from ..stages.base import Response
+    from .descents import Descents
     from .estimates import Estimate, LagRange, StopReason, SwarmRun
     from .least_squares import LeastSquares
     from .selection import Trial
@@ -95,6 +96,7 @@ class Identification(IdentifiedModel):
     order: int = 0
     seed: int | None = None
     swarm: ParticleSwarm | None = None
+    descents: Descents | None = None
     least_squares: LeastSquares | None = None
     lags: LagRange | None = None
     trials: tuple[Trial, ...] = ()

@@ -15,6 +15,7 @@ from .._support.units import of_drive
 from ..data import diagnostics
 from ..errors import Interrupted, ParameterError
 from ..stages.registry import stage_class
+from .descents import Descents
 from .estimates import Estimate, LagRange, Progress, SwarmRun
 from .history import start_after
 from .model_file import fit_entry, provenance
@@ -29,7 +30,10 @@ if TYPE_CHECKING:
 
 __all__ = ["search"]
 
-DEFAULT_RUNS = 4
+# Searches by default, and their names: a swarm has to be restarted to tell whether it converged.
+RUNS: dict[type, int] = {ParticleSwarm: 4, Descents: 1}
+METHODS: dict[type, str] = {ParticleSwarm: "swarm", Descents: "descents"}
+DEFAULT = "swarm"
 # Unit and symbol of what is searched beside the parameters of a model.
 SENSOR = {"delay": ("s", "Td"), "voltage_before": ("V", "u0")}
 
@@ -47,7 +51,9 @@ def search(
     delay: object = None,
     history: History = "virgin",
     creep: object = None,
+    method: object = None,
     swarm: object = None,
+    descents: object = None,
     seed: object = None,
     runs: object = None,
     threads: object = None,
@@ -80,11 +86,7 @@ def search(
     ParameterError, DataError, NumericalError, Interrupted
         As for `identify`.
     """
-    swarm = ParticleSwarm() if swarm is None else swarm
-    if not isinstance(swarm, ParticleSwarm):
-        raise ParameterError(
-            f"swarm is {quoted(swarm)}: expected a ParticleSwarm, as pt.ParticleSwarm()"
-        )
+    settings = _settings(method, swarm, descents)
     if callback is not None and not callable(callback):
         raise ParameterError(f"callback is {quoted(callback)}: expected a function, or None")
     seed = 0 if seed is None else _core.as_count("seed", seed)
@@ -109,21 +111,42 @@ def search(
             delay=searched_delay,
             history=history,
             creep=creep_times,
-            settings=swarm._core,
+            method=settings._core,
             seed=seed,
-            runs=DEFAULT_RUNS if runs is None else _core.as_count("runs", runs),
+            runs=RUNS[type(settings)] if runs is None else _core.as_count("runs", runs),
             threads=0 if threads is None else _core.as_count("threads", threads),
             callback=None if callback is None else _reporting(info, callback),
             progress=bar.update,
         )
     if found is None:
         raise Interrupted("interrupted before the first cost was computed")
-    fit = _identification(info, found, data, swarm, seed, offset, history)
+    fit = _identification(info, found, data, settings, seed, offset, history)
     if not fit.success:
         raise Interrupted(
             f"interrupted after {fit.nit} iterations, best cost {fit.cost_um:.4g} um", fit
         )
     return fit
+
+
+def _settings(method: object, swarm: object, descents: object) -> ParticleSwarm | Descents:
+    """Return the settings of the method that is asked for, by its name or by its settings."""
+    given = {"swarm": swarm, "descents": descents}
+    named = [name for name, value in given.items() if value is not None]
+    method = method if method is not None else named[0] if named else DEFAULT
+    if method not in given:
+        raise ParameterError(f"method is {quoted(method)}: expected 'descents' or 'swarm'")
+    for name in named:
+        if name != method:
+            raise ParameterError(
+                f"{name} is {quoted(given[name])}: expected none, as the method is {method!r}"
+            )
+    kind = ParticleSwarm if method == "swarm" else Descents
+    settings = given[str(method)]
+    if settings is not None and not isinstance(settings, kind):
+        raise ParameterError(
+            f"{method} is {quoted(settings)}: expected pt.{kind.__name__}, as pt.{kind.__name__}()"
+        )
+    return kind() if settings is None else settings
 
 
 def _reporting(info: ModelInfo, callback: Callable[[Progress], object]) -> Callable[..., bool]:
@@ -211,7 +234,7 @@ def _identification(
     info: ModelInfo,
     found: _core.Search,
     data: Dataset,
-    swarm: ParticleSwarm,
+    settings: ParticleSwarm | Descents,
     seed: int,
     offset: bool,
     history: History,
@@ -254,7 +277,7 @@ def _identification(
             "substeps": found.substeps,
             "order": found.order,
         },
-        "provenance": provenance(data, seed=seed, swarm=asdict(swarm)),
+        "provenance": provenance(data, seed=seed, **{METHODS[type(settings)]: asdict(settings)}),
     }
     return Identification(
         lags=None if found.lags is None else LagRange(*found.lags),
@@ -279,7 +302,8 @@ def _identification(
         substeps=found.substeps,
         order=found.order,
         seed=seed,
-        swarm=swarm,
+        swarm=settings if isinstance(settings, ParticleSwarm) else None,
+        descents=settings if isinstance(settings, Descents) else None,
     )
 
 

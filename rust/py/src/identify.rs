@@ -2,7 +2,7 @@
 
 use numpy::PyArray1;
 use piezotrack_core::identify::{
-    BEFORE, Coordinate, DELAY, Delay, History, Identification, Outcome, Plan, Record, Spec,
+    BEFORE, Coordinate, DELAY, Delay, History, Identification, Method, Outcome, Plan, Record, Spec,
     StopReason, creep_times, identify as identified, visited,
 };
 use piezotrack_core::integrator::Order;
@@ -15,6 +15,7 @@ use crate::arrays::{array, samples};
 use crate::enter::{Watchers, enter_pool};
 use crate::errors::raise;
 use crate::stage::hold;
+use crate::descents::PyDescents;
 use crate::swarm::PySettings;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -27,6 +28,8 @@ fn reason_name(reason: StopReason) -> &'static str {
     match reason {
         StopReason::Stalled => "stalled",
         StopReason::Iterations => "iterations",
+        StopReason::Agreed => "agreed",
+        StopReason::Converged => "converged",
         StopReason::Interrupted => "interrupted",
     }
 }
@@ -192,13 +195,29 @@ fn voltages_before<'py>(
     array(py, voltages().map_err(|error| raise(&error))?.into_iter())
 }
 
+/// What searches, in Python.
+#[derive(FromPyObject)]
+enum Searcher<'py> {
+    Swarm(PyRef<'py, PySettings>),
+    Descents(PyRef<'py, PyDescents>),
+}
+
+impl Searcher<'_> {
+    fn method(&self) -> Method {
+        match self {
+            Self::Swarm(settings) => Method::Swarm(settings.0.clone()),
+            Self::Descents(settings) => Method::Descents(settings.0.clone()),
+        }
+    }
+}
+
 /// Identifies a stage with creep of these time constants, or with those that suit the record where
 /// there are none, and its `delay` between two bounds, known where they are equal, or
 /// between bounds of its own choice where there are none; None where the search was stopped before
 /// its first cost.
 #[pyfunction]
 #[pyo3(signature = (*, model, u, y, dt, hold_name, start, free, fixed, bounds, stiffness, offset,
-    delay, history, creep, settings, seed, runs, threads, callback, progress))]
+    delay, history, creep, method, seed, runs, threads, callback, progress))]
 #[expect(clippy::too_many_arguments, reason = "keyword-only, called from one place")]
 fn identify(
     py: Python<'_>,
@@ -216,7 +235,7 @@ fn identify(
     delay: Option<(f64, f64)>,
     history: &str,
     creep: Option<Vec<f64>>,
-    settings: &PySettings,
+    method: Searcher<'_>,
     seed: u64,
     runs: usize,
     threads: usize,
@@ -234,7 +253,7 @@ fn identify(
     let history = history_named(history).map_err(|error| raise(&error))?;
     let mut spec =
         Spec { free, fixed, bounds, stiffness, offset, delay, history, ..Spec::of(model) };
-    let plan = Plan { settings: settings.0.clone(), seed, runs };
+    let plan = Plan { method: method.method(), seed, runs };
     let watchers = Watchers { callback, progress };
     let found = enter_pool(py, threads, &watchers, |monitor, stop| {
         let record = Record::new(&u, &y, dt, hold(hold_name)?, start)?;

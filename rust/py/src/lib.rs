@@ -2,6 +2,7 @@
 
 mod arrays;
 mod control;
+mod descents;
 mod design;
 mod displacements;
 mod enter;
@@ -30,6 +31,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     stage::register(module)?;
     inverse::register(module)?;
     identify::register(module)?;
+    descents::register(module)?;
     step::register(module)?;
     swarm::register(module)?;
     control::register(module)?;

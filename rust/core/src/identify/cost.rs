@@ -19,7 +19,7 @@ use super::history::visited;
 use super::motion::motion;
 use super::problem::Problem;
 use super::record::Record;
-use super::residual_sums::{Costs, Delayed, Direct, ResidualSums, Residuals};
+use super::residual_sums::{Costs, Delayed, Direct, ResidualSums, Residuals, Simulated};
 use super::step_size;
 use crate::integrator::{
     FeedbackState, Kernel, MOST_PARAMETERS, Mechanics, Stepping, SteppingLoop, halvings,
@@ -116,9 +116,30 @@ impl<'a> Evaluator<'a> {
     /// Those that were not finished when `stop` said so are infinite.
     #[must_use]
     pub fn costs(&self, candidates: &[Candidate], stop: Stop<'_>) -> Vec<Costs> {
-        let all = All { of: self, candidates, stop };
-        let costs = self.problem.model.kernel(&self.held, self.stepping.order, all);
+        let found = self.simulated(candidates, 0, stop);
+        let costs = found.map(|all| all.into_iter().map(|one| one.costs).collect());
         costs.unwrap_or_else(|| vec![Costs::FAILED; candidates.len()])
+    }
+
+    /// Costs of candidates, and what is read of them every `stride` samples of the window; empty
+    /// where a simulation did not stay finite, or was not finished when `stop` said so.
+    pub(super) fn readings(
+        &self,
+        candidates: &[Candidate],
+        stride: usize,
+        stop: Stop<'_>,
+    ) -> Vec<Simulated> {
+        self.simulated(candidates, stride, stop).unwrap_or_default()
+    }
+
+    fn simulated(
+        &self,
+        candidates: &[Candidate],
+        stride: usize,
+        stop: Stop<'_>,
+    ) -> Option<Vec<Simulated>> {
+        let all = All { of: self, candidates, stride, stop };
+        self.problem.model.kernel(&self.held, self.stepping.order, all)
     }
 }
 
@@ -126,31 +147,34 @@ impl<'a> Evaluator<'a> {
 struct All<'a> {
     of: &'a Evaluator<'a>,
     candidates: &'a [Candidate],
+    stride: usize,
     stop: Stop<'a>,
 }
 
 impl<'a> KernelVisitor for All<'a> {
-    type Output = Vec<Costs>;
+    type Output = Vec<Simulated>;
 
-    fn visit<K: Kernel>(self, kernel: K) -> Vec<Costs> {
-        let Self { of, candidates, stop } = self;
+    fn visit<K: Kernel>(self, kernel: K) -> Vec<Simulated> {
+        let Self { of, candidates, stride, stop } = self;
         let width = of.arch.dispatch(Width);
         // Every thread gets vectors to fill before any gets a second one.
         let vectors = candidates.len().div_ceil(width);
         // A delay reads a ring in memory, which several vectors do not make faster.
-        let several = const { K::VECTORS > 1 } && width > 1 && !of.problem.has_delay();
+        let several =
+            const { K::VECTORS > 1 } && width > 1 && !of.problem.has_delay() && stride == 0;
         let most = if several { K::VECTORS } else { 1 };
         let each = vectors.div_ceil(rayon::current_num_threads()).clamp(1, most);
         let size = candidates.len().div_ceil(vectors.div_ceil(each).max(1)).max(1);
         let bundle = |chunk: &'a [Candidate]| {
             // Only a kernel that gains by several vectors is compiled for them.
             if const { K::VECTORS > 1 } && several && chunk.len() > width {
-                let bundle = Bundle::<K, VECTORS> { kernel, of, candidates: chunk, stop };
+                let bundle =
+                    Bundle::<K, VECTORS> { kernel, of, candidates: chunk, stride, stop };
                 if let Some(costs) = dispatch_vectors(of.arch, bundle) {
                     return costs;
                 }
             }
-            of.arch.dispatch(Bundle::<K, 1> { kernel, of, candidates: chunk, stop })
+            of.arch.dispatch(Bundle::<K, 1> { kernel, of, candidates: chunk, stride, stop })
         };
         candidates.par_chunks(size).flat_map_iter(bundle).collect()
     }
@@ -175,15 +199,16 @@ struct Bundle<'a, K, const V: usize> {
     kernel: K,
     of: &'a Evaluator<'a>,
     candidates: &'a [Candidate],
+    stride: usize,
     stop: Stop<'a>,
 }
 
 impl<K: Kernel, const V: usize> WithSimd for Bundle<'_, K, V> {
-    type Output = Vec<Costs>;
+    type Output = Vec<Simulated>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Vec<Costs> {
-        let Self { kernel, of, candidates, stop } = self;
+    fn with_simd<S: Simd>(self, simd: S) -> Vec<Simulated> {
+        let Self { kernel, of, candidates, stride, stop } = self;
         let (drive, substeps) = (&of.residuals.record.drive, of.stepping.substeps);
         let zero = Lanes::<S, V>::splat(simd, 0.0);
         let mut parameters = [zero; MOST_PARAMETERS];
@@ -209,14 +234,14 @@ impl<K: Kernel, const V: usize> WithSimd for Bundle<'_, K, V> {
         let residuals = &of.residuals;
         if const { V > 1 } {
             let mut sums =
-                ResidualSums::new(residuals, candidates, stop, zero, index(substeps), || Direct);
+                ResidualSums::new(residuals, candidates, stride, stop, zero, index(substeps), || Direct);
             let ended = stepping.run(drive, substeps, start, &mut sums).is_some();
             sums.conclude(ended)
         } else {
             let delayed = || Delayed::new(candidates, drive.dt, x, index(substeps));
             let reading = || of.problem.has_delay().then(delayed);
             let mut sums =
-                ResidualSums::new(residuals, candidates, stop, zero, index(substeps), reading);
+                ResidualSums::new(residuals, candidates, stride, stop, zero, index(substeps), reading);
             let ended = stepping.run(drive, substeps, start, &mut sums).is_some();
             sums.conclude(ended)
         }

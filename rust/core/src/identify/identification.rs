@@ -1,12 +1,13 @@
 //! Identification of a stage from a record: bounds, search, local refinement, standard deviations.
 
 use super::cost::Evaluator;
+use super::descents::descend;
 use super::inertia::with_mass;
 use super::lag::{LagRange, lag_range};
 use super::levenberg_marquardt::{LocalRefinement, Sensitivity};
 use super::problem::{Problem, Spec};
 use super::record::Record;
-use super::search::{Monitor, Outcome, Plan, StopReason, search};
+use super::search::{Method, Monitor, Outcome, Plan, StopReason, search};
 use crate::error::Result;
 use crate::integrator::Stepping;
 use crate::math::available;
@@ -47,11 +48,24 @@ pub fn identify(
     let problem = Problem::new(record, spec, stop)?;
     enough_memory(record, &problem)?;
     let evaluator = Evaluator::new(record, &problem, stop);
-    let mut runs = search(&evaluator, &problem, plan, monitor, stop)?;
-    let ended = runs.iter().all(|run| run.reason != StopReason::Interrupted);
     let local = LocalRefinement { record, problem: &problem, evaluator: &evaluator, stop };
-    if ended && plan.settings.polish {
-        for run in runs.iter_mut().filter(|run| run.costs.rms.is_finite()) {
+    let (mut runs, polish) = match &plan.method {
+        Method::Swarm(settings) => {
+            (search(&evaluator, &problem, settings, plan, monitor, stop)?, settings.polish)
+        }
+        Method::Descents(settings) => {
+            (descend(&local, settings, plan.seed, plan.runs, monitor)?, true)
+        }
+    };
+    let ended = runs.iter().all(|run| run.reason != StopReason::Interrupted);
+    // Descents that ended elsewhere are not refined.
+    let lowest = runs.iter().fold(f64::INFINITY, |low, run| low.min(run.costs.rms));
+    let refined = |run: &Outcome| match plan.method {
+        Method::Swarm(_) => run.costs.rms.is_finite(),
+        Method::Descents(_) => run.costs.rms <= lowest,
+    };
+    if ended && polish {
+        for run in runs.iter_mut().filter(|run| refined(run)) {
             let polished = local.polish(&run.place, run.costs);
             run.polish_evaluations = polished.evaluations;
             run.costs = polished.costs;
@@ -64,7 +78,7 @@ pub fn identify(
         .min_by(|&i, &j| runs[i].costs.rms.total_cmp(&runs[j].costs.rms));
     let Told { lags, sensitivities, with_mass } = best
         .filter(|_| ended)
-        .map(|i| told_by(&local, &mut runs[i], plan.settings.polish))
+        .map(|i| told_by(&local, &mut runs[i], polish))
         .unwrap_or_default();
     if stop() {
         for run in &mut runs {

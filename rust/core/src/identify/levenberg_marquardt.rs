@@ -7,7 +7,6 @@
 //! Correlated deviations, such as those of an inexact model, make the true spread larger: Ljung 1999, System Identification, section 9.4.
 
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::candidate::Candidate;
 use super::coordinate::Coordinate;
@@ -20,6 +19,9 @@ use crate::signal::{Stop, index};
 /// Most samples in the Jacobian: more would hardly change the result.
 const MOST_ROWS: usize = 200_000;
 
+/// Most samples in the Jacobian of one of many descents.
+const FEW_ROWS: usize = 50_000;
+
 /// Change of a coordinate of the unit box, for the differences.
 const CHANGE: f64 = 1e-4;
 
@@ -31,7 +33,7 @@ const WHITE: f64 = 0.9;
 const ITERATIONS: usize = 60;
 
 /// Normal equations about a candidate, in coordinates of the unit box.
-struct Normal {
+pub(super) struct Normal {
     /// J^T J.
     square: DMatrix<f64>,
     /// J^T r, r being measured less simulated.
@@ -130,35 +132,73 @@ impl LocalRefinement<'_> {
         found.collect()
     }
 
-    /// Normal equations at a place; `None` where a neighbour cannot be simulated.
+    /// Normal equations at a place by central differences; `None` where a neighbour cannot be
+    /// simulated.
     fn normal(&self, place: &[f64]) -> Option<Normal> {
-        let stride = self.record.window.len().div_ceil(MOST_ROWS);
+        let stride = self.stride(MOST_ROWS);
         let pairs: Vec<(f64, f64)> =
             place.iter().map(|z| ((z - CHANGE).max(0.0), (z + CHANGE).min(1.0))).collect();
-        let residual = self.residual(place, stride)?;
-        let columns: Option<Vec<Vec<f64>>> = pairs
-            .par_iter()
-            .enumerate()
-            .map(|(d, &(low, high))| {
-                let at = |z| {
-                    let mut moved = place.to_vec();
-                    moved[d] = z;
-                    self.displacement(&moved, stride)
-                };
-                let (below, mut column) = (at(low)?, at(high)?);
-                let scale = 1.0 / (high - low);
-                column.iter_mut().zip(below).for_each(|(x, b)| *x = (*x - b) * scale);
-                self.centre(&mut column);
-                Some(column)
-            })
-            .collect();
-        let columns = columns?;
+        let ends = pairs.iter().enumerate().flat_map(|(d, &(low, high))| [(d, low), (d, high)]);
+        let moved = ends.map(|(d, z)| with(place, d, z));
+        let places: Vec<Vec<f64>> = [place.to_vec()].into_iter().chain(moved).collect();
+        let [base, ends @ ..] = &self.readings(&places, stride)?[..] else { return None };
+        let columns = ends.chunks_exact(2).zip(pairs).map(|(ends, (low, high))| {
+            let scale = 1.0 / (high - low);
+            ends[1].iter().zip(&ends[0]).map(|(x, below)| (x - below) * scale).collect()
+        });
+        Some(self.equations(columns.collect(), base, stride))
+    }
+
+    /// Normal equations at each of some places by one-sided differences, all simulated side by
+    /// side; `None` for one where a neighbour cannot be simulated.
+    pub(super) fn normals(&self, places: &[Vec<f64>]) -> Vec<Option<Normal>> {
+        let stride = self.stride(FEW_ROWS);
+        let change = |z: f64| if z < 0.5 { CHANGE } else { -CHANGE };
+        let neighbours = |place: &Vec<f64>| {
+            let moved = place.iter().enumerate().map(|(d, z)| with(place, d, z + change(*z)));
+            [place.clone()].into_iter().chain(moved).collect::<Vec<_>>()
+        };
+        let all: Vec<Candidate> =
+            places.iter().flat_map(neighbours).map(|place| self.candidate(&place)).collect();
+        let found = self.evaluator.readings(&all, stride, self.stop);
+        let mut rest = found.as_slice();
+        let normal = |place: &Vec<f64>| {
+            let (own, others) = rest.split_at_checked(1 + place.len())?;
+            rest = others;
+            if own.iter().any(|one| one.reading.is_empty()) {
+                return None;
+            }
+            let base = &own[0].reading;
+            let columns = place.iter().zip(&own[1..]).map(|(z, one)| {
+                let scale = 1.0 / change(*z);
+                one.reading.iter().zip(base).map(|(x, base)| (x - base) * scale).collect()
+            });
+            Some(self.equations(columns.collect(), base, stride))
+        };
+        places.iter().map(normal).collect()
+    }
+
+    /// Samples of the window to a row of the normal equations.
+    fn stride(&self, most: usize) -> usize {
+        self.record.window.len().div_ceil(most)
+    }
+
+    /// The normal equations of the columns of a Jacobian and what is read at their place.
+    fn equations(&self, mut columns: Vec<Vec<f64>>, read: &[f64], stride: usize) -> Normal {
+        columns.iter_mut().for_each(|column| self.centre(column));
+        let measured = self.record.y[self.record.window.clone()].iter().step_by(stride);
+        let mut residual: Vec<f64> = measured.zip(read).map(|(y, x)| y - x).collect();
+        self.centre(&mut residual);
         let count = columns.len();
-        Some(Normal {
-            square: DMatrix::from_fn(count, count, |i, j| product(&columns[i], &columns[j])),
-            slope: DVector::from_fn(count, |i, _| product(&columns[i], &residual)),
-            rows: residual.len(),
-        })
+        let mut square = DMatrix::zeros(count, count);
+        for i in 0..count {
+            for j in 0..=i {
+                square[(i, j)] = product(&columns[i], &columns[j]);
+                square[(j, i)] = square[(i, j)];
+            }
+        }
+        let slope = DVector::from_fn(count, |i, _| product(&columns[i], &residual));
+        Normal { square, slope, rows: residual.len() }
     }
 
     /// Whether the deviations of a candidate are white: half the mean square of their differences
@@ -166,28 +206,34 @@ impl LocalRefinement<'_> {
     /// doi 10.1214/aoms/1177731677).
     #[must_use]
     pub fn is_white(&self, place: &[f64]) -> bool {
-        let Some(residual) = self.residual(place, 1) else { return false };
+        let Some(residual) = self.residual(place) else { return false };
         let squares = product(&residual, &residual);
         let differences = residual.windows(2).map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0]));
         0.5 * differences.sum::<f64>() / squares > WHITE
     }
 
-    /// Measured less simulated at every stride-th sample, the mean taken off where an offset is
-    /// fitted.
-    fn residual(&self, place: &[f64], stride: usize) -> Option<Vec<f64>> {
-        let mut residual = self.displacement(place, stride)?;
-        let measured = self.record.y[self.record.window.clone()].iter().step_by(stride);
+    /// Measured less simulated, the mean taken off where an offset is fitted.
+    fn residual(&self, place: &[f64]) -> Option<Vec<f64>> {
+        let mut residual = self.evaluator.reading(&self.problem.theta(place), self.stop)?;
+        let measured = &self.record.y[self.record.window.clone()];
         residual.iter_mut().zip(measured).for_each(|(x, y)| *x = y - *x);
         self.centre(&mut residual);
         Some(residual)
     }
 
-    /// Every stride-th sample of the window, simulated as the search does, with the shares of the
-    /// creep that suit it best.
-    fn displacement(&self, place: &[f64], stride: usize) -> Option<Vec<f64>> {
-        let theta = self.problem.theta(place);
-        let x = self.evaluator.reading(&theta, self.stop)?;
-        Some(x.iter().step_by(stride).copied().collect())
+    /// What is read at some places every `stride` samples, simulated as the search does, with the
+    /// shares of the creep that suit each best; `None` where one cannot be simulated.
+    fn readings(&self, places: &[Vec<f64>], stride: usize) -> Option<Vec<Vec<f64>>> {
+        let candidates: Vec<Candidate> =
+            places.iter().map(|place| self.candidate(place)).collect();
+        let found = self.evaluator.readings(&candidates, stride, self.stop);
+        let whole = found.len() == places.len() && found.iter().all(|one| !one.reading.is_empty());
+        whole.then(|| found.into_iter().map(|one| one.reading).collect())
+    }
+
+    /// The candidate at a place, simulated to its end however bad.
+    fn candidate(&self, place: &[f64]) -> Candidate {
+        Candidate { theta: self.problem.theta(place), limit: f64::INFINITY }
     }
 
     /// Takes the mean off where an offset is fitted.
@@ -201,8 +247,15 @@ impl LocalRefinement<'_> {
     }
 }
 
+/// A place with another value of one coordinate.
+fn with(place: &[f64], d: usize, z: f64) -> Vec<f64> {
+    let mut moved = place.to_vec();
+    moved[d] = z;
+    moved
+}
+
 /// A damped step that stays in the box; `None` where nothing can move.
-fn step(normal: &Normal, place: &[f64], damping: f64) -> Option<Vec<f64>> {
+pub(super) fn step(normal: &Normal, place: &[f64], damping: f64) -> Option<Vec<f64>> {
     let presses = |d: usize, z: f64| {
         (z <= 0.0 && normal.slope[d] < 0.0) || (z >= 1.0 && normal.slope[d] > 0.0)
     };

@@ -135,14 +135,30 @@ pub(super) struct ResidualSums<'a, const V: usize, S: Simd, R> {
     creep: Vec<Relaxing<Lanes<S, V>, R>>,
     /// Costs of the candidates that are settled before the end.
     verdicts: Vec<Option<Costs>>,
+    /// Every so many samples of the window what is read is kept; 0 for never.
+    stride: usize,
+    /// The sample that is kept next.
+    next: usize,
+    /// What was kept: at each of these samples the displacement, and the creep's outputs.
+    kept: Vec<Lanes<S, V>>,
+}
+
+/// A candidate simulated.
+pub(super) struct Simulated {
+    /// Its cost.
+    pub costs: Costs,
+    /// What is read at the samples that were asked for, with the best shares of the creep but
+    /// without offset, m.
+    pub reading: Vec<f64>,
 }
 
 impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
-    /// Sums that are 0.
+    /// Sums that are 0; a reading is kept every `stride` samples, or never.
     #[inline(always)]
     pub fn new(
         of: &'a Residuals<'a>,
         candidates: &'a [Candidate],
+        stride: usize,
         stop: Stop<'a>,
         zero: Lanes<S, V>,
         substeps: f64,
@@ -160,6 +176,9 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
         };
         let creep = of.creep_times.iter().map(relaxing).collect();
         let (last, reading) = ([zero; 2], reading());
+        let kept = if stride > 0 { of.record.window.len().div_ceil(stride) } else { 0 };
+        let kept = Vec::with_capacity(kept * (1 + of.creep_times.len()));
+        let next = if stride > 0 { of.record.window.start } else { usize::MAX };
         Self {
             of,
             candidates,
@@ -171,6 +190,9 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
             last,
             creep,
             verdicts,
+            stride,
+            next,
+            kept,
         }
     }
 
@@ -213,15 +235,32 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
         stop() || self.verdicts.iter().all(Option::is_some)
     }
 
-    /// The costs, where the lanes `ended` or were given up before.
-    pub fn conclude(self, ended: bool) -> Vec<Costs> {
+    /// The costs, where the lanes `ended` or were given up before, and what was kept.
+    pub fn conclude(self, ended: bool) -> Vec<Simulated> {
         let samples = self.of.record.window.len();
-        let costs = self.verdicts.iter().enumerate().map(|(lane, verdict)| match verdict {
-            Some(verdict) => *verdict,
-            None if ended => self.of.costs(&self.sums(lane), samples, false),
-            None => Costs::FAILED,
+        let simulated = self.verdicts.iter().enumerate().map(|(lane, verdict)| {
+            let costs = match verdict {
+                Some(verdict) => *verdict,
+                None if ended => self.of.costs(&self.sums(lane), samples, false),
+                None => Costs::FAILED,
+            };
+            Simulated { costs, reading: self.reading_of(lane, &costs) }
         });
-        costs.collect()
+        simulated.collect()
+    }
+
+    /// What was kept of a lane, the creep added.
+    fn reading_of(&self, lane: usize, costs: &Costs) -> Vec<f64> {
+        if self.stride == 0 || costs.rms.is_infinite() {
+            return Vec::new();
+        }
+        let row = |row: &[Lanes<S, V>]| {
+            let mut at = row.iter().map(|lanes| lanes.as_slice()[lane]);
+            let displacement = at.next().unwrap_or(f64::NAN);
+            let creep = at.zip(&costs.shares).map(|(output, c)| c * (output + self.of.centre));
+            displacement + creep.sum::<f64>()
+        };
+        self.kept.chunks_exact(1 + self.creep.len()).map(row).collect()
     }
 }
 
@@ -266,6 +305,12 @@ impl<const V: usize, S: Simd, M, R: Reading<Lanes<S, V>>> Observer<Lanes<S, V>, 
         }
         let x = self.reading.read(k, state.x, state.w);
         let record = self.of.record;
+        // Bundles of one vector only: several have no register for it.
+        if const { V == 1 } && k == self.next {
+            self.next += self.stride;
+            self.kept.push(x);
+            self.kept.extend(self.creep.iter().map(|one| one.output));
+        }
         if k >= record.window.start {
             let deviation = x.like(record.y[k] - self.of.centre) - x;
             self.sum = self.sum + deviation;

@@ -3,6 +3,7 @@
 use super::candidate::Candidate;
 use super::candidate::Theta;
 use super::cost::Evaluator;
+use super::descents::DescentSettings;
 use super::problem::Problem;
 use super::residual_sums::Costs;
 use super::swarm::{Swarm, SwarmSettings};
@@ -18,6 +19,10 @@ pub enum StopReason {
     Stalled,
     /// All iterations were done.
     Iterations,
+    /// As many independent descents as asked for ended at the lowest cost.
+    Agreed,
+    /// A descent had nothing left to gain.
+    Converged,
     /// The caller's monitor or stop flag ended it.
     Interrupted,
 }
@@ -75,12 +80,21 @@ pub struct Outcome {
 /// How a problem is searched.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// Settings of each swarm.
-    pub settings: SwarmSettings,
+    /// What searches.
+    pub method: Method,
     /// Seed of the random numbers.
     pub seed: u64,
-    /// Swarms that search apart from each other.
+    /// Searches apart from each other.
     pub runs: usize,
+}
+
+/// What searches.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Method {
+    /// A particle swarm.
+    Swarm(SwarmSettings),
+    /// Descents from random points.
+    Descents(DescentSettings),
 }
 
 impl Plan {
@@ -89,14 +103,22 @@ impl Plan {
     /// # Errors
     /// [`Error::Parameter`] naming what cannot be used.
     pub fn validate(&self) -> Result<()> {
-        self.settings.validate()?;
+        let each = match &self.method {
+            Method::Swarm(settings) => {
+                settings.validate()?;
+                settings.particles
+            }
+            Method::Descents(settings) => {
+                settings.validate()?;
+                settings.samples
+            }
+        };
         if self.runs == 0 || self.runs > MOST_RUNS {
             let expected = format!("1 or more, {MOST_RUNS} at most");
             return Err(Error::parameter("runs", self.runs, expected));
         }
-        let particles = self.runs * self.settings.particles;
+        let particles = self.runs * each;
         if particles > MOST_PARTICLES {
-            let each = self.settings.particles;
             let expected = format!(
                 "{} at most with {each} particles in each: {MOST_PARTICLES} together",
                 (MOST_PARTICLES / each).max(1)
@@ -199,6 +221,7 @@ impl Run {
 pub fn search(
     evaluator: &Evaluator<'_>,
     problem: &Problem,
+    settings: &SwarmSettings,
     plan: &Plan,
     monitor: &mut dyn Monitor,
     stop: Stop<'_>,
@@ -207,7 +230,7 @@ pub fn search(
     plan.validate()?;
     let runs = 0..plan.runs as u64;
     let runs: Result<Vec<Run>> =
-        runs.map(|run| Run::new(&plan.settings, coordinates, plan.seed, run)).collect();
+        runs.map(|run| Run::new(settings, coordinates, plan.seed, run)).collect();
     let mut runs = runs?;
     while runs.iter().any(|run| run.reason.is_none()) {
         let asked: Vec<Vec<Candidate>> = runs.iter().map(|run| run.candidates(problem)).collect();
@@ -223,7 +246,7 @@ pub fn search(
                 run.tell(own);
             }
         }
-        if monitor.report(&progress(&runs, problem, plan)).is_break() {
+        if monitor.report(&progress(&runs, problem, settings.iterations)).is_break() {
             for run in &mut runs {
                 run.reason = Some(StopReason::Interrupted);
             }
@@ -242,12 +265,12 @@ pub fn search(
 }
 
 /// Where the runs stand together.
-fn progress(runs: &[Run], problem: &Problem, plan: &Plan) -> Progress {
+fn progress(runs: &[Run], problem: &Problem, iterations: usize) -> Progress {
     let best = runs.iter().map(|run| run.swarm.best()).min_by(|a, b| a.1.total_cmp(&b.1));
     let (place, cost) = best.unwrap_or((&[], f64::INFINITY));
     Progress {
         iteration: runs.iter().map(|run| run.swarm.iteration()).max().unwrap_or(0),
-        iterations: plan.settings.iterations,
+        iterations,
         evaluations: runs.iter().map(|run| run.evaluations).sum(),
         cost,
         theta: problem.theta(place),
