@@ -65,7 +65,7 @@ const ITERATIONS: usize = 60;
 /// Shares of the cost that an iteration gains: below the first it is over, below the second twice
 /// in a row too.
 const NOTHING: f64 = 1e-9;
-const LITTLE: f64 = 1e-5;
+const LITTLE: f64 = 1e-4;
 
 /// Dampings that are tried side by side, as factors of the last one that gained.
 const DAMPINGS: [f64; 3] = [0.1, 1.0, 10.0];

@@ -255,24 +255,39 @@ fn with(place: &[f64], d: usize, z: f64) -> Vec<f64> {
 }
 
 /// A damped step that stays in the box; `None` where nothing can move.
+///
+/// A coordinate whose step would cross a bound goes to the bound, and the others take the step
+/// that is best with it there.
 pub(super) fn step(normal: &Normal, place: &[f64], damping: f64) -> Option<Vec<f64>> {
     let presses = |d: usize, z: f64| {
         (z <= 0.0 && normal.slope[d] < 0.0) || (z >= 1.0 && normal.slope[d] > 0.0)
     };
-    let moving: Vec<usize> = (0..place.len())
+    let mut moving: Vec<usize> = (0..place.len())
         .filter(|&d| normal.square[(d, d)] > 0.0 && !presses(d, place[d]))
         .collect();
-    let square = DMatrix::from_fn(moving.len(), moving.len(), |i, j| {
-        let value = normal.square[(moving[i], moving[j])];
-        if i == j { value * (1.0 + damping) } else { value }
-    });
-    let slope = DVector::from_fn(moving.len(), |i, _| normal.slope[moving[i]]);
-    let change = square.cholesky()?.solve(&slope);
-    let mut next = place.to_vec();
-    for (&d, change) in moving.iter().zip(change.iter()) {
-        next[d] = (place[d] + change).clamp(0.0, 1.0);
+    let mut change = DVector::zeros(place.len());
+    while !moving.is_empty() {
+        let square = DMatrix::from_fn(moving.len(), moving.len(), |i, j| {
+            let value = normal.square[(moving[i], moving[j])];
+            if i == j { value * (1.0 + damping) } else { value }
+        });
+        // What those at their bounds leave of the slope.
+        let left = &normal.slope - &normal.square * &change;
+        let slope = DVector::from_fn(moving.len(), |i, _| left[moving[i]]);
+        let found = square.cholesky()?.solve(&slope);
+        let next = |(&d, change): (&usize, &f64)| (d, place[d] + change);
+        let (inside, crossing): (Vec<(usize, f64)>, Vec<(usize, f64)>) =
+            moving.iter().zip(found.iter()).map(next).partition(|(_, z)| (0.0..=1.0).contains(z));
+        if crossing.is_empty() {
+            inside.iter().for_each(|&(d, z)| change[d] = z - place[d]);
+            break;
+        }
+        crossing.iter().for_each(|&(d, z)| change[d] = z.clamp(0.0, 1.0) - place[d]);
+        moving = inside.into_iter().map(|(d, _)| d).collect();
     }
-    (!moving.is_empty() && next != place).then_some(next)
+    let next: Vec<f64> =
+        place.iter().zip(change.iter()).map(|(z, change)| (z + change).clamp(0.0, 1.0)).collect();
+    (next != place).then_some(next)
 }
 
 /// Standard deviations in the unit box, from the eigenvalues of the scaled normal equations.
