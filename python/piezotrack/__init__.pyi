@@ -27,10 +27,10 @@ from .errors import ParameterError as ParameterError
 from .errors import PiezotrackError as PiezotrackError
 from .errors import ShapeError as ShapeError
 from .identification.comparison import compare as compare
+from .identification.descents import Descents as Descents
 from .identification.fit import identify as identify
 from .identification.identified import load as load
 from .identification.step_response import identify_step as identify_step
-from .identification.descents import Descents as Descents
 from .identification.swarm import ParticleSwarm as ParticleSwarm
 from .references.parse import parse_reference as parse_reference
 from .references.paths import circle as circle

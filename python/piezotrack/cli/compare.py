@@ -67,7 +67,7 @@ def compare_command(
     resample: Resample = None,
     hold: HoldOption = "foh",
     seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
-    runs: Annotated[int, typer.Option(help="Number of independent restarts.")] = 4,
+    runs: Annotated[int, typer.Option(help="Number of independent searches.")] = 1,
     threads: Annotated[
         int | None, typer.Option(help="Number of threads, up to 256; default all cores.")
     ] = None,

@@ -81,7 +81,7 @@ Creep = Annotated[
     typer.Option(
         metavar="none|fit|S,S,...",
         help="Creep: none, fit it, or its known time constants in s; default none for models that "
-        "a swarm searches, what the log shows for the Prandtl-Ishlinskii models.",
+        "are searched, what the log shows for the Prandtl-Ishlinskii models.",
     ),
 ]
 Plays = Annotated[
@@ -107,14 +107,22 @@ Dynamics = Annotated[
         "(mode); default auto, what the log shows.",
     ),
 ]
+Method = Annotated[
+    Literal["descents", "swarm"] | None,
+    typer.Option(
+        help="What searches: descents from random points until independent ones agree, or a "
+        "particle swarm; default descents.",
+    ),
+]
 Swarm = Annotated[
     str | None,
     typer.Option(
-        metavar="NAME", help="Swarm settings: xu-li-2010 or spso-2011; default settings of our own."
+        metavar="NAME",
+        help="Swarm with these settings: xu-li-2010, spso-2011 or default, which are our own.",
     ),
 ]
 
-# How a swarm is run.
+# How a search is run.
 RUNNING = ("seed", "runs", "threads")
 # Options of least squares.
 OF_PLAYS = ("plays", "asymmetry", "dynamics")
@@ -152,12 +160,12 @@ class Kinds:
             )
         if not any(map(_of_plays, self.names)):
             refuse_without_effect(
-                context, OF_PLAYS, f"with the model {named}, whose parameters a swarm searches"
+                context, OF_PLAYS, f"with the model {named}, whose parameters are searched"
             )
         for given in ("delay", "stiffness"):
             if context.params[given] is not None and self.names == (AUTO,):
                 refuse_without_effect(
-                    context, OF_PLAYS, f"with --{given}, for which a swarm has to search"
+                    context, OF_PLAYS, f"with --{given}, for which a search is needed"
                 )
 
     def arguments_of(self, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
@@ -175,7 +183,7 @@ class Kinds:
 
 
 def searched(name: str) -> bool:
-    """Whether a swarm searches a kind, or one of those that are tried."""
+    """Whether a kind is searched, or one of those that are tried."""
     return name == AUTO or LISTED[name].searched
 
 
@@ -193,6 +201,7 @@ def fit_options(
     plays: int | None,
     asymmetry: int | None,
     dynamics: str | None,
+    method: str | None,
     swarm: str | None,
 ) -> dict[str, Any]:
     """Parse the options of a fit; None stands for what was not given."""
@@ -205,6 +214,7 @@ def fit_options(
         "delay": _delay(delay),
         "creep": relaxations,
         "least_squares": _least_squares(plays, asymmetry, dynamics, relaxations),
+        "method": method,
         "swarm": _swarm(swarm),
     }
 
@@ -230,7 +240,7 @@ def _swarm(name: str | None) -> ParticleSwarm | None:
     from ..identification.swarm import ParticleSwarm
 
     known = {
-        "default": None,
+        "default": ParticleSwarm(),
         "xu-li-2010": ParticleSwarm.xu_li_2010(),
         "spso-2011": ParticleSwarm.spso_2011(),
     }

@@ -22,6 +22,7 @@ from .fit_options import (
     History,
     Kinds,
     KindsNamed,
+    Method,
     Plays,
     Swarm,
     fit_options,
@@ -89,10 +90,12 @@ def identify_command(
     plays: Plays = None,
     asymmetry: Asymmetry = None,
     dynamics: Dynamics = None,
+    method: Method = None,
     swarm: Swarm = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the random numbers; default 0.")] = None,
     runs: Annotated[
-        int | None, typer.Option(help="Number of independent restarts; default 4.")
+        int | None,
+        typer.Option(help="Number of independent searches; default 1, of swarms 4."),
     ] = None,
     threads: Annotated[
         int | None, typer.Option(help="Number of threads, up to 256; default all cores.")
@@ -118,6 +121,7 @@ def identify_command(
         plays=plays,
         asymmetry=asymmetry,
         dynamics=dynamics,
+        method=method,
         swarm=swarm,
     )
     given |= {"stiffness": stiffness, "offset": offset, "history": history}

@@ -5,6 +5,7 @@ from .comparison import ModelScore as ModelScore
 from .comparison import compare as compare
 from .cross_talk import CrossTalk as CrossTalk
 from .cross_talk import identify_cross_talk as identify_cross_talk
+from .descents import Descents as Descents
 from .estimates import Estimate as Estimate
 from .estimates import LagRange as LagRange
 from .estimates import Progress as Progress
@@ -28,5 +29,4 @@ from .step_readings import StepReadings as StepReadings
 from .step_response import StepResult as StepResult
 from .step_response import StepTrace as StepTrace
 from .step_response import identify_step as identify_step
-from .descents import Descents as Descents
 from .swarm import ParticleSwarm as ParticleSwarm

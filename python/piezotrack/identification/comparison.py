@@ -225,7 +225,7 @@ def compare(
     test: Window | Dataset | None = None,
     history: History | None = None,
     seed: int = 0,
-    runs: int = 4,
+    runs: int = 1,
     threads: int | None = None,
     progress: bool | None = None,
 ) -> Comparison:
@@ -262,7 +262,7 @@ def compare(
     history : {"virgin", "settled", "fit"}, optional
         What the stage went through before the record, as for `identify`.
     seed, runs, threads, progress : optional
-        As for `identify`, for the models that a swarm searches.
+        As for `identify`, for the models that are searched.
 
     Returns
     -------

@@ -43,10 +43,10 @@ class Descents:
     3
     """
 
-    samples: int = 64
-    starts: int = 8
+    samples: int = 32
+    starts: int = 32
     agreeing: int = 2
-    rounds: int = 25
+    rounds: int = 10
 
     def __post_init__(self) -> None:
         for field in fields(self):

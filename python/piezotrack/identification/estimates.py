@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 
 __all__ = ["Estimate", "LagRange", "Progress", "StopReason", "SwarmRun"]
 
-StopReason = Literal["stalled", "iterations", "interrupted", "solved"]
+StopReason = Literal["agreed", "converged", "stalled", "iterations", "interrupted", "solved"]
 
 
 class Progress(NamedTuple):
@@ -100,7 +100,7 @@ class LagRange(NamedTuple):
 
 
 class SwarmRun(NamedTuple):
-    """One of the independent restarts of a search.
+    """One of the independent restarts of a swarm, or one descent.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class SwarmRun(NamedTuple):
         Its lowest cost [m], after local refinement where that is asked for.
     nit, nfev : int
         Its iterations and simulations.
-    stop_reason : {"stalled", "iterations", "interrupted"}
+    stop_reason : {"agreed", "converged", "stalled", "iterations", "interrupted"}
         Why it ended.
     """
 

@@ -1,4 +1,4 @@
-"""`identify`: identification of any model, by a swarm or by least squares."""
+"""`identify`: identification of any model, by a search or by least squares."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .selection import AUTO, identify_best
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
+    from .descents import Descents
     from .estimates import Progress
     from .history import History
     from .least_squares import LeastSquares
     from .result import Identification
     from .step_response import StepResult
-    from .descents import Descents
     from .swarm import ParticleSwarm
 
 __all__ = ["identify"]
@@ -55,9 +55,9 @@ def identify(
 
     .. math:: f = \sqrt{\tfrac{1}{n} \sum_i (x_i - \hat x_i)^2}
 
-    (Xu and Li 2010, equation (16), doi 10.1115/1.4001712), by a particle swarm or, where the
-    model is linear in its weights, by least squares. The warm-up before the window is simulated,
-    from rest, and not counted.
+    (Xu and Li 2010, equation (16), doi 10.1115/1.4001712), by descents from random
+    points, by a particle swarm or, where the model is linear in its weights, by least squares. The
+    warm-up before the window is simulated, from rest, and not counted.
 
     Voltage and displacement determine ratios only: all parameters with the dimension of force, such
     as mass, damping and stiffness, can be multiplied by one number without changing the motion.
@@ -73,14 +73,14 @@ def identify(
     model : str, optional
         Name of the model. By default, ``"auto"``, those that suit the record are fitted to the
         first three fifths of the window and judged on the rest, and the best is fitted to all of
-        it and says so: `Identification.trials`. A swarm searches ``"dahl"`` (`DahlStage`),
+        it and says so: `Identification.trials`. Searched are ``"dahl"`` (`DahlStage`),
         ``"bouc-wen"`` (`BoucWenStage`), ``"first-order-dahl"`` (`FirstOrderDahlStage`),
         ``"parallel-dahl"`` (`ParallelDahlStage`) and ``"bouc-wen-oscillator"``
         (`BoucWenOscillator`); least squares find
         ``"prandtl-ishlinskii"`` (`PrandtlIshlinskiiStage`) and
         ``"generalised-prandtl-ishlinskii"`` (`GeneralisedPrandtlIshlinskiiStage`). Of the
         arguments below, `offset` and `history` apply to every model, `least_squares` to those
-        found by least squares, and all others to those that a swarm searches; an argument that
+        found by least squares, and all others to those that are searched; an argument that
         does not apply to the model is refused.
     free : iterable of str, optional
         Parameters to search; by default all that are not fixed. `b0`, dry friction at reversals,
@@ -116,11 +116,16 @@ def identify(
         three at most, or two whose time constants follow from the record (True): the drive's
         period and half of the window. What relaxes within a period widens the loop, as damping and
         hysteresis do, and one record does not tell them apart. The weights, 0.5 together at most,
-        are the best for each candidate, by linear least squares, and add nothing to what the swarm
-        searches.
+        are the best for each candidate, by linear least squares, and add nothing to what
+        is searched.
         For models found by least squares, see ``LeastSquares.creep``.
+    method : {"descents", "swarm"}, optional
+        What searches: descents from random points until independent ones agree, or a particle
+        swarm; where not given, that whose settings are, else descents.
     swarm : ParticleSwarm, optional
         Settings of the swarm.
+    descents : Descents, optional
+        Settings of the descents.
     least_squares : LeastSquares, optional
         Settings of the least squares: ``pt.identification.LeastSquares``.
     seed : int, optional
@@ -128,9 +133,10 @@ def identify(
         threads. Least squares, which need neither, take `seed`, `runs`, `threads` and `progress`
         too, for calls in a loop over models.
     runs : int, optional
-        Number of independent restarts, 4 where not given, each with its own random numbers;
-        different final costs show that there are several local minima. The restarts are simulated
-        side by side in the processor's SIMD lanes. Up to a million particles in all of them.
+        Number of independent searches, each with its own random numbers: 1 by descents, 4 by a
+        swarm, where not given. Different final costs show that there are several local minima; a
+        rare one is found by more descents. Swarms are simulated side by side in the processor's
+        SIMD lanes. Up to a million particles in all of them.
     threads : int, optional
         Up to 256; all cores where it is 0 or not given.
     progress : bool, optional

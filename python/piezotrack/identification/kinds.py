@@ -1,4 +1,4 @@
-"""Identification of one kind of stage: by a swarm or by least squares."""
+"""Identification of one kind of stage: by a search or by least squares."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def refuse_given(info: ModelInfo, of_swarm: Mapping[str, object], least_squares:
     ParameterError
         One is given for the other way.
     """
-    how = "a swarm searches" if info.searched else "least squares find"
+    how = "are searched" if info.searched else "follow by least squares"
     check_counts(of_swarm)
     given = {"least_squares": least_squares} if info.searched else of_swarm
     for name, value in given.items():

@@ -203,7 +203,8 @@ def plot_convergence(
     # A cost of 0 has no place on a logarithmic scale.
     finite = np.isfinite(fit.history) & (fit.history > 0.0)
     iterations = np.arange(fit.history.size)[finite]
-    best = f"best of {len(fit.runs)} restarts" if len(fit.runs) > 1 else "swarm"
+    one = "swarm" if fit.swarm is not None else "descent"
+    best = f"best of {len(fit.runs)} {one}s" if len(fit.runs) > 1 else one
     ax.plot(
         iterations,
         1e6 * fit.history[finite],
@@ -213,7 +214,8 @@ def plot_convergence(
     )
     ends = [(run.nit, 1e6 * run.cost) for run in fit.runs if 0.0 < run.cost < np.inf]
     if len(ends) > 1:
-        label = "each restart, refined" if fit.npolish else "end of each restart"
+        refined = fit.npolish and fit.swarm is not None
+        label = f"each {one}, refined" if refined else f"end of each {one}"
         ax.plot(*zip(*ends, strict=True), **{**MARKS, "marker": "x", "label": label})
     if fit.npolish and fit.cost > 0.0:
         ax.plot(fit.nit, fit.cost_um, **{**MARKS, "label": f"refined: {fit.cost_um:.4g} um"})
@@ -277,7 +279,7 @@ def plot_response(
 def plot_identification(
     fit: Identification, data: Dataset | None = None, fig: Figure | SubFigure | None = None
 ) -> Figure:
-    """Draw loop, displacement, error and, after a swarm search, convergence in one figure.
+    """Draw loop, displacement, error and, after a search, convergence in one figure.
 
     Parameters
     ----------
@@ -296,7 +298,7 @@ def plot_identification(
     own = data is None
     record = fit.data if data is None else data
     run = fit.simulate(record, offset=fit.offset if own else "own")
-    searched = fit.swarm is not None
+    searched = fit.model.info.searched
     figure = panels(fig, (11.0, 6.6 if searched else 5.6))
     grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.35])
     plot_loop(record, run, figure.add_subplot(grid[0 if searched else slice(None), 0]))

@@ -49,9 +49,10 @@ def summary_text(fit: Identification) -> str:
     ]
     if begun := of_start(fit.start, data):
         lines.append(f"      the record begins {begun}")
-    searched = fit.swarm is not None
+    searched = fit.model.info.searched
     if searched:
-        how = f"{fit.nit} iterations, {fit.nfev} simulations, seed {fit.seed}: {fit.message}"
+        iterations = f"{fit.nit} iterations, " if fit.swarm is not None else ""
+        how = f"{iterations}{fit.nfev} simulations, seed {fit.seed}: {fit.message}"
         lines += [f"      {how}", *_runs(fit)]
     else:
         lines.append(f"      least squares, {fit.nfev} simulations")
@@ -136,13 +137,20 @@ def _scaled(fit: Identification, one: Parameter) -> list[float]:
 
 
 def _runs(fit: Identification) -> list[str]:
-    """Say whether several runs agree."""
-    if len(fit.runs) == 1:
+    """Say whether several runs agree, and what the others found."""
+    costs = sorted(1e6 * run.cost for run in fit.runs)
+    if fit.descents is not None:
+        text = f"{fit.agreeing} of {len(costs)} descents end within 0.1 % of the lowest cost"
+        others = costs[fit.agreeing :]
+        if others and others[0] < math.inf:
+            most = max(cost for cost in others if cost < math.inf)
+            text += f", the others at {others[0]:.4g} to {most:.4g} um"
+        return [f"      {text}"]
+    if len(costs) == 1:
         return ["      one run: runs=4 would show whether there are other local minima"]
-    costs = ", ".join(f"{1e6 * cost:.4g}" for cost in sorted(run.cost for run in fit.runs)[:4])
-    more = ", ..." if len(fit.runs) > 4 else ""
-    verdict = f"{fit.agreeing} of {len(fit.runs)} runs end within 0.1 % of the best"
-    return [f"      {verdict}: {costs}{more} um"]
+    more = ", ..." if len(costs) > 4 else ""
+    verdict = f"{fit.agreeing} of {len(costs)} runs end within 0.1 % of the best"
+    return [f"      {verdict}: {', '.join(f'{cost:.4g}' for cost in costs[:4])}{more} um"]
 
 
 def _known(fit: Identification) -> list[str]:
@@ -205,7 +213,7 @@ def identification_files(name: str, *, searched: bool) -> list[str]:
     name : str
         Beginning of the file names.
     searched : bool
-        Whether a swarm searches the model.
+        Whether the model is searched.
 
     Returns
     -------
@@ -239,7 +247,7 @@ def save_identification(
     Returns
     -------
     list of pathlib.Path
-        ``{name}.json``, and as PNG and SVG ``{name}_loop``, ``{name}_time`` and, after a swarm
+        ``{name}.json``, and as PNG and SVG ``{name}_loop``, ``{name}_time`` and, after a
         search, ``{name}_convergence``.
     """
     from .plot import named, plot_convergence, plot_loop, plot_time, what_was_fitted
@@ -254,7 +262,7 @@ def save_identification(
         f"{name}_loop": plot_loop(record, run, title=title).figure,
         f"{name}_time": above.figure,
     }
-    if fit.swarm is not None:
+    if fit.model.info.searched:
         figures[f"{name}_convergence"] = plot_convergence(fit, title=named(fit, fit.data)).figure
     with together(make_folder(folder)) as path:
         return [fit.save(path / f"{name}.json"), *save_figures(figures, path)]  # type: ignore[arg-type]

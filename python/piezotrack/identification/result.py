@@ -37,7 +37,7 @@ __all__ = ["Identification"]
 class Identification(IdentifiedModel):
     """Result of an identification; see `IdentifiedModel` for its use.
 
-    After a swarm search all attributes but `least_squares` and `at_bound` are set; after a fit by
+    After a search all attributes but `least_squares` and `at_bound` are set; after a fit by
     least squares these two, and the first four.
 
     Attributes
@@ -48,27 +48,33 @@ class Identification(IdentifiedModel):
         RMS deviation in the window [m], equation (16) of Xu and Li 2010.
     nfev : int
         Simulations of the record, of all runs.
-    stop_reason : {"stalled", "iterations", "interrupted", "solved"}
+    stop_reason : {"agreed", "converged", "stalled", "iterations", "interrupted", "solved"}
         Why the fit ended; ``"solved"`` after least squares.
     parameters : dict of str to Estimate
         The parameters with units, bounds and standard deviations; and the delay where it
         was fitted. Empty after least squares.
     history : ndarray, shape (nit + 1,)
-        Best cost after each iteration of the swarm [m].
+        Best cost after each iteration of the best run [m].
     nit : int
-        Iterations of the swarm that found the best candidate.
+        Iterations of the swarm, or of the descent, that found the best candidate.
     nfail : int
         Simulations that diverged.
     npolish : int
-        Simulations of the local refinement after that swarm, which `history` does not include.
+        Simulations of the local refinement after that run, which `history` does not include.
     runs : tuple of SwarmRun
-        The independent restarts; the other attributes are those of the best one.
+        The independent restarts of a swarm, or the descents; the other attributes are those of
+        the best one.
     substeps, order : int
         Steps of the integrator in each sampling interval and their order, fixed for the search.
     seed : int or None
         Seed of the random numbers.
+    agreeing : int
+        Number of runs that ended within 0.1 % of the lowest cost; of descents before the local
+        refinement of the best one. Costs below 0.001 % of the stroke count as equal.
     swarm : ParticleSwarm or None
-        Settings of the swarm.
+        Settings of the swarm, where one searched.
+    descents : Descents or None
+        Settings of the descents, where they searched.
     least_squares : LeastSquares or None
         Settings of the least squares.
     lags : LagRange or None
@@ -95,6 +101,7 @@ class Identification(IdentifiedModel):
     substeps: int = 1
     order: int = 0
     seed: int | None = None
+    agreeing: int = 0
     swarm: ParticleSwarm | None = None
     descents: Descents | None = None
     least_squares: LeastSquares | None = None
@@ -174,17 +181,9 @@ class Identification(IdentifiedModel):
                 "the record does not determine the dynamics: time constant or mode lies on a bound"
             )
         if len(self.runs) > 1 and self.agreeing == 1:
-            notes.append("no other restart ended in the minimum of the best one: increase runs=")
+            what = "restart" if self.swarm is not None else "descent"
+            notes.append(f"no other {what} ended in the minimum of the best one: increase runs=")
         return notes
-
-    @property
-    def agreeing(self) -> int:
-        """Number of runs that ended within 0.1 % of the lowest cost.
-
-        Costs below 0.001 % of the stroke count as equal.
-        """
-        near = max(1.001 * self.cost, 1e-5 * self.stroke)
-        return sum(run.cost <= near for run in self.runs)
 
     @property
     def success(self) -> bool:
@@ -201,6 +200,10 @@ class Identification(IdentifiedModel):
             )
         if self.stop_reason == "iterations" and self.swarm is not None:
             return f"all {self.swarm.iterations} iterations were done"
+        if self.stop_reason == "agreed":
+            return "independent descents agree"
+        if self.stop_reason == "iterations" and self.descents is not None:
+            return f"all {self.descents.rounds} rounds were done"
         return self.stop_reason
 
     def summary(self) -> str:
@@ -216,7 +219,7 @@ class Identification(IdentifiedModel):
         return summary_text(self)
 
     def plot(self, data: Dataset | None = None, *, fig: Figure | SubFigure | None = None) -> Figure:
-        """Loop, displacement with its error over time, and convergence of a swarm.
+        """Loop, displacement with its error over time, and convergence of the search.
 
         One panel alone, in axes of your own: `plot_loop`, `plot_time`, `plot_convergence`.
 

@@ -33,7 +33,7 @@ __all__ = ["search"]
 # Searches by default, and their names: a swarm has to be restarted to tell whether it converged.
 RUNS: dict[type, int] = {ParticleSwarm: 4, Descents: 1}
 METHODS: dict[type, str] = {ParticleSwarm: "swarm", Descents: "descents"}
-DEFAULT = "swarm"
+DEFAULT = "descents"
 # Unit and symbol of what is searched beside the parameters of a model.
 SENSOR = {"delay": ("s", "Td"), "voltage_before": ("V", "u0")}
 
@@ -60,7 +60,7 @@ def search(
     progress: bool | None = None,
     callback: object = None,
 ) -> Identification:
-    """Search the parameters of a model with a swarm.
+    """Search the parameters of a model, by descents or with a swarm.
 
     Parameters
     ----------
@@ -72,8 +72,8 @@ def search(
         Whether an offset of the sensor is fitted.
     history : {"virgin", "settled", "fit"}
         What the stage went through before the record.
-    free, fixed, initial, bounds, stiffness, delay, creep, swarm, seed, runs, threads, progress, \
-    callback
+    free, fixed, initial, bounds, stiffness, delay, creep, method, swarm, descents, seed, runs, \
+    threads, progress, callback
         As for `identify`, not yet checked; None stands for the default.
 
     Returns
@@ -302,6 +302,7 @@ def _identification(
         substeps=found.substeps,
         order=found.order,
         seed=seed,
+        agreeing=found.agreeing,
         swarm=settings if isinstance(settings, ParticleSwarm) else None,
         descents=settings if isinstance(settings, Descents) else None,
     )

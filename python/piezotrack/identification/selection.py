@@ -110,13 +110,13 @@ def identify_best(
     check_counts(of_swarm)
     common: dict[str, Any] = {"offset": offset, "history": history, "least_squares": least_squares}
     swarm = dict(of_swarm)
-    if swarm["swarm"] is None:
+    if swarm["method"] == "swarm" and swarm["swarm"] is None:
         swarm["swarm"] = ParticleSwarm(iterations=ITERATIONS)
     infos = kinds_tried(data, of_swarm)
     part, rest = _parts(data)
     noise = sample_noise(rest.y)
     trial = dict(swarm)
-    if rest is not part and trial["runs"] is None:
+    if rest is not part and trial["runs"] is None and trial["swarm"] is not None:
         trial["runs"] = RUNS
     found: list[tuple[Trial, ModelInfo]] = []
     refused: Exception | None = None

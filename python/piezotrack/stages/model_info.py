@@ -53,7 +53,7 @@ class ModelInfo:
     drive_unit : str
         Unit of the drive.
     searched : bool
-        Whether a swarm searches the parameters; otherwise least squares find them.
+        Whether the parameters are searched; otherwise least squares find them.
     parameters, state : tuple of Parameter
         The parameters, and the parts of the state.
     """
@@ -67,7 +67,7 @@ class ModelInfo:
 
     @property
     def hysteresis(self) -> tuple[str, ...]:
-        """Parameters of the hysteresis of a model that a swarm searches by default."""
+        """Parameters of the hysteresis of a model that are searched by default."""
         return tuple(
             one.name
             for one in self.parameters

@@ -149,6 +149,12 @@ impl PySearch {
             .collect()
     }
 
+    /// Runs that ended as low as the best one.
+    #[getter]
+    fn agreeing(&self) -> usize {
+        self.found.agreeing
+    }
+
     /// Least and largest lag that fit as well, s, and whether none fits too; None where the drive
     /// shows the dynamics.
     #[getter]

@@ -28,7 +28,7 @@ pub struct DescentSettings {
 
 impl Default for DescentSettings {
     fn default() -> Self {
-        Self { samples: 64, starts: 8, agreeing: 2, rounds: 25 }
+        Self { samples: 32, starts: 32, agreeing: 2, rounds: 10 }
     }
 }
 
@@ -56,8 +56,15 @@ impl DescentSettings {
     }
 }
 
-/// Descents whose costs differ by less than this share of the lowest agree.
+/// Searches whose costs differ by less than the first share of the lowest agree, and those whose
+/// costs are below the second share of the stroke.
 const ALIKE: f64 = 1e-3;
+const EXACT: f64 = 1e-5;
+
+/// The cost up to which a search agrees with the one at the lowest.
+pub(super) fn as_low_as(lowest: f64, stroke: f64) -> f64 {
+    (lowest * (1.0 + ALIKE)).max(EXACT * stroke)
+}
 
 /// Most iterations of one descent.
 const ITERATIONS: usize = 60;
@@ -207,7 +214,8 @@ impl Search<'_> {
     /// Descents that ended at the lowest cost.
     fn agreeing(&self) -> usize {
         let lowest = self.ended.iter().fold(f64::INFINITY, |low, one| low.min(one.costs.rms));
-        self.ended.iter().filter(|one| one.costs.rms <= lowest * (1.0 + ALIKE)).count()
+        let near = as_low_as(lowest, self.local.record.stroke());
+        self.ended.iter().filter(|one| one.costs.rms <= near).count()
     }
 
     /// Draws the points of a round, and starts from the best that are not beside a better one.

@@ -1,7 +1,7 @@
 //! Identification of a stage from a record: bounds, search, local refinement, standard deviations.
 
 use super::cost::Evaluator;
-use super::descents::descend;
+use super::descents::{as_low_as, descend};
 use super::inertia::with_mass;
 use super::lag::{LagRange, lag_range};
 use super::levenberg_marquardt::{LocalRefinement, Sensitivity};
@@ -25,6 +25,9 @@ pub struct Identification {
     /// Which of the runs has the lowest cost; `None` where the search was stopped before its
     /// first cost.
     pub best: Option<usize>,
+    /// Runs that ended as low as the best one: of descents before the refinement, which only the
+    /// best one gets.
+    pub agreeing: usize,
     /// Lags that fit as well as the one of the best run, where the drive is slow.
     pub lags: Option<LagRange>,
     /// Standard deviation of each free parameter; empty where the search was stopped.
@@ -64,6 +67,7 @@ pub fn identify(
         Method::Swarm(_) => run.costs.rms.is_finite(),
         Method::Descents(_) => run.costs.rms <= lowest,
     };
+    let mut agreeing = agreeing_with(&runs, record);
     if ended && polish {
         for run in runs.iter_mut().filter(|run| refined(run)) {
             let polished = local.polish(&run.place, run.costs);
@@ -76,6 +80,9 @@ pub fn identify(
     let best = (0..runs.len())
         .filter(|&i| runs[i].costs.rms.is_finite())
         .min_by(|&i, &j| runs[i].costs.rms.total_cmp(&runs[j].costs.rms));
+    if matches!(plan.method, Method::Swarm(_)) {
+        agreeing = agreeing_with(&runs, record);
+    }
     let Told { lags, sensitivities, with_mass } = best
         .filter(|_| ended)
         .map(|i| told_by(&local, &mut runs[i], polish))
@@ -87,7 +94,14 @@ pub fn identify(
     }
     let stepping = evaluator.stepping;
     let problem = with_mass.unwrap_or(problem);
-    Ok(Identification { problem, stepping, runs, best, lags, sensitivities })
+    Ok(Identification { problem, stepping, runs, best, agreeing, lags, sensitivities })
+}
+
+/// Runs that agree with the best one.
+fn agreeing_with(runs: &[Outcome], record: &Record<'_>) -> usize {
+    let lowest = runs.iter().fold(f64::INFINITY, |low, run| low.min(run.costs.rms));
+    let near = as_low_as(lowest, record.stroke());
+    runs.iter().filter(|run| run.costs.rms <= near).count()
 }
 
 /// What the record tells of the best candidate.
