@@ -139,7 +139,7 @@ fn circle(infos: &[ParameterInfo], ties: &[Tie]) -> Error {
     }
     let names = path.iter().filter_map(|&place| infos.get(place)).map(|info| info.name);
     let shown = names.collect::<Vec<_>>().join(" -> ");
-    Error::parameter("ties", format!("a circle, {shown}"), "each to refer to parameters before it")
+    Error::parameter("ties", format!("a circle, {shown}"), "none that refer to each other")
 }
 
 /// A text that was understood, with single blanks.
