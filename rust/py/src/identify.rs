@@ -2,8 +2,8 @@
 
 use numpy::PyArray1;
 use piezotrack_core::identify::{
-    BEFORE, Coordinate, DELAY, Delay, History, Identification, Outcome, Plan, Record, Relations, Spec,
-    StopReason, creep_times, identify as identified, visited,
+    BEFORE, Coordinate, DELAY, Delay, History, Identification, Outcome, Plan, Record, Relations,
+    Spec, StopReason, creep_times, identify as identified, visited,
 };
 use piezotrack_core::integrator::Order;
 use piezotrack_core::models::Model;

@@ -206,12 +206,7 @@ impl LocalRefinement<'_> {
 
     /// Standard deviations in the unit box, from the eigenvalues of the scaled normal equations; and
     /// of parameters that depend on several coordinates, SI.
-    fn spreads(
-        &self,
-        normal: &Normal,
-        rms: f64,
-        place: &[f64],
-    ) -> (Vec<f64>, Vec<(usize, f64)>) {
+    fn spreads(&self, normal: &Normal, rms: f64, place: &[f64]) -> (Vec<f64>, Vec<(usize, f64)>) {
         let count = normal.slope.len();
         let sizes: Vec<f64> = (0..count).map(|d| normal.square[(d, d)].sqrt()).collect();
         let scaled = DMatrix::from_fn(count, count, |i, j| {
@@ -236,8 +231,7 @@ impl LocalRefinement<'_> {
         let spreads = (0..count).map(spread).collect();
         let (eigenvalues, eigenvectors) = (&decomposed.eigenvalues, &decomposed.eigenvectors);
         let several = Spread { sizes: &sizes, eigenvalues, eigenvectors, noise };
-        let searched =
-            |&i: &usize| !matches!(self.problem.coordinates[i], Coordinate::Fixed(_));
+        let searched = |&i: &usize| !matches!(self.problem.coordinates[i], Coordinate::Fixed(_));
         let along = self.problem.relations.dependent().filter(searched);
         let along = along.map(|parameter| (parameter, several.of(self.problem, place, parameter)));
         (spreads, along.collect())

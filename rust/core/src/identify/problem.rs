@@ -210,17 +210,7 @@ impl Problem {
             let (low, high) = came_from(&record.drive);
             coordinates[BEFORE] = Coordinate::between("the voltage before", low, high)?;
         }
-        for (name, (low, high)) in &spec.bounds {
-            let i = position(infos, "bounds", name)?;
-            if !free[i] {
-                return Err(Error::parameter(
-                    format!("bounds of {name}"),
-                    format!("({low}, {high})"),
-                    "no bounds, as this parameter is not free",
-                ));
-            }
-            coordinates[i] = Coordinate::between(name, *low, *high)?;
-        }
+        enter_bounds(spec, &free, &mut coordinates)?;
         if scale_assumed && spec.bounds.iter().any(|(name, _)| name == "stiffness") {
             // Bounds make the stiffness a choice of the caller's, but no force is known.
             return Err(Error::parameter(
@@ -231,10 +221,7 @@ impl Problem {
         }
         let bounded = |name: &str| spec.bounds.iter().any(|(other, _)| other == name);
         relations.enter(spec.model, (&fixed, &free), &mut coordinates, bounded)?;
-        for (name, scale) in &spec.scales {
-            let i = position(infos, "scales", name)?;
-            coordinates[i] = coordinates[i].on(Scale::named(name, scale)?, name)?;
-        }
+        enter_scales(spec, &mut coordinates)?;
         check_times(&spec.creep_times)?;
         let Spec { model, offset, history, .. } = *spec;
         let creep_times = spec.creep_times.clone();
@@ -394,6 +381,33 @@ fn check_fixed(model: Model, fixed: &Fixed) -> Result<()> {
     let defaults = Held::defaults(model.scalars()).values;
     let value = |i: usize| fixed[i].or(defaults[i]).unwrap_or(1.0);
     model.check(&core::array::from_fn(value))
+}
+
+/// Puts the bounds of the caller into the coordinates.
+fn enter_bounds(spec: &Spec, free: &Free, coordinates: &mut [Coordinate; PLACES]) -> Result<()> {
+    let infos = spec.model.scalars();
+    for (name, (low, high)) in &spec.bounds {
+        let i = position(infos, "bounds", name)?;
+        if !free[i] {
+            return Err(Error::parameter(
+                format!("bounds of {name}"),
+                format!("({low}, {high})"),
+                "no bounds, as this parameter is not free",
+            ));
+        }
+        coordinates[i] = Coordinate::between(name, *low, *high)?;
+    }
+    Ok(())
+}
+
+/// Puts the scales of the caller into the coordinates.
+fn enter_scales(spec: &Spec, coordinates: &mut [Coordinate; PLACES]) -> Result<()> {
+    let infos = spec.model.scalars();
+    for (name, scale) in &spec.scales {
+        let i = position(infos, "scales", name)?;
+        coordinates[i] = coordinates[i].on(Scale::named(name, scale)?, name)?;
+    }
+    Ok(())
 }
 
 /// Refuses what else is said of a tied parameter, and takes its default away.
