@@ -68,6 +68,10 @@ def identify(
     free: list[str] | None,
     fixed: list[tuple[str, float]],
     bounds: list[tuple[str, tuple[float, float]]],
+    scales: list[tuple[str, str]],
+    ties: list[tuple[str, str]],
+    constraints: list[str],
+    priors: list[tuple[str, tuple[float, float]]],
     stiffness: float | None,
     offset: bool,
     delay: tuple[float, float] | None,
@@ -183,6 +187,10 @@ class Search:
     def estimates(self) -> list[dict[str, Any]]: ...
     @property
     def rms(self) -> float: ...
+    @property
+    def rms_with_priors(self) -> float | None: ...
+    @property
+    def constraints(self) -> list[tuple[str, str, str, bool]]: ...
     @property
     def offset(self) -> float: ...
     @property

@@ -182,11 +182,49 @@ fn a_bound_of_the_cost_is_never_above_it() {
     }
 }
 
+/// Ties, inequalities and priors, of which the last make some candidates cost a third more.
+fn related() -> Spec {
+    Spec {
+        ties: vec![("mass".into(), "1e-5 * stiffness * sqrt(a1 / a1)".into())],
+        constraints: vec!["a1 < damping".into()],
+        priors: vec![("damping".into(), (2e3, 50.0)), ("a1".into(), (500.0, 20.0))],
+        scales: vec![("a1".into(), "linear".into())],
+        ..spec()
+    }
+}
+
 #[test]
 fn abandoning_a_guess_changes_no_result() {
-    for spec in [spec(), creeping()] {
+    for spec in [spec(), creeping(), related()] {
         abandoning(&spec);
     }
+}
+
+#[test]
+fn priors_multiply_the_cost() {
+    let (u, y) = log();
+    let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
+    let problem = Problem::new(&record, &related(), NEVER).unwrap();
+    let plain = Problem::new(&record, &Spec { priors: vec![], ..related() }, NEVER).unwrap();
+    let stepping = Stepping { order: Order::Fourth, substeps: 2 };
+    let costs = |problem: &Problem| {
+        let mut evaluator = Evaluator::new(&record, problem, NEVER);
+        evaluator.stepping = stepping;
+        evaluator.costs(&candidates(problem), NEVER)
+    };
+    let names: Vec<&str> = Model::Dahl.scalars().iter().map(|info| info.name).collect();
+    let place = |name| names.iter().position(|other| *other == name).unwrap();
+    let mut most: f64 = 1.0;
+    for ((with, without), one) in
+        costs(&problem).iter().zip(costs(&plain)).zip(candidates(&problem))
+    {
+        let distance = |name, mean: f64, width: f64| (one.theta.0[place(name)] - mean) / width;
+        let (a, b) = (distance("damping", 2e3, 50.0), distance("a1", 500.0, 20.0));
+        let factor = (0.5 * (a * a + b * b) / 3900.0).exp();
+        assert!((with.rms / (without.rms * factor) - 1.0).abs() < 1e-12 || !with.rms.is_finite());
+        most = most.max(factor);
+    }
+    assert!(most > 1.2, "{most}");
 }
 
 fn abandoning(spec: &Spec) {

@@ -20,6 +20,7 @@ __all__ = [
     "AUTO",
     "Asymmetry",
     "Bound",
+    "Constrain",
     "Creep",
     "Delay",
     "Dynamics",
@@ -29,7 +30,10 @@ __all__ = [
     "Kinds",
     "KindsNamed",
     "Plays",
+    "Priors",
+    "Scales",
     "Swarm",
+    "Ties",
     "fit_options",
     "searched",
 ]
@@ -60,6 +64,39 @@ Bound = Annotated[
     typer.Option(
         metavar="NAME=LOW:HIGH",
         help="Bounds of a parameter, in SI units; default from the log. Repeatable.",
+    ),
+]
+Scales = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--scale",
+        metavar="NAME=linear|log",
+        help="Scale on which a parameter is searched; default what suits its bounds. Repeatable.",
+    ),
+]
+Ties = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--tie",
+        metavar="NAME=EXPRESSION",
+        help="Parameter that follows from others, as b1=1.57*a2, in SI units; default none. "
+        "Repeatable.",
+    ),
+]
+Constrain = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="'A < B'",
+        help="Inequality between two parameters, in quotes; default none. Repeatable.",
+    ),
+]
+Priors = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--prior",
+        metavar="NAME=VALUE:WIDTH",
+        help="Known value of a parameter and its standard deviation, in SI units; default none. "
+        "Repeatable.",
     ),
 ]
 Delay = Annotated[
@@ -196,6 +233,10 @@ def fit_options(
     free: str | None,
     fix: list[str] | None,
     bound: list[str] | None,
+    scale: list[str] | None,
+    tie: list[str] | None,
+    constrain: list[str] | None,
+    prior: list[str] | None,
     delay: str | None,
     creep: str | None,
     plays: int | None,
@@ -211,6 +252,10 @@ def fit_options(
         "fixed": {name: number("--fix", text) for name, text in pairs("--fix", fix)} or None,
         "bounds": {name: number_range("--bound", text) for name, text in pairs("--bound", bound)}
         or None,
+        "scales": dict(pairs("--scale", scale)) or None,
+        "ties": dict(pairs("--tie", tie)) or None,
+        "constraints": constrain or None,
+        "priors": {name: _prior(text) for name, text in pairs("--prior", prior)} or None,
         "delay": _delay(delay),
         "creep": relaxations,
         "least_squares": _least_squares(plays, asymmetry, dynamics, relaxations),
@@ -249,6 +294,13 @@ def _swarm(name: str | None) -> ParticleSwarm | None:
     if name not in known:
         raise ParameterError(f"--swarm is '{name}': expected {', '.join(known)}")
     return known[name]
+
+
+def _prior(text: str) -> tuple[float, float]:
+    value, colon, width = text.partition(":")
+    if not colon:
+        raise ParameterError(f"--prior has '{text}': expected VALUE:WIDTH")
+    return number("--prior", value), number("--prior", width)
 
 
 def _delay(text: str | None) -> bool | float | tuple[float, float] | None:

@@ -6,6 +6,7 @@ from .comparison import compare as compare
 from .cross_talk import CrossTalk as CrossTalk
 from .cross_talk import identify_cross_talk as identify_cross_talk
 from .descents import Descents as Descents
+from .estimates import Constraint as Constraint
 from .estimates import Estimate as Estimate
 from .estimates import LagRange as LagRange
 from .estimates import Progress as Progress

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-__all__ = ["Estimate", "LagRange", "Progress", "StopReason", "SwarmRun"]
+__all__ = ["Constraint", "Estimate", "LagRange", "Progress", "StopReason", "SwarmRun"]
 
+# Share of a prior's width from which on a standard deviation is the prior's.
+OF_PRIOR = 0.9
 StopReason = Literal["agreed", "converged", "stalled", "iterations", "interrupted", "solved"]
 
 
@@ -57,7 +59,13 @@ class Estimate(NamedTuple):
         the true spread is larger. Infinite where the parameter has no effect on the data, such as
         a mass that a record does not show and that was held for that.
     at_bound : bool
-        Whether the value lies on a bound.
+        Whether the value lies on a bound, or on a constraint.
+    scale : {"linear", "log"} or None
+        How the search went through the bounds.
+    tie : str or None
+        The expression of others from which the value follows.
+    prior : (float, float) or None
+        Value and standard deviation that were known besides the record, in `unit`.
     """
 
     value: float
@@ -67,6 +75,9 @@ class Estimate(NamedTuple):
     bounds: tuple[float, float] | None
     deviation: float | None
     at_bound: bool
+    scale: Literal["linear", "log"] | None = None
+    tie: str | None = None
+    prior: tuple[float, float] | None = None
 
     @property
     def precise(self) -> bool:
@@ -77,8 +88,36 @@ class Estimate(NamedTuple):
 
     @property
     def identified(self) -> bool:
-        """Whether the record determines the value: `precise`, and not on a bound."""
-        return self.precise and not self.at_bound
+        """Whether the record determines the value: `precise`, not on a bound, not `from_prior`."""
+        return self.precise and not self.at_bound and not self.from_prior
+
+    @property
+    def from_prior(self) -> bool:
+        """Whether the prior alone determines the value: the record hardly narrows it."""
+        return (
+            self.prior is not None
+            and self.deviation is not None
+            and self.deviation > OF_PRIOR * self.prior[1]
+        )
+
+
+class Constraint(NamedTuple):
+    """An inequality between two parameters.
+
+    Attributes
+    ----------
+    text : str
+        As it was given.
+    lower, upper : str
+        Names of the smaller and of the larger parameter.
+    active : bool
+        Whether it decides the result: the two are equal.
+    """
+
+    text: str
+    lower: str
+    upper: str
+    active: bool
 
 
 class LagRange(NamedTuple):

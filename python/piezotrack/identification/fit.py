@@ -34,6 +34,10 @@ def identify(
     fixed: Mapping[str, float] | None = None,
     initial: StepResult | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
+    scales: Mapping[str, Literal["linear", "log"]] | None = None,
+    ties: Mapping[str, str] | None = None,
+    constraints: Iterable[str] | None = None,
+    priors: Mapping[str, tuple[float, float]] | None = None,
     stiffness: float | None = None,
     offset: bool = True,
     delay: bool | float | tuple[float, float] | None = None,
@@ -95,7 +99,26 @@ def identify(
         `fixed`, `free` or `bounds` are not taken from it.
     bounds : mapping of str to (float, float), optional
         Bounds of free parameters, SI; derived from the record where not given. Where both are
-        positive and two decades or more apart, the search is on a logarithmic scale.
+        positive and two decades or more apart, the search is on a logarithmic scale, unless
+        `scales` says otherwise.
+    scales : mapping of str to {"linear", "log"}, optional
+        How the search goes through the bounds of a parameter; ``"log"`` needs bounds above 0.
+    ties : mapping of str to str, optional
+        Parameters that follow from others, as ``{"b1": "1.57 * a2"}``: numbers, names of
+        parameters, ``+ - * / **``, brackets, ``sqrt``, ``exp`` and ``log``, SI. The text is read,
+        never run. It may name other tied parameters, but not in a circle.
+    constraints : iterable of str, optional
+        Inequalities between two parameters that are not tied, as ``["a2 < b1"]``. The search goes
+        through what they leave of the bounds; equality is included. `Identification.constraints`
+        says which of them decide the result.
+    priors : mapping of str to (float, float), optional
+        Values known besides the record with their standard deviations, SI, as
+        ``{"stiffness": (2.6e4, 1e3)}``. What is minimised is then :math:`f e^{Q / 2n}` with the sum
+        Q of the squared deviations from these values over their widths: the largest posterior
+        density for normal priors and n independent residuals of unknown variance. Residuals of an
+        inexact model are correlated, so n counts too high, and a long record outweighs a prior
+        more than it should; a smaller width makes up for it. Bounds not given are eight widths on
+        either side. A prior of a parameter with the dimension of force fixes the scale of all.
     stiffness : float, optional
         K [N/m] where it is known.
     offset : bool, optional
@@ -192,6 +215,10 @@ def identify(
         "fixed": fixed,
         "initial": initial,
         "bounds": bounds,
+        "scales": scales,
+        "ties": ties,
+        "constraints": constraints,
+        "priors": priors,
         "stiffness": stiffness,
         "delay": delay,
         "creep": creep,

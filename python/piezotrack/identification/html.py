@@ -6,10 +6,11 @@ import math
 from typing import TYPE_CHECKING
 
 from .._support.html_table import html_table
+from .report import said_of
 
 if TYPE_CHECKING:
     from .comparison import Comparison
-    from .estimates import Estimate
+    from .estimates import Constraint, Estimate
     from .result import Identification
 
 __all__ = ["comparison_html", "identification_html"]
@@ -27,25 +28,28 @@ def identification_html(fit: Identification) -> str:
     ]
     if fit.delay:
         rows.append(("delay", f"{1e3 * fit.delay:.4g} ms"))
+    rows += [("constraint", _constraint(one)) for one in fit.constraints]
     rows += [("note", note) for note in fit.notes]
     tables = [html_table(f"Identification: {fit.model.info.title}", rows)]
     if fit.parameters:
-        found = [_estimate(name, one) for name, one in fit.parameters.items()]
+        found = [_estimate(fit, name, one) for name, one in fit.parameters.items()]
         heads = ("parameter", "symbol", "value", "unit", "standard deviation")
         tables.append(html_table("Parameters", found, heads))
     return "".join(tables)
 
 
-def _estimate(name: str, one: Estimate) -> tuple[str, ...]:
-    if not one.free:
+def _estimate(fit: Identification, name: str, one: Estimate) -> tuple[str, ...]:
+    if not one.free and one.tie is None:
         deviation = "held"
     elif one.deviation is None:
         deviation = "unknown"
     else:
         deviation = f"{one.deviation:.2g}" if math.isfinite(one.deviation) else "no effect"
-    if one.at_bound:
-        deviation += ", on a bound"
-    return name, one.symbol, f"{one.value:.6g}", one.unit, deviation
+    return name, one.symbol, f"{one.value:.6g}", one.unit, deviation + said_of(fit, name)
+
+
+def _constraint(one: Constraint) -> str:
+    return one.text + (", active" if one.active else "")
 
 
 def comparison_html(comparison: Comparison) -> str:

@@ -17,13 +17,16 @@ from .remarks import drive_rate, fit_percent
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from ..data.dataset import Dataset
     from ..stages.model_info import ModelInfo
+    from .estimates import Constraint
     from .identified import IdentifiedModel
 
-__all__ = ["document_of", "drive_unit_of", "fit_entry", "provenance", "read_model", "sensor_number"]
+__all__ = [
+    "constraint_entries",
+    "document_of", "drive_unit_of", "fit_entry", "provenance", "read_model", "sensor_number"]
 
 FORMAT = "piezotrack-model"
 SCHEMA_VERSION = 2
@@ -259,7 +262,24 @@ def entries_of(name: str) -> Iterator[None]:
         raise DataError(f"{name}: {error}") from None
 
 
-def fit_entry(cost: float, data: Dataset) -> dict[str, Any]:
+def constraint_entries(constraints: Iterable[Constraint]) -> dict[str, Any]:
+    """Entries of a file on the inequalities of a fit; none where it had none.
+
+    Parameters
+    ----------
+    constraints : iterable of Constraint
+        The inequalities.
+
+    Returns
+    -------
+    dict
+        Of texts and truth values only.
+    """
+    found = [{"text": one.text, "active": one.active} for one in constraints]
+    return {"constraints": found} if found else {}
+
+
+def fit_entry(cost: float, data: Dataset, with_priors: float | None = None) -> dict[str, Any]:
     """Entries of a file on the residual of a fit.
 
     Parameters
@@ -268,14 +288,18 @@ def fit_entry(cost: float, data: Dataset) -> dict[str, Any]:
         Its root mean square [m].
     data : Dataset
         The record.
+    with_priors : float or None, optional
+        What was minimised, where there were priors [m].
 
     Returns
     -------
     dict
         Of numbers, texts and dicts only.
     """
+    known = {} if with_priors is None else {"cost_with_priors": {"value": with_priors, "unit": "m"}}
     return {
         "cost": {"value": cost, "unit": "m"},
+        **known,
         "fit_percent": {"value": fit_percent(cost, float(data.y.std())), "unit": "%"},
     }
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .estimates import Estimate
     from .result import Identification
 
-__all__ = ["identification_files", "save_identification", "summary_text"]
+__all__ = ["identification_files", "said_of", "save_identification", "summary_text"]
 
 # Units of values that a stage gives in um, and the factor for a drive in metres.
 PER_METRE = {"um/V": ("um/um", 1e-6), "1/V": ("1/um", 1e-6)}
@@ -49,6 +49,8 @@ def summary_text(fit: Identification) -> str:
     ]
     if begun := of_start(fit.start, data):
         lines.append(f"      the record begins {begun}")
+    if fit.cost_with_priors is not None:
+        lines.append(f"      {1e6 * fit.cost_with_priors:.4g} um with the priors was minimised")
     searched = fit.model.info.searched
     if searched:
         iterations = f"{fit.nit} iterations, " if fit.swarm is not None else ""
@@ -89,10 +91,13 @@ def _estimates(fit: Identification) -> list[str]:
         lines.append("parameters")
     width = 1 + max(3, *(len(estimate.symbol) for estimate in fit.parameters.values()))
     lines.append(f"  {'':<18}{'':<{width}}{'value':>13}  {'':<9}{'standard deviation'}")
-    lines += [_row(name, estimate, width) for name, estimate in fit.parameters.items()]
+    lines += [_row(fit, name, estimate, width) for name, estimate in fit.parameters.items()]
     lines += _values(fit, [one for one in fit.model.info.parameters if one.is_list])[1:-1]
-    if unclear := [n for n, e in fit.parameters.items() if not e.identified]:
+    lines += _constraints(fit)
+    if unclear := [n for n, e in fit.parameters.items() if not (e.identified or e.from_prior)]:
         lines += ["", "Not determined by this record: " + ", ".join(unclear) + "."]
+    if known := [n for n, e in fit.parameters.items() if e.from_prior]:
+        lines += ["", "Known by their priors, not by this record: " + ", ".join(known) + "."]
     if fit.nfail:
         lines += ["", f"{fit.nfail} simulations diverged; their cost counted as infinite."]
     return lines
@@ -166,7 +171,8 @@ def _known(fit: Identification) -> list[str]:
     for name, symbol, value, unit in ratios:
         estimate = fit.parameters[name]
         no_ratio = "/" not in symbol
-        held = not estimate.free and (not whole.free or no_ratio)
+        moves = estimate.free or (estimate.tie is not None and estimate.deviation != 0.0)
+        held = not moves and (not whole.free or no_ratio)
         sure = estimate.identified and (whole.precise or no_ratio)
         if not held:
             (known if sure else unknown).append((symbol, f"{value:>12.6g}  {unit}"))
@@ -187,9 +193,50 @@ def _ratios(fit: Identification) -> list[tuple[str, str, float, str]]:
     return [r for r in ratios if r[0] != "b0" or fit.parameters["b0"].free or r[2]]
 
 
-def _row(name: str, estimate: Estimate, width: int) -> str:
-    if not estimate.free:
+def _constraints(fit: Identification) -> list[str]:
+    """List the inequalities, and which of them decide the result."""
+    if not fit.constraints:
+        return []
+    wide = max(len(one.text) for one in fit.constraints)
+    states = {True: "active: the two are equal", False: "not active"}
+    rows = [f"  {one.text:<{wide}}  {states[one.active]}" for one in fit.constraints]
+    return ["", "constraints", *rows]
+
+
+def said_of(fit: Identification, name: str) -> str:
+    """Write what a caller said of a parameter besides value and bounds, and what it met.
+
+    Parameters
+    ----------
+    fit : Identification
+        Result of an identification.
+    name : str
+        The parameter.
+
+    Returns
+    -------
+    str
+        Behind a standard deviation, beginning with a comma; empty where there is nothing.
+    """
+    estimate, said = fit.parameters[name], []
+    if estimate.at_bound:
+        on = any(one.active and name in (one.lower, one.upper) for one in fit.constraints)
+        said.append("on a constraint" if on else "on a bound")
+    if name in fit.scales:
+        said.append(f"{fit.scales[name]} scale")
+    if estimate.tie is not None:
+        said.append(f"tied: {estimate.tie}")
+    if estimate.prior is not None:
+        mean, width = estimate.prior
+        said.append(f"prior {mean:.6g} +- {width:.4g} {estimate.unit}".rstrip())
+    return "".join(f", {one}" for one in said)
+
+
+def _row(fit: Identification, name: str, estimate: Estimate, width: int) -> str:
+    if not estimate.free and estimate.tie is None:
         note = "held" if estimate.deviation is None else "held: no effect on the data"
+    elif estimate.deviation == 0.0:
+        note = "held"
     elif estimate.deviation is None:
         note = "unknown"
     elif not math.isfinite(estimate.deviation):
@@ -198,8 +245,7 @@ def _row(name: str, estimate: Estimate, width: int) -> str:
         share = 100 * estimate.deviation / abs(estimate.value) if estimate.value else math.inf
         digits = f"{share:.2g}" if share < 10 else f"{share:.0f}"
         note = f"{digits} %" if share < 100 else "larger than the value"
-    if estimate.at_bound:
-        note += ", on a bound"
+    note += said_of(fit, name)
     return (
         f"  {name:<18}{estimate.symbol:<{width}}{estimate.value:>13.6g}  {estimate.unit:<9}{note}"
     ).rstrip()

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..data.dataset import Dataset
     from ..stages.base import Response
     from .descents import Descents
-    from .estimates import Estimate, LagRange, StopReason, SwarmRun
+    from .estimates import Constraint, Estimate, LagRange, StopReason, SwarmRun
     from .least_squares import LeastSquares
     from .selection import Trial
     from .swarm import ParticleSwarm
@@ -53,6 +53,13 @@ class Identification(IdentifiedModel):
     parameters : dict of str to Estimate
         The parameters with units, bounds and standard deviations; and the delay where it
         was fitted. Empty after least squares.
+    constraints : tuple of Constraint
+        The inequalities that were given, each with whether it decides the result.
+    scales : dict of str to str
+        The scales that were given.
+    cost_with_priors : float or None
+        What was minimised where there were priors [m]: `cost` times the factor of the priors, see
+        `identify`. `history` and the costs of `runs` have it too.
     history : ndarray, shape (nit + 1,)
         Best cost after each iteration of the best run [m].
     nit : int
@@ -93,6 +100,9 @@ class Identification(IdentifiedModel):
     nfev: int
     stop_reason: StopReason
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
+    constraints: tuple[Constraint, ...] = ()
+    scales: Mapping[str, str] = field(default_factory=dict)
+    cost_with_priors: float | None = None
     history: Array = field(default_factory=lambda: np.empty(0))
     nit: int = 0
     nfail: int = 0

@@ -16,9 +16,10 @@ from ..data import diagnostics
 from ..errors import Interrupted, ParameterError
 from ..stages.registry import stage_class
 from .descents import Descents
-from .estimates import Estimate, LagRange, Progress, SwarmRun
+from .estimates import Constraint, Estimate, LagRange, Progress, SwarmRun
 from .history import start_after
-from .model_file import fit_entry, provenance
+from .model_file import constraint_entries, fit_entry, provenance
+from .parameter_arguments import ParameterArguments
 from .result import Identification
 from .step_response import StepResult
 from .swarm import ParticleSwarm
@@ -47,6 +48,10 @@ def search(
     fixed: object = None,
     initial: object = None,
     bounds: object = None,
+    scales: object = None,
+    ties: object = None,
+    constraints: object = None,
+    priors: object = None,
     stiffness: object = None,
     delay: object = None,
     history: History = "virgin",
@@ -72,8 +77,8 @@ def search(
         Whether an offset of the sensor is fitted.
     history : {"virgin", "settled", "fit"}
         What the stage went through before the record.
-    free, fixed, initial, bounds, stiffness, delay, creep, method, swarm, descents, seed, runs, \
-    threads, progress, callback
+    free, fixed, initial, bounds, scales, ties, constraints, priors, stiffness, delay, creep, \
+    method, swarm, descents, seed, runs, threads, progress, callback
         As for `identify`, not yet checked; None stands for the default.
 
     Returns
@@ -92,7 +97,8 @@ def search(
     seed = 0 if seed is None else _core.as_count("seed", seed)
     searched_delay = _delay(False if delay is None else delay)
     creep_times = _creep_times(False if creep is None else creep)
-    held = _held(initial, fixed, free, bounds)
+    said = ParameterArguments.checked(scales, ties, constraints, priors)
+    held = _held(initial, fixed, free, bounds, said.named)
     diagnostics.check_record(data, searches_hysteresis=bool(set(info.hysteresis) - set(held)))
     full = data.full
     with ProgressBar(progress, f"identify: {info.name}") as bar:
@@ -106,6 +112,7 @@ def search(
             free=_names(free),
             fixed=list(held.items()),
             bounds=[(name, _pair(name, pair)) for name, pair in _items("bounds", bounds)],
+            **said.core,
             stiffness=None if stiffness is None else _core.as_number("stiffness", stiffness),
             offset=offset,
             delay=searched_delay,
@@ -120,7 +127,7 @@ def search(
         )
     if found is None:
         raise Interrupted("interrupted before the first cost was computed")
-    fit = _identification(info, found, data, settings, seed, offset, history)
+    fit = _identification(info, found, data, settings, seed, offset, history, dict(said.scales))
     if not fit.success:
         raise Interrupted(
             f"interrupted after {fit.nit} iterations, best cost {fit.cost_um:.4g} um", fit
@@ -169,7 +176,9 @@ def _names(free: object) -> list[str] | None:
     return [str(name) for name in free]
 
 
-def _held(initial: object, fixed: object, free: object, bounds: object) -> dict[str, float]:
+def _held(
+    initial: object, fixed: object, free: object, bounds: object, named: set[str]
+) -> dict[str, float]:
     """Return the parameters held: by `fixed`, and by a step response where not named elsewhere."""
     given = {name: _core.as_number(name, value) for name, value in _items("fixed", fixed)}
     if initial is None:
@@ -178,7 +187,7 @@ def _held(initial: object, fixed: object, free: object, bounds: object) -> dict[
         raise ParameterError(
             f"initial is {type(initial).__name__}: expected a StepResult, see pt.identify_step"
         )
-    said = {*(_names(free) or []), *(name for name, _ in _items("bounds", bounds))}
+    said = named | {*(_names(free) or []), *(name for name, _ in _items("bounds", bounds))}
     return {n: v for n, v in initial.hysteresis.items() if n not in said} | given
 
 
@@ -238,6 +247,7 @@ def _identification(
     seed: int,
     offset: bool,
     history: History,
+    scales: Mapping[str, str],
 ) -> Identification:
     facts = {one.name: (one.unit, one.symbol) for one in info.parameters} | SENSOR
     facts = {name: (of_drive(unit, data.drive_unit), sign) for name, (unit, sign) in facts.items()}
@@ -245,8 +255,9 @@ def _identification(
     for one in found.estimates:
         unit, symbol = facts[one["name"]]
         bounds, deviation, at_bound = one["bounds"], one["deviation"], one["at_bound"]
+        known = {name: one[name] for name in ("scale", "tie", "prior")}
         parameters[one["name"]] = Estimate(
-            one["value"], unit, symbol, bounds is not None, bounds, deviation, at_bound
+            one["value"], unit, symbol, bounds is not None, bounds, deviation, at_bound, **known
         )
     values = {name: [estimate.value] for name, estimate in parameters.items()}
     (delay,) = values.pop("delay")
@@ -258,6 +269,7 @@ def _identification(
     if before is None:
         del parameters["voltage_before"]
     model = stage_class(info)._from(values.items())
+    constraints = tuple(Constraint(*one) for one in found.constraints)
     details: dict[str, Any] = {
         "parameters": {
             one.name: _details(parameters[one.name])
@@ -266,8 +278,9 @@ def _identification(
         }
         | {"creep_weights": {"free": True}, "creep_times": {"free": False}},
         "delay": _details(parameters["delay"]) if "delay" in parameters else {},
+        **constraint_entries(constraints),
         "fit": {
-            **fit_entry(found.rms, data),
+            **fit_entry(found.rms, data, found.rms_with_priors),
             "iterations": found.iterations,
             "simulations": sum(nfev for _, _, nfev, _ in found.runs),
             "polish_simulations": found.polish_evaluations,
@@ -291,7 +304,10 @@ def _identification(
         details=details,
         data=data,
         parameters=parameters,
+        constraints=constraints,
+        scales=scales,
         cost=found.rms,
+        cost_with_priors=found.rms_with_priors,
         history=found.history,
         nit=found.iterations,
         nfev=sum(nfev for _, _, nfev, _ in found.runs),
@@ -316,4 +332,8 @@ def _details(estimate: Estimate) -> dict[str, Any]:
         "bounds": estimate.bounds,
         "standard_deviation": estimate.deviation if known else None,
         "at_bound": estimate.at_bound,
+    } | {
+        name: value
+        for name in ("scale", "tie", "prior")
+        if (value := getattr(estimate, name)) is not None
     }

@@ -15,6 +15,7 @@ from ..errors import DataError, NumericalError, ParameterError
 from ..stages.registry import model_named
 from .kinds import check_counts, identify_kind
 from .least_squares import BY_PLAYS
+from .parameter_arguments import ON_PARAMETERS
 from .swarm import ParticleSwarm
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ AUTO = "auto"
 OF_VOLTS = ("prandtl-ishlinskii", "first-order-dahl", "parallel-dahl", "bouc-wen")
 OF_FORCE = ("bouc-wen-oscillator", "prandtl-ishlinskii")
 # Arguments that name parameters of one model.
-OF_ONE_MODEL = ("free", "fixed", "initial", "bounds")
+OF_ONE_MODEL = ("free", "fixed", "initial", "bounds", *ON_PARAMETERS)
 # Arguments that least squares cannot follow.
 OF_SWARM_ONLY = ("delay", "stiffness")
 # Share of the window that is fitted, and turns of the drive that each part needs.

@@ -2,8 +2,8 @@
 
 use numpy::PyArray1;
 use piezotrack_core::identify::{
-    BEFORE, Coordinate, DELAY, Delay, History, Identification, Method, Outcome, Plan, Record, Spec,
-    StopReason, creep_times, identify as identified, visited,
+    BEFORE, Coordinate, DELAY, Delay, History, Identification, Method, Outcome, Plan, Record,
+    Relations, Spec, StopReason, creep_times, identify as identified, visited,
 };
 use piezotrack_core::integrator::Order;
 use piezotrack_core::models::Model;
@@ -44,6 +44,12 @@ struct Estimate {
     /// Standard deviation; None where it was not computed, infinite where the value has no effect.
     deviation: Option<f64>,
     at_bound: bool,
+    /// How the search went through the bounds; None for a parameter that was not searched.
+    scale: Option<&'static str>,
+    /// Expression of a parameter that follows from others.
+    tie: Option<String>,
+    /// Value and standard deviation that were known besides the record.
+    prior: Option<(f64, f64)>,
 }
 
 /// What a search found, in plain numbers.
@@ -65,10 +71,13 @@ impl PySearch {
         let held = problem.mass_if_shown.is_some();
         let unseen = |name| (held && name == "mass").then_some(f64::INFINITY);
         let estimate = |(place, name)| {
-            let bounds = match problem.coordinates[place] {
-                Coordinate::Fixed(_) => None,
-                Coordinate::Free { low, high, .. } => Some((low, high)),
+            let (bounds, scale) = match problem.coordinates[place] {
+                Coordinate::Fixed(_) | Coordinate::Tied => (None, None),
+                Coordinate::Free { low, high, scale } => (Some((low, high)), Some(scale.name())),
             };
+            let Relations { ties, priors, .. } = &problem.relations;
+            let tie = ties.iter().find(|tie| tie.parameter == place);
+            let prior = priors.iter().find(|prior| prior.parameter == place);
             let found = self.found.sensitivities.iter().find(|found| found.parameter == place);
             Estimate {
                 name,
@@ -76,14 +85,37 @@ impl PySearch {
                 bounds,
                 deviation: found.map(|found| found.deviation).or_else(|| unseen(name)),
                 at_bound: found.is_some_and(|found| found.at_bound),
+                scale,
+                tie: tie.map(|tie| tie.text.clone()),
+                prior: prior.map(|prior| (prior.mean, prior.width)),
             }
         };
         places.map(estimate).collect()
     }
 
+    /// Without the factor of the priors.
     #[getter]
     fn rms(&self) -> f64 {
-        self.outcome.costs.rms
+        let relations = &self.found.problem.relations;
+        self.outcome.costs.rms / relations.factor(&self.outcome.theta)
+    }
+
+    /// What was minimised, with the factor of the priors; None without priors.
+    #[getter]
+    fn rms_with_priors(&self) -> Option<f64> {
+        let known = !self.found.problem.relations.priors.is_empty();
+        known.then_some(self.outcome.costs.rms)
+    }
+
+    /// Text, smaller and larger parameter of each inequality, and whether the two are equal.
+    #[getter]
+    fn constraints(&self) -> Vec<(String, &'static str, &'static str, bool)> {
+        let problem = &self.found.problem;
+        let name = |place: usize| problem.model.scalars()[place].name;
+        let active = problem.active(&self.outcome.place);
+        let all = problem.relations.constraints.iter().zip(active);
+        all.map(|(one, active)| (one.text.clone(), name(one.lower), name(one.upper), active))
+            .collect()
     }
 
     #[getter]
@@ -222,8 +254,9 @@ impl Searcher<'_> {
 /// between bounds of its own choice where there are none; None where the search was stopped before
 /// its first cost.
 #[pyfunction]
-#[pyo3(signature = (*, model, u, y, dt, hold_name, start, free, fixed, bounds, stiffness, offset,
-    delay, history, creep, method, seed, runs, threads, callback, progress))]
+#[pyo3(signature = (*, model, u, y, dt, hold_name, start, free, fixed, bounds, scales, ties,
+    constraints, priors, stiffness, offset, delay, history, creep, method, seed, runs, threads,
+    callback, progress))]
 #[expect(clippy::too_many_arguments, reason = "keyword-only, called from one place")]
 fn identify(
     py: Python<'_>,
@@ -236,6 +269,10 @@ fn identify(
     free: Option<Vec<String>>,
     fixed: Vec<(String, f64)>,
     bounds: Vec<(String, (f64, f64))>,
+    scales: Vec<(String, String)>,
+    ties: Vec<(String, String)>,
+    constraints: Vec<String>,
+    priors: Vec<(String, (f64, f64))>,
     stiffness: Option<f64>,
     offset: bool,
     delay: Option<(f64, f64)>,
@@ -257,8 +294,20 @@ fn identify(
     };
     let model = Model::named(model).map_err(|error| raise(&error))?;
     let history = history_named(history).map_err(|error| raise(&error))?;
-    let mut spec =
-        Spec { free, fixed, bounds, stiffness, offset, delay, history, ..Spec::of(model) };
+    let mut spec = Spec {
+        free,
+        fixed,
+        bounds,
+        scales,
+        ties,
+        constraints,
+        priors,
+        stiffness,
+        offset,
+        delay,
+        history,
+        ..Spec::of(model)
+    };
     let plan = Plan { method: method.method(), seed, runs };
     let watchers = Watchers { callback, progress };
     let found = enter_pool(py, threads, &watchers, |monitor, stop| {

@@ -11,9 +11,37 @@ pub enum Scale {
     Log,
 }
 
+impl Scale {
+    /// A scale by its name.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for any other text.
+    pub fn named(parameter: &str, name: &str) -> Result<Self> {
+        match name {
+            "linear" => Ok(Self::Linear),
+            "log" => Ok(Self::Log),
+            other => {
+                let (argument, found) = (format!("scale of {parameter}"), other.escape_debug());
+                Err(Error::parameter(argument, format!("'{found}'"), "'linear' or 'log'"))
+            }
+        }
+    }
+
+    /// Its name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Linear => "linear",
+            Self::Log => "log",
+        }
+    }
+}
+
 /// One parameter of the stage in a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Coordinate {
+    /// Follows from others.
+    Tied,
     /// Held at a value.
     Fixed(f64),
     /// Searched between two bounds.
@@ -53,6 +81,7 @@ impl Coordinate {
     #[must_use]
     pub fn value(&self, z: f64) -> f64 {
         match *self {
+            Self::Tied => f64::NAN,
             Self::Fixed(value) => value,
             Self::Free { low, high, scale: Scale::Linear } => {
                 (low + (high - low) * z).clamp(low, high)
@@ -62,6 +91,47 @@ impl Coordinate {
                 let (from, to) = (libm::log(low), libm::log(high));
                 libm::exp(from + z * (to - from)).clamp(low, high)
             }
+        }
+    }
+
+    /// The coordinate with an upper bound that is no higher than this.
+    #[must_use]
+    pub(super) fn limited(self, limit: f64) -> Self {
+        match self {
+            Self::Free { low, high, scale } => {
+                Self::Free { low, high: high.min(limit).max(low), scale }
+            }
+            other => other,
+        }
+    }
+
+    /// The coordinate with a lower bound that is no lower than this.
+    #[must_use]
+    pub(super) fn raised(self, limit: f64) -> Self {
+        match self {
+            Self::Free { low, high, scale } => {
+                Self::Free { low: low.max(limit).min(high), high, scale }
+            }
+            other => other,
+        }
+    }
+
+    /// The coordinate on another scale.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] where it is held, or its bounds have no logarithm.
+    pub(super) fn on(self, scale: Scale, parameter: &str) -> Result<Self> {
+        let argument = format!("scale of {parameter}");
+        let found = format!("'{}'", scale.name());
+        match self {
+            Self::Free { low, high, .. } if scale == Scale::Linear || low > 0.0 => {
+                Ok(Self::Free { low, high, scale })
+            }
+            Self::Free { low, high, .. } => {
+                let ends = format!("({}, {})", shown(low), shown(high));
+                Err(Error::parameter(argument, found, format!("bounds above 0 for it, not {ends}")))
+            }
+            _ => Err(Error::parameter(argument, found, "none, as this parameter is not free")),
         }
     }
 }

@@ -111,11 +111,29 @@ impl<'a> Evaluator<'a> {
         Some(total)
     }
 
-    /// Costs of candidates, in their order, computed on the threads of the present pool.
+    /// Costs of candidates, in their order, computed on the threads of the present pool; where
+    /// there are priors, with their factors.
     ///
     /// Those that were not finished when `stop` said so are infinite.
     #[must_use]
     pub fn costs(&self, candidates: &[Candidate], stop: Stop<'_>) -> Vec<Costs> {
+        let relations = &self.problem.relations;
+        if relations.priors.is_empty() {
+            return self.deviations(candidates, stop);
+        }
+        let factors: Vec<f64> = candidates.iter().map(|one| relations.factor(&one.theta)).collect();
+        let scaled = candidates.iter().zip(&factors);
+        let scaled: Vec<Candidate> =
+            scaled.map(|(one, factor)| Candidate { limit: one.limit / factor, ..*one }).collect();
+        let mut costs = self.deviations(&scaled, stop);
+        for (one, factor) in costs.iter_mut().zip(&factors) {
+            one.rms *= factor;
+        }
+        costs
+    }
+
+    /// RMS deviations of candidates.
+    fn deviations(&self, candidates: &[Candidate], stop: Stop<'_>) -> Vec<Costs> {
         let found = self.simulated(candidates, 0, stop);
         let costs = found.map(|all| all.into_iter().map(|one| one.costs).collect());
         costs.unwrap_or_else(|| vec![Costs::FAILED; candidates.len()])

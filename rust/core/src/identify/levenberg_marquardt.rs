@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use super::candidate::Candidate;
 use super::coordinate::Coordinate;
 use super::cost::Evaluator;
+use super::information::{Spread, add_priors};
 use super::problem::Problem;
 use super::record::Record;
 use super::residual_sums::Costs;
@@ -84,7 +85,7 @@ impl LocalRefinement<'_> {
         let mut best = Polished { place: place.to_vec(), costs, evaluations: 0 };
         let mut damping = 1e-3;
         for _ in 0..ITERATIONS {
-            let Some(normal) = self.normal(&best.place) else {
+            let Some(normal) = self.normal(&best.place, 1.0) else {
                 break;
             };
             best.evaluations += 2 * place.len() + 1;
@@ -120,21 +121,38 @@ impl LocalRefinement<'_> {
     /// Empty where the candidate or its neighbours cannot be simulated.
     #[must_use]
     pub fn sensitivities(&self, place: &[f64], rms: f64) -> Vec<Sensitivity> {
-        let Some(normal) = self.normal(place) else {
+        let freedom = self.freedom(place.len());
+        let Some(normal) = self.normal(place, index(self.record.window.len()) / freedom) else {
             return Vec::new();
         };
-        let free = self.problem.free().zip(place).zip(spreads(&normal, rms, self.record));
+        let Self { problem, .. } = *self;
+        let rms = rms / problem.relations.factor(&problem.theta(place));
+        let (spreads, along) = self.spreads(&normal, rms, place);
+        let free = problem.free().zip(place).zip(spreads);
         let found = free.map(|((parameter, &z), spread)| {
-            let coordinate = self.problem.coordinates[parameter];
+            let coordinate = problem.coordinates[parameter];
             let at_bound = !(1e-3..=1.0 - 1e-3).contains(&z);
             Sensitivity { parameter, deviation: spread * slope_at(coordinate, z), at_bound }
         });
-        found.collect()
+        let mut found: Vec<Sensitivity> = found.collect();
+        for (parameter, deviation) in along {
+            match found.iter_mut().find(|one| one.parameter == parameter) {
+                Some(one) => one.deviation = deviation,
+                None => found.push(Sensitivity { parameter, deviation, at_bound: false }),
+            }
+        }
+        found
     }
 
-    /// Normal equations at a place by central differences; `None` where a neighbour cannot be
-    /// simulated.
-    fn normal(&self, place: &[f64]) -> Option<Normal> {
+    /// Samples less what was fitted to them.
+    fn freedom(&self, count: usize) -> f64 {
+        index(self.record.window.len().saturating_sub(count + 1).max(1))
+    }
+
+    /// Normal equations at a place by central differences, with the priors, for which the mean
+    /// square of the deviations times `samples_over_freedom` is the variance of one; `None` where a
+    /// neighbour cannot be simulated.
+    fn normal(&self, place: &[f64], samples_over_freedom: f64) -> Option<Normal> {
         let stride = self.stride(MOST_ROWS);
         let pairs: Vec<(f64, f64)> =
             place.iter().map(|z| ((z - CHANGE).max(0.0), (z + CHANGE).min(1.0))).collect();
@@ -146,7 +164,7 @@ impl LocalRefinement<'_> {
             let scale = 1.0 / (high - low);
             ends[1].iter().zip(&ends[0]).map(|(x, below)| (x - below) * scale).collect()
         });
-        Some(self.equations(columns.collect(), base, stride))
+        Some(self.equations(place, columns.collect(), base, stride, samples_over_freedom))
     }
 
     /// Normal equations at each of some places by one-sided differences, all simulated side by
@@ -173,7 +191,7 @@ impl LocalRefinement<'_> {
                 let scale = 1.0 / change(*z);
                 one.reading.iter().zip(base).map(|(x, base)| (x - base) * scale).collect()
             });
-            Some(self.equations(columns.collect(), base, stride))
+            Some(self.equations(place, columns.collect(), base, stride, 1.0))
         };
         places.iter().map(normal).collect()
     }
@@ -184,7 +202,14 @@ impl LocalRefinement<'_> {
     }
 
     /// The normal equations of the columns of a Jacobian and what is read at their place.
-    fn equations(&self, mut columns: Vec<Vec<f64>>, read: &[f64], stride: usize) -> Normal {
+    fn equations(
+        &self,
+        place: &[f64],
+        mut columns: Vec<Vec<f64>>,
+        read: &[f64],
+        stride: usize,
+        samples_over_freedom: f64,
+    ) -> Normal {
         columns.iter_mut().for_each(|column| self.centre(column));
         let measured = self.record.y[self.record.window.clone()].iter().step_by(stride);
         let mut residual: Vec<f64> = measured.zip(read).map(|(y, x)| y - x).collect();
@@ -197,8 +222,13 @@ impl LocalRefinement<'_> {
                 square[(j, i)] = square[(i, j)];
             }
         }
-        let slope = DVector::from_fn(count, |i, _| product(&columns[i], &residual));
-        Normal { square, slope, rows: residual.len() }
+        let mut slope = DVector::from_fn(count, |i, _| product(&columns[i], &residual));
+        let rows = residual.len();
+        // Some rows stand for all of them, and weigh less against the priors by their share.
+        let samples = index(self.record.window.len());
+        let variance = product(&residual, &residual) / samples * samples_over_freedom;
+        add_priors(self.problem, place, variance, &mut square, &mut slope);
+        Normal { square, slope, rows }
     }
 
     /// Whether the deviations of a candidate are white: half the mean square of their differences
@@ -234,6 +264,39 @@ impl LocalRefinement<'_> {
     /// The candidate at a place, simulated to its end however bad.
     fn candidate(&self, place: &[f64]) -> Candidate {
         Candidate { theta: self.problem.theta(place), limit: f64::INFINITY }
+    }
+
+    /// Standard deviations in the unit box, from the eigenvalues of the scaled normal equations; and
+    /// of parameters that depend on several coordinates, SI.
+    fn spreads(&self, normal: &Normal, rms: f64, place: &[f64]) -> (Vec<f64>, Vec<(usize, f64)>) {
+        let count = normal.slope.len();
+        let sizes: Vec<f64> = (0..count).map(|d| normal.square[(d, d)].sqrt()).collect();
+        let scaled = DMatrix::from_fn(count, count, |i, j| {
+            let size = sizes[i] * sizes[j];
+            if size > 0.0 { normal.square[(i, j)] / size } else { 0.0 }
+        });
+        let decomposed = scaled.symmetric_eigen();
+        let samples = self.record.window.len();
+        // Some rows stand for all of them.
+        let kept = index(normal.rows) / index(samples);
+        let noise = rms * (index(samples) / self.freedom(count) * kept).sqrt();
+        let spread = |d: usize| {
+            let variance: f64 = (0..count)
+                .map(|k| {
+                    let part = decomposed.eigenvectors[(d, k)];
+                    part * part / decomposed.eigenvalues[k].max(0.0)
+                })
+                .sum();
+            let spread = noise * variance.sqrt() / sizes[d];
+            if spread.is_nan() { f64::INFINITY } else { spread }
+        };
+        let spreads = (0..count).map(spread).collect();
+        let (eigenvalues, eigenvectors) = (&decomposed.eigenvalues, &decomposed.eigenvectors);
+        let several = Spread { sizes: &sizes, eigenvalues, eigenvectors, noise };
+        let searched = |&i: &usize| !matches!(self.problem.coordinates[i], Coordinate::Fixed(_));
+        let along = self.problem.relations.dependent().filter(searched);
+        let along = along.map(|parameter| (parameter, several.of(self.problem, place, parameter)));
+        (spreads, along.collect())
     }
 
     /// Takes the mean off where an offset is fitted.
@@ -288,33 +351,6 @@ pub(super) fn step(normal: &Normal, place: &[f64], damping: f64) -> Option<Vec<f
     let next: Vec<f64> =
         place.iter().zip(change.iter()).map(|(z, change)| (z + change).clamp(0.0, 1.0)).collect();
     (next != place).then_some(next)
-}
-
-/// Standard deviations in the unit box, from the eigenvalues of the scaled normal equations.
-fn spreads(normal: &Normal, rms: f64, record: &Record<'_>) -> Vec<f64> {
-    let count = normal.slope.len();
-    let sizes: Vec<f64> = (0..count).map(|d| normal.square[(d, d)].sqrt()).collect();
-    let scaled = DMatrix::from_fn(count, count, |i, j| {
-        let size = sizes[i] * sizes[j];
-        if size > 0.0 { normal.square[(i, j)] / size } else { 0.0 }
-    });
-    let decomposed = scaled.symmetric_eigen();
-    let samples = record.window.len();
-    let freedom = index(samples.saturating_sub(count + 1).max(1));
-    // Some rows stand for all of them.
-    let kept = index(normal.rows) / index(samples);
-    let noise = rms * (index(samples) / freedom * kept).sqrt();
-    let spread = |d: usize| {
-        let variance: f64 = (0..count)
-            .map(|k| {
-                let part = decomposed.eigenvectors[(d, k)];
-                part * part / decomposed.eigenvalues[k].max(0.0)
-            })
-            .sum();
-        let spread = noise * variance.sqrt() / sizes[d];
-        if spread.is_nan() { f64::INFINITY } else { spread }
-    };
-    (0..count).map(spread).collect()
 }
 
 /// Change of a parameter with its coordinate.

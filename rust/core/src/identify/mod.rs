@@ -2,6 +2,7 @@
 
 pub mod bounds;
 mod candidate;
+mod constraint;
 mod coordinate;
 mod cost;
 mod creep_shares;
@@ -10,12 +11,15 @@ mod descents;
 mod history;
 mod identification;
 mod inertia;
+mod information;
 mod lag;
 mod least_squares;
 mod levenberg_marquardt;
 mod motion;
+mod prior;
 mod problem;
 mod record;
+mod relations;
 mod residual_sums;
 mod resonances;
 mod search;
@@ -24,8 +28,10 @@ mod step_response;
 mod step_ringing;
 mod step_size;
 mod swarm;
+mod tie;
 
 pub use candidate::{BEFORE, Candidate, DELAY, PLACES, Theta};
+pub use constraint::Constraint;
 pub use coordinate::{Coordinate, Scale};
 pub use cost::Evaluator;
 pub use creep_shares::{MOST_CREEP, MOST_SHARES, Shares, creep_times};
@@ -39,11 +45,14 @@ pub use least_squares::{
     WeightsRecord, identify_weights,
 };
 pub use levenberg_marquardt::{LocalRefinement, Polished, Sensitivity};
+pub use prior::Prior;
 pub use problem::{Delay, Problem, Spec};
 pub use record::Record;
+pub use relations::Relations;
 pub use residual_sums::Costs;
 pub use resonances::{Resonance, resonances};
 pub use search::{Method, Monitor, Outcome, Plan, Progress, StopReason, search};
 pub use sensor_noise::{Noise, noise_at_rest};
 pub use step_response::{Conventional, StepReadings, StepResponse, read_step, separate};
 pub use swarm::{Boundary, Swarm, SwarmSettings, Topology, Update};
+pub use tie::Tie;

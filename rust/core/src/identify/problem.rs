@@ -2,10 +2,13 @@
 
 use super::bounds;
 use super::candidate::{BEFORE, DELAY, PLACES, Theta};
-use super::coordinate::Coordinate;
+use super::constraint::Constraint;
+use super::coordinate::{Coordinate, Scale};
 use super::creep_shares::check_times;
 use super::history::{History, came_from};
 use super::record::Record;
+use super::relations::Relations;
+use super::tie::shown_text;
 use crate::error::{Error, Result, positive, shown};
 use crate::integrator::MOST_PARAMETERS;
 use crate::models::{FoundBy, Held, Measures, Model, NOMINAL_STIFFNESS, position};
@@ -32,6 +35,14 @@ pub struct Spec {
     pub history: History,
     /// Time constants of the creep whose shares are fitted, s; none for no creep.
     pub creep_times: Vec<f64>,
+    /// Scales of the search, `"linear"` or `"log"`; those that suit the bounds where not given.
+    pub scales: Vec<(String, String)>,
+    /// Parameters that follow from others, with their expressions.
+    pub ties: Vec<(String, String)>,
+    /// Inequalities between two parameters, as `"a < b"`.
+    pub constraints: Vec<String>,
+    /// Values that are known besides the record, with their standard deviations, SI.
+    pub priors: Vec<(String, (f64, f64))>,
 }
 
 impl Spec {
@@ -48,7 +59,15 @@ impl Spec {
             delay: Delay::default(),
             history: History::Virgin,
             creep_times: Vec::new(),
+            scales: Vec::new(),
+            ties: Vec::new(),
+            constraints: Vec::new(),
+            priors: Vec::new(),
         }
+    }
+
+    fn scales(&self, name: &str) -> bool {
+        self.scales.iter().any(|(other, _)| other == name)
     }
 }
 
@@ -116,6 +135,8 @@ pub struct Problem {
     pub mass_if_shown: Option<Coordinate>,
     /// Time constants of the creep whose shares are fitted, s.
     pub creep_times: Vec<f64>,
+    /// Ties, inequalities and priors.
+    pub relations: Relations,
 }
 
 /// A value for each scalar parameter, where there is one.
@@ -139,12 +160,19 @@ impl Problem {
             return Err(Error::parameter("model", found, "one that a swarm searches"));
         }
         let mut fixed = fixed_values(spec)?;
-        let free = free_parameters(spec, &mut fixed)?;
+        let relations = Relations::read(
+            infos,
+            (&spec.ties, &spec.constraints),
+            &spec.priors,
+            record.window.len(),
+        )?;
+        check_tied(spec, &relations, &mut fixed)?;
+        let free = free_parameters(spec, &relations, &mut fixed)?;
         let has_scale = infos.iter().any(|info| info.carries_force);
         let holds_scale = !has_scale
             || infos
                 .iter()
-                .zip(&fixed)
+                .zip(&relations.known(&fixed))
                 .any(|(info, value)| info.carries_force && value.is_some_and(|v| v != 0.0));
         let mut scale_assumed = false;
         if !holds_scale {
@@ -158,30 +186,31 @@ impl Problem {
                      (give stiffness=, or name one in fixed=)",
                 ));
             }
-            fixed[position(infos, "stiffness", "stiffness")?] = Some(NOMINAL_STIFFNESS);
+            let stiffness = position(infos, "stiffness", "stiffness")?;
+            if let Some(tie) = relations.ties.iter().find(|tie| tie.parameter == stiffness) {
+                return Err(Error::parameter(
+                    "tie of stiffness",
+                    shown_text(&tie.text),
+                    "another parameter that carries force to be held, as voltage and displacement \
+                     determine only their ratios",
+                ));
+            }
+            fixed[stiffness] = Some(NOMINAL_STIFFNESS);
             scale_assumed = true;
         }
         check_fixed(spec.model, &fixed)?;
         let mut coordinates = [Coordinate::Fixed(0.0); PLACES];
-        let wants_mode = spec.free.as_ref().is_some_and(|names| names.iter().any(|n| n == "mass"));
-        let derived = bounds::derive(record, spec.model, &fixed, wants_mode, stop)?;
+        let names_mass = spec.free.as_ref().is_some_and(|names| names.iter().any(|n| n == "mass"));
+        let wants_mode = names_mass || spec.scales("mass");
+        let known = relations.known(&fixed);
+        let derived = bounds::derive(record, spec.model, &known, wants_mode, stop)?;
         coordinates[..DELAY].copy_from_slice(&derived);
         coordinates[DELAY] = spec.delay.coordinate(record)?;
         if spec.history == History::Fitted {
             let (low, high) = came_from(&record.drive);
             coordinates[BEFORE] = Coordinate::between("the voltage before", low, high)?;
         }
-        for (name, (low, high)) in &spec.bounds {
-            let i = position(infos, "bounds", name)?;
-            if !free[i] {
-                return Err(Error::parameter(
-                    format!("bounds of {name}"),
-                    format!("({low}, {high})"),
-                    "no bounds, as this parameter is not free",
-                ));
-            }
-            coordinates[i] = Coordinate::between(name, *low, *high)?;
-        }
+        enter_bounds(spec, &free, &mut coordinates)?;
         if scale_assumed && spec.bounds.iter().any(|(name, _)| name == "stiffness") {
             // Bounds make the stiffness a choice of the caller's, but no force is known.
             return Err(Error::parameter(
@@ -190,13 +219,21 @@ impl Problem {
                 "stiffness=, or a value other than 0 for another of them in fixed=",
             ));
         }
+        let bounded = |name: &str| spec.bounds.iter().any(|(other, _)| other == name);
+        relations.enter(spec.model, (&fixed, &free), &mut coordinates, bounded)?;
+        enter_scales(spec, &mut coordinates)?;
         check_times(&spec.creep_times)?;
         let Spec { model, offset, history, .. } = *spec;
         let creep_times = spec.creep_times.clone();
-        let chosen = |name: &str| spec.bounds.iter().any(|(other, _)| other == name);
+        let said = |name: &str| infos.iter().position(|info| info.name == name);
+        let chosen = |name: &str| {
+            let mentioned = said(name).is_some_and(|place| relations.mention(place));
+            bounded(name) || mentioned || spec.scales(name)
+        };
         let measures = bounds::measures(record);
         let slow = !wants_mode && !chosen("damping") && measures.excited().is_none();
-        let mass_if_shown = mass_if_shown(&measures, model, &fixed, &coordinates);
+        let mass_if_shown = mass_if_shown(&measures, model, &fixed, &coordinates)
+            .filter(|_| !said("mass").is_some_and(|place| relations.mention(place)));
         let problem = Self {
             model,
             coordinates,
@@ -206,6 +243,7 @@ impl Problem {
             slow,
             mass_if_shown,
             creep_times,
+            relations,
         };
         problem.check_corners()?;
         Ok(problem)
@@ -217,14 +255,39 @@ impl Problem {
             .filter(|&i| matches!(self.coordinates[i], Coordinate::Free { .. }))
     }
 
-    /// All parameters at a place in the unit box of the free ones.
+    /// All parameters at a place in the unit box of the free ones; NaN where ties make them such
+    /// that no stage has them.
     #[must_use]
     pub fn theta(&self, place: &[f64]) -> Theta {
+        let mut theta = self.values(place);
+        self.relations.fail_without_stage(self.model, &mut theta);
+        theta
+    }
+
+    /// All parameters at a place, whether a stage has them or not.
+    fn values(&self, place: &[f64]) -> Theta {
         let mut places = place.iter();
-        Theta(self.coordinates.map(|coordinate| match coordinate {
-            Coordinate::Fixed(value) => value,
-            Coordinate::Free { .. } => coordinate.value(places.next().copied().unwrap_or(0.5)),
-        }))
+        let unit = self.coordinates.map(|coordinate| match coordinate {
+            Coordinate::Fixed(_) | Coordinate::Tied => f64::NAN,
+            Coordinate::Free { .. } => places.next().copied().unwrap_or(0.5),
+        });
+        let mut theta = Theta(core::array::from_fn(|i| self.coordinates[i].value(unit[i])));
+        if !self.relations.is_empty() {
+            self.relations.settle(&self.coordinates, &unit, &mut theta);
+        }
+        theta
+    }
+
+    /// Whether the candidate at a place has the two parameters of each inequality equal.
+    #[must_use]
+    pub fn active(&self, place: &[f64]) -> Vec<bool> {
+        let mut unit = [f64::NAN; PLACES];
+        for (i, &z) in self.free().zip(place) {
+            unit[i] = z;
+        }
+        let values = self.theta(place).0;
+        let active = |one: &Constraint| one.is_active(&self.coordinates, &unit, &values);
+        self.relations.constraints.iter().map(active).collect()
     }
 
     /// The parameters that all candidates share.
@@ -234,7 +297,7 @@ impl Problem {
         for (slot, coordinate) in held.values.iter_mut().zip(&self.coordinates) {
             *slot = match coordinate {
                 Coordinate::Fixed(value) => Some(*value),
-                Coordinate::Free { .. } => None,
+                Coordinate::Free { .. } | Coordinate::Tied => None,
             };
         }
         held
@@ -258,6 +321,10 @@ impl Problem {
         let count = self.free().count();
         if count == 0 {
             return Err(Error::parameter("free", "empty", "at least one parameter to search"));
+        }
+        if !self.relations.ties.is_empty() {
+            // Ties may have no stage at a corner: such candidates fail by themselves.
+            return self.relations.check_middle(self.model, &self.values(&vec![0.5; count]));
         }
         for corner in [0.0, 1.0] {
             self.model.check(&self.theta(&vec![corner; count]).parameters())?;
@@ -316,10 +383,61 @@ fn check_fixed(model: Model, fixed: &Fixed) -> Result<()> {
     model.check(&core::array::from_fn(value))
 }
 
-/// Which parameters are searched; each of the others must have a value.
-fn free_parameters(spec: &Spec, fixed: &mut Fixed) -> Result<Free> {
+/// Puts the bounds of the caller into the coordinates.
+fn enter_bounds(spec: &Spec, free: &Free, coordinates: &mut [Coordinate; PLACES]) -> Result<()> {
+    let infos = spec.model.scalars();
+    for (name, (low, high)) in &spec.bounds {
+        let i = position(infos, "bounds", name)?;
+        if !free[i] {
+            return Err(Error::parameter(
+                format!("bounds of {name}"),
+                format!("({low}, {high})"),
+                "no bounds, as this parameter is not free",
+            ));
+        }
+        coordinates[i] = Coordinate::between(name, *low, *high)?;
+    }
+    Ok(())
+}
+
+/// Puts the scales of the caller into the coordinates.
+fn enter_scales(spec: &Spec, coordinates: &mut [Coordinate; PLACES]) -> Result<()> {
+    let infos = spec.model.scalars();
+    for (name, scale) in &spec.scales {
+        let i = position(infos, "scales", name)?;
+        coordinates[i] = coordinates[i].on(Scale::named(name, scale)?, name)?;
+    }
+    Ok(())
+}
+
+/// Refuses what else is said of a tied parameter, and takes its default away.
+fn check_tied(spec: &Spec, relations: &Relations, fixed: &mut Fixed) -> Result<()> {
+    let stiffness = spec.stiffness.map(|_| "stiffness");
+    for tie in &relations.ties {
+        let name = spec.model.scalars()[tie.parameter].name;
+        let arguments = [
+            ("free=", spec.free.iter().flatten().any(|other| other == name)),
+            ("fixed=", spec.fixed.iter().any(|(other, _)| other == name)),
+            ("bounds=", spec.bounds.iter().any(|(other, _)| other == name)),
+            ("scales=", spec.scales(name)),
+            ("stiffness=", stiffness == Some(name)),
+        ];
+        if let Some((argument, _)) = arguments.iter().find(|(_, given)| *given) {
+            return Err(Error::parameter(
+                format!("tie of {name}"),
+                shown_text(&tie.text),
+                format!("{name} not in {argument} as well"),
+            ));
+        }
+        fixed[tie.parameter] = None;
+    }
+    Ok(())
+}
+
+/// Which parameters are searched; each of the others must have a value or be tied.
+fn free_parameters(spec: &Spec, relations: &Relations, fixed: &mut Fixed) -> Result<Free> {
     let Some(names) = &spec.free else {
-        return Ok(fixed.map(|value| value.is_none()));
+        return Ok(core::array::from_fn(|i| fixed[i].is_none() && !relations.is_tied(i)));
     };
     let infos = spec.model.scalars();
     let mut free: Free = [false; MOST_PARAMETERS];
@@ -338,7 +456,7 @@ fn free_parameters(spec: &Spec, fixed: &mut Fixed) -> Result<Free> {
     for (i, info) in infos.iter().enumerate() {
         // The stiffness may still be assumed.
         let scale = info.name == "stiffness" && info.carries_force;
-        if !free[i] && fixed[i].is_none() && !scale {
+        if !free[i] && fixed[i].is_none() && !scale && !relations.is_tied(i) {
             return Err(Error::parameter(
                 "free",
                 names.join(", "),

@@ -14,7 +14,8 @@ use crate::signal::{FractionalDelay, Stop, between, index};
 /// Cost and offset of a candidate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Costs {
-    /// RMS deviation, m; infinite where the simulation blew up. Where the candidate was
+    /// RMS deviation, m, times the factor of the priors where there are any; infinite where the
+    /// simulation blew up. Where the candidate was
     /// abandoned, a lower bound that lies above its limit.
     pub rms: f64,
     /// Offset added to the simulated displacement, m.

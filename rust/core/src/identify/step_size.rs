@@ -104,7 +104,9 @@ pub(super) fn corners(problem: &Problem) -> Vec<Theta> {
         .map(|bits| (0..count).map(|d| f64::from(u8::from(bits >> d & 1 == 1))).collect())
         .collect();
     places.push(vec![0.5; count]);
-    places.iter().map(|place| problem.theta(place)).collect()
+    // Ties may leave corners without a stage, never the middle.
+    let all = places.iter().map(|place| problem.theta(place));
+    all.filter(|theta| theta.parameters().iter().all(|value| !value.is_nan())).collect()
 }
 
 /// Parts of a long drive that ask most of the integrator: its beginning, and its steepest part.
