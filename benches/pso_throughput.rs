@@ -12,7 +12,7 @@ use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
 use paper::{Peak, RATE, SAMPLES, Width, candidates, drive, paper_spec};
 use piezotrack_core::identify::{
-    Candidate, Evaluator, Plan, Problem, Progress, Record, SwarmSettings, search,
+    Candidate, Evaluator, Problem, Progress, Record, SwarmSettings, search,
 };
 use piezotrack_core::integrator::{Order, Stepping};
 use piezotrack_core::models::{DahlStage, Experiment, StageModel};
@@ -86,12 +86,13 @@ fn throughput(criterion: &mut Criterion) {
     group.sample_size(10);
     let settings = SwarmSettings { stall_iterations: 100_000, ..SwarmSettings::xu_li_2010() };
     for runs in [1, 32] {
-        let plan = Plan { settings: settings.clone(), seed: 1, runs };
         group.bench_function(format!("the paper's, {runs} at once, 2 threads"), |bencher| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
             bencher.iter(|| {
                 let mut quiet = |_: &Progress| core::ops::ControlFlow::Continue(());
-                pool.install(|| search(&evaluator(), &problem, &plan, &mut quiet, NEVER))
+                pool.install(|| {
+                    search(&evaluator(), &problem, &settings, 1, runs, &mut quiet, NEVER)
+                })
             });
         });
     }

@@ -2,8 +2,8 @@
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use piezotrack_core::identify::{
-    Candidate, Delay, Evaluator, Monitor, Outcome, Plan, Problem, Progress, Record, Spec,
-    SwarmSettings, search,
+    Candidate, Delay, Evaluator, Monitor, Outcome, Problem, Progress, Record, Spec, SwarmSettings,
+    search,
 };
 use piezotrack_core::integrator::{Order, Stepping};
 use piezotrack_core::models::{DahlStage, Experiment, Model, StageModel};
@@ -259,13 +259,12 @@ fn searched(settings: &SwarmSettings, threads: usize, seed: u64, runs: usize) ->
     let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
     let problem = Problem::new(&record, &spec(), NEVER).unwrap();
     let settings = SwarmSettings { iterations: 30, ..settings.clone() };
-    let plan = Plan { settings, seed, runs };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     pool.install(|| {
         let evaluator = Evaluator::new(&record, &problem, NEVER);
         let mut quiet = |_: &Progress| core::ops::ControlFlow::Continue(());
         let monitor: &mut dyn Monitor = &mut quiet;
-        search(&evaluator, &problem, &plan, monitor, NEVER).unwrap()
+        search(&evaluator, &problem, &settings, seed, runs, monitor, NEVER).unwrap()
     })
 }
 

@@ -4,7 +4,7 @@
 use core::sync::atomic::{AtomicUsize, Ordering};
 
 use piezotrack_core::Error;
-use piezotrack_core::identify::{Plan, SwarmSettings};
+use piezotrack_core::identify::{self, Plan, SwarmSettings};
 use piezotrack_core::math::{available, room, zeros};
 use piezotrack_core::models::{DahlStage, Experiment, Method, Model, Plant, Values};
 use piezotrack_core::signal::{Drive, Hold, NEVER, delayed};
@@ -120,7 +120,7 @@ fn memory_that_cannot_be_had_is_an_error_with_its_size() {
 fn particles_of_all_runs_together_are_bounded() {
     let plan = |particles, runs| {
         let settings = SwarmSettings { particles, ..SwarmSettings::xu_li_2010() };
-        Plan { settings, seed: 1, runs }.validate()
+        Plan { method: identify::Method::Swarm(settings), seed: 1, runs }.validate()
     };
     assert_eq!(plan(100_000, 1), Ok(()));
     assert_eq!(plan(100, 10_000), Ok(()));

@@ -162,7 +162,7 @@ def _reporting(info: ModelInfo, callback: Callable[[Progress], object]) -> Calla
 
     def report(nit: int, most: int, nfev: int, cost: float, theta: list[float]) -> bool:
         parameters = dict(zip(names, theta, strict=False))
-        return bool(callback(Progress(nit, most, nfev, cost, parameters, theta[-1])))
+        return bool(callback(Progress(nit, most, nfev, cost, parameters, theta[-2])))
 
     return report
 

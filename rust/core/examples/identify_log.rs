@@ -4,7 +4,7 @@
 use std::ops::ControlFlow;
 
 use piezotrack_core::Result;
-use piezotrack_core::identify::{Plan, Progress, Record, Spec, SwarmSettings, identify};
+use piezotrack_core::identify::{DescentSettings, Method, Plan, Progress, Record, Spec, identify};
 use piezotrack_core::models::{DahlStage, Experiment, Model, StageModel};
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 
@@ -28,7 +28,7 @@ fn main() -> Result<()> {
         ],
         ..Spec::of(Model::Dahl)
     };
-    let plan = Plan { settings: SwarmSettings::xu_li_2010(), seed: 1, runs: 4 };
+    let plan = Plan { method: Method::Descents(DescentSettings::default()), seed: 1, runs: 1 };
     let mut quiet = |_: &Progress| ControlFlow::Continue(());
     let found = identify(&record, &spec, &plan, &mut quiet, NEVER)?;
     for run in &found.runs {

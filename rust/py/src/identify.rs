@@ -12,10 +12,10 @@ use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
 use crate::arrays::{array, samples};
+use crate::descents::PyDescents;
 use crate::enter::{Watchers, enter_pool};
 use crate::errors::raise;
 use crate::stage::hold;
-use crate::descents::PyDescents;
 use crate::swarm::PySettings;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

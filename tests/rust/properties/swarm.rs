@@ -3,8 +3,8 @@
 use core::ops::ControlFlow;
 
 use piezotrack_core::identify::{
-    Boundary, Evaluator, Monitor, Plan, Problem, Progress, Record, Spec, Swarm, SwarmSettings,
-    Topology, Update, search,
+    Boundary, Evaluator, Monitor, Problem, Progress, Record, Spec, Swarm, SwarmSettings, Topology,
+    Update, search,
 };
 use piezotrack_core::models::{DahlStage, Experiment, Model, StageModel};
 use piezotrack_core::signal::{Drive, Hold, NEVER};
@@ -67,13 +67,17 @@ proptest! {
         if Swarm::new(settings.clone(), 1, 0, 0).is_err() {
             return Ok(());
         }
-        let plan = Plan { settings, seed, runs };
-        prop_assert_eq!(found(&plan, 1), found(&plan, threads));
+        prop_assert_eq!(found(&settings, seed, runs, 1), found(&settings, seed, runs, threads));
     }
 }
 
 /// The result of each run, to the last bit.
-fn found(plan: &Plan, threads: usize) -> Vec<(Vec<u64>, Vec<u64>, usize)> {
+fn found(
+    settings: &SwarmSettings,
+    seed: u64,
+    runs: usize,
+    threads: usize,
+) -> Vec<(Vec<u64>, Vec<u64>, usize)> {
     let dt = 0.01;
     let u: Vec<f64> = (0..60).map(|k| 30.0 * (1.0 - (0.2 * f64::from(k)).cos())).collect();
     let drive = Drive::new(&u, dt, Hold::First).unwrap();
@@ -92,7 +96,7 @@ fn found(plan: &Plan, threads: usize) -> Vec<(Vec<u64>, Vec<u64>, usize)> {
         let evaluator = Evaluator::new(&record, &problem, NEVER);
         let mut quiet = |_: &Progress| ControlFlow::Continue(());
         let monitor: &mut dyn Monitor = &mut quiet;
-        search(&evaluator, &problem, plan, monitor, NEVER).unwrap()
+        search(&evaluator, &problem, settings, seed, runs, monitor, NEVER).unwrap()
     });
     outcomes
         .into_iter()

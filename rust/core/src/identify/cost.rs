@@ -186,8 +186,7 @@ impl<'a> KernelVisitor for All<'a> {
         let bundle = |chunk: &'a [Candidate]| {
             // Only a kernel that gains by several vectors is compiled for them.
             if const { K::VECTORS > 1 } && several && chunk.len() > width {
-                let bundle =
-                    Bundle::<K, VECTORS> { kernel, of, candidates: chunk, stride, stop };
+                let bundle = Bundle::<K, VECTORS> { kernel, of, candidates: chunk, stride, stop };
                 if let Some(costs) = dispatch_vectors(of.arch, bundle) {
                     return costs;
                 }
@@ -251,15 +250,29 @@ impl<K: Kernel, const V: usize> WithSimd for Bundle<'_, K, V> {
         let stepping = SteppingLoop { coupling, gain };
         let residuals = &of.residuals;
         if const { V > 1 } {
-            let mut sums =
-                ResidualSums::new(residuals, candidates, stride, stop, zero, index(substeps), || Direct);
+            let mut sums = ResidualSums::new(
+                residuals,
+                candidates,
+                stride,
+                stop,
+                zero,
+                index(substeps),
+                || Direct,
+            );
             let ended = stepping.run(drive, substeps, start, &mut sums).is_some();
             sums.conclude(ended)
         } else {
             let delayed = || Delayed::new(candidates, drive.dt, x, index(substeps));
             let reading = || of.problem.has_delay().then(delayed);
-            let mut sums =
-                ResidualSums::new(residuals, candidates, stride, stop, zero, index(substeps), reading);
+            let mut sums = ResidualSums::new(
+                residuals,
+                candidates,
+                stride,
+                stop,
+                zero,
+                index(substeps),
+                reading,
+            );
             let ended = stepping.run(drive, substeps, start, &mut sums).is_some();
             sums.conclude(ended)
         }

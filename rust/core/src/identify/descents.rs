@@ -272,8 +272,7 @@ impl Search<'_> {
                 .iter()
                 .map(|(one, normal)| {
                     let dampings = DAMPINGS.map(|factor| factor * one.damping);
-                    let next =
-                        |damping| Some((damping, step(normal, &one.place, damping)?));
+                    let next = |damping| Some((damping, step(normal, &one.place, damping)?));
                     dampings.into_iter().filter_map(next).collect()
                 })
                 .collect();

@@ -54,7 +54,8 @@ pub fn identify(
     let local = LocalRefinement { record, problem: &problem, evaluator: &evaluator, stop };
     let (mut runs, polish) = match &plan.method {
         Method::Swarm(settings) => {
-            (search(&evaluator, &problem, settings, plan, monitor, stop)?, settings.polish)
+            let found = search(&evaluator, &problem, settings, plan.seed, plan.runs, monitor, stop);
+            (found?, settings.polish)
         }
         Method::Descents(settings) => {
             (descend(&local, settings, plan.seed, plan.runs, monitor)?, true)
@@ -83,10 +84,8 @@ pub fn identify(
     if matches!(plan.method, Method::Swarm(_)) {
         agreeing = agreeing_with(&runs, record);
     }
-    let Told { lags, sensitivities, with_mass } = best
-        .filter(|_| ended)
-        .map(|i| told_by(&local, &mut runs[i], polish))
-        .unwrap_or_default();
+    let Told { lags, sensitivities, with_mass } =
+        best.filter(|_| ended).map(|i| told_by(&local, &mut runs[i], polish)).unwrap_or_default();
     if stop() {
         for run in &mut runs {
             run.reason = StopReason::Interrupted;

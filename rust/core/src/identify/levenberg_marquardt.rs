@@ -254,8 +254,7 @@ impl LocalRefinement<'_> {
     /// What is read at some places every `stride` samples, simulated as the search does, with the
     /// shares of the creep that suit each best; `None` where one cannot be simulated.
     fn readings(&self, places: &[Vec<f64>], stride: usize) -> Option<Vec<Vec<f64>>> {
-        let candidates: Vec<Candidate> =
-            places.iter().map(|place| self.candidate(place)).collect();
+        let candidates: Vec<Candidate> = places.iter().map(|place| self.candidate(place)).collect();
         let found = self.evaluator.readings(&candidates, stride, self.stop);
         let whole = found.len() == places.len() && found.iter().all(|one| !one.reading.is_empty());
         whole.then(|| found.into_iter().map(|one| one.reading).collect())

@@ -222,15 +222,14 @@ pub fn search(
     evaluator: &Evaluator<'_>,
     problem: &Problem,
     settings: &SwarmSettings,
-    plan: &Plan,
+    seed: u64,
+    runs: usize,
     monitor: &mut dyn Monitor,
     stop: Stop<'_>,
 ) -> Result<Vec<Outcome>> {
     let coordinates = problem.free().count();
-    plan.validate()?;
-    let runs = 0..plan.runs as u64;
     let runs: Result<Vec<Run>> =
-        runs.map(|run| Run::new(settings, coordinates, plan.seed, run)).collect();
+        (0..runs as u64).map(|run| Run::new(settings, coordinates, seed, run)).collect();
     let mut runs = runs?;
     while runs.iter().any(|run| run.reason.is_none()) {
         let asked: Vec<Vec<Candidate>> = runs.iter().map(|run| run.candidates(problem)).collect();
