@@ -58,25 +58,8 @@ def visited(
     u: ArrayLike, dt: float, hold_name: str, history: str, before: float
 ) -> NDArray[np.float64]: ...
 def identify(
+    question: dict[str, Any],
     *,
-    model: str,
-    u: ArrayLike,
-    y: ArrayLike,
-    dt: float,
-    hold_name: str,
-    start: int,
-    free: list[str] | None,
-    fixed: list[tuple[str, float]],
-    bounds: list[tuple[str, tuple[float, float]]],
-    scales: list[tuple[str, str]],
-    ties: list[tuple[str, str]],
-    constraints: list[str],
-    priors: list[tuple[str, tuple[float, float]]],
-    stiffness: float | None,
-    offset: bool,
-    delay: tuple[float, float] | None,
-    history: str,
-    creep: list[float] | None,
     method: SwarmSettings | DescentSettings,
     seed: int,
     runs: int,
@@ -149,6 +132,15 @@ class Swarm:
     def best(self) -> tuple[list[float], float]: ...
     @property
     def done(self) -> bool: ...
+
+@final
+class Objective:
+    def __new__(cls, question: dict[str, Any], threads: int) -> Objective: ...
+    @property
+    def coordinates(self) -> list[tuple[str, float, float, str]]: ...
+    def costs(self, places: list[list[float]]) -> list[float]: ...
+    def descend(self, places: list[list[float]]) -> list[tuple[list[float], float, int]]: ...
+    def parameters(self, place: list[float]) -> list[float]: ...
 
 @final
 class DescentSettings:

@@ -274,7 +274,7 @@ def test_the_installed_command_works_and_repeats_itself() -> None:
 @pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C in another way")
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_keeps_the_best_so_far(number: signal.Signals, code: int) -> None:
-    search = ["identify", "log.csv", "--model", "dahl", "--runs", "500", "--out", "out"]
+    search = ["identify", "log.csv", "--model", "dahl", "--runs", "10000", "--out", "out"]
     with subprocess.Popen(
         [*COMMAND, *search], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:

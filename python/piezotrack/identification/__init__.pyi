@@ -17,6 +17,7 @@ from .identified import IdentifiedModel as IdentifiedModel
 from .identified import Score as Score
 from .identified import load as load
 from .least_squares import LeastSquares as LeastSquares
+from .objective import Objective as Objective
 from .plot import plot_convergence as plot_convergence
 from .plot import plot_loop as plot_loop
 from .plot import plot_time as plot_time

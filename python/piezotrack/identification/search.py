@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from .. import _core
-from .._support.arguments import as_numbers
 from .._support.messages import quoted
 from .._support.progress_bar import ProgressBar
 from .._support.units import of_drive
-from ..data import diagnostics
 from ..errors import Interrupted, ParameterError
 from ..stages.registry import stage_class
 from .descents import Descents
 from .estimates import Constraint, Estimate, LagRange, Progress, SwarmRun
 from .history import start_after
 from .model_file import constraint_entries, fit_entry, provenance
-from .parameter_arguments import ParameterArguments
+from .question import question_of
 from .result import Identification
-from .step_response import StepResult
 from .swarm import ParticleSwarm
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
     from ..data.dataset import Dataset
     from ..stages.model_info import ModelInfo
     from .history import History
@@ -44,18 +42,7 @@ def search(
     info: ModelInfo,
     *,
     offset: bool,
-    free: object = None,
-    fixed: object = None,
-    initial: object = None,
-    bounds: object = None,
-    scales: object = None,
-    ties: object = None,
-    constraints: object = None,
-    priors: object = None,
-    stiffness: object = None,
-    delay: object = None,
     history: History = "virgin",
-    creep: object = None,
     method: object = None,
     swarm: object = None,
     descents: object = None,
@@ -64,6 +51,7 @@ def search(
     threads: object = None,
     progress: bool | None = None,
     callback: object = None,
+    **asked: object,
 ) -> Identification:
     """Search the parameters of a model, by descents or with a swarm.
 
@@ -77,9 +65,10 @@ def search(
         Whether an offset of the sensor is fitted.
     history : {"virgin", "settled", "fit"}
         What the stage went through before the record.
-    free, fixed, initial, bounds, scales, ties, constraints, priors, stiffness, delay, creep, \
     method, swarm, descents, seed, runs, threads, progress, callback
         As for `identify`, not yet checked; None stands for the default.
+    **asked
+        As for `question_of`.
 
     Returns
     -------
@@ -95,29 +84,10 @@ def search(
     if callback is not None and not callable(callback):
         raise ParameterError(f"callback is {quoted(callback)}: expected a function, or None")
     seed = 0 if seed is None else _core.as_count("seed", seed)
-    searched_delay = _delay(False if delay is None else delay)
-    creep_times = _creep_times(False if creep is None else creep)
-    said = ParameterArguments.checked(scales, ties, constraints, priors)
-    held = _held(initial, fixed, free, bounds, said.named)
-    diagnostics.check_record(data, searches_hysteresis=bool(set(info.hysteresis) - set(held)))
-    full = data.full
+    question = question_of(data, info, offset=offset, history=history, **asked)
     with ProgressBar(progress, f"identify: {info.name}") as bar:
         found = _core.identify(
-            model=info.name,
-            u=full.u,
-            y=full.y,
-            dt=data.dt,
-            hold_name=data.hold,
-            start=data.warmup,
-            free=_names(free),
-            fixed=list(held.items()),
-            bounds=[(name, _pair(name, pair)) for name, pair in _items("bounds", bounds)],
-            **said.core,
-            stiffness=None if stiffness is None else _core.as_number("stiffness", stiffness),
-            offset=offset,
-            delay=searched_delay,
-            history=history,
-            creep=creep_times,
+            question,
             method=settings._core,
             seed=seed,
             runs=RUNS[type(settings)] if runs is None else _core.as_count("runs", runs),
@@ -127,7 +97,9 @@ def search(
         )
     if found is None:
         raise Interrupted("interrupted before the first cost was computed")
-    fit = _identification(info, found, data, settings, seed, offset, history, dict(said.scales))
+    fit = _identification(
+        info, found, data, settings, seed, offset, history, dict(question["scales"])
+    )
     if not fit.success:
         raise Interrupted(
             f"interrupted after {fit.nit} iterations, best cost {fit.cost_um:.4g} um", fit
@@ -165,78 +137,6 @@ def _reporting(info: ModelInfo, callback: Callable[[Progress], object]) -> Calla
         return bool(callback(Progress(nit, most, nfev, cost, parameters, theta[-2])))
 
     return report
-
-
-def _names(free: object) -> list[str] | None:
-    """Check that free names parameters in a list."""
-    if free is None:
-        return None
-    if isinstance(free, str) or not isinstance(free, Iterable):
-        raise ParameterError(f"free is {quoted(free)}: expected names in a list, as ['mass']")
-    return [str(name) for name in free]
-
-
-def _held(
-    initial: object, fixed: object, free: object, bounds: object, named: set[str]
-) -> dict[str, float]:
-    """Return the parameters held: by `fixed`, and by a step response where not named elsewhere."""
-    given = {name: _core.as_number(name, value) for name, value in _items("fixed", fixed)}
-    if initial is None:
-        return given
-    if not isinstance(initial, StepResult):
-        raise ParameterError(
-            f"initial is {type(initial).__name__}: expected a StepResult, see pt.identify_step"
-        )
-    said = named | {*(_names(free) or []), *(name for name, _ in _items("bounds", bounds))}
-    return {n: v for n, v in initial.hysteresis.items() if n not in said} | given
-
-
-def _items(argument: str, mapping: object) -> list[tuple[str, Any]]:
-    """Check that an argument is a mapping, and return its entries."""
-    if mapping is None:
-        return []
-    if not isinstance(mapping, Mapping):
-        raise ParameterError(
-            f"{argument} is {quoted(mapping)}: expected a mapping of names to values"
-        )
-    return [(str(name), value) for name, value in mapping.items()]
-
-
-def _pair(name: str, pair: object) -> tuple[float, float]:
-    """Check that bounds are two numbers."""
-    two = list(pair) if isinstance(pair, Iterable) and not isinstance(pair, str) else []
-    if len(two) != 2:
-        raise ParameterError(f"bounds of {name} are {quoted(pair)}: expected (low, high)")
-    low, high = two
-    return (
-        _core.as_number(f"lower bound of {name}", low),
-        _core.as_number(f"upper bound of {name}", high),
-    )
-
-
-def _delay(delay: object) -> tuple[float, float] | None:
-    """Bounds of the delay: None if the core chooses them, equal ones if it is known."""
-    if isinstance(delay, bool):
-        return None if delay else (0.0, 0.0)
-    if isinstance(delay, Iterable) and not isinstance(delay, str):
-        low, high = _pair("delay", delay)
-        if low == high:
-            raise ParameterError(f"bounds of delay are ({low}, {high}) s: expected the lower first")
-        return low, high
-    known = _core.as_number("delay", delay)
-    return known, known
-
-
-def _creep_times(creep: object) -> list[float] | None:
-    """Time constants of the creep: None if the core chooses them, empty if there is none."""
-    if isinstance(creep, bool):
-        return None if creep else []
-    if not isinstance(creep, Iterable) or isinstance(creep, str):
-        raise ParameterError(
-            f"creep is {quoted(creep)}: expected True, False or time constants in seconds, "
-            "as [0.1, 1.0]"
-        )
-    return list(as_numbers("creep", creep))
 
 
 def _identification(

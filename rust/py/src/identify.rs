@@ -2,11 +2,10 @@
 
 use numpy::PyArray1;
 use piezotrack_core::identify::{
-    BEFORE, Coordinate, DELAY, Delay, History, Identification, Method, Outcome, Plan, Record,
-    Relations, Spec, StopReason, creep_times, identify as identified, visited,
+    BEFORE, Coordinate, DELAY, History, Identification, Method, Outcome, Plan, Relations,
+    StopReason, identify as identified, visited,
 };
 use piezotrack_core::integrator::Order;
-use piezotrack_core::models::Model;
 use piezotrack_core::signal::Drive;
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
@@ -15,6 +14,7 @@ use crate::arrays::{array, samples};
 use crate::descents::PyDescents;
 use crate::enter::{Watchers, enter_pool};
 use crate::errors::raise;
+use crate::question::Question;
 use crate::stage::hold;
 use crate::swarm::PySettings;
 
@@ -249,35 +249,13 @@ impl Searcher<'_> {
     }
 }
 
-/// Identifies a stage with creep of these time constants, or with those that suit the record where
-/// there are none, and its `delay` between two bounds, known where they are equal, or
-/// between bounds of its own choice where there are none; None where the search was stopped before
-/// its first cost.
+/// Identifies a stage; None where the search was stopped before its first cost.
 #[pyfunction]
-#[pyo3(signature = (*, model, u, y, dt, hold_name, start, free, fixed, bounds, scales, ties,
-    constraints, priors, stiffness, offset, delay, history, creep, method, seed, runs, threads,
-    callback, progress))]
+#[pyo3(signature = (question, *, method, seed, runs, threads, callback, progress))]
 #[expect(clippy::too_many_arguments, reason = "keyword-only, called from one place")]
 fn identify(
     py: Python<'_>,
-    model: &str,
-    u: &Bound<'_, PyAny>,
-    y: &Bound<'_, PyAny>,
-    dt: f64,
-    hold_name: &str,
-    start: usize,
-    free: Option<Vec<String>>,
-    fixed: Vec<(String, f64)>,
-    bounds: Vec<(String, (f64, f64))>,
-    scales: Vec<(String, String)>,
-    ties: Vec<(String, String)>,
-    constraints: Vec<String>,
-    priors: Vec<(String, (f64, f64))>,
-    stiffness: Option<f64>,
-    offset: bool,
-    delay: Option<(f64, f64)>,
-    history: &str,
-    creep: Option<Vec<f64>>,
+    question: Question<'_>,
     method: Searcher<'_>,
     seed: u64,
     runs: usize,
@@ -285,35 +263,12 @@ fn identify(
     callback: Option<Py<PyAny>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Option<PySearch>> {
-    let (u, y) = (samples("u", u)?, samples("y", y)?);
-    let delay = match delay {
-        None => Delay::Fitted,
-        #[expect(clippy::float_cmp, reason = "the caller writes one number twice")]
-        Some((low, high)) if low == high => Delay::Fixed(low),
-        Some((low, high)) => Delay::Between(low, high),
-    };
-    let model = Model::named(model).map_err(|error| raise(&error))?;
-    let history = history_named(history).map_err(|error| raise(&error))?;
-    let mut spec = Spec {
-        free,
-        fixed,
-        bounds,
-        scales,
-        ties,
-        constraints,
-        priors,
-        stiffness,
-        offset,
-        delay,
-        history,
-        ..Spec::of(model)
-    };
+    let asked = question.asked()?;
     let plan = Plan { method: method.method(), seed, runs };
     let watchers = Watchers { callback, progress };
     let found = enter_pool(py, threads, &watchers, |monitor, stop| {
-        let record = Record::new(&u, &y, dt, hold(hold_name)?, start)?;
-        spec.creep_times = creep.map_or_else(|| creep_times(&record), Ok)?;
-        identified(&record, &spec, &plan, monitor, stop)
+        let record = asked.record()?;
+        identified(&record, &asked.spec(&record)?, &plan, monitor, stop)
     })?;
     Ok(found.best.map(|best| PySearch { outcome: found.runs[best].clone(), found }))
 }

@@ -12,6 +12,8 @@ mod inverse;
 mod least_squares;
 mod models;
 mod numbers;
+mod objective;
+mod question;
 mod snapshots;
 mod stage;
 mod step;
@@ -32,6 +34,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     inverse::register(module)?;
     identify::register(module)?;
     descents::register(module)?;
+    objective::register(module)?;
     step::register(module)?;
     swarm::register(module)?;
     control::register(module)?;

@@ -45,7 +45,12 @@ impl<'a> Evaluator<'a> {
     /// Fixes the stepping from the bounds, the sampling rate and the drive.
     #[must_use]
     pub fn new(record: &'a Record<'a>, problem: &'a Problem, stop: Stop<'_>) -> Self {
-        let stepping = step_size::choose(record, problem, stop);
+        Self::stepped(record, problem, step_size::choose(record, problem, stop))
+    }
+
+    /// With a stepping that was chosen before.
+    #[must_use]
+    pub fn stepped(record: &'a Record<'a>, problem: &'a Problem, stepping: Stepping) -> Self {
         let rate = step_size::corners(problem).iter().fold(0.0, |most: f64, theta| {
             let [mass, damping, stiffness, ..] = theta.parameters();
             most.max(Mechanics { mass, damping, stiffness }.rate())

@@ -6,7 +6,7 @@
 //! 10.1007/BF01581046.
 
 use super::candidate::Candidate;
-use super::levenberg_marquardt::{LocalRefinement, step};
+use super::levenberg_marquardt::{LocalRefinement, Polished, step};
 use super::problem::Problem;
 use super::residual_sums::Costs;
 use super::search::{Monitor, Outcome, Progress, StopReason};
@@ -152,18 +152,9 @@ pub(super) fn descend(
     runs: usize,
     monitor: &mut dyn Monitor,
 ) -> Result<Vec<Outcome>> {
-    let coordinates = local.problem.free().count();
     let mut outcomes = Vec::new();
     for run in 0..runs as u64 {
-        let mut search = Search {
-            local,
-            settings,
-            coordinates,
-            ended: Vec::new(),
-            evaluations: 0,
-            iterations: 0,
-            failures: 0,
-        };
+        let mut search = Search::new(local, settings);
         let reason = search.run(seed, run, monitor);
         let simulations = search.evaluations;
         let failures = search.failures;
@@ -187,7 +178,39 @@ pub(super) fn descend(
     Ok(outcomes)
 }
 
-impl Search<'_> {
+impl LocalRefinement<'_> {
+    /// Descends from places of the unit box, side by side; the cost of one that could not be
+    /// simulated is infinite.
+    #[must_use]
+    pub fn descended(&self, places: &[Vec<f64>]) -> Vec<Polished> {
+        let settings = DescentSettings::default();
+        let mut search = Search::new(self, &settings);
+        let candidates: Vec<Candidate> = places.iter().map(|one| search.candidate(one)).collect();
+        let costs = self.evaluator.costs(&candidates, self.stop);
+        let start = |(place, costs): (&Vec<f64>, Costs)| {
+            let mut one = Descent::new(place.clone(), costs, 1);
+            one.reason = costs.rms.is_infinite().then_some(StopReason::Converged);
+            one
+        };
+        let mut descents: Vec<Descent> = places.iter().zip(costs).map(start).collect();
+        while descents.iter().any(|one| one.reason.is_none()) && !(self.stop)() {
+            search.iterate(&mut descents);
+        }
+        let ended = |one: Descent| {
+            let Descent { place, costs, evaluations, .. } = one;
+            Polished { place, costs, evaluations }
+        };
+        descents.into_iter().map(ended).collect()
+    }
+}
+
+impl<'a> Search<'a> {
+    fn new(local: &'a LocalRefinement<'a>, settings: &'a DescentSettings) -> Self {
+        let coordinates = local.problem.free().count();
+        let ended = Vec::new();
+        Self { local, settings, coordinates, ended, evaluations: 0, iterations: 0, failures: 0 }
+    }
+
     /// Round after round, until descents agree.
     fn run(&mut self, seed: u64, run: u64, monitor: &mut dyn Monitor) -> StopReason {
         for round in 0..self.settings.rounds {

@@ -1,0 +1,148 @@
+"""Success of methods of search against simulations: ``python benches/search/run.py``.
+
+Writes ``search.json``, ``search.md`` and ``search.png`` into the folder that is given, by default
+``build/search``; ``--draw`` makes table and picture again from ``search.json``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from methods import METHODS
+from problems import PROBLEMS
+
+import piezotrack as pt
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+NEAR = 1e-3
+
+
+def measure(name: str, methods: list[str], seeds: int, most: int) -> dict[str, Any]:
+    """Run the methods on a problem; the course of the best cost of every seed."""
+    problem = PROBLEMS[name]
+    objective = pt.identification.Objective(
+        problem.record(), problem.model, history="virgin", **problem.arguments
+    )
+    courses = {}
+    for method in methods:
+        began = time.perf_counter()
+        courses[method] = [METHODS[method](objective, seed, most) for seed in range(seeds)]
+        low = min(course[-1][1] for course in courses[method] if course)
+        spent = time.perf_counter() - began
+        print(f"{name}: {method}: lowest {1e6 * low:.6f} um, {spent:.0f} s", flush=True)
+    return {
+        "title": problem.title,
+        "coordinates": len(objective.names),
+        "most": most,
+        "seeds": seeds,
+        "courses": courses,
+    }
+
+
+def successes(found: dict[str, Any]) -> dict[str, NDArray[np.float64]]:
+    """Simulations after which each seed was within a thousandth of the lowest cost known."""
+    courses = found["courses"]
+    ends = [course[-1][1] for runs in courses.values() for course in runs if course]
+    near = min(ends) * (1.0 + NEAR)
+    return {
+        method: np.array(
+            [next((used for used, cost in course if cost <= near), math.inf) for course in runs]
+        )
+        for method, runs in courses.items()
+    }
+
+
+def for_99(times: NDArray[np.float64], most: int) -> float:
+    """Simulations for 99 % success: of the tries at the best length to begin anew after."""
+    best = math.inf
+    for length in [*np.sort(times[np.isfinite(times)]), most]:
+        share = float(np.mean(times <= length))
+        if share > 0.0:
+            tries = 1.0 if share >= 0.99 else math.log(0.01) / math.log(1.0 - share)
+            best = min(best, float(length) * tries)
+    return best
+
+
+def table(results: dict[str, Any]) -> str:
+    """Rows of the methods, columns of the problems."""
+    lines = ["| method | " + " | ".join(one["title"] for one in results.values()) + " |"]
+    lines.append("| --- |" + " --- |" * len(results))
+    times = {name: successes(one) for name, one in results.items()}
+    for method in METHODS:
+        row = []
+        for name, one in results.items():
+            if method not in times[name]:
+                row.append("")
+                continue
+            found = times[name][method]
+            share = int(np.isfinite(found).sum())
+            needed = for_99(found, one["most"])
+            text = "never" if math.isinf(needed) else f"{float(f'{needed:.2g}'):,.0f}"
+            row.append(f"{text} ({share} of {found.size})")
+        lines.append(f"| {method} | " + " | ".join(row) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def draw(results: dict[str, Any], path: Path) -> None:
+    """One panel a problem: share of the seeds that succeeded within so many simulations."""
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(2, 3, figsize=(14.0, 8.6), sharey=True, layout="constrained")
+    colours = plt.get_cmap("tab20").colors  # type: ignore[attr-defined]
+    for ax, one in zip(axes.flat, results.values(), strict=False):
+        for k, (method, times) in enumerate(successes(one).items()):
+            done = np.sort(times[np.isfinite(times)])
+            share = 100.0 * np.arange(1, done.size + 1) / times.size
+            own = method.startswith(("descents", "swarm cut", "scatter"))
+            ax.step(
+                [*done, one["most"]],
+                [*share, share[-1] if share.size else 0.0],
+                where="post",
+                label=method,
+                color=colours[k],
+                linestyle="-" if own else "--",
+            )
+        ax.set(title=one["title"], xscale="log", xlabel="simulations", ylim=(-2, 102))
+        ax.grid(alpha=0.3)
+    for ax in axes[:, 0]:
+        ax.set_ylabel("seeds within 0.1 % of the lowest cost [%]")
+    handles, labels = axes.flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=5, fontsize="small")
+    figure.savefig(path, dpi=110)
+
+
+def main() -> None:
+    """Measure, and write what was found."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("build/search"))
+    parser.add_argument("--seeds", type=int, default=50)
+    parser.add_argument("--most", type=int, default=50_000, help="simulations of a run")
+    parser.add_argument("--problems", default=",".join(PROBLEMS))
+    parser.add_argument("--methods", default=",".join(METHODS).replace(", ", "; "))
+    parser.add_argument("--draw", action="store_true", help="from what was measured")
+    given = parser.parse_args()
+    given.out.mkdir(parents=True, exist_ok=True)
+    path = given.out / "search.json"
+    results: dict[str, Any] = json.loads(path.read_text()) if path.exists() else {}
+    methods = [one.replace("; ", ", ") for one in given.methods.split(",")]
+    for name in [] if given.draw else given.problems.split(","):
+        results[name] = measure(name, methods, given.seeds, given.most)
+        path.write_text(json.dumps(results))
+    results = {name: results[name] for name in PROBLEMS if name in results}
+    (given.out / "search.md").write_text(table(results))
+    draw(results, given.out / "search.png")
+    print(table(results))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,161 @@
+"""What is asked of a record: the searched parameters, their bounds, and what is known of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from .. import _core
+from .._support.arguments import as_numbers
+from .._support.messages import quoted
+from ..data import diagnostics
+from ..errors import ParameterError
+from .parameter_arguments import ParameterArguments
+from .step_response import StepResult
+
+if TYPE_CHECKING:
+    from ..data.dataset import Dataset
+    from ..stages.model_info import ModelInfo
+    from .history import History
+
+__all__ = ["question_of"]
+
+
+def question_of(
+    data: Dataset,
+    info: ModelInfo,
+    *,
+    offset: bool,
+    history: History,
+    free: object = None,
+    fixed: object = None,
+    initial: object = None,
+    bounds: object = None,
+    scales: object = None,
+    ties: object = None,
+    constraints: object = None,
+    priors: object = None,
+    stiffness: object = None,
+    delay: object = None,
+    creep: object = None,
+) -> dict[str, Any]:
+    """Check what is asked of a record, and return it as the core takes it.
+
+    Parameters
+    ----------
+    data : Dataset
+        The record.
+    info : ModelInfo
+        The model.
+    offset : bool
+        Whether an offset of the sensor is fitted.
+    history : {"virgin", "settled", "fit"}
+        What the stage went through before the record.
+    free, fixed, initial, bounds, scales, ties, constraints, priors, stiffness, delay, creep
+        As for `identify`, not yet checked; None stands for the default.
+
+    Returns
+    -------
+    dict
+        In plain data.
+
+    Raises
+    ------
+    ParameterError, DataError
+        As for `identify`.
+    """
+    searched_delay = _delay(False if delay is None else delay)
+    creep_times = _creep_times(False if creep is None else creep)
+    said = ParameterArguments.checked(scales, ties, constraints, priors)
+    held = _held(initial, fixed, free, bounds, said.named)
+    diagnostics.check_record(data, searches_hysteresis=bool(set(info.hysteresis) - set(held)))
+    full = data.full
+    return {
+        "model": info.name,
+        "u": full.u,
+        "y": full.y,
+        "dt": data.dt,
+        "hold_name": data.hold,
+        "start": data.warmup,
+        "free": _names(free),
+        "fixed": list(held.items()),
+        "bounds": [(name, _pair(name, pair)) for name, pair in _items("bounds", bounds)],
+        **said.core,
+        "stiffness": None if stiffness is None else _core.as_number("stiffness", stiffness),
+        "offset": offset,
+        "delay": searched_delay,
+        "history": history,
+        "creep": creep_times,
+    }
+
+
+def _names(free: object) -> list[str] | None:
+    """Check that free names parameters in a list."""
+    if free is None:
+        return None
+    if isinstance(free, str) or not isinstance(free, Iterable):
+        raise ParameterError(f"free is {quoted(free)}: expected names in a list, as ['mass']")
+    return [str(name) for name in free]
+
+
+def _held(
+    initial: object, fixed: object, free: object, bounds: object, named: set[str]
+) -> dict[str, float]:
+    """Return the parameters held: by `fixed`, and by a step response where not named elsewhere."""
+    given = {name: _core.as_number(name, value) for name, value in _items("fixed", fixed)}
+    if initial is None:
+        return given
+    if not isinstance(initial, StepResult):
+        raise ParameterError(
+            f"initial is {type(initial).__name__}: expected a StepResult, see pt.identify_step"
+        )
+    said = named | {*(_names(free) or []), *(name for name, _ in _items("bounds", bounds))}
+    return {n: v for n, v in initial.hysteresis.items() if n not in said} | given
+
+
+def _items(argument: str, mapping: object) -> list[tuple[str, Any]]:
+    """Check that an argument is a mapping, and return its entries."""
+    if mapping is None:
+        return []
+    if not isinstance(mapping, Mapping):
+        raise ParameterError(
+            f"{argument} is {quoted(mapping)}: expected a mapping of names to values"
+        )
+    return [(str(name), value) for name, value in mapping.items()]
+
+
+def _pair(name: str, pair: object) -> tuple[float, float]:
+    """Check that bounds are two numbers."""
+    two = list(pair) if isinstance(pair, Iterable) and not isinstance(pair, str) else []
+    if len(two) != 2:
+        raise ParameterError(f"bounds of {name} are {quoted(pair)}: expected (low, high)")
+    low, high = two
+    return (
+        _core.as_number(f"lower bound of {name}", low),
+        _core.as_number(f"upper bound of {name}", high),
+    )
+
+
+def _delay(delay: object) -> tuple[float, float] | None:
+    """Bounds of the delay: None if the core chooses them, equal ones if it is known."""
+    if isinstance(delay, bool):
+        return None if delay else (0.0, 0.0)
+    if isinstance(delay, Iterable) and not isinstance(delay, str):
+        low, high = _pair("delay", delay)
+        if low == high:
+            raise ParameterError(f"bounds of delay are ({low}, {high}) s: expected the lower first")
+        return low, high
+    known = _core.as_number("delay", delay)
+    return known, known
+
+
+def _creep_times(creep: object) -> list[float] | None:
+    """Time constants of the creep: None if the core chooses them, empty if there is none."""
+    if isinstance(creep, bool):
+        return None if creep else []
+    if not isinstance(creep, Iterable) or isinstance(creep, str):
+        raise ParameterError(
+            f"creep is {quoted(creep)}: expected True, False or time constants in seconds, "
+            "as [0.1, 1.0]"
+        )
+    return list(as_numbers("creep", creep))

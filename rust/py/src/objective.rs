@@ -1,0 +1,127 @@
+//! The cost that an identification minimises, for optimisers of the caller's.
+
+use piezotrack_core::identify::{
+    Candidate, Coordinate, DELAY, Evaluator, LocalRefinement, Problem, Scale,
+};
+use piezotrack_core::integrator::Stepping;
+use piezotrack_core::signal::Stop;
+use piezotrack_core::{Error, Result};
+use pyo3::prelude::*;
+
+use crate::enter::{Watchers, enter_pool};
+use crate::errors::raise;
+use crate::question::{Asked, Question};
+
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<PyObjective>()
+}
+
+/// A record, what is asked of it, and how finely its candidates are stepped.
+#[pyclass(name = "Objective", frozen, module = "piezotrack._core")]
+pub struct PyObjective {
+    asked: Asked,
+    problem: Problem,
+    stepping: Stepping,
+    threads: usize,
+}
+
+/// Place in the unit box, cost and simulations of a descent.
+type Descended = (Vec<f64>, f64, usize);
+
+#[pymethods]
+impl PyObjective {
+    #[new]
+    #[expect(clippy::needless_pass_by_value, reason = "extracted from a dict")]
+    fn new(py: Python<'_>, question: Question<'_>, threads: usize) -> PyResult<Self> {
+        let asked = question.asked()?;
+        let watchers = Watchers { callback: None, progress: None };
+        let (problem, stepping) = enter_pool(py, threads, &watchers, |_, stop| {
+            let record = asked.record()?;
+            let problem = Problem::new(&record, &asked.spec(&record)?, stop)?;
+            let stepping = Evaluator::new(&record, &problem, stop).stepping;
+            Ok((problem, stepping))
+        })?;
+        Ok(Self { asked, problem, stepping, threads })
+    }
+
+    /// Name, bounds and scale of each coordinate.
+    #[getter]
+    fn coordinates(&self) -> Vec<(&'static str, f64, f64, &'static str)> {
+        let infos = self.problem.model.scalars();
+        let name = |place: usize| {
+            infos
+                .get(place)
+                .map_or(if place == DELAY { "delay" } else { "voltage_before" }, |one| one.name)
+        };
+        let searched =
+            self.problem.free().filter_map(|place| match self.problem.coordinates[place] {
+                Coordinate::Free { low, high, scale } => {
+                    let scale = if scale == Scale::Log { "log" } else { "linear" };
+                    Some((name(place), low, high, scale))
+                }
+                _ => None,
+            });
+        searched.collect()
+    }
+
+    /// Costs at places of the unit box.
+    fn costs(&self, py: Python<'_>, places: Vec<Vec<f64>>) -> PyResult<Vec<f64>> {
+        self.check(&places).map_err(|error| raise(&error))?;
+        self.evaluated(py, |local, stop| {
+            let candidates: Vec<Candidate> = places
+                .iter()
+                .map(|place| Candidate { theta: self.problem.theta(place), limit: f64::INFINITY })
+                .collect();
+            let costs = local.evaluator.costs(&candidates, stop);
+            Ok(costs.into_iter().map(|one| one.rms).collect())
+        })
+    }
+
+    /// Descends from places of the unit box, side by side.
+    fn descend(&self, py: Python<'_>, places: Vec<Vec<f64>>) -> PyResult<Vec<Descended>> {
+        self.check(&places).map_err(|error| raise(&error))?;
+        self.evaluated(py, |local, _| {
+            let found = local.descended(&places);
+            Ok(found.into_iter().map(|one| (one.place, one.costs.rms, one.evaluations)).collect())
+        })
+    }
+
+    /// The parameters at a place of the unit box, SI, in the order of the model; then the delay and
+    /// the voltage before.
+    fn parameters(&self, place: Vec<f64>) -> PyResult<Vec<f64>> {
+        self.check(std::slice::from_ref(&place)).map_err(|error| raise(&error))?;
+        Ok(self.problem.theta(&place).0.to_vec())
+    }
+}
+
+impl PyObjective {
+    /// Refuses places that are not in the unit box of the problem.
+    fn check(&self, places: &[Vec<f64>]) -> Result<()> {
+        let count = self.problem.free().count();
+        for place in places {
+            if place.len() != count {
+                let expected = format!("{count}, one for each searched parameter");
+                return Err(Error::parameter("coordinates of a place", place.len(), expected));
+            }
+            if let Some(z) = place.iter().find(|z| !(0.0..=1.0).contains(*z)) {
+                return Err(Error::parameter("coordinate of a place", z, "0 to 1"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Runs a job with the evaluator, on threads of its own.
+    fn evaluated<T: Send>(
+        &self,
+        py: Python<'_>,
+        job: impl FnOnce(&LocalRefinement<'_>, Stop<'_>) -> Result<T> + Send,
+    ) -> PyResult<T> {
+        let watchers = Watchers { callback: None, progress: None };
+        enter_pool(py, self.threads, &watchers, |_, stop| {
+            let record = self.asked.record()?;
+            let evaluator = Evaluator::stepped(&record, &self.problem, self.stepping);
+            let (record, problem, evaluator) = (&record, &self.problem, &evaluator);
+            job(&LocalRefinement { record, problem, evaluator, stop }, stop)
+        })
+    }
+}

@@ -1,0 +1,92 @@
+//! What is asked of a record: the kind of stage, what is searched, and between which bounds.
+
+use piezotrack_core::Result;
+use piezotrack_core::identify::{Delay, Record, Spec, creep_times};
+use piezotrack_core::models::Model;
+use piezotrack_core::signal::Hold;
+use pyo3::prelude::*;
+
+use crate::arrays::samples;
+use crate::errors::raise;
+use crate::identify::history_named;
+use crate::stage::hold;
+
+/// A record and what is asked of it, from a dict of Python.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Question<'py> {
+    model: String,
+    u: Bound<'py, PyAny>,
+    y: Bound<'py, PyAny>,
+    dt: f64,
+    hold_name: String,
+    start: usize,
+    free: Option<Vec<String>>,
+    fixed: Vec<(String, f64)>,
+    bounds: Vec<(String, (f64, f64))>,
+    scales: Vec<(String, String)>,
+    ties: Vec<(String, String)>,
+    constraints: Vec<String>,
+    priors: Vec<(String, (f64, f64))>,
+    stiffness: Option<f64>,
+    offset: bool,
+    delay: Option<(f64, f64)>,
+    history: String,
+    creep: Option<Vec<f64>>,
+}
+
+/// The same, checked as far as it can be without the record's help.
+pub struct Asked {
+    u: Vec<f64>,
+    y: Vec<f64>,
+    dt: f64,
+    hold: Hold,
+    start: usize,
+    spec: Spec,
+    /// Known time constants of the creep; those that suit the record where there are none.
+    creep: Option<Vec<f64>>,
+}
+
+impl Question<'_> {
+    /// Takes the numbers out of Python.
+    pub fn asked(self) -> PyResult<Asked> {
+        let (u, y) = (samples("u", &self.u)?, samples("y", &self.y)?);
+        let delay = match self.delay {
+            None => Delay::Fitted,
+            #[expect(clippy::float_cmp, reason = "the caller writes one number twice")]
+            Some((low, high)) if low == high => Delay::Fixed(low),
+            Some((low, high)) => Delay::Between(low, high),
+        };
+        let named = || Ok((Model::named(&self.model)?, history_named(&self.history)?));
+        let (model, history) = named().map_err(|error| raise(&error))?;
+        let spec = Spec {
+            free: self.free,
+            fixed: self.fixed,
+            bounds: self.bounds,
+            scales: self.scales,
+            ties: self.ties,
+            constraints: self.constraints,
+            priors: self.priors,
+            stiffness: self.stiffness,
+            offset: self.offset,
+            delay,
+            history,
+            ..Spec::of(model)
+        };
+        let hold = hold(&self.hold_name).map_err(|error| raise(&error))?;
+        Ok(Asked { u, y, dt: self.dt, hold, start: self.start, spec, creep: self.creep })
+    }
+}
+
+impl Asked {
+    /// The record.
+    pub fn record(&self) -> Result<Record<'_>> {
+        Record::new(&self.u, &self.y, self.dt, self.hold, self.start)
+    }
+
+    /// What is searched, with the creep that suits the record.
+    pub fn spec(&self, record: &Record<'_>) -> Result<Spec> {
+        let creep_times = self.creep.clone().map_or_else(|| creep_times(record), Ok)?;
+        Ok(Spec { creep_times, ..self.spec.clone() })
+    }
+}
