@@ -289,7 +289,7 @@ def test_a_signal_keeps_the_best_so_far(number: signal.Signals, code: int) -> No
     assert time.monotonic() - sent < 3.0
     assert (process.returncode, output) == (code, "")
     assert re.fullmatch(
-        r"piezotrack: interrupted after \d+ iterations[^\n]+\n", without_progress(errors)
+        r"piezotrack: interrupted after \d+ simulations[^\n]+\n", without_progress(errors)
     )
     assert str(Path("out", "dahl.partial.json")) in errors
     assert names("out") == ["dahl.partial.json"]

@@ -51,7 +51,7 @@ def test_a_true_answer_stops_with_the_best_so_far() -> None:
         seen.append(progress)
         return progress.nit == 7
 
-    with pytest.raises(KeyboardInterrupt, match="interrupted after 7 iterations") as caught:
+    with pytest.raises(KeyboardInterrupt, match=r"interrupted after \d+ simulations") as caught:
         quick_fit(callback=enough)
     assert type(caught.value) is pt.Interrupted
     partial = caught.value.partial

@@ -102,7 +102,7 @@ def search(
     )
     if not fit.success:
         raise Interrupted(
-            f"interrupted after {fit.nit} iterations, best cost {fit.cost_um:.4g} um", fit
+            f"interrupted after {fit.nfev} simulations, best cost {fit.cost_um:.4g} um", fit
         )
     return fit
 
