@@ -6,6 +6,7 @@ counted is simulations, so the language of a method does not matter.
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
     Course = list[tuple[int, float]]
-    Method = Callable[[pt.identification.Objective, int, int], Course]
+    Method = Callable[[pt.identification.Objective, int, float, int], Course]
 
 NEVER = 10**6
 
@@ -31,11 +32,11 @@ NEVER = 10**6
 class Counted:
     """An objective with its simulations counted and the course of its best cost kept.
 
-    Raises `Done` when the simulations are used up.
+    Raises `Done` when the goal is reached or the simulations are used up.
     """
 
-    def __init__(self, objective: pt.identification.Objective, most: int) -> None:
-        self.objective, self.most = objective, most
+    def __init__(self, objective: pt.identification.Objective, goal: float, most: int) -> None:
+        self.objective, self.goal, self.most = objective, goal, most
         self.size = len(objective.names)
         self.used, self.best = 0, np.inf
         self.course: Course = []
@@ -58,23 +59,21 @@ class Counted:
         if cost < self.best:
             self.best = cost
             self.course.append((self.used, cost))
-        if self.used >= self.most:
+        if cost <= self.goal or self.used >= self.most:
             raise Done
 
 
-class Done(Exception):
-    """The simulations are used up."""
+class Done(Exception):  # noqa: N818 - an end, not an error
+    """The goal is reached, or the simulations are used up."""
 
 
 def course_of(run: Callable[[Counted, np.random.Generator], None]) -> Method:
     """Make a method of a function that goes on until `Done`."""
 
-    def method(objective: pt.identification.Objective, seed: int, most: int) -> Course:
-        counted = Counted(objective, most)
-        try:
+    def method(objective: pt.identification.Objective, seed: int, goal: float, most: int) -> Course:
+        counted = Counted(objective, goal, most)
+        with contextlib.suppress(Done):
             run(counted, np.random.default_rng(seed))
-        except Done:
-            pass
         return counted.course
 
     return method
