@@ -10,6 +10,7 @@ mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
+from peers import ITERATIONS, PARTICLES
 from problems import NEAR
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ COLOURS = {
     "PINTS": "tab:brown",
     "least_squares": "tab:pink",
 }
+WHOLE = PARTICLES * (ITERATIONS + 1)
 OWN_STYLES = ("-", "--", ":")
 
 
@@ -38,7 +40,8 @@ def write(results: Row, folder: Path) -> None:
     readme = folder / "README.md"
     if readme.exists():
         before, rest = readme.read_text().split(BEGIN)
-        readme.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{rest.split(END)[1]}")
+        whole = f"{text}\n\n![Cost of the best so far against wall time](peers.png)"
+        readme.write_text(f"{before}{BEGIN}\n\n{whole}\n\n{END}{rest.split(END)[1]}")
     else:
         (folder / "table.md").write_text(text + "\n")
     print(text)
@@ -97,7 +100,11 @@ def ratios(results: Row) -> list[str]:
     present = [row for row in results["rows"] if "runs" in row]
     lines: list[str] = []
     paper = [row for row in present if row["problem"] == "paper"]
-    peers = {row["name"]: seconds(row) for row in paper if row["whole"] and not row["own"]}
+    peers = {
+        row["name"] + ", extrapolated" * row["extrapolated"]: seconds(row)
+        for row in paper
+        if row["whole"] and not row["own"]
+    }
     own = {
         row["name"]: seconds(row)
         for row in paper
@@ -157,10 +164,10 @@ def table(rows: list[Row]) -> list[str]:
         took, cost = amount(seconds(row)), f"{np.median(costs):.5f}, {max(costs):.5f} um"
         if row["extrapolated"]:
             took += f" (extrapolated from {simulations} simulations)"
-            simulations, cost = 20010, f"after {simulations}: {np.median(costs):.2f} um"
+            simulations, cost = WHOLE, f"after {simulations}: {np.median(costs):.2f} um"
         lines.append(
             f"| {row['name']} | {simulations} | {took} | {cost} | {hits} of {len(runs)} "
-            f"| {amount(time) if np.isfinite(time) else '-'} | {row['error_nm']:.1g} nm "
+            f"| {amount(time) if np.isfinite(time) else '-'} | {small(row['error_nm'])} nm "
             f"| {sum(run['diverged'] for run in runs)} |"
         )
     return lines
@@ -171,6 +178,11 @@ def amount(value: float) -> str:
     if value >= 100.0:
         return f"{value:.0f}"
     return f"{value:.3g}"
+
+
+def small(value: float) -> str:
+    """One digit, without an exponent."""
+    return f"{float(f'{value:.1g}'):.10f}".rstrip("0").rstrip(".")
 
 
 def median_course(row: Row, times: np.ndarray) -> np.ndarray:
