@@ -62,7 +62,7 @@ class Own:
 OWN = (
     Own("piezotrack, paper's swarm", {"swarm": PAPER_SWARM, "runs": 1}, (PAPER,), whole=True),
     Own("piezotrack, default call"),
-    Own("piezotrack, default, one run", {"runs": 1}),
+    Own("piezotrack, default swarm, one run", {"method": "swarm", "runs": 1}),
     Own("piezotrack, history not given", {"history": None}, (LOG,)),
 )
 
