@@ -109,7 +109,7 @@ class CampaignFolder:
             if title in said and said[title] != json_ready(settings):
                 raise DataError(
                     f"folder {self.path} has the model '{title}' with other settings, "
-                    f"{quoted(said[title])}: expected another title, or another folder"
+                    f"{quoted(said[title])}: expected another folder, or another title"
                 )
         new = {
             key: {
@@ -136,7 +136,7 @@ class CampaignFolder:
             self.document = document
 
     def file(self, task: str) -> Path:
-        """The file of a task."""
+        """Return the file of a task."""
         return self.path / f"{task}.json"
 
     def result(self, task: str) -> dict[str, Any] | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -16,6 +15,8 @@ from .campaign_task import FAILURE
 from .identified import IdentifiedModel, load
 
 if TYPE_CHECKING:
+    import os
+
     from matplotlib.figure import Figure, SubFigure
 
 __all__ = ["Campaign", "TaskResult"]
@@ -242,6 +243,16 @@ class Campaign(Sequence[TaskResult]):
         from .campaign_report import campaign_text
 
         return campaign_text(self)
+
+    def document(self) -> dict[str, Any]:
+        """Return the figures of all tasks, as `to_frame` has them, with the notes in words.
+
+        Returns
+        -------
+        dict
+            Of numbers, texts, lists and dicts only.
+        """
+        return {"results": [{**one.row, "notes": one.notes} for one in self]}
 
     def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Cost of every task by record; with several seeds, how far each is above the lowest.

@@ -87,23 +87,29 @@ def compute(
         Ctrl-C.
     """
     found: dict[str, Document] = {}
+    failed = 0
 
     def keep(one: Planned, document: Document) -> None:
+        nonlocal failed
         document["campaign"] |= {"record": one.record, "model": one.model}
         place.store(document)
         found[one.name] = document
+        failed += document["format"] == FAILURE
+
+    def done() -> int:
+        return total - len(missing) + len(found)
 
     def so_far() -> str:
-        done = total - len(missing) + len(found)
-        return f"{done} of {total} results are in {place.path}, run it again for the others"
+        return f"{done()} of {total} results are in {place.path}, run it again for the others"
 
     with ProgressBar(progress, "campaign") as bar, _workers(executor, len(missing)) as workers:
         run = _Run(workers, missing)
         try:
-            _show(bar, total, len(missing), found)
+            bar.step(done(), total, f"{total} tasks")
             for one, document in run.outcomes():
                 keep(one, document)
-                _show(bar, total, len(missing), found)
+                more = f", {failed} without a model" if failed else ""
+                bar.step(done(), total, f"{total} tasks{more}")
         except KeyboardInterrupt:
             for one, document in run.finished():
                 keep(one, document)
@@ -119,12 +125,6 @@ def compute(
             f"executor did not return {tasks}, {_reason(run.trouble)}: {so_far()}"
         ) from run.trouble
     return found
-
-
-def _show(bar: ProgressBar, total: int, missing: int, found: dict[str, Document]) -> None:
-    failed = sum(document["format"] == FAILURE for document in found.values())
-    more = f", {failed} without a model" if failed else ""
-    bar.step(total - missing + len(found), total, f"{total} tasks{more}")
 
 
 @contextmanager
@@ -151,6 +151,8 @@ class _Run:
         self._workers = workers
         self._waiting = deque(missing)
         self._ahead: dict[Future[Document], Planned] = {}
+        # Bytes of their records.
+        self._size = 0
         self._ended: SimpleQueue[Future[Document]] = SimpleQueue()
         # The first of what went wrong in the executor, not in a task.
         self.trouble: Exception | None = None
@@ -171,7 +173,7 @@ class _Run:
                 self.trouble = self.trouble or error
             else:
                 yield self._ahead[future], document
-            del self._ahead[future]
+            self._size -= _size(self._ahead.pop(future))
 
     def finished(self) -> Iterator[tuple[Planned, Document]]:
         """Return what is there already."""
@@ -189,8 +191,7 @@ class _Run:
     def _submit(self) -> bool:
         """Keep the executor supplied; return whether there is anything to wait for."""
         executor, threads, stop = self._workers
-        size = sum(_size(one) for one in self._ahead.values())
-        while self._waiting and (len(self._ahead) < AHEAD or size < AHEAD_BYTES):
+        while self._waiting and (len(self._ahead) < AHEAD or self._size < AHEAD_BYTES):
             one = self._waiting.popleft()
             arguments = () if stop is None else (stop.is_set,)
             try:
@@ -200,7 +201,7 @@ class _Run:
                 self.trouble = self.trouble or error
                 self._waiting.clear()
                 break
-            size += _size(one)
+            self._size += _size(one)
             self._ahead[future] = one
             future.add_done_callback(self._ended.put)
         return bool(self._ahead)

@@ -174,6 +174,9 @@ def settings(title: str, given: object) -> dict[str, Any]:
         if name not in GIVEN:
             raise ParameterError(f"models: '{title}' has {quoted(name)}: expected {listed(GIVEN)}")
     found = {name: value for name, value in given.items() if value is not None}
+    if found.get("offset") is True:
+        # As where it is not given.
+        del found["offset"]
     try:
         _check(found.setdefault("model", title), found)
         return {name: _plain(name, found[name]) for name in GIVEN if name in found}
