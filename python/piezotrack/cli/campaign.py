@@ -59,7 +59,7 @@ PARQUET = "campaign.parquet"
 def campaign_command(
     context: typer.Context,
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILE...", help="Logs in CSV, with units in the header.")
+        list[Path], typer.Argument(metavar="FILE", help="Logs in CSV, with units in the header.")
     ],
     window: Seconds = None,
     model: KindsNamed = None,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._support.plot_style import GUIDE, MODELS, few_ticks, folded, heading, literal, panels, whole
-from .campaign_report import counted
+from .campaign_report import size_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,13 +49,7 @@ def plot_campaign(campaign: Campaign, fig: Figure | SubFigure | None = None) -> 
     if several:
         _apart(campaign, axes[1])
     _records(campaign, axes[0])
-    failed = campaign.failed
-    without = f", {len(failed)} without a model" if failed else ""
-    figure.suptitle(
-        f"{counted(len(campaign.records), 'record')}, {counted(len(campaign.models), 'model')}, "
-        f"{counted(len(campaign), 'task')}{without}",
-        fontsize="large",
-    )
+    figure.suptitle(size_of(campaign), fontsize="large")
     handles, labels = axes[0].get_legend_handles_labels()
     if handles:
         figure.legend(

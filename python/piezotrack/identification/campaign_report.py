@@ -10,7 +10,7 @@ from .._support.html_table import html_table
 if TYPE_CHECKING:
     from .campaign_result import Campaign, TaskResult
 
-__all__ = ["campaign_html", "campaign_text"]
+__all__ = ["campaign_html", "campaign_text", "size_of"]
 
 # Lines of the table, and of tasks without a model.
 MOST_ROWS, MOST_FAILED = 60, 20
@@ -63,24 +63,22 @@ def campaign_html(campaign: Campaign) -> str:
     return "".join(tables)
 
 
-def agreeing(group: list[TaskResult]) -> int:
+def _agreeing(group: list[TaskResult]) -> int:
     """Count the seeds within 0.1 % of the lowest cost; those below 0.001 % of stroke are equal."""
     costs = [one.rms_percent for one in group if one.error is None]
     return sum(cost <= max(1.001 * min(costs), 1e-3) for cost in costs)
 
 
-def counted(number: int, word: str) -> str:
-    """Write a number with its word: 1 task, 2 tasks."""
-    return f"{number} {word}" if number == 1 else f"{number} {word}s"
+def size_of(campaign: Campaign) -> str:
+    """Count records, models and tasks in words."""
+    counts = {"record": len(campaign.records), "model": len(campaign.models), "task": len(campaign)}
+    words = [f"{n} {word}" if n == 1 else f"{n} {word}s" for word, n in counts.items()]
+    failed = [f"{len(campaign.failed)} without a model"] if campaign.failed else []
+    return ", ".join([*words, *failed])
 
 
 def _heading(campaign: Campaign) -> str:
-    failed = f", {len(campaign.failed)} without a model" if campaign.failed else ""
-    return (
-        f"campaign of {counted(len(campaign.records), 'record')} and "
-        f"{counted(len(campaign.models), 'model')}: {counted(len(campaign), 'task')}{failed}, "
-        f"in {campaign.folder}"
-    )
+    return f"campaign in {campaign.folder}: {size_of(campaign)}"
 
 
 def _row(record: str, model: str, group: list[TaskResult]) -> tuple[str, ...]:
@@ -92,7 +90,7 @@ def _row(record: str, model: str, group: list[TaskResult]) -> tuple[str, ...]:
     costs = [one.rms_percent for one in found]
     kinds = ", ".join(sorted({one.kind or "" for one in found}))
     figures = (f"{value:.4g}" for value in (min(costs), median(costs), max(costs)))
-    return record, model, count, *figures, str(agreeing(group)), kinds
+    return record, model, count, *figures, str(_agreeing(group)), kinds
 
 
 def _failed(campaign: Campaign) -> list[tuple[str, str]]:

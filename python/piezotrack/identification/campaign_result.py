@@ -152,11 +152,9 @@ class Campaign(Sequence[TaskResult]):
         return len(self.results)
 
     def __repr__(self) -> str:
-        failed = f", {len(self.failed)} without a model" if self.failed else ""
-        return (
-            f"<Campaign, {len(self.records)} records, {len(self.models)} models, {len(self)} "
-            f"tasks{failed}; see summary()>"
-        )
+        from .campaign_report import size_of
+
+        return f"<Campaign, {size_of(self)}; see summary()>"
 
     def _repr_html_(self) -> str:
         from .campaign_report import campaign_html
@@ -290,7 +288,7 @@ class Campaign(Sequence[TaskResult]):
         titles = list(dict.fromkeys(title for row in rows for title in row))
         frame = frame_of({title: [row.get(title) for row in rows] for title in titles})
         # Where least squares need no seed a plain column would have 0.0 in place of 0.
-        return frame.astype({"seed": "Int64", "kind": "object", "error": "object"})
+        return frame.astype({"seed": "Int64"})
 
     def to_parquet(self, path: str | os.PathLike[str]) -> Path:
         """Write the data frame to a Parquet file.

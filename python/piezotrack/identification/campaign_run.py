@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from queue import Empty, SimpleQueue
@@ -28,6 +28,9 @@ __all__ = ["Planned", "compute"]
 AHEAD, AHEAD_BYTES = 64, 2**28
 # Seconds between two looks for Ctrl-C, which not every system reports to a thread that waits.
 LOOK = 0.5
+# Seconds without a result after which an executor is asked whether it still takes tasks, the first
+# time and at most: one that was closed may leave its tasks without an end.
+PATIENCE, MOST_PATIENCE = 2.0, 60.0
 # Letters of the reason that an executor gives.
 REASON = 160
 
@@ -162,11 +165,19 @@ class _Run:
 
         What one task did to the executor is no reason to lose the others: all are tried.
         """
+        silent, patience = 0.0, PATIENCE
         while self._submit():
             try:
                 future = self._ended.get(timeout=LOOK)
             except Empty:
+                silent += LOOK
+                if silent < patience:
+                    continue
+                if self._is_closed():
+                    return
+                silent, patience = 0.0, min(2.0 * patience, MOST_PATIENCE)
                 continue
+            silent, patience = 0.0, PATIENCE
             try:
                 document = future.result()
             except Exception as error:
@@ -188,6 +199,15 @@ class _Run:
         for future in self._ahead:
             future.cancel()
 
+    def _is_closed(self) -> bool:
+        """Whether the executor takes no more tasks, and what it has may never come."""
+        try:
+            self._workers.executor.submit(_nothing).cancel()
+        except Exception as error:
+            self.trouble = self.trouble or error
+            return True
+        return False
+
     def _submit(self) -> bool:
         """Keep the executor supplied; return whether there is anything to wait for."""
         executor, threads, stop = self._workers
@@ -207,6 +227,10 @@ class _Run:
         return bool(self._ahead)
 
 
+def _nothing() -> None:
+    """Do nothing, elsewhere."""
+
+
 def _size(one: Planned) -> int:
     """Bytes of a record: times, drive and displacement."""
     return 24 * (len(one.task.record) + one.task.record.warmup)
@@ -214,6 +238,8 @@ def _size(one: Planned) -> int:
 
 def _reason(error: Exception) -> str:
     """Write what an executor says, in a part of a sentence."""
+    if isinstance(error, CancelledError):
+        return "which were cancelled, or it was closed"
     first = str(error).strip().partition("\n")[0].partition(". ")[0].rstrip(".")
     name = type(error).__name__
     if isinstance(error, ExecutorError):
