@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 MODELS = {"dahl": LONGER}
-SEEDS = range(6)
+SEEDS = range(5)
 PICTURE = ("campaign.png", "campaign.svg")
 
 

@@ -202,7 +202,8 @@ class _Run:
     def _is_closed(self) -> bool:
         """Whether the executor takes no more tasks, and what it has may never come."""
         try:
-            self._workers.executor.submit(_nothing).cancel()
+            # Not cancelled: a pool of Python 3.11 that breaks just then would never end.
+            self._workers.executor.submit(_nothing)
         except Exception as error:
             self.trouble = self.trouble or error
             return True
