@@ -130,6 +130,7 @@ def _apart(campaign: Campaign, ax: Axes) -> None:
     ax.set_xlim(left=0.5 * EQUAL)
     _plain_numbers(ax)
     ax.axvline(0.1, **{**GUIDE, "color": "0.3", "linestyle": "--"})
+    ax.text(0.1, 0.02, " 0.1 %", transform=ax.get_xaxis_transform(), fontsize="small", color="0.3")
     ax.set_xlabel(f"above the lowest of the seeds [%]; {EQUAL:g} and less at {EQUAL:g}")
     heading(ax, "Seeds left of the dashed line agree within 0.1 %")
 
