@@ -313,6 +313,8 @@ def test_a_worker_of_another_version_is_refused() -> None:
         (([log()], "dahl"), r"models is 'dahl': expected several in a list, as \['dahl'\]"),
         (([log()], []), "models is empty"),
         (([log()], ["dahl", "dahl"]), "models has 'dahl' twice"),
+        (([log()], [["dahl"]]), r"models has \['dahl'\]: expected names of kinds, or a mapping"),
+        (([log()], {"a": QUICK, "b": QUICK}), "models has the same settings as 'a' and as 'b'"),
         (([log()], ["dalh"]), "models: 'dalh': model is 'dalh': .*Did you mean 'dahl'"),
         (([log()], {"mine": {}}), "models: 'mine': model is 'mine': expected one of 'dahl'"),
         (([log()], {"mine": 3}), "models: 'mine' is 3: expected arguments of identify"),
@@ -379,6 +381,11 @@ def test_the_folder_of_another_campaign_is_left_alone(tmp_path: Path) -> None:
     with pytest.raises(pt.DataError, match=r"has the model 'quick' with other settings, \{'mo"):
         run(tmp_path, [log()], {"quick": {**QUICK, "runs": 2}})
     assert contents(tmp_path) == before
+    # A title under which nothing was found yet may be put right.
+    wrong = run(tmp_path, [log()], {"new": {**QUICK, "free": ["nope"]}})[0]
+    assert "nope" in str(wrong[0].error)
+    assert run(tmp_path, [log()], {"new": {**QUICK, "runs": 3}})[0].failed == ()
+    assert len(pt.identification.Campaign.load(tmp_path)) == 3
     # Settings with an infinity, which JSON does not have, are the same when they are read.
     swarm = {**QUICK, "swarm": replace(QUICK["swarm"], velocity_limit=np.inf)}
     for tasks in (1, 0):

@@ -106,7 +106,10 @@ class CampaignFolder:
                 "given: expected another folder, or one of these records too"
             )
         for title, settings in models.items():
-            if title in said and said[title] != json_ready(settings):
+            if said.get(title, settings) not in (settings, json_ready(settings)) and any(
+                one["format"] == MODEL and one["campaign"].get("model") == title
+                for one in self.results()
+            ):
                 raise DataError(
                     f"folder {self.path} has the model '{title}' with other settings, "
                     f"{quoted(said[title])}: expected another folder, or another title"

@@ -197,7 +197,14 @@ class Campaign(Sequence[TaskResult]):
                 file=place.file(entry["task"]),
                 document=document,
             )
-        ordered = sorted(latest.values(), key=lambda one: (one.record, one.model, one.seed or 0))
+        # As they were first given.
+        known = place.document["records"].values()
+        records = {one.get("title"): i for i, one in enumerate(known) if isinstance(one, dict)}
+        models = {title: i for i, title in enumerate(place.document["models"])}
+        ordered = sorted(
+            latest.values(),
+            key=lambda one: (records.get(one.record, 0), models.get(one.model, 0), one.seed or 0),
+        )
         return cls(results=tuple(ordered), folder=place.path)
 
     @property

@@ -96,7 +96,11 @@ def campaign(
     wanted = _models(models)
     numbers = _seeds(seeds)
     if executor is not None and not isinstance(executor, Executor):
-        hint = "client.get_executor()" if hasattr(executor, "get_executor") else "a process pool"
+        hint = (
+            "client.get_executor()"
+            if hasattr(executor, "get_executor")
+            else "ProcessPoolExecutor(4)"
+        )
         raise ParameterError(
             f"executor is {quoted(executor)}: expected a concurrent.futures.Executor, as {hint}"
         )
@@ -182,16 +186,22 @@ def _models(models: object) -> dict[str, dict[str, Any]]:
     else:
         named = {}
         for name in models:
-            if name in named:
-                raise ParameterError(f"models has '{name}' twice: expected it once")
             if not isinstance(name, str):
                 raise ParameterError(
                     f"models has {quoted(name)}: expected names of kinds, or a mapping of titles "
                     "to arguments of identify"
                 )
+            if name in named:
+                raise ParameterError(f"models has '{name}' twice: expected it once")
             named[name] = settings(name, {"model": name})
     if not named:
         raise ParameterError("models is empty: expected one or more")
+    titles = list(named)
+    for i, title in enumerate(titles):
+        if alike := [one for one in titles[:i] if named[one] == named[title]]:
+            raise ParameterError(
+                f"models has the same settings as '{alike[0]}' and as '{title}': expected them once"
+            )
     return named
 
 
