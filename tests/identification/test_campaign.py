@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import pickle
 import re
 import subprocess
@@ -145,6 +146,17 @@ def test_what_failed_once_is_replaced_when_it_works(
     assert (tasks, found.failed, len(results(tmp_path))) == (1, (), 1)
 
 
+def test_two_runs_at_a_time_write_the_same_files(tmp_path: Path) -> None:
+    with ThreadPoolExecutor(2) as both:
+        runs = [
+            both.submit(run, tmp_path / "both", [log(), log(0.9)], {"quick": QUICK}, range(3))
+            for _ in range(2)
+        ]
+        assert [len(one.result()[0]) for one in runs] == [6, 6]
+    run(tmp_path / "alone", [log(), log(0.9)], {"quick": QUICK}, range(3))
+    assert contents(tmp_path / "both") == contents(tmp_path / "alone")
+
+
 def test_an_executor_that_dies_loses_nothing(tmp_path: Path) -> None:
     dying = Serial(3, BrokenProcessPool("A child process terminated. It was killed"))
     with pytest.raises(pt.ExecutorError) as caught:
@@ -189,6 +201,7 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:
     assert run(tmp_path, [log()], {"quick": QUICK}, range(4))[1] == 2
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for a single process")
 def test_ctrl_c_ends_the_searches_of_threads_soon() -> None:
     """The process ends within seconds of the signal, though its searches would take minutes."""
     code = """

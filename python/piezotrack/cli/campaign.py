@@ -112,7 +112,7 @@ def campaign_command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Identify models of many logs; run again, it does what is missing."""
+    """Identify models of many logs; again for what is missing."""
     from .._support.files import save_figures
     from ..identification.campaign_result import check_parquet
     from ..identification.campaigns import campaign
