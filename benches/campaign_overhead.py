@@ -86,10 +86,11 @@ def main() -> None:
     print(
         f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}; {TASKS} tasks, median of {ROUNDS}"
     )
-    print(f"{'':12}{'samples':>9}{'alone ms':>10}{'task ms':>10}{'beyond ms':>11}{'start s':>9}")
+    print(f"{'':12}{'samples':>9}{'alone ms':>10}{'task ms':>10}{'beyond ms':>11}{'first s':>9}")
     for place in (threads, processes, dask):
         began = time.perf_counter()
         with place() as executor:
+            # Workers start, and import what they need.
             campaign(record(1_000), executor)
             start = time.perf_counter() - began
             for samples in SAMPLES:

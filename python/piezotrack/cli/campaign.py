@@ -112,7 +112,7 @@ def campaign_command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Identify models of many logs; again for what is missing."""
+    """Identify models of many logs; run again for the rest."""
     from .._support.files import save_figures
     from ..identification.campaign_result import check_parquet
     from ..identification.campaigns import campaign
