@@ -171,7 +171,7 @@ def test_the_examples_run(example: Path, tmp_path: Path) -> None:
     written = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert written
     for path in written:
-        if path.suffix == ".json":
+        if path.suffix == ".json" and path.name != "campaign.json":
             assert np.isfinite(pt.load(path).model.simulate([0.0, 1.0], 0.01).x).all()
 
 

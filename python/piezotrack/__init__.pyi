@@ -21,11 +21,13 @@ from .data import datasets as datasets
 from .data.dataset import Dataset as Dataset
 from .data.reader import read as read
 from .errors import DataError as DataError
+from .errors import ExecutorError as ExecutorError
 from .errors import Interrupted as Interrupted
 from .errors import NumericalError as NumericalError
 from .errors import ParameterError as ParameterError
 from .errors import PiezotrackError as PiezotrackError
 from .errors import ShapeError as ShapeError
+from .identification.campaigns import campaign as campaign
 from .identification.comparison import compare as compare
 from .identification.descents import Descents as Descents
 from .identification.fit import identify as identify

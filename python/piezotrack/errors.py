@@ -10,6 +10,7 @@ from typing import Any
 
 __all__ = [
     "DataError",
+    "ExecutorError",
     "Interrupted",
     "NumericalError",
     "ParameterError",
@@ -57,6 +58,10 @@ class DataError(PiezotrackError, ValueError):
 
 class NumericalError(PiezotrackError, ArithmeticError):
     """A computation with valid input did not reach a usable result."""
+
+
+class ExecutorError(PiezotrackError, RuntimeError):
+    """An executor did not return the tasks that it was given: names how many, and why."""
 
 
 class Interrupted(KeyboardInterrupt):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from itertools import pairwise
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -13,6 +14,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import piezotrack as pt
+from campaigns import QUICK
 from piezotrack._support import plot_style
 from piezotrack._support.plot_style import folded, legend_inside, plain_log_ticks
 
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 UM = 1e-6
+PI = {"model": "prandtl-ishlinskii"}
 
 
 @cache
@@ -64,10 +67,20 @@ def traced() -> pt.control.Contour:
     return pt.contour(pt.XYStage.xu_li_2010(seed=1), (loop(), loop()), path)
 
 
+def of_two_records(models: tuple[str, ...]) -> pt.identification.Campaign:
+    """Three seeds of a search and one that finds nothing, or least squares alone."""
+    given = {"flat": {**QUICK, "bounds": {"mass": (1.0, 0.5)}}, "quick": QUICK, "plays": PI}
+    records = {"first": log(), "$second_name": log()[1.0:]}
+    with TemporaryDirectory() as folder:
+        return pt.campaign(records, {one: given[one] for one in models}, range(3), folder=folder)
+
+
 PICTURES: dict[str, Callable[[], Any]] = {
     "record": log,
     "fit": fit,
     "comparison": lambda: pt.compare(log(), ["prandtl-ishlinskii"]),
+    "campaign": lambda: of_two_records(("flat", "quick")),
+    "campaign, one model": lambda: of_two_records(("plays",)),
     "noise": lambda: pt.identification.identify_noise(stage().record(np.zeros(5000), 2e-4)),
     "step": stepped,
     "tracking": tracked,

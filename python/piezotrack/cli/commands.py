@@ -10,6 +10,7 @@ import typer
 from typer.core import TyperCommand
 
 from .. import __version__
+from .campaign import campaign_command
 from .compare import compare_command
 from .contour import contour_command
 from .demo import demo_command
@@ -70,12 +71,16 @@ class Command(TyperCommand):
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
         """Write FILE and [MODEL] in place of {FILE} and [[MODEL]]."""
         pieces = super().collect_usage_pieces(ctx)
-        return [piece.strip("{}").replace("[[", "[").replace("]]", "]") for piece in pieces]
+        table = {"{": "", "}": "", "[[": "[", "]]": "]"}
+        for typed, shown in table.items():
+            pieces = [piece.replace(typed, shown) for piece in pieces]
+        return pieces
 
 
 COMMANDS: dict[str, Callable[..., None]] = {
     "identify": identify_command,
     "compare": compare_command,
+    "campaign": campaign_command,
     "step": step_command,
     "simulate": simulate_command,
     "feedforward": feedforward_command,

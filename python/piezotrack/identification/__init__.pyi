@@ -1,5 +1,8 @@
 # The public names and their homes, each written once: type checkers read them here, and
 # _support/lazy.py does at run time. One name a line, as `ruff format` keeps it.
+from .campaign_result import Campaign as Campaign
+from .campaign_result import TaskResult as TaskResult
+from .campaigns import campaign as campaign
 from .comparison import Comparison as Comparison
 from .comparison import ModelScore as ModelScore
 from .comparison import compare as compare
