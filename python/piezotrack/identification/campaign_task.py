@@ -19,6 +19,7 @@ from .. import _core
 from .._support.messages import listed, quoted
 from ..errors import ExecutorError, ParameterError, PiezotrackError
 from ..stages.registry import model_named
+from .descents import Descents
 from .fit import identify
 from .kinds import refuse_given
 from .least_squares import LeastSquares
@@ -38,7 +39,9 @@ SCHEMA_VERSION = 1
 # Hexadecimal digits of a hash: two in a million million million names would be the same.
 DIGITS = 32
 # Arguments of `identify` that a model of a campaign may have.
-OF_SWARM = ("free", "fixed", "bounds", "stiffness", "delay", "creep", "swarm", "runs")
+OF_PARAMETERS = ("free", "fixed", "bounds", "scales", "ties", "constraints", "priors")
+OF_SEARCH = ("stiffness", "delay", "creep", "method", "swarm", "descents", "runs")
+OF_SWARM = (*OF_PARAMETERS, *OF_SEARCH)
 GIVEN = ("model", "offset", "history", "least_squares", *OF_SWARM)
 # And those that it has in another way.
 ELSEWHERE = {
@@ -49,7 +52,7 @@ ELSEWHERE = {
     "initial": "expected its values in fixed=, as fixed=dict(step.hysteresis)",
     "data": "expected the record in records=",
 }
-SETTINGS = {"swarm": ParticleSwarm, "least_squares": LeastSquares}
+SETTINGS = {"swarm": ParticleSwarm, "descents": Descents, "least_squares": LeastSquares}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -192,7 +195,7 @@ def _check(kind: object, found: Mapping[str, Any]) -> None:
     if "runs" in found:
         _core.as_count("runs", found["runs"])
     if kind == AUTO:
-        if of_one := [name for name in ("free", "fixed", "bounds") if name in found]:
+        if of_one := [name for name in OF_PARAMETERS if name in found]:
             raise ParameterError(
                 f"{of_one[0]} is given with model='auto': expected the kind whose parameters "
                 "these are"
@@ -206,7 +209,7 @@ def _check(kind: object, found: Mapping[str, Any]) -> None:
 
 def _plain(name: str, value: Any) -> Any:
     """Put an argument in numbers, texts, lists and dicts."""
-    if isinstance(value, (ParticleSwarm, LeastSquares)):
+    if isinstance(value, tuple(SETTINGS.values())):
         return _plain(name, asdict(value))
     if value is None or isinstance(value, (bool, str)):
         return value
