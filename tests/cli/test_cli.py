@@ -83,6 +83,31 @@ def test_every_option_of_a_fit_reaches_it() -> None:
 
 
 @pytest.mark.usefixtures("_no_pictures")
+def test_what_else_is_known_of_parameters_reaches_a_fit() -> None:
+    options = (
+        *("--model", "dahl", "--fix", "a1=121.9874", "--fix", "a2=1177300", "--runs", "1"),
+        *("--bound", "damping=1000:5000", "--scale", "damping=log", "--tie", "b1=1.57 * a2"),
+        *("--constrain", "damping < stiffness", "--prior", "mass=0.18:0.02"),
+    )
+    printed = ran("identify", "log.csv", *options)
+    fit = pt.identify(
+        pt.read("log.csv"),
+        "dahl",
+        fixed={"a1": 121.9874, "a2": 1177300.0},
+        bounds={"damping": (1000.0, 5000.0)},
+        scales={"damping": "log"},
+        ties={"b1": "1.57 * a2"},
+        constraints=["damping < stiffness"],
+        priors={"mass": (0.18, 0.02)},
+        runs=1,
+    )
+    fit.save("expected.json")
+    assert Path("results/dahl.json").read_bytes() == Path("expected.json").read_bytes()
+    for words in ("tied: 1.57 * a2", "prior 0.18 +- 0.02 kg", "damping < stiffness", "log scale"):
+        assert words in printed
+
+
+@pytest.mark.usefixtures("_no_pictures")
 def test_columns_and_units_can_be_named() -> None:
     lines = log_text().splitlines()
     text = "\n".join(

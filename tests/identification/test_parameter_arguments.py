@@ -1,4 +1,4 @@
-"""Scales, ties, inequalities and priors of parameters: what they make of a fit, and what is refused."""
+"""Scales, ties, inequalities and priors: what they make of a fit, and what is refused."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 SMALL = pt.ParticleSwarm(particles=4, iterations=2, polish=False)
-FIXED = {"mass": TABLE_1.mass, **HELD}
+FIXED: dict[str, Any] = {"mass": TABLE_1.mass, **HELD}
 # The three parameters that a slow sine then determines.
 SEARCHED = ("damping", "stiffness", "piezo_coefficient")
 RATIO = TABLE_1.piezo_coefficient / TABLE_1.stiffness
@@ -30,7 +30,8 @@ RATIO = TABLE_1.piezo_coefficient / TABLE_1.stiffness
 
 def deviation(values: Array) -> float:
     """RMS deviation of a stage on the quick record, its mean taken off [m]."""
-    stage = pt.DahlStage(**FIXED, **dict(zip(SEARCHED, values, strict=True)), b0=0.0, up=30.0)
+    found: dict[str, Any] = dict(zip(SEARCHED, values.tolist(), strict=True))
+    stage = pt.DahlStage(**found, **FIXED, b0=0.0, up=30.0)
     rest = quick().y - stage.simulate(quick().u, quick().dt).x
     return float(rest.std())
 
@@ -46,6 +47,15 @@ def minimum(cost: Callable[[Array], float], around: Array) -> Array:
     assert found.success
     values: Array = around * (1.0 + 0.01 * found.x)
     return values
+
+
+def alike(fit: pt.identification.Identification, other: pt.identification.Identification) -> None:
+    """Assert that two fits found the same values, and are as sure of them."""
+    for name in SEARCHED:
+        one, same = fit.parameters[name], other.parameters[name]
+        assert one.deviation is not None
+        assert one.value == pytest.approx(same.value, abs=0.01 * one.deviation)
+        assert one.deviation == pytest.approx(same.deviation, rel=1e-3)
 
 
 # Ties.
@@ -135,21 +145,22 @@ def test_an_inequality_that_the_truth_keeps_changes_nothing() -> None:
     fit = quick_fit(fixed=FIXED, bounds=bounds, constraints=["stiffness > damping"])
     assert not fit.constraints[0].active
     assert fit.cost == pytest.approx(free.cost, rel=1e-9)
-    for name in SEARCHED:
-        one, other = fit.parameters[name], free.parameters[name]
-        assert one.value == pytest.approx(other.value, abs=0.01 * other.deviation)
-        # The smaller one's coordinate depends on the larger: the spread is propagated.
-        assert one.deviation == pytest.approx(other.deviation, rel=1e-3)
+    # The smaller one's coordinate depends on the larger: the spread is propagated.
+    alike(fit, free)
 
 
 def test_every_candidate_keeps_a_chain_of_inequalities() -> None:
     seen: list[dict[str, float]] = []
+
+    def keep(progress: pt.identification.Progress) -> None:
+        seen.append(progress.parameters)
+
     quick_fit(
         fixed={"mass": TABLE_1.mass, "a1": HELD["a1"], "b1": HELD["b1"]},
         bounds={"damping": (1.0, 1e6), "stiffness": (100.0, 3e5), "a2": (1e4, 1e6)},
         constraints=["a2 < damping", "stiffness < damping", "a2 > stiffness"],
         swarm=pt.ParticleSwarm(particles=8, iterations=40, polish=False),
-        callback=lambda progress: seen.append(progress.parameters) or False,
+        callback=keep,
     )
     assert len(seen) > 10
     for one in seen:
@@ -176,20 +187,21 @@ def test_a_prior_is_weighed_against_the_record_as_scipy_does() -> None:
     fit = quick_fit(fixed=FIXED, bounds=bounds, priors={"stiffness": (mean, width)})
 
     def objective(values: Array) -> float:
-        prior = ((values[1] - mean) / width) ** 2
+        prior = float((values[1] - mean) / width) ** 2
         return len(quick()) * math.log(deviation(values)) + 0.5 * prior
 
     around = np.array([fit.parameters[name].value for name in SEARCHED])
     found = minimum(objective, around)
     # The curvature of minus the logarithm of the posterior, by differences over a twentieth of the
     # deviations, as the parameters are correlated.
-    steps = 0.05 * np.array([fit.parameters[name].deviation for name in SEARCHED], dtype=float)
+    deviations = [fit.parameters[name].deviation for name in SEARCHED]
+    steps: Array = 0.05 * np.array(deviations, dtype=float)
     at = np.eye(3) * steps
 
     def second(i: int, j: int) -> float:
         signs = ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
-        total = sum(s * objective(found + a * at[i] + b * at[j]) for a, b, s in signs)
-        return total / (4 * steps[i] * steps[j])
+        total: float = sum(s * objective(found + a * at[i] + b * at[j]) for a, b, s in signs)
+        return total / (4.0 * float(steps[i]) * float(steps[j]))
 
     curvature = np.array([[second(i, j) for j in range(3)] for i in range(3)])
     spread = np.sqrt(np.diag(np.linalg.inv(curvature)))
@@ -252,10 +264,7 @@ def test_a_wide_prior_changes_nothing() -> None:
     bounds = {name: BOX[name] for name in SEARCHED}
     free = quick_fit(fixed=FIXED, bounds=bounds)
     fit = quick_fit(fixed=FIXED, bounds=bounds, priors={"stiffness": (2e4, 1e7)})
-    for name in SEARCHED:
-        one, other = fit.parameters[name], free.parameters[name]
-        assert one.value == pytest.approx(other.value, abs=0.01 * other.deviation)
-        assert one.deviation == pytest.approx(other.deviation, rel=1e-3)
+    alike(fit, free)
 
 
 def test_a_prior_far_from_where_the_search_begins_is_found() -> None:
@@ -417,7 +426,7 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
 
 @pytest.mark.parametrize(("arguments", "message"), REFUSED)
 def test_refuses_in_one_sentence(arguments: dict[str, Any], message: str) -> None:
-    wanted = {"fixed": F, "swarm": SMALL} | arguments
+    wanted: dict[str, Any] = {"fixed": F, "swarm": SMALL} | arguments
     with pytest.raises(pt.ParameterError, match=message) as caught:
         pt.identify(quick(), "dahl", **wanted)
     assert "\n" not in str(caught.value)

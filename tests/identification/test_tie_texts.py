@@ -97,7 +97,9 @@ def expressions() -> st.SearchStrategy[str]:
             st.tuples(inner, st.sampled_from(["**2", " ** -1", "** 0.5", "**2**-1"])).map("".join),
             inner.map("-{}".format),
             inner.map("( {} )".format),
-            st.tuples(st.sampled_from(list(FUNCTIONS)), inner).map(lambda two: f"{two[0]}({two[1]})"),
+            st.tuples(st.sampled_from(list(FUNCTIONS)), inner).map(
+                lambda two: f"{two[0]}({two[1]})"
+            ),
         )
 
     return st.recursive(leaves, larger, max_leaves=8)
@@ -112,10 +114,14 @@ def expressions() -> st.SearchStrategy[str]:
 def test_an_expression_is_worth_what_python_says(text: str) -> None:
     try:
         fit = tied(text)
-    except (pt.ParameterError, pt.NumericalError) as error:
-        # Only for want of a finite value, or of a motion that stays finite with it.
-        assert re.search("in the middle of the bounds|stayed finite", str(error)), str(error)
+    except pt.NumericalError:
+        # The motion does not stay finite with it.
         return
+    except pt.ParameterError as error:
+        # Nor has every expression a finite value.
+        if "in the middle of the bounds" in str(error):
+            return
+        raise
     meaning = Meaning({name: getattr(fit.model, name) for name in OTHERS})
     value = meaning.of(text)
     assume(meaning.largest < 1e200)

@@ -60,9 +60,15 @@ fn instruction_sets() -> Vec<Arch> {
 
 #[test]
 fn one_lane_and_many_on_every_instruction_set() {
+    for spec in [spec(), related()] {
+        on_every_instruction_set(&spec);
+    }
+}
+
+fn on_every_instruction_set(spec: &Spec) {
     let (u, y) = log();
     let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
-    let problem = Problem::new(&record, &spec(), NEVER).unwrap();
+    let problem = Problem::new(&record, spec, NEVER).unwrap();
     let asked = candidates(&problem);
     for order in [Order::Second, Order::Fourth] {
         let evaluator = |arch| {

@@ -418,6 +418,9 @@ KINDS = {
 }  # fmt: skip
 
 
+TIES = st.sampled_from(["1.57 * stiffness", "mass ** -2", "-(damping)", "log(mass)", "2 *", ""])
+
+
 def identify(script: Script, draw: Draw) -> None:
     made = dataset(script, draw, longest=40)
     if made is None:
@@ -429,6 +432,10 @@ def identify(script: Script, draw: Draw) -> None:
         "free": Slot(None, st.lists(names, max_size=3)),
         "fixed": Slot(None, st.dictionaries(names, number(1.0).other, max_size=2)),
         "bounds": Slot(None, st.dictionaries(names, box, max_size=2)),
+        "scales": Slot(None, st.dictionaries(names, st.sampled_from(["linear", "log", ""]))),
+        "ties": Slot(None, st.dictionaries(names, st.one_of(names, TIES), max_size=2)),
+        "constraints": Slot(None, st.lists(st.tuples(names, names).map(" < ".join), max_size=2)),
+        "priors": Slot(None, st.dictionaries(names, box, max_size=2)),
         "stiffness": number(None, near=1e4),
         "offset": truth(True),
         "delay": Slot(None, st.one_of(st.booleans(), number(1e-3).other, box)),

@@ -23,6 +23,7 @@ from .fit_options import (
     Kinds,
     KindsNamed,
     Plays,
+    Method,
     Swarm,
     fit_options,
     searched,
@@ -105,9 +106,11 @@ def campaign_command(
     plays: Plays = None,
     asymmetry: Asymmetry = None,
     dynamics: Dynamics = None,
+    method: Method = None,
     swarm: Swarm = None,
     runs: Annotated[
-        int | None, typer.Option(help="Number of independent restarts; default 4.")
+        int | None,
+        typer.Option(help="Number of independent searches; default 1, of swarms 4."),
     ] = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -134,6 +137,7 @@ def campaign_command(
         plays=plays,
         asymmetry=asymmetry,
         dynamics=dynamics,
+        method=method,
         swarm=swarm,
     )
     given |= {"stiffness": stiffness, "offset": offset, "history": history, "runs": runs}

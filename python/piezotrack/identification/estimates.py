@@ -23,7 +23,7 @@ class Progress(NamedTuple):
     nfev : int
         Simulations done.
     cost : float
-        Best cost so far [m].
+        Best cost so far [m], with the priors where there are any.
     parameters : dict of str to float
         Parameters of the best candidate, SI.
     delay : float
@@ -144,7 +144,8 @@ class SwarmRun(NamedTuple):
     Attributes
     ----------
     cost : float
-        Its lowest cost [m], after local refinement where that is asked for.
+        Its lowest cost [m], after local refinement where that is asked for, and with the priors
+        where there are any.
     nit, nfev : int
         Its iterations and simulations.
     stop_reason : {"agreed", "converged", "stalled", "iterations", "interrupted"}

@@ -96,7 +96,7 @@ def identify(
     initial : StepResult, optional
         Result of a step response, see `identify_step`: its a1, a2, b1 and b0 are held, as in
         section 3.3 of the paper, and b1 then fixes the scale of the forces. Those named in
-        `fixed`, `free` or `bounds` are not taken from it.
+        `fixed`, `free`, `bounds`, `scales`, `ties` or `priors` are not taken from it.
     bounds : mapping of str to (float, float), optional
         Bounds of free parameters, SI; derived from the record where not given. Where both are
         positive and two decades or more apart, the search is on a logarithmic scale, unless

@@ -26,7 +26,13 @@ if TYPE_CHECKING:
 
 __all__ = [
     "constraint_entries",
-    "document_of", "drive_unit_of", "fit_entry", "provenance", "read_model", "sensor_number"]
+    "document_of",
+    "drive_unit_of",
+    "fit_entry",
+    "provenance",
+    "read_model",
+    "sensor_number",
+]
 
 FORMAT = "piezotrack-model"
 SCHEMA_VERSION = 2

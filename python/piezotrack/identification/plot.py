@@ -218,7 +218,8 @@ def plot_convergence(
         label = f"each {one}, refined" if refined else f"end of each {one}"
         ax.plot(*zip(*ends, strict=True), **{**MARKS, "marker": "x", "label": label})
     if fit.npolish and fit.cost > 0.0:
-        ax.plot(fit.nit, fit.cost_um, **{**MARKS, "label": f"refined: {fit.cost_um:.4g} um"})
+        least = fit.cost_um if fit.cost_with_priors is None else 1e6 * fit.cost_with_priors
+        ax.plot(fit.nit, least, **{**MARKS, "label": f"refined: {least:.4g} um"})
     if finite.any():
         ax.set_yscale("log")
     ax.set(xlabel="iteration", ylabel="best cost, rms [um]")

@@ -7,9 +7,9 @@
 //! N ln f + Q/2,   Q = sum ((theta - mean) / width)^2
 //! ```
 //!
-//! with the RMS deviation f of N samples. What is minimised is f exp(Q / 2N), which has the unit of
-//! a cost and falls with the posterior. Gelman et al. 2013, Bayesian Data Analysis, section 3.2, for
-//! a variance that is integrated out instead, which makes N - 1 of N.
+//! with the RMS deviation f of N samples; integrating the variance out with the usual prior
+//! 1/variance gives the same (Gelman et al. 2013, Bayesian Data Analysis, section 3.2). What is
+//! minimised is f exp(Q / 2N), which has the unit of a cost and falls where the posterior rises.
 
 use super::candidate::Theta;
 use crate::error::{Error, Result, shown};
@@ -49,8 +49,8 @@ impl Prior {
         if usable { Ok(prior) } else { Err(prior.refuse(info, "a finite value, a width above 0")) }
     }
 
-    /// The values that are searched where no bounds are given; a value that is `valid`, or below
-    /// which there are none, ends them.
+    /// The values that are searched where no bounds are given: eight widths on either side, or up
+    /// to near 0 where what is beyond is not `valid`.
     #[must_use]
     pub fn range(&self, valid: impl Fn(f64) -> bool) -> (f64, f64) {
         let Self { mean, width, .. } = *self;
