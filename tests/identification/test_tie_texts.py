@@ -111,6 +111,7 @@ def expressions() -> st.SearchStrategy[str]:
 @example("2 ** 3 ** 2 - a1 / 4 / 2")
 @example("a2 - 3 - 2")
 @example("2 ** -a1 ** 2")
+@example("exp(362.0)")
 def test_an_expression_is_worth_what_python_says(text: str) -> None:
     try:
         fit = tied(text)

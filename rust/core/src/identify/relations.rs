@@ -90,14 +90,16 @@ impl Relations {
         &self,
         fixed: &[Option<f64>; MOST_PARAMETERS],
     ) -> [Option<f64>; MOST_PARAMETERS] {
+        // Bounds derived from any other would not be finite.
+        let usable = |value: &f64| value.abs() > 1e-60 && value.abs() < 1e60;
         let mut known = *fixed;
         for prior in &self.priors {
-            known[prior.parameter] = Some(prior.mean);
+            known[prior.parameter] = Some(prior.mean).filter(usable);
         }
         for tie in &self.ties {
             let values = known.map(|value| value.unwrap_or(f64::NAN));
             let whole = tie.names().all(|name| fixed[name].is_some() || self.is_tied(name));
-            let value = Some(tie.value(&values)).filter(|value| whole && value.is_finite());
+            let value = Some(tie.value(&values)).filter(|value| whole && usable(value));
             known[tie.parameter] = known[tie.parameter].or(value);
         }
         known
