@@ -14,6 +14,7 @@ from .error_messages import in_words
 from .fit_options import (
     Asymmetry,
     Bound,
+    Constrain,
     Creep,
     Delay,
     Dynamics,
@@ -22,9 +23,12 @@ from .fit_options import (
     History,
     Kinds,
     KindsNamed,
-    Plays,
     Method,
+    Plays,
+    Priors,
+    Scales,
     Swarm,
+    Ties,
     fit_options,
     searched,
 )
@@ -96,6 +100,10 @@ def campaign_command(
     free: Free = None,
     fix: Fix = None,
     bound: Bound = None,
+    scale: Scales = None,
+    tie: Ties = None,
+    constrain: Constrain = None,
+    prior: Priors = None,
     stiffness: Annotated[
         float | None, typer.Option(help="Stiffness in N/m, if known; default a nominal 1e6.")
     ] = None,
@@ -132,6 +140,10 @@ def campaign_command(
         free=free,
         fix=fix,
         bound=bound,
+        scale=scale,
+        tie=tie,
+        constrain=constrain,
+        prior=prior,
         delay=delay,
         creep=creep,
         plays=plays,

@@ -209,7 +209,7 @@ def _check(kind: object, found: Mapping[str, Any]) -> None:
 
 def _plain(name: str, value: Any) -> Any:
     """Put an argument in numbers, texts, lists and dicts."""
-    if isinstance(value, tuple(SETTINGS.values())):
+    if isinstance(value, (ParticleSwarm, Descents, LeastSquares)):
         return _plain(name, asdict(value))
     if value is None or isinstance(value, (bool, str)):
         return value
