@@ -281,7 +281,10 @@ def test_an_interruption_is_no_fault_of_a_number() -> None:
 
 
 # Matrices of 2 by 2, which no record gives.
-NO_RECORD = ("XYReference.transformed", "contour", "run_table_2", "control.StateSpace")
+NO_RECORD = (
+    *("XYReference.transformed", "contour", "run_table_2", "control.StateSpace"),
+    *("Objective.descend", "Objective.parameters"),
+)
 ROOMS = (pt, pt.control, pt.data, pt.identification, pt.references, pt.stages, pt.xu_li_2010)
 
 

@@ -37,7 +37,7 @@ class Counted:
 
     def __init__(self, objective: pt.identification.Objective, goal: float, most: int) -> None:
         self.objective, self.goal, self.most = objective, goal, most
-        self.size = len(objective.names)
+        self.size = len(objective.ranges)
         self.used, self.best = 0, np.inf
         self.course: Course = []
 

@@ -38,7 +38,7 @@ def measure(name: str, methods: list[str], seeds: int, most: int) -> dict[str, A
     lowest = math.inf
     for _ in range(REFERENCE // 100):
         lowest = min(
-            lowest, float(objective.descend(random.random((100, len(objective.names))))[1].min())
+            lowest, float(objective.descend(random.random((100, len(objective.ranges))))[1].min())
         )
     print(f"{name}: lowest of {REFERENCE} descents {1e6 * lowest:.6f} um", flush=True)
     goal = lowest * (1.0 + NEAR)
@@ -54,7 +54,7 @@ def measure(name: str, methods: list[str], seeds: int, most: int) -> dict[str, A
             print(f"{name}: {method} found less: {1e6 * low:.6f} um", flush=True)
     return {
         "title": problem.title,
-        "coordinates": len(objective.names),
+        "coordinates": len(objective.ranges),
         "lowest": lowest,
         "most": most,
         "seeds": seeds,

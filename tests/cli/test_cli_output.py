@@ -155,7 +155,7 @@ def test_creep_reaches_what_auto_tries() -> None:
 def test_progress_is_told_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(progress_bar, "FIRST", 0.0)
     monkeypatch.setattr(progress_bar, "EVERY", 0.01)
-    search = ("identify", "log.csv", *PAPER, "--seed", "3")
+    search = ("identify", "log.csv", *PAPER, "--method", "swarm", "--seed", "3")
     result = run(*search)
     assert result.exit_code == 0
     lines = result.stderr.splitlines()

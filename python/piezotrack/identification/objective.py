@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -12,10 +12,13 @@ from ..stages.registry import model_named
 from .question import question_of
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
     from numpy.typing import ArrayLike, NDArray
 
     from ..data.dataset import Dataset
     from .history import History
+    from .step_response import StepResult
 
     Array = NDArray[np.float64]
 
@@ -41,18 +44,9 @@ class Objective:
         What the stage went through before the record.
     threads : int, optional
         Up to 256; all cores where it is 0 or not given.
-    **asked
-        ``free``, ``fixed``, ``initial``, ``bounds``, ``scales``, ``ties``, ``constraints``,
-        ``priors``, ``stiffness``, ``delay`` and ``creep``, as for `identify`.
-
-    Attributes
-    ----------
-    names : tuple of str
-        The free parameters, one a coordinate.
-    bounds : tuple of (float, float)
-        Their bounds, SI: 0 and 1 in the unit box.
-    scales : tuple of {"linear", "log"}
-        Their scales between the bounds.
+    free, fixed, initial, bounds, scales, ties, constraints, priors, stiffness, delay, \
+    creep : optional
+        As for `identify`.
 
     Raises
     ------
@@ -65,8 +59,8 @@ class Objective:
     >>> import piezotrack as pt
     >>> log = pt.datasets.dbo_training()[3.0:5.0]
     >>> cost = pt.identification.Objective(log, "dahl")
-    >>> len(cost.names), cost(np.full((3, len(cost.names)), 0.5)).shape
-    (6, (3,))
+    >>> len(cost.ranges), cost(np.full((3, len(cost.ranges)), 0.5)).shape
+    (5, (3,))
     """
 
     def __init__(
@@ -77,19 +71,46 @@ class Objective:
         offset: bool = True,
         history: History = "virgin",
         threads: int | None = None,
-        **asked: object,
+        free: Iterable[str] | None = None,
+        fixed: Mapping[str, float] | None = None,
+        initial: StepResult | None = None,
+        bounds: Mapping[str, tuple[float, float]] | None = None,
+        scales: Mapping[str, Literal["linear", "log"]] | None = None,
+        ties: Mapping[str, str] | None = None,
+        constraints: Iterable[str] | None = None,
+        priors: Mapping[str, tuple[float, float]] | None = None,
+        stiffness: float | None = None,
+        delay: bool | float | tuple[float, float] | None = None,
+        creep: bool | Iterable[float] | None = None,
     ) -> None:
         info = model_named(model)
         if not info.searched:
             raise ParameterError(f"model is {model!r}: expected one that is searched")
-        question = question_of(data, info, offset=offset, history=history, **asked)
+        question = question_of(
+            data,
+            info,
+            offset=offset,
+            history=history,
+            free=free,
+            fixed=fixed,
+            initial=initial,
+            bounds=bounds,
+            scales=scales,
+            ties=ties,
+            constraints=constraints,
+            priors=priors,
+            stiffness=stiffness,
+            delay=delay,
+            creep=creep,
+        )
         count = 0 if threads is None else _core.as_count("threads", threads)
         self._core = _core.Objective(question, count)
         self._scalars = [one.name for one in info.parameters if not one.is_list]
-        coordinates = self._core.coordinates
-        self.names = tuple(name for name, *_ in coordinates)
-        self.bounds = tuple((low, high) for _, low, high, _ in coordinates)
-        self.scales = tuple(scale for *_, scale in coordinates)
+
+    @property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Bounds of the free parameters, SI: 0 and 1 in the unit box, a coordinate each."""
+        return {name: (low, high) for name, low, high, _ in self._core.coordinates}
 
     def __call__(self, places: ArrayLike) -> Array:
         """Return the costs at places of the unit box.
@@ -97,7 +118,7 @@ class Objective:
         Parameters
         ----------
         places : array_like, shape (n, d) or (d,)
-            Coordinates from 0 to 1, in the order of `names`.
+            Coordinates from 0 to 1, in the order of `ranges`.
 
         Returns
         -------
