@@ -109,7 +109,14 @@ def draw(results: dict[str, Any], path: Path) -> None:
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(2, 3, figsize=(14.0, 8.6), sharey=True, layout="constrained")
+    columns = min(3, len(results))
+    rows = math.ceil(len(results) / columns)
+    size = (4.7 * columns, 1.2 + 3.7 * rows)
+    figure, axes = plt.subplots(
+        rows, columns, figsize=size, sharey=True, squeeze=False, layout="constrained"
+    )
+    for ax in axes.flat[len(results) :]:
+        ax.set_axis_off()
     colours = plt.get_cmap("tab20").colors  # type: ignore[attr-defined]
     for ax, one in zip(axes.flat, results.values(), strict=False):
         for k, (method, times) in enumerate(successes(one).items()):
@@ -129,7 +136,9 @@ def draw(results: dict[str, Any], path: Path) -> None:
     for ax in axes[:, 0]:
         ax.set_ylabel("seeds within 0.1 % of the lowest cost [%]")
     handles, labels = axes.flat[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=5, fontsize="small")
+    figure.legend(
+        handles, labels, loc="outside lower center", ncols=min(5, 2 * columns), fontsize="small"
+    )
     figure.savefig(path, dpi=110)
 
 

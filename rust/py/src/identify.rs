@@ -241,7 +241,7 @@ enum Searcher<'py> {
 }
 
 impl Searcher<'_> {
-    fn method(&self) -> Method {
+    fn into_method(self) -> Method {
         match self {
             Self::Swarm(settings) => Method::Swarm(settings.0.clone()),
             Self::Descents(settings) => Method::Descents(settings.0.clone()),
@@ -264,7 +264,7 @@ fn identify(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Option<PySearch>> {
     let asked = question.asked()?;
-    let plan = Plan { method: method.method(), seed, runs };
+    let plan = Plan { method: method.into_method(), seed, runs };
     let watchers = Watchers { callback, progress };
     let found = enter_pool(py, threads, &watchers, |monitor, stop| {
         let record = asked.record()?;

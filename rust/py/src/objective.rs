@@ -29,9 +29,9 @@ pub struct PyObjective {
 type Descended = (Vec<f64>, f64, usize);
 
 #[pymethods]
+#[expect(clippy::needless_pass_by_value, reason = "extracted from lists")]
 impl PyObjective {
     #[new]
-    #[expect(clippy::needless_pass_by_value, reason = "extracted from a dict")]
     fn new(py: Python<'_>, question: Question<'_>, threads: usize) -> PyResult<Self> {
         let asked = question.asked()?;
         let watchers = Watchers { callback: None, progress: None };

@@ -210,7 +210,9 @@ impl LocalRefinement<'_> {
         stride: usize,
         samples_over_freedom: f64,
     ) -> Normal {
-        columns.iter_mut().for_each(|column| self.centre(column));
+        for column in &mut columns {
+            self.centre(column);
+        }
         let measured = self.record.y[self.record.window.clone()].iter().step_by(stride);
         let mut residual: Vec<f64> = measured.zip(read).map(|(y, x)| y - x).collect();
         self.centre(&mut residual);
@@ -337,14 +339,21 @@ pub(super) fn step(normal: &Normal, place: &[f64], damping: f64) -> Option<Vec<f
         let left = &normal.slope - &normal.square * &change;
         let slope = DVector::from_fn(moving.len(), |i, _| left[moving[i]]);
         let found = square.cholesky()?.solve(&slope);
-        let next = |(&d, change): (&usize, &f64)| (d, place[d] + change);
-        let (inside, crossing): (Vec<(usize, f64)>, Vec<(usize, f64)>) =
-            moving.iter().zip(found.iter()).map(next).partition(|(_, z)| (0.0..=1.0).contains(z));
-        if crossing.is_empty() {
-            inside.iter().for_each(|&(d, z)| change[d] = z - place[d]);
+        let mut inside = Vec::with_capacity(moving.len());
+        for (&d, found) in moving.iter().zip(found.iter()) {
+            let z = place[d] + found;
+            if (0.0..=1.0).contains(&z) {
+                inside.push((d, *found));
+            } else {
+                change[d] = z.clamp(0.0, 1.0) - place[d];
+            }
+        }
+        if inside.len() == moving.len() {
+            for (d, found) in inside {
+                change[d] = found;
+            }
             break;
         }
-        crossing.iter().for_each(|&(d, z)| change[d] = z.clamp(0.0, 1.0) - place[d]);
         moving = inside.into_iter().map(|(d, _)| d).collect();
     }
     let next: Vec<f64> =
