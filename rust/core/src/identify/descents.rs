@@ -6,7 +6,7 @@
 //! 10.1007/BF01581046.
 
 use super::candidate::Candidate;
-use super::levenberg_marquardt::{LocalRefinement, Polished, step};
+use super::levenberg_marquardt::{LocalRefinement, Normal, Polished, damped_step};
 use super::problem::Problem;
 use super::residual_sums::Costs;
 use super::search::{Monitor, Outcome, Progress, StopReason};
@@ -128,6 +128,9 @@ impl Descent {
     }
 }
 
+/// A descent with the normal equations at its place.
+type Moving<'d> = (&'d mut Descent, Normal);
+
 /// A search by descents.
 struct Search<'a> {
     local: &'a LocalRefinement<'a>,
@@ -163,7 +166,7 @@ pub(super) fn descend(
         let best = found.iter_mut().min_by(|a, b| a.costs.rms.total_cmp(&b.costs.rms));
         match best {
             Some(best) => (best.reason, best.failures) = (reason, failures),
-            None if reason == StopReason::Interrupted => {}
+            None if reason == StopReason::Interrupted || !outcomes.is_empty() => {}
             None => {
                 return Err(Error::Numerical(format!(
                     "not one of {simulations} simulations stayed finite: check bounds and units"
@@ -267,7 +270,8 @@ impl<'a> Search<'a> {
             }
         }
         // The simulations of the points are counted with the descents, in even shares.
-        let (each, rest) = (settings.samples / settings.starts, settings.samples % settings.starts);
+        let share = chosen.len().max(1);
+        let (each, rest) = (settings.samples / share, settings.samples % share);
         let start = |(i, (place, costs)): (usize, (Vec<f64>, Costs))| {
             Descent::new(place, costs, each + usize::from(i < rest))
         };
@@ -291,50 +295,56 @@ impl<'a> Search<'a> {
             }
         }
         while !moving.is_empty() && !(self.local.stop)() {
-            let trials: Vec<Vec<(f64, Vec<f64>)>> = moving
-                .iter()
-                .map(|(one, normal)| {
-                    let dampings = DAMPINGS.map(|factor| factor * one.damping);
-                    let next = |damping| Some((damping, step(normal, &one.place, damping)?));
-                    dampings.into_iter().filter_map(next).collect()
-                })
-                .collect();
-            let candidates: Vec<Candidate> = moving
-                .iter()
-                .zip(&trials)
-                .flat_map(|((one, _), trials)| {
-                    let limit = one.costs.rms;
-                    trials.iter().map(move |(_, place)| (place, limit))
-                })
-                .map(|(place, limit)| Candidate { limit, ..self.candidate(place) })
-                .collect();
-            let costs = self.local.evaluator.costs(&candidates, self.local.stop);
-            self.evaluations += candidates.len();
-            let mut rest = costs.as_slice();
-            let tried = moving.into_iter().zip(trials).filter_map(|((one, normal), trials)| {
-                let (own, others) = rest.split_at(trials.len());
-                rest = others;
-                one.evaluations += trials.len();
-                let best = own
-                    .iter()
-                    .zip(trials)
-                    .filter(|(costs, _)| costs.rms < one.costs.rms)
-                    .min_by(|a, b| a.0.rms.total_cmp(&b.0.rms));
-                let before = one.costs.rms;
-                if let Some((&costs, (damping, place))) = best {
-                    (one.costs, one.place, one.damping) = (costs, place, damping.max(1e-12));
-                    one.iterated(before);
-                    return None;
-                }
-                one.damping *= 1e3;
-                if own.is_empty() || one.damping > MOST_DAMPING {
-                    one.iterated(before);
-                    return None;
-                }
-                Some((one, normal))
-            });
-            moving = tried.collect();
+            moving = self.step(moving);
         }
+    }
+
+    /// Steps of each descent with several dampings; those that none took down, to try again with
+    /// larger ones.
+    fn step<'d>(&mut self, moving: Vec<Moving<'d>>) -> Vec<Moving<'d>> {
+        let trials: Vec<Vec<(f64, Vec<f64>)>> = moving
+            .iter()
+            .map(|(one, normal)| {
+                let dampings = DAMPINGS.map(|factor| factor * one.damping);
+                let next = |damping| Some((damping, damped_step(normal, &one.place, damping)?));
+                dampings.into_iter().filter_map(next).collect()
+            })
+            .collect();
+        let candidates: Vec<Candidate> = moving
+            .iter()
+            .zip(&trials)
+            .flat_map(|((one, _), trials)| {
+                let limit = one.costs.rms;
+                trials.iter().map(move |(_, place)| (place, limit))
+            })
+            .map(|(place, limit)| Candidate { limit, ..self.candidate(place) })
+            .collect();
+        let costs = self.local.evaluator.costs(&candidates, self.local.stop);
+        self.evaluations += candidates.len();
+        let mut rest = costs.as_slice();
+        let tried = moving.into_iter().zip(trials).filter_map(|((one, normal), trials)| {
+            let (own, others) = rest.split_at(trials.len());
+            rest = others;
+            one.evaluations += trials.len();
+            let best = own
+                .iter()
+                .zip(trials)
+                .filter(|(costs, _)| costs.rms < one.costs.rms)
+                .min_by(|a, b| a.0.rms.total_cmp(&b.0.rms));
+            let before = one.costs.rms;
+            if let Some((&costs, (damping, place))) = best {
+                (one.costs, one.place, one.damping) = (costs, place, damping.max(1e-12));
+                one.iterated(before);
+                return None;
+            }
+            one.damping *= 1e3;
+            if own.is_empty() || one.damping > MOST_DAMPING {
+                one.iterated(before);
+                return None;
+            }
+            Some((one, normal))
+        });
+        tried.collect()
     }
 
     fn candidate(&self, place: &[f64]) -> Candidate {

@@ -91,7 +91,7 @@ impl LocalRefinement<'_> {
             best.evaluations += 2 * place.len() + 1;
             let before = best.costs.rms;
             while damping < 1e8 {
-                let Some(next) = step(&normal, &best.place, damping) else {
+                let Some(next) = damped_step(&normal, &best.place, damping) else {
                     break;
                 };
                 let candidate =
@@ -322,7 +322,7 @@ fn with(place: &[f64], d: usize, z: f64) -> Vec<f64> {
 ///
 /// A coordinate whose step would cross a bound goes to the bound, and the others take the step
 /// that is best with it there.
-pub(super) fn step(normal: &Normal, place: &[f64], damping: f64) -> Option<Vec<f64>> {
+pub(super) fn damped_step(normal: &Normal, place: &[f64], damping: f64) -> Option<Vec<f64>> {
     let presses = |d: usize, z: f64| {
         (z <= 0.0 && normal.slope[d] < 0.0) || (z >= 1.0 && normal.slope[d] > 0.0)
     };
