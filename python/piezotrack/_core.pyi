@@ -7,9 +7,11 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = [
     "Controller",
     "Conventional",
+    "DescentSettings",
     "Inverse",
     "LeastSquaresFit",
     "LoopPlant",
+    "Objective",
     "Response",
     "Search",
     "Session",
