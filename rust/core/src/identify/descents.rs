@@ -8,8 +8,8 @@
 use super::candidate::Candidate;
 use super::levenberg_marquardt::{LocalRefinement, Normal, Polished, damped_step};
 use super::problem::Problem;
+use super::progress::{Monitor, Outcome, Progress, StopReason};
 use super::residual_sums::Costs;
-use super::search::{Monitor, Outcome, Progress, StopReason};
 use crate::error::{Error, Result};
 use crate::math::Draws;
 

@@ -16,8 +16,10 @@ mod lag;
 mod least_squares;
 mod levenberg_marquardt;
 mod motion;
+mod plan;
 mod prior;
 mod problem;
+mod progress;
 mod record;
 mod relations;
 mod residual_sums;
@@ -45,13 +47,15 @@ pub use least_squares::{
     WeightsRecord, identify_weights,
 };
 pub use levenberg_marquardt::{LocalRefinement, Polished, Sensitivity};
+pub use plan::{Method, Plan};
 pub use prior::Prior;
 pub use problem::{Delay, Problem, Spec};
+pub use progress::{Monitor, Outcome, Progress, StopReason};
 pub use record::Record;
 pub use relations::Relations;
 pub use residual_sums::Costs;
 pub use resonances::{Resonance, resonances};
-pub use search::{Method, Monitor, Outcome, Plan, Progress, StopReason, search};
+pub use search::search;
 pub use sensor_noise::{Noise, noise_at_rest};
 pub use step_response::{Conventional, StepReadings, StepResponse, read_step, separate};
 pub use swarm::{Boundary, Swarm, SwarmSettings, Topology, Update};
