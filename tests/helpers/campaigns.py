@@ -30,7 +30,7 @@ QUICK: dict[str, Any] = {
 LONGER: dict[str, Any] = {
     **QUICK,
     "swarm": pt.ParticleSwarm(
-        particles=64, iterations=700, stall_iterations=700, min_improvement=0.0, polish=False
+        particles=64, iterations=5000, stall_iterations=5000, min_improvement=0.0, polish=False
     ),
 }
 
