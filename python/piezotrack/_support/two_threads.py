@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
-__all__ = ["two_threads"]
+__all__ = ["one_by_one", "two_threads"]
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+# Ctrl-C that comes just before a wait begins does not end it: no wait is longer than this [s].
+LONGEST = 0.2
 
 
 @contextmanager
@@ -28,3 +34,28 @@ def two_threads() -> Iterator[ThreadPoolExecutor]:
         pool.shutdown(wait=False, cancel_futures=True)
         raise
     pool.shutdown()
+
+
+def one_by_one(
+    pool: ThreadPoolExecutor, function: Callable[[T], R], values: Iterable[T]
+) -> Iterator[R]:
+    """Compute a function of each value in a pool.
+
+    Parameters
+    ----------
+    pool : ThreadPoolExecutor
+        Where it is computed.
+    function : callable
+        Of one value.
+    values : iterable
+        All of them are given to the pool at once.
+
+    Yields
+    ------
+    object
+        The results, in the order of the values.
+    """
+    for future in [pool.submit(function, value) for value in values]:
+        while not future.done():
+            wait([future], timeout=LONGEST)
+        yield future.result()

@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import _core
 from .._support.progress_bar import ProgressBar
-from .._support.two_threads import two_threads
+from .._support.two_threads import one_by_one, two_threads
 from ..errors import ParameterError
 from .apparatus import Apparatus, calibration_file
 from .conclusions import Conclusion, conclusions
@@ -255,7 +255,7 @@ def _scored(
 
     found = []
     with two_threads() as pool:
-        for one in pool.map(score, seeds):
+        for one in one_by_one(pool, score, seeds):
             found.append(one)
             bar.step(1 + len(found), 1 + len(seeds), f"{1 + len(seeds)} seeds")
     return found
