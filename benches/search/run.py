@@ -21,6 +21,8 @@ from problems import PROBLEMS
 import piezotrack as pt
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
 NEAR = 1e-3
@@ -28,22 +30,34 @@ NEAR = 1e-3
 REFERENCE = 2000
 
 
-def measure(name: str, methods: list[str], seeds: int, most: int) -> dict[str, Any]:
-    """Run the methods on a problem; the course of the best cost of every seed."""
+def lowest_cost(objective: pt.identification.Objective) -> float:
+    """Lowest cost of many descents from random places [m]."""
+    random = np.random.default_rng(99)
+    size = (100, len(objective.ranges))
+    rounds = (objective.descend(random.random(size))[1] for _ in range(REFERENCE // 100))
+    return min(float(costs.min()) for costs in rounds)
+
+
+def measure(
+    name: str, methods: list[str], seeds: int, most: int, before: dict[str, Any] | None
+) -> Iterator[dict[str, Any]]:
+    """Run the methods on a problem; the course of the best cost of every seed.
+
+    What was measured ``before`` with as many seeds and simulations is kept.
+    """
     problem = PROBLEMS[name]
     objective = pt.identification.Objective(
         problem.record(), problem.model, history="virgin", **problem.arguments
     )
-    random = np.random.default_rng(99)
-    lowest = math.inf
-    for _ in range(REFERENCE // 100):
-        lowest = min(
-            lowest, float(objective.descend(random.random((100, len(objective.ranges))))[1].min())
-        )
+    if before is not None and (before["seeds"], before["most"]) == (seeds, most):
+        lowest, courses = before["lowest"], dict(before["courses"])
+    else:
+        lowest, courses = lowest_cost(objective), {}
     print(f"{name}: lowest of {REFERENCE} descents {1e6 * lowest:.6f} um", flush=True)
     goal = lowest * (1.0 + NEAR)
-    courses = {}
     for method in methods:
+        if method in courses:
+            continue
         began = time.perf_counter()
         courses[method] = [METHODS[method](objective, seed, goal, most) for seed in range(seeds)]
         low = min(course[-1][1] for course in courses[method] if course)
@@ -52,14 +66,14 @@ def measure(name: str, methods: list[str], seeds: int, most: int) -> dict[str, A
         print(f"{name}: {method}: {done} of {seeds}, {spent:.0f} s", flush=True)
         if low < lowest * (1.0 - NEAR):
             print(f"{name}: {method} found less: {1e6 * low:.6f} um", flush=True)
-    return {
-        "title": problem.title,
-        "coordinates": len(objective.ranges),
-        "lowest": lowest,
-        "most": most,
-        "seeds": seeds,
-        "courses": courses,
-    }
+        yield {
+            "title": problem.title,
+            "coordinates": len(objective.ranges),
+            "lowest": lowest,
+            "most": most,
+            "seeds": seeds,
+            "courses": courses,
+        }
 
 
 def successes(found: dict[str, Any]) -> dict[str, NDArray[np.float64]]:
@@ -157,8 +171,9 @@ def main() -> None:
     results: dict[str, Any] = json.loads(path.read_text()) if path.exists() else {}
     methods = [one.replace("; ", ", ") for one in given.methods.split(",")]
     for name in [] if given.draw else given.problems.split(","):
-        results[name] = measure(name, methods, given.seeds, given.most)
-        path.write_text(json.dumps(results))
+        for one in measure(name, methods, given.seeds, given.most, results.get(name)):
+            results[name] = one
+            path.write_text(json.dumps(results))
     results = {name: results[name] for name in PROBLEMS if name in results}
     (given.out / "search.md").write_text(table(results))
     draw(results, given.out / "search.png")

@@ -13,7 +13,7 @@ from .._support.html_table import html_table
 from .._support.messages import quoted
 from .._support.units import best_length_unit
 from ..errors import DataError, ParameterError
-from .dataset_arguments import decimation_factor, further_columns, time_limit
+from .dataset_arguments import MIN_SAMPLES, decimation_factor, further_columns, window_samples
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -29,7 +29,6 @@ __all__ = ["Dataset", "Hold"]
 
 Hold = Literal["foh", "zoh"]
 
-MIN_SAMPLES = 3
 # Most samples of an interpolated record.
 MOST_SAMPLES = 50_000_000
 
@@ -423,22 +422,7 @@ class Dataset:
 
     def _samples(self, start: float | None, stop: float | None) -> tuple[int, int]:
         """Turn the bounds of a window [s] into indices of the arrays."""
-        t = self.t
-        # Times and bounds are decimal numbers rounded to binary: equal ones may differ a little.
-        slack = max(1e-6 * self._dt, 4.0 * float(np.spacing(np.abs(t).max())))
-        low, high = float(t[0]), float(t[-1]) + self._dt
-        begin = low if start is None else time_limit("start", start)
-        end = high if stop is None else time_limit("stop", stop)
-        window = f"the window from {begin:.10g} s to {end:.10g} s"
-        record = f"the record, whose samples go from {low:.10g} s to {float(t[-1]):.10g} s"
-        if begin < low - self._dt / 2 or end > high + self._dt / 2:
-            raise ParameterError(f"{window} reaches out of {record}")
-        if begin >= end:
-            raise ParameterError(f"{window} is empty: expected start < stop within {record}")
-        first, last = (int(np.searchsorted(t, bound - slack)) for bound in (begin, end))
-        if last - first < MIN_SAMPLES:
-            few = f"holds {last - first} samples: expected at least {MIN_SAMPLES}"
-            raise ParameterError(f"{window} {few}, within {record}")
+        first, last = window_samples(self.t, self._dt, start, stop)
         return self._start + first, self._start + last
 
     def _part(self, first: int, stop: int, start: int) -> Dataset:

@@ -1,4 +1,4 @@
-"""Checked arguments of a record: factors, limits of time and further columns."""
+"""Checked arguments of a record: factors, windows and further columns."""
 
 from __future__ import annotations
 
@@ -7,17 +7,20 @@ from collections.abc import Mapping
 from numbers import Integral
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from .._support.arrays import real, signal_of
 from .._support.messages import listed, quoted
 from ..errors import ParameterError
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
     Array = NDArray[np.float64]
 
-__all__ = ["decimation_factor", "further_columns", "time_limit"]
+__all__ = ["MIN_SAMPLES", "decimation_factor", "further_columns", "window_samples"]
+
+MIN_SAMPLES = 3
 
 
 def decimation_factor(value: object) -> int:
@@ -27,7 +30,7 @@ def decimation_factor(value: object) -> int:
     return int(value)
 
 
-def time_limit(name: str, value: object) -> float:
+def _time_limit(name: str, value: object) -> float:
     """Check a limit of a window of time [s]."""
     number = real(value)
     if not math.isfinite(number):
@@ -61,3 +64,23 @@ def further_columns(
         for name, values in columns.items()
     }
     return kept, {name: units.get(name, "") for name in kept}
+
+
+def window_samples(t: Array, dt: float, start: float | None, stop: float | None) -> tuple[int, int]:
+    """Turn the bounds of a window [s] into indices of its times."""
+    # Times and bounds are decimal numbers rounded to binary: equal ones may differ a little.
+    slack = max(1e-6 * dt, 4.0 * float(np.spacing(np.abs(t).max())))
+    low, high = float(t[0]), float(t[-1]) + dt
+    begin = low if start is None else _time_limit("start", start)
+    end = high if stop is None else _time_limit("stop", stop)
+    window = f"the window from {begin:.10g} s to {end:.10g} s"
+    record = f"the record, whose samples go from {low:.10g} s to {float(t[-1]):.10g} s"
+    if begin < low - dt / 2 or end > high + dt / 2:
+        raise ParameterError(f"{window} reaches out of {record}")
+    if begin >= end:
+        raise ParameterError(f"{window} is empty: expected start < stop within {record}")
+    first, last = (int(np.searchsorted(t, bound - slack)) for bound in (begin, end))
+    if last - first < MIN_SAMPLES:
+        few = f"holds {last - first} samples: expected at least {MIN_SAMPLES}"
+        raise ParameterError(f"{window} {few}, within {record}")
+    return first, last

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
-from .._support.two_threads import two_threads
+from .._support.two_threads import one_by_one, two_threads
 from ..control.checks import check_stable
 from ..errors import PiezotrackError
 from ..identification.fit import identify
@@ -127,7 +127,7 @@ def _round(
     with two_threads() as pool:
         for iteration in range(settings.iterations + 1):
             places = [None if one is None else theta_at(one, box) for one in swarm.ask()]
-            swarm.tell(list(pool.map(lambda theta: _cost_at(theta, seeds), places)))
+            swarm.tell(list(one_by_one(pool, lambda theta: _cost_at(theta, seeds), places)))
             if progress is not None:
                 place, least = swarm.best
                 progress(iteration, least, theta_at(place, box))

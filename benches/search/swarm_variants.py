@@ -1,7 +1,7 @@
 """Swarms at equal numbers of simulations, 100 runs each.
 
-Run as ``python benches/swarm_variants.py``; prints the rows of benches/README.md. The first is
-the paper's search, where the cost of the optimum is that of the descent, from which no run found
+Run as ``python benches/search/swarm_variants.py``; prints the rows of benches/README.md. The first
+is the paper's search, where the cost of the optimum is that of the descent, from which no run found
 a better place. The others have all parameters free on stages richer than the model, every swarm
 followed by the descent: they decide the default. Takes half an hour or more.
 """
@@ -11,6 +11,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from problems import paper as paper_log
+from problems import plays, swelling
 
 import piezotrack as pt
 from piezotrack.xu_li_2010.procedure import SEARCH_BOX
@@ -71,26 +73,6 @@ def all_free(simulations: int) -> dict[str, pt.ParticleSwarm]:
     return {n: sized(swarm, size, simulations, polish=True) for n, (swarm, size) in plain.items()}
 
 
-def plays(u: np.ndarray, widths: np.ndarray) -> np.ndarray:
-    """Sum of play operators, one a width: hysteresis that Dahl's operator only approximates."""
-    total = np.zeros(u.size)
-    for width in widths:
-        place = 0.0
-        for i, v in enumerate(u):
-            place = min(max(place, v - width), v + width)
-            total[i] += place
-    return total
-
-
-def swelling() -> pt.Dataset:
-    """1 Hz, 200 samples a second, swelling from 1 to 5 V and back in 10 s: loops of many sizes."""
-    t = np.arange(4601) / 200.0
-    u = 5.0 * np.sin(2.0 * np.pi * t) * (0.6 + 0.4 * np.cos(0.2 * np.pi * t))
-    x = 0.9e-6 * u + 0.03e-6 * plays(u, np.linspace(0.3, 3.0, 10))
-    noise = np.random.default_rng(1).normal(0.0, 5e-9, t.size)
-    return pt.Dataset(u=u, y=x + noise, dt=1 / 200.0)[3.0:]
-
-
 def two_tones() -> pt.Dataset:
     """0.25 Hz and 1 Hz together, 0 to 75 V, 500 samples a second: small loops in a large one."""
     t = np.arange(6001) / 500.0
@@ -118,19 +100,9 @@ def show(title: str, found: dict[tuple[str, int], np.ndarray]) -> None:
         print(f"| {name} | {simulations} | {near} of {RUNS} | {middle:.4f} | {high:.4f} |")
 
 
-def table_1_log() -> pt.Dataset:
-    """Table 1 under the paper's drive, with the published noise and steps of the sensor."""
-    t = np.arange(60001) / 5000.0
-    u = 37.5 * (1.0 - np.cos(2.0 * np.pi * 0.25 * t))
-    x = pt.DahlStage.xu_li_2010().simulate(u, 1 / 5000.0).x
-    noisy = x + np.random.default_rng(1).normal(0.0, 0.097e-6, t.size)
-    step = 2.5e-3 / 2**16
-    return pt.Dataset(u=u, y=step * np.round(noisy / step), dt=1 / 5000.0)
-
-
 def main() -> None:
     """Run and print."""
-    log = table_1_log()[:4.0]
+    log = paper_log()
     stage = pt.DahlStage.xu_li_2010()
     held = {"a1": stage.a1, "a2": stage.a2, "b1": stage.b1}
     paper = {"fixed": held, "bounds": SEARCH_BOX, "offset": False}
