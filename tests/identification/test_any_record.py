@@ -230,14 +230,3 @@ def test_plays_gather_where_those_of_the_stage_are() -> None:
     y = x + noise * np.random.default_rng(2).normal(size=x.size)
     fit = pt.identify(pt.Dataset(u=u, y=y, dt=1e-3), "prandtl-ishlinskii")
     assert fit.cost < 1.2 * noise
-
-
-def test_kinds_are_told_the_history_that_plays_show(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refused(_: pt.Dataset) -> None:
-        raise AssertionError("asked again")
-
-    monkeypatch.setattr("piezotrack.identification.kinds.shown_history", refused)
-    one = case(0, bouc_wen, quick=False)
-    short = pt.ParticleSwarm(particles=4, iterations=1, polish=False)
-    fit = pt.identify(one.log, swarm=short, runs=1, progress=False)
-    assert len(fit.trials) > 1

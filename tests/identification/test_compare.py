@@ -63,7 +63,9 @@ def test_a_model_is_what_identify_finds_on_the_fitted_part() -> None:
 
 def test_the_rest_is_simulated_through_with_state_and_offset_carried_on() -> None:
     for one in found().rows:
-        through = one.fit.model.simulate(log().u, 0.005).x + one.fit.offset
+        assert one.fit.start is not None
+        begun = one.fit.start.state
+        through = one.fit.model.simulate(log().u, 0.005, initial=begun).x + one.fit.offset
         error = (log().y - through)[1000:]
         assert len(found().test) == 600
         assert one.test.rms == pytest.approx(float(np.sqrt(np.mean(error**2))), rel=1e-9)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
+from piezotrack.identification.search import search as one_search
 
 DT = 1e-3
 NOISE = 10e-9
@@ -75,6 +76,24 @@ def test_plays_beyond_half_of_the_range_move_once() -> None:
     assert isinstance(fit.model, pt.PrandtlIshlinskiiStage)
     assert 24.9 < fit.model.thresholds[-1] < 27.0
     assert fit.model.weights[-1] == pytest.approx(2e-7, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("visited", "searched"), [([], ["virgin"]), ([75.0], ["virgin", "settled", "fit"])]
+)
+def test_a_record_is_searched_again_only_for_a_history_that_it_shows(
+    visited: list[float], searched: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = []
+
+    def search(*arguments: Any, history: str = "virgin", **settings: Any) -> Any:
+        asked.append(history)
+        return one_search(*arguments, history=history, **settings)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("piezotrack.identification.kinds.search", search)
+    pt.identify(record(visited), "first-order-dahl")
+    assert set(asked) <= set(searched)
+    assert asked[-1] == searched[-1]
 
 
 def test_a_settled_stage_repeats() -> None:

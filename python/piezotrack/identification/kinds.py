@@ -9,7 +9,8 @@ from .._support.messages import quoted
 from .._support.progress_bar import ProgressBar
 from ..errors import Interrupted, ParameterError
 from .history import GAIN
-from .least_squares import LeastSquares, shown_history, solve_least_squares
+from .least_squares import LeastSquares, solve_least_squares
+from .other_histories import other_histories
 from .search import search
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ __all__ = ["check_counts", "identify_kind", "refuse_given"]
 
 # How a search is run, not what it finds.
 RUNNING = ("seed", "runs", "threads", "progress")
+# Arguments of a search, not of what is searched.
+OF_SEARCH = ("method", "swarm", "descents", "seed", "runs", "progress", "callback")
 
 
 def identify_kind(
@@ -34,7 +37,6 @@ def identify_kind(
     history: History | None,
     of_swarm: Mapping[str, Any],
     least_squares: object,
-    shown: History | None = None,
 ) -> Identification:
     """Identify a stage of one kind.
 
@@ -51,9 +53,6 @@ def identify_kind(
     of_swarm, least_squares : mapping, object
         Arguments for one of the two ways, not yet checked; those for the other are not used.
 
-    shown : {"virgin", "settled", "fit"} or None, optional
-        What plays show of the history, where it is known.
-
     Returns
     -------
     Identification
@@ -67,13 +66,7 @@ def identify_kind(
     if info.searched and history is not None:
         return search(data, info, offset=offset, history=history, **of_swarm)
     if info.searched:
-        # What plays show may be due to a loop that they cannot make: the kind itself decides.
-        fit = search(data, info, offset=offset, **of_swarm)
-        history = shown or shown_history(data)
-        if history == "virgin":
-            return fit
-        other = search(data, info, offset=offset, history=history, **of_swarm)
-        return other if other.cost < (1.0 - GAIN) * fit.cost else fit
+        return _as_shown(data, info, offset, of_swarm)
     settings = LeastSquares() if least_squares is None else least_squares
     if not isinstance(settings, LeastSquares):
         raise ParameterError(
@@ -84,6 +77,19 @@ def identify_kind(
             return solve_least_squares(data, info, settings, offset, history)
     except KeyboardInterrupt:
         raise Interrupted("interrupted before the weights were found") from None
+
+
+def _as_shown(
+    data: Dataset, info: ModelInfo, offset: bool, of_swarm: Mapping[str, Any]
+) -> Identification:
+    """Search with the history that the record shows: more freedom has to lower the cost."""
+    fit = search(data, info, offset=offset, **of_swarm)
+    asked = {name: value for name, value in of_swarm.items() if name not in OF_SEARCH}
+    for one in other_histories(data, info, fit, offset=offset, asked=asked):
+        if one.cost < (1.0 - GAIN) * fit.cost:
+            other = search(data, info, offset=offset, history=one.history, **of_swarm)
+            fit = other if other.cost < (1.0 - GAIN) * fit.cost else fit
+    return fit
 
 
 def refuse_given(info: ModelInfo, of_swarm: Mapping[str, object], least_squares: object) -> None:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from .. import _core
 from .._support.arguments import as_numbers
 from .._support.messages import quoted
-from ..errors import DataError, NumericalError, ParameterError
-from ..stages.registry import model_named, stage_class
+from ..errors import DataError, ParameterError
+from ..stages.registry import stage_class
 from .estimates import LagRange
 from .history import start_of_fit
 from .model_file import fit_entry, provenance
@@ -21,14 +21,12 @@ if TYPE_CHECKING:
     from ..data.dataset import Dataset
     from ..stages.model_info import ModelInfo
 
-__all__ = ["BY_PLAYS", "LeastSquares", "shown_history", "solve_least_squares"]
+__all__ = ["LeastSquares", "solve_least_squares"]
 
 History = Literal["virgin", "settled", "fit"]
 
 MOST_PLAYS, MOST_ZONES, MOST_RELAXATIONS = 32, 8, 8
 DYNAMICS = ("time_constant", "frequency", "damping_ratio")
-# The model by which the history of a record is found for all others.
-BY_PLAYS = "prandtl-ishlinskii"
 # Parameters that the settings and the record fix beforehand.
 CHOSEN = ("thresholds", "dead_zone_thresholds", "creep_times")
 
@@ -224,23 +222,3 @@ def solve_least_squares(
 def _lags(found: tuple[float, float] | None) -> LagRange | None:
     """Lags that fit as well, where the record does not show the dynamics."""
     return None if found is None else LagRange(*found, from_zero=found[0] == 0.0)
-
-
-def shown_history(data: Dataset) -> History:
-    """Find what a record shows of the drive before it, by a stage with plays.
-
-    Parameters
-    ----------
-    data : Dataset
-        The record.
-
-    Returns
-    -------
-    {"virgin", "settled", "fit"}
-        The history; that of a stage that never moved where plays cannot be fitted.
-    """
-    try:
-        found = solve_least_squares(data, model_named(BY_PLAYS), LeastSquares(), offset=True)
-    except (DataError, NumericalError):
-        return "virgin"
-    return "virgin" if found.start is None else found.start.history

@@ -108,6 +108,11 @@ class Objective:
         self._scalars = [one.name for one in info.parameters if not one.is_list]
 
     @property
+    def coordinates(self) -> list[tuple[str, float, float, str]]:
+        """Name, bounds in SI and scale, ``"linear"`` or ``"log"``, of each coordinate."""
+        return list(self._core.coordinates)
+
+    @property
     def ranges(self) -> dict[str, tuple[float, float]]:
         """Bounds of the free parameters, SI: 0 and 1 in the unit box, a coordinate each."""
         return {name: (low, high) for name, low, high, _ in self._core.coordinates}

@@ -14,7 +14,6 @@ from .._support.statistics import sample_noise
 from ..errors import DataError, NumericalError, ParameterError
 from ..stages.registry import model_named
 from .kinds import check_counts, identify_kind
-from .least_squares import BY_PLAYS
 from .parameter_arguments import ON_PARAMETERS
 from .swarm import ParticleSwarm
 
@@ -125,9 +124,6 @@ def identify_best(
         try:
             fit = identify_kind(part, info, of_swarm=trial, **common)
             score = fit.score(rest, offset=fit.offset) if rest is not part else fit.fitted
-            if info.name == BY_PLAYS and fit.start is not None:
-                # What swarms would ask a stage with plays for, each time again.
-                common["shown"] = fit.start.history
         except (DataError, NumericalError) as error:
             refused = refused or error
             continue
