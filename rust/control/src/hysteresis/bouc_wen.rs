@@ -75,7 +75,7 @@ pub struct BoucWenBranch<N> {
 /// Longest piece with n = 1, times the rate: the series below are summed for it.
 const PIECE: f64 = 0.5;
 /// Terms of the exponential's series: the next is below 0.5^14 / 15! = 5e-17.
-const TERMS: usize = 14;
+pub(super) const TERMS: usize = 14;
 /// Terms of the logarithm's series: the next is below 0.25^26 / 27 = 1e-17.
 const LOG_TERMS: usize = 13;
 /// Longest piece with another exponent, times the rate: an error of 1e-8 of the change.
@@ -299,7 +299,7 @@ fn magnitude<N: Number>(value: N) -> N {
 }
 
 /// 1/k!
-const RECIPROCAL_FACTORIAL: [f64; TERMS + 1] = reciprocal_factorials();
+pub(super) const RECIPROCAL_FACTORIAL: [f64; TERMS + 1] = reciprocal_factorials();
 
 const fn reciprocal_factorials() -> [f64; TERMS + 1] {
     let mut out = [1.0; TERMS + 1];

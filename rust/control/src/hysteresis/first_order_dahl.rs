@@ -16,7 +16,8 @@
 //! force stays within +-Fc, the influence of the initial state decays along the path, and loops
 //! close.
 
-use super::{BoucWen, BoucWenBranch, BoucWenState, NonsmoothOperator, Operator};
+use super::decay::decay;
+use super::{BoucWenBranch, BoucWenState, NonsmoothOperator, Operator};
 use crate::Number;
 
 /// First-order Dahl operator.
@@ -46,14 +47,6 @@ pub struct FirstOrderDahl<N> {
 }
 
 impl<N: Number> FirstOrderDahl<N> {
-    /// The operator for i = 1: Bouc-Wen hysteresis with gamma = 0.
-    #[inline(always)]
-    fn exponential(&self) -> BoucWen<N> {
-        let beta = self.rest_stiffness / self.coulomb_force;
-        let gamma = beta.like(0.0);
-        BoucWen { rise: self.rest_stiffness, beta, gamma, exponent: 1.0 }
-    }
-
     #[inline(always)]
     fn is_exponential(&self) -> bool {
         (self.exponent - 1.0).abs() <= 0.0
@@ -62,6 +55,9 @@ impl<N: Number> FirstOrderDahl<N> {
     /// dF/dx at a force counted along the direction of motion.
     #[inline(always)]
     fn slope(&self, force: N) -> N {
+        if self.is_exponential() {
+            return self.rest_stiffness / self.coulomb_force * (self.coulomb_force - force);
+        }
         let i = self.exponent;
         N::lanewise([force, self.rest_stiffness, self.coulomb_force], move |[f, sigma, limit]| {
             sigma * power(1.0 - f / limit, i)
@@ -75,7 +71,7 @@ impl<N: Number> Operator<N> for FirstOrderDahl<N> {
 
     #[inline(always)]
     fn rest(&self) -> BoucWenState<N> {
-        self.exponential().rest()
+        BoucWenState { value: self.rest_stiffness.like(0.0), slope: self.rest_stiffness }
     }
 
     #[inline(always)]
@@ -90,10 +86,12 @@ impl<N: Number> Operator<N> for FirstOrderDahl<N> {
 
     #[inline(always)]
     fn along(&self, branch: &BoucWenBranch<N>, distance: N) -> BoucWenState<N> {
-        if self.is_exponential() {
-            return self.exponential().along(branch, distance);
-        }
         let BoucWenBranch { along, direction } = *branch;
+        if self.is_exponential() {
+            let path = self.rest_stiffness / self.coulomb_force * (direction * distance);
+            let force = (along - self.coulomb_force).mul_add(decay(path), along);
+            return BoucWenState { value: direction * force, slope: self.slope(force) };
+        }
         let i = self.exponent;
         let arguments = [along, direction * distance, self.rest_stiffness, self.coulomb_force];
         let force = N::lanewise(arguments, move |[f, length, sigma, limit]| {
@@ -107,10 +105,7 @@ impl<N: Number> Operator<N> for FirstOrderDahl<N> {
 
 impl<N: Number> NonsmoothOperator<N> for FirstOrderDahl<N> {
     #[inline(always)]
-    fn leaving(&self, state: &BoucWenState<N>, distance: N, direction: N) -> BoucWenState<N> {
-        if self.is_exponential() {
-            return self.exponential().leaving(state, distance, direction);
-        }
+    fn leaving(&self, state: &BoucWenState<N>, _distance: N, direction: N) -> BoucWenState<N> {
         BoucWenState { slope: self.slope(direction * state.value), ..*state }
     }
 }

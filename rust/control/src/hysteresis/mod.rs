@@ -7,6 +7,7 @@
 
 mod bouc_wen;
 mod dahl;
+mod decay;
 mod first_order_dahl;
 mod parallel_dahl;
 mod play;

@@ -15,7 +15,7 @@
 //!
 //! along the direction of motion. The force stays within the sum of the `Fc_j`, and loops close.
 
-use super::bouc_wen::growth;
+use super::decay::decay;
 use super::{NonsmoothOperator, Operator};
 use crate::Number;
 
@@ -65,14 +65,6 @@ pub struct ParallelDahlBranch<N> {
     direction: N,
 }
 
-/// Paths over l are cut off here: e^-40 of the way to the Coulomb force is left.
-const LONGEST: f64 = 40.0;
-/// A path is halved so often before the series is summed.
-const HALVINGS: usize = 5;
-/// Terms of the series: what they leave out, times the share of the way that is left, is below
-/// 2e-16 for all paths.
-const TERMS: usize = 10;
-
 impl<N: Number> ParallelDahl<N> {
     /// Elements with these slopes at F = 0 whose paths l are a geometric sequence: the first is
     /// `yield_path`, each of the others `path_ratio` times the one before.
@@ -110,19 +102,6 @@ fn product<N: Number>(
     [d, e, f]: [N; FRICTION_ELEMENTS],
 ) -> [N; FRICTION_ELEMENTS] {
     [a * d, b * e, c * f]
-}
-
-/// e^-path - 1 for a path from 0 up.
-#[inline(always)]
-fn decay<N: Number>(path: N) -> N {
-    let longest = path.like(LONGEST);
-    let path = (path - longest).where_negative(path, longest);
-    let part = path * path.like(-1.0 / f64::from(1 << HALVINGS));
-    let mut change = part * growth::<_, TERMS>(part);
-    for _ in 0..HALVINGS {
-        change = change.mul_add(change, change + change);
-    }
-    change
 }
 
 impl<N: Number> Operator<N> for ParallelDahl<N> {
