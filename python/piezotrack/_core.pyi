@@ -60,7 +60,7 @@ def visited(
     u: ArrayLike, dt: float, hold_name: str, history: str, before: float
 ) -> NDArray[np.float64]: ...
 def identify(
-    question: dict[str, Any],
+    questions: list[dict[str, Any]],
     *,
     method: SwarmSettings | DescentSettings,
     seed: int,
