@@ -42,7 +42,7 @@ def identify(
     stiffness: float | None = None,
     offset: bool | list[bool] = True,
     delay: Delay | list[Delay] = None,
-    history: History | None | list[History | None] = None,
+    history: History | list[History | None] | None = None,
     weights: Sequence[float] | None = None,
     creep: bool | Iterable[float] | None = None,
     method: Literal["descents", "swarm"] | None = None,

@@ -170,8 +170,8 @@ class Identification(IdentifiedModel):
     @property
     def fit_percent(self) -> float:
         """Share of the motion that the model explains, as `Score.fit_percent`."""
-        fitted = [(one.data, one.weight) for one in self.records if one.data is not None]
-        return remarks.fit_percent(self.cost, remarks.spread_of(fitted))
+        spread = remarks.spread_of([(data, one.weight) for data, one in self._fitted])
+        return remarks.fit_percent(self.cost, spread)
 
     @property
     def fitted(self) -> Score:
@@ -270,12 +270,14 @@ class Identification(IdentifiedModel):
     def plot(self, data: Dataset | None = None, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Loop, displacement with its error over time, and convergence of the search.
 
+        Of several records loop and displacement of each, one below the other.
+
         One panel alone, in axes of your own: `plot_loop`, `plot_time`, `plot_convergence`.
 
         Parameters
         ----------
         data : Dataset, optional
-            Another record, on which the model is shown.
+            Another record, on which the model is shown; or one of several that were identified.
         fig : matplotlib.figure.Figure or SubFigure, optional
             Where to draw; a new figure of pyplot where not given.
 

@@ -12,9 +12,9 @@ from .._support.progress_bar import ProgressBar
 from .._support.units import of_drive
 from ..errors import Interrupted, ParameterError
 from ..stages.registry import stage_class
+from .asked import Asked
 from .descents import Descents
 from .estimates import Constraint, Estimate, LagRange, Progress, SwarmRun
-from .asked import Asked
 from .fitted_record import FittedRecord
 from .history import start_after
 from .model_file import constraint_entries, fit_entry, origin_of, provenance
@@ -256,7 +256,7 @@ def _identification(
 
 
 def _estimate(found: Mapping[str, Any], unit: str, symbol: str) -> Estimate:
-    """What a search found of a parameter."""
+    """Return what a search found of a parameter."""
     bounds, deviation, at_bound = found["bounds"], found["deviation"], found["at_bound"]
     known = {name: found[name] for name in ("scale", "tie", "prior")}
     value = found["value"]
@@ -267,7 +267,7 @@ def _estimate(found: Mapping[str, Any], unit: str, symbol: str) -> Estimate:
 def _fitted(
     model: Any, asked: Asked, own: Mapping[str, Any], facts: Mapping[str, tuple[str, str]]
 ) -> FittedRecord:
-    """What a search found of a record alone."""
+    """Return what a search found of a record alone."""
     data, history = asked.data, asked.history or "virgin"
     estimates = {name: _estimate(own[name], *facts[name]) for name in SENSOR}
     delay, before = estimates["delay"], estimates["voltage_before"]

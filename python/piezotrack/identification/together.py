@@ -66,14 +66,16 @@ def identify_together(
         )
     fit = search_records(records, info, **of_search)
     shown = [one if one.history else _with_shown(fit, one) for one in records]
-    if all(one.history in ("virgin", known.history) for one, known in zip(shown, records)):
+    if all(
+        one.history in ("virgin", known.history) for one, known in zip(shown, records, strict=True)
+    ):
         return fit
     other = search_records(shown, info, **of_search)
     return other if other.cost < (1.0 - GAIN) * fit.cost else fit
 
 
 def _with_shown(fit: Identification, asked: Asked) -> Asked:
-    """The record with the history that it shows by the stage that never moved before any."""
+    """Give a record the history that it shows by the stage that never moved before any."""
     own = next(one for one in fit.records if one.data is asked.data)
     # As of another record: the one that was fitted begins as it was assumed to.
     model = replace(fit, records=(), start=None, delay=own.delay, offset_fitted=own.offset_fitted)
@@ -110,7 +112,8 @@ def best_together(records: Sequence[Asked], of_search: Mapping[str, Any]) -> Ide
     trial, full = short_trials(of_search)
     pairs = [two_parts(one.data) for one in records]
     apart = all(part is not rest for part, rest in pairs)
-    first = [replace(a, data=part) for a, (part, _) in zip(records, pairs)] if apart else records
+    halves = zip(records, pairs, strict=True)
+    first = [replace(one, data=part) for one, (part, _) in halves] if apart else records
     rests = [rest for _, rest in pairs] if apart else [one.data for one in records]
     counts = np.array([one.weight * len(rest) for one, rest in zip(records, rests, strict=True)])
     found: list[tuple[Trial, ModelInfo]] = []

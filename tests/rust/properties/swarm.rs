@@ -3,8 +3,8 @@
 use core::ops::ControlFlow;
 
 use piezotrack_core::identify::{
-    Boundary, Evaluator, Monitor, Problem, Progress, Record, Records, Spec, Swarm, SwarmSettings, Topology,
-    Update, search,
+    Boundary, Evaluator, Monitor, Problem, Progress, Record, Records, Spec, Swarm, SwarmSettings,
+    Topology, Update, search,
 };
 use piezotrack_core::models::{DahlStage, Experiment, Model, StageModel};
 use piezotrack_core::signal::{Drive, Hold, NEVER};

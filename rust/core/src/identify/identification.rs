@@ -143,7 +143,16 @@ pub fn identify_together(
         let own = |(problem, (theta, costs))| OwnResult { problem, theta, costs };
         searched.into_iter().zip(each).map(own).collect()
     });
-    Ok(Identification { problem, stepping, records: owns, runs, best, agreeing, lags, sensitivities })
+    Ok(Identification {
+        problem,
+        stepping,
+        records: owns,
+        runs,
+        best,
+        agreeing,
+        lags,
+        sensitivities,
+    })
 }
 
 /// Runs that agree with the best one.

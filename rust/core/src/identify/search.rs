@@ -37,9 +37,7 @@ impl Run {
             return Vec::new();
         }
         let asked = self.swarm.ask().zip(self.swarm.limits());
-        asked
-            .filter_map(|(place, limit)| Some(Point { place: place?.to_vec(), limit }))
-            .collect()
+        asked.filter_map(|(place, limit)| Some(Point { place: place?.to_vec(), limit })).collect()
     }
 
     /// Takes the costs of its candidates, in their order.
