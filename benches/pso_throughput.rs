@@ -12,7 +12,7 @@ use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
 use paper::{Peak, RATE, SAMPLES, Width, candidates, drive, paper_spec};
 use piezotrack_core::identify::{
-    Candidate, Evaluator, Problem, Progress, Record, SwarmSettings, search,
+    Candidate, Evaluator, Problem, Progress, Record, Records, SwarmSettings, search,
 };
 use piezotrack_core::integrator::{Order, Stepping};
 use piezotrack_core::models::{DahlStage, Experiment, StageModel};
@@ -91,7 +91,7 @@ fn throughput(criterion: &mut Criterion) {
             bencher.iter(|| {
                 let mut quiet = |_: &Progress| core::ops::ControlFlow::Continue(());
                 pool.install(|| {
-                    search(&evaluator(), &problem, &settings, 1, runs, &mut quiet, NEVER)
+                    search(&Records::one(evaluator()), &settings, 1, runs, &mut quiet, NEVER)
                 })
             });
         });

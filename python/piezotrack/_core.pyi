@@ -60,7 +60,7 @@ def visited(
     u: ArrayLike, dt: float, hold_name: str, history: str, before: float
 ) -> NDArray[np.float64]: ...
 def identify(
-    question: dict[str, Any],
+    questions: list[dict[str, Any]],
     *,
     method: SwarmSettings | DescentSettings,
     seed: int,
@@ -185,6 +185,8 @@ class Search:
     def rms_with_priors(self) -> float | None: ...
     @property
     def constraints(self) -> list[tuple[str, str, str, bool]]: ...
+    @property
+    def records(self) -> list[dict[str, Any]]: ...
     @property
     def offset(self) -> float: ...
     @property

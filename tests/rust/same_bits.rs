@@ -2,8 +2,8 @@
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use piezotrack_core::identify::{
-    Candidate, Delay, Evaluator, Monitor, Outcome, Problem, Progress, Record, Spec, SwarmSettings,
-    search,
+    Candidate, Delay, Evaluator, Monitor, Outcome, Problem, Progress, Record, Records, Spec,
+    SwarmSettings, search,
 };
 use piezotrack_core::integrator::{Order, Stepping};
 use piezotrack_core::models::{DahlStage, Experiment, Model, StageModel};
@@ -270,7 +270,7 @@ fn searched(settings: &SwarmSettings, threads: usize, seed: u64, runs: usize) ->
         let evaluator = Evaluator::new(&record, &problem, NEVER);
         let mut quiet = |_: &Progress| core::ops::ControlFlow::Continue(());
         let monitor: &mut dyn Monitor = &mut quiet;
-        search(&evaluator, &problem, &settings, seed, runs, monitor, NEVER).unwrap()
+        search(&Records::one(evaluator), &settings, seed, runs, monitor, NEVER).unwrap()
     })
 }
 

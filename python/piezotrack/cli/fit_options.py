@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
@@ -12,7 +13,7 @@ from ..stages.model_info import LISTED
 from .options import number, number_range, pairs, refuse_without_effect
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from ..identification.swarm import ParticleSwarm
 
@@ -23,18 +24,25 @@ __all__ = [
     "Constrain",
     "Creep",
     "Delay",
+    "Delays",
     "Dynamics",
     "Fix",
     "Free",
+    "Histories",
     "History",
     "Kinds",
     "KindsNamed",
+    "LogFiles",
     "Plays",
     "Priors",
     "Scales",
     "Swarm",
     "Ties",
+    "Weights",
+    "Windows",
+    "each_of",
     "fit_options",
+    "of_each_log",
     "searched",
 ]
 
@@ -106,11 +114,51 @@ Delay = Annotated[
         help="Sensor delay: fit it, a known value in s, or bounds in s; default none.",
     ),
 ]
+Delays = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--delay",
+        metavar="fit|S|LOW:HIGH",
+        help="Sensor delay: fit it, a known value in s, or bounds in s; default none. Once, or "
+        "once for each of several logs.",
+    ),
+]
 History = Annotated[
     str | None,
     typer.Option(
         metavar="virgin|settled|fit",
         help="What the stage went through before the log; default what the log shows.",
+    ),
+]
+Histories = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--history",
+        metavar="virgin|settled|fit",
+        help="What the stage went through before the log; default what the log shows. Once, or "
+        "once for each of several logs.",
+    ),
+]
+Windows = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="A:B",
+        help="Seconds to use, default all; the drive before A is simulated as warm-up. Once, or "
+        "once for each of several logs.",
+    ),
+]
+Weights = Annotated[
+    list[float] | None,
+    typer.Option(
+        help="How much a sample of a log counts beside those of the others; default 1. Once for "
+        "each of several logs.",
+    ),
+]
+LogFiles = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="FILE...",
+        help="Log in CSV, with units in its header; or several, of which one model is made.",
     ),
 ]
 Creep = Annotated[
@@ -301,6 +349,39 @@ def _prior(text: str) -> tuple[float, float]:
     if not colon:
         raise ParameterError(f"--prior has '{text}': expected VALUE:WIDTH")
     return number("--prior", value), number("--prior", width)
+
+
+def of_each_log(
+    delay: list[str] | None, history: list[str] | None, weight: list[float] | None, count: int
+) -> dict[str, Any]:
+    """Parse what may be said of each of several logs; one value stands for all of them."""
+    for option, given in (("--delay", delay), ("--history", history), ("--weight", weight)):
+        check_count(option, given, count)
+    if weight and count == 1:
+        raise ParameterError("--weight has no effect with 1 log: expected it left out")
+    delays = [_delay(text) for text in delay or []]
+    return {
+        "delay": delays if len(delays) > 1 else next(iter(delays), None),
+        "history": history if history and len(history) > 1 else next(iter(history or []), None),
+        "weights": None if not weight else weight * count if len(weight) == 1 else weight,
+    }
+
+
+def each_of(option: str, given: list[str] | None, count: int) -> list[str | None]:
+    """Return an option for each of several logs: given once for all, or once for each."""
+    if given is None or len(given) in (0, 1):
+        return [given[0] if given else None] * count
+    check_count(option, given, count)
+    return list(given)
+
+
+def check_count(option: str, given: Sequence[object] | None, count: int) -> None:
+    """Refuse an option that is given more than once, but not once for each of several logs."""
+    if given is not None and len(given) not in (1, count):
+        logs = "1 log" if count == 1 else f"{count} logs"
+        raise ParameterError(
+            f"{option} is given {len(given)} times with {logs}: expected once, or once for each"
+        )
 
 
 def _delay(text: str | None) -> bool | float | tuple[float, float] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,20 +17,25 @@ from .fit_options import (
     Bound,
     Constrain,
     Creep,
-    Delay,
+    Delays,
     Dynamics,
     Fix,
     Free,
-    History,
+    Histories,
     Kinds,
     KindsNamed,
+    LogFiles,
     Method,
     Plays,
     Priors,
     Scales,
     Swarm,
     Ties,
+    Weights,
+    Windows,
+    each_of,
     fit_options,
+    of_each_log,
     searched,
 )
 from .interruption import heard
@@ -40,7 +46,6 @@ from .options import (
     HoldOption,
     Interval,
     Json,
-    LogFile,
     Out,
     Overwrite,
     Quiet,
@@ -57,8 +62,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from ..data.dataset import Dataset
-    from ..identification.identified import Score
     from ..identification.result import Identification
+    from ..identification.score import Score
 
 __all__ = ["identify_command"]
 
@@ -69,8 +74,9 @@ PANELS = ("loop", "time")
 @in_words
 def identify_command(
     context: typer.Context,
-    file: LogFile,
-    window: Seconds = None,
+    files: LogFiles,
+    window: Windows = None,
+    weight: Weights = None,
     model: KindsNamed = None,
     out: Out = Path("results"),
     overwrite: Overwrite = False,
@@ -92,8 +98,8 @@ def identify_command(
         float | None, typer.Option(help="Stiffness in N/m, if known; default a nominal 1e6.")
     ] = None,
     offset: Annotated[bool, typer.Option(help="Fit a constant sensor offset.")] = True,
-    delay: Delay = None,
-    history: History = None,
+    delay: Delays = None,
+    history: Histories = None,
     creep: Creep = None,
     plays: Plays = None,
     asymmetry: Asymmetry = None,
@@ -116,7 +122,7 @@ def identify_command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Identify models of a stage from a log."""
+    """Identify models of a stage from a log, or from several at once."""
     kinds = Kinds.checked(model)
     kinds.refuse_without_effect(context)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
@@ -128,7 +134,7 @@ def identify_command(
         tie=tie,
         constrain=constrain,
         prior=prior,
-        delay=delay,
+        delay=None,
         creep=creep,
         plays=plays,
         asymmetry=asymmetry,
@@ -136,23 +142,28 @@ def identify_command(
         method=method,
         swarm=swarm,
     )
-    given |= {"stiffness": stiffness, "offset": offset, "history": history}
+    given |= {"stiffness": stiffness, "offset": offset}
+    given |= of_each_log(delay, history, weight, len(files))
     given |= {"seed": seed, "runs": runs, "threads": threads, "progress": result.progress}
     columns = Columns(time, drive, displacement, unit, dt)
     if validate is None and validate_window is not None:
         raise ParameterError("--validate-window is given without --validate")
-    log = windowed(columns.read(file, hold, resample), file, "--window", window)
+    windows = each_of("--window", window, len(files))
+    logs = [
+        windowed(columns.read(file, hold, resample), file, "--window", one)
+        for file, one in zip(files, windows, strict=True)
+    ]
     second = None
     if validate is not None:
         whole = columns.read(validate, hold, resample)
         second = windowed(whole, validate, "--validate-window", validate_window)
-    result.will_write(_files(kinds, log, given, validated=second is not None))
+    result.will_write(_files(kinds, logs, given, validated=second is not None))
     words: list[str] = []
     documents: list[dict[str, Any]] = []
     written: list[Path] = []
     for kind in kinds.names:
-        with of_file(file):
-            fit = _search(log, out, kind, **kinds.arguments_of(kind, given))
+        with nullcontext() if len(files) > 1 else of_file(files[0]):
+            fit = _search(logs, out, kind, **kinds.arguments_of(kind, given))
         fit, score = _judged(fit, second)
         written += _write(fit, out, second)
         # The result is complete: remove the file of an interrupted search.
@@ -168,7 +179,7 @@ def identify_command(
 
 
 def _files(
-    kinds: Kinds, log: Dataset, given: Mapping[str, Any], *, validated: bool
+    kinds: Kinds, logs: list[Dataset], given: Mapping[str, Any], *, validated: bool
 ) -> Iterator[str]:
     """Names of all files that the command may write."""
     from .._support.files import picture_files
@@ -177,9 +188,10 @@ def _files(
 
     names = [name for name in kinds.names if name != AUTO]
     if AUTO in kinds.names:
-        names += [kind.name for kind in kinds_tried(log, given)]
+        tried = kinds_tried(logs[0], given)
+        names += [kind.name for kind in tried if len(logs) == 1 or kind.searched]
     for name in dict.fromkeys(names):
-        yield from identification_files(name, searched=searched(name))
+        yield from identification_files(name, searched=searched(name), records=len(logs))
         if validated:
             yield from picture_files(*(f"{name}_validation_{panel}" for panel in PANELS))
 
@@ -189,13 +201,13 @@ def _partial(model: str) -> str:
     return f"{model}.partial.json"
 
 
-def _search(log: Dataset, out: Path, kind: str, **arguments: Any) -> Identification:
+def _search(logs: list[Dataset], out: Path, kind: str, **arguments: Any) -> Identification:
     """Identify; on Ctrl-C save the best model found so far."""
     from .._support.files import make_folder
     from ..identification.fit import identify
 
     try:
-        return identify(log, kind, **arguments)
+        return identify(logs[0] if len(logs) == 1 else logs, kind, **arguments)
     except Interrupted as stopped:
         heard()
         if stopped.partial is None:

@@ -16,8 +16,8 @@ from .controller import Controller
 from .tracking import Tracking, track
 
 if TYPE_CHECKING:
-    from ..identification.identified import Score
     from ..identification.result import Identification
+    from ..identification.score import Score
     from ..stages.inverse import Inverse
 
 __all__ = [

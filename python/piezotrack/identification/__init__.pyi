@@ -15,9 +15,9 @@ from .estimates import LagRange as LagRange
 from .estimates import Progress as Progress
 from .estimates import SwarmRun as SwarmRun
 from .fit import identify as identify
+from .fitted_record import FittedRecord as FittedRecord
 from .history import Start as Start
 from .identified import IdentifiedModel as IdentifiedModel
-from .identified import Score as Score
 from .identified import load as load
 from .least_squares import LeastSquares as LeastSquares
 from .objective import Objective as Objective
@@ -25,6 +25,7 @@ from .plot import plot_convergence as plot_convergence
 from .plot import plot_loop as plot_loop
 from .plot import plot_time as plot_time
 from .result import Identification as Identification
+from .score import Score as Score
 from .selection import Trial as Trial
 from .sensor_noise import Noise as Noise
 from .sensor_noise import identify_noise as identify_noise

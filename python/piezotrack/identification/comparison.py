@@ -16,7 +16,7 @@ from ..data.dataset import Dataset
 from ..errors import ParameterError
 from ..stages.registry import MODELS, ModelInfo, model_named
 from .fit import identify
-from .identified import IdentifiedModel, Score, load
+from .identified import IdentifiedModel, load
 from .model_file import provenance
 
 if TYPE_CHECKING:
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .history import History
+    from .score import Score
 
     Array = NDArray[np.float64]
 

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal
 
-from .. import _core
-from ..data.dataset import Dataset
-from ..errors import ParameterError
 from ..stages.registry import model_named
-from .history import checked_history
+from .asked import Own, asked_of
 from .kinds import identify_kind, refuse_given
 from .selection import AUTO, identify_best
+from .together import best_together, identify_together, refuse_several
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
+    from ..data.dataset import Dataset
     from .descents import Descents
     from .estimates import Progress
     from .history import History
@@ -23,11 +22,13 @@ if TYPE_CHECKING:
     from .step_response import StepResult
     from .swarm import ParticleSwarm
 
+    Delay = bool | float | tuple[float, float] | None
+
 __all__ = ["identify"]
 
 
 def identify(
-    data: Dataset,
+    data: Dataset | Sequence[Dataset],
     model: str = "auto",
     *,
     free: Iterable[str] | None = None,
@@ -39,9 +40,10 @@ def identify(
     constraints: Iterable[str] | None = None,
     priors: Mapping[str, tuple[float, float]] | None = None,
     stiffness: float | None = None,
-    offset: bool = True,
-    delay: bool | float | tuple[float, float] | None = None,
-    history: History | None = None,
+    offset: bool | list[bool] = True,
+    delay: Delay | list[Delay] = None,
+    history: History | list[History | None] | None = None,
+    weights: Sequence[float] | None = None,
     creep: bool | Iterable[float] | None = None,
     method: Literal["descents", "swarm"] | None = None,
     swarm: ParticleSwarm | None = None,
@@ -53,7 +55,7 @@ def identify(
     progress: bool | None = None,
     callback: Callable[[Progress], object] | None = None,
 ) -> Identification:
-    r"""Identify the parameters of a stage model from a record.
+    r"""Identify the parameters of a stage model from a record, or from several at once.
 
     Minimises the RMS deviation over the record's window,
 
@@ -63,6 +65,15 @@ def identify(
     points, by a particle swarm or, where the model is linear in its weights, by least squares. The
     warm-up before the window is simulated, from rest, and not counted.
 
+    From several records, ``pt.identify([log_a, log_b], "dahl")``, one model is identified; each
+    record is simulated from a beginning of its own and has its own offset and delay. What is
+    minimised is
+
+    .. math:: f^2 = \sum_r w_r n_r f_r^2 / \sum_r w_r n_r
+
+    with the weight, the samples and the deviation of each record: with equal weights the RMS
+    deviation of all samples. Sampling intervals and holds may differ.
+
     Voltage and displacement determine ratios only: all parameters with the dimension of force, such
     as mass, damping and stiffness, can be multiplied by one number without changing the motion.
     Where no argument fixes a force, the stiffness is held at a nominal 1e6 N/m, and the result says
@@ -71,9 +82,10 @@ def identify(
 
     Parameters
     ----------
-    data : Dataset
+    data : Dataset or sequence of Dataset
         The record. ``log[3.0:23.0]`` counts this window only and keeps the drive before it as
-        warm-up.
+        warm-up. Or several records, in a list, whose drives have one unit; for a model that is
+        searched, without `creep`. `Identification.records` has what is each one's own.
     model : str, optional
         Name of the model. By default, ``"auto"``, those that suit the record are fitted to the
         first three fifths of the window and judged on the rest, and the best is fitted to all of
@@ -121,19 +133,24 @@ def identify(
         either side. A prior of a parameter with the dimension of force fixes the scale of all.
     stiffness : float, optional
         K [N/m] where it is known.
-    offset : bool, optional
-        Whether a constant offset of the displacement is fitted too.
-    delay : bool, float or (float, float), optional
+    offset : bool or list of bool, optional
+        Whether a constant offset of the displacement is fitted too; of several records for each
+        one of its own. A list has an entry for each record.
+    delay : bool, float or (float, float), or a list of these, optional
         Delay of the displacement with respect to the drive [s], as amplifiers and slow sensor
         readings cause it: none (False, the default), fitted (True), known (a number), or fitted
         between two bounds. Under one slow sine the effect of a delay is that of damping; a drive
-        of several frequencies separates the two.
-    history : {"virgin", "settled", "fit"}, optional
+        of several frequencies separates the two. A list has an entry for each of several records;
+        each has a delay of its own in any case.
+    history : {"virgin", "settled", "fit"}, or a list of these or None, optional
         What the stage went through before the record, whose first sample finds it in equilibrium:
         nothing (``"virgin"``), the drive of the record once or more until the hysteresis repeats
         (``"settled"``), or a voltage that is fitted with the rest, V (``"fit"``), with the creep
         that it left. Where it is not given, what the record shows: with more freedom only where
-        that lowers the cost by 2 %.
+        that lowers the cost by 2 %. A list has an entry for each of several records.
+    weights : sequence of float, optional
+        How much each sample of a record counts beside those of the others: only the ratios matter,
+        and a weight of 2 is that record given twice. 1 each where not given.
     creep : bool or iterable of float, optional
         Creep of the stage: none (False, the default), relaxations with these time constants [s],
         three at most, or two whose time constants follow from the record (True): the drive's
@@ -203,13 +220,7 @@ def identify(
     >>> print(f"K = {1e-3 * fit.model.stiffness:.1f} kN/m, {fit.nit > 0}")
     K = 26.1 kN/m, True
     """
-    if not isinstance(data, Dataset):
-        raise ParameterError(
-            f"data is {type(data).__name__}: expected a Dataset, as pt.read "
-            "or pt.Dataset.from_frame make it"
-        )
-    offset = _core.as_truth("offset", offset)
-    history = checked_history(history)
+    records = asked_of(data, Own(offset, history, delay, weights))
     of_swarm: dict[str, Any] = {
         "free": free,
         "fixed": fixed,
@@ -220,7 +231,6 @@ def identify(
         "constraints": constraints,
         "priors": priors,
         "stiffness": stiffness,
-        "delay": delay,
         "creep": creep,
         "method": method,
         "swarm": swarm,
@@ -231,17 +241,21 @@ def identify(
         "progress": progress,
         "callback": callback,
     }
+    if len(records) > 1:
+        refuse_several("creep", creep, len(records))
+        refuse_several("least_squares", least_squares, len(records))
+        if model == AUTO:
+            return best_together(records, of_swarm)
+        return identify_together(records, model_named(model), of_swarm)
+    (one,) = records
+    alone: dict[str, Any] = {
+        "offset": one.offset,
+        "history": one.history,
+        "of_swarm": of_swarm | {"delay": one.delay},
+        "least_squares": least_squares,
+    }
     if model == AUTO:
-        return identify_best(
-            data, offset=offset, history=history, of_swarm=of_swarm, least_squares=least_squares
-        )
+        return identify_best(one.data, **alone)
     info = model_named(model)
-    refuse_given(info, of_swarm, least_squares)
-    return identify_kind(
-        data,
-        info,
-        offset=offset,
-        history=history,
-        of_swarm=of_swarm,
-        least_squares=least_squares,
-    )
+    refuse_given(info, alone["of_swarm"], least_squares)
+    return identify_kind(one.data, info, **alone)

@@ -9,6 +9,7 @@ from .._support.html_table import html_table
 from .report import said_of
 
 if TYPE_CHECKING:
+    from ..data.dataset import Dataset
     from .comparison import Comparison
     from .estimates import Constraint, Estimate
     from .result import Identification
@@ -18,24 +19,60 @@ __all__ = ["comparison_html", "identification_html"]
 
 def identification_html(fit: Identification) -> str:
     """Write model, record, errors, parameters and warnings of a fit."""
-    score = fit.fitted
     rows = [
-        ("record", f"{fit.data.source or 'unnamed'}: {fit.data!r}"),
+        *(_record(one.data) for one in fit.records if one.data is not None),
         ("model", repr(fit.model)),
         ("rms error", f"{fit.cost_um:.4g} um, {fit.cost_percent:.3g} % of stroke"),
-        ("largest error", f"{1e6 * score.max_error:.4g} um"),
-        ("offset", f"{1e6 * fit.offset:.4g} um"),
     ]
-    if fit.delay:
-        rows.append(("delay", f"{1e3 * fit.delay:.4g} ms"))
+    if len(fit.records) == 1:
+        rows += [
+            ("largest error", f"{1e6 * fit.fitted.max_error:.4g} um"),
+            ("offset", f"{1e6 * fit.offset:.4g} um"),
+        ]
+        if fit.delay:
+            rows.append(("delay", f"{1e3 * fit.delay:.4g} ms"))
     rows += [("constraint", _constraint(one)) for one in fit.constraints]
     rows += [("note", note) for note in fit.notes]
     tables = [html_table(f"Identification: {fit.model.info.title}", rows)]
+    if len(fit.records) > 1:
+        tables.append(_records(fit))
     if fit.parameters:
         found = [_estimate(fit, name, one) for name, one in fit.parameters.items()]
         heads = ("parameter", "symbol", "value", "unit", "standard deviation")
         tables.append(html_table("Parameters", found, heads))
     return "".join(tables)
+
+
+def _record(data: Dataset) -> tuple[str, str]:
+    return "record", f"{data.source or 'unnamed'}: {data!r}"
+
+
+def _records(fit: Identification) -> str:
+    """Write what each of several records has of its own."""
+    heads = (
+        "record",
+        "weight",
+        "rms error [um]",
+        "% of its stroke",
+        "largest [um]",
+        "offset [um]",
+        "delay [ms]",
+        "begins",
+    )
+    rows = [
+        (
+            f"{i + 1}",
+            f"{one.weight:g}",
+            f"{1e6 * one.cost:.4g}",
+            f"{one.cost_percent:.3g}",
+            f"{1e6 * score.max_error:.4g}",
+            f"{1e6 * one.offset:.4g}",
+            f"{1e3 * one.delay:.4g}",
+            one.start.history if one.start else "",
+        )
+        for i, (one, score) in enumerate(zip(fit.records, fit.scores, strict=True))
+    ]
+    return html_table("Records", rows, heads)
 
 
 def _estimate(fit: Identification, name: str, one: Estimate) -> tuple[str, ...]:

@@ -13,9 +13,11 @@ from .._support.arrays import check_dt, signal_of
 from .._support.files import write_document
 from ..data.dataset import Dataset
 from ..errors import ParameterError, ShapeError
+from .fitted_record import record_of
 from .history import begin, checked_history, same_beginning
 from .model_file import document_of, drive_unit_of, read_model, sensor_number
-from .remarks import beyond_fit, fit_percent
+from .remarks import beyond_fit
+from .score import Score
 
 if TYPE_CHECKING:
     import os
@@ -27,62 +29,12 @@ if TYPE_CHECKING:
     from ..data.dataset import Hold
     from ..stages.base import Response, StageState
     from ..stages.inverse import Inverse
+    from .fitted_record import FittedRecord
     from .history import History, Start
 
     Array = NDArray[np.float64]
 
-__all__ = ["IdentifiedModel", "Score", "load"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Score:
-    """Deviation of a simulated displacement from the measured one.
-
-    Attributes
-    ----------
-    rms, max_error : float
-        Root mean square and largest absolute deviation [m].
-    stroke : float
-        Stroke that the percentages refer to [m].
-    offset : float
-        Offset added to the simulated displacement [m].
-    spread : float
-        Standard deviation of the measured displacement [m], to which `fit_percent` refers.
-    notes : tuple of str
-        Remarks on a record that goes beyond the one identified.
-    """
-
-    rms: float
-    max_error: float
-    stroke: float
-    offset: float
-    spread: float = math.nan
-    notes: tuple[str, ...] = ()
-
-    @property
-    def rms_percent(self) -> float:
-        """`rms` in per cent of the stroke."""
-        return 100.0 * self.rms / self.stroke
-
-    @property
-    def max_percent(self) -> float:
-        """`max_error` in per cent of the stroke."""
-        return 100.0 * self.max_error / self.stroke
-
-    @property
-    def fit_percent(self) -> float:
-        """Share of the motion that the model explains, 100 (1 - |y - x| / |y - mean y|) [%].
-
-        100 for an exact model; 0 for one that is no better than the mean of the record.
-        """
-        return fit_percent(self.rms, self.spread)
-
-    def __str__(self) -> str:
-        fit = "" if math.isnan(self.spread) else f", fit {self.fit_percent:.4g} %"
-        return (
-            f"rms {1e6 * self.rms:.4g} um ({self.rms_percent:.3g} % of stroke), "
-            f"max {1e6 * self.max_error:.4g} um ({self.max_percent:.3g} %){fit}"
-        )
+__all__ = ["IdentifiedModel", "load"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,6 +59,10 @@ class IdentifiedModel:
     start : Start or None
         Where the record identified begins: what the stage went through before, and its state at
         the first sample. None in files of older versions.
+    records : tuple of FittedRecord
+        What each of several records identified has of its own; `offset`, `delay` and `start` are
+        those of the first, and `stroke` is the largest. Of one record: a result has it alone, a
+        model from a file has none.
     details : mapping
         Other entries of the model file: fit, provenance.
     """
@@ -119,6 +75,7 @@ class IdentifiedModel:
     scale_assumed: bool = False
     delay: float = 0.0
     start: Start | None = None
+    records: tuple[FittedRecord, ...] = ()
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
@@ -126,9 +83,11 @@ class IdentifiedModel:
 
     @property
     def drive_range(self) -> tuple[float, float] | None:
-        """Lowest and highest drive of the record identified; None if the file has none."""
-        found = self._record.get("drive_range")
-        return (float(found[0]), float(found[1])) if found else None
+        """Lowest and highest drive of the records identified; None if the file has none."""
+        found = [one["drive_range"] for one in self._origins if one.get("drive_range")]
+        if not found:
+            return None
+        return float(min(low for low, _ in found)), float(max(high for _, high in found))
 
     @property
     def drive_unit(self) -> str:
@@ -148,6 +107,16 @@ class IdentifiedModel:
         return origin.get("data") or {}
 
     @property
+    def _origins(self) -> list[Mapping[str, Any]]:
+        """Entries of the file on each record identified."""
+        several = len(self.records) > 1
+        return [one.origin for one in self.records] if several else [self._record]
+
+    def _own(self, data: Dataset) -> FittedRecord | None:
+        """Which of several records identified a record is, or is a window of."""
+        return record_of(self.records, data) if len(self.records) > 1 else None
+
+    @property
     def free_count(self) -> int | None:
         """Number of values fitted, offset included; None if the file does not have it.
 
@@ -160,7 +129,8 @@ class IdentifiedModel:
         own = self.model.parameter_names()
         free = [name for name in own if found.get(name, {}).get("free", False)]
         delay = bool(self.details.get("delay", {}).get("free", False))
-        return sum(_count(getattr(self.model, name)) for name in free) + delay + self.offset_fitted
+        offsets = int(self.offset_fitted) + sum(one.offset_fitted for one in self.records[1:])
+        return sum(_count(getattr(self.model, name)) for name in free) + delay + offsets
 
     def beyond_fit(self, u: ArrayLike, dt: float | None = None) -> list[str]:
         """Remarks on a drive that goes beyond the range or the rate of the record identified.
@@ -182,12 +152,12 @@ class IdentifiedModel:
         DataError, ShapeError, ParameterError
             If `u` is no sequence of finite numbers, or `dt` no interval.
         """
-        rate = self._record.get("drive_rate")
+        rates = [one["drive_rate"] for one in self._origins if one.get("drive_rate") is not None]
         drive = signal_of("u", u)
         interval = None if dt is None else check_dt(dt)
         if not drive.size:
             raise ShapeError("u has no samples: expected at least one")
-        most = None if rate is None else float(rate)
+        most = float(max(rates)) if rates else None
         return beyond_fit(drive, interval, self.drive_range, most, self.drive_unit)
 
     def fitted_on(self, data: Dataset) -> bool:
@@ -203,7 +173,7 @@ class IdentifiedModel:
         bool
             Whether window, warm-up and all numbers are the same.
         """
-        return self._record.get("sha256") == data.sha256
+        return any(one.get("sha256") == data.sha256 for one in self._origins)
 
     def window_on(self, data: Dataset) -> tuple[float, float] | None:
         """Return which window of a record was fitted, judged by the name of its file.
@@ -218,11 +188,12 @@ class IdentifiedModel:
         (float, float) or None
             The window [s] if it overlaps `data`; None otherwise.
         """
-        window = self._record.get("window_s")
-        same = data.source is not None and self._record.get("source") == data.source
-        if not same or not window or window[0] > data.t[-1] or window[1] < data.t[0]:
-            return None
-        return float(window[0]), float(window[1])
+        for one in self._origins:
+            window = one.get("window_s")
+            same = data.source is not None and one.get("source") == data.source
+            if same and window and window[0] <= data.t[-1] and window[1] >= data.t[0]:
+                return float(window[0]), float(window[1])
+        return None
 
     def inverse(
         self,
@@ -271,12 +242,18 @@ class IdentifiedModel:
         ndarray, shape (n,)
             Displacement with offset and delay [m].
         """
-        return self._shown(self.model.simulate(u, dt, hold=hold, initial=initial)) + self.offset
+        run = self.model.simulate(u, dt, hold=hold, initial=initial)
+        return self._shown(run, self.delay) + self.offset
 
-    def _shown(self, run: Response) -> Array:
+    def _shown(self, run: Response, delay: float) -> Array:
         """Displacement with the delay of the sensor [m]."""
         dt = float(run.t[1]) if run.t.size > 1 else 1.0
-        return _core.delayed(run.x, run.v, dt, self.delay) if self.delay else run.x
+        return _core.delayed(run.x, run.v, dt, delay) if delay else run.x
+
+    def _delay_on(self, data: Dataset) -> float:
+        """Delay of the sensor on a record [s]: its own where it is one of those identified."""
+        own = self._own(data)
+        return self.delay if own is None else own.delay
 
     def simulate(
         self,
@@ -297,7 +274,7 @@ class IdentifiedModel:
             this record's window best, otherwise none.
         history : {"virgin", "settled", "fit"}, optional
             What the stage went through before the record; see `identify`. Where it is not given:
-            of the record identified as it was there, of another one what that record shows.
+            of a record identified as it was there, of another one what that record shows.
         initial : StageState, optional
             State at the first sample of the record and its warm-up, such as the `final` of the
             record before it, in place of a history.
@@ -306,7 +283,7 @@ class IdentifiedModel:
         -------
         Response
             Motion in the window; offset and delay are in its displacement, the rest is the
-            stage's own.
+            stage's own. The delay is that of the record where it is one of those identified.
         """
         if not isinstance(data, Dataset):
             raise ParameterError(f"data is {type(data).__name__}: expected a Dataset")
@@ -318,7 +295,7 @@ class IdentifiedModel:
         state = self._begins(data, history, initial)
         start = data.warmup
         run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
-        x = self._shown(run)[start:]
+        x = self._shown(run, self._delay_on(data))[start:]
         signals = {
             one.name: value[start:]
             for one in fields(run)
@@ -352,15 +329,17 @@ class IdentifiedModel:
         Returns
         -------
         Score
-            Percentages refer to the stroke of the record identified.
+            Percentages refer to the stroke of the record identified: of one of several to its
+            own, of another record to the largest.
         """
         x = self.simulate(data, offset=0.0, history=history, initial=initial).x
         shift = self._shift(data, x, offset)
         error = data.y - x - shift
+        own = self._own(data)
         return Score(
             rms=float(np.sqrt(np.mean(error**2))),
             max_error=float(np.abs(error).max()),
-            stroke=self.stroke,
+            stroke=self.stroke if own is None else own.stroke,
             offset=shift,
             spread=float(np.std(data.y)),
             notes=tuple(self.beyond_fit(data.u, data.dt)),
@@ -382,16 +361,22 @@ class IdentifiedModel:
             Its `state` is in equilibrium under the first sample of the drive.
         """
         history = checked_history(history)
-        known = self.start
+        own = self._own(data)
+        known = self.start if own is None else own.start
         if known and same_beginning(known, data) and history in (None, known.history):
             return known
-        return begin(self.model, data, history, self._residual, offset=self.offset_fitted)
+        return begin(self.model, data, history, self._residual, offset=self._fits_offset(data))
 
     def _residual(self, data: Dataset, state: StageState) -> Array:
         """Measured less simulated displacement in the window, without offset [m]."""
         run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
-        rest: Array = data.y - self._shown(run)[data.warmup :]
+        rest: Array = data.y - self._shown(run, self._delay_on(data))[data.warmup :]
         return rest
+
+    def _fits_offset(self, data: Dataset) -> bool:
+        """Whether a record gets an offset."""
+        own = self._own(data)
+        return self.offset_fitted if own is None else own.offset_fitted
 
     def _begins(
         self, data: Dataset, history: History | None, initial: StageState | None
@@ -412,7 +397,7 @@ class IdentifiedModel:
             if not math.isfinite(shift):
                 raise ParameterError(f"offset is {shift}: expected a finite number or 'own'")
             return shift
-        return float(np.mean(data.y - x)) if self.offset_fitted else 0.0
+        return float(np.mean(data.y - x)) if self._fits_offset(data) else 0.0
 
     def document(self) -> dict[str, Any]:
         """Content of the JSON file.

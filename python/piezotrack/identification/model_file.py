@@ -12,6 +12,7 @@ from .._support.json_text import number_pair, object_of, parse_json, text_of
 from .._support.units import of_drive
 from ..errors import DataError, ParameterError, PiezotrackError
 from ..stages.registry import model_named, stage_class
+from .fitted_record import record_entries, records_of_file
 from .history import start_entry, start_of
 from .remarks import drive_rate, fit_percent
 
@@ -20,8 +21,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from ..data.dataset import Dataset
+    from ..stages.base import StageState
     from ..stages.model_info import ModelInfo
     from .estimates import Constraint
+    from .fitted_record import FittedRecord
     from .identified import IdentifiedModel
 
 __all__ = [
@@ -29,6 +32,7 @@ __all__ = [
     "document_of",
     "drive_unit_of",
     "fit_entry",
+    "origin_of",
     "provenance",
     "read_model",
     "sensor_number",
@@ -53,6 +57,7 @@ OWN = {
     "stroke",
     "delay",
     "start",
+    "records",
 }
 # Unit and limits of the numbers that go with a stage. What is beyond them is in another unit.
 SENSOR: dict[str, tuple[str, Callable[[float], bool], str]] = {
@@ -99,6 +104,7 @@ def document_of(model: IdentifiedModel) -> dict[str, Any]:
         "stroke": {"value": model.stroke, "unit": "m"},
         "delay": {"value": model.delay, "unit": "s"} | delay,
         "start": start_entry(model.start, model.drive_unit),
+        **record_entries(model.records, model.drive_unit),
         **details,
     }
 
@@ -155,6 +161,7 @@ def read_model(path: str | os.PathLike[str]) -> dict[str, Any]:
             "stroke": file_number("stroke", document["stroke"]),
             "delay": file_number("delay", delay),
             "start": start_of(document.get("start"), stage_class(info)._state),
+            "records": _records(document, stage_class(info)._state),
             "details": {
                 "parameters": {key: _fit_details(entry) for key, entry in parameters.items()},
                 "delay": _fit_details(delay),
@@ -165,14 +172,27 @@ def read_model(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 def _check_origin(found: Any) -> None:
     """Refuse entries on the record identified that cannot be used."""
-    record = object_of("provenance: data", object_of("provenance", found).get("data"))
+    _check_record("provenance: data", object_of("provenance", found).get("data"))
+
+
+def _check_record(place: str, found: Any) -> None:
+    """Refuse entries on a record that cannot be used."""
+    record = object_of(place, found)
     for name in ("source", "sha256", "drive_unit"):
-        text_of(f"provenance: data: {name}", record.get(name))
+        text_of(f"{place}: {name}", record.get(name))
     for name in ("drive_rate", "dt_s"):
         if record.get(name) is not None:
-            _core.as_number(f"provenance: data: {name}", record[name])
+            _core.as_number(f"{place}: {name}", record[name])
     for name in ("window_s", "drive_range"):
-        number_pair(f"provenance: data: {name}", record.get(name))
+        number_pair(f"{place}: {name}", record.get(name))
+
+
+def _records(document: Mapping[str, Any], state: type[StageState]) -> tuple[FittedRecord, ...]:
+    """Read the records of a model that was identified from several."""
+    records = records_of_file(document.get("records"), state)
+    for i, one in enumerate(records):
+        _check_record(f"records[{i}]: data", one.origin)
+    return records
 
 
 def drive_unit_of(details: Mapping[str, Any], info: ModelInfo) -> str:
@@ -285,7 +305,9 @@ def constraint_entries(constraints: Iterable[Constraint]) -> dict[str, Any]:
     return {"constraints": found} if found else {}
 
 
-def fit_entry(cost: float, data: Dataset, with_priors: float | None = None) -> dict[str, Any]:
+def fit_entry(
+    cost: float, data: Dataset, with_priors: float | None = None, spread: float | None = None
+) -> dict[str, Any]:
     """Entries of a file on the residual of a fit.
 
     Parameters
@@ -296,17 +318,20 @@ def fit_entry(cost: float, data: Dataset, with_priors: float | None = None) -> d
         The record.
     with_priors : float or None, optional
         What was minimised, where there were priors [m].
+    spread : float or None, optional
+        Standard deviation of the measured displacement [m]; that of the record where not given.
 
     Returns
     -------
     dict
         Of numbers, texts and dicts only.
     """
+    spread = float(data.y.std()) if spread is None else spread
     known = {} if with_priors is None else {"cost_with_priors": {"value": with_priors, "unit": "m"}}
     return {
         "cost": {"value": cost, "unit": "m"},
         **known,
-        "fit_percent": {"value": fit_percent(cost, float(data.y.std())), "unit": "%"},
+        "fit_percent": {"value": fit_percent(cost, spread), "unit": "%"},
     }
 
 
@@ -316,18 +341,23 @@ def provenance(data: Dataset, **settings: Any) -> dict[str, Any]:
         "package": "piezotrack",
         "version": _core.__version__,
         **settings,
-        "data": {
-            "source": data.source,
-            "sha256": data.sha256,
-            "samples": len(data),
-            "warmup_samples": data.warmup,
-            "window_s": [float(data.t[0]), float(data.t[-1])],
-            "dt_s": data.dt,
-            "drive_range": [float(data.full.u.min()), float(data.full.u.max())],
-            "drive_rate": drive_rate(data.full.u, data.dt),
-            "drive_unit": data.drive_unit,
-            "hold": data.hold,
-        },
+        "data": origin_of(data),
+    }
+
+
+def origin_of(data: Dataset) -> dict[str, Any]:
+    """Entries of a file on a record."""
+    return {
+        "source": data.source,
+        "sha256": data.sha256,
+        "samples": len(data),
+        "warmup_samples": data.warmup,
+        "window_s": [float(data.t[0]), float(data.t[-1])],
+        "dt_s": data.dt,
+        "drive_range": [float(data.full.u.min()), float(data.full.u.max())],
+        "drive_rate": drive_rate(data.full.u, data.dt),
+        "drive_unit": data.drive_unit,
+        "hold": data.hold,
     }
 
 

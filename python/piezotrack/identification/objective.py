@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from .. import _core
+from ..data.dataset import Dataset
 from ..errors import ParameterError
 from ..stages.registry import model_named
+from .asked import Asked
 from .question import question_of
 
 if TYPE_CHECKING:
@@ -16,7 +18,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from ..data.dataset import Dataset
     from .history import History
     from .step_response import StepResult
 
@@ -83,14 +84,14 @@ class Objective:
         delay: bool | float | tuple[float, float] | None = None,
         creep: bool | Iterable[float] | None = None,
     ) -> None:
+        if not isinstance(data, Dataset):
+            raise ParameterError(f"data is {type(data).__name__}: expected a Dataset, one record")
         info = model_named(model)
         if not info.searched:
             raise ParameterError(f"model is {model!r}: expected one that is searched")
         question = question_of(
-            data,
+            Asked(data=data, offset=offset, history=history, delay=delay),
             info,
-            offset=offset,
-            history=history,
             free=free,
             fixed=fixed,
             initial=initial,
@@ -100,7 +101,6 @@ class Objective:
             constraints=constraints,
             priors=priors,
             stiffness=stiffness,
-            delay=delay,
             creep=creep,
         )
         count = 0 if threads is None else _core.as_count("threads", threads)

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
     from ..data.dataset import Dataset
     from ..stages.base import Response
+    from .fitted_record import FittedRecord
     from .result import Identification
 
     Array = NDArray[np.float64]
@@ -296,6 +297,8 @@ def plot_identification(
     matplotlib.figure.Figure
         The figure drawn in, with four panels or three.
     """
+    if data is None and len(fit.records) > 1:
+        return _of_records(fit, fig)
     own = data is None
     record = fit.data if data is None else data
     run = fit.simulate(record, offset=fit.offset if own else "own")
@@ -313,9 +316,43 @@ def plot_identification(
     return whole(figure)
 
 
-def what_was_fitted(fit: Identification) -> str:
-    """Write model, record, window and error of a fit, as the title of its pictures."""
-    return f"{named(fit, fit.data)}: {fit.cost_percent:.3g} % of stroke rms"
+def _of_records(fit: Identification, fig: Figure | SubFigure | None) -> Figure:
+    """Draw loop, displacement and error of each record, and the convergence below."""
+    count = len(fit.records)
+    figure = panels(fig, (11.0, 4.6 * count + 3.0))
+    parts = figure.subfigures(count + 1, 1, height_ratios=[4.6] * count + [3.0], squeeze=False)
+    for one, part in zip(fit.records, parts[:count, 0], strict=True):
+        if one.data is None:
+            continue
+        run = fit.simulate(one.data, offset=one.offset)
+        grid = part.add_gridspec(2, 2, width_ratios=[1.0, 1.35])
+        plot_loop(one.data, run, part.add_subplot(grid[:, 0]))
+        above = part.add_subplot(grid[0, 1])
+        below = part.add_subplot(grid[1, 1], sharex=above)
+        plot_time(one.data, run, (above, below), stroke=one.stroke)
+        part.suptitle(what_was_fitted(fit, one), fontsize="large")
+    plot_convergence(fit, parts[count, 0].subplots())
+    return whole(figure)
+
+
+def what_was_fitted(fit: Identification, own: FittedRecord | None = None) -> str:
+    """Write model, record, window and error of a fit, as the title of its pictures.
+
+    Parameters
+    ----------
+    fit : Identification
+        The fit.
+    own : FittedRecord, optional
+        Which of its records; the first where not given.
+
+    Returns
+    -------
+    str
+        One line.
+    """
+    own = fit.records[0] if own is None else own
+    record = fit.data if own.data is None else own.data
+    return f"{named(fit, record)}: {own.cost_percent:.3g} % of stroke rms"
 
 
 def what_was_not_fitted(fit: Identification, record: Dataset, run: Response) -> str:

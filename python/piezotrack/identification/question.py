@@ -10,23 +10,21 @@ from .._support.arguments import as_numbers
 from .._support.messages import quoted
 from ..data import diagnostics
 from ..errors import ParameterError
+from .asked import of_record
 from .parameter_arguments import ParameterArguments
 from .step_response import StepResult
 
 if TYPE_CHECKING:
-    from ..data.dataset import Dataset
     from ..stages.model_info import ModelInfo
-    from .history import History
+    from .asked import Asked
 
 __all__ = ["question_of"]
 
 
 def question_of(
-    data: Dataset,
+    asked: Asked,
     info: ModelInfo,
     *,
-    offset: bool,
-    history: History,
     free: object = None,
     fixed: object = None,
     initial: object = None,
@@ -36,22 +34,18 @@ def question_of(
     constraints: object = None,
     priors: object = None,
     stiffness: object = None,
-    delay: object = None,
     creep: object = None,
 ) -> dict[str, Any]:
     """Check what is asked of a record, and return it as the core takes it.
 
     Parameters
     ----------
-    data : Dataset
-        The record.
+    asked : Asked
+        The record, and what is asked of it alone; without a history that of a stage that never
+        moved.
     info : ModelInfo
         The model.
-    offset : bool
-        Whether an offset of the sensor is fitted.
-    history : {"virgin", "settled", "fit"}
-        What the stage went through before the record.
-    free, fixed, initial, bounds, scales, ties, constraints, priors, stiffness, delay, creep
+    free, fixed, initial, bounds, scales, ties, constraints, priors, stiffness, creep
         As for `identify`, not yet checked; None stands for the default.
 
     Returns
@@ -64,11 +58,14 @@ def question_of(
     ParameterError, DataError
         As for `identify`.
     """
-    searched_delay = _delay(False if delay is None else delay)
+    data = asked.data
+    with of_record(asked.label):
+        searched_delay = _delay(False if asked.delay is None else asked.delay)
     creep_times = _creep_times(False if creep is None else creep)
     said = ParameterArguments.checked(scales, ties, constraints, priors)
     held = _held(initial, fixed, free, bounds, said.named)
-    diagnostics.check_record(data, searches_hysteresis=bool(set(info.hysteresis) - set(held)))
+    with of_record(asked.label):
+        diagnostics.check_record(data, searches_hysteresis=bool(set(info.hysteresis) - set(held)))
     full = data.full
     return {
         "model": info.name,
@@ -82,10 +79,12 @@ def question_of(
         "bounds": [(name, _pair(name, pair)) for name, pair in _items("bounds", bounds)],
         **said.core,
         "stiffness": None if stiffness is None else _core.as_number("stiffness", stiffness),
-        "offset": offset,
+        "offset": asked.offset,
         "delay": searched_delay,
-        "history": history,
+        "history": asked.history or "virgin",
         "creep": creep_times,
+        "label": asked.label,
+        "weight": asked.weight,
     }
 
 

@@ -10,6 +10,8 @@ import numpy as np
 from .._support.units import drive_text, shown_unit
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from ..data.dataset import Dataset
@@ -26,6 +28,7 @@ __all__ = [
     "fit_percent",
     "of_lags",
     "of_start",
+    "spread_of",
 ]
 
 # A residual of so many times the noise is not due to the noise.
@@ -59,6 +62,26 @@ def fit_percent(rms: float, spread: float) -> float:
     95.0
     """
     return 100.0 * (1.0 - rms / spread) if spread else -math.inf
+
+
+def spread_of(records: Sequence[tuple[Dataset, float]]) -> float:
+    """Return the standard deviation of measured displacements, each about its own mean [m].
+
+    Parameters
+    ----------
+    records : sequence of (Dataset, float)
+        The records with their weights.
+
+    Returns
+    -------
+    float
+        Of one record that of its displacement.
+    """
+    if len(records) == 1:
+        return float(records[0][0].y.std())
+    counts = np.array([weight * len(data) for data, weight in records])
+    squares = np.array([float(data.y.var()) for data, _ in records])
+    return math.sqrt(float(counts @ squares) / float(counts.sum()))
 
 
 def above_noise(cost: float, noise: float) -> list[str]:

@@ -38,17 +38,7 @@ def summary_text(fit: Identification) -> str:
     str
         Several lines.
     """
-    data = fit.data
-    lines = [
-        f"{fit.model.info.title}: stage identified from {data.source or 'a record'}, "
-        f"{len(data)} samples, {data.duration:.4g} s at {1 / data.dt:.6g} Hz, "
-        f"stroke {1e6 * data.stroke:.4g} um",
-        f"cost  {fit.cost_um:.4g} um rms = {fit.cost_percent:.3g} % of stroke, "
-        f"fit {fit.fit_percent:.4g} %"
-        + (f", offset {1e6 * fit.offset:.5g} um fitted" if fit.offset_fitted else ""),
-    ]
-    if begun := of_start(fit.start, data):
-        lines.append(f"      the record begins {begun}")
+    lines = _of_several(fit) if len(fit.records) > 1 else _of_one(fit)
     if fit.cost_with_priors is not None:
         lines.append(f"      {1e6 * fit.cost_with_priors:.4g} um with the priors was minimised")
     searched = fit.model.info.searched
@@ -62,6 +52,59 @@ def summary_text(fit: Identification) -> str:
     lines += [*(f"note  {note}" for note in fit.notes), ""]
     return "\n".join(
         [*lines, *(_estimates(fit) if searched else _values(fit, fit.model.info.parameters))]
+    )
+
+
+def _of_one(fit: Identification) -> list[str]:
+    """Say from which record, and what is left of it."""
+    data = fit.data
+    lines = [
+        f"{fit.model.info.title}: stage identified from {data.source or 'a record'}, {_size(data)}",
+        f"cost  {fit.cost_um:.4g} um rms = {fit.cost_percent:.3g} % of stroke, "
+        f"fit {fit.fit_percent:.4g} %"
+        + (f", offset {1e6 * fit.offset:.5g} um fitted" if fit.offset_fitted else ""),
+    ]
+    if begun := of_start(fit.start, data):
+        lines.append(f"      the record begins {begun}")
+    return lines
+
+
+def _of_several(fit: Identification) -> list[str]:
+    """Say from which records, what is left of each, and what each has of its own."""
+    lines = [
+        f"{fit.model.info.title}: stage identified from {len(fit.records)} records",
+        f"cost  {fit.cost_um:.4g} um rms of all = {fit.cost_percent:.3g} % of the largest stroke, "
+        f"fit {fit.fit_percent:.4g} %",
+    ]
+    for i, one in enumerate(fit.records):
+        if one.data is None:
+            continue
+        said = f"{1e6 * one.cost:.4g} um rms = {one.cost_percent:.3g} % of its stroke"
+        said += "" if one.weight == 1.0 else f", weight {one.weight:g}"
+        said += f", offset {1e6 * one.offset:.5g} um fitted" if one.offset_fitted else ""
+        if "delay" in one.parameters:
+            said += f", delay {1e3 * one.delay:.4g} ms" + _spread(one.parameters["delay"])
+        lines += [
+            f"  {i + 1:>2}  {one.data.source or 'unnamed'}, {_size(one.data)}",
+            f"      {said}",
+        ]
+        if begun := of_start(one.start, one.data):
+            lines.append(f"      it begins {begun}")
+    return lines
+
+
+def _spread(delay: Estimate) -> str:
+    """Write the standard deviation of a delay, where it is known."""
+    if delay.deviation is None or not math.isfinite(delay.deviation):
+        return ""
+    return f" +- {1e3 * delay.deviation:.2g} ms"
+
+
+def _size(data: Dataset) -> str:
+    """Write the size of a record."""
+    return (
+        f"{len(data)} samples, {data.duration:.4g} s at {1 / data.dt:.6g} Hz, "
+        f"stroke {1e6 * data.stroke:.4g} um"
     )
 
 
@@ -94,10 +137,11 @@ def _estimates(fit: Identification) -> list[str]:
     lines += [_row(fit, name, estimate, width) for name, estimate in fit.parameters.items()]
     lines += _values(fit, [one for one in fit.model.info.parameters if one.is_list])[1:-1]
     lines += _constraints(fit)
+    which = "this record" if len(fit.records) == 1 else "these records"
     if unclear := [n for n, e in fit.parameters.items() if not (e.identified or e.from_prior)]:
-        lines += ["", "Not determined by this record: " + ", ".join(unclear) + "."]
+        lines += ["", f"Not determined by {which}: " + ", ".join(unclear) + "."]
     if known := [n for n, e in fit.parameters.items() if e.from_prior]:
-        lines += ["", "Known by their priors, not by this record: " + ", ".join(known) + "."]
+        lines += ["", f"Known by their priors, not by {which}: " + ", ".join(known) + "."]
     if fit.nfail:
         lines += ["", f"{fit.nfail} simulations diverged; their cost counted as infinite."]
     return lines
@@ -251,7 +295,7 @@ def _row(fit: Identification, name: str, estimate: Estimate, width: int) -> str:
     ).rstrip()
 
 
-def identification_files(name: str, *, searched: bool) -> list[str]:
+def identification_files(name: str, *, searched: bool, records: int = 1) -> list[str]:
     """Return the names of the files that `save_identification` writes.
 
     Parameters
@@ -260,14 +304,22 @@ def identification_files(name: str, *, searched: bool) -> list[str]:
         Beginning of the file names.
     searched : bool
         Whether the model is searched.
+    records : int, optional
+        Number of records.
 
     Returns
     -------
     list of str
         The model and its pictures.
     """
-    pictures = ("loop", "time", "convergence") if searched else ("loop", "time")
+    pictures = [f"{panel}{_nth(i)}" for i in range(records) for panel in ("loop", "time")]
+    pictures += ["convergence"] if searched else []
     return [f"{name}.json", *picture_files(*(f"{name}_{picture}" for picture in pictures))]
+
+
+def _nth(i: int) -> str:
+    """End of the names of a record's pictures: nothing for the first."""
+    return f"_{i + 1}" if i else ""
 
 
 def save_identification(
@@ -288,26 +340,29 @@ def save_identification(
     name : str, optional
         Beginning of the file names; by default the name of the model.
     shown : Dataset, optional
-        A longer record that the pictures show, with the end of the fit marked.
+        A longer record that the pictures show, with the end of the fit marked; of a fit of one
+        record.
 
     Returns
     -------
     list of pathlib.Path
         ``{name}.json``, and as PNG and SVG ``{name}_loop``, ``{name}_time`` and, after a
-        search, ``{name}_convergence``.
+        search, ``{name}_convergence``; of a second record ``{name}_loop_2`` and ``{name}_time_2``.
     """
     from .plot import named, plot_convergence, plot_loop, plot_time, what_was_fitted
 
     name = fit.model.info.name if name is None else name
-    record = fit.data if shown is None else shown
-    run = fit.simulate(record, offset=fit.offset)
     until = None if shown is None else float(fit.data.t[-1])
-    title = what_was_fitted(fit)
-    above, _ = plot_time(record, run, stroke=fit.stroke, fitted_until=until, title=title)
-    figures = {
-        f"{name}_loop": plot_loop(record, run, title=title).figure,
-        f"{name}_time": above.figure,
-    }
+    figures = {}
+    for i, one in enumerate(fit.records):
+        record = one.data if shown is None else shown
+        if record is None:
+            continue
+        run = fit.simulate(record, offset=one.offset)
+        title = what_was_fitted(fit, one)
+        above, _ = plot_time(record, run, stroke=one.stroke, fitted_until=until, title=title)
+        figures[f"{name}_loop{_nth(i)}"] = plot_loop(record, run, title=title).figure
+        figures[f"{name}_time{_nth(i)}"] = above.figure
     if fit.model.info.searched:
         figures[f"{name}_convergence"] = plot_convergence(fit, title=named(fit, fit.data)).figure
     with together(make_folder(folder)) as path:

@@ -12,7 +12,8 @@ import numpy as np
 from .._support.statistics import sample_noise
 from ..data import diagnostics
 from . import remarks
-from .identified import IdentifiedModel, Score
+from .fitted_record import FittedRecord
+from .identified import IdentifiedModel
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from .descents import Descents
     from .estimates import Constraint, Estimate, LagRange, StopReason, SwarmRun
     from .least_squares import LeastSquares
+    from .score import Score
     from .selection import Trial
     from .swarm import ParticleSwarm
 
@@ -43,9 +45,13 @@ class Identification(IdentifiedModel):
     Attributes
     ----------
     data : Dataset
-        The record.
+        The record; the first of several.
+    records : tuple of FittedRecord
+        The records, each with its weight, delay, offset, start and cost. `data`, `delay`,
+        `offset`, `start` and `fitted` are those of the first, and `stroke` is the largest.
     cost : float
-        RMS deviation in the window [m], equation (16) of Xu and Li 2010.
+        RMS deviation in the window [m], equation (16) of Xu and Li 2010; of several records see
+        `identify`.
     nfev : int
         Simulations of the record, of all runs.
     stop_reason : {"agreed", "converged", "stalled", "iterations", "interrupted", "solved"}
@@ -120,6 +126,21 @@ class Identification(IdentifiedModel):
     fitted_until: float | None = None
     at_bound: bool = False
 
+    def __post_init__(self) -> None:
+        if not self.records:
+            # One record, whose own are those of the result.
+            own = FittedRecord(
+                data=self.data,
+                delay=self.delay,
+                offset=self.offset,
+                offset_fitted=self.offset_fitted,
+                start=self.start,
+                cost=self.cost,
+                stroke=self.stroke,
+                origin=self._record,
+            )
+            object.__setattr__(self, "records", (own,))
+
     def __repr__(self) -> str:
         return (
             f"<Identification, {self.model.info.title}: {self.cost_um:.4g} um rms, "
@@ -149,43 +170,42 @@ class Identification(IdentifiedModel):
     @property
     def fit_percent(self) -> float:
         """Share of the motion that the model explains, as `Score.fit_percent`."""
-        return remarks.fit_percent(self.cost, float(np.std(self.data.y)))
+        spread = remarks.spread_of([(data, one.weight) for data, one in self._fitted])
+        return remarks.fit_percent(self.cost, spread)
 
-    @cached_property
+    @property
     def fitted(self) -> Score:
         """Score on the record that was identified, simulated with converged sub-steps."""
-        return self.score(self.data, offset=self.offset)
+        return self.scores[0]
 
     @cached_property
-    def _response(self) -> Response:
-        """Motion of the model on the record."""
-        return self.simulate(self.data, offset=self.offset)
+    def scores(self) -> tuple[Score, ...]:
+        """Score on each record that was identified, with its own offset, delay and start."""
+        return tuple(self.score(data, offset=one.offset) for data, one in self._fitted)
+
+    @property
+    def _fitted(self) -> list[tuple[Dataset, FittedRecord]]:
+        """The records, those of a result being there."""
+        return [(one.data, one) for one in self.records if one.data is not None]
+
+    @cached_property
+    def _responses(self) -> list[Response]:
+        """Motion of the model on each record."""
+        return [self.simulate(data, offset=one.offset) for data, one in self._fitted]
 
     @property
     def notes(self) -> list[str]:
         """Warnings about the record and the fit, one sentence each."""
-        info, data = self.model.info, self.data
-        notes = diagnostics.record_warnings(data)
-        if self.cost_percent > 5.0:
-            notes.append(
-                "the model does not fit this record: the residual is "
-                f"{self.cost_percent:.3g} % of stroke"
-            )
-        if self.cost_percent > diagnostics.REMAINS:
-            held = [name for name, estimate in self.parameters.items() if not estimate.free]
-            notes += diagnostics.fit_warnings(
-                data, self._response.x, self.cost_percent, info.hysteresis, held
-            )
-        if info.drive_unit == "N" and data.drive_unit != "N":
-            unit = data.drive_unit
+        info, unit = self.model.info, self.data.drive_unit
+        notes: list[str] = []
+        several = len(self.records) > 1
+        for i, ((data, one), run) in enumerate(zip(self._fitted, self._responses, strict=True)):
+            source = f" ({data.source})" if data.source else ""
+            which = f"record {i + 1}{source}: " if several else ""
+            notes += [which + note for note in self._notes_on(data, one, run)]
+        if info.drive_unit == "N" and unit != "N":
             notes.append(f"the drive is in {unit}: forces are in {unit} too, not in N")
-        notes += self.model._notes(lambda: self._response)
-        if self.trials:
-            # A mode moves from sample to sample as noise does; what is left of it hardly does.
-            noise = min(sample_noise(data.y), sample_noise(data.y - self._response.x))
-            notes += remarks.above_noise(self.cost, noise)
-        notes += remarks.of_lags(self.lags, 2.0 * math.pi * _frequency(data))
-        notes += remarks.first_samples(data.y - self._response.x, data)
+        notes += remarks.of_lags(self.lags, 2.0 * math.pi * _frequency(self.data))
         if self.at_bound:
             notes.append(
                 "the record does not determine the dynamics: time constant or mode lies on a bound"
@@ -194,6 +214,25 @@ class Identification(IdentifiedModel):
             what = "restart" if self.swarm is not None else "descent"
             notes.append(f"no other {what} ended in the minimum of the best one: increase runs=")
         return notes
+
+    def _notes_on(self, data: Dataset, one: FittedRecord, run: Response) -> list[str]:
+        """Warnings about one of the records and the fit there."""
+        notes, rest = diagnostics.record_warnings(data), data.y - run.x
+        if one.cost_percent > 5.0:
+            notes.append(
+                "the model does not fit this record: the residual is "
+                f"{one.cost_percent:.3g} % of stroke"
+            )
+        if one.cost_percent > diagnostics.REMAINS:
+            held = [name for name, estimate in self.parameters.items() if not estimate.free]
+            notes += diagnostics.fit_warnings(
+                data, run.x, one.cost_percent, self.model.info.hysteresis, held
+            )
+        notes += self.model._notes(lambda: run)
+        if self.trials:
+            # A mode moves from sample to sample as noise does; what is left of it hardly does.
+            notes += remarks.above_noise(one.cost, min(sample_noise(data.y), sample_noise(rest)))
+        return notes + remarks.first_samples(rest, data)
 
     @property
     def success(self) -> bool:
@@ -231,12 +270,14 @@ class Identification(IdentifiedModel):
     def plot(self, data: Dataset | None = None, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Loop, displacement with its error over time, and convergence of the search.
 
+        Of several records loop and displacement of each, one below the other.
+
         One panel alone, in axes of your own: `plot_loop`, `plot_time`, `plot_convergence`.
 
         Parameters
         ----------
         data : Dataset, optional
-            Another record, on which the model is shown.
+            Another record, on which the model is shown; or one of several that were identified.
         fig : matplotlib.figure.Figure or SubFigure, optional
             Where to draw; a new figure of pyplot where not given.
 

@@ -12,22 +12,25 @@ from .._support.progress_bar import ProgressBar
 from .._support.units import of_drive
 from ..errors import Interrupted, ParameterError
 from ..stages.registry import stage_class
+from .asked import Asked
 from .descents import Descents
 from .estimates import Constraint, Estimate, LagRange, Progress, SwarmRun
+from .fitted_record import FittedRecord
 from .history import start_after
-from .model_file import constraint_entries, fit_entry, provenance
+from .model_file import constraint_entries, fit_entry, origin_of, provenance
 from .question import question_of
+from .remarks import spread_of
 from .result import Identification
 from .swarm import ParticleSwarm
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from ..data.dataset import Dataset
     from ..stages.model_info import ModelInfo
     from .history import History
 
-__all__ = ["search"]
+__all__ = ["search", "search_records"]
 
 # Searches by default, and their names: a swarm has to be restarted to tell whether it converged.
 RUNS: dict[type, int] = {ParticleSwarm: 4, Descents: 1}
@@ -43,17 +46,10 @@ def search(
     *,
     offset: bool,
     history: History = "virgin",
-    method: object = None,
-    swarm: object = None,
-    descents: object = None,
-    seed: object = None,
-    runs: object = None,
-    threads: object = None,
-    progress: bool | None = None,
-    callback: object = None,
-    **asked: object,
+    delay: object = None,
+    **asked: Any,
 ) -> Identification:
-    """Search the parameters of a model, by descents or with a swarm.
+    """Search the parameters of a model on one record.
 
     Parameters
     ----------
@@ -65,6 +61,47 @@ def search(
         Whether an offset of the sensor is fitted.
     history : {"virgin", "settled", "fit"}
         What the stage went through before the record.
+    delay : object
+        As for `identify`, not yet checked.
+    **asked
+        As for `search_records`.
+
+    Returns
+    -------
+    Identification
+        Result with the best candidate.
+
+    Raises
+    ------
+    ParameterError, DataError, NumericalError, Interrupted
+        As for `identify`.
+    """
+    record = Asked(data=data, offset=offset, history=history, delay=delay)
+    return search_records((record,), info, **asked)
+
+
+def search_records(
+    records: Sequence[Asked],
+    info: ModelInfo,
+    *,
+    method: object = None,
+    swarm: object = None,
+    descents: object = None,
+    seed: object = None,
+    runs: object = None,
+    threads: object = None,
+    progress: bool | None = None,
+    callback: object = None,
+    **asked: object,
+) -> Identification:
+    """Search the parameters of a model on one record or several, by descents or with a swarm.
+
+    Parameters
+    ----------
+    records : sequence of Asked
+        The records, each with what is asked of it alone.
+    info : ModelInfo
+        The model.
     method, swarm, descents, seed, runs, threads, progress, callback
         As for `identify`, not yet checked; None stands for the default.
     **asked
@@ -84,10 +121,10 @@ def search(
     if callback is not None and not callable(callback):
         raise ParameterError(f"callback is {quoted(callback)}: expected a function, or None")
     seed = 0 if seed is None else _core.as_count("seed", seed)
-    question = question_of(data, info, offset=offset, history=history, **asked)
+    questions = [question_of(one, info, **asked) for one in records]
     with ProgressBar(progress, f"identify: {info.name}") as bar:
         found = _core.identify(
-            question,
+            questions,
             method=settings._core,
             seed=seed,
             runs=RUNS[type(settings)] if runs is None else _core.as_count("runs", runs),
@@ -97,9 +134,7 @@ def search(
         )
     if found is None:
         raise Interrupted("interrupted before the first cost was computed")
-    fit = _identification(
-        info, found, data, settings, seed, offset, history, dict(question["scales"])
-    )
+    fit = _identification(info, found, records, settings, seed, dict(questions[0]["scales"]))
     if not fit.success:
         raise Interrupted(
             f"interrupted after {fit.nfev} simulations, best cost {fit.cost_um:.4g} um", fit
@@ -142,33 +177,28 @@ def _reporting(info: ModelInfo, callback: Callable[[Progress], object]) -> Calla
 def _identification(
     info: ModelInfo,
     found: _core.Search,
-    data: Dataset,
+    records: Sequence[Asked],
     settings: ParticleSwarm | Descents,
     seed: int,
-    offset: bool,
-    history: History,
     scales: Mapping[str, str],
 ) -> Identification:
+    drive_unit = records[0].data.drive_unit
     facts = {one.name: (one.unit, one.symbol) for one in info.parameters} | SENSOR
-    facts = {name: (of_drive(unit, data.drive_unit), sign) for name, (unit, sign) in facts.items()}
-    parameters = {}
-    for one in found.estimates:
-        unit, symbol = facts[one["name"]]
-        bounds, deviation, at_bound = one["bounds"], one["deviation"], one["at_bound"]
-        known = {name: one[name] for name in ("scale", "tie", "prior")}
-        parameters[one["name"]] = Estimate(
-            one["value"], unit, symbol, bounds is not None, bounds, deviation, at_bound, **known
-        )
+    facts = {name: (of_drive(unit, drive_unit), sign) for name, (unit, sign) in facts.items()}
+    parameters = {
+        one["name"]: _estimate(one, *facts[one["name"]])
+        for one in found.estimates
+        if one["name"] not in SENSOR
+    }
     values = {name: [estimate.value] for name, estimate in parameters.items()}
-    (delay,) = values.pop("delay")
     values["creep_weights"], values["creep_times"] = found.creep
-    if delay == 0.0 and not parameters["delay"].free:
-        del parameters["delay"]
-    (voltage,) = values.pop("voltage_before")
-    before = voltage if history == "fit" else None
-    if before is None:
-        del parameters["voltage_before"]
     model = stage_class(info)._from(values.items())
+    fitted = tuple(
+        _fitted(model, one, own, facts) for one, own in zip(records, found.records, strict=True)
+    )
+    first, data = fitted[0], records[0].data
+    parameters |= first.parameters
+    spread = spread_of([(one.data, one.weight) for one in records])
     constraints = tuple(Constraint(*one) for one in found.constraints)
     details: dict[str, Any] = {
         "parameters": {
@@ -180,7 +210,7 @@ def _identification(
         "delay": _details(parameters["delay"]) if "delay" in parameters else {},
         **constraint_entries(constraints),
         "fit": {
-            **fit_entry(found.rms, data, found.rms_with_priors),
+            **fit_entry(found.rms, data, found.rms_with_priors, spread),
             "iterations": found.iterations,
             "simulations": sum(nfev for _, _, nfev, _ in found.runs),
             "polish_simulations": found.polish_evaluations,
@@ -195,12 +225,13 @@ def _identification(
     return Identification(
         lags=None if found.lags is None else LagRange(*found.lags),
         model=model,
-        start=start_after(model, data, history, before, creeps=False),
-        delay=delay,
-        offset=found.offset,
-        offset_fitted=offset,
+        start=first.start,
+        delay=first.delay,
+        offset=first.offset,
+        offset_fitted=first.offset_fitted,
         scale_assumed=found.scale_assumed,
-        stroke=data.stroke,
+        stroke=max(one.stroke for one in fitted),
+        records=fitted,
         details=details,
         data=data,
         parameters=parameters,
@@ -221,6 +252,41 @@ def _identification(
         agreeing=found.agreeing,
         swarm=settings if isinstance(settings, ParticleSwarm) else None,
         descents=settings if isinstance(settings, Descents) else None,
+    )
+
+
+def _estimate(found: Mapping[str, Any], unit: str, symbol: str) -> Estimate:
+    """Return what a search found of a parameter."""
+    bounds, deviation, at_bound = found["bounds"], found["deviation"], found["at_bound"]
+    known = {name: found[name] for name in ("scale", "tie", "prior")}
+    value = found["value"]
+    free = bounds is not None
+    return Estimate(value, unit, symbol, free, bounds, deviation, at_bound, **known)
+
+
+def _fitted(
+    model: Any, asked: Asked, own: Mapping[str, Any], facts: Mapping[str, tuple[str, str]]
+) -> FittedRecord:
+    """Return what a search found of a record alone."""
+    data, history = asked.data, asked.history or "virgin"
+    estimates = {name: _estimate(own[name], *facts[name]) for name in SENSOR}
+    delay, before = estimates["delay"], estimates["voltage_before"]
+    if delay.value == 0.0 and not delay.free:
+        del estimates["delay"]
+    if history != "fit":
+        del estimates["voltage_before"]
+    voltage = before.value if history == "fit" else None
+    return FittedRecord(
+        data=data,
+        weight=asked.weight,
+        delay=delay.value,
+        offset=own["offset"],
+        offset_fitted=asked.offset,
+        start=start_after(model, data, history, voltage, creeps=False),
+        cost=own["rms"],
+        stroke=data.stroke,
+        parameters=estimates,
+        origin=origin_of(data),
     )
 
 

@@ -29,7 +29,16 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["AUTO", "Trial", "identify_best", "kinds_tried"]
+__all__ = [
+    "AUTO",
+    "Trial",
+    "identify_best",
+    "is_white",
+    "kinds_tried",
+    "refuse_of_one_model",
+    "short_trials",
+    "two_parts",
+]
 
 AUTO = "auto"
 # Kinds that are tried for a drive in volts, and for a force.
@@ -101,23 +110,13 @@ def identify_best(
     ParameterError, DataError, NumericalError, Interrupted
         As for `identify`.
     """
-    for name in OF_ONE_MODEL:
-        if of_swarm[name] is not None:
-            raise ParameterError(
-                f"{name} is {quoted(of_swarm[name])}: expected none with model='auto'; name the "
-                "model whose parameters these are, as model='dahl'"
-            )
-    check_counts(of_swarm)
+    refuse_of_one_model(of_swarm)
     common: dict[str, Any] = {"offset": offset, "history": history, "least_squares": least_squares}
-    swarm = dict(of_swarm)
-    if swarm["method"] == "swarm" and swarm["swarm"] is None:
-        swarm["swarm"] = ParticleSwarm(iterations=ITERATIONS)
+    several, swarm = short_trials(of_swarm)
     infos = kinds_tried(data, of_swarm)
-    part, rest = _parts(data)
+    part, rest = two_parts(data)
     noise = sample_noise(rest.y)
-    trial = dict(swarm)
-    if rest is not part and trial["runs"] is None and trial["swarm"] is not None:
-        trial["runs"] = RUNS
+    trial = several if rest is not part else swarm
     found: list[tuple[Trial, ModelInfo]] = []
     refused: Exception | None = None
     for info in infos:
@@ -129,7 +128,7 @@ def identify_best(
             continue
         found.append((Trial(info.name, info.title, score.rms), info))
         # Of a quick motion, differences from sample to sample are not the noise's alone.
-        if score.rms < AS_NOISE * noise and _white(
+        if score.rms < AS_NOISE * noise and is_white(
             rest.y - fit.simulate(rest, offset=fit.offset).x
         ):
             break
@@ -153,6 +152,50 @@ def identify_best(
     return replace(whole, trials=trials, fitted_until=until, details={**whole.details, **details})
 
 
+def refuse_of_one_model(of_swarm: Mapping[str, Any]) -> None:
+    """Refuse arguments that name parameters of one model, and counts that are none.
+
+    Parameters
+    ----------
+    of_swarm : mapping
+        As for `identify_best`.
+
+    Raises
+    ------
+    ParameterError
+        One is given.
+    """
+    for name in OF_ONE_MODEL:
+        if of_swarm[name] is not None:
+            raise ParameterError(
+                f"{name} is {quoted(of_swarm[name])}: expected none with model='auto'; name the "
+                "model whose parameters these are, as model='dahl'"
+            )
+    check_counts(of_swarm)
+
+
+def short_trials(of_swarm: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the arguments of the trials on a part, and those of the fit of the best kind.
+
+    Parameters
+    ----------
+    of_swarm : mapping
+        As for `identify_best`.
+
+    Returns
+    -------
+    trial, full : dict
+        The same, but for the size of swarms.
+    """
+    full = dict(of_swarm)
+    if full["method"] == "swarm" and full["swarm"] is None:
+        full["swarm"] = ParticleSwarm(iterations=ITERATIONS)
+    trial = dict(full)
+    if trial["runs"] is None and trial["swarm"] is not None:
+        trial["runs"] = RUNS
+    return trial, full
+
+
 def kinds_tried(data: Dataset, of_swarm: Mapping[str, Any]) -> list[ModelInfo]:
     """Return the kinds that can be fitted with what the caller gives.
 
@@ -174,8 +217,19 @@ def kinds_tried(data: Dataset, of_swarm: Mapping[str, Any]) -> list[ModelInfo]:
     return [info for info in infos if info.searched or not needs_swarm]
 
 
-def _parts(data: Dataset) -> tuple[Dataset, Dataset]:
-    """Part to fit and part to judge on; the whole twice where the drive turns too seldom."""
+def two_parts(data: Dataset) -> tuple[Dataset, Dataset]:
+    """Part a record for trials; the whole twice where the drive turns too seldom.
+
+    Parameters
+    ----------
+    data : Dataset
+        The record.
+
+    Returns
+    -------
+    part, rest : Dataset
+        To fit, and to judge on.
+    """
     turns = np.array(_core.turns(data.u, 0.2 * float(np.ptp(data.u))), dtype=np.intp)
     for place in turns[np.argsort(np.abs(turns - FITTED * len(data)))]:
         before, after = int(np.sum(turns < place)), int(np.sum(turns >= place))
@@ -185,8 +239,19 @@ def _parts(data: Dataset) -> tuple[Dataset, Dataset]:
     return data, data
 
 
-def _white(rest: Array) -> bool:
-    """Whether residuals are noise from sample to sample: nothing is left to describe."""
+def is_white(rest: Array) -> bool:
+    """Return whether residuals are noise from sample to sample: nothing is left to describe.
+
+    Parameters
+    ----------
+    rest : ndarray, shape (n,)
+        The residuals [m].
+
+    Returns
+    -------
+    bool
+        Whether no correlation is left.
+    """
     rest = rest - rest.mean()
     squares = float(rest @ rest)
     if rest.size <= APART or squares == 0.0:

@@ -51,6 +51,24 @@ impl Error {
     ) -> Self {
         Self::Parameter { name: name.into(), value: value.to_string(), expected: expected.into() }
     }
+
+    /// The same error, said of one of several records by its label; as it is where that is empty.
+    #[must_use]
+    pub fn of(self, label: &str) -> Self {
+        let of = |text: String| format!("{label}: {text}");
+        match self {
+            _ if label.is_empty() => self,
+            Self::Parameter { name, value, expected } => {
+                Self::Parameter { name: of(name), value, expected }
+            }
+            Self::Shape { name, found, expected } => {
+                Self::Shape { name: of(name), found, expected }
+            }
+            Self::Data(text) => Self::Data(of(text)),
+            Self::Numerical(text) => Self::Numerical(of(text)),
+            Self::Memory { what, bytes } => Self::Memory { what: of(what), bytes },
+        }
+    }
 }
 
 impl From<piezotrack_control::Error> for Error {

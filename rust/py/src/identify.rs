@@ -2,8 +2,8 @@
 
 use numpy::PyArray1;
 use piezotrack_core::identify::{
-    BEFORE, Coordinate, DELAY, History, Identification, Method, Outcome, Plan, Relations,
-    StopReason, identify as identified, visited,
+    BEFORE, Coordinate, DELAY, History, Identification, Method, Outcome, OwnResult, Plan, Record,
+    Relations, Spec, StopReason, identify_together, visited,
 };
 use piezotrack_core::integrator::Order;
 use piezotrack_core::signal::Drive;
@@ -14,7 +14,7 @@ use crate::arrays::{array, samples};
 use crate::descents::PyDescents;
 use crate::enter::{Watchers, enter_pool};
 use crate::errors::raise;
-use crate::question::Question;
+use crate::question::{Asked, Question};
 use crate::stage::hold;
 use crate::swarm::PySettings;
 
@@ -52,6 +52,16 @@ struct Estimate {
     prior: Option<(f64, f64)>,
 }
 
+/// What one of the records has of its own, as a dict in Python.
+#[derive(IntoPyObject)]
+struct Own {
+    /// RMS deviation, m, without priors.
+    rms: f64,
+    offset: f64,
+    delay: Estimate,
+    voltage_before: Estimate,
+}
+
 /// What a search found, in plain numbers.
 #[pyclass(name = "Search", frozen, module = "piezotrack._core")]
 struct PySearch {
@@ -64,33 +74,21 @@ impl PySearch {
     /// The parameters of the stage, the delay and the voltage that it came from, by their names.
     #[getter]
     fn estimates(&self) -> Vec<Estimate> {
-        let problem = &self.found.problem;
-        let names = problem.model.scalars().iter().map(|info| info.name);
+        let names = self.found.problem.model.scalars().iter().map(|info| info.name);
         let places = names.enumerate().chain([(DELAY, "delay"), (BEFORE, "voltage_before")]);
-        // A mass that the record does not show is held where it has no effect.
-        let held = problem.mass_if_shown.is_some();
-        let unseen = |name| (held && name == "mass").then_some(f64::INFINITY);
-        let estimate = |(place, name)| {
-            let (bounds, scale) = match problem.coordinates[place] {
-                Coordinate::Fixed(_) | Coordinate::Tied => (None, None),
-                Coordinate::Free { low, high, scale } => (Some((low, high)), Some(scale.name())),
-            };
-            let Relations { ties, priors, .. } = &problem.relations;
-            let tie = ties.iter().find(|tie| tie.parameter == place);
-            let prior = priors.iter().find(|prior| prior.parameter == place);
-            let found = self.found.sensitivities.iter().find(|found| found.parameter == place);
-            Estimate {
-                name,
-                value: self.outcome.theta.0[place],
-                bounds,
-                deviation: found.map(|found| found.deviation).or_else(|| unseen(name)),
-                at_bound: found.is_some_and(|found| found.at_bound),
-                scale,
-                tie: tie.map(|tie| tie.text.clone()),
-                prior: prior.map(|prior| (prior.mean, prior.width)),
-            }
+        places.filter_map(|(place, name)| self.estimate(0, place, name)).collect()
+    }
+
+    /// What each record has of its own, in their order.
+    #[getter]
+    fn records(&self) -> Vec<Own> {
+        let own = |(r, one): (usize, &OwnResult)| {
+            let (rms, offset) = (one.costs.rms, one.costs.offset);
+            let delay = self.estimate(r, DELAY, "delay")?;
+            let voltage_before = self.estimate(r, BEFORE, "voltage_before")?;
+            Some(Own { rms, offset, delay, voltage_before })
         };
-        places.map(estimate).collect()
+        self.found.records.iter().enumerate().filter_map(own).collect()
     }
 
     /// Without the factor of the priors.
@@ -201,6 +199,35 @@ impl PySearch {
     }
 }
 
+impl PySearch {
+    /// What was found at a place of a record's parameters.
+    fn estimate(&self, r: usize, place: usize, name: &'static str) -> Option<Estimate> {
+        let OwnResult { problem, theta, .. } = self.found.records.get(r)?;
+        // A mass that the record does not show is held where it has no effect.
+        let held = problem.mass_if_shown.is_some();
+        let unseen = (held && name == "mass").then_some(f64::INFINITY);
+        let (bounds, scale) = match problem.coordinates[place] {
+            Coordinate::Fixed(_) | Coordinate::Tied => (None, None),
+            Coordinate::Free { low, high, scale } => (Some((low, high)), Some(scale.name())),
+        };
+        let Relations { ties, priors, .. } = &problem.relations;
+        let tie = ties.iter().find(|tie| tie.parameter == place);
+        let prior = priors.iter().find(|prior| prior.parameter == place);
+        let mut all = self.found.sensitivities.iter();
+        let found = all.find(|found| (found.record, found.parameter) == (r, place));
+        Some(Estimate {
+            name,
+            value: theta.0[place],
+            bounds,
+            deviation: found.map(|found| found.deviation).or(unseen),
+            at_bound: found.is_some_and(|found| found.at_bound),
+            scale,
+            tie: tie.map(|tie| tie.text.clone()),
+            prior: prior.map(|prior| (prior.mean, prior.width)),
+        })
+    }
+}
+
 /// What a stage went through before a record, by its name.
 pub fn history_named(name: &str) -> Result<History> {
     match name {
@@ -249,13 +276,13 @@ impl Searcher<'_> {
     }
 }
 
-/// Identifies a stage; None where the search was stopped before its first cost.
+/// Identifies a stage from records; None where the search was stopped before its first cost.
 #[pyfunction]
-#[pyo3(signature = (question, *, method, seed, runs, threads, callback, progress))]
+#[pyo3(signature = (questions, *, method, seed, runs, threads, callback, progress))]
 #[expect(clippy::too_many_arguments, reason = "keyword-only, called from one place")]
 fn identify(
     py: Python<'_>,
-    question: Question<'_>,
+    questions: Vec<Question<'_>>,
     method: Searcher<'_>,
     seed: u64,
     runs: usize,
@@ -263,12 +290,17 @@ fn identify(
     callback: Option<Py<PyAny>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Option<PySearch>> {
-    let asked = question.asked()?;
+    let asked: Vec<Asked> = questions.into_iter().map(Question::asked).collect::<PyResult<_>>()?;
     let plan = Plan { method: method.into_method(), seed, runs };
     let watchers = Watchers { callback, progress };
     let found = enter_pool(py, threads, &watchers, |monitor, stop| {
-        let record = asked.record()?;
-        identified(&record, &asked.spec(&record)?, &plan, monitor, stop)
+        let records: Vec<Record<'_>> = asked.iter().map(Asked::record).collect::<Result<_>>()?;
+        let spec = |(one, record): (&Asked, &Record<'_>)| {
+            one.spec(record).map_err(|error| record.named(error))
+        };
+        let specs: Vec<Spec> = asked.iter().zip(&records).map(spec).collect::<Result<_>>()?;
+        let together: Vec<(&Record<'_>, &Spec)> = records.iter().zip(&specs).collect();
+        identify_together(&together, &plan, monitor, stop)
     })?;
     Ok(found.best.map(|best| PySearch { outcome: found.runs[best].clone(), found }))
 }

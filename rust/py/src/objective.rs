@@ -1,7 +1,7 @@
 //! The cost that an identification minimises, for optimisers of the caller's.
 
 use piezotrack_core::identify::{
-    Candidate, Coordinate, DELAY, Evaluator, LocalRefinement, Problem, Scale,
+    Coordinate, DELAY, Evaluator, LocalRefinement, Point, Problem, Records, Scale,
 };
 use piezotrack_core::integrator::Stepping;
 use piezotrack_core::signal::Stop;
@@ -68,11 +68,9 @@ impl PyObjective {
     fn costs(&self, py: Python<'_>, places: Vec<Vec<f64>>) -> PyResult<Vec<f64>> {
         self.check(&places).map_err(|error| raise(&error))?;
         self.evaluated(py, |local, stop| {
-            let candidates: Vec<Candidate> = places
-                .iter()
-                .map(|place| Candidate { theta: self.problem.theta(place), limit: f64::INFINITY })
-                .collect();
-            let costs = local.evaluator.costs(&candidates, stop);
+            let point = |place| Point { place, limit: f64::INFINITY };
+            let points: Vec<Point> = places.into_iter().map(point).collect();
+            let costs = local.records.costs(&points, stop);
             Ok(costs.into_iter().map(|one| one.rms).collect())
         })
     }
@@ -120,8 +118,8 @@ impl PyObjective {
         enter_pool(py, self.threads, &watchers, |_, stop| {
             let record = self.asked.record()?;
             let evaluator = Evaluator::stepped(&record, &self.problem, self.stepping);
-            let (record, problem, evaluator) = (&record, &self.problem, &evaluator);
-            job(&LocalRefinement { record, problem, evaluator, stop }, stop)
+            let records = Records::one(evaluator);
+            job(&LocalRefinement { records: &records, stop }, stop)
         })
     }
 }

@@ -33,6 +33,8 @@ pub struct Question<'py> {
     delay: Option<(f64, f64)>,
     history: String,
     creep: Option<Vec<f64>>,
+    label: String,
+    weight: f64,
 }
 
 /// The same, checked as far as it can be without the record's help.
@@ -45,6 +47,8 @@ pub struct Asked {
     spec: Spec,
     /// Known time constants of the creep; those that suit the record where there are none.
     creep: Option<Vec<f64>>,
+    label: String,
+    weight: f64,
 }
 
 impl Question<'_> {
@@ -74,14 +78,16 @@ impl Question<'_> {
             ..Spec::of(model)
         };
         let hold = hold(&self.hold_name).map_err(|error| raise(&error))?;
-        Ok(Asked { u, y, dt: self.dt, hold, start: self.start, spec, creep: self.creep })
+        let Self { dt, start, creep, label, weight, .. } = self;
+        Ok(Asked { u, y, dt, hold, start, spec, creep, label, weight })
     }
 }
 
 impl Asked {
     /// The record.
     pub fn record(&self) -> Result<Record<'_>> {
-        Record::new(&self.u, &self.y, self.dt, self.hold, self.start)
+        let record = Record::new(&self.u, &self.y, self.dt, self.hold, self.start);
+        record.map_err(|error| error.of(&self.label))?.among(&self.label, self.weight)
     }
 
     /// What is searched, with the creep that suits the record.

@@ -3,8 +3,8 @@
 use core::ops::ControlFlow;
 
 use piezotrack_core::identify::{
-    Boundary, Evaluator, Monitor, Problem, Progress, Record, Spec, Swarm, SwarmSettings, Topology,
-    Update, search,
+    Boundary, Evaluator, Monitor, Problem, Progress, Record, Records, Spec, Swarm, SwarmSettings,
+    Topology, Update, search,
 };
 use piezotrack_core::models::{DahlStage, Experiment, Model, StageModel};
 use piezotrack_core::signal::{Drive, Hold, NEVER};
@@ -96,7 +96,7 @@ fn found(
         let evaluator = Evaluator::new(&record, &problem, NEVER);
         let mut quiet = |_: &Progress| ControlFlow::Continue(());
         let monitor: &mut dyn Monitor = &mut quiet;
-        search(&evaluator, &problem, settings, seed, runs, monitor, NEVER).unwrap()
+        search(&Records::one(evaluator), settings, seed, runs, monitor, NEVER).unwrap()
     });
     outcomes
         .into_iter()

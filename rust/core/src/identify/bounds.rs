@@ -5,7 +5,7 @@ use super::record::Record;
 use super::resonances::resonances;
 use crate::error::{Error, Result, shown};
 use crate::integrator::MOST_PARAMETERS;
-use crate::models::{Held, Measures, ModeShown, Model};
+use crate::models::{Held, Measures, ModeShown, Model, Range, Ranges};
 use crate::signal::{Drive, Stop, index, range};
 
 /// What the bounds are built from.
@@ -62,18 +62,63 @@ fn steady(of: &mut Measures, record: &Record<'_>, mode: f64) {
     }
 }
 
-/// Coordinates of all parameters: the fixed ones as given, the others between derived bounds.
+/// Parameters whose ranges follow from a mode where a record shows one.
+const OF_MODE: [&str; 2] = ["mass", "damping"];
+
+/// Coordinates of all parameters: the fixed ones as given, the others between derived bounds, which
+/// hold those of each record.
 ///
 /// # Errors
-/// [`Error::Data`] where the record's values are absurd; [`Error::Parameter`] where a derived
+/// [`Error::Data`] where a record's values are absurd; [`Error::Parameter`] where a derived
 /// range is empty, which does not happen with other records that passed [`Record::new`].
 pub fn derive(
-    record: &Record<'_>,
+    records: &[&Record<'_>],
     model: Model,
     fixed: &[Option<f64>; MOST_PARAMETERS],
     wants_mode: bool,
     stop: Stop<'_>,
 ) -> Result<[Coordinate; MOST_PARAMETERS]> {
+    let infos = model.scalars();
+    let mut held = Held::defaults(infos);
+    held.values = *fixed;
+    let ranges = |record: &&Record<'_>| {
+        let of = looked_through(record, wants_mode, stop).map_err(|error| record.named(error))?;
+        Ok((matches!(of.mode, ModeShown::Clear(_)), model.ranges(&of, &held)?))
+    };
+    let all: Vec<(bool, Ranges)> = records.iter().map(ranges).collect::<Result<_>>()?;
+    let shown = all.iter().any(|(clear, _)| *clear);
+    let mut coordinates = [Coordinate::Fixed(0.0); MOST_PARAMETERS];
+    for (i, info) in infos.iter().enumerate() {
+        // A mode that one record shows is that of the stage, whatever the others leave open.
+        let decides = |clear: bool| clear || !(shown && OF_MODE.contains(&info.name));
+        let found = all.iter().filter(|(clear, _)| decides(*clear)).filter_map(|(_, ranges)| {
+            ranges.iter().find(|(name, _)| *name == info.name).map(|(_, range)| *range)
+        });
+        let range = found.reduce(hull);
+        coordinates[i] = match (fixed[i], range) {
+            (Some(value), _) => Coordinate::Fixed(value),
+            (None, Some((low, high))) if low < high => Coordinate::between(info.name, low, high)?,
+            (None, range) => Coordinate::Fixed(range.map_or(0.0, |(value, _)| value)),
+        };
+    }
+    Ok(coordinates)
+}
+
+/// The range that holds two, of which one that is a single value has no effect on its record.
+fn hull(one: Range, other: Range) -> Range {
+    match (one.0 < one.1, other.0 < other.1) {
+        (true, true) => (one.0.min(other.0), one.1.max(other.1)),
+        (true, false) => one,
+        (false, true) => other,
+        (false, false) => {
+            let least = one.0.min(other.0);
+            (least, least)
+        }
+    }
+}
+
+/// What a record shows, of a mode too.
+fn looked_through(record: &Record<'_>, wants_mode: bool, stop: Stop<'_>) -> Result<Measures> {
     let mut of = Measures { wants_mode, ..measures(record) };
     if !of.usable() {
         return Err(Error::Data(format!(
@@ -90,20 +135,5 @@ pub fn derive(
     if let ModeShown::Clear(mode) = of.mode {
         steady(&mut of, record, mode);
     }
-    let infos = model.scalars();
-    let mut held = Held::defaults(infos);
-    held.values = *fixed;
-    let ranges = model.ranges(&of, &held)?;
-    let mut coordinates = [Coordinate::Fixed(0.0); MOST_PARAMETERS];
-    for (i, info) in infos.iter().enumerate() {
-        let range = ranges.iter().find(|(name, _)| *name == info.name);
-        coordinates[i] = match (fixed[i], range) {
-            (Some(value), _) => Coordinate::Fixed(value),
-            (None, Some(&(_, (low, high)))) if low < high => {
-                Coordinate::between(info.name, low, high)?
-            }
-            (None, range) => Coordinate::Fixed(range.map_or(0.0, |(_, (value, _))| *value)),
-        };
-    }
-    Ok(coordinates)
+    Ok(of)
 }

@@ -36,6 +36,15 @@ impl Theta {
     }
 }
 
+/// A place of the unit box to simulate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Point {
+    /// Coordinates of all that is free.
+    pub place: Vec<f64>,
+    /// The cost, m, beyond which nobody asks how bad the place is; infinite for none.
+    pub limit: f64,
+}
+
 /// Parameters to simulate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {

@@ -66,6 +66,18 @@ impl<'a> Evaluator<'a> {
         Self { residuals, problem, held, arch, stepping, halvings, visited }
     }
 
+    /// The record.
+    #[must_use]
+    pub fn record(&self) -> &'a Record<'a> {
+        self.residuals.record
+    }
+
+    /// What is searched on it.
+    #[must_use]
+    pub fn problem(&self) -> &'a Problem {
+        self.problem
+    }
+
     /// Runs on another instruction set: the costs have the same bits.
     #[must_use]
     pub fn on(mut self, arch: Arch) -> Self {
@@ -137,8 +149,8 @@ impl<'a> Evaluator<'a> {
         costs
     }
 
-    /// RMS deviations of candidates.
-    fn deviations(&self, candidates: &[Candidate], stop: Stop<'_>) -> Vec<Costs> {
+    /// RMS deviations of candidates, without the factors of priors.
+    pub(super) fn deviations(&self, candidates: &[Candidate], stop: Stop<'_>) -> Vec<Costs> {
         let found = self.simulated(candidates, 0, stop);
         let costs = found.map(|all| all.into_iter().map(|one| one.costs).collect());
         costs.unwrap_or_else(|| vec![Costs::FAILED; candidates.len()])

@@ -5,10 +5,11 @@
 //! Multistart with a reduced sample: Boender, Rinnooy Kan, Timmer and Stougie 1982, doi
 //! 10.1007/BF01581046.
 
-use super::candidate::Candidate;
-use super::levenberg_marquardt::{LocalRefinement, Normal, Polished, damped_step};
-use super::problem::Problem;
+use super::candidate::Point;
+use super::levenberg_marquardt::{LocalRefinement, Polished, damped_step};
+use super::normal::Normal;
 use super::progress::{Monitor, Outcome, Progress, StopReason};
+use super::records::Records;
 use super::residual_sums::Costs;
 use crate::error::{Error, Result};
 use crate::math::Draws;
@@ -113,9 +114,9 @@ impl Descent {
         }
     }
 
-    fn outcome(self, problem: &Problem) -> Outcome {
+    fn outcome(self, records: &Records<'_>) -> Outcome {
         Outcome {
-            theta: problem.theta(&self.place),
+            theta: records.theta(&self.place),
             iterations: self.history.len() - 1,
             place: self.place,
             costs: self.costs,
@@ -126,6 +127,11 @@ impl Descent {
             reason: self.reason.unwrap_or(StopReason::Interrupted),
         }
     }
+}
+
+/// A place that is simulated to its end however bad.
+fn anywhere(place: &[f64]) -> Point {
+    Point { place: place.to_vec(), limit: f64::INFINITY }
 }
 
 /// A descent with the normal equations at its place.
@@ -162,7 +168,7 @@ pub(super) fn descend(
         let simulations = search.evaluations;
         let failures = search.failures;
         let mut found: Vec<Outcome> =
-            search.ended.into_iter().map(|one| one.outcome(local.problem)).collect();
+            search.ended.into_iter().map(|one| one.outcome(local.records)).collect();
         let best = found.iter_mut().min_by(|a, b| a.costs.rms.total_cmp(&b.costs.rms));
         match best {
             Some(best) => (best.reason, best.failures) = (reason, failures),
@@ -188,8 +194,8 @@ impl LocalRefinement<'_> {
     pub fn descended(&self, places: &[Vec<f64>]) -> Vec<Polished> {
         let settings = DescentSettings::default();
         let mut search = Search::new(self, &settings);
-        let candidates: Vec<Candidate> = places.iter().map(|one| search.candidate(one)).collect();
-        let costs = self.evaluator.costs(&candidates, self.stop);
+        let points: Vec<Point> = places.iter().map(|one| anywhere(one)).collect();
+        let costs = self.records.costs(&points, self.stop);
         let start = |(place, costs): (&Vec<f64>, Costs)| {
             let mut one = Descent::new(place.clone(), costs, 1);
             one.reason = costs.rms.is_infinite().then_some(StopReason::Converged);
@@ -209,7 +215,7 @@ impl LocalRefinement<'_> {
 
 impl<'a> Search<'a> {
     fn new(local: &'a LocalRefinement<'a>, settings: &'a DescentSettings) -> Self {
-        let coordinates = local.problem.free().count();
+        let coordinates = local.records.coordinates().len();
         let ended = Vec::new();
         Self { local, settings, coordinates, ended, evaluations: 0, iterations: 0, failures: 0 }
     }
@@ -240,7 +246,7 @@ impl<'a> Search<'a> {
     /// Descents that ended at the lowest cost.
     fn agreeing(&self) -> usize {
         let lowest = self.ended.iter().fold(f64::INFINITY, |low, one| low.min(one.costs.rms));
-        let near = as_low_as(lowest, self.local.record.stroke());
+        let near = as_low_as(lowest, self.local.records.stroke());
         self.ended.iter().filter(|one| one.costs.rms <= near).count()
     }
 
@@ -253,8 +259,8 @@ impl<'a> Search<'a> {
             (0..coordinates).map(|_| draws.uniform()).collect::<Vec<f64>>()
         };
         let points: Vec<Vec<f64>> = (0..count).map(point).collect();
-        let candidates: Vec<Candidate> = points.iter().map(|place| self.candidate(place)).collect();
-        let costs = local.evaluator.costs(&candidates, local.stop);
+        let asked: Vec<Point> = points.iter().map(|place| anywhere(place)).collect();
+        let costs = local.records.costs(&asked, local.stop);
         self.evaluations += points.len();
         self.failures += costs.iter().filter(|costs| costs.rms.is_infinite()).count();
         let mut order: Vec<(Vec<f64>, Costs)> =
@@ -283,7 +289,7 @@ impl<'a> Search<'a> {
         let active: Vec<&mut Descent> =
             descents.iter_mut().filter(|one| one.reason.is_none()).collect();
         let places: Vec<Vec<f64>> = active.iter().map(|one| one.place.clone()).collect();
-        let normals = self.local.normals(&places);
+        let normals = self.local.records.normals(&places, self.local.stop);
         let each = self.coordinates + 1;
         self.evaluations += each * active.len();
         let mut moving = Vec::new();
@@ -310,17 +316,16 @@ impl<'a> Search<'a> {
                 dampings.into_iter().filter_map(next).collect()
             })
             .collect();
-        let candidates: Vec<Candidate> = moving
+        let points: Vec<Point> = moving
             .iter()
             .zip(&trials)
             .flat_map(|((one, _), trials)| {
                 let limit = one.costs.rms;
-                trials.iter().map(move |(_, place)| (place, limit))
+                trials.iter().map(move |(_, place)| Point { place: place.clone(), limit })
             })
-            .map(|(place, limit)| Candidate { limit, ..self.candidate(place) })
             .collect();
-        let costs = self.local.evaluator.costs(&candidates, self.local.stop);
-        self.evaluations += candidates.len();
+        let costs = self.local.records.costs(&points, self.local.stop);
+        self.evaluations += points.len();
         let mut rest = costs.as_slice();
         let tried = moving.into_iter().zip(trials).filter_map(|((one, normal), trials)| {
             let (own, others) = rest.split_at(trials.len());
@@ -347,10 +352,6 @@ impl<'a> Search<'a> {
         tried.collect()
     }
 
-    fn candidate(&self, place: &[f64]) -> Candidate {
-        Candidate { theta: self.local.problem.theta(place), limit: f64::INFINITY }
-    }
-
     /// Tells the monitor where the search stands; whether it ends it.
     fn report(&self, descents: &[Descent], monitor: &mut dyn Monitor) -> bool {
         let all = self.ended.iter().chain(descents);
@@ -362,7 +363,7 @@ impl<'a> Search<'a> {
             iterations: self.settings.rounds * ITERATIONS,
             evaluations: self.evaluations,
             cost: best.costs.rms,
-            theta: self.local.problem.theta(&best.place),
+            theta: self.local.records.theta(&best.place),
         };
         monitor.report(&progress).is_break()
     }

@@ -1,5 +1,6 @@
 //! Identification of a stage from a record: bounds, search, local refinement, standard deviations.
 
+use super::candidate::Theta;
 use super::cost::Evaluator;
 use super::descents::{as_low_as, descend};
 use super::inertia::with_mass;
@@ -9,8 +10,10 @@ use super::plan::{Method, Plan};
 use super::problem::{Problem, Spec};
 use super::progress::{Monitor, Outcome, StopReason};
 use super::record::Record;
+use super::records::Records;
+use super::residual_sums::Costs;
 use super::search::search;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::integrator::Stepping;
 use crate::math::available;
 use crate::signal::{FractionalDelay, Stop};
@@ -18,10 +21,12 @@ use crate::signal::{FractionalDelay, Stop};
 /// An identified stage and how it was found.
 #[derive(Clone, Debug)]
 pub struct Identification {
-    /// What was held, what was free, and between which bounds.
+    /// What was held, what was free, and between which bounds; of several records, for the first.
     pub problem: Problem,
-    /// How finely the search stepped.
+    /// How finely the search stepped through the first record.
     pub stepping: Stepping,
+    /// What each record has of its own in the best run, in their order; empty where there is none.
+    pub records: Vec<OwnResult>,
     /// What each run found, in their order.
     pub runs: Vec<Outcome>,
     /// Which of the runs has the lowest cost; `None` where the search was stopped before its
@@ -34,6 +39,17 @@ pub struct Identification {
     pub lags: Option<LagRange>,
     /// Standard deviation of each free parameter; empty where the search was stopped.
     pub sensitivities: Vec<Sensitivity>,
+}
+
+/// What one of the records has in the best run.
+#[derive(Clone, Debug)]
+pub struct OwnResult {
+    /// What was held and free, with its own delay and voltage before.
+    pub problem: Problem,
+    /// The parameters, its delay and its voltage before.
+    pub theta: Theta,
+    /// Its RMS deviation, m, without priors, and its offset.
+    pub costs: Costs,
 }
 
 /// Identifies a stage from a record: swarms, optional local refinement, standard deviations.
@@ -49,14 +65,40 @@ pub fn identify(
     monitor: &mut dyn Monitor,
     stop: Stop<'_>,
 ) -> Result<Identification> {
+    identify_together(&[(record, spec)], plan, monitor, stop)
+}
+
+/// Identifies one stage from several records, each with its own offset, delay, history and weight,
+/// as [`Problem::of_records`] and [`Records`] say: no state goes from one record to the next.
+///
+/// # Errors
+/// As [`identify`]; [`crate::Error::Parameter`] for creep, whose shares are fitted to one record, and
+/// where there is no record.
+pub fn identify_together(
+    asked: &[(&Record<'_>, &Spec)],
+    plan: &Plan,
+    monitor: &mut dyn Monitor,
+    stop: Stop<'_>,
+) -> Result<Identification> {
     plan.validate()?;
-    let problem = Problem::new(record, spec, stop)?;
-    enough_memory(record, &problem)?;
-    let evaluator = Evaluator::new(record, &problem, stop);
-    let local = LocalRefinement { record, problem: &problem, evaluator: &evaluator, stop };
+    if asked.len() > 1
+        && let Some((_, spec)) = asked.iter().find(|(_, spec)| !spec.creep_times.is_empty())
+    {
+        let found = format!("{} time constants", spec.creep_times.len());
+        let expected = "none with several records, as its weights are fitted to one";
+        return Err(Error::parameter("creep", found, expected));
+    }
+    let problems = Problem::of_records(asked, stop)?;
+    let each = || asked.iter().map(|&(record, _)| record).zip(&problems);
+    for (record, problem) in each() {
+        enough_memory(record, problem).map_err(|error| record.named(error))?;
+    }
+    let evaluators = each().map(|(record, problem)| Evaluator::new(record, problem, stop));
+    let records = Records::new(evaluators.collect());
+    let local = LocalRefinement { records: &records, stop };
     let (mut runs, polish) = match &plan.method {
         Method::Swarm(settings) => {
-            let found = search(&evaluator, &problem, settings, plan.seed, plan.runs, monitor, stop);
+            let found = search(&records, settings, plan.seed, plan.runs, monitor, stop);
             (found?, settings.polish)
         }
         Method::Descents(settings) => {
@@ -70,13 +112,13 @@ pub fn identify(
         Method::Swarm(_) => run.costs.rms.is_finite(),
         Method::Descents(_) => run.costs.rms <= lowest,
     };
-    let mut agreeing = agreeing_with(&runs, record);
+    let mut agreeing = agreeing_with(&runs, &records);
     if ended && polish {
         for run in runs.iter_mut().filter(|run| refined(run)) {
             let polished = local.polish(&run.place, run.costs);
             run.polish_evaluations = polished.evaluations;
             run.costs = polished.costs;
-            run.theta = problem.theta(&polished.place);
+            run.theta = records.theta(&polished.place);
             run.place = polished.place;
         }
     }
@@ -84,7 +126,7 @@ pub fn identify(
         .filter(|&i| runs[i].costs.rms.is_finite())
         .min_by(|&i, &j| runs[i].costs.rms.total_cmp(&runs[j].costs.rms));
     if matches!(plan.method, Method::Swarm(_)) {
-        agreeing = agreeing_with(&runs, record);
+        agreeing = agreeing_with(&runs, &records);
     }
     let Told { lags, sensitivities, with_mass } =
         best.filter(|_| ended).map(|i| told_by(&local, &mut runs[i], polish)).unwrap_or_default();
@@ -93,15 +135,30 @@ pub fn identify(
             run.reason = StopReason::Interrupted;
         }
     }
-    let stepping = evaluator.stepping;
-    let problem = with_mass.unwrap_or(problem);
-    Ok(Identification { problem, stepping, runs, best, agreeing, lags, sensitivities })
+    let stepping = records.members()[0].evaluator.stepping;
+    let searched = with_mass.unwrap_or_else(|| problems.clone());
+    let problem = searched[0].clone();
+    let owns = best.map_or_else(Vec::new, |i| {
+        let each = records.of(&searched).each(&runs[i].place, runs[i].costs, stop);
+        let own = |(problem, (theta, costs))| OwnResult { problem, theta, costs };
+        searched.into_iter().zip(each).map(own).collect()
+    });
+    Ok(Identification {
+        problem,
+        stepping,
+        records: owns,
+        runs,
+        best,
+        agreeing,
+        lags,
+        sensitivities,
+    })
 }
 
 /// Runs that agree with the best one.
-fn agreeing_with(runs: &[Outcome], record: &Record<'_>) -> usize {
+fn agreeing_with(runs: &[Outcome], records: &Records<'_>) -> usize {
     let lowest = runs.iter().fold(f64::INFINITY, |low, run| low.min(run.costs.rms));
-    let near = as_low_as(lowest, record.stroke());
+    let near = as_low_as(lowest, records.stroke());
     runs.iter().filter(|run| run.costs.rms <= near).count()
 }
 
@@ -110,27 +167,27 @@ fn agreeing_with(runs: &[Outcome], record: &Record<'_>) -> usize {
 struct Told {
     lags: Option<LagRange>,
     sensitivities: Vec<Sensitivity>,
-    /// The problem with the mass free, where the record shows it.
-    with_mass: Option<Problem>,
+    /// The problems with the mass free, where the records show it.
+    with_mass: Option<Vec<Problem>>,
 }
 
 /// Standard deviations of a candidate; of a `polished` one first the mass is taken where the record
 /// shows it, else under a slow drive the least lag that fits.
 fn told_by(local: &LocalRefinement<'_>, run: &mut Outcome, polished: bool) -> Told {
-    if polished && let Some((problem, polished)) = with_mass(local, &run.place, run.costs) {
+    if polished && let Some((problems, polished)) = with_mass(local, &run.place, run.costs) {
         run.polish_evaluations += polished.evaluations;
         (run.place, run.costs) = (polished.place, polished.costs);
-        run.theta = problem.theta(&run.place);
-        let evaluator = local.evaluator.of(&problem);
-        let freed = LocalRefinement { problem: &problem, evaluator: &evaluator, ..*local };
+        let records = local.records.of(&problems);
+        run.theta = records.theta(&run.place);
+        let freed = LocalRefinement { records: &records, ..*local };
         let sensitivities = freed.sensitivities(&run.place, run.costs.rms);
-        return Told { sensitivities, with_mass: Some(problem), lags: None };
+        return Told { sensitivities, with_mass: Some(problems), lags: None };
     }
-    let slow = polished && local.problem.slow;
+    let slow = polished && local.records.problem().slow;
     let lags = slow.then(|| lag_range(local, &run.place, run.costs)).flatten();
     if let Some(found) = &lags {
         (run.place, run.costs) = (found.place.clone(), found.costs);
-        run.theta = local.problem.theta(&run.place);
+        run.theta = local.records.theta(&run.place);
         run.polish_evaluations += found.evaluations;
     }
     let sensitivities = local.sensitivities(&run.place, run.costs.rms);

@@ -4,7 +4,7 @@
 //! mode is mostly creep or what the model lacks. Where the record is fitted down to white noise
 //! with the mass free, and not without, the mass is what was missing.
 
-use super::candidate::Candidate;
+use super::candidate::Point;
 use super::levenberg_marquardt::{LocalRefinement, Polished};
 use super::problem::Problem;
 use super::residual_sums::Costs;
@@ -17,36 +17,38 @@ const GAIN: f64 = 25.0;
 /// Masses from which the best one is refined.
 const STARTS: usize = 32;
 
-/// The problem with the mass free and its best candidate next to `place`, where the mass shows.
+/// The problems with the mass free and the best candidate next to `place`, where the mass shows.
 pub(super) fn with_mass(
     local: &LocalRefinement<'_>,
     place: &[f64],
     costs: Costs,
-) -> Option<(Problem, Polished)> {
-    let range = local.problem.mass_if_shown?;
-    let infos = local.problem.model.info().parameters;
+) -> Option<(Vec<Problem>, Polished)> {
+    let range = local.records.problem().mass_if_shown?;
+    let infos = local.records.problem().model.info().parameters;
     let mass = position(infos, "parameters", "mass").ok()?;
-    let mut problem = local.problem.clone();
-    (problem.mass_if_shown, problem.slow) = (None, false);
-    problem.coordinates[mass] = range;
-    let slot = problem.free().position(|free| free == mass)?;
-    let evaluator = local.evaluator.of(&problem);
-    let freed = LocalRefinement { problem: &problem, evaluator: &evaluator, ..*local };
+    let mut problems: Vec<Problem> = local.records.problems().cloned().collect();
+    for problem in &mut problems {
+        (problem.mass_if_shown, problem.slow) = (None, false);
+        problem.coordinates[mass] = range;
+    }
+    let records = local.records.of(&problems);
+    let slot = records.coordinates().iter().position(|&(_, free)| free == mass)?;
+    let freed = LocalRefinement { records: &records, ..*local };
     let beside = |k: usize| {
         let mut start = place.to_vec();
         start.insert(slot, index(k) / index(STARTS - 1));
         start
     };
-    let candidate = |k| Candidate { theta: problem.theta(&beside(k)), limit: f64::INFINITY };
-    let starts: Vec<Candidate> = (0..STARTS).map(candidate).collect();
-    let found = evaluator.costs(&starts, local.stop);
+    let point = |k| Point { place: beside(k), limit: f64::INFINITY };
+    let starts: Vec<Point> = (0..STARTS).map(point).collect();
+    let found = records.costs(&starts, local.stop);
     let (k, costs_beside) =
         found.into_iter().enumerate().min_by(|(_, a), (_, b)| a.rms.total_cmp(&b.rms))?;
     let best = freed.polish(&beside(k), costs_beside);
-    let samples = index(local.record.window.len());
+    let samples = index(local.records.samples());
     let gain = 2.0 * samples * libm::log(costs.rms / best.costs.rms);
     if gain > GAIN && freed.is_white(&best.place) {
-        return Some((problem, Polished { evaluations: best.evaluations + STARTS, ..best }));
+        return Some((problems, Polished { evaluations: best.evaluations + STARTS, ..best }));
     }
     None
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::problem::Problem;
+use super::records::Records;
 
 /// Change of a coordinate of the unit box, for the differences.
 const CHANGE: f64 = 1e-4;
@@ -11,13 +11,13 @@ const CHANGE: f64 = 1e-4;
 const ROUNDING: f64 = 1e-9;
 
 /// Change of a parameter with each coordinate of the unit box, at a place.
-fn gradient(problem: &Problem, place: &[f64], parameter: usize) -> DVector<f64> {
+fn gradient(records: &Records<'_>, place: &[f64], parameter: usize) -> DVector<f64> {
     DVector::from_fn(place.len(), |d, _| {
         let (low, high) = ((place[d] - CHANGE).max(0.0), (place[d] + CHANGE).min(1.0));
         let at = |z: f64| {
             let mut moved = place.to_vec();
             moved[d] = z;
-            problem.theta(&moved).0[parameter]
+            records.theta(&moved).0[parameter]
         };
         (at(high) - at(low)) / (high - low)
     })
@@ -26,15 +26,15 @@ fn gradient(problem: &Problem, place: &[f64], parameter: usize) -> DVector<f64> 
 /// Adds the priors to normal equations, each like one more deviation: `variance` is that of a
 /// deviation.
 pub(super) fn add_priors(
-    problem: &Problem,
+    records: &Records<'_>,
     place: &[f64],
     variance: f64,
     square: &mut DMatrix<f64>,
     slope: &mut DVector<f64>,
 ) {
-    for prior in &problem.relations.priors {
-        let value = problem.theta(place).0[prior.parameter];
-        let gradient = gradient(problem, place, prior.parameter);
+    for prior in &records.problem().relations.priors {
+        let value = records.theta(place).0[prior.parameter];
+        let gradient = gradient(records, place, prior.parameter);
         let weight = variance / (prior.width * prior.width);
         let whole = gradient.iter().all(|change| change.is_finite());
         if whole && weight.is_finite() {
@@ -57,8 +57,8 @@ pub(super) struct Spread<'a> {
 impl Spread<'_> {
     /// Standard deviation of a parameter that depends on several coordinates, by propagation of
     /// their covariance; infinite where it depends on one that has no effect.
-    pub fn of(&self, problem: &Problem, place: &[f64], parameter: usize) -> f64 {
-        let gradient = gradient(problem, place, parameter);
+    pub fn of(&self, records: &Records<'_>, place: &[f64], parameter: usize) -> f64 {
+        let gradient = gradient(records, place, parameter);
         let scaled = DVector::from_fn(gradient.len(), |d, _| {
             if gradient[d] == 0.0 { 0.0 } else { gradient[d] / self.sizes[d] }
         });

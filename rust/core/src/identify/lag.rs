@@ -7,6 +7,7 @@
 
 use super::coordinate::Coordinate;
 use super::levenberg_marquardt::LocalRefinement;
+use super::problem::Problem;
 use super::residual_sums::Costs;
 use crate::models::position;
 use crate::signal::index;
@@ -51,10 +52,11 @@ pub(super) fn lag_range(
     place: &[f64],
     costs: Costs,
 ) -> Option<LagRange> {
-    let infos = local.problem.model.info().parameters;
+    let infos = local.records.problem().model.info().parameters;
     let parameter = position(infos, "parameters", "damping").ok()?;
-    let damping = local.problem.free().position(|free| free == parameter)?;
-    let by_chance = libm::exp(0.5 * LIKELY / index(local.record.window.len())) - 1.0;
+    let place_of = |&(_, free): &(usize, usize)| free == parameter;
+    let damping = local.records.coordinates().iter().position(place_of)?;
+    let by_chance = libm::exp(0.5 * LIKELY / index(local.records.samples())) - 1.0;
     let white = local.is_white(place);
     let limit = costs.rms * (1.0 + if white { by_chance.min(AS_WELL) } else { AS_WELL });
     let mut profile = Profile { local: *local, damping, limit, evaluations: 0 };
@@ -65,7 +67,7 @@ pub(super) fn lag_range(
     }
     let (most, _) = profile.towards(place, costs, 1.0);
     let lag = |place: &[f64]| {
-        let [_, damping, stiffness, ..] = local.problem.theta(place).parameters();
+        let [_, damping, stiffness, ..] = local.records.theta(place).parameters();
         damping / stiffness
     };
     Some(LagRange {
@@ -99,12 +101,14 @@ impl Profile<'_> {
     /// The best candidate with the damping held, from one beside it; `None` where it costs more.
     fn fit_at(&mut self, from: &(Vec<f64>, Costs), damping: f64) -> Option<(Vec<f64>, Costs)> {
         let local = self.local;
-        let parameter = local.problem.free().nth(self.damping)?;
-        let mut problem = local.problem.clone();
-        let value = problem.coordinates[parameter].value(damping);
-        problem.coordinates[parameter] = Coordinate::Fixed(value);
-        let evaluator = local.evaluator.of(&problem);
-        let held = LocalRefinement { problem: &problem, evaluator: &evaluator, ..local };
+        let &(_, parameter) = local.records.coordinates().get(self.damping)?;
+        let value = local.records.problem().coordinates[parameter].value(damping);
+        let mut problems: Vec<Problem> = local.records.problems().cloned().collect();
+        for problem in &mut problems {
+            problem.coordinates[parameter] = Coordinate::Fixed(value);
+        }
+        let records = local.records.of(&problems);
+        let held = LocalRefinement { records: &records, ..local };
         let mut others = from.0.clone();
         others.remove(self.damping);
         let start = Costs { rms: f64::INFINITY, ..from.1 };

@@ -8,23 +8,13 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::candidate::Candidate;
+use super::candidate::Point;
 use super::coordinate::Coordinate;
-use super::cost::Evaluator;
-use super::information::{Spread, add_priors};
-use super::problem::Problem;
-use super::record::Record;
+use super::information::Spread;
+use super::normal::{CHANGE, Normal, product};
+use super::records::Records;
 use super::residual_sums::Costs;
 use crate::signal::{Stop, index};
-
-/// Most samples in the Jacobian: more would hardly change the result.
-const MOST_ROWS: usize = 200_000;
-
-/// Most samples in the Jacobian of one of many descents.
-const FEW_ROWS: usize = 50_000;
-
-/// Change of a coordinate of the unit box, for the differences.
-const CHANGE: f64 = 1e-4;
 
 /// Least ratio of half the mean square of the differences to the variance: of what an inexact model
 /// leaves, white deviations have no part worth the name.
@@ -32,16 +22,6 @@ const WHITE: f64 = 0.9;
 
 /// Most iterations of the polish.
 const ITERATIONS: usize = 60;
-
-/// Normal equations about a candidate, in coordinates of the unit box.
-pub(super) struct Normal {
-    /// J^T J.
-    square: DMatrix<f64>,
-    /// J^T r, r being measured less simulated.
-    slope: DVector<f64>,
-    /// Samples that entered.
-    rows: usize,
-}
 
 /// A candidate after the polish.
 #[derive(Clone, Debug)]
@@ -57,6 +37,8 @@ pub struct Polished {
 /// What the data tell of one free parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensitivity {
+    /// Which of several records it belongs to, where each has its own; 0 for what they share.
+    pub record: usize,
     /// Index of the parameter.
     pub parameter: usize,
     /// Standard deviation, SI; infinite where the data say nothing of it.
@@ -65,15 +47,11 @@ pub struct Sensitivity {
     pub at_bound: bool,
 }
 
-/// The neighbourhood of candidatees of one problem.
+/// The neighbourhood of candidates of one problem.
 #[derive(Clone, Copy)]
 pub struct LocalRefinement<'a> {
-    /// The record.
-    pub record: &'a Record<'a>,
-    /// What is free, and where.
-    pub problem: &'a Problem,
-    /// Computes costs, with the sub-steps of the search.
-    pub evaluator: &'a Evaluator<'a>,
+    /// The records with what is free, and what computes their costs.
+    pub records: &'a Records<'a>,
     /// Asked whether to give up.
     pub stop: Stop<'a>,
 }
@@ -85,7 +63,7 @@ impl LocalRefinement<'_> {
         let mut best = Polished { place: place.to_vec(), costs, evaluations: 0 };
         let mut damping = 1e-3;
         for _ in 0..ITERATIONS {
-            let Some(normal) = self.normal(&best.place, 1.0) else {
+            let Some(normal) = self.records.normal(&best.place, 1.0, self.stop) else {
                 break;
             };
             best.evaluations += 2 * place.len() + 1;
@@ -94,14 +72,13 @@ impl LocalRefinement<'_> {
                 let Some(next) = damped_step(&normal, &best.place, damping) else {
                     break;
                 };
-                let candidate =
-                    Candidate { theta: self.problem.theta(&next), limit: best.costs.rms };
-                let costs = self.evaluator.costs(&[candidate], self.stop);
+                let point = Point { place: next, limit: best.costs.rms };
+                let costs = self.records.costs(std::slice::from_ref(&point), self.stop);
                 best.evaluations += 1;
                 if let Some(&costs) = costs.first()
                     && costs.rms < best.costs.rms
                 {
-                    best.place = next;
+                    best.place = point.place;
                     best.costs = costs;
                     damping = (0.1 * damping).max(1e-12);
                     break;
@@ -122,149 +99,51 @@ impl LocalRefinement<'_> {
     #[must_use]
     pub fn sensitivities(&self, place: &[f64], rms: f64) -> Vec<Sensitivity> {
         let freedom = self.freedom(place.len());
-        let Some(normal) = self.normal(place, index(self.record.window.len()) / freedom) else {
+        let Self { records, stop } = *self;
+        let Some(normal) = records.normal(place, index(records.samples()) / freedom, stop) else {
             return Vec::new();
         };
-        let Self { problem, .. } = *self;
-        let rms = rms / problem.relations.factor(&problem.theta(place));
+        let rms = rms / records.problem().relations.factor(&records.theta(place));
         let (spreads, along) = self.spreads(&normal, rms, place);
-        let free = problem.free().zip(place).zip(spreads);
-        let found = free.map(|((parameter, &z), spread)| {
-            let coordinate = problem.coordinates[parameter];
+        let free = records.coordinates().iter().zip(place).zip(spreads);
+        let found = free.map(|((&(record, parameter), &z), spread)| {
+            let problem = records.members()[record].evaluator.problem();
+            let deviation = spread * slope_at(problem.coordinates[parameter], z);
             let at_bound = !(1e-3..=1.0 - 1e-3).contains(&z);
-            Sensitivity { parameter, deviation: spread * slope_at(coordinate, z), at_bound }
+            Sensitivity { record, parameter, deviation, at_bound }
         });
         let mut found: Vec<Sensitivity> = found.collect();
         for (parameter, deviation) in along {
             match found.iter_mut().find(|one| one.parameter == parameter) {
                 Some(one) => one.deviation = deviation,
-                None => found.push(Sensitivity { parameter, deviation, at_bound: false }),
+                None => {
+                    found.push(Sensitivity { record: 0, parameter, deviation, at_bound: false });
+                }
             }
         }
         found
     }
 
-    /// Samples less what was fitted to them.
+    /// Samples less what was fitted to them, with an offset of each record.
     fn freedom(&self, count: usize) -> f64 {
-        index(self.record.window.len().saturating_sub(count + 1).max(1))
-    }
-
-    /// Normal equations at a place by central differences, with the priors, for which the mean
-    /// square of the deviations times `samples_over_freedom` is the variance of one; `None` where a
-    /// neighbour cannot be simulated.
-    fn normal(&self, place: &[f64], samples_over_freedom: f64) -> Option<Normal> {
-        let stride = self.stride(MOST_ROWS);
-        let pairs: Vec<(f64, f64)> =
-            place.iter().map(|z| ((z - CHANGE).max(0.0), (z + CHANGE).min(1.0))).collect();
-        let ends = pairs.iter().enumerate().flat_map(|(d, &(low, high))| [(d, low), (d, high)]);
-        let moved = ends.map(|(d, z)| with(place, d, z));
-        let places: Vec<Vec<f64>> = [place.to_vec()].into_iter().chain(moved).collect();
-        let [base, ends @ ..] = &self.readings(&places, stride)?[..] else { return None };
-        let columns = ends.chunks_exact(2).zip(pairs).map(|(ends, (low, high))| {
-            let scale = 1.0 / (high - low);
-            ends[1].iter().zip(&ends[0]).map(|(x, below)| (x - below) * scale).collect()
-        });
-        Some(self.equations(place, columns.collect(), base, stride, samples_over_freedom))
-    }
-
-    /// Normal equations at each of some places by one-sided differences, all simulated side by
-    /// side; `None` for one where a neighbour cannot be simulated.
-    pub(super) fn normals(&self, places: &[Vec<f64>]) -> Vec<Option<Normal>> {
-        let stride = self.stride(FEW_ROWS);
-        let change = |z: f64| if z < 0.5 { CHANGE } else { -CHANGE };
-        let neighbours = |place: &Vec<f64>| {
-            let moved = place.iter().enumerate().map(|(d, z)| with(place, d, z + change(*z)));
-            [place.clone()].into_iter().chain(moved).collect::<Vec<_>>()
-        };
-        let all: Vec<Candidate> =
-            places.iter().flat_map(neighbours).map(|place| self.candidate(&place)).collect();
-        let found = self.evaluator.readings(&all, stride, self.stop);
-        let mut rest = found.as_slice();
-        let normal = |place: &Vec<f64>| {
-            let (own, others) = rest.split_at_checked(1 + place.len())?;
-            rest = others;
-            if own.iter().any(|one| one.reading.is_empty()) {
-                return None;
-            }
-            let base = &own[0].reading;
-            let columns = place.iter().zip(&own[1..]).map(|(z, one)| {
-                let scale = 1.0 / change(*z);
-                one.reading.iter().zip(base).map(|(x, base)| (x - base) * scale).collect()
-            });
-            Some(self.equations(place, columns.collect(), base, stride, 1.0))
-        };
-        places.iter().map(normal).collect()
-    }
-
-    /// Samples of the window to a row of the normal equations.
-    fn stride(&self, most: usize) -> usize {
-        self.record.window.len().div_ceil(most)
-    }
-
-    /// The normal equations of the columns of a Jacobian and what is read at their place.
-    fn equations(
-        &self,
-        place: &[f64],
-        mut columns: Vec<Vec<f64>>,
-        read: &[f64],
-        stride: usize,
-        samples_over_freedom: f64,
-    ) -> Normal {
-        for column in &mut columns {
-            self.centre(column);
-        }
-        let measured = self.record.y[self.record.window.clone()].iter().step_by(stride);
-        let mut residual: Vec<f64> = measured.zip(read).map(|(y, x)| y - x).collect();
-        self.centre(&mut residual);
-        let count = columns.len();
-        let mut square = DMatrix::zeros(count, count);
-        for i in 0..count {
-            for j in 0..=i {
-                square[(i, j)] = product(&columns[i], &columns[j]);
-                square[(j, i)] = square[(i, j)];
-            }
-        }
-        let mut slope = DVector::from_fn(count, |i, _| product(&columns[i], &residual));
-        let rows = residual.len();
-        // Some rows stand for all of them, and weigh less against the priors by their share.
-        let samples = index(self.record.window.len());
-        let variance = product(&residual, &residual) / samples * samples_over_freedom;
-        add_priors(self.problem, place, variance, &mut square, &mut slope);
-        Normal { square, slope, rows }
+        let fitted = count + self.records.members().len();
+        index(self.records.samples().saturating_sub(fitted).max(1))
     }
 
     /// Whether the deviations of a candidate are white: half the mean square of their differences
     /// from sample to sample is near their variance, and less of correlated ones (von Neumann 1941,
-    /// doi 10.1214/aoms/1177731677).
+    /// doi 10.1214/aoms/1177731677); those of every record.
     #[must_use]
     pub fn is_white(&self, place: &[f64]) -> bool {
-        let Some(residual) = self.residual(place) else { return false };
-        let squares = product(&residual, &residual);
-        let differences = residual.windows(2).map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0]));
-        0.5 * differences.sum::<f64>() / squares > WHITE
-    }
-
-    /// Measured less simulated, the mean taken off where an offset is fitted.
-    fn residual(&self, place: &[f64]) -> Option<Vec<f64>> {
-        let mut residual = self.evaluator.reading(&self.problem.theta(place), self.stop)?;
-        let measured = &self.record.y[self.record.window.clone()];
-        residual.iter_mut().zip(measured).for_each(|(x, y)| *x = y - *x);
-        self.centre(&mut residual);
-        Some(residual)
-    }
-
-    /// What is read at some places every `stride` samples, simulated as the search does, with the
-    /// shares of the creep that suit each best; `None` where one cannot be simulated.
-    fn readings(&self, places: &[Vec<f64>], stride: usize) -> Option<Vec<Vec<f64>>> {
-        let candidates: Vec<Candidate> = places.iter().map(|place| self.candidate(place)).collect();
-        let found = self.evaluator.readings(&candidates, stride, self.stop);
-        let whole = found.len() == places.len() && found.iter().all(|one| !one.reading.is_empty());
-        whole.then(|| found.into_iter().map(|one| one.reading).collect())
-    }
-
-    /// The candidate at a place, simulated to its end however bad.
-    fn candidate(&self, place: &[f64]) -> Candidate {
-        Candidate { theta: self.problem.theta(place), limit: f64::INFINITY }
+        self.records.members().iter().all(|one| {
+            let Some(residual) = one.evaluator.residual(&one.own(place), self.stop) else {
+                return false;
+            };
+            let squares = product(&residual, &residual);
+            let differences =
+                residual.windows(2).map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0]));
+            0.5 * differences.sum::<f64>() / squares > WHITE
+        })
     }
 
     /// Standard deviations in the unit box, from the eigenvalues of the scaled normal equations; and
@@ -277,7 +156,7 @@ impl LocalRefinement<'_> {
             if size > 0.0 { normal.square[(i, j)] / size } else { 0.0 }
         });
         let decomposed = scaled.symmetric_eigen();
-        let samples = self.record.window.len();
+        let samples = self.records.samples();
         // Some rows stand for all of them.
         let kept = index(normal.rows) / index(samples);
         let noise = rms * (index(samples) / self.freedom(count) * kept).sqrt();
@@ -294,28 +173,12 @@ impl LocalRefinement<'_> {
         let spreads = (0..count).map(spread).collect();
         let (eigenvalues, eigenvectors) = (&decomposed.eigenvalues, &decomposed.eigenvectors);
         let several = Spread { sizes: &sizes, eigenvalues, eigenvectors, noise };
-        let searched = |&i: &usize| !matches!(self.problem.coordinates[i], Coordinate::Fixed(_));
-        let along = self.problem.relations.dependent().filter(searched);
-        let along = along.map(|parameter| (parameter, several.of(self.problem, place, parameter)));
+        let problem = self.records.problem();
+        let searched = |&i: &usize| !matches!(problem.coordinates[i], Coordinate::Fixed(_));
+        let along = problem.relations.dependent().filter(searched);
+        let along = along.map(|parameter| (parameter, several.of(self.records, place, parameter)));
         (spreads, along.collect())
     }
-
-    /// Takes the mean off where an offset is fitted.
-    fn centre(&self, values: &mut [f64]) {
-        if self.problem.offset {
-            let mean = values.iter().sum::<f64>() / index(values.len());
-            for value in values {
-                *value -= mean;
-            }
-        }
-    }
-}
-
-/// A place with another value of one coordinate.
-fn with(place: &[f64], d: usize, z: f64) -> Vec<f64> {
-    let mut moved = place.to_vec();
-    moved[d] = z;
-    moved
 }
 
 /// A damped step that stays in the box; `None` where nothing can move.
@@ -365,8 +228,4 @@ pub(super) fn damped_step(normal: &Normal, place: &[f64], damping: f64) -> Optio
 fn slope_at(coordinate: Coordinate, z: f64) -> f64 {
     let (low, high) = ((z - CHANGE).max(0.0), (z + CHANGE).min(1.0));
     (coordinate.value(high) - coordinate.value(low)) / (high - low)
-}
-
-fn product(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

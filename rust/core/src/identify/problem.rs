@@ -5,14 +5,15 @@ use super::candidate::{BEFORE, DELAY, PLACES, Theta};
 use super::constraint::Constraint;
 use super::coordinate::{Coordinate, Scale};
 use super::creep_shares::check_times;
+use super::delay::Delay;
 use super::history::{History, came_from};
 use super::record::Record;
 use super::relations::Relations;
 use super::tie::shown_text;
-use crate::error::{Error, Result, positive, shown};
+use crate::error::{Error, Result, positive};
 use crate::integrator::MOST_PARAMETERS;
 use crate::models::{FoundBy, Held, Measures, Model, NOMINAL_STIFFNESS, position};
-use crate::signal::{Stop, index};
+use crate::signal::Stop;
 
 /// Specification by the caller.
 #[derive(Clone, Debug)]
@@ -71,50 +72,6 @@ impl Spec {
     }
 }
 
-/// Delay between drive and displacement.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Delay {
-    /// Known, s; 0 for none.
-    Fixed(f64),
-    /// Fitted, up to twenty samples or a tenth of the drive's period, whichever is less.
-    Fitted,
-    /// Fitted between two bounds, s.
-    Between(f64, f64),
-}
-
-impl Default for Delay {
-    fn default() -> Self {
-        Self::Fixed(0.0)
-    }
-}
-
-impl Delay {
-    /// The coordinate of the search.
-    fn coordinate(self, record: &Record<'_>) -> Result<Coordinate> {
-        let length = record.drive.dt * index(record.drive.u.len());
-        let (low, high) = match self {
-            Self::Fixed(value) => (value, value),
-            Self::Fitted => {
-                return Coordinate::between("delay", 0.0, bounds::measures(record).longest_delay());
-            }
-            Self::Between(low, high) => (low, high),
-        };
-        if !(low >= 0.0 && high < length) {
-            let found = if low < high || high < low {
-                format!("({}, {}) s", shown(low), shown(high))
-            } else {
-                format!("{} s", shown(low))
-            };
-            let expected = format!("0 s or above, below the record's {length:.6} s");
-            return Err(Error::parameter("delay", found, expected));
-        }
-        match self {
-            Self::Fixed(value) => Ok(Coordinate::Fixed(value)),
-            _ => Coordinate::between("delay", low, high),
-        }
-    }
-}
-
 /// A search with all its coordinates.
 #[derive(Clone, Debug)]
 pub struct Problem {
@@ -154,6 +111,22 @@ impl Problem {
     /// that is both fixed and free or has no value, and where all the parameters that carry
     /// force are free.
     pub fn new(record: &Record<'_>, spec: &Spec, stop: Stop<'_>) -> Result<Self> {
+        Ok(Self::of_records(&[(record, spec)], stop)?.remove(0))
+    }
+
+    /// The same for each of several records of one stage, with what is asked of it: the parameters
+    /// of the stage have the same coordinates in all, between bounds that suit every record.
+    ///
+    /// Delay, history and offset are a record's own; what is asked besides is that of the first.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; where one record is meant, with its label. [`Error::Parameter`] where there
+    /// is no record.
+    pub fn of_records(asked: &[(&Record<'_>, &Spec)], stop: Stop<'_>) -> Result<Vec<Self>> {
+        let &[(_, spec), ..] = asked else {
+            return Err(Error::parameter("records", "empty", "at least one"));
+        };
+        let records: Vec<&Record<'_>> = asked.iter().map(|&(record, _)| record).collect();
         let infos = spec.model.scalars();
         if spec.model.found_by() != FoundBy::Swarm {
             let found = format!("'{}'", spec.model.info().name);
@@ -164,7 +137,7 @@ impl Problem {
             infos,
             (&spec.ties, &spec.constraints),
             &spec.priors,
-            record.window.len(),
+            records.iter().map(|record| record.window.len()).sum(),
         )?;
         check_tied(spec, &relations, &mut fixed)?;
         let free = free_parameters(spec, &relations, &mut fixed)?;
@@ -203,13 +176,8 @@ impl Problem {
         let names_mass = spec.free.as_ref().is_some_and(|names| names.iter().any(|n| n == "mass"));
         let wants_mode = names_mass || spec.scales("mass");
         let known = relations.known(&fixed);
-        let derived = bounds::derive(record, spec.model, &known, wants_mode, stop)?;
+        let derived = bounds::derive(&records, spec.model, &known, wants_mode, stop)?;
         coordinates[..DELAY].copy_from_slice(&derived);
-        coordinates[DELAY] = spec.delay.coordinate(record)?;
-        if spec.history == History::Fitted {
-            let (low, high) = came_from(&record.drive);
-            coordinates[BEFORE] = Coordinate::between("the voltage before", low, high)?;
-        }
         enter_bounds(spec, &free, &mut coordinates)?;
         if scale_assumed && spec.bounds.iter().any(|(name, _)| name == "stiffness") {
             // Bounds make the stiffness a choice of the caller's, but no force is known.
@@ -223,28 +191,47 @@ impl Problem {
         relations.enter(spec.model, (&fixed, &free), &mut coordinates, bounded)?;
         enter_scales(spec, &mut coordinates)?;
         check_times(&spec.creep_times)?;
-        let Spec { model, offset, history, .. } = *spec;
-        let creep_times = spec.creep_times.clone();
         let said = |name: &str| infos.iter().position(|info| info.name == name);
         let chosen = |name: &str| {
             let mentioned = said(name).is_some_and(|place| relations.mention(place));
             bounded(name) || mentioned || spec.scales(name)
         };
-        let measures = bounds::measures(record);
-        let slow = !wants_mode && !chosen("damping") && measures.excited().is_none();
-        let mass_if_shown = mass_if_shown(&measures, model, &fixed, &coordinates)
+        let measures: Vec<Measures> =
+            records.iter().map(|record| bounds::measures(record)).collect();
+        let slow = !wants_mode
+            && !chosen("damping")
+            && measures.iter().all(|measures| measures.excited().is_none());
+        let mass_if_shown = mass_if_shown(&measures, spec.model, &fixed, &coordinates)
             .filter(|_| !said("mass").is_some_and(|place| relations.mention(place)));
-        let problem = Self {
-            model,
+        let stage = Self {
+            model: spec.model,
             coordinates,
             scale_assumed,
-            offset,
-            history,
+            offset: spec.offset,
+            history: spec.history,
             slow,
             mass_if_shown,
-            creep_times,
+            creep_times: spec.creep_times.clone(),
             relations,
         };
+        let searched = |&(record, spec): &(&Record<'_>, &Spec)| {
+            stage.on(record, spec).map_err(|error| record.named(error))
+        };
+        let all: Vec<Self> = asked.iter().map(searched).collect::<Result<_>>()?;
+        if all.iter().all(|one| one.free().count() == 0) {
+            return Err(Error::parameter("free", "empty", "at least one parameter to search"));
+        }
+        Ok(all)
+    }
+
+    /// The search on a record, with the coordinates that are the record's own.
+    fn on(&self, record: &Record<'_>, spec: &Spec) -> Result<Self> {
+        let mut problem = Self { offset: spec.offset, history: spec.history, ..self.clone() };
+        problem.coordinates[DELAY] = spec.delay.coordinate(record)?;
+        if spec.history == History::Fitted {
+            let (low, high) = came_from(&record.drive);
+            problem.coordinates[BEFORE] = Coordinate::between("the voltage before", low, high)?;
+        }
         problem.check_corners()?;
         Ok(problem)
     }
@@ -319,9 +306,6 @@ impl Problem {
     /// Refuses bounds that reach where no stage exists.
     fn check_corners(&self) -> Result<()> {
         let count = self.free().count();
-        if count == 0 {
-            return Err(Error::parameter("free", "empty", "at least one parameter to search"));
-        }
         if !self.relations.ties.is_empty() {
             // Ties may have no stage at a corner: such candidates fail by themselves.
             return self.relations.check_middle(self.model, &self.values(&vec![0.5; count]));
@@ -336,7 +320,7 @@ impl Problem {
 /// Range of a mass that nobody held, from where it is held up to a mode at three times the slowest
 /// motion.
 fn mass_if_shown(
-    of: &Measures,
+    of: &[Measures],
     model: Model,
     fixed: &Fixed,
     coordinates: &[Coordinate; PLACES],
@@ -344,7 +328,7 @@ fn mass_if_shown(
     let place = |name| position(model.scalars(), "parameters", name).ok();
     let (mass, stiffness) = (place("mass")?, place("stiffness")?);
     let Coordinate::Fixed(least) = coordinates[mass] else { return None };
-    let slowest = 3.0 * of.slow;
+    let slowest = 3.0 * of.iter().fold(f64::INFINITY, |slow, one| slow.min(one.slow));
     let most = coordinates[stiffness].value(1.0) / (slowest * slowest);
     fixed[mass].is_none().then(|| Coordinate::between("mass", least, most).ok())?
 }

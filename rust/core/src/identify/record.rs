@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, shown};
 use crate::signal::{Drive, Hold, range};
 
 /// A drive and the displacement measured under it.
@@ -14,6 +14,10 @@ pub struct Record<'a> {
     pub y: &'a [f64],
     /// The samples that count.
     pub window: Range<usize>,
+    /// How messages call it among several; empty where it is the only one.
+    pub label: String,
+    /// How much each of its samples counts beside those of other records.
+    pub weight: f64,
 }
 
 impl<'a> Record<'a> {
@@ -52,7 +56,25 @@ impl<'a> Record<'a> {
                  the sensor seems dead or not connected"
             )));
         }
-        Ok(Self { drive, y, window })
+        Ok(Self { drive, y, window, label: String::new(), weight: 1.0 })
+    }
+
+    /// The record as one of several, with its name in messages and its weight beside the others.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a weight that is not finite and above 0.
+    pub fn among(self, label: &str, weight: f64) -> Result<Self> {
+        if weight > 0.0 && weight.is_finite() {
+            return Ok(Self { label: label.into(), weight, ..self });
+        }
+        let expected = "a finite number above 0: leave out a record that is not to count";
+        Err(Error::parameter("weight", shown(weight), expected).of(label))
+    }
+
+    /// An error of this record among several.
+    #[must_use]
+    pub fn named(&self, error: Error) -> Error {
+        error.of(&self.label)
     }
 
     /// Range of the displacement in the window, m.

@@ -1,9 +1,8 @@
 //! The search by swarms: their candidates, costs and ends.
 
-use super::candidate::Candidate;
-use super::cost::Evaluator;
-use super::problem::Problem;
+use super::candidate::Point;
 use super::progress::{Monitor, Outcome, Progress, StopReason};
+use super::records::Records;
 use super::residual_sums::Costs;
 use super::swarm::{Swarm, SwarmSettings};
 use crate::error::{Error, Result};
@@ -33,14 +32,12 @@ impl Run {
     }
 
     /// What the swarm wants to know now; nothing once it has ended.
-    fn candidates(&self, problem: &Problem) -> Vec<Candidate> {
+    fn candidates(&self) -> Vec<Point> {
         if self.reason.is_some() {
             return Vec::new();
         }
         let asked = self.swarm.ask().zip(self.swarm.limits());
-        asked
-            .filter_map(|(place, limit)| Some(Candidate { theta: problem.theta(place?), limit }))
-            .collect()
+        asked.filter_map(|(place, limit)| Some(Point { place: place?.to_vec(), limit })).collect()
     }
 
     /// Takes the costs of its candidates, in their order.
@@ -66,10 +63,10 @@ impl Run {
         }
     }
 
-    fn outcome(self, problem: &Problem) -> Outcome {
+    fn outcome(self, records: &Records<'_>) -> Outcome {
         let (place, rms) = self.swarm.best();
         Outcome {
-            theta: problem.theta(place),
+            theta: records.theta(place),
             place: place.to_vec(),
             costs: Costs { rms, ..self.costs },
             iterations: self.swarm.iteration(),
@@ -90,21 +87,20 @@ impl Run {
 /// [`Error::Parameter`] for settings that cannot be used, [`Error::Numerical`] where no candidate
 /// could be simulated.
 pub fn search(
-    evaluator: &Evaluator<'_>,
-    problem: &Problem,
+    records: &Records<'_>,
     settings: &SwarmSettings,
     seed: u64,
     runs: usize,
     monitor: &mut dyn Monitor,
     stop: Stop<'_>,
 ) -> Result<Vec<Outcome>> {
-    let coordinates = problem.free().count();
+    let coordinates = records.coordinates().len();
     let runs: Result<Vec<Run>> =
         (0..runs as u64).map(|run| Run::new(settings, coordinates, seed, run)).collect();
     let mut runs = runs?;
     while runs.iter().any(|run| run.reason.is_none()) {
-        let asked: Vec<Vec<Candidate>> = runs.iter().map(|run| run.candidates(problem)).collect();
-        let costs = evaluator.costs(&asked.concat(), stop);
+        let asked: Vec<Vec<Point>> = runs.iter().map(Run::candidates).collect();
+        let costs = records.costs(&asked.concat(), stop);
         if stop() {
             break;
         }
@@ -116,7 +112,7 @@ pub fn search(
                 run.tell(own);
             }
         }
-        if monitor.report(&progress(&runs, problem, settings.iterations)).is_break() {
+        if monitor.report(&progress(&runs, records, settings.iterations)).is_break() {
             for run in &mut runs {
                 run.reason = Some(StopReason::Interrupted);
             }
@@ -131,11 +127,11 @@ pub fn search(
             "not one of {simulations} simulations stayed finite: check bounds and units"
         )));
     }
-    Ok(runs.into_iter().map(|run| run.outcome(problem)).collect())
+    Ok(runs.into_iter().map(|run| run.outcome(records)).collect())
 }
 
 /// Where the runs stand together.
-fn progress(runs: &[Run], problem: &Problem, iterations: usize) -> Progress {
+fn progress(runs: &[Run], records: &Records<'_>, iterations: usize) -> Progress {
     let best = runs.iter().map(|run| run.swarm.best()).min_by(|a, b| a.1.total_cmp(&b.1));
     let (place, cost) = best.unwrap_or((&[], f64::INFINITY));
     Progress {
@@ -143,6 +139,6 @@ fn progress(runs: &[Run], problem: &Problem, iterations: usize) -> Progress {
         iterations,
         evaluations: runs.iter().map(|run| run.evaluations).sum(),
         cost,
-        theta: problem.theta(place),
+        theta: records.theta(place),
     }
 }

@@ -1,0 +1,173 @@
+"""Identification of one kind of stage, or of the best one, from several records at once."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._support.messages import quoted
+from .._support.statistics import sample_noise
+from ..errors import DataError, NumericalError, ParameterError
+from ..stages.model_info import LISTED
+from .history import GAIN
+from .search import search_records
+from .selection import (
+    AS_NOISE,
+    BETTER,
+    Trial,
+    is_white,
+    kinds_tried,
+    refuse_of_one_model,
+    short_trials,
+    two_parts,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from ..stages.model_info import ModelInfo
+    from .asked import Asked
+    from .result import Identification
+
+__all__ = ["best_together", "identify_together"]
+
+
+def identify_together(
+    records: Sequence[Asked], info: ModelInfo, of_search: Mapping[str, Any]
+) -> Identification:
+    """Identify a stage of one kind from several records.
+
+    Parameters
+    ----------
+    records : sequence of Asked
+        The records, each with what is asked of it alone.
+    info : ModelInfo
+        The kind.
+    of_search : mapping
+        Arguments of the search, not yet checked.
+
+    Returns
+    -------
+    Identification
+        The result.
+
+    Raises
+    ------
+    ParameterError, DataError, NumericalError, Interrupted
+        As for `identify`.
+    """
+    if not info.searched:
+        raise ParameterError(
+            f"model is {info.name!r} with {len(records)} records: expected one whose parameters "
+            f"are searched, {_searched()}"
+        )
+    fit = search_records(records, info, **of_search)
+    shown = [one if one.history else _with_shown(fit, one) for one in records]
+    if all(
+        one.history in ("virgin", known.history) for one, known in zip(shown, records, strict=True)
+    ):
+        return fit
+    other = search_records(shown, info, **of_search)
+    return other if other.cost < (1.0 - GAIN) * fit.cost else fit
+
+
+def _with_shown(fit: Identification, asked: Asked) -> Asked:
+    """Give a record the history that it shows by the stage that never moved before any."""
+    own = next(one for one in fit.records if one.data is asked.data)
+    # As of another record: the one that was fitted begins as it was assumed to.
+    model = replace(fit, records=(), start=None, delay=own.delay, offset_fitted=own.offset_fitted)
+    return replace(asked, history=model.start_on(asked.data).history)
+
+
+def _searched() -> str:
+    names = [repr(name) for name, info in LISTED.items() if info.searched]
+    return ", ".join(names[:-1]) + f" or {names[-1]}"
+
+
+def best_together(records: Sequence[Asked], of_search: Mapping[str, Any]) -> Identification:
+    """Identify the kind of stage that describes several records best.
+
+    Parameters
+    ----------
+    records : sequence of Asked
+        The records, each with what is asked of it alone.
+    of_search : mapping
+        Arguments of the search, not yet checked.
+
+    Returns
+    -------
+    Identification
+        The best of the kinds that are searched, fitted to the whole windows. The trials were fitted
+        to the first part of each window and judged on the rest of each.
+
+    Raises
+    ------
+    ParameterError, DataError, NumericalError, Interrupted
+        As for `identify`.
+    """
+    refuse_of_one_model(of_search)
+    trial, full = short_trials(of_search)
+    pairs = [two_parts(one.data) for one in records]
+    apart = all(part is not rest for part, rest in pairs)
+    halves = zip(records, pairs, strict=True)
+    first = [replace(one, data=part) for one, (part, _) in halves] if apart else records
+    rests = [rest for _, rest in pairs] if apart else [one.data for one in records]
+    counts = np.array([one.weight * len(rest) for one, rest in zip(records, rests, strict=True)])
+    found: list[tuple[Trial, ModelInfo]] = []
+    refused: Exception | None = None
+    fit: Identification | None = None
+    for info in kinds_tried(records[0].data, of_search):
+        if not info.searched:
+            continue
+        try:
+            fit = identify_together(first, info, trial if apart else full)
+        except (DataError, NumericalError) as error:
+            refused = refused or error
+            continue
+        left = [
+            rest.y - fit.simulate(rest, offset=own.offset).x
+            for rest, own in zip(rests, fit.records, strict=True)
+        ]
+        rms = np.array([math.sqrt(float(np.mean(one**2))) for one in left])
+        whole = math.sqrt(float(counts @ rms**2) / float(counts.sum()))
+        found.append((Trial(info.name, info.title, whole), info))
+        noise = [sample_noise(rest.y) for rest in rests]
+        if np.all(rms < AS_NOISE * np.array(noise)) and all(is_white(one) for one in left):
+            break
+    if not found or fit is None:
+        raise refused or DataError("no kind of stage could be fitted")
+    best, info = found[0]
+    for other, kind in found[1:]:
+        if other.rms < (1.0 - BETTER) * best.rms:
+            best, info = other, kind
+    if apart or best is not found[-1][0]:
+        fit = identify_together(records, info, full)
+    trials = tuple(sorted((one for one, _ in found), key=lambda one: one.rms))
+    until = float(first[0].data.t[-1]) if apart else None
+    models = {one.model: {"rms": one.rms, "unit": "m"} for one in trials}
+    details = {"selection": {"fitted_until_s": until, "models": models}}
+    return replace(fit, trials=trials, fitted_until=until, details={**fit.details, **details})
+
+
+def refuse_several(name: str, value: object, count: int) -> None:
+    """Refuse an argument of one record's least squares beside several records.
+
+    Parameters
+    ----------
+    name : str
+        The argument.
+    value : object
+        What was given; None where it was not.
+    count : int
+        Number of records.
+
+    Raises
+    ------
+    ParameterError
+        It was given.
+    """
+    if value is not None and value is not False:
+        raise ParameterError(f"{name} is {quoted(value)}: expected none with {count} records")

@@ -1,0 +1,51 @@
+//! The delay of a displacement, as a caller says it and as a coordinate of a search.
+
+use super::bounds;
+use super::coordinate::Coordinate;
+use super::record::Record;
+use crate::error::{Error, Result, shown};
+use crate::signal::index;
+
+/// Delay between drive and displacement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Delay {
+    /// Known, s; 0 for none.
+    Fixed(f64),
+    /// Fitted, up to twenty samples or a tenth of the drive's period, whichever is less.
+    Fitted,
+    /// Fitted between two bounds, s.
+    Between(f64, f64),
+}
+
+impl Default for Delay {
+    fn default() -> Self {
+        Self::Fixed(0.0)
+    }
+}
+
+impl Delay {
+    /// The coordinate of the search.
+    pub(super) fn coordinate(self, record: &Record<'_>) -> Result<Coordinate> {
+        let length = record.drive.dt * index(record.drive.u.len());
+        let (low, high) = match self {
+            Self::Fixed(value) => (value, value),
+            Self::Fitted => {
+                return Coordinate::between("delay", 0.0, bounds::measures(record).longest_delay());
+            }
+            Self::Between(low, high) => (low, high),
+        };
+        if !(low >= 0.0 && high < length) {
+            let found = if low < high || high < low {
+                format!("({}, {}) s", shown(low), shown(high))
+            } else {
+                format!("{} s", shown(low))
+            };
+            let expected = format!("0 s or above, below the record's {length:.6} s");
+            return Err(Error::parameter("delay", found, expected));
+        }
+        match self {
+            Self::Fixed(value) => Ok(Coordinate::Fixed(value)),
+            _ => Coordinate::between("delay", low, high),
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! Normal equations about a candidate, from central or one-sided differences, of all records.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::candidate::Candidate;
+use super::cost::Evaluator;
+use super::information::add_priors;
+use super::records::{Member, Records};
+use crate::signal::{Stop, index};
+
+/// Most samples of a record in the Jacobian: more would hardly change the result.
+const MOST_ROWS: usize = 200_000;
+
+/// Most samples of a record in the Jacobian of one of many descents.
+const FEW_ROWS: usize = 50_000;
+
+/// Change of a coordinate of the unit box, for the differences.
+pub(super) const CHANGE: f64 = 1e-4;
+
+/// Normal equations about a candidate, in coordinates of the unit box.
+pub(super) struct Normal {
+    /// J^T J.
+    pub square: DMatrix<f64>,
+    /// J^T r, r being measured less simulated.
+    pub slope: DVector<f64>,
+    /// Samples that entered.
+    pub rows: usize,
+}
+
+/// What one record adds to them, in its own coordinates.
+struct Block {
+    square: DMatrix<f64>,
+    slope: DVector<f64>,
+    /// Sum of r^2.
+    squares: f64,
+    rows: usize,
+}
+
+impl Records<'_> {
+    /// Normal equations at a place by central differences, with the priors, for which the mean
+    /// square of the deviations times `samples_over_freedom` is the variance of one; `None` where a
+    /// neighbour cannot be simulated.
+    pub(super) fn normal(
+        &self,
+        place: &[f64],
+        samples_over_freedom: f64,
+        stop: Stop<'_>,
+    ) -> Option<Normal> {
+        let block = |one: &Member<'_>| one.evaluator.central(&one.own(place), stop);
+        let blocks: Option<Vec<Block>> = self.members().iter().map(block).collect();
+        Some(self.joined(place, &blocks?, samples_over_freedom))
+    }
+
+    /// Normal equations at each of some places by one-sided differences, all simulated side by
+    /// side; `None` for one where a neighbour cannot be simulated.
+    pub(super) fn normals(&self, places: &[Vec<f64>], stop: Stop<'_>) -> Vec<Option<Normal>> {
+        let mut all: Vec<Option<Vec<Block>>> = places.iter().map(|_| Some(Vec::new())).collect();
+        for one in self.members() {
+            let own: Vec<Vec<f64>> = places.iter().map(|place| one.own(place)).collect();
+            for (blocks, block) in all.iter_mut().zip(one.evaluator.one_sided(&own, stop)) {
+                match (blocks.as_mut(), block) {
+                    (Some(blocks), Some(block)) => blocks.push(block),
+                    _ => *blocks = None,
+                }
+            }
+        }
+        let joined = |(place, blocks): (&Vec<f64>, Option<Vec<Block>>)| {
+            Some(self.joined(place, &blocks?, 1.0))
+        };
+        places.iter().zip(all).map(joined).collect()
+    }
+
+    /// The equations of all records, each as much as its share, and the priors.
+    fn joined(&self, place: &[f64], blocks: &[Block], samples_over_freedom: f64) -> Normal {
+        let count = place.len();
+        let rows = blocks.iter().map(|block| block.rows).sum();
+        let (mut square, mut slope) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        let mut squares = 0.0;
+        for (one, block) in self.members().iter().zip(blocks) {
+            let scale = one.share * index(rows) / index(block.rows);
+            for (i, &row) in one.slots().iter().enumerate() {
+                slope[row] += scale * block.slope[i];
+                for (j, &column) in one.slots().iter().enumerate() {
+                    square[(row, column)] += scale * block.square[(i, j)];
+                }
+            }
+            squares += scale * block.squares;
+        }
+        // Some rows stand for all samples, and weigh less against the priors by their share.
+        let variance = squares / index(self.samples()) * samples_over_freedom;
+        add_priors(self, place, variance, &mut square, &mut slope);
+        Normal { square, slope, rows }
+    }
+}
+
+impl Evaluator<'_> {
+    /// By central differences.
+    fn central(&self, place: &[f64], stop: Stop<'_>) -> Option<Block> {
+        let stride = self.stride(MOST_ROWS);
+        let pairs: Vec<(f64, f64)> =
+            place.iter().map(|z| ((z - CHANGE).max(0.0), (z + CHANGE).min(1.0))).collect();
+        let ends = pairs.iter().enumerate().flat_map(|(d, &(low, high))| [(d, low), (d, high)]);
+        let moved = ends.map(|(d, z)| with(place, d, z));
+        let candidates: Vec<Candidate> =
+            [place.to_vec()].into_iter().chain(moved).map(|place| self.at(&place)).collect();
+        let found = self.readings(&candidates, stride, stop);
+        if found.len() < candidates.len() || found.iter().any(|one| one.reading.is_empty()) {
+            return None;
+        }
+        let readings: Vec<Vec<f64>> = found.into_iter().map(|one| one.reading).collect();
+        let [base, ends @ ..] = &readings[..] else { return None };
+        let columns = ends.chunks_exact(2).zip(pairs).map(|(ends, (low, high))| {
+            let scale = 1.0 / (high - low);
+            ends[1].iter().zip(&ends[0]).map(|(x, below)| (x - below) * scale).collect()
+        });
+        Some(self.block(columns.collect(), base, stride))
+    }
+
+    /// By one-sided differences, at each of some places.
+    fn one_sided(&self, places: &[Vec<f64>], stop: Stop<'_>) -> Vec<Option<Block>> {
+        let stride = self.stride(FEW_ROWS);
+        let change = |z: f64| if z < 0.5 { CHANGE } else { -CHANGE };
+        let neighbours = |place: &Vec<f64>| {
+            let moved = place.iter().enumerate().map(|(d, z)| with(place, d, z + change(*z)));
+            [place.clone()].into_iter().chain(moved).collect::<Vec<_>>()
+        };
+        let all: Vec<Candidate> =
+            places.iter().flat_map(neighbours).map(|place| self.at(&place)).collect();
+        let found = self.readings(&all, stride, stop);
+        let mut rest = found.as_slice();
+        let block = |place: &Vec<f64>| {
+            let (own, others) = rest.split_at_checked(1 + place.len())?;
+            rest = others;
+            if own.iter().any(|one| one.reading.is_empty()) {
+                return None;
+            }
+            let base = &own[0].reading;
+            let columns = place.iter().zip(&own[1..]).map(|(z, one)| {
+                let scale = 1.0 / change(*z);
+                one.reading.iter().zip(base).map(|(x, base)| (x - base) * scale).collect()
+            });
+            Some(self.block(columns.collect(), base, stride))
+        };
+        places.iter().map(block).collect()
+    }
+
+    /// Samples of the window to a row of the normal equations.
+    fn stride(&self, most: usize) -> usize {
+        self.record().window.len().div_ceil(most)
+    }
+
+    /// The candidate at a place of this record's problem, simulated to its end however bad.
+    fn at(&self, place: &[f64]) -> Candidate {
+        Candidate { theta: self.problem().theta(place), limit: f64::INFINITY }
+    }
+
+    /// The normal equations of the columns of a Jacobian and what is read at their place.
+    fn block(&self, mut columns: Vec<Vec<f64>>, read: &[f64], stride: usize) -> Block {
+        for column in &mut columns {
+            self.centre(column);
+        }
+        let record = self.record();
+        let measured = record.y[record.window.clone()].iter().step_by(stride);
+        let mut residual: Vec<f64> = measured.zip(read).map(|(y, x)| y - x).collect();
+        self.centre(&mut residual);
+        let count = columns.len();
+        let mut square = DMatrix::zeros(count, count);
+        for i in 0..count {
+            for j in 0..=i {
+                square[(i, j)] = product(&columns[i], &columns[j]);
+                square[(j, i)] = square[(i, j)];
+            }
+        }
+        let slope = DVector::from_fn(count, |i, _| product(&columns[i], &residual));
+        Block { square, slope, squares: product(&residual, &residual), rows: residual.len() }
+    }
+
+    /// Measured less simulated at a place, the mean taken off where an offset is fitted.
+    pub(super) fn residual(&self, place: &[f64], stop: Stop<'_>) -> Option<Vec<f64>> {
+        let record = self.record();
+        let mut residual = self.reading(&self.problem().theta(place), stop)?;
+        let measured = &record.y[record.window.clone()];
+        residual.iter_mut().zip(measured).for_each(|(x, y)| *x = y - *x);
+        self.centre(&mut residual);
+        Some(residual)
+    }
+
+    /// Takes the mean off where an offset is fitted.
+    fn centre(&self, values: &mut [f64]) {
+        if self.problem().offset {
+            let mean = values.iter().sum::<f64>() / index(values.len());
+            for value in values {
+                *value -= mean;
+            }
+        }
+    }
+}
+
+/// A place with another value of one coordinate.
+fn with(place: &[f64], d: usize, z: f64) -> Vec<f64> {
+    let mut moved = place.to_vec();
+    moved[d] = z;
+    moved
+}
+
+/// Product of two columns.
+pub(super) fn product(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

@@ -1,0 +1,205 @@
+//! The records of a search: one cost for all of them, and what each has of its own.
+//!
+//! ```text
+//! f^2 = sum_r w_r n_r f_r^2 / sum_r w_r n_r
+//! ```
+//!
+//! with the weight, the samples and the RMS deviation of each record: with equal weights the RMS
+//! deviation of all samples. Each record is simulated from a beginning of its own. A place of the
+//! unit box has the coordinates of the stage's parameters and then, record by record, those of the
+//! delay and the voltage before.
+
+use super::candidate::{Candidate, DELAY, Point, Theta};
+use super::cost::Evaluator;
+use super::problem::Problem;
+use super::residual_sums::Costs;
+use crate::signal::{Stop, index};
+
+/// Records with one problem, and what computes their costs.
+pub struct Records<'a> {
+    members: Vec<Member<'a>>,
+    /// Record and parameter of each coordinate; of what the records share the first record.
+    coordinates: Vec<(usize, usize)>,
+    samples: usize,
+}
+
+/// One of the records.
+pub(super) struct Member<'a> {
+    /// Its costs.
+    pub evaluator: Evaluator<'a>,
+    /// Share of its mean square in that of all.
+    pub share: f64,
+    /// Which coordinates of a place are its own.
+    own: Vec<usize>,
+}
+
+impl<'a> Records<'a> {
+    /// One record.
+    #[must_use]
+    pub fn one(evaluator: Evaluator<'a>) -> Self {
+        Self::new(vec![evaluator])
+    }
+
+    /// Several, with the weights that they have; their problems share the coordinates of the stage.
+    #[must_use]
+    pub(super) fn new(evaluators: Vec<Evaluator<'a>>) -> Self {
+        let counts = |one: &Evaluator<'_>| one.record().weight * index(one.record().window.len());
+        let total: f64 = evaluators.iter().map(counts).sum();
+        let samples = evaluators.iter().map(|one| one.record().window.len()).sum();
+        let mut coordinates = Vec::new();
+        let mut own = vec![Vec::new(); evaluators.len()];
+        let shared = evaluators.first().into_iter().flat_map(|one| one.problem().free());
+        for parameter in shared.filter(|&parameter| parameter < DELAY) {
+            own.iter_mut().for_each(|own| own.push(coordinates.len()));
+            coordinates.push((0, parameter));
+        }
+        for (r, one) in evaluators.iter().enumerate() {
+            for parameter in one.problem().free().filter(|&parameter| parameter >= DELAY) {
+                own[r].push(coordinates.len());
+                coordinates.push((r, parameter));
+            }
+        }
+        let member = |(evaluator, own): (Evaluator<'a>, Vec<usize>)| {
+            let share = counts(&evaluator) / total;
+            Member { evaluator, share, own }
+        };
+        let members = evaluators.into_iter().zip(own).map(member).collect();
+        Self { members, coordinates, samples }
+    }
+
+    /// The same records and steppings for problems with other parameters held.
+    pub(super) fn of<'b>(&self, problems: &'b [Problem]) -> Records<'b>
+    where
+        'a: 'b,
+    {
+        let evaluators = self.members.iter().zip(problems);
+        Records::new(evaluators.map(|(one, problem)| one.evaluator.of(problem)).collect())
+    }
+
+    /// The problem of the first record: what it says of the stage it says of all.
+    pub(super) fn problem(&self) -> &'a Problem {
+        self.first().evaluator.problem()
+    }
+
+    /// The problems, record by record.
+    pub(super) fn problems(&self) -> impl Iterator<Item = &'a Problem> {
+        self.members.iter().map(|one| one.evaluator.problem())
+    }
+
+    /// The records with what computes their costs.
+    pub(super) fn members(&self) -> &[Member<'a>] {
+        &self.members
+    }
+
+    fn first(&self) -> &Member<'a> {
+        &self.members[0]
+    }
+
+    /// Record and parameter of each coordinate.
+    pub(super) fn coordinates(&self) -> &[(usize, usize)] {
+        &self.coordinates
+    }
+
+    /// Samples in the windows of all records.
+    pub(super) fn samples(&self) -> usize {
+        self.samples
+    }
+
+    /// Range of the displacement, m; of several records the root mean square.
+    pub(super) fn stroke(&self) -> f64 {
+        let squares = self.members.iter().map(|one| {
+            let stroke = one.evaluator.record().stroke();
+            one.share * stroke * stroke
+        });
+        match &self.members[..] {
+            [one] => one.evaluator.record().stroke(),
+            _ => libm::sqrt(squares.sum()),
+        }
+    }
+
+    /// The parameters at a place, with delay and voltage before of the first record.
+    #[must_use]
+    pub fn theta(&self, place: &[f64]) -> Theta {
+        self.first().theta(place)
+    }
+
+    /// Costs at places, in their order; where there are priors, with their factors. Offset and
+    /// shares are those of the first record.
+    ///
+    /// Those that were not finished when `stop` said so are infinite.
+    #[must_use]
+    pub fn costs(&self, points: &[Point], stop: Stop<'_>) -> Vec<Costs> {
+        if let [one] = &self.members[..] {
+            let candidates: Vec<Candidate> =
+                points.iter().map(|point| one.candidate(&point.place, point.limit)).collect();
+            return one.evaluator.costs(&candidates, stop);
+        }
+        let relations = &self.problem().relations;
+        let factors: Vec<f64> =
+            points.iter().map(|point| relations.factor(&self.theta(&point.place))).collect();
+        let limits = points.iter().zip(&factors).map(|(point, factor)| {
+            let limit = point.limit / factor;
+            // A hair above, so that rounding cannot abandon one that ends at its limit.
+            limit * limit * (1.0 + 1e-9)
+        });
+        let limits: Vec<f64> = limits.collect();
+        let mut found = vec![Costs { rms: 0.0, ..Costs::FAILED }; points.len()];
+        // While records are added up, the field has the mean square.
+        let mut left: Vec<usize> = (0..points.len()).collect();
+        for (r, one) in self.members.iter().enumerate() {
+            let candidate = |&i: &usize| {
+                let rest = (limits[i] - found[i].rms) / one.share;
+                one.candidate(&points[i].place, libm::sqrt(rest))
+            };
+            let candidates: Vec<Candidate> = left.iter().map(candidate).collect();
+            for (&i, costs) in left.iter().zip(one.evaluator.deviations(&candidates, stop)) {
+                let square = found[i].rms + one.share * costs.rms * costs.rms;
+                found[i] = Costs { rms: square, ..if r == 0 { costs } else { found[i] } };
+            }
+            // What is beyond its limit is not simulated on the records after.
+            left.retain(|&i| found[i].rms <= limits[i] && found[i].rms.is_finite());
+        }
+        for (one, factor) in found.iter_mut().zip(&factors) {
+            one.rms = libm::sqrt(one.rms) * factor;
+        }
+        found
+    }
+
+    /// What each record has at a place: its parameters, and cost and offset without priors; `whole`
+    /// is the cost of all.
+    pub(super) fn each(&self, place: &[f64], whole: Costs, stop: Stop<'_>) -> Vec<(Theta, Costs)> {
+        if let [one] = &self.members[..] {
+            let theta = one.theta(place);
+            let factor = self.problem().relations.factor(&theta);
+            return vec![(theta, Costs { rms: whole.rms / factor, ..whole })];
+        }
+        let found = self.members.iter().map(|one| {
+            let candidate = one.candidate(place, f64::INFINITY);
+            let costs = one.evaluator.deviations(&[candidate], stop);
+            (candidate.theta, costs.first().copied().unwrap_or(Costs::FAILED))
+        });
+        found.collect()
+    }
+}
+
+impl Member<'_> {
+    /// Its own coordinates of a place.
+    pub fn own(&self, place: &[f64]) -> Vec<f64> {
+        self.own.iter().map(|&i| place[i]).collect()
+    }
+
+    /// Where its coordinates are among those of all.
+    pub fn slots(&self) -> &[usize] {
+        &self.own
+    }
+
+    /// The parameters at a place of all.
+    pub fn theta(&self, place: &[f64]) -> Theta {
+        self.evaluator.problem().theta(&self.own(place))
+    }
+
+    /// The candidate at a place of all.
+    pub fn candidate(&self, place: &[f64], limit: f64) -> Candidate {
+        Candidate { theta: self.theta(place), limit }
+    }
+}
