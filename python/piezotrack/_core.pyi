@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "Checkpoint",
     "Controller",
     "Conventional",
     "DescentSettings",
@@ -68,7 +69,15 @@ def identify(
     threads: int,
     callback: Callable[[int, int, int, float, list[float]], bool] | None,
     progress: Callable[[int, int, int, float, list[float]], None] | None,
+    checkpoint: Checkpoint | None,
 ) -> Search | None: ...
+
+@final
+class Checkpoint:
+    def __new__(cls, path: str, identity: str) -> Checkpoint: ...
+    def save(self) -> str | None: ...
+    @property
+    def known(self) -> int: ...
 
 # Names and numbers: a scalar as a list of one, an optional one as a list of none or one.
 _Named = list[tuple[str, list[float]]]

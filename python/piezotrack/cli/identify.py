@@ -114,6 +114,12 @@ def identify_command(
     threads: Annotated[
         int | None, typer.Option(help="Number of threads, up to 256; default all cores.")
     ] = None,
+    checkpoint: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Keep simulations here, to go on after an interruption; none."
+        ),
+    ] = None,
     validate: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Second log, for validation only; default none."),
@@ -145,6 +151,8 @@ def identify_command(
     given |= {"stiffness": stiffness, "offset": offset}
     given |= of_each_log(delay, history, weight, len(files))
     given |= {"seed": seed, "runs": runs, "threads": threads, "progress": result.progress}
+    if checkpoint is not None and len(kinds.names) > 1:
+        raise ParameterError("--checkpoint is given with several models: expected one")
     columns = Columns(time, drive, displacement, unit, dt)
     if validate is None and validate_window is not None:
         raise ParameterError("--validate-window is given without --validate")
@@ -163,7 +171,7 @@ def identify_command(
     written: list[Path] = []
     for kind in kinds.names:
         with nullcontext() if len(files) > 1 else of_file(files[0]):
-            fit = _search(logs, out, kind, **kinds.arguments_of(kind, given))
+            fit = _search(logs, out, kind, **kinds.arguments_of(kind, given), checkpoint=checkpoint)
         fit, score = _judged(fit, second)
         written += _write(fit, out, second)
         # The result is complete: remove the file of an interrupted search.

@@ -6,14 +6,9 @@ where, is not part of that.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Mapping, Set
-from dataclasses import asdict, dataclass
-from hashlib import sha256
-from numbers import Integral, Real
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from .. import _core
 from .._support.messages import listed, quoted
@@ -21,6 +16,7 @@ from ..errors import ExecutorError, ParameterError, PiezotrackError
 from ..stages.registry import model_named
 from .descents import Descents
 from .fit import identify
+from .keys import exact, key_of, plain, record_key
 from .kinds import refuse_given
 from .least_squares import LeastSquares
 from .selection import AUTO
@@ -31,13 +27,11 @@ if TYPE_CHECKING:
 
     from ..data.dataset import Dataset
 
-__all__ = ["FAILURE", "SCHEMA_VERSION", "Task", "is_searched", "record_key", "run_task", "settings"]
+__all__ = ["FAILURE", "SCHEMA_VERSION", "Task", "is_searched", "run_task", "settings"]
 
 # Format of the file of a task that found no model.
 FAILURE = "piezotrack-campaign-failure"
 SCHEMA_VERSION = 1
-# Hexadecimal digits of a hash: two in a million million million names would be the same.
-DIGITS = 32
 # Arguments of `identify` that a model of a campaign may have.
 OF_PARAMETERS = ("free", "fixed", "bounds", "scales", "ties", "constraints", "priors")
 OF_SEARCH = ("stiffness", "delay", "creep", "method", "swarm", "descents", "runs")
@@ -49,6 +43,7 @@ ELSEWHERE = {
     "threads": "expected none, as the executor says how many tasks run at a time",
     "progress": "expected progress= of the campaign",
     "callback": "expected none, as a task may run on another machine",
+    "checkpoint": "expected none, as the folder of the campaign keeps each result",
     "initial": "expected its values in fixed=, as fixed=dict(step.hysteresis)",
     "data": "expected the record in records=",
 }
@@ -85,7 +80,7 @@ class Task:
     def name(self) -> str:
         """Hash of record, settings, seed and version: 32 hexadecimal digits."""
         seed = None if self.seed is None else str(self.seed)
-        return _hash([record_key(self.record), _exact(self.settings), seed, self.version])
+        return key_of([record_key(self.record), exact(self.settings), seed, self.version])
 
 
 def run_task(task: Task, stopped: Callable[[], bool] | None = None) -> dict[str, Any]:
@@ -140,11 +135,6 @@ def is_searched(settings: Mapping[str, Any]) -> bool:
     return settings["model"] == AUTO or model_named(settings["model"]).searched
 
 
-def record_key(data: Dataset) -> str:
-    """Hash of a record: samples, window, where it begins, hold and unit of the drive."""
-    return _hash([data.sha256, data.hold, data.drive_unit, _exact(float(data.t[0]))])
-
-
 def settings(title: str, given: object) -> dict[str, Any]:
     """Check the arguments of `identify` that a model of a campaign has.
 
@@ -182,7 +172,7 @@ def settings(title: str, given: object) -> dict[str, Any]:
         del found["offset"]
     try:
         _check(found.setdefault("model", title), found)
-        return {name: _plain(name, found[name]) for name in GIVEN if name in found}
+        return {name: plain(name, found[name]) for name in GIVEN if name in found}
     except ParameterError as error:
         raise ParameterError(f"models: '{title}': {error}") from None
 
@@ -205,44 +195,3 @@ def _check(kind: object, found: Mapping[str, Any]) -> None:
     for name in ("model", "offset", "history", "least_squares"):
         of_swarm.pop(name, None)
     refuse_given(model_named(kind), of_swarm, found.get("least_squares"))
-
-
-def _plain(name: str, value: Any) -> Any:
-    """Put an argument in numbers, texts, lists and dicts."""
-    if isinstance(value, (ParticleSwarm, Descents, LeastSquares)):
-        return _plain(name, asdict(value))
-    if value is None or isinstance(value, (bool, str)):
-        return value
-    if isinstance(value, np.bool_):
-        return bool(value)
-    if isinstance(value, Integral):
-        return int(value)
-    if isinstance(value, Real):
-        return float(value)
-    if isinstance(value, Mapping):
-        return {str(key): _plain(name, entry) for key, entry in value.items()}
-    if isinstance(value, Set):
-        # Its order is another one in every process.
-        return sorted(_plain(name, entry) for entry in value)
-    if isinstance(value, Iterable):
-        return [_plain(name, entry) for entry in value]
-    raise ParameterError(f"{name} is {quoted(value)}: expected numbers, texts, lists or mappings")
-
-
-def _exact(value: Any) -> Any:
-    """Write numbers to the last bit, the same for 1 and 1.0."""
-    if isinstance(value, dict):
-        return {key: _exact(entry) for key, entry in value.items()}
-    if isinstance(value, list):
-        return [_exact(entry) for entry in value]
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        try:
-            return float(value).hex()
-        except OverflowError:
-            return str(value)
-    return value
-
-
-def _hash(content: Any) -> str:
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
-    return sha256(text.encode()).hexdigest()[:DIGITS]

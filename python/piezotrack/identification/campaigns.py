@@ -14,7 +14,8 @@ from ..errors import ParameterError
 from .campaign_folder import CampaignFolder
 from .campaign_result import Campaign, TaskResult
 from .campaign_run import Planned, compute
-from .campaign_task import FAILURE, Task, is_searched, record_key, settings
+from .campaign_task import FAILURE, Task, is_searched, settings
+from .keys import record_key
 from .selection import AUTO
 
 __all__ = ["campaign"]

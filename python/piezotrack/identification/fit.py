@@ -6,14 +6,18 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from ..stages.registry import model_named
 from .asked import Own, asked_of
+from .checkpoint import checkpoint_of
 from .kinds import identify_kind, refuse_given
 from .selection import AUTO, identify_best
 from .together import best_together, identify_together, refuse_several
 
 if TYPE_CHECKING:
+    import os
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from ..data.dataset import Dataset
+    from ..stages.model_info import ModelInfo
+    from .asked import Asked
     from .descents import Descents
     from .estimates import Progress
     from .history import History
@@ -54,6 +58,7 @@ def identify(
     threads: int | None = None,
     progress: bool | None = None,
     callback: Callable[[Progress], object] | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
 ) -> Identification:
     r"""Identify the parameters of a stage model from a record, or from several at once.
 
@@ -185,6 +190,10 @@ def identify(
     callback : callable, optional
         Called with a `Progress` after every iteration; a true return value, or StopIteration,
         stops the search.
+    checkpoint : path-like, optional
+        File in which a search keeps what it has simulated, written twice a second and at its end.
+        The same call goes on from it after an interruption, however it came, and gives the same
+        bits as one that was not interrupted. The file stays; it is refused for another search.
 
     Returns
     -------
@@ -196,6 +205,7 @@ def identify(
     ParameterError
         An argument has a value that cannot be used, or does not apply to the model.
     DataError
+        The checkpoint is that of another search, or cannot be written.
         The drive or the displacement is constant in the window, or parameters of the hysteresis
         are searched and neither ever reverses; for least squares also: the displacement falls as
         the drive rises, or the window is too short.
@@ -240,22 +250,35 @@ def identify(
         "threads": threads,
         "progress": progress,
         "callback": callback,
+        "checkpoint": checkpoint,
     }
-    if len(records) > 1:
+    info = None if model == AUTO else model_named(model)
+    several = len(records) > 1
+    if several:
         refuse_several("creep", creep, len(records))
         refuse_several("least_squares", least_squares, len(records))
-        if model == AUTO:
+    elif info is not None:
+        refuse_given(info, of_swarm | {"delay": records[0].delay}, least_squares)
+    said = {**of_swarm, "model": model, "least_squares": least_squares}
+    with checkpoint_of(checkpoint, records, said) as kept:
+        of_swarm["checkpoint"] = kept
+        if several and info is None:
             return best_together(records, of_swarm)
-        return identify_together(records, model_named(model), of_swarm)
-    (one,) = records
-    alone: dict[str, Any] = {
+        if several and info is not None:
+            return identify_together(records, info, of_swarm)
+        return _alone(records[0], info, of_swarm, least_squares)
+
+
+def _alone(
+    one: Asked, info: ModelInfo | None, of_swarm: dict[str, Any], least_squares: object
+) -> Identification:
+    """Identify a stage of a kind, or of the best one, from one record."""
+    asked: dict[str, Any] = {
         "offset": one.offset,
         "history": one.history,
         "of_swarm": of_swarm | {"delay": one.delay},
         "least_squares": least_squares,
     }
-    if model == AUTO:
-        return identify_best(one.data, **alone)
-    info = model_named(model)
-    refuse_given(info, alone["of_swarm"], least_squares)
-    return identify_kind(one.data, info, **alone)
+    if info is None:
+        return identify_best(one.data, **asked)
+    return identify_kind(one.data, info, **asked)

@@ -26,7 +26,7 @@ __all__ = ["check_counts", "identify_kind", "refuse_given"]
 # How a search is run, not what it finds.
 RUNNING = ("seed", "runs", "threads", "progress")
 # Arguments of a search, not of what is searched.
-OF_SEARCH = ("method", "swarm", "descents", "seed", "runs", "progress", "callback")
+OF_SEARCH = ("method", "swarm", "descents", "seed", "runs", "progress", "callback", "checkpoint")
 
 
 def identify_kind(

@@ -92,6 +92,7 @@ def search_records(
     threads: object = None,
     progress: bool | None = None,
     callback: object = None,
+    checkpoint: _core.Checkpoint | None = None,
     **asked: object,
 ) -> Identification:
     """Search the parameters of a model on one record or several, by descents or with a swarm.
@@ -104,6 +105,8 @@ def search_records(
         The model.
     method, swarm, descents, seed, runs, threads, progress, callback
         As for `identify`, not yet checked; None stands for the default.
+    checkpoint : _core.Checkpoint or None
+        What the search keeps its simulations in.
     **asked
         As for `question_of`.
 
@@ -131,6 +134,7 @@ def search_records(
             threads=0 if threads is None else _core.as_count("threads", threads),
             callback=None if callback is None else _reporting(info, callback),
             progress=bar.update,
+            checkpoint=checkpoint,
         )
     if found is None:
         raise Interrupted("interrupted before the first cost was computed")

@@ -1,13 +1,13 @@
 //! Entry of all long calls into the core: GIL, Ctrl-C, progress and threads.
 
 use std::ops::ControlFlow;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use piezotrack_core::Error;
-use piezotrack_core::identify::{Monitor, Progress};
+use piezotrack_core::identify::{Journal, Monitor, Progress};
 use piezotrack_core::signal::Stop;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyOSError, PyStopIteration};
 use pyo3::prelude::*;
@@ -26,6 +26,8 @@ pub struct Watchers {
     pub callback: Option<Py<PyAny>>,
     /// Called now and then.
     pub progress: Option<Py<PyAny>>,
+    /// Keeps what is computed.
+    pub journal: Option<Arc<dyn Journal>>,
 }
 
 /// Why a job was stopped from Python.
@@ -126,6 +128,7 @@ pub fn enter_pool<T: Send>(
         waits: watchers.callback.is_some(),
         shows: watchers.progress.is_some(),
         last: None,
+        journal: watchers.journal.clone(),
     };
     let (pool, stop) = (&pool, &|| halt.stopped());
     let joined = py.detach(move || {
@@ -206,9 +209,14 @@ struct Relay {
     waits: bool,
     shows: bool,
     last: Option<Instant>,
+    journal: Option<Arc<dyn Journal>>,
 }
 
 impl Monitor for Relay {
+    fn journal(&self) -> Option<Arc<dyn Journal>> {
+        self.journal.clone()
+    }
+
     fn report(&mut self, progress: &Progress) -> ControlFlow<()> {
         let due = self.last.is_none_or(|last| last.elapsed() >= POLL);
         let wanted = self.waits || (self.shows && due);

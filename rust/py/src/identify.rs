@@ -1,9 +1,11 @@
 //! Identification of a stage whose parameters a swarm searches.
 
+use std::sync::Arc;
+
 use numpy::PyArray1;
 use piezotrack_core::identify::{
-    BEFORE, Coordinate, DELAY, History, Identification, Method, Outcome, OwnResult, Plan, Record,
-    Relations, Spec, StopReason, identify_together, visited,
+    BEFORE, Coordinate, DELAY, History, Identification, Journal, Method, Outcome, OwnResult, Plan,
+    Record, Relations, Spec, StopReason, identify_together, visited,
 };
 use piezotrack_core::integrator::Order;
 use piezotrack_core::signal::Drive;
@@ -11,6 +13,7 @@ use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
 use crate::arrays::{array, samples};
+use crate::checkpoint::PyCheckpoint;
 use crate::descents::PyDescents;
 use crate::enter::{Watchers, enter_pool};
 use crate::errors::raise;
@@ -20,6 +23,7 @@ use crate::swarm::PySettings;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PySearch>()?;
+    module.add_class::<PyCheckpoint>()?;
     module.add_function(wrap_pyfunction!(voltages_before, module)?)?;
     module.add_function(wrap_pyfunction!(identify, module)?)
 }
@@ -278,7 +282,7 @@ impl Searcher<'_> {
 
 /// Identifies a stage from records; None where the search was stopped before its first cost.
 #[pyfunction]
-#[pyo3(signature = (questions, *, method, seed, runs, threads, callback, progress))]
+#[pyo3(signature = (questions, *, method, seed, runs, threads, callback, progress, checkpoint))]
 #[expect(clippy::too_many_arguments, reason = "keyword-only, called from one place")]
 fn identify(
     py: Python<'_>,
@@ -289,10 +293,12 @@ fn identify(
     threads: usize,
     callback: Option<Py<PyAny>>,
     progress: Option<Py<PyAny>>,
+    checkpoint: Option<PyRef<'_, PyCheckpoint>>,
 ) -> PyResult<Option<PySearch>> {
     let asked: Vec<Asked> = questions.into_iter().map(Question::asked).collect::<PyResult<_>>()?;
     let plan = Plan { method: method.into_method(), seed, runs };
-    let watchers = Watchers { callback, progress };
+    let journal = checkpoint.map(|one| one.0.clone() as Arc<dyn Journal>);
+    let watchers = Watchers { callback, progress, journal };
     let found = enter_pool(py, threads, &watchers, |monitor, stop| {
         let records: Vec<Record<'_>> = asked.iter().map(Asked::record).collect::<Result<_>>()?;
         let spec = |(one, record): (&Asked, &Record<'_>)| {

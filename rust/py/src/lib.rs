@@ -1,6 +1,7 @@
 //! The Python module `piezotrack._core`: this file only registers the contents of the others.
 
 mod arrays;
+mod checkpoint;
 mod control;
 mod descents;
 mod design;

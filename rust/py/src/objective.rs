@@ -34,7 +34,7 @@ impl PyObjective {
     #[new]
     fn new(py: Python<'_>, question: Question<'_>, threads: usize) -> PyResult<Self> {
         let asked = question.asked()?;
-        let watchers = Watchers { callback: None, progress: None };
+        let watchers = Watchers { callback: None, progress: None, journal: None };
         let (problem, stepping) = enter_pool(py, threads, &watchers, |_, stop| {
             let record = asked.record()?;
             let problem = Problem::new(&record, &asked.spec(&record)?, stop)?;
@@ -114,7 +114,7 @@ impl PyObjective {
         py: Python<'_>,
         job: impl FnOnce(&LocalRefinement<'_>, Stop<'_>) -> Result<T> + Send,
     ) -> PyResult<T> {
-        let watchers = Watchers { callback: None, progress: None };
+        let watchers = Watchers { callback: None, progress: None, journal: None };
         enter_pool(py, self.threads, &watchers, |_, stop| {
             let record = self.asked.record()?;
             let evaluator = Evaluator::stepped(&record, &self.problem, self.stepping);

@@ -94,7 +94,7 @@ pub fn identify_together(
         enough_memory(record, problem).map_err(|error| record.named(error))?;
     }
     let evaluators = each().map(|(record, problem)| Evaluator::new(record, problem, stop));
-    let records = Records::new(evaluators.collect());
+    let records = Records::new(evaluators.collect()).kept(monitor.journal());
     let local = LocalRefinement { records: &records, stop };
     let (mut runs, polish) = match &plan.method {
         Method::Swarm(settings) => {

@@ -13,6 +13,7 @@ mod history;
 mod identification;
 mod inertia;
 mod information;
+mod journal;
 mod lag;
 mod least_squares;
 mod levenberg_marquardt;
@@ -45,6 +46,7 @@ pub use delay::Delay;
 pub use descents::DescentSettings;
 pub use history::{History, visited};
 pub use identification::{Identification, OwnResult, identify, identify_together};
+pub use journal::Journal;
 pub use lag::LagRange;
 pub use least_squares::{
     CreepKind, DynamicsKind, LeastSquaresFit, PlaysKind, Settings as WeightsSettings,

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::candidate::Candidate;
 use super::cost::Evaluator;
 use super::information::add_priors;
+use super::journal::remembered;
 use super::records::{Member, Records};
 use crate::signal::{Stop, index};
 
@@ -47,13 +48,21 @@ impl Records<'_> {
         stop: Stop<'_>,
     ) -> Option<Normal> {
         let block = |one: &Member<'_>| one.evaluator.central(&one.own(place), stop);
-        let blocks: Option<Vec<Block>> = self.members().iter().map(block).collect();
-        Some(self.joined(place, &blocks?, samples_over_freedom))
+        let computed = || {
+            let blocks: Option<Vec<Block>> = self.members().iter().map(block).collect();
+            vec![blocks.map(|blocks| self.joined(place, &blocks, samples_over_freedom))]
+        };
+        remembered(self.journal(), (1, place.len()), stop, computed).pop().flatten()
     }
 
     /// Normal equations at each of some places by one-sided differences, all simulated side by
     /// side; `None` for one where a neighbour cannot be simulated.
     pub(super) fn normals(&self, places: &[Vec<f64>], stop: Stop<'_>) -> Vec<Option<Normal>> {
+        let questions = (places.len(), self.coordinates().len());
+        remembered(self.journal(), questions, stop, || self.differentiated(places, stop))
+    }
+
+    fn differentiated(&self, places: &[Vec<f64>], stop: Stop<'_>) -> Vec<Option<Normal>> {
         let mut all: Vec<Option<Vec<Block>>> = places.iter().map(|_| Some(Vec::new())).collect();
         for one in self.members() {
             let own: Vec<Vec<f64>> = places.iter().map(|place| one.own(place)).collect();

@@ -1,8 +1,10 @@
 //! What a search tells on its way, and what each of its runs found.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use super::candidate::Theta;
+use super::journal::Journal;
 use super::residual_sums::Costs;
 
 /// Why a search ended.
@@ -39,6 +41,11 @@ pub struct Progress {
 pub trait Monitor {
     /// Called after each iteration, in order.
     fn report(&mut self, progress: &Progress) -> ControlFlow<()>;
+
+    /// Where what is computed is kept, if anywhere.
+    fn journal(&self) -> Option<Arc<dyn Journal>> {
+        None
+    }
 }
 
 impl<F: FnMut(&Progress) -> ControlFlow<()>> Monitor for F {

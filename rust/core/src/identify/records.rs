@@ -9,8 +9,11 @@
 //! unit box has the coordinates of the stage's parameters and then, record by record, those of the
 //! delay and the voltage before.
 
+use std::sync::Arc;
+
 use super::candidate::{Candidate, DELAY, Point, Theta};
 use super::cost::Evaluator;
+use super::journal::{Journal, remembered};
 use super::problem::Problem;
 use super::residual_sums::Costs;
 use crate::signal::{Stop, index};
@@ -21,6 +24,7 @@ pub struct Records<'a> {
     /// Record and parameter of each coordinate; of what the records share the first record.
     coordinates: Vec<(usize, usize)>,
     samples: usize,
+    journal: Option<Arc<dyn Journal>>,
 }
 
 /// One of the records.
@@ -50,7 +54,9 @@ impl<'a> Records<'a> {
         let mut own = vec![Vec::new(); evaluators.len()];
         let shared = evaluators.first().into_iter().flat_map(|one| one.problem().free());
         for parameter in shared.filter(|&parameter| parameter < DELAY) {
-            own.iter_mut().for_each(|own| own.push(coordinates.len()));
+            for own in &mut own {
+                own.push(coordinates.len());
+            }
             coordinates.push((0, parameter));
         }
         for (r, one) in evaluators.iter().enumerate() {
@@ -64,7 +70,7 @@ impl<'a> Records<'a> {
             Member { evaluator, share, own }
         };
         let members = evaluators.into_iter().zip(own).map(member).collect();
-        Self { members, coordinates, samples }
+        Self { members, coordinates, samples, journal: None }
     }
 
     /// The same records and steppings for problems with other parameters held.
@@ -73,7 +79,19 @@ impl<'a> Records<'a> {
         'a: 'b,
     {
         let evaluators = self.members.iter().zip(problems);
-        Records::new(evaluators.map(|(one, problem)| one.evaluator.of(problem)).collect())
+        let records = evaluators.map(|(one, problem)| one.evaluator.of(problem)).collect();
+        Records::new(records).kept(self.journal.clone())
+    }
+
+    /// The same with what is computed kept.
+    pub(super) fn kept(mut self, journal: Option<Arc<dyn Journal>>) -> Self {
+        self.journal = journal;
+        self
+    }
+
+    /// Where what is computed is kept.
+    pub(super) fn journal(&self) -> Option<&Arc<dyn Journal>> {
+        self.journal.as_ref()
     }
 
     /// The problem of the first record: what it says of the stage it says of all.
@@ -129,6 +147,11 @@ impl<'a> Records<'a> {
     /// Those that were not finished when `stop` said so are infinite.
     #[must_use]
     pub fn costs(&self, points: &[Point], stop: Stop<'_>) -> Vec<Costs> {
+        let questions = (points.len(), self.coordinates.len());
+        remembered(self.journal(), questions, stop, || self.simulated(points, stop))
+    }
+
+    fn simulated(&self, points: &[Point], stop: Stop<'_>) -> Vec<Costs> {
         if let [one] = &self.members[..] {
             let candidates: Vec<Candidate> =
                 points.iter().map(|point| one.candidate(&point.place, point.limit)).collect();

@@ -1,0 +1,112 @@
+//! What a search has computed, kept so that it can go on after an interruption.
+//!
+//! A search asks the simulations for costs and for normal equations; what it does between two
+//! questions follows from the answers and the seed. A search that is given the answers of an
+//! interrupted one again therefore goes the same way, to the bit, up to where that one ended.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::creep_shares::MOST_SHARES;
+use super::normal::Normal;
+use super::residual_sums::Costs;
+use crate::signal::{Stop, index};
+
+/// Keeps the answers of simulations, in the order of the questions.
+pub trait Journal: Send + Sync {
+    /// The next answer of an earlier search, of so many numbers; `None` where there is none left.
+    fn recall(&self, count: usize) -> Option<Vec<f64>>;
+
+    /// Takes an answer that had to be computed.
+    fn keep(&self, numbers: &[f64]);
+}
+
+/// An answer of simulations, in numbers.
+pub(super) trait Answer: Sized {
+    /// Numbers of one with so many coordinates.
+    fn length(coordinates: usize) -> usize;
+
+    /// Writes it to the end of some numbers.
+    fn write(&self, numbers: &mut Vec<f64>, coordinates: usize);
+
+    /// Reads it from as many numbers as were written.
+    fn read(numbers: &[f64], coordinates: usize) -> Self;
+}
+
+/// Recalls the answers to so many questions, or computes and keeps them; what was stopped is not
+/// kept.
+pub(super) fn remembered<T: Answer>(
+    journal: Option<&Arc<dyn Journal>>,
+    (questions, coordinates): (usize, usize),
+    stop: Stop<'_>,
+    compute: impl FnOnce() -> Vec<T>,
+) -> Vec<T> {
+    let Some(journal) = journal else { return compute() };
+    let each = T::length(coordinates);
+    if let Some(numbers) = journal.recall(questions * each) {
+        return numbers.chunks_exact(each).map(|one| T::read(one, coordinates)).collect();
+    }
+    let found = compute();
+    if !stop() {
+        let mut numbers = Vec::with_capacity(questions * each);
+        for one in &found {
+            one.write(&mut numbers, coordinates);
+        }
+        journal.keep(&numbers);
+    }
+    found
+}
+
+impl Answer for Costs {
+    fn length(_coordinates: usize) -> usize {
+        2 + MOST_SHARES
+    }
+
+    fn write(&self, numbers: &mut Vec<f64>, _coordinates: usize) {
+        numbers.extend([self.rms, self.offset]);
+        numbers.extend(self.shares);
+    }
+
+    fn read(numbers: &[f64], _coordinates: usize) -> Self {
+        let at = |i: usize| numbers.get(i).copied().unwrap_or(f64::NAN);
+        Self { rms: at(0), offset: at(1), shares: core::array::from_fn(|i| at(2 + i)) }
+    }
+}
+
+/// First the rows, -1 where a neighbour could not be simulated.
+impl Answer for Option<Normal> {
+    fn length(coordinates: usize) -> usize {
+        1 + coordinates + coordinates * coordinates
+    }
+
+    fn write(&self, numbers: &mut Vec<f64>, coordinates: usize) {
+        if let Some(Normal { square, slope, rows }) = self {
+            numbers.push(index(*rows));
+            numbers.extend(slope.iter());
+            numbers.extend(square.iter());
+        } else {
+            numbers.push(-1.0);
+            numbers.resize(numbers.len() + Self::length(coordinates) - 1, 0.0);
+        }
+    }
+
+    fn read(numbers: &[f64], coordinates: usize) -> Self {
+        let (&rows, rest) = numbers.split_first()?;
+        let (slope, square) = rest.split_at_checked(coordinates)?;
+        if rows < 0.0 {
+            return None;
+        }
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a count, written above"
+        )]
+        let rows = rows as usize;
+        Some(Normal {
+            square: DMatrix::from_column_slice(coordinates, coordinates, square),
+            slope: DVector::from_column_slice(slope),
+            rows,
+        })
+    }
+}
