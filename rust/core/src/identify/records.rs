@@ -13,7 +13,7 @@ use super::candidate::{Candidate, DELAY, Point, Theta};
 use super::cost::Evaluator;
 use super::problem::Problem;
 use super::residual_sums::Costs;
-use crate::signal::{Stop, index};
+use crate::signal::{NEVER, Stop, index};
 
 /// Records with one problem, and what computes their costs.
 pub struct Records<'a> {
@@ -167,7 +167,7 @@ impl<'a> Records<'a> {
 
     /// What each record has at a place: its parameters, and cost and offset without priors; `whole`
     /// is the cost of all.
-    pub(super) fn each(&self, place: &[f64], whole: Costs, stop: Stop<'_>) -> Vec<(Theta, Costs)> {
+    pub(super) fn each(&self, place: &[f64], whole: Costs) -> Vec<(Theta, Costs)> {
         if let [one] = &self.members[..] {
             let theta = one.theta(place);
             let factor = self.problem().relations.factor(&theta);
@@ -175,7 +175,8 @@ impl<'a> Records<'a> {
         }
         let found = self.members.iter().map(|one| {
             let candidate = one.candidate(place, f64::INFINITY);
-            let costs = one.evaluator.deviations(&[candidate], stop);
+            // Also where the search was stopped: what it found so far is told.
+            let costs = one.evaluator.deviations(&[candidate], NEVER);
             (candidate.theta, costs.first().copied().unwrap_or(Costs::FAILED))
         });
         found.collect()
