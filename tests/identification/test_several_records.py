@@ -64,7 +64,8 @@ def small(count: int = 1000, dt: float = 5e-4) -> Array:
     f = 4.0 * np.arange(1, 31)
     phases = rng.uniform(0.0, 2.0 * np.pi, f.size)
     u: Array = 0.3 * np.cos(2.0 * np.pi * np.outer(t, f) + phases).sum(axis=1)
-    return u - u[0]
+    u -= u[0]
+    return u
 
 
 @cache
@@ -309,7 +310,7 @@ def test_a_file_with_broken_records_is_refused(tmp_path: Path) -> None:
     ):
         path = tmp_path / "two.json"
         path.write_text(json.dumps(document | change), encoding="utf-8")
-        with pytest.raises(pt.DataError, match="two.json") as caught:
+        with pytest.raises(pt.DataError, match=r"two\.json") as caught:
             pt.load(path)
         assert str(caught.value) == said
     document["records"][1]["delay"]["unit"] = "ms"

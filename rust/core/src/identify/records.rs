@@ -50,7 +50,9 @@ impl<'a> Records<'a> {
         let mut own = vec![Vec::new(); evaluators.len()];
         let shared = evaluators.first().into_iter().flat_map(|one| one.problem().free());
         for parameter in shared.filter(|&parameter| parameter < DELAY) {
-            own.iter_mut().for_each(|own| own.push(coordinates.len()));
+            for own in &mut own {
+                own.push(coordinates.len());
+            }
             coordinates.push((0, parameter));
         }
         for (r, one) in evaluators.iter().enumerate() {
