@@ -373,7 +373,7 @@ def still() -> pt.Dataset:
     [
         (list, {}, "data is an empty list: expected at least one Dataset"),
         (lambda: 3.0, {}, "data is float: expected a Dataset"),
-        (lambda: [slow(), 3.0], {}, "record 2 of data is float: expected a Dataset"),
+        (lambda: [slow(), 3.0], {}, "data is a list whose record 2 is float: expected a Dataset"),
         (
             lambda: [slow(), of_force()],
             {},
