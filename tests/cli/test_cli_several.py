@@ -90,7 +90,7 @@ def test_a_model_of_several_logs_is_used_like_any_other() -> None:
         (("--weight", "1", "--weight", "-1"), "record 2 (b.csv): weight is -1"),
         (("--history", "virgin", "--history", "old"), "record 2 (b.csv): history is 'old'"),
         (("--window", "0:1", "--window", "9:"), "b.csv: --window 9:"),
-        (("--creep", "fit"), "--creep is True: expected none with 2 records"),
+        (("--creep", "fit"), "--creep has no effect with several logs: expected it left out"),
     ],
 )
 def test_refusals_name_the_option_or_the_log(options: tuple[str, ...], said: str) -> None:
@@ -99,14 +99,8 @@ def test_refusals_name_the_option_or_the_log(options: tuple[str, ...], said: str
     assert not Path("results").exists()
 
 
-def test_one_log_has_no_weight_and_logs_of_other_units_do_not_mix() -> None:
+def test_what_several_logs_cannot_have_is_refused() -> None:
     assert "--weight has no effect with 1 log" in refusal("identify", "a.csv", "--weight", "2")
-    text = Path("b.csv").read_text(encoding="utf-8").splitlines()
-    title = text[0].replace("[V]", "[N]").replace("(V)", "(N)").replace("_V", "_N")
-    assert title != text[0]
-    write("force.csv", "\n".join([title, *text[1:]]) + "\n")
-    said = refusal("identify", "a.csv", "force.csv", "--model", "dahl")
-    assert "record 2 (force.csv) is in N: expected V, as that of record 1 (a.csv)" in said
     said = refusal("identify", "a.csv", "b.csv", "--model", "prandtl-ishlinskii")
     assert "expected one whose parameters are searched" in said
     write("broken.csv", "time,drive\n1,2\n")
