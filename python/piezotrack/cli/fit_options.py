@@ -248,7 +248,7 @@ class Kinds:
                 context, OF_PLAYS, f"with the model {named}, whose parameters are searched"
             )
         for given in ("delay", "stiffness"):
-            if context.params[given] is not None and self.names == (AUTO,):
+            if context.params[given] not in (None, [], ()) and self.names == (AUTO,):
                 refuse_without_effect(
                     context, OF_PLAYS, f"with --{given}, for which a search is needed"
                 )

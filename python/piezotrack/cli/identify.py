@@ -54,6 +54,7 @@ from .options import (
     TimeColumn,
     Units,
     of_file,
+    refuse_without_effect,
     windowed,
 )
 from .output import Output
@@ -67,6 +68,8 @@ if TYPE_CHECKING:
 
 __all__ = ["identify_command"]
 
+# Options that one log can have.
+OF_ONE_LOG = ("creep", "plays", "asymmetry", "dynamics")
 # Pictures of a second log.
 PANELS = ("loop", "time")
 
@@ -131,6 +134,8 @@ def identify_command(
     """Identify models of a stage from a log, or from several at once."""
     kinds = Kinds.checked(model)
     kinds.refuse_without_effect(context)
+    if len(files) > 1:
+        refuse_without_effect(context, OF_ONE_LOG, "with several logs")
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     given = fit_options(
         free=free,

@@ -122,8 +122,9 @@ def _records(data: object) -> list[Dataset]:
     for i, record in enumerate(data):
         if not isinstance(record, Dataset):
             raise ParameterError(
-                f"record {i + 1} of data is {type(record).__name__}: expected a Dataset, as "
-                "pt.read or pt.Dataset.from_frame make it"
+                f"data is a {type(data).__name__} whose record {i + 1} is "
+                f"{type(record).__name__}: expected a Dataset, as pt.read or "
+                "pt.Dataset.from_frame make it"
             )
         if record.drive_unit != data[0].drive_unit:
             raise ParameterError(

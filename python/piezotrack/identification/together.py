@@ -32,7 +32,10 @@ if TYPE_CHECKING:
     from .asked import Asked
     from .result import Identification
 
-__all__ = ["best_together", "identify_together"]
+__all__ = ["best_together", "identify_together", "refuse_several"]
+
+# A history that a record shows and that nobody gave.
+SHOWN = (("settled", None), ("fit", None))
 
 
 def identify_together(
@@ -66,12 +69,19 @@ def identify_together(
         )
     fit = search_records(records, info, **of_search)
     shown = [one if one.history else _with_shown(fit, one) for one in records]
-    if all(
-        one.history in ("virgin", known.history) for one, known in zip(shown, records, strict=True)
-    ):
+    moved = [i for i, one in enumerate(shown) if (one.history, records[i].history) in SHOWN]
+    if not moved:
         return fit
     other = search_records(shown, info, **of_search)
-    return other if other.cost < (1.0 - GAIN) * fit.cost else fit
+    if not other.cost < (1.0 - GAIN) * fit.cost:
+        return fit
+    # A model that takes one record for virgin shows more of the others than there is.
+    for i in moved if len(moved) > 1 else []:
+        simpler = [records[k] if k == i else one for k, one in enumerate(shown)]
+        less = search_records(simpler, info, **of_search)
+        if not other.cost < (1.0 - GAIN) * less.cost:
+            shown, other = simpler, less
+    return other
 
 
 def _with_shown(fit: Identification, asked: Asked) -> Asked:

@@ -139,7 +139,7 @@ pub fn identify_together(
     let searched = with_mass.unwrap_or_else(|| problems.clone());
     let problem = searched[0].clone();
     let owns = best.map_or_else(Vec::new, |i| {
-        let each = records.of(&searched).each(&runs[i].place, runs[i].costs, stop);
+        let each = records.of(&searched).each(&runs[i].place, runs[i].costs);
         let own = |(problem, (theta, costs))| OwnResult { problem, theta, costs };
         searched.into_iter().zip(each).map(own).collect()
     });

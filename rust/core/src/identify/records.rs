@@ -16,7 +16,7 @@ use super::cost::Evaluator;
 use super::journal::{Journal, remembered};
 use super::problem::Problem;
 use super::residual_sums::Costs;
-use crate::signal::{Stop, index};
+use crate::signal::{NEVER, Stop, index};
 
 /// Records with one problem, and what computes their costs.
 pub struct Records<'a> {
@@ -190,7 +190,7 @@ impl<'a> Records<'a> {
 
     /// What each record has at a place: its parameters, and cost and offset without priors; `whole`
     /// is the cost of all.
-    pub(super) fn each(&self, place: &[f64], whole: Costs, stop: Stop<'_>) -> Vec<(Theta, Costs)> {
+    pub(super) fn each(&self, place: &[f64], whole: Costs) -> Vec<(Theta, Costs)> {
         if let [one] = &self.members[..] {
             let theta = one.theta(place);
             let factor = self.problem().relations.factor(&theta);
@@ -198,7 +198,8 @@ impl<'a> Records<'a> {
         }
         let found = self.members.iter().map(|one| {
             let candidate = one.candidate(place, f64::INFINITY);
-            let costs = one.evaluator.deviations(&[candidate], stop);
+            // Also where the search was stopped: what it found so far is told.
+            let costs = one.evaluator.deviations(&[candidate], NEVER);
             (candidate.theta, costs.first().copied().unwrap_or(Costs::FAILED))
         });
         found.collect()
