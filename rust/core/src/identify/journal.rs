@@ -6,12 +6,9 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
-
 use super::creep_shares::MOST_SHARES;
-use super::normal::Normal;
 use super::residual_sums::Costs;
-use crate::signal::{Stop, index};
+use crate::signal::Stop;
 
 /// Keeps the answers of simulations, in the order of the questions.
 pub trait Journal: Send + Sync {
@@ -71,42 +68,5 @@ impl Answer for Costs {
     fn read(numbers: &[f64], _coordinates: usize) -> Self {
         let at = |i: usize| numbers.get(i).copied().unwrap_or(f64::NAN);
         Self { rms: at(0), offset: at(1), shares: core::array::from_fn(|i| at(2 + i)) }
-    }
-}
-
-/// First the rows, -1 where a neighbour could not be simulated.
-impl Answer for Option<Normal> {
-    fn length(coordinates: usize) -> usize {
-        1 + coordinates + coordinates * coordinates
-    }
-
-    fn write(&self, numbers: &mut Vec<f64>, coordinates: usize) {
-        if let Some(Normal { square, slope, rows }) = self {
-            numbers.push(index(*rows));
-            numbers.extend(slope.iter());
-            numbers.extend(square.iter());
-        } else {
-            numbers.push(-1.0);
-            numbers.resize(numbers.len() + Self::length(coordinates) - 1, 0.0);
-        }
-    }
-
-    fn read(numbers: &[f64], coordinates: usize) -> Self {
-        let (&rows, rest) = numbers.split_first()?;
-        let (slope, square) = rest.split_at_checked(coordinates)?;
-        if rows < 0.0 {
-            return None;
-        }
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a count, written above"
-        )]
-        let rows = rows as usize;
-        Some(Normal {
-            square: DMatrix::from_column_slice(coordinates, coordinates, square),
-            slope: DVector::from_column_slice(slope),
-            rows,
-        })
     }
 }

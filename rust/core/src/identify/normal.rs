@@ -1,11 +1,12 @@
 //! Normal equations about a candidate, from central or one-sided differences, of all records.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::candidate::Candidate;
 use super::cost::Evaluator;
 use super::information::add_priors;
-use super::journal::remembered;
+use super::journal::{Answer, remembered};
 use super::records::{Member, Records};
 use crate::signal::{Stop, index};
 
@@ -26,6 +27,43 @@ pub(super) struct Normal {
     pub slope: DVector<f64>,
     /// Samples that entered.
     pub rows: usize,
+}
+
+/// First the rows, -1 where a neighbour could not be simulated.
+impl Answer for Option<Normal> {
+    fn length(coordinates: usize) -> usize {
+        1 + coordinates + coordinates * coordinates
+    }
+
+    fn write(&self, numbers: &mut Vec<f64>, coordinates: usize) {
+        if let Some(Normal { square, slope, rows }) = self {
+            numbers.push(index(*rows));
+            numbers.extend(slope.iter());
+            numbers.extend(square.iter());
+        } else {
+            numbers.push(-1.0);
+            numbers.resize(numbers.len() + Self::length(coordinates) - 1, 0.0);
+        }
+    }
+
+    fn read(numbers: &[f64], coordinates: usize) -> Self {
+        let (&rows, rest) = numbers.split_first()?;
+        let (slope, square) = rest.split_at_checked(coordinates)?;
+        if rows < 0.0 {
+            return None;
+        }
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a count, written above"
+        )]
+        let rows = rows as usize;
+        Some(Normal {
+            square: DMatrix::from_column_slice(coordinates, coordinates, square),
+            slope: DVector::from_column_slice(slope),
+            rows,
+        })
+    }
 }
 
 /// What one record adds to them, in its own coordinates.
@@ -136,10 +174,9 @@ impl Evaluator<'_> {
         let all: Vec<Candidate> =
             places.iter().flat_map(neighbours).map(|place| self.at(&place)).collect();
         let found = self.readings(&all, stride, stop);
-        let mut rest = found.as_slice();
-        let block = |place: &Vec<f64>| {
-            let (own, others) = rest.split_at_checked(1 + place.len())?;
-            rest = others;
+        let block = |(i, place): (usize, &Vec<f64>)| {
+            let each = 1 + place.len();
+            let own = found.get(i * each..(i + 1) * each)?;
             if own.iter().any(|one| one.reading.is_empty()) {
                 return None;
             }
@@ -150,7 +187,7 @@ impl Evaluator<'_> {
             });
             Some(self.block(columns.collect(), base, stride))
         };
-        places.iter().map(block).collect()
+        places.par_iter().enumerate().map(block).collect()
     }
 
     /// Samples of the window to a row of the normal equations.
@@ -197,7 +234,7 @@ impl Evaluator<'_> {
     /// Takes the mean off where an offset is fitted.
     fn centre(&self, values: &mut [f64]) {
         if self.problem().offset {
-            let mean = values.iter().sum::<f64>() / index(values.len());
+            let mean = mean(values);
             for value in values {
                 *value -= mean;
             }
@@ -212,7 +249,31 @@ fn with(place: &[f64], d: usize, z: f64) -> Vec<f64> {
     moved
 }
 
+/// Sums side by side, which the processor adds at once.
+const SUMS: usize = 8;
+
 /// Product of two columns.
 pub(super) fn product(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+    let (a, a_rest) = a.as_chunks::<SUMS>();
+    let (b, b_rest) = b.as_chunks::<SUMS>();
+    let mut sums = [0.0; SUMS];
+    for (a, b) in a.iter().zip(b) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
+        }
+    }
+    let rest = a_rest.iter().zip(b_rest).map(|(a, b)| a * b);
+    sums.into_iter().chain(rest).sum()
+}
+
+/// Mean of a column.
+fn mean(values: &[f64]) -> f64 {
+    let (all, rest) = values.as_chunks::<SUMS>();
+    let mut sums = [0.0; SUMS];
+    for values in all {
+        for (sum, value) in sums.iter_mut().zip(values) {
+            *sum += value;
+        }
+    }
+    sums.iter().chain(rest).sum::<f64>() / index(values.len())
 }

@@ -255,6 +255,9 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
         if self.stride == 0 || costs.rms.is_infinite() {
             return Vec::new();
         }
+        if self.creep.is_empty() {
+            return self.kept.iter().map(|lanes| lanes.as_slice()[lane]).collect();
+        }
         let row = |row: &[Lanes<S, V>]| {
             let mut at = row.iter().map(|lanes| lanes.as_slice()[lane]);
             let displacement = at.next().unwrap_or(f64::NAN);
