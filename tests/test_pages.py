@@ -50,8 +50,10 @@ TYPED = [page for page in PAGES if any(b.language in ("python", "console") for b
 FITS: dict[str, Any] = {}
 
 
-def fitted_once(data: pt.Dataset, *arguments: Any, **options: Any) -> Any:
+def fitted_once(data: Any, *arguments: Any, **options: Any) -> Any:
     """Identify, but the same record once only: README and pages fit the same one."""
+    if not isinstance(data, pt.Dataset):
+        return identify(data, *arguments, **options)
     # The command line says what the default is.
     said = {key: value for key, value in options.items() if (key, value) != ("offset", True)}
     record = (data.full.sha256, data.t[0], data.t[-1], data.source)

@@ -360,6 +360,44 @@ def test_an_interrupted_search_keeps_the_best() -> None:
     assert partial.cost == pytest.approx(weighted(partial, [1.0, 1.0]), rel=1e-2)
 
 
+def test_a_search_of_several_goes_on_from_its_checkpoint(tmp_path: Path) -> None:
+    kept = tmp_path / "search.checkpoint"
+    with pytest.raises(pt.Interrupted):
+        pt.identify([slow(), quick()], callback=lambda now: now.nit >= 2, checkpoint=kept, **ASKED)
+    on = pt.identify([slow(), quick()], checkpoint=kept, **ASKED)
+    assert on.model == both().model
+    assert on.records == tuple(
+        replace(one, data=other.data) for one, other in zip(both().records, on.records, strict=True)
+    )
+    with pytest.raises(pt.DataError):
+        pt.identify([quick(), slow()], checkpoint=kept, **ASKED)
+
+
+def test_windows_of_one_log_are_told_apart() -> None:
+    log = record(large(1500), 4e-3, seed=7)
+    late = pt.Dataset(u=log.u, y=log.y, dt=log.dt)
+    fit = pt.identify([log[0.0:2.0], late[3.0:5.0]], offset=[True, False], **ASKED)
+    for window, own in ((log[0.5:1.5], 0), (log[3.5:4.5], 1), (log[3.0:5.0], 1)):
+        assert fit.score(window).stroke == fit.records[own].stroke
+    # No offset where none was fitted.
+    assert fit.score(log[3.5:4.5]).offset == 0.0 != fit.score(log[0.5:1.5]).offset
+
+
+def test_a_lag_that_fits_at_two_rates_is_not_said_to_hold_at_one() -> None:
+    stage, dt = pt.DahlStage.xu_li_2010(), 4e-3
+
+    def at(rate: float, count: int = 1000) -> pt.Dataset:
+        u = 37.5 * (1.0 - np.cos(2.0 * np.pi * rate * dt * np.arange(count)))
+        return pt.Dataset(u=u, y=stage.simulate(u, dt).x, dt=dt)
+
+    # Another kind of stage than the one that made them, so that the residual is not white.
+    asked: dict[str, Any] = {"model": "bouc-wen", "history": "virgin", "seed": 1, "progress": False}
+    for records, said in (([at(0.5), at(0.5, 1200)], True), ([at(0.5), at(2.0)], False)):
+        fit = pt.identify(records, **asked)
+        assert fit.lags is not None
+        assert any("holds at this rate only" in note for note in fit.notes) == said
+
+
 def of_force() -> pt.Dataset:
     return pt.Dataset(u=slow().u, y=slow().y, dt=slow().dt, drive_unit="N", source="force.csv")
 

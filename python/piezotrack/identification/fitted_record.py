@@ -79,11 +79,19 @@ def record_of(records: Sequence[FittedRecord], data: Dataset) -> FittedRecord | 
     Returns
     -------
     FittedRecord or None
-        The one of the same numbers, else one of the same beginning.
+        The one of the same numbers, else one of the same beginning, whose window overlaps if any
+        does.
     """
     alike = [one for one in records if same_beginning(one.start, data)]
-    same = [one for one in alike if one.origin.get("sha256") == data.sha256] if alike else []
-    return next(iter([*same, *alike]), None)
+    if len(alike) < 2:
+        return next(iter(alike), None)
+    first, last = float(data.t[0]), float(data.t[-1])
+
+    def apart(one: FittedRecord) -> tuple[bool, bool]:
+        low, high = one.origin.get("window_s") or (first, last)
+        return one.origin.get("sha256") != data.sha256, high < first or last < low
+
+    return min(alike, key=apart)
 
 
 def record_entries(records: Sequence[FittedRecord], unit: str) -> dict[str, Any]:

@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Identification"]
 
+# Ratio of the rates of two records from which on a lag that fits both holds at more than one rate.
+OTHER = 1.5
+
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Identification(IdentifiedModel):
@@ -205,7 +208,9 @@ class Identification(IdentifiedModel):
             notes += [which + note for note in self._notes_on(data, one, run)]
         if info.drive_unit == "N" and unit != "N":
             notes.append(f"the drive is in {unit}: forces are in {unit} too, not in N")
-        notes += remarks.of_lags(self.lags, 2.0 * math.pi * _frequency(self.data))
+        rates = [_frequency(data) for data, _ in self._fitted]
+        if self.lags is not None and (self.lags.from_zero or max(rates) < OTHER * min(rates)):
+            notes += remarks.of_lags(self.lags, 2.0 * math.pi * rates[0])
         if self.at_bound:
             notes.append(
                 "the record does not determine the dynamics: time constant or mode lies on a bound"
