@@ -51,6 +51,7 @@ def values_of(apparatus: Apparatus) -> dict[str, float]:
         "dahl",
         fixed={"a1": published.a1, "a2": published.a2, "b1": published.b1},
         bounds=SEARCH_BOX,
+        history="virgin",
         seed=SEED,
         runs=1,
         threads=1,

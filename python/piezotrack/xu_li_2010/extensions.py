@@ -264,7 +264,7 @@ def _largest_error(run: Tracking) -> list[str]:
 def rivals(data: Dataset) -> dict[str, Any]:
     """Fit the other models that have an inverse: a Bouc-Wen model and Prandtl-Ishlinskii."""
     plays = identify(data, "prandtl-ishlinskii")
-    free: dict[str, Any] = {"seed": 1, "runs": 1, "threads": 1, "progress": False}
+    free: dict[str, Any] = {"seed": 1, "history": "virgin", "threads": 1, "progress": False}
     name, bouc_wen = "Bouc-Wen", identify(data, "bouc-wen", **free)
     if abs(bouc_wen.model.gamma) > bouc_wen.model.beta:
         # Not passive, and therefore without an inverse.

@@ -48,6 +48,7 @@ def search(log: Dataset, seed: int) -> Identification:
         "dahl",
         fixed={"a1": published.a1, "a2": published.a2, "b1": published.b1},
         bounds=SEARCH_BOX,
+        history="virgin",
         swarm=ParticleSwarm.xu_li_2010(),
         seed=seed,
         runs=3,

@@ -29,6 +29,7 @@ def judge(log: Dataset, fit: Identification, seed: int, *, every: int = 10) -> C
     bouc_wen = identify(
         thinned(log, every)[:FITTED_SECONDS],
         "bouc-wen",
+        history="virgin",
         seed=seed,
         runs=4,
         threads=1,

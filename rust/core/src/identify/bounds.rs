@@ -21,9 +21,14 @@ const CLEAR: f64 = 0.3;
 /// Damping ratio below which it is a mode for certain: above, a lag looks alike.
 const SWINGING: f64 = 0.5;
 
+/// Samples of the window in which a mode is looked for: more would take longer than the search.
+const LOOKED_AT: usize = 1 << 16;
+
 /// Looks for a mode in the record: one that is clear, something that may be one, or none.
 fn look_for_mode(of: &mut Measures, record: &Record<'_>, stop: Stop<'_>) {
-    let found = resonances(&record.drive, record.y, record.window.start, 1, stop);
+    let end = record.y.len().min(record.window.start + LOOKED_AT);
+    let drive = Drive { u: &record.drive.u[..end], ..record.drive };
+    let found = resonances(&drive, &record.y[..end], record.window.start, 1, stop);
     let Some(found) = found else { return };
     of.mode = match found.first() {
         Some(mode) if mode.gain >= CLEAR && mode.damping_ratio < SWINGING => {
