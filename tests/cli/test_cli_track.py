@@ -147,7 +147,7 @@ def test_noise_bandwidth_and_gains_reach_ones_own_stage() -> None:
         pt.Controller.of(known, dt=0.01, feedback=feedback),
         sine(0.5, 6.0, 10e-6, 100e-6),
     )
-    assert report()["metrics"]["rms_error"] == expected.metrics.rms_error
+    assert report()["metrics"]["rms_error"] == pytest.approx(expected.metrics.rms_error, rel=1e-12)
     assert "loop at" in printed
     # Half of an error is learnt in a period.
     ran("track", "dahl.json", *course, *options.split(), "--repetitive", "--overwrite")

@@ -123,7 +123,7 @@ def test_a_candidate_without_a_stage_fails_and_the_search_goes_on() -> None:
 
 def test_an_inequality_that_the_truth_breaks_makes_the_two_equal() -> None:
     # With damping and stiffness as true, D/K is 0.1 s; the search is told that it is 1 s or more.
-    bounds = {"damping": (1e3, 5e4), "stiffness": (1e3, 5e4), "piezo_coefficient": (1e-3, 0.1)}
+    bounds = {"damping": (1e2, 5e4), "stiffness": (1e2, 5e4), "piezo_coefficient": (1e-4, 0.1)}
     fit = quick_fit(fixed=FIXED, bounds=bounds, constraints=["stiffness <= damping"])
     (constraint,) = fit.constraints
     assert constraint == ("stiffness <= damping", "stiffness", "damping", True)
