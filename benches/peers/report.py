@@ -81,10 +81,10 @@ def tables(results: Row) -> list[str]:
     lines = [
         f"{machine['cores']} cores of {machine['processor']}, {results['threads']} threads, "
         f"Python {machine['python']}, {versions}; {results['seeds']} seeds. "
-        f"Load of the machine at the beginning: {machine['load']:.1f}.",
+        f"Load of the machine in the minute before: {machine['load']:.1f}.",
     ]
     if machine["load"] > 0.5:
-        lines += ["", "**Other programs ran meanwhile: the times are not to be quoted.**"]
+        lines += ["", "**Other programs ran just before: take the ratios, not the times.**"]
     if results["quick"]:
         lines += ["", "**`--quick`: too few seeds and simulations to be quoted.**"]
     lines += ["", "### Ratios"]

@@ -96,6 +96,16 @@ def test_a_record_is_searched_again_only_for_a_history_that_it_shows(
     assert asked[-1] == searched[-1]
 
 
+def test_a_long_record_is_asked_at_its_beginning(monkeypatch: pytest.MonkeyPatch) -> None:
+    log = record([75.0])
+    expected = pt.identify(log, "first-order-dahl").cost
+    monkeypatch.setattr("piezotrack.identification.other_histories.BEGINNING", 1500)
+    assert pt.identify(log, "first-order-dahl").cost == expected
+    # Without a reversal in its beginning, all of it.
+    monkeypatch.setattr("piezotrack.identification.other_histories.BEGINNING", 20)
+    assert pt.identify(log, "first-order-dahl").cost == expected
+
+
 def test_a_settled_stage_repeats() -> None:
     u = 40.0 + 35.0 * np.sin(2.0 * np.pi * DT * np.arange(6000))
     x = STAGE.simulate(u, DT, initial=STAGE.equilibrium(40.0)).x

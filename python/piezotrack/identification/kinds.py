@@ -83,10 +83,10 @@ def _as_shown(
     data: Dataset, info: ModelInfo, offset: bool, of_swarm: Mapping[str, Any]
 ) -> Identification:
     """Search with the history that the record shows: more freedom has to lower the cost."""
-    fit = search(data, info, offset=offset, **of_swarm)
+    fit = virgin = search(data, info, offset=offset, **of_swarm)
     asked = {name: value for name, value in of_swarm.items() if name not in OF_SEARCH}
     for one in other_histories(data, info, fit, offset=offset, asked=asked):
-        if one.cost < (1.0 - GAIN) * fit.cost:
+        if one.share * virgin.cost < (1.0 - GAIN) * fit.cost:
             other = search(data, info, offset=offset, history=one.history, **of_swarm)
             fit = other if other.cost < (1.0 - GAIN) * fit.cost else fit
     return fit

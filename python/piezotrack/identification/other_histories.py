@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..errors import DataError
 from .history import GAIN
 from .objective import Objective
 
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Gaining", "other_histories"]
 
+# Samples of a long record that are asked: the history shows at its beginning.
+BEGINNING = 200_000
 # Voltages tried before the record, from the best of which a descent starts.
 GRID = 15
 VOLTAGE = "voltage_before"
@@ -36,12 +40,12 @@ class Gaining(NamedTuple):
     ----------
     history : {"settled", "fit"}
         The history.
-    cost : float
-        Cost of the minimum with it that is next to the one without it [m].
+    share : float
+        Cost of the minimum with it that is next to the one without it, relative to that one.
     """
 
     history: History
-    cost: float
+    share: float
 
 
 def other_histories(
@@ -72,13 +76,22 @@ def other_histories(
     list of Gaining
         Those by which the cost falls enough, the one with less freedom first.
     """
-    found = []
-    for history in ("settled", "fit"):
-        objective = Objective(data, info.name, offset=offset, history=history, **asked)
-        cost = float(objective.descend(_starts(objective, fit))[1].min())
-        if cost < (1.0 - GAIN) * fit.cost:
-            found.append(Gaining(history, cost))
-    return found
+
+    def lowest(part: Dataset, history: History) -> float:
+        objective = Objective(part, info.name, offset=offset, history=history, **asked)
+        return float(objective.descend(_starts(objective, fit))[1].min())
+
+    part, cost = data, fit.cost
+    if len(data) > BEGINNING:
+        # Where that shows no reversal, the whole record has to be asked.
+        with suppress(DataError):
+            beginning = data[float(data.t[0]) : float(data.t[BEGINNING])]
+            part, cost = beginning, lowest(beginning, "virgin")
+    if cost <= 0.0:
+        return []
+    histories: tuple[History, ...] = ("settled", "fit")
+    gaining = [Gaining(history, lowest(part, history) / cost) for history in histories]
+    return [one for one in gaining if one.share < 1.0 - GAIN]
 
 
 def _starts(objective: Objective, fit: Identification) -> Array:
