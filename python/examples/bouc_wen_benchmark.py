@@ -70,7 +70,7 @@ def main() -> None:
     spent = time.perf_counter() - began
     fit.save("oscillator.json")
     print(
-        f"identified in {spent:.0f} s, {fit.agreeing} of {len(fit.runs)} runs agree, "
+        f"identified in {spent:.1f} s, {fit.agreeing} of {len(fit.runs)} runs agree, "
         f"{fit.cost_um:.2f} um rms remain"
     )
     print(f"{'parameter':<12}{'true':>10}{'found':>14}{'error':>10}")

@@ -28,6 +28,8 @@ __all__ = ["Gaining", "other_histories"]
 
 # Samples of a long record that are asked: the history shows at its beginning.
 BEGINNING = 200_000
+# Share of the cost by which the voltages before a record change it where it shows its history.
+UNSEEN = 1e-3
 # Voltages tried before the record, from the best of which a descent starts.
 GRID = 15
 VOLTAGE = "voltage_before"
@@ -77,8 +79,10 @@ def other_histories(
         Those by which the cost falls enough, the one with less freedom first.
     """
 
-    def lowest(part: Dataset, history: History) -> float:
-        objective = Objective(part, info.name, offset=offset, history=history, **asked)
+    def objective_of(part: Dataset, history: History) -> Objective:
+        return Objective(part, info.name, offset=offset, history=history, **asked)
+
+    def lowest(objective: Objective) -> float:
         return float(objective.descend(_starts(objective, fit))[1].min())
 
     part, cost = data, fit.cost
@@ -86,23 +90,34 @@ def other_histories(
         # Where that shows no reversal, the whole record has to be asked.
         with suppress(DataError):
             beginning = data[float(data.t[0]) : float(data.t[BEGINNING])]
-            part, cost = beginning, lowest(beginning, "virgin")
-    if cost <= 0.0:
+            part, cost = beginning, lowest(objective_of(beginning, "virgin"))
+    fitted = objective_of(part, "fit")
+    costs = fitted(_places(fitted, fit))
+    # Where the window does not show the voltage before, it shows no history.
+    if cost <= 0.0 or float(np.ptp(costs)) < UNSEEN * cost:
         return []
-    histories: tuple[History, ...] = ("settled", "fit")
-    gaining = [Gaining(history, lowest(part, history) / cost) for history in histories]
+    objectives: dict[History, Objective] = {
+        "settled": objective_of(part, "settled"),
+        "fit": fitted,
+    }
+    gaining = [Gaining(name, lowest(one) / cost) for name, one in objectives.items()]
     return [one for one in gaining if one.share < 1.0 - GAIN]
 
 
 def _starts(objective: Objective, fit: Identification) -> Array:
     """Where the descent starts: at the parameters of the fit, after the best voltage of a grid."""
+    places = _places(objective, fit)
+    return places[[int(np.argmin(objective(places)))]]
+
+
+def _places(objective: Objective, fit: Identification) -> Array:
+    """Places with the parameters of the fit: after each voltage of a grid where one is searched."""
     place = [_coordinate(fit, *one) for one in objective.coordinates if one[0] != VOLTAGE]
     if VOLTAGE not in objective.ranges:
         return np.array([place])
     volts = (np.arange(GRID) + 0.5) / GRID
     # After the parameters.
-    places = np.column_stack([np.tile(place, (GRID, 1)), volts])
-    return places[[int(np.argmin(objective(places)))]]
+    return np.column_stack([np.tile(place, (GRID, 1)), volts])
 
 
 def _coordinate(fit: Identification, name: str, low: float, high: float, scale: str) -> float:
