@@ -49,3 +49,26 @@ def model_text() -> str:
     text = path.read_text(encoding="utf-8")
     path.unlink()
     return text
+
+
+@cache
+def fig_12(what: str) -> pt.control.Tracking:
+    """Run of Fig. 12, 0.2 Hz over 0 to 110 um, with feedforward (FF), feedback (FB) or both."""
+    parts: dict[str, Any] = {}
+    if "FF" in what:
+        parts["feedforward"] = forward()
+    if "FB" in what:
+        parts["feedback"] = PID
+    return pt.track(STAGE, loop(**parts), sine(0.2, 20.0))
+
+
+@cache
+def fig_13(pid: pt.Pid | None) -> pt.control.Tracking:
+    """Run of Fig. 13 within 6 and 28 V: from 8 to 40 um the loop asks for 5.7 to 30.4 V.
+
+    `None`: with the usual limits.
+    """
+    limits = (0.0, 75.0) if pid is None else (6.0, 28.0)
+    controller = loop(limits=limits, feedforward=forward(), feedback=pid or PID)
+    course = sine(0.2, 20.0, 8e-6, 40e-6)
+    return pt.track(STAGE, controller, course, beyond_reach=True)

@@ -18,7 +18,7 @@ from .parameter_arguments import ON_PARAMETERS
 from .swarm import ParticleSwarm
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -134,22 +134,56 @@ def identify_best(
             break
     if not found:
         raise refused or DataError("no kind of stage could be fitted")
-    best, info = found[0]
-    for other, kind in found[1:]:
-        if other.rms < (1.0 - BETTER) * best.rms:
-            best, info = other, kind
+    best, info = best_of(found)
     whole = fit if rest is part and best is found[-1][0] else None
     if whole is None:
         whole = identify_kind(data, info, of_swarm=swarm, **common)
+    return with_trials(whole, found, None if rest is part else float(part.t[-1]))
+
+
+def best_of(found: Sequence[tuple[Trial, ModelInfo]]) -> tuple[Trial, ModelInfo]:
+    """Return the best trial, or one before it in the list that is hardly worse.
+
+    Parameters
+    ----------
+    found : sequence of (Trial, ModelInfo)
+        At least one, in the order in which they were tried.
+
+    Returns
+    -------
+    Trial, ModelInfo
+        The one to take.
+    """
+    best = found[0]
+    for other in found[1:]:
+        if other[0].rms < (1.0 - BETTER) * best[0].rms:
+            best = other
+    return best
+
+
+def with_trials(
+    fit: Identification, found: Sequence[tuple[Trial, ModelInfo]], until: float | None
+) -> Identification:
+    """Put into a result what was tried before it.
+
+    Parameters
+    ----------
+    fit : Identification
+        The best kind.
+    found : sequence of (Trial, ModelInfo)
+        What was tried.
+    until : float or None
+        End of the part that the trials were fitted to [s]; None where that was the whole.
+
+    Returns
+    -------
+    Identification
+        The same with its trials, in its file too.
+    """
     trials = tuple(sorted((one for one, _ in found), key=lambda one: one.rms))
-    until = None if rest is part else float(part.t[-1])
-    details = {
-        "selection": {
-            "fitted_until_s": until,
-            "models": {one.model: {"rms": one.rms, "unit": "m"} for one in trials},
-        }
-    }
-    return replace(whole, trials=trials, fitted_until=until, details={**whole.details, **details})
+    models = {one.model: {"rms": one.rms, "unit": "m"} for one in trials}
+    details = {"selection": {"fitted_until_s": until, "models": models}}
+    return replace(fit, trials=trials, fitted_until=until, details={**fit.details, **details})
 
 
 def refuse_of_one_model(of_swarm: Mapping[str, Any]) -> None:

@@ -16,13 +16,14 @@ from .history import GAIN
 from .search import search_records
 from .selection import (
     AS_NOISE,
-    BETTER,
     Trial,
+    best_of,
     is_white,
     kinds_tried,
     refuse_of_one_model,
     short_trials,
     two_parts,
+    with_trials,
 )
 
 if TYPE_CHECKING:
@@ -149,17 +150,10 @@ def best_together(records: Sequence[Asked], of_search: Mapping[str, Any]) -> Ide
             break
     if not found or fit is None:
         raise refused or DataError("no kind of stage could be fitted")
-    best, info = found[0]
-    for other, kind in found[1:]:
-        if other.rms < (1.0 - BETTER) * best.rms:
-            best, info = other, kind
+    best, info = best_of(found)
     if apart or best is not found[-1][0]:
         fit = identify_together(records, info, full)
-    trials = tuple(sorted((one for one, _ in found), key=lambda one: one.rms))
-    until = float(first[0].data.t[-1]) if apart else None
-    models = {one.model: {"rms": one.rms, "unit": "m"} for one in trials}
-    details = {"selection": {"fitted_until_s": until, "models": models}}
-    return replace(fit, trials=trials, fitted_until=until, details={**fit.details, **details})
+    return with_trials(fit, found, float(first[0].data.t[-1]) if apart else None)
 
 
 def refuse_several(name: str, value: object, count: int) -> None:
