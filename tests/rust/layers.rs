@@ -9,8 +9,8 @@ use std::path::Path;
 use std::slice::from_ref;
 
 /// From the bottom up.
-const CORE: [&str; 8] =
-    ["error", "math", "signal", "integrator", "design", "models", "simulate", "identify"];
+const CORE: [&str; 9] =
+    ["error", "math", "signal", "integrator", "design", "models", "simulate", "identify", "tune"];
 
 /// From the bottom up.
 const CONTROL: [&str; 19] = [

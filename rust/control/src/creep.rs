@@ -55,10 +55,10 @@ impl Lag {
     /// by `rise`, to `end`. Output, `end` and `rise` have the same unit.
     #[must_use]
     #[inline(always)]
-    pub fn step(&self, output: f64, end: f64, rise: f64) -> f64 {
+    pub fn step<N: Number>(&self, output: N, end: N, rise: N) -> N {
         // Behind a ramp the output lags by `trail` in the end; the rest of the gap decays.
-        let trail = rise * self.ratio;
-        end - ((end - rise - output - trail) * self.decay + trail)
+        let trail = rise * rise.like(self.ratio);
+        end - ((end - rise - output - trail) * rise.like(self.decay) + trail)
     }
 }
 
@@ -82,14 +82,14 @@ impl<const N: usize> Default for CreepState<N> {
 /// The displacement d (m) for the input h (m) and the outputs q (m) of the relaxations.
 #[must_use]
 #[inline(always)]
-pub fn output(relaxations: &[Creep], input: f64, reached: &[f64]) -> f64 {
+pub fn output<N: Number>(relaxations: &[Creep], input: N, reached: &[N]) -> N {
     let crept = relaxations.iter().zip(reached);
-    crept.fold(input, |sum, (creep, reached)| sum + creep.share * reached)
+    crept.fold(input, |sum, (creep, reached)| sum + input.like(creep.share) * *reached)
 }
 
 /// One step of every relaxation, in which the input goes in a straight line from `from` to `to`, m.
 #[inline(always)]
-pub fn advance(lags: &[Lag], reached: &mut [f64], from: f64, to: f64) {
+pub fn advance<N: Number>(lags: &[Lag], reached: &mut [N], from: N, to: N) {
     let rise = to - from;
     for (reached, lag) in reached.iter_mut().zip(lags) {
         *reached = lag.step(*reached, to, rise);

@@ -4,7 +4,8 @@
 //! of Python, prints nothing, and returns an [`Error`] where an argument cannot be used.
 //!
 //! The modules are layers. Each uses those before it in this list, and none after it: [`error`],
-//! [`math`], [`signal`], [`integrator`], [`design`], [`models`], [`simulate`], [`identify`].
+//! [`math`], [`signal`], [`integrator`], [`design`], [`models`], [`simulate`], [`identify`],
+//! [`tune`].
 #![forbid(unsafe_code)]
 
 pub mod design;
@@ -15,5 +16,6 @@ pub mod math;
 pub mod models;
 pub mod signal;
 pub mod simulate;
+pub mod tune;
 
 pub use error::{Error, Result};

@@ -116,31 +116,34 @@ impl<N: Number, const PLAYS: usize, const ZONES: usize> Play<N, PLAYS, ZONES> {
 
 impl<const PLAYS: usize, const ZONES: usize> Play<f64, PLAYS, ZONES> {
     /// As [`Self::follow`], where the plays after the first `used` and the dead zones after the
-    /// first `zones` weigh 0.
+    /// first `zones` weigh 0; of one state or of lanes of them.
     #[inline(always)]
-    pub fn follow_used(
+    pub fn follow_used<N: Number>(
         &self,
-        state: &mut PlayState<f64, PLAYS>,
-        input: f64,
+        state: &mut PlayState<N, PLAYS>,
+        input: N,
         (used, zones): (usize, usize),
-    ) -> f64 {
-        let falls = input < state.input;
-        let mut value = self.linear * input;
-        let mut slope = self.linear;
+    ) -> N {
+        let number = |value: f64| input.like(value);
+        let zero = number(0.0);
+        let way = input - state.input;
+        let mut value = number(self.linear) * input;
+        let mut slope = number(self.linear);
         let settings = self.thresholds.iter().zip(&self.weights);
         for ((threshold, weight), play) in settings.zip(&mut state.plays).take(used) {
+            let (threshold, weight) = (number(*threshold), number(*weight));
             let (low, high) = (input - threshold, input + threshold);
-            *play = low.max(high.min(*play));
-            let gap = if falls { *play - high } else { low - *play };
-            slope += if gap < 0.0 { 0.0 } else { *weight };
-            value += weight * *play;
+            *play = larger(low, smaller(high, *play));
+            let gap = way.where_negative(*play - high, low - *play);
+            slope = slope + gap.where_negative(zero, weight);
+            value = value + weight * *play;
         }
         (state.input, state.slope) = (input, slope);
         let mut bent = value;
         let settings = self.dead_zone_thresholds.iter().zip(&self.dead_zone_weights);
         for (corner, bend) in settings.take(zones) {
-            let beyond = value - corner;
-            bent += if beyond < 0.0 { 0.0 } else { bend * beyond };
+            let beyond = value - number(*corner);
+            bent = bent + beyond.where_negative(zero, number(*bend) * beyond);
         }
         bent
     }

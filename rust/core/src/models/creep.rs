@@ -15,6 +15,7 @@
 
 pub use piezotrack_control::{Creep, Dynamics, MOST_MODES, Mode, Modes};
 
+use piezotrack_control::Number;
 use piezotrack_control::creep::{Lag, advance, output};
 
 use crate::error::{Error, Result, not_negative, positive};
@@ -40,21 +41,37 @@ pub struct Relaxation {
     pub dynamics: Dynamics,
 }
 
-/// Memory of creep and dynamics.
+/// Memory of creep and dynamics, of one stage or of lanes of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct RelaxationState {
+pub struct RelaxationState<N = f64> {
     /// Input h, m.
-    pub input: f64,
+    pub input: N,
     /// State q of each relaxation, m.
-    pub creep: [f64; MOST_RELAXATIONS],
+    pub creep: [N; MOST_RELAXATIONS],
     /// Displacement, m.
-    pub x: f64,
+    pub x: N,
     /// Velocity, m/s; 0 where there is no mode.
-    pub v: f64,
+    pub v: N,
     /// Displacement of each mode beside the main one, m.
-    pub mode_x: [f64; FURTHER],
+    pub mode_x: [N; FURTHER],
     /// Velocity of each of them, m/s.
-    pub mode_v: [f64; FURTHER],
+    pub mode_v: [N; FURTHER],
+}
+
+impl RelaxationState {
+    /// The same state in every lane of a number like `number`.
+    #[must_use]
+    pub fn in_lanes<N: Number>(&self, number: N) -> RelaxationState<N> {
+        let each = |value: f64| number.like(value);
+        RelaxationState {
+            input: each(self.input),
+            creep: self.creep.map(each),
+            x: each(self.x),
+            v: each(self.v),
+            mode_x: self.mode_x.map(each),
+            mode_v: self.mode_v.map(each),
+        }
+    }
 }
 
 /// Steps of one length.
@@ -98,15 +115,17 @@ impl ModeFlow {
     /// Takes displacement and velocity through a step of `step` seconds in which the static
     /// displacement rises by `rise` from `before`.
     #[inline(always)]
-    fn step(&self, step: f64, x: &mut f64, v: &mut f64, before: f64, rise: f64) {
+    fn step<N: Number>(&self, step: f64, x: &mut N, v: &mut N, before: N, rise: N) {
         let Self { propagator: p, stiffness } = self;
-        let (force, ramp) = (stiffness * before, stiffness * rise);
-        let (from, w) = (*x, *v * step);
+        let number = |value: f64| before.like(value);
+        let (force, ramp) = (number(*stiffness) * before, number(*stiffness) * rise);
+        let (from, w) = (*x, *v * number(step));
         let end = |position: f64, velocity: f64, constant: f64, slope: f64| {
-            position.mul_add(from, velocity.mul_add(w, constant.mul_add(force, slope * ramp)))
+            let held = number(constant).mul_add(force, number(slope) * ramp);
+            number(position).mul_add(from, number(velocity).mul_add(w, held))
         };
         *x = end(p.position.x, p.velocity.x, p.constant.x, p.ramp.x);
-        *v = end(p.position.w, p.velocity.w, p.constant.w, p.ramp.w) / step;
+        *v = end(p.position.w, p.velocity.w, p.constant.w, p.ramp.w) / number(step);
     }
 }
 
@@ -200,12 +219,12 @@ impl Relaxation {
 
     /// Input of the dynamics, d, m.
     #[must_use]
-    pub fn target(&self, state: &RelaxationState) -> f64 {
+    pub fn target<N: Number>(&self, state: &RelaxationState<N>) -> N {
         output(self.used(), state.input, &state.creep)
     }
 
     /// The input jumps to `input`, m.
-    pub fn jump(&self, state: &mut RelaxationState, input: f64) {
+    pub fn jump<N: Number>(&self, state: &mut RelaxationState<N>, input: N) {
         state.input = input;
         if matches!(self.dynamics, Dynamics::None) {
             state.x = self.target(state);
@@ -214,7 +233,12 @@ impl Relaxation {
 
     /// One step in which the input is linear and ends at `input`, m.
     #[inline(always)]
-    pub fn step(&self, flow: &RelaxationFlow, state: &mut RelaxationState, input: f64) {
+    pub fn step<N: Number>(
+        &self,
+        flow: &RelaxationFlow,
+        state: &mut RelaxationState<N>,
+        input: N,
+    ) {
         let before = self.target(state);
         let used = self.used().len();
         advance(&flow.creep[..used], &mut state.creep, state.input, input);
@@ -242,10 +266,12 @@ impl Relaxation {
     }
 
     /// What the modes beside the main one add to displacement and velocity.
-    fn beside(&self, state: &RelaxationState) -> (f64, f64) {
+    fn beside<N: Number>(&self, state: &RelaxationState<N>) -> (N, N) {
         let modes = self.dynamics.further().iter().zip(state.mode_x.iter().zip(&state.mode_v));
-        modes.fold((0.0, 0.0), |(x, v), (mode, (place, speed))| {
-            (x + mode.weight * place, v + mode.weight * speed)
+        let zero = state.x.like(0.0);
+        modes.fold((zero, zero), |(x, v), (mode, (place, speed))| {
+            let weight = zero.like(mode.weight);
+            (x + weight * *place, v + weight * *speed)
         })
     }
 

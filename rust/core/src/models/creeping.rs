@@ -78,6 +78,13 @@ pub(crate) fn relaxed(
     [reached, slopes]
 }
 
+impl<M> Creeping<M> {
+    /// The relaxations as those of an input stage, without dynamics.
+    pub(super) fn relaxation(&self) -> &Relaxation {
+        &self.relaxation
+    }
+}
+
 impl<M: StageModel> Creeping<M> {
     const ALL_PARAMETERS: &'static [ParameterInfo; ROOM] =
         &extended(M::INFO.parameters, &PARAMETERS);

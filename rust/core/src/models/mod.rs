@@ -9,6 +9,7 @@ mod dynamics_parameters;
 mod first_order_dahl;
 mod generalised_prandtl_ishlinskii;
 mod input_stage;
+mod lanes;
 mod mechanics_parameters;
 mod parallel_dahl;
 mod plant;
@@ -35,6 +36,7 @@ pub use generalised_prandtl_ishlinskii::{
     GeneralisedPrandtlIshlinskiiStage,
 };
 pub use input_stage::{InputOperator, InputStage, InputStageFlow, InputStageState, Segmented};
+pub use lanes::{LanedPlant, LanedVisitor};
 pub use parallel_dahl::{ParallelDahlKernel, ParallelDahlStage};
 pub use plant::{KernelFlow, KernelModel, Plant, Settling};
 pub use prandtl_ishlinskii::{

@@ -1,5 +1,7 @@
 //! The amplifier: first-order lag, slew limit, output limits.
 
+use piezotrack_control::Number;
+
 use crate::error::{Error, Result};
 
 /// A voltage amplifier of gain 1; its command is what it would give at rest.
@@ -72,11 +74,11 @@ impl Amplifier {
         1.0 / (core::f64::consts::TAU * self.bandwidth)
     }
 
-    /// The nearest voltage that the amplifier can give, V.
+    /// The nearest voltage that the amplifier can give, V; of one amplifier or of lanes of them.
     #[inline(always)]
     #[must_use]
-    pub fn within_limits(&self, volts: f64) -> f64 {
-        volts.max(self.low).min(self.high)
+    pub fn within_limits<N: Number>(&self, volts: N) -> N {
+        within(volts, volts.like(self.low), volts.like(self.high))
     }
 
     /// Works out steps of `step` seconds.
@@ -96,15 +98,22 @@ impl Amplifier {
     /// The lag is exact; the slew limit is applied to the step as a whole.
     #[inline(always)]
     #[must_use]
-    pub fn advance(&self, flow: &AmplifierFlow, output: f64, from: f64, to: f64) -> (f64, f64) {
+    pub fn advance<N: Number>(&self, flow: &AmplifierFlow, output: N, from: N, to: N) -> (N, N) {
         let (from, to) = (self.within_limits(from), self.within_limits(to));
         if flow.ideal {
             return (from, to);
         }
+        let number = |value: f64| output.like(value);
         // Behind a ramp the output settles to trail by `trail`; the rest of the gap decays.
-        let trail = (to - from) * flow.lag;
-        let gap = (from - output - trail) * flow.decay + trail;
-        let change = (to - gap - output).max(-flow.most).min(flow.most);
+        let trail = (to - from) * number(flow.lag);
+        let gap = (from - output - trail) * number(flow.decay) + trail;
+        let change = within(to - gap - output, number(-flow.most), number(flow.most));
         (output, output + change)
     }
+}
+
+#[inline(always)]
+fn within<N: Number>(value: N, low: N, high: N) -> N {
+    let value = (value - low).where_negative(low, value);
+    (high - value).where_negative(high, value)
 }

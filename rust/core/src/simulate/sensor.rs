@@ -93,6 +93,12 @@ impl Sensor {
     /// The reading, m, at `displacement`, m, `interval` seconds after the one before.
     #[must_use]
     pub fn read(&self, state: &mut SensorState, displacement: f64, interval: f64) -> f64 {
+        let noise = self.next_noise(state, interval);
+        self.quantised(displacement + noise) - state.zero
+    }
+
+    /// The noise of the next reading, m.
+    pub(crate) fn next_noise(&self, state: &mut SensorState, interval: f64) -> f64 {
         if self.noise > 0.0 {
             let memory = if state.count == 0 {
                 0.0
@@ -103,11 +109,11 @@ impl Sensor {
             state.noise = memory * state.noise + fresh * Draws::normal(self.seed, state.count);
         }
         state.count += 1;
-        self.quantised(displacement + state.noise) - state.zero
+        state.noise
     }
 
     /// The nearest value that can be read, m.
-    fn quantised(&self, value: f64) -> f64 {
+    pub(crate) fn quantised(&self, value: f64) -> f64 {
         if self.resolution == 0.0 {
             return value.max(-self.range).min(self.range);
         }

@@ -1,0 +1,383 @@
+//! Closed loops of many controllers on one stage, in lanes.
+//!
+//! The plant and its amplifier go in lanes, a controller in each; each controller is stepped by the
+//! code that firmware runs. The noise of a sensor depends on nothing that a controller does, so all
+//! lanes get the same.
+
+use piezotrack_control::{Controller, ControllerState, Number};
+use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+
+use crate::error::{Error, Result};
+use crate::math::{Lanes, room, zeros};
+use crate::models::{LanedPlant, LanedVisitor, StageState};
+use crate::signal::Stop;
+use crate::simulate::{
+    AmplifierFlow, ApparatusState, DELAY_LINE, Law, LawState, ReferenceSamples, Timing,
+    VirtualStage, track,
+};
+
+/// Which error counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Judged {
+    /// Reference less reading: what a person sees on hardware.
+    Measured,
+    /// Reference less true displacement, without noise and quantisation of the sensor.
+    True,
+}
+
+/// A motion that controllers are judged by.
+#[derive(Clone, Copy, Debug)]
+pub struct Task<'a> {
+    /// The stage, with its amplifier and sensor.
+    pub stage: &'a VirtualStage,
+    /// Voltages that it visits slowly before, V.
+    pub visited: &'a [f64],
+    /// When the controllers look and act; the samples are those of the reference.
+    pub timing: Timing,
+    /// Reference and feedforward.
+    pub samples: ReferenceSamples<'a>,
+    /// Samples before the first that counts.
+    pub from: usize,
+    /// Which error counts.
+    pub judged: Judged,
+}
+
+/// What is read of a closed loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Figures {
+    /// Tracking error, m rms.
+    pub rms: f64,
+    /// Largest tracking error, m.
+    pub largest: f64,
+    /// Change of the command from sample to sample, V rms.
+    pub effort: f64,
+    /// Fastest change of the command, V/s.
+    pub slew: f64,
+    /// Share of the samples at which the command was clipped.
+    pub clipped: f64,
+}
+
+impl Figures {
+    /// Of a loop that did not stay finite.
+    pub const FAILED: Self = Self {
+        rms: f64::INFINITY,
+        largest: f64::INFINITY,
+        effort: f64::INFINITY,
+        slew: f64::INFINITY,
+        clipped: 1.0,
+    };
+}
+
+/// Beyond this a loop counts as diverged, m.
+const DIVERGED: f64 = 1.0;
+
+/// Ends of the parts in which an amplifier settles after a change of its command, in lags.
+const SETTLING: [f64; 6] = [0.25, 0.6, 1.1, 1.9, 3.2, 6.0];
+
+impl Task<'_> {
+    /// Figures of each controller in its loop, in their order, computed on the threads of the present
+    /// pool; the bits are the same for any number of them. Empty where `stop` said so.
+    ///
+    /// With sampling jitter, and for a stage without lanes, each loop is simulated by itself.
+    ///
+    /// # Errors
+    /// Those of [`track`], and where memory does not suffice.
+    pub fn figures(
+        &self,
+        controllers: &[Controller<Law>],
+        stop: Stop<'_>,
+    ) -> Result<Vec<Figures>> {
+        let start = self.stage.start_after(self.visited);
+        if self.timing.jitter == 0.0 {
+            let loops = Loops { task: self, start: &start, controllers, stop };
+            let voltages = self.voltages();
+            if let Some(found) = self.stage.stage.in_lanes(&voltages, &start.plant, loops) {
+                return found;
+            }
+        }
+        let found = controllers.par_iter().map(|controller| self.alone(controller, &start, stop));
+        found.collect()
+    }
+
+    /// Slow visits that lead to where the loops begin, V.
+    fn voltages(&self) -> Vec<f64> {
+        match self.stage.preconditioning {
+            Some(cycles) if self.visited.is_empty() => [cycles.swing, 0.0].repeat(CYCLES),
+            _ => self.visited.to_vec(),
+        }
+    }
+
+    /// The loop of one controller.
+    fn alone(
+        &self,
+        controller: &Controller<Law>,
+        start: &ApparatusState<StageState>,
+        stop: Stop<'_>,
+    ) -> Result<Figures> {
+        let timing = Timing { samples: self.samples.reference.len(), substeps: 1, ..self.timing };
+        let apparatus = self.stage.apparatus();
+        let run = track(&apparatus, start.clone(), &timing, controller, self.samples, stop);
+        let run = match run {
+            Ok(Some(run)) => run,
+            // Also where the loop diverged.
+            Ok(None) | Err(Error::Numerical(_)) => return Ok(Figures::FAILED),
+            Err(other) => return Err(other),
+        };
+        let mut score = Score::new(self.timing.interval);
+        let shown = match self.judged {
+            Judged::Measured => &run.motion.measured,
+            Judged::True => &run.motion.displacement,
+        };
+        for (k, (command, shown)) in run.commands.iter().zip(shown).enumerate() {
+            let error = self.samples.reference[k] - shown;
+            score.take(k >= self.from, error, command.volts, command.saturated);
+        }
+        Ok(score.figures())
+    }
+}
+
+/// Cycles that bring the memory of a stage to its settled loop.
+const CYCLES: usize = 8;
+
+/// The running sums of a loop.
+#[derive(Clone, Copy)]
+struct Score {
+    interval: f64,
+    count: f64,
+    squares: f64,
+    largest: f64,
+    changes: f64,
+    fastest: f64,
+    clipped: f64,
+    before: Option<f64>,
+}
+
+impl Score {
+    fn new(interval: f64) -> Self {
+        Self {
+            interval,
+            count: 0.0,
+            squares: 0.0,
+            largest: 0.0,
+            changes: 0.0,
+            fastest: 0.0,
+            clipped: 0.0,
+            before: None,
+        }
+    }
+
+    #[inline(always)]
+    fn take(&mut self, counts: bool, error: f64, volts: f64, clipped: bool) {
+        let change = self.before.map_or(0.0, |before| volts - before);
+        self.before = Some(volts);
+        if counts {
+            self.count += 1.0;
+            self.squares += error * error;
+            // Not so where the error is not a number
+            self.largest = if error.abs() <= self.largest { self.largest } else { error.abs() };
+            self.changes += change * change;
+            self.fastest = self.fastest.max(change.abs());
+            self.clipped += f64::from(u8::from(clipped));
+        }
+    }
+
+    fn figures(&self) -> Figures {
+        if !(self.largest <= DIVERGED && self.squares.is_finite() && self.count > 0.0) {
+            return Figures::FAILED;
+        }
+        Figures {
+            rms: libm::sqrt(self.squares / self.count),
+            largest: self.largest,
+            effort: libm::sqrt(self.changes / self.count),
+            slew: self.fastest / self.interval,
+            clipped: self.clipped / self.count,
+        }
+    }
+}
+
+/// Loops of one task, to be spread over threads and lanes.
+struct Loops<'a> {
+    task: &'a Task<'a>,
+    start: &'a ApparatusState<StageState>,
+    controllers: &'a [Controller<Law>],
+    stop: Stop<'a>,
+}
+
+impl LanedVisitor for Loops<'_> {
+    type Output = Result<Vec<Figures>>;
+
+    fn visit<P: LanedPlant>(self, plant: P) -> Self::Output {
+        let Self { task, start, controllers, stop } = self;
+        let stage = task.stage;
+        let noise = noises(task, start)?;
+        let arch = Arch::new();
+        let width = arch.dispatch(Width);
+        let parts = parts(task, P::LONGEST);
+        let found: Result<Vec<Vec<Figures>>> = controllers
+            .par_chunks(width)
+            .map(|chunk| {
+                let states = chunk.iter().map(|one| {
+                    let length = one.repetitive.map_or(0, |part| part.length());
+                    Ok(one.rest(zeros(DELAY_LINE, length)?)?)
+                });
+                let states: Result<Vec<_>> = states.collect();
+                let (plant, noise, parts) = (&plant, &noise, &parts);
+                let bundle = Bundle {
+                    task,
+                    stage,
+                    start,
+                    plant,
+                    noise,
+                    parts,
+                    controllers: chunk,
+                    states: states?,
+                    stop,
+                };
+                Ok(arch.dispatch(bundle))
+            })
+            .collect();
+        Ok(found?.concat())
+    }
+}
+
+/// Noise of each reading, m.
+fn noises(task: &Task<'_>, start: &ApparatusState<StageState>) -> Result<Vec<f64>> {
+    let mut noise = room("the sensor's noise", task.samples.reference.len())?;
+    let mut sensor = start.sensor;
+    for k in 0..task.samples.reference.len() {
+        let interval = if k == 0 { 0.0 } else { task.timing.interval };
+        noise.push(task.stage.sensor.next_noise(&mut sensor, interval));
+    }
+    Ok(noise)
+}
+
+/// A part of a control interval in which the command does not change.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    /// Its length, s.
+    step: f64,
+    /// Whether the newest command that acts in this interval acts here, or the one before.
+    newest: bool,
+}
+
+/// Whole intervals of delay, and the parts of each interval.
+fn parts(task: &Task<'_>, longest: f64) -> (usize, Vec<Part>) {
+    let (dt, stage) = (task.timing.interval, task.stage);
+    let late = (task.timing.delay + stage.sensor.delay) / dt;
+    let nearest = late.round();
+    let whole = if (late - nearest).abs() < SAME { nearest } else { late.floor() };
+    let fraction = if (late - nearest).abs() < SAME { 0.0 } else { late - whole };
+    let lag = stage.amplifier.lag();
+    let mut edges = vec![fraction, 1.0];
+    for settled in SETTLING {
+        let after = settled * lag / dt;
+        edges.extend([fraction + after, fraction + after - 1.0]);
+    }
+    if stage.amplifier.slew.is_finite() || longest.is_finite() {
+        let count = (1.0 / longest.min(0.25)).ceil();
+        let mut edge = 1.0;
+        while edge < count {
+            edges.push(edge / count);
+            edge += 1.0;
+        }
+    }
+    edges.retain(|edge| *edge > SAME && *edge < 1.0 + SAME);
+    edges.sort_by(f64::total_cmp);
+    edges.dedup_by(|a, b| (*a - *b).abs() < SAME);
+    let mut from = 0.0;
+    let mut parts = Vec::with_capacity(edges.len());
+    for edge in edges {
+        parts.push(Part { step: (edge - from) * dt, newest: from > fraction - SAME });
+        from = edge;
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+    let whole = whole as usize;
+    (whole, parts)
+}
+
+/// Parts of a control interval nearer than this are one.
+const SAME: f64 = 1e-9;
+
+/// Asks an instruction set for its lanes.
+struct Width;
+
+impl WithSimd for Width {
+    type Output = usize;
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> usize {
+        S::F64_LANES
+    }
+}
+
+/// Loops in one vector of lanes.
+struct Bundle<'a, P> {
+    task: &'a Task<'a>,
+    stage: &'a VirtualStage,
+    start: &'a ApparatusState<StageState>,
+    plant: &'a P,
+    noise: &'a [f64],
+    parts: &'a (usize, Vec<Part>),
+    controllers: &'a [Controller<Law>],
+    states: Vec<ControllerState<LawState, Vec<f64>>>,
+    stop: Stop<'a>,
+}
+
+/// Samples between two questions whether to stop.
+const POLL: usize = 1 << 12;
+
+impl<P: LanedPlant> WithSimd for Bundle<'_, P> {
+    type Output = Vec<Figures>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Vec<Figures> {
+        let Self { task, stage, start, plant, noise, parts, controllers, mut states, stop } = self;
+        let (whole, parts) = parts;
+        let zero = Lanes::<S, 1>::splat(simd, 0.0);
+        let flows: Vec<(P::Flow<Lanes<S, 1>>, AmplifierFlow, bool)> = parts
+            .iter()
+            .map(|part| {
+                (plant.flow(zero, part.step), stage.amplifier.flow(part.step), part.newest)
+            })
+            .collect();
+        let mut state = plant.start(zero);
+        let mut applied = zero.like(start.applied);
+        let held = zero.like(start.command);
+        // The newest last.
+        let mut issued = vec![held; whole + 2];
+        let mut scores = vec![Score::new(task.timing.interval); controllers.len()];
+        let n = task.samples.reference.len();
+        for k in 0..n {
+            if k % POLL == POLL - 1 && stop() {
+                return vec![Figures::FAILED; controllers.len()];
+            }
+            let shown = plant.displacement(&state);
+            let (reference, feedforward) = (task.samples.reference[k], task.samples.feedforward[k]);
+            let mut volts = [0.0; MOST_LANES];
+            for (lane, (controller, state)) in controllers.iter().zip(&mut states).enumerate() {
+                let x = shown.as_slice()[lane];
+                let reading = stage.sensor.quantised(x + noise[k]) - start.sensor.zero;
+                let command = controller.step(state, reference, reading, feedforward);
+                volts[lane] = command.volts;
+                let actual = match task.judged {
+                    Judged::Measured => reading,
+                    Judged::True => x - start.sensor.zero,
+                };
+                let (error, clipped) = (reference - actual, command.saturated);
+                scores[lane].take(k >= task.from, error, command.volts, clipped);
+            }
+            issued.rotate_left(1);
+            issued[whole + 1] = Lanes::gather(simd, |lane| volts[lane]);
+            for (flow, amplifier, newest) in &flows {
+                let command = issued[usize::from(*newest)];
+                let (low, high) = stage.amplifier.advance(amplifier, applied, command, command);
+                plant.advance(flow, &mut state, low, high);
+                applied = high;
+            }
+        }
+        scores.iter().map(Score::figures).collect()
+    }
+}
+
+/// Lanes of the widest vector.
+const MOST_LANES: usize = 8;
