@@ -47,7 +47,8 @@ fn alone(task: &Task<'_>, controller: &Controller<Law>) -> (f64, f64) {
     let run = run.unwrap().unwrap();
     let pairs = run.motion.measured.iter().zip(task.samples.reference);
     let errors = pairs.skip(task.from).map(|(y, r)| (r - y).abs());
-    let rms = libm::sqrt(errors.clone().map(|e| e * e).sum::<f64>() / errors.clone().count() as f64);
+    let rms =
+        libm::sqrt(errors.clone().map(|e| e * e).sum::<f64>() / errors.clone().count() as f64);
     (errors.fold(0.0, f64::max), rms)
 }
 

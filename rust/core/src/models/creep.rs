@@ -233,12 +233,7 @@ impl Relaxation {
 
     /// One step in which the input is linear and ends at `input`, m.
     #[inline(always)]
-    pub fn step<N: Number>(
-        &self,
-        flow: &RelaxationFlow,
-        state: &mut RelaxationState<N>,
-        input: N,
-    ) {
+    pub fn step<N: Number>(&self, flow: &RelaxationFlow, state: &mut RelaxationState<N>, input: N) {
         let before = self.target(state);
         let used = self.used().len();
         advance(&flow.creep[..used], &mut state.creep, state.input, input);

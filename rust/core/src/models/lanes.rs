@@ -13,9 +13,7 @@ use super::input_stage::InputStageState;
 use super::plant::KernelModel;
 use super::prandtl_ishlinskii::{MOST_PLAYS, PrandtlIshlinskiiStage};
 use super::registry::{Stage, StageState};
-use crate::integrator::{
-    Coupling, FeedbackState, Kernel, LumpedStage, Memory, TERMS, halvings,
-};
+use crate::integrator::{Coupling, FeedbackState, Kernel, LumpedStage, Memory, TERMS, halvings};
 
 /// A plant whose state may be in lanes: configuration in `&self`.
 pub trait LanedPlant: Sync {

@@ -83,11 +83,7 @@ impl Task<'_> {
     ///
     /// # Errors
     /// Those of [`track`], and where memory does not suffice.
-    pub fn figures(
-        &self,
-        controllers: &[Controller<Law>],
-        stop: Stop<'_>,
-    ) -> Result<Vec<Figures>> {
+    pub fn figures(&self, controllers: &[Controller<Law>], stop: Stop<'_>) -> Result<Vec<Figures>> {
         let start = self.stage.start_after(self.visited);
         if self.timing.jitter == 0.0 {
             let loops = Loops { task: self, start: &start, controllers, stop };
@@ -336,9 +332,7 @@ impl<P: LanedPlant> WithSimd for Bundle<'_, P> {
         let zero = Lanes::<S, 1>::splat(simd, 0.0);
         let flows: Vec<(P::Flow<Lanes<S, 1>>, AmplifierFlow, bool)> = parts
             .iter()
-            .map(|part| {
-                (plant.flow(zero, part.step), stage.amplifier.flow(part.step), part.newest)
-            })
+            .map(|part| (plant.flow(zero, part.step), stage.amplifier.flow(part.step), part.newest))
             .collect();
         let mut state = plant.start(zero);
         let mut applied = zero.like(start.applied);
