@@ -2,10 +2,13 @@
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use piezotrack_control::{Controller, Filter, Limits, Pid, Repetitive, Smoothing};
+use piezotrack_core::design::{LoopPlant, SampledLoop};
 use piezotrack_core::models::Model;
 use piezotrack_core::signal::NEVER;
 use piezotrack_core::simulate::{Law, ReferenceSamples, Timing, VirtualStage, track};
-use piezotrack_core::tune::{Figures, Judged, Task};
+use piezotrack_core::tune::{
+    Aim, Figures, Judged, PlantSet, Requirements, Setting, Sought, Task, Template, Tuning, pid,
+};
 
 const DT: f64 = 0.02;
 
@@ -58,7 +61,7 @@ fn agrees(stage: &VirtualStage, delay: f64, tolerance: f64) {
     let samples = ReferenceSamples { reference: &reference, feedforward: &feedforward };
     let task = task(stage, samples, delay);
     let all = controllers(11);
-    let found = task.figures(&all, NEVER).unwrap();
+    let found = task.ready().unwrap().figures(&all, NEVER).unwrap();
     for (i, (controller, figures)) in all.iter().zip(&found).enumerate() {
         let (largest, rms) = alone(&task, controller);
         let near = |a: f64, b: f64| (a - b).abs() < tolerance * b;
@@ -93,10 +96,146 @@ fn the_bits_do_not_depend_on_the_threads_or_the_neighbours() {
     let samples = ReferenceSamples { reference: &reference, feedforward: &feedforward };
     let task = Task { from: 10, ..task(&stage, samples, 1e-3) };
     let all = controllers(19);
+    let task = task.ready().unwrap();
     let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let one = pool(1).install(|| task.figures(&all, NEVER)).unwrap();
     let three = pool(3).install(|| task.figures(&all, NEVER)).unwrap();
     assert_eq!(one, three);
     let single = task.figures(&all[7..8], NEVER).unwrap();
     assert_eq!(single[0], one[7]);
+}
+
+/// Margins from the grid against the exact ones, over gains from far too low to unstable.
+#[test]
+fn margins_on_the_grid_are_the_exact_ones() {
+    let stage = VirtualStage::xu_li_2010(1);
+    let ringing = LoopPlant::mode(1.5e-6, 160.0, 0.02).unwrap().with_delay(0.3e-3).unwrap();
+    let slow = LoopPlant::mode(1.5e-6, 3.0, 0.1).unwrap().with_delay(0.05).unwrap();
+    let plants: Vec<LoopPlant> =
+        stage.loop_plants(0.0, 75.0).unwrap().into_iter().chain([ringing, slow]).collect();
+    let limits = Limits::new(0.0, 75.0).unwrap();
+    let (mut stable, mut unstable) = (0, 0);
+    for (dt, most) in [(0.02, 0.8e6), (1e-3, 0.3e6)] {
+        for (i, plant) in plants.iter().enumerate() {
+            let set = PlantSet::new(std::slice::from_ref(plant), dt).unwrap();
+            for share in 0..60_u32 {
+                let gain = most * 10_f64.powf(-3.0 * f64::from(share) / 60.0);
+                let kd = if share % 2 == 0 { 0.3 * gain } else { 0.0 };
+                let law = pid(0.7 * gain, gain, kd, dt).unwrap().at(dt).unwrap();
+                let mut controller = Controller::new(limits, Law::Pid(law));
+                if share % 3 == 0 {
+                    controller.filters[0] = Some(Filter::low_pass(0.1 / dt, dt).unwrap());
+                }
+                let exact = SampledLoop::of(plant, &controller, dt).unwrap().margins();
+                let found = set.robustness(&controller);
+                let place = format!("plant {i} at {dt} s, gain {gain:e}");
+                let margin = exact.gain.unwrap_or(f64::INFINITY);
+                if (margin - 1.0).abs() < 0.02 {
+                    continue;
+                }
+                assert_eq!(
+                    found.unstable.value == 0.0,
+                    exact.stable,
+                    "{place}: {found:?} {exact:?}"
+                );
+                if !exact.stable {
+                    unstable += 1;
+                    continue;
+                }
+                stable += 1;
+                // A loop on the edge of instability is not sought.
+                let accuracy = if exact.sensitivity < 5.0 { 0.01 } else { 0.5 };
+                let near = |a: f64, b: f64| (a - b).abs() < accuracy * b;
+                assert!(
+                    near(found.sensitivity.value, exact.sensitivity),
+                    "{place}: {found:?} {exact:?}"
+                );
+                if let Some(phase) = exact.phase {
+                    assert!(near(found.phase_margin.value, phase), "{place}: {found:?} {exact:?}");
+                }
+            }
+        }
+    }
+    assert!(stable > 100 && unstable > 100, "{stable} stable, {unstable} unstable");
+}
+
+fn required() -> Requirements {
+    Requirements {
+        gain_margin: 2.0,
+        phase_margin: 0.5,
+        sensitivity: 2.0,
+        learning: 1.0,
+        slew: f64::INFINITY,
+        clipped: 0.0,
+    }
+}
+
+fn sought(gain: f64) -> Vec<Sought> {
+    [Setting::Proportional, Setting::Integral, Setting::Derivative]
+        .map(|setting| Sought { setting, low: 1e-4 / gain, high: 2.0 / gain, logarithmic: true })
+        .to_vec()
+}
+
+/// On a plant without dynamics the largest integral gain with Ms = 2 is known: an integrator behind
+/// a delay of one sample, L = k/(z - 1), has its smallest distance from -1 at z = -1, 1 - k/2, so
+/// that k = 1. Proportional and derivative action are kept out of the way.
+#[test]
+fn the_integral_gain_from_margins_alone_is_the_known_one() {
+    let plant = LoopPlant::fixed_gain(1e-6).unwrap();
+    let dt = 0.01;
+    let one = |setting, low: f64, high: f64| Sought { setting, low, high, logarithmic: true };
+    let limits = Limits::new(0.0, 75.0).unwrap();
+    let base = Controller::new(limits, Law::None);
+    let tuning = Tuning {
+        sought: vec![one(Setting::Proportional, 1.0, 1.000_001), one(Setting::Integral, 1e4, 1e7)],
+        template: Template { base, dt, period: None },
+        tasks: Vec::new(),
+        plants: PlantSet::new(&[plant], dt).unwrap(),
+        required: Requirements { phase_margin: 0.0, gain_margin: 1.001, ..required() },
+        aim: Aim::Disturbance,
+        effort: 0.0,
+        particles: 20,
+        iterations: 100,
+        seed: 1,
+    };
+    let found = tuning.search(NEVER).unwrap();
+    let integral = found.settings[1].1 * 1e-6;
+    // The reading of a sample is taken before its command acts: z/(z - 1) behind one sample.
+    assert!((integral - 1.0).abs() < 1e-3, "{integral}");
+    assert!((found.robustness.sensitivity.value - 2.0).abs() < 2e-3);
+}
+
+#[test]
+fn a_search_beats_the_published_gains_and_keeps_its_margins() {
+    let stage = VirtualStage::xu_li_2010(1);
+    let reference = reference(750);
+    let feedforward = vec![0.0; 750];
+    let samples = ReferenceSamples { reference: &reference, feedforward: &feedforward };
+    let task = task(&stage, samples, 0.0);
+    let limits = Limits::new(0.0, 75.0).unwrap();
+    let published = Controller::new(limits, Law::Pid(Pid::xu_li_2010().at(DT).unwrap()));
+    let before = task.ready().unwrap().figures(&[published], NEVER).unwrap()[0];
+    let plants = stage.loop_plants(0.0, 75.0).unwrap();
+    let tuning = Tuning {
+        sought: sought(1.56e-6),
+        template: Template { base: Controller::new(limits, Law::None), dt: DT, period: None },
+        tasks: vec![task],
+        plants: PlantSet::new(&plants, DT).unwrap(),
+        required: required(),
+        aim: Aim::Rms,
+        effort: 0.0,
+        particles: 24,
+        iterations: 40,
+        seed: 1,
+    };
+    let found = tuning.search(NEVER).unwrap();
+    assert!(found.excess <= 1.0);
+    assert!(found.cost < before.rms, "{:e} tuned, {:e} published", found.cost, before.rms);
+    for plant in &plants {
+        let exact = SampledLoop::of(plant, &found.controller, DT).unwrap().margins();
+        assert!(exact.stable && exact.sensitivity < 2.0 * 1.001, "{exact:?}");
+        assert!(exact.gain.unwrap() > 2.0 * 0.999);
+    }
+    let again = tuning.search(NEVER).unwrap();
+    assert_eq!(again.settings, found.settings);
 }

@@ -75,25 +75,23 @@ const DIVERGED: f64 = 1.0;
 /// Ends of the parts in which an amplifier settles after a change of its command, in lags.
 const SETTLING: [f64; 6] = [0.25, 0.6, 1.1, 1.9, 3.2, 6.0];
 
-impl Task<'_> {
-    /// Figures of each controller in its loop, in their order, computed on the threads of the present
-    /// pool; the bits are the same for any number of them. Empty where `stop` said so.
-    ///
-    /// With sampling jitter, and for a stage without lanes, each loop is simulated by itself.
+impl<'a> Task<'a> {
+    /// Brings the stage to where the loops begin, and draws the noise of its sensor.
     ///
     /// # Errors
-    /// Those of [`track`], and where memory does not suffice.
-    pub fn figures(&self, controllers: &[Controller<Law>], stop: Stop<'_>) -> Result<Vec<Figures>> {
-        let start = self.stage.start_after(self.visited);
-        if self.timing.jitter == 0.0 {
-            let loops = Loops { task: self, start: &start, controllers, stop };
-            let voltages = self.voltages();
-            if let Some(found) = self.stage.stage.in_lanes(&voltages, &start.plant, loops) {
-                return found;
-            }
+    /// Where memory does not suffice, or feedforward and reference differ in length.
+    pub fn ready(&'a self) -> Result<ReadyTask<'a>> {
+        let (found, expected) = (self.samples.feedforward.len(), self.samples.reference.len());
+        if found != expected {
+            return Err(Error::Shape {
+                name: "feedforward".into(),
+                found: format!("{found} samples"),
+                expected: format!("{expected}, as many as the reference"),
+            });
         }
-        let found = controllers.par_iter().map(|controller| self.alone(controller, &start, stop));
-        found.collect()
+        let start = self.stage.start_after(self.visited);
+        let noise = noises(self, &start)?;
+        Ok(ReadyTask { task: self, start, noise })
     }
 
     /// Slow visits that lead to where the loops begin, V.
@@ -130,6 +128,37 @@ impl Task<'_> {
             score.take(k >= self.from, error, command.volts, command.saturated);
         }
         Ok(score.figures())
+    }
+}
+
+/// A task whose stage is where the loops begin.
+#[derive(Clone, Debug)]
+pub struct ReadyTask<'a> {
+    task: &'a Task<'a>,
+    start: ApparatusState<StageState>,
+    /// Of each reading, m.
+    noise: Vec<f64>,
+}
+
+impl ReadyTask<'_> {
+    /// Figures of each controller in its loop, in their order, computed on the threads of the present
+    /// pool; the bits are the same for any number of them. Where `stop` said so,
+    /// [`Figures::FAILED`].
+    ///
+    /// With sampling jitter, and for a stage without lanes, each loop is simulated by itself.
+    ///
+    /// # Errors
+    /// Those of [`track`], and where memory does not suffice.
+    pub fn figures(&self, controllers: &[Controller<Law>], stop: Stop<'_>) -> Result<Vec<Figures>> {
+        let Self { task, start, noise } = self;
+        if task.timing.jitter == 0.0 {
+            let loops = Loops { task, start, noise, controllers, stop };
+            let voltages = task.voltages();
+            if let Some(found) = task.stage.stage.in_lanes(&voltages, &start.plant, loops) {
+                return found;
+            }
+        }
+        controllers.par_iter().map(|controller| task.alone(controller, start, stop)).collect()
     }
 }
 
@@ -196,6 +225,7 @@ impl Score {
 struct Loops<'a> {
     task: &'a Task<'a>,
     start: &'a ApparatusState<StageState>,
+    noise: &'a [f64],
     controllers: &'a [Controller<Law>],
     stop: Stop<'a>,
 }
@@ -204,9 +234,8 @@ impl LanedVisitor for Loops<'_> {
     type Output = Result<Vec<Figures>>;
 
     fn visit<P: LanedPlant>(self, plant: P) -> Self::Output {
-        let Self { task, start, controllers, stop } = self;
+        let Self { task, start, noise, controllers, stop } = self;
         let stage = task.stage;
-        let noise = noises(task, start)?;
         let arch = Arch::new();
         let width = arch.dispatch(Width);
         let parts = parts(task, P::LONGEST);
@@ -218,7 +247,7 @@ impl LanedVisitor for Loops<'_> {
                     Ok(one.rest(zeros(DELAY_LINE, length)?)?)
                 });
                 let states: Result<Vec<_>> = states.collect();
-                let (plant, noise, parts) = (&plant, &noise, &parts);
+                let (plant, parts) = (&plant, &parts);
                 let bundle = Bundle {
                     task,
                     stage,

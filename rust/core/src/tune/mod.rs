@@ -2,5 +2,11 @@
 //! keep for every model of a set, and the search.
 
 mod loops;
+mod requirements;
+mod search;
+mod settings;
 
-pub use loops::{Figures, Judged, Task};
+pub use loops::{Figures, Judged, ReadyTask, Task};
+pub use requirements::{PlantSet, Requirements, Robustness, Worst};
+pub use search::{Aim, Found, Tuning};
+pub use settings::{Setting, Sought, Template, pid};

@@ -1,0 +1,374 @@
+//! What a loop has to keep for every plant of a set, read off a grid of frequencies.
+//!
+//! For a search: thousands of controllers against the same plants, whose responses are computed
+//! once. The grid is fine where a plant turns fast; what it says of the best controller is checked
+//! by [`crate::design`], which is exact.
+
+use core::f64::consts::PI;
+
+use piezotrack_control::{Controller, Filter, SampledRepetitive};
+
+use crate::design::{LinearFeedback, LoopPlant};
+use crate::error::{Error, Result, positive};
+use crate::math::{C, Jet, Ratio};
+use crate::simulate::Law;
+
+/// What every loop of a set keeps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Requirements {
+    /// Least gain margin, a factor above 1.
+    pub gain_margin: f64,
+    /// Least phase margin, rad.
+    pub phase_margin: f64,
+    /// Largest sensitivity Ms, above 1.
+    pub sensitivity: f64,
+    /// Largest gain from what is learnt in one period to what is learnt in the next.
+    pub learning: f64,
+    /// Fastest change of the command, V/s; infinite for any.
+    pub slew: f64,
+    /// Largest share of samples at which the command is clipped.
+    pub clipped: f64,
+}
+
+impl Requirements {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming the one that no loop can keep.
+    pub fn validate(&self) -> Result<()> {
+        let above = |name: &str, value: f64| {
+            if value > 1.0 && value.is_finite() {
+                return Ok(());
+            }
+            Err(Error::parameter(name, value, "a finite number above 1"))
+        };
+        above("gain_margin", self.gain_margin)?;
+        above("sensitivity", self.sensitivity)?;
+        if !(self.phase_margin >= 0.0 && self.phase_margin < PI) {
+            let found = format!("{} rad", self.phase_margin);
+            return Err(Error::parameter("phase_margin", found, "from 0 to below pi rad"));
+        }
+        if !(self.slew > 0.0) {
+            let found = format!("{} V/s", self.slew);
+            return Err(Error::parameter("slew", found, "above 0, or infinity"));
+        }
+        if !(0.0..=1.0).contains(&self.clipped) {
+            return Err(Error::parameter("clipped", self.clipped, "a share, 0 to 1"));
+        }
+        positive("learning", self.learning, "").map(drop)
+    }
+}
+
+/// A number of the worst plant of a set.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Worst {
+    /// Its value.
+    pub value: f64,
+    /// Which plant has it.
+    pub plant: usize,
+}
+
+/// What is least good over a set of plants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Robustness {
+    /// Roots outside of the unit circle, of the plant that has most of them.
+    pub unstable: Worst,
+    /// Least gain margin.
+    pub gain_margin: Worst,
+    /// Least phase margin, rad.
+    pub phase_margin: Worst,
+    /// Largest sensitivity.
+    pub sensitivity: Worst,
+    /// Largest gain of what is learnt from period to period; 0 without a repetitive part.
+    pub learning: Worst,
+}
+
+impl Robustness {
+    /// How far the set is from what is required: 1 or less where it is kept by all.
+    #[must_use]
+    pub fn excess(&self, required: &Requirements) -> f64 {
+        if self.unstable.value > 0.0 {
+            return 1e3 * (1.0 + self.unstable.value);
+        }
+        let ratios = [
+            self.sensitivity.value / required.sensitivity,
+            required.gain_margin / self.gain_margin.value,
+            required.phase_margin / self.phase_margin.value.max(1e-9),
+            self.learning.value / required.learning,
+        ];
+        ratios.into_iter().fold(0.0, |most, ratio| if ratio <= most { most } else { ratio })
+    }
+}
+
+/// Responses of the plants of a set, on a grid.
+#[derive(Clone, Debug)]
+pub struct PlantSet {
+    dt: f64,
+    /// z - 1 at the grid's places, and 1/z.
+    delta: Vec<C>,
+    late: Vec<C>,
+    /// Of each plant.
+    responses: Vec<Vec<C>>,
+}
+
+/// Places of the grid that are even on a logarithmic scale, and those that are even.
+const SLOW: usize = 160;
+const EVEN: usize = 240;
+
+/// Places about each mode of a plant, on either side.
+const NEAR: i32 = 24;
+
+/// Lowest angle of the grid, rad.
+const LOWEST: f64 = 1e-4;
+
+impl PlantSet {
+    /// The plants at samples every `dt` seconds.
+    ///
+    /// # Errors
+    /// Names `dt`, and `plants` where there is none; those of the sampling of a plant.
+    pub fn new(plants: &[LoopPlant], dt: f64) -> Result<Self> {
+        positive("dt", dt, "s")?;
+        if plants.is_empty() {
+            return Err(Error::parameter("plants", "none", "one or more"));
+        }
+        let sampled: Result<Vec<(Ratio, usize)>> =
+            plants.iter().map(|plant| plant.sampled(dt)).collect();
+        let sampled = sampled?;
+        let angles = grid(&sampled);
+        let delta: Vec<C> = angles.iter().map(|angle| unit(*angle)).collect();
+        let late: Vec<C> = delta.iter().map(|delta| (delta + C::new(1.0, 0.0)).inv()).collect();
+        let responses = sampled
+            .iter()
+            .map(|(ratio, whole)| {
+                let places = delta.iter().zip(&late);
+                places.map(|(delta, late)| of(ratio, *delta) * late.powu(to_u32(*whole))).collect()
+            })
+            .collect();
+        Ok(Self { dt, delta, late, responses })
+    }
+
+    /// Number of plants.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.responses.len()
+    }
+
+    /// Whether there is no plant.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.responses.is_empty()
+    }
+
+    /// Sampling interval, s.
+    #[must_use]
+    pub fn dt(&self) -> f64 {
+        self.dt
+    }
+
+    /// What is least good of a controller over the set.
+    #[must_use]
+    pub fn robustness(&self, controller: &Controller<Law>) -> Robustness {
+        let law = self.along(&polynomials(&controller.feedback.transfer_function()));
+        let filters = controller.filters.iter().flatten();
+        let passed = filters.fold(None, |before: Option<Vec<C>>, filter| {
+            let this = self.along(&filter_ratio(filter));
+            Some(match before {
+                None => this,
+                Some(before) => before.iter().zip(&this).map(|(a, b)| a * b).collect(),
+            })
+        });
+        let learnt = controller.repetitive.as_ref().map(|part| self.learnt(part));
+        let mut out: Option<Robustness> = None;
+        for (plant, response) in self.responses.iter().enumerate() {
+            let forward = |k: usize| match &passed {
+                Some(filter) => response[k] * filter[k],
+                None => response[k],
+            };
+            let mut one = walk(law.len(), |k| forward(k) * law[k]);
+            if let Some(learnt) = &learnt {
+                let gain = (0..law.len()).map(|k| {
+                    let closed = forward(k) / (C::new(1.0, 0.0) + forward(k) * law[k]);
+                    (learnt[k].0 * (C::new(1.0, 0.0) - learnt[k].1 * closed)).norm()
+                });
+                one.learning.value = gain.fold(0.0, f64::max);
+            }
+            out = Some(out.map_or(one, |before| worse(before, one, plant)));
+        }
+        // There is a plant: `new` saw to it.
+        out.unwrap_or_else(|| walk(0, |_| C::new(0.0, 0.0)))
+    }
+
+    fn along(&self, ratio: &Ratio) -> Vec<C> {
+        self.delta.iter().map(|delta| of(ratio, *delta)).collect()
+    }
+
+    /// Filter of the repetitive part, and what it takes of the error, at each place.
+    fn learnt(&self, part: &SampledRepetitive) -> Vec<(C, C)> {
+        let recursion = part.recursion();
+        let one = C::new(1.0, 0.0);
+        let places = self.late.iter().map(|late| {
+            let mut power = one;
+            let mut sum = C::new(0.0, 0.0);
+            for tap in recursion.taps.iter().rev() {
+                sum += power * *tap;
+                power *= late;
+            }
+            // The whole delay turns it, and changes no size.
+            let lead = late.inv().powu(to_u32(recursion.lead.min(recursion.nearest)));
+            (sum / (one - late * recursion.pole), lead * recursion.gain)
+        });
+        places.collect()
+    }
+}
+
+/// The loop along the grid: margins, and roots outside.
+fn walk(count: usize, open: impl Fn(usize) -> C) -> Robustness {
+    let one = C::new(1.0, 0.0);
+    let mut nearest = f64::INFINITY;
+    let (mut phase, mut gain) = (PI, f64::INFINITY);
+    let mut turned = 0.0;
+    let mut before: Option<(C, C)> = None;
+    let mut first = 0.0;
+    for k in 0..count {
+        let open = open(k);
+        let closed = one + open;
+        let distance = before.map_or(closed.norm(), |(_, last)| from_zero(last, closed));
+        nearest = if distance >= nearest { nearest } else { distance };
+        if let Some((last, last_closed)) = before {
+            turned += (closed * last_closed.conj()).arg();
+            if (last.norm_sqr() > 1.0) != (open.norm_sqr() > 1.0) {
+                let at = between(last, open, last.norm().ln(), open.norm().ln());
+                phase = phase.min((-at).arg().abs());
+            }
+            if (last.im > 0.0) != (open.im > 0.0) {
+                let at = between(last, open, last.im, open.im).re;
+                if at < 0.0 {
+                    let factor = -1.0 / at;
+                    gain = gain.min(if factor > 1.0 { factor } else { 1.0 / factor });
+                }
+            }
+        } else {
+            first = closed.arg();
+        }
+        before = Some((open, closed));
+    }
+    // At half the sampling rate, the last place, the loop is real.
+    if let Some((last, _)) = before
+        && last.re < 0.0
+        && last.re > -1.0
+    {
+        gain = gain.min(-1.0 / last.re);
+    }
+    // Along the upper half of the circle 1 + L turns from where it begins to 0 where no root is
+    // outside; an integrator begins at -90 degrees.
+    let lost = (first + turned) / PI;
+    let outside = if lost.is_nan() || first.abs() > 0.75 * PI { 1.0 } else { lost.abs().round() };
+    let worst = |value| Worst { value, plant: 0 };
+    Robustness {
+        unstable: worst(outside),
+        gain_margin: worst(gain),
+        phase_margin: worst(phase),
+        sensitivity: worst(if nearest > 0.0 { 1.0 / nearest } else { f64::INFINITY }),
+        learning: worst(0.0),
+    }
+}
+
+/// Distance of the line between two values from 0.
+fn from_zero(a: C, b: C) -> f64 {
+    let way = b - a;
+    let share = -(a.re * way.re + a.im * way.im) / way.norm_sqr();
+    let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 };
+    (a + way * share).norm()
+}
+
+/// Where the line between two values crosses zero of a quantity that is `low` at one, `high` at
+/// the other.
+fn between(a: C, b: C, low: f64, high: f64) -> C {
+    let share = low / (low - high);
+    if share.is_finite() { a + (b - a) * share } else { a }
+}
+
+/// The worse of each, `one` being of plant number `plant`.
+fn worse(before: Robustness, one: Robustness, plant: usize) -> Robustness {
+    let high = |a: Worst, b: Worst| {
+        if b.value > a.value { Worst { value: b.value, plant } } else { a }
+    };
+    let low = |a: Worst, b: Worst| {
+        if b.value < a.value { Worst { value: b.value, plant } } else { a }
+    };
+    Robustness {
+        unstable: high(before.unstable, one.unstable),
+        gain_margin: low(before.gain_margin, one.gain_margin),
+        phase_margin: low(before.phase_margin, one.phase_margin),
+        sensitivity: high(before.sensitivity, one.sensitivity),
+        learning: high(before.learning, one.learning),
+    }
+}
+
+/// Angles from nearly 0 to pi, dense where a plant turns fast.
+fn grid(plants: &[(Ratio, usize)]) -> Vec<f64> {
+    let even = |k: usize, n: usize| small(k) / small(n);
+    let slow = (0..SLOW).map(|k| LOWEST * (PI / LOWEST).powf(even(k, SLOW)));
+    let mut angles: Vec<f64> = slow.chain((1..=EVEN).map(|k| PI * even(k, EVEN))).collect();
+    for (ratio, _) in plants {
+        for (angle, width) in modes(ratio) {
+            for k in -NEAR..=NEAR {
+                let away = width * (f64::from(k) / 8.0).sinh();
+                angles.push(angle + away);
+            }
+        }
+    }
+    angles.retain(|angle| *angle >= LOWEST && *angle <= PI);
+    angles.sort_by(f64::total_cmp);
+    angles.dedup();
+    angles
+}
+
+/// Angle and width of the poles of a sampled plant, rad: from peaks of its response.
+fn modes(ratio: &Ratio) -> Vec<(f64, f64)> {
+    const FINE: usize = 4096;
+    let angle = |k: usize| PI * small(k) / small(FINE);
+    let size: Vec<f64> = (1..FINE).map(|k| of(ratio, unit(angle(k))).norm()).collect();
+    let peaks =
+        size.windows(3).enumerate().filter(|(_, near)| near[1] > near[0] && near[1] > near[2]);
+    peaks
+        .map(|(k, _)| {
+            let place = angle(k + 2);
+            let half = size[k + 1] * core::f64::consts::FRAC_1_SQRT_2;
+            let wide = size[k + 1..].iter().take_while(|value| **value > half).count();
+            (place, small(wide.max(1)) * PI / small(FINE))
+        })
+        .collect()
+}
+
+/// `exp(i angle) - 1` without cancelling.
+fn unit(angle: f64) -> C {
+    let half = libm::sin(0.5 * angle);
+    C::new(-2.0 * half * half, libm::sin(angle))
+}
+
+fn of(ratio: &Ratio, delta: C) -> C {
+    let (above, below) = ratio.at(Jet { value: delta, slope: C::new(0.0, 0.0) });
+    above.value / below.value
+}
+
+fn polynomials([above, below]: &[Vec<f64>; 2]) -> Ratio {
+    Ratio { above: above.clone(), below: below.clone() }
+}
+
+/// A filter in powers of `z - 1`.
+fn filter_ratio(filter: &Filter) -> Ratio {
+    let ([b0, b1, b2], [a1, a2]) = filter.coefficients();
+    Ratio {
+        above: vec![b0 + b1 + b2, 2.0 * b0 + b1, b0],
+        below: vec![1.0 + a1 + a2, 2.0 + a1, 1.0],
+    }
+}
+
+fn small(count: usize) -> f64 {
+    crate::signal::index(count)
+}
+
+fn to_u32(count: usize) -> u32 {
+    u32::try_from(count).unwrap_or(u32::MAX)
+}

@@ -1,0 +1,187 @@
+//! The settings of a controller that a search may change, by their names.
+
+use piezotrack_control::{Controller, Filter, Pid, Repetitive, Smoothing};
+
+use crate::error::{Error, Result};
+use crate::simulate::Law;
+
+/// A setting that is sought.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Setting {
+    /// Proportional gain of the PID, V/m.
+    Proportional,
+    /// Integral gain a sample, Kp Ts/Ti, V/m.
+    Integral,
+    /// Derivative gain a sample, Kp Td/Ts, V/m.
+    Derivative,
+    /// Cutoff of the low-pass on the measurement, Hz.
+    Cutoff,
+    /// Middle of the notch, Hz.
+    NotchFrequency,
+    /// Damping ratio of the notch's poles.
+    NotchWidth,
+    /// Gain in the middle of the notch.
+    NotchDepth,
+    /// Learning gain of the repetitive part, V/um.
+    Learning,
+    /// Order of its zero-phase filter, to the nearest whole number; 0 for none.
+    Order,
+    /// Time constant of its lag, s, in place of the zero-phase filter.
+    Lag,
+    /// Samples by which it is advanced, to the nearest whole number.
+    Lead,
+    /// Its forgetting factor.
+    Forgetting,
+}
+
+/// All of them, with the names that both languages use.
+const NAMES: [(&str, Setting); 12] = [
+    ("kp", Setting::Proportional),
+    ("ki", Setting::Integral),
+    ("kd", Setting::Derivative),
+    ("cutoff", Setting::Cutoff),
+    ("notch_frequency", Setting::NotchFrequency),
+    ("notch_width", Setting::NotchWidth),
+    ("notch_depth", Setting::NotchDepth),
+    ("kq", Setting::Learning),
+    ("order", Setting::Order),
+    ("tq", Setting::Lag),
+    ("lead", Setting::Lead),
+    ("forgetting_factor", Setting::Forgetting),
+];
+
+impl Setting {
+    /// The setting of a name.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] where there is none.
+    pub fn named(name: &str) -> Result<Self> {
+        NAMES.iter().find(|(known, _)| *known == name).map(|(_, setting)| *setting).ok_or_else(
+            || {
+                let names: Vec<&str> = NAMES.iter().map(|(known, _)| *known).collect();
+                Error::parameter("setting", format!("'{name}'"), names.join(", "))
+            },
+        )
+    }
+
+    /// Its name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        NAMES.iter().find(|(_, setting)| *setting == self).map_or("", |(name, _)| name)
+    }
+}
+
+/// A setting with the range in which it is sought.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sought {
+    /// What is sought.
+    pub setting: Setting,
+    /// Least value.
+    pub low: f64,
+    /// Largest value.
+    pub high: f64,
+    /// Whether equal ratios are equally far, not equal differences.
+    pub logarithmic: bool,
+}
+
+impl Sought {
+    /// The value at a place from 0 to 1.
+    #[must_use]
+    pub fn at(&self, place: f64) -> f64 {
+        if self.logarithmic {
+            return self.low * libm::pow(self.high / self.low, place);
+        }
+        self.low + (self.high - self.low) * place
+    }
+
+    /// Checks the range.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming the setting.
+    pub fn validate(&self) -> Result<()> {
+        let ordered = self.low.is_finite() && self.high.is_finite() && self.low < self.high;
+        if ordered && (!self.logarithmic || self.low > 0.0) {
+            return Ok(());
+        }
+        let found = format!("{} to {}", self.low, self.high);
+        Err(Error::parameter(self.setting.name(), found, "the lower end of the range first"))
+    }
+}
+
+/// A controller of which some settings are sought.
+#[derive(Clone, Copy, Debug)]
+pub struct Template {
+    /// Limits, span, and what is not sought.
+    pub base: Controller<Law>,
+    /// Sampling interval, s.
+    pub dt: f64,
+    /// Period of a repetitive part, s; `None` for none.
+    pub period: Option<f64>,
+}
+
+impl Template {
+    /// The controller with these settings; `None` where there is none with them.
+    #[must_use]
+    pub fn controller(&self, settings: &[(Setting, f64)]) -> Option<Controller<Law>> {
+        let value = |wanted: Setting| {
+            settings.iter().find(|(setting, _)| *setting == wanted).map(|(_, value)| *value)
+        };
+        let mut out = self.base;
+        if let Some(kp) = value(Setting::Proportional) {
+            let ki = value(Setting::Integral).unwrap_or(0.0);
+            let kd = value(Setting::Derivative).unwrap_or(0.0);
+            let pid = pid(kp, ki, kd, self.dt).ok()?;
+            out.feedback = Law::Pid(pid.at(self.dt).ok()?);
+        }
+        let mut slots = out.filters.iter_mut();
+        if let Some(cutoff) = value(Setting::Cutoff) {
+            *slots.next()? = Some(Filter::low_pass(cutoff, self.dt).ok()?);
+        }
+        if let Some(frequency) = value(Setting::NotchFrequency) {
+            let width = value(Setting::NotchWidth).unwrap_or(0.5);
+            let depth = value(Setting::NotchDepth).unwrap_or(0.0);
+            *slots.next()? = Some(Filter::notch(frequency, width, depth, self.dt).ok()?);
+        }
+        if let (Some(period), Some(kq)) = (self.period, value(Setting::Learning)) {
+            out.repetitive = Some(self.repetitive(period, kq, &value)?.at(self.dt).ok()?);
+        }
+        Some(out)
+    }
+
+    fn repetitive(
+        &self,
+        period: f64,
+        kq: f64,
+        value: &impl Fn(Setting) -> Option<f64>,
+    ) -> Option<Repetitive> {
+        let smoothing = match (value(Setting::Lag), value(Setting::Order).map(whole)) {
+            (Some(tq), _) => Smoothing::Lag { tq, compensated: true },
+            (None, None | Some(0)) => Smoothing::None,
+            (None, Some(order)) => Smoothing::ZeroPhase { order },
+        };
+        let part = Repetitive::new(period, smoothing, kq).ok()?;
+        let forgetting_factor = value(Setting::Forgetting).unwrap_or(part.forgetting_factor);
+        let lead = value(Setting::Lead).map_or(0, whole);
+        Some(Repetitive { forgetting_factor, lead, ..part })
+    }
+}
+
+/// A PID of gains a sample: Kp, Kp Ts/Ti and Kp Td/Ts, V/m.
+///
+/// Its antiwindup has the usual time, but one sampling interval at least.
+///
+/// # Errors
+/// Those of [`Pid::new`].
+pub fn pid(kp: f64, ki: f64, kd: f64, dt: f64) -> Result<Pid> {
+    let ti = if ki > 0.0 { kp * dt / ki } else { f64::INFINITY };
+    let td = kd * dt / kp;
+    let usual = if td > 0.0 { libm::sqrt(ti * td) } else { ti };
+    let tt = ti.is_finite().then_some(usual.max(dt));
+    Ok(Pid::new(kp, ti, td, tt)?)
+}
+
+/// The nearest whole number.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+fn whole(value: f64) -> u32 {
+    value.round() as u32
+}
