@@ -17,6 +17,9 @@ from .control.controller import Controller as Controller
 from .control.linear_systems import to_control as to_control
 from .control.stability import check_loop as check_loop
 from .control.tracking import track as track
+from .control.tuning.margins import Margins as Margins
+from .control.tuning.margins import Spread as Spread
+from .control.tuning.tune import tune as tune
 from .data import datasets as datasets
 from .data.dataset import Dataset as Dataset
 from .data.reader import read as read

@@ -20,6 +20,7 @@ __all__ = [
     "StepResponse",
     "Swarm",
     "SwarmSettings",
+    "Task",
     "TrackingRun",
     "VirtualStage",
     "XYStage",
@@ -45,6 +46,7 @@ __all__ = [
     "sensor_noise",
     "spread",
     "tracking_metrics",
+    "tune",
     "turns",
     "visited",
 ]
@@ -311,6 +313,43 @@ class VirtualStage:
         sampling: _Pace,
         visited: ArrayLike,
     ) -> TrackingRun: ...
+
+# Rms and largest error [m], effort [V], slew [V/s], clipped share.
+_Figures = tuple[float, float, float, float, float]
+
+@final
+class Task:
+    def __new__(
+        cls,
+        *,
+        stage: VirtualStage,
+        visited: ArrayLike,
+        dt: float,
+        delay: float,
+        jitter: float,
+        reference: ArrayLike,
+        feedforward: ArrayLike,
+        first: int,
+        measured: bool,
+    ) -> Task: ...
+    def figures(self, controllers: Sequence[Controller], threads: int) -> list[_Figures]: ...
+
+def tune(
+    *,
+    controller: Controller,
+    period: float | None,
+    sign: float,
+    sought: list[tuple[str, float, float, bool]],
+    tasks: Sequence[Task],
+    plants: Sequence[LoopPlant],
+    required: tuple[float, float, float, float, float, float],
+    aim: str,
+    effort: float,
+    particles: int,
+    iterations: int,
+    seed: int,
+    threads: int,
+) -> dict[str, Any]: ...
 
 # Delay and jitter [s], and instants kept in each control interval.
 _Pace = tuple[float, float, int]

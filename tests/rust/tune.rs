@@ -188,7 +188,7 @@ fn the_integral_gain_from_margins_alone_is_the_known_one() {
     let base = Controller::new(limits, Law::None);
     let tuning = Tuning {
         sought: vec![one(Setting::Proportional, 1.0, 1.000_001), one(Setting::Integral, 1e4, 1e7)],
-        template: Template { base, dt, period: None },
+        template: Template { base, dt, period: None, sign: 1.0 },
         tasks: Vec::new(),
         plants: PlantSet::new(&[plant], dt).unwrap(),
         required: Requirements { phase_margin: 0.0, gain_margin: 1.001, ..required() },
@@ -218,7 +218,12 @@ fn a_search_beats_the_published_gains_and_keeps_its_margins() {
     let plants = stage.loop_plants(0.0, 75.0).unwrap();
     let tuning = Tuning {
         sought: sought(1.56e-6),
-        template: Template { base: Controller::new(limits, Law::None), dt: DT, period: None },
+        template: Template {
+            base: Controller::new(limits, Law::None),
+            dt: DT,
+            period: None,
+            sign: 1.0,
+        },
         tasks: vec![task],
         plants: PlantSet::new(&plants, DT).unwrap(),
         required: required(),

@@ -32,3 +32,9 @@ from .tracking_plot import plot_effort as plot_effort
 from .tracking_plot import plot_error as plot_error
 from .tracking_plot import plot_following as plot_following
 from .tracking_plot import plot_motion as plot_motion
+from .tuning.margins import Margins as Margins
+from .tuning.margins import Spread as Spread
+from .tuning.tune import tune as tune
+from .tuning.tuned import Kept as Kept
+from .tuning.tuned import Tuned as Tuned
+from .tuning.tuned import TuningReport as TuningReport

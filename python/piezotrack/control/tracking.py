@@ -123,11 +123,7 @@ class Tracking:
         After the smooth start; of a reference that repeats, from the first whole period after it
         if there is one. 0 where the smooth start lasts to the end.
         """
-        period = self.reference.period
-        if period is None:
-            return self.reference.ramp if self.reference.ramp < self.t[-1] - 1e-9 else 0.0
-        start = math.ceil(self.reference.ramp / period - 1e-9) * period
-        return start if start + period <= self.reference.duration * (1 + 1e-9) else 0.0
+        return settled_from(self.reference, float(self.t[-1]))
 
     @cached_property
     def metrics(self) -> Metrics:
@@ -372,6 +368,15 @@ def track(
     before = voltages_before(plant, visited, controller.limits)
     run = run_closed_loop(plant, controller, samples.x, voltage, sampling, before)
     return collected(run, controller, reference, samples, note, substeps)
+
+
+def settled_from(reference: Reference, end: float) -> float:
+    """Time from which a run along a reference counts as settled [s]; it ends at `end`."""
+    period = reference.period
+    if period is None:
+        return reference.ramp if reference.ramp < end - 1e-9 else 0.0
+    start = math.ceil(reference.ramp / period - 1e-9) * period
+    return start if start + period <= reference.duration * (1 + 1e-9) else 0.0
 
 
 def feedforward_of(

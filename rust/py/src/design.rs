@@ -44,6 +44,11 @@ impl PyLoopPlant {
 }
 
 impl PyLoopPlant {
+    /// The plant itself.
+    pub fn plant(&self) -> &LoopPlant {
+        &self.0
+    }
+
     /// Three plants, with a delay more.
     pub fn delayed(plants: Result<[LoopPlant; 3]>, delay: f64) -> PyResult<[Self; 3]> {
         let build = || -> Result<[Self; 3]> {

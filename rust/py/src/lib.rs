@@ -20,6 +20,7 @@ mod stage;
 mod step;
 mod swarm;
 mod tracking;
+mod tune;
 mod virtual_stage;
 mod xy;
 
@@ -43,5 +44,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     least_squares::register(module)?;
     virtual_stage::register(module)?;
     tracking::register(module)?;
+    tune::register(module)?;
     xy::register(module)
 }

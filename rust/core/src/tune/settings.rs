@@ -117,6 +117,8 @@ pub struct Template {
     pub dt: f64,
     /// Period of a repetitive part, s; `None` for none.
     pub period: Option<f64>,
+    /// Sign of the PID's gains: that of the plant's gain.
+    pub sign: f64,
 }
 
 impl Template {
@@ -130,6 +132,7 @@ impl Template {
         if let Some(kp) = value(Setting::Proportional) {
             let ki = value(Setting::Integral).unwrap_or(0.0);
             let kd = value(Setting::Derivative).unwrap_or(0.0);
+            let [kp, ki, kd] = [kp, ki, kd].map(|gain| self.sign * gain);
             let pid = pid(kp, ki, kd, self.dt).ok()?;
             out.feedback = Law::Pid(pid.at(self.dt).ok()?);
         }
@@ -173,7 +176,7 @@ impl Template {
 /// # Errors
 /// Those of [`Pid::new`].
 pub fn pid(kp: f64, ki: f64, kd: f64, dt: f64) -> Result<Pid> {
-    let ti = if ki > 0.0 { kp * dt / ki } else { f64::INFINITY };
+    let ti = if ki.abs() > 0.0 { kp * dt / ki } else { f64::INFINITY };
     let td = kd * dt / kp;
     let usual = if td > 0.0 { libm::sqrt(ti * td) } else { ti };
     let tt = ti.is_finite().then_some(usual.max(dt));

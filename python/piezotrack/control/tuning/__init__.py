@@ -1,0 +1,1 @@
+"""Gains that nobody picks by hand."""

@@ -1,0 +1,168 @@
+"""What a search for gains may change, and in which ranges."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ..._support.messages import quoted
+from ...errors import ParameterError
+from ..components import LowPass, Notch, Pid, Repetitive, ZeroPhase
+
+if TYPE_CHECKING:
+    from ... import _core
+
+__all__ = ["PARTS", "Box", "Parts", "box_of", "parts_named", "resonance"]
+
+PARTS = ("pid", "low-pass", "notch", "repetitive")
+# Beyond this damping ratio a mode does not ring.
+RINGING = 0.4
+# A sampled filter has no room nearer to half the sampling rate.
+NYQUIST = 0.475
+
+
+class Parts(NamedTuple):
+    """The parts of a controller with their settings."""
+
+    feedback: Pid
+    filters: tuple[LowPass | Notch, ...]
+    repetitive: Repetitive | None
+
+
+class Box(NamedTuple):
+    """Ranges: name, lower and upper end, whether on a logarithmic scale."""
+
+    ranges: list[tuple[str, float, float, bool]]
+    dt: float
+    period: float | None
+    sign: float
+
+    def parts(self, settings: dict[str, float]) -> Parts:
+        """Make the parts of a controller from the settings that were found."""
+        gains = [self.sign * settings[name] for name in ("kp", "ki", "kd")]
+        kp, ki, kd = gains
+        ti, td = kp * self.dt / ki, kd * self.dt / kp
+        pid = Pid(kp=kp, ti=ti, td=td, tt=max(math.sqrt(ti * td), self.dt))
+        filters: list[LowPass | Notch] = []
+        if "cutoff" in settings:
+            filters.append(LowPass(settings["cutoff"]))
+        if "notch_frequency" in settings:
+            names = ("notch_frequency", "notch_width", "notch_depth")
+            filters.append(Notch(*(settings[name] for name in names)))
+        repetitive = None
+        if self.period is not None:
+            order = _whole(settings["order"])
+            repetitive = Repetitive(
+                period=self.period,
+                kq=1e6 * settings["kq"],
+                smoothing=ZeroPhase(order=order) if order else None,
+                lead=_whole(settings["lead"]),
+                forgetting_factor=settings["forgetting_factor"],
+            )
+        return Parts(pid, tuple(filters), repetitive)
+
+    def edges(self, settings: dict[str, float]) -> list[str]:
+        """Name the settings that are at an end of their range."""
+        found = []
+        for name, low, high, logarithmic in self.ranges:
+            ends = (math.log(low), math.log(high)) if logarithmic else (low, high)
+            value = math.log(settings[name]) if logarithmic else settings[name]
+            place = (value - ends[0]) / (ends[1] - ends[0])
+            if place > 0.999:
+                found.append(f"{name} is at the upper end of its range, {high:.4g}")
+            elif place < 0.001 and name not in ("kd", "order", "lead", "notch_depth"):
+                found.append(f"{name} is at the lower end of its range, {low:.4g}")
+        return found
+
+
+def _whole(value: float) -> int:
+    # As the core rounds: halves away from 0.
+    return math.floor(value + 0.5)
+
+
+def parts_named(parts: object) -> tuple[str, ...] | None:
+    """Check the names of parts."""
+    if parts is None:
+        return None
+    named = (parts,) if isinstance(parts, str) else parts
+    if not isinstance(named, Sequence) or any(one not in PARTS for one in named):
+        raise ParameterError(
+            f"parts is {quoted(parts)}: expected some of {', '.join(map(repr, PARTS))}"
+        )
+    return ("pid", *(one for one in PARTS[1:] if one in named))
+
+
+def resonance(plants: Sequence[_core.LoopPlant], dt: float) -> tuple[float, float] | None:
+    """Lowest and highest frequency [Hz] of the modes that ring below half the sampling rate."""
+    found = []
+    for plant in plants:
+        a, b, *_ = plant.matrices()
+        for root in np.linalg.eigvals(np.reshape(a, (len(b), len(b)))) if b else ():
+            size = abs(root)
+            if root.imag > 0.0 and -root.real < RINGING * size:
+                found.append(size / (2.0 * math.pi))
+    found = [one for one in found if one * dt < NYQUIST]
+    return (min(found), max(found)) if found else None
+
+
+def box_of(
+    parts: Sequence[str],
+    plants: Sequence[_core.LoopPlant],
+    dt: float,
+    period: float | None,
+    limits: tuple[float, float],
+) -> Box:
+    """Set the ranges for plants that are sampled every `dt` seconds."""
+    gains = [plant.static_gain for plant in plants]
+    largest = max((abs(gain) for gain in gains if math.isfinite(gain)), default=0.0)
+    if largest == 0.0 or min(gains) * max(gains) <= 0.0:
+        raise ParameterError(
+            f"models have static gains of {min(gains):.4g} to {max(gains):.4g} m/V: expected "
+            "finite ones, all of one sign"
+        )
+    sign = math.copysign(1.0, gains[0])
+    # A controller refuses gains with which 1 mm asks for less than a thousandth of the range.
+    least = max(1e-4 / largest, 1.001 * (limits[1] - limits[0]))
+    ranges = [
+        ("kp", least, 10.0 / largest, True),
+        ("ki", 1e-4 / largest, 3.0 / largest, True),
+        ("kd", 1e-4 / largest, 100.0 / largest, True),
+    ]
+    if "low-pass" in parts:
+        ranges.append(("cutoff", 0.02 / dt, 2.0 / dt, True))
+    if "notch" in parts:
+        ranges += _notch(plants, dt)
+    if "repetitive" in parts:
+        if period is None:
+            raise ParameterError("parts has 'repetitive': expected references that repeat")
+        if sign < 0.0:
+            raise ParameterError(
+                "parts has 'repetitive', but the stage falls as the voltage rises: expected a stage "
+                "that rises, for its learning gain is above 0"
+            )
+        longest = min(24.0, math.floor(period / dt / 4.0))
+        ranges += [
+            ("kq", 0.005, min(1.99, 2e-6 / largest), True),
+            ("order", -0.49, 4.49, False),
+            ("lead", -0.49, longest + 0.49, False),
+            ("forgetting_factor", 0.9, 1.0, False),
+        ]
+    return Box(ranges, dt, period if "repetitive" in parts else None, sign)
+
+
+def _notch(plants: Sequence[_core.LoopPlant], dt: float) -> list[tuple[str, float, float, bool]]:
+    modes = resonance(plants, dt)
+    if modes is None:
+        raise ParameterError(
+            f"parts has 'notch': expected a mode that rings below half the sampling rate, "
+            f"{0.5 / dt:.4g} Hz"
+        )
+    low, high = 0.7 * modes[0], min(1.3 * modes[1], NYQUIST / dt)
+    return [
+        ("notch_frequency", low, high, True),
+        ("notch_width", 0.02, 2.0, True),
+        ("notch_depth", 0.0, 0.9, False),
+    ]

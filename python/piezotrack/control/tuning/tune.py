@@ -1,0 +1,523 @@
+"""Gains from a search over simulated closed loops, under margins for a set of plants."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from ... import _core
+from ..._support.arguments import not_negative
+from ..._support.arrays import check_dt
+from ..._support.messages import quoted
+from ...errors import ParameterError
+from ...identification.identified import IdentifiedModel
+from ...references.reference import Reference
+from ...stages.base import Stage
+from ...stages.inverse import Inverse
+from ..checks import check_drive_unit, check_within_reach
+from ..controller import Controller, number_pair
+from ..plant import Plant, plant_of, stepped, voltages_before
+from ..tracking import feedforward_of, settled_from, track
+from .box import Box, box_of, parts_named, resonance
+from .margins import Margins, NamedPlant, Spread, plants_of
+from .tuned import Kept, Tuned, TuningReport
+
+if TYPE_CHECKING:
+    from ...stages.virtual import VirtualStage
+
+__all__ = ["tune"]
+
+Figure = Literal["rms", "largest"]
+FIGURES = {"rms": "rms error", "largest": "largest error"}
+# A margin that uses up this share of what was asked for binds.
+BINDS = 0.98
+# The grid of the search is accurate to this; what the exact check finds beyond is asked again.
+SLACK = 0.003
+# Periods after which a repetitive part has learnt.
+LEARNT = 3
+
+
+class _Question(NamedTuple):
+    """What is common to the searches at all sampling intervals."""
+
+    stages: list[Plant | IdentifiedModel]
+    references: list[Reference]
+    limits: tuple[float, float]
+    drive_unit: str
+    feedforward: Inverse | None
+    parts: tuple[str, ...] | None
+    margins: Margins
+    spread: Spread
+    figure: str
+    effort: float
+    slew: float
+    clipped: float
+    delay: float
+    jitter: float
+    visited: tuple[float, ...]
+    measured: bool
+    seeds: int
+    particles: int
+    iterations: int
+    seed: int
+    threads: int
+
+
+class _Answer(NamedTuple):
+    """Settings found at one sampling interval."""
+
+    found: dict[str, Any]
+    box: Box
+    base: Controller
+    plants: list[NamedPlant]
+
+
+def tune(
+    stage: Plant | IdentifiedModel | Sequence[Plant | IdentifiedModel],
+    reference: Reference | Sequence[Reference] | None = None,
+    *,
+    dt: float | Sequence[float] | None = None,
+    limits: tuple[float, float] | None = None,
+    feedforward: Inverse | Literal["inverse"] | None = "inverse",
+    parts: Sequence[str] | str | None = None,
+    margins: Margins | None = None,
+    spread: Spread | None = None,
+    figure: Figure = "rms",
+    effort: float = 0.0,
+    slew: float = math.inf,
+    clipped: float = 0.0,
+    delay: float = 0.0,
+    jitter: float = 0.0,
+    visited: float | Sequence[float] = (),
+    error: Literal["measured", "true"] = "measured",
+    seeds: int = 1,
+    particles: int = 40,
+    iterations: int = 60,
+    seed: int = 1,
+    threads: int = 0,
+) -> Tuned:
+    """Find the gains of a controller, its filters and its repetitive part.
+
+    A swarm looks at controllers in closed loop with the stage, with its noise, quantisation, delay,
+    jitter, saturation and creep, and makes the error along the references small. Every controller
+    keeps the margins for every plant of a set: each stage given at its lowest, middle and highest
+    gain, with every end of the spread. What it keeps is checked exactly in the end. Without a
+    reference the gains follow from the margins alone: the largest integral gain that keeps them
+    (Panagopoulos, Astrom and Hagglund 2002, doi 10.1049/ip-cta:20020013).
+
+    Parameters
+    ----------
+    stage : Stage, VirtualStage, IdentifiedModel, or a sequence of them
+        The first is simulated; the margins hold for all of them. A stage model and an identified
+        one have no noise and no amplifier: ``pt.VirtualStage.of`` gives them both.
+    reference : Reference or sequence of Reference, optional
+        Motions along which the error counts.
+    dt : float or sequence of float, optional
+        Sampling interval [s], or those that are allowed; by default that of an identified model's
+        record.
+    limits : (float, float), optional
+        Lowest and highest voltage [V]; by default the range of the drive of that record.
+    feedforward : Inverse or "inverse" or None, optional
+        By default the inverse of the first stage; of a `VirtualStage`, of which nobody knows the
+        model, none.
+    parts : sequence of str, optional
+        Some of ``"pid"``, ``"low-pass"``, ``"notch"`` and ``"repetitive"``. By default PID and
+        low-pass, a notch where a mode rings below half the sampling rate, and a repetitive part
+        where all references repeat more than four times with one period.
+    margins : Margins, optional
+        What every loop keeps.
+    spread : Spread, optional
+        What may be different from the stages.
+    figure : {"rms", "largest"}, optional
+        Which error is made small: the rms over all references, or the largest in any.
+    effort : float, optional
+        Error that 1 V rms of change of the command from sample to sample is worth [m/V].
+    slew : float, optional
+        Fastest change of the command [V/s].
+    clipped : float, optional
+        Largest share of the samples at which the command may be clipped.
+    delay, jitter, visited : optional
+        As of `track`.
+    error : {"measured", "true"}, optional
+        Whether the reading of the sensor counts or the true displacement.
+    seeds : int, optional
+        Draws of the sensor's noise over which each reference is followed.
+    particles, iterations : int, optional
+        Of the swarm; it looks twice, the second time about the best place.
+    seed : int, optional
+        Seed of the swarm.
+    threads : int, optional
+        Threads, 0 for all cores. The result has the same bits for any number of them.
+
+    Returns
+    -------
+    Tuned
+        The controller and the report: ``controller, report = pt.tune(...)``.
+
+    Raises
+    ------
+    ParameterError
+        An argument cannot be used; a reference is beyond the reach of the stage; no gains keep the
+        margins, with which one forbids it and how far the nearest are off.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> stage = pt.stages.PrandtlIshlinskiiStage(
+    ...     linear=1e-6, thresholds=[10.0], weights=[0.2e-6], frequency=200.0, damping_ratio=0.05
+    ... )
+    >>> controller, report = pt.tune(stage, dt=1e-3, limits=(0.0, 75.0), parts="pid")
+    >>> report.kept[-1].name, report.kept[-1].value < 2.01
+    ('sensitivity', True)
+    """
+    question, intervals = _question(
+        stage, reference, dt, limits, feedforward, parts, margins, spread, figure,
+        effort, slew, clipped, delay, jitter, visited, error, seeds, particles, iterations,
+        seed, threads,
+    )  # fmt: skip
+    answers = [_searched(question, one) for one in intervals]
+    best = min(answers, key=lambda one: (max(1.0, one.found["excess"]), one.found["cost"]))
+    if best.found["excess"] > 1.0 + 1e-9:
+        raise ParameterError(_refusal(question, best))
+    return _answered(question, best, answers)
+
+
+def _question(
+    stage: Any,
+    reference: Any,
+    dt: Any,
+    limits: Any,
+    feedforward: Any,
+    parts: Any,
+    margins: Any,
+    spread: Any,
+    figure: Any,
+    effort: float,
+    slew: float,
+    clipped: float,
+    delay: float,
+    jitter: float,
+    visited: Any,
+    error: Any,
+    seeds: int,
+    particles: int,
+    iterations: int,
+    seed: int,
+    threads: int,
+) -> tuple[_Question, list[float]]:
+    """Check all arguments."""
+    stages = list(stage) if isinstance(stage, Sequence) else [stage]
+    if not stages:
+        raise ParameterError("stage is empty: expected a stage or more")
+    first = plant_of(stages[0])
+    for one in stages:
+        plant_of(one)
+    references = [] if reference is None else reference
+    references = list(references) if isinstance(references, Sequence) else [references]
+    for one in references:
+        if not isinstance(one, Reference):
+            raise ParameterError(f"reference is {type(one).__name__}: expected pt.Reference")
+    _check_kind("margins", margins, Margins)
+    _check_kind("spread", spread, Spread)
+    if figure not in FIGURES:
+        raise ParameterError(f"figure is {quoted(figure)}: expected 'rms' or 'largest'")
+    if error not in ("measured", "true"):
+        raise ParameterError(f"error is {quoted(error)}: expected 'measured' or 'true'")
+    model = stages[0] if isinstance(stages[0], IdentifiedModel) else None
+    intervals = _intervals(dt, model)
+    if limits is None:
+        limits = model.drive_range if model is not None else None
+        if limits is None:
+            raise ParameterError("limits are missing: expected (low, high) in V")
+    unit = model.drive_unit if model is not None else "V"
+    limits = number_pair("limits", limits, unit)
+    if not 1 <= _core.as_count("seeds", seeds) <= 100:
+        raise ParameterError(f"seeds is {seeds}: expected 1 to 100")
+    if not _core.as_number("slew", slew) > 0.0:
+        raise ParameterError(f"slew is {slew} V/s: expected above 0")
+    question = _Question(
+        stages=stages,
+        references=references,
+        limits=limits,
+        drive_unit=unit,
+        feedforward=_inverse_of(stages[0], feedforward),
+        parts=parts_named(parts),
+        margins=margins or Margins(),
+        spread=spread or Spread(),
+        figure=figure,
+        effort=not_negative("effort", effort, "m/V"),
+        slew=slew,
+        clipped=_core.as_number("clipped", clipped),
+        delay=not_negative("delay", delay, "s"),
+        jitter=not_negative("jitter", jitter, "s"),
+        visited=voltages_before(first, visited, limits),
+        measured=error == "measured",
+        seeds=seeds,
+        particles=_core.as_count("particles", particles),
+        iterations=_core.as_count("iterations", iterations),
+        seed=_core.as_count("seed", seed),
+        threads=_core.as_count("threads", threads),
+    )
+    return question, intervals
+
+
+def _check_kind(name: str, value: object, kind: type) -> None:
+    if value is not None and not isinstance(value, kind):
+        raise ParameterError(f"{name} is {type(value).__name__}: expected pt.{kind.__name__}")
+
+
+def _intervals(dt: Any, model: IdentifiedModel | None) -> list[float]:
+    if dt is None:
+        if model is None or model.dt is None:
+            raise ParameterError("dt is missing: expected the sampling interval of the loop in s")
+        dt = model.dt
+    several = list(dt) if isinstance(dt, Sequence) else [dt]
+    if not several:
+        raise ParameterError("dt is empty: expected a sampling interval in s or more")
+    return [check_dt(one) for one in several]
+
+
+def _inverse_of(stage: Plant | IdentifiedModel, feedforward: Any) -> Inverse | None:
+    if feedforward is None or isinstance(feedforward, Inverse):
+        return feedforward
+    if feedforward != "inverse":
+        raise ParameterError(
+            f"feedforward is {quoted(feedforward)}: expected 'inverse', a pt.Inverse or None"
+        )
+    if isinstance(stage, (IdentifiedModel, Stage)):
+        return stage.inverse()
+    return None
+
+
+def _searched(question: _Question, dt: float) -> _Answer:
+    """Search at one sampling interval; where the exact margins are beyond, with some in reserve."""
+    named = plants_of(question.stages, question.limits, question.delay, question.spread)
+    plants = [one.plant for one in named]
+    parts = question.parts or _usual_parts(question, plants, dt)
+    periods = {one.period for one in question.references}
+    if "repetitive" in parts and len(periods) > 1:
+        listed = ", ".join(f"{one:g} s" if one else "none" for one in sorted(periods, key=str))
+        raise ParameterError(
+            f"references have periods of {listed}: expected one period for the repetitive part"
+        )
+    period = next(iter(periods), None)
+    box = box_of(parts, plants, dt, period, question.limits)
+    base = Controller(
+        dt=dt,
+        limits=question.limits,
+        feedforward=question.feedforward,
+        drive_unit=question.drive_unit,
+    )
+    tasks = _tasks(question, base, "repetitive" in parts)
+    reserve = 1.0
+    for _ in range(4):
+        found = _core.tune(
+            controller=base._core,
+            period=box.period,
+            sign=box.sign,
+            sought=box.ranges,
+            tasks=tasks,
+            plants=plants,
+            required=_required(question, reserve),
+            aim=question.figure if tasks else "disturbance",
+            effort=question.effort,
+            particles=question.particles,
+            iterations=question.iterations,
+            seed=question.seed,
+            threads=question.threads,
+        )
+        answer = _Answer(found, box, base, named)
+        if found["excess"] > 1.0:
+            return answer
+        beyond = max(one.share for one in _kept(question, answer))
+        if beyond <= 1.0 + SLACK:
+            return answer
+        reserve *= 1.0 + 1.2 * (beyond - 1.0)
+    return answer
+
+
+def _required(
+    question: _Question, reserve: float
+) -> tuple[float, float, float, float, float, float]:
+    """What is asked for, with a factor in reserve for what the grid does not show."""
+    margins = question.margins
+    gain = 1.0 + (margins.gain - 1.0) * reserve
+    sensitivity = 1.0 + (margins.sensitivity - 1.0) / reserve
+    learning = margins.learning * (1.0 + 1e-9)
+    phase = min(margins.phase * reserve, 0.999 * math.pi)
+    return gain, phase, sensitivity, learning, question.slew, question.clipped
+
+
+def _usual_parts(
+    question: _Question, plants: list[_core.LoopPlant], dt: float
+) -> tuple[str, ...]:
+    parts = ["pid", "low-pass"]
+    if resonance(plants, dt) is not None:
+        parts.append("notch")
+    periods = {one.period for one in question.references}
+    rising = all(plant.static_gain > 0.0 for plant in plants)
+    repeats = len(periods) == 1 and None not in periods and rising
+    if repeats and all(one.duration > 4.0 * (one.period or 0.0) for one in question.references):
+        parts.append("repetitive")
+    return tuple(parts)
+
+
+def _tasks(question: _Question, base: Controller, repeats: bool) -> list[_core.Task]:
+    """Make the motions that the controllers are judged by."""
+    tasks = []
+    plant = plant_of(question.stages[0])
+    check_drive_unit(question.stages[0], base)
+    for reference in question.references:
+        samples = reference.sample(base.dt)
+        if question.clipped == 0.0:
+            check_within_reach(plant, question.limits, samples, question.drive_unit)
+        voltage = feedforward_of(base, reference, samples).voltage
+        first = _first(reference, float(samples.t[-1]), base.dt, repeats)
+        for k in range(question.seeds):
+            sensor = replace(plant.sensor, seed=plant.sensor.seed + k)
+            seeded: VirtualStage = stepped(replace(plant, sensor=sensor), base)
+            task = _core.Task(
+                stage=seeded._core,
+                visited=question.visited,
+                dt=base.dt,
+                delay=question.delay,
+                jitter=question.jitter,
+                reference=samples.x,
+                feedforward=voltage,
+                first=first,
+                measured=question.measured,
+            )
+            tasks.append(task)
+    return tasks
+
+
+def _first(reference: Reference, end: float, dt: float, repeats: bool) -> int:
+    """Return the first sample that counts: settled and, with a repetitive part, learnt."""
+    start = settled_from(reference, end)
+    if repeats and reference.period is not None:
+        learnt = start + LEARNT * reference.period
+        start = learnt if learnt + reference.period <= end + dt else start
+    return math.ceil(start / dt - 1e-9)
+
+
+def _kept(question: _Question, answer: _Answer) -> list[Kept]:
+    """Check the margins of what was found, exactly, over all plants."""
+    controller = _controller(answer)
+    margins = question.margins
+    bounds = {
+        "gain margin": margins.gain,
+        "phase margin": margins.phase,
+        "learning": margins.learning,
+        "sensitivity": margins.sensitivity,
+    }
+    worst: dict[str, Kept] = {}
+    for name, plant in answer.plants:
+        check = _core.check_loop(controller._core, plant)
+        values = {
+            "gain margin": check["gain_margin"] or math.inf,
+            "phase margin": math.pi if check["phase_margin"] is None else check["phase_margin"],
+            "learning": check["small_gain"] or 0.0,
+            "sensitivity": check["sensitivity"],
+        }
+        if not check["stable"]:
+            values["sensitivity"] = math.inf
+        for key, value in values.items():
+            one = Kept(key, value, bounds[key], name)
+            if key not in worst or one.share > worst[key].share:
+                worst[key] = one
+    if controller.repetitive is None:
+        del worst["learning"]
+    return list(worst.values())
+
+
+def _controller(answer: _Answer) -> Controller:
+    parts = answer.box.parts(dict(answer.found["settings"]))
+    return replace(
+        answer.base,
+        feedback=parts.feedback,
+        filters=parts.filters,
+        repetitive=parts.repetitive,
+    )
+
+
+def _answered(question: _Question, best: _Answer, answers: list[_Answer]) -> Tuned:
+    """Check and simulate what was found in full."""
+    controller = _controller(best)
+    runs = tuple(
+        track(
+            question.stages[0],
+            controller,
+            reference,
+            delay=question.delay,
+            jitter=question.jitter,
+            visited=question.visited,
+            beyond_reach=True,
+            unstable=True,
+        )
+        for reference in question.references
+    )
+    kept = _kept(question, best)
+    binding = [f"{one.name}, {one.plant}" for one in kept if one.share > BINDS]
+    figures = best.found["figures"]
+    if math.isfinite(question.slew) and max(one[3] for one in figures) > BINDS * question.slew:
+        binding.append("slew")
+    binding += best.box.edges(dict(best.found["settings"]))
+    report = TuningReport(
+        figure=FIGURES[question.figure] if runs else "integral gain from margins alone",
+        value=best.found["cost"] * (1.0 if runs else controller.dt),
+        runs=runs,
+        kept=tuple(kept),
+        margins=question.margins,
+        plants=tuple(one.name for one in best.plants),
+        binding=tuple(binding),
+        dt=controller.dt,
+        candidates=sum(one.found["candidates"] for one in answers),
+        loops=sum(one.found["loops"] for one in answers),
+        history=tuple(best.found["history"]),
+    )
+    return Tuned(controller, report)
+
+
+def _refusal(question: _Question, best: _Answer) -> str:
+    """Say which constraint forbids any controller, and how far the nearest one is off."""
+    unstable, gain, phase, sensitivity, learning = best.found["robustness"]
+    names = [one.name for one in best.plants]
+    margins = question.margins
+    if unstable[0] > 0.0:
+        return (
+            f"models: no gains in the search make all {len(names)} plants stable; the nearest leave "
+            f"{names[unstable[1]]} unstable: expected a smaller spread, or plants nearer to each other"
+        )
+    ratios = {
+        "gain": (margins.gain / gain[0], gain, margins.gain, "or more", ""),
+        "phase": (margins.phase / max(phase[0], 1e-9), phase, margins.phase, "or more", " rad"),
+        "sensitivity": (
+            sensitivity[0] / margins.sensitivity,
+            sensitivity,
+            margins.sensitivity,
+            "or less",
+            "",
+        ),
+        "learning": (learning[0] / margins.learning, learning, margins.learning, "or less", ""),
+    }
+    name, (ratio, (value, plant), bound, side, unit) = max(
+        ratios.items(), key=lambda item: item[1][0]
+    )
+    if ratio > 1.0:
+        return (
+            f"margins.{name} is {bound:.4g}{unit}: expected one that some gains can keep; the nearest "
+            f"have {value:.4g}{unit} ({names[plant]}), where {bound:.4g}{unit} {side} was asked for"
+        )
+    figures = best.found["figures"]
+    fastest, share = max(one[3] for one in figures), max(one[4] for one in figures)
+    if fastest > question.slew:
+        return (
+            f"slew is {question.slew:.4g} V/s: expected {fastest:.4g} V/s, which the slowest "
+            "controller needs along these references"
+        )
+    return (
+        f"clipped is {question.clipped:.3g}: expected {share:.3g} at least, the share of the samples "
+        "at which every controller is clipped along these references"
+    )

@@ -1,0 +1,155 @@
+"""The answer of a search for gains: the controller, what it keeps, and what binds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+from ..._support.units import shown_unit
+
+if TYPE_CHECKING:
+    from ..components import LowPass, Notch, Pid, Repetitive
+    from ..controller import Controller
+    from ..tracking import Tracking
+    from .margins import Margins
+
+__all__ = ["Kept", "Tuned", "TuningReport", "parts_text"]
+
+UNITS = {"gain margin": "", "phase margin": " rad", "sensitivity": "", "learning": ""}
+
+
+class Kept(NamedTuple):
+    """A margin over the set of plants.
+
+    Attributes
+    ----------
+    name : str
+        Which margin.
+    value : float
+        Of the worst plant, exact.
+    bound : float
+        What was asked for.
+    plant : str
+        Which plant is the worst.
+    """
+
+    name: str
+    value: float
+    bound: float
+    plant: str
+
+    @property
+    def share(self) -> float:
+        """How much of what was asked for is used up: 1 at the bound."""
+        if self.name in ("gain margin", "phase margin"):
+            return self.bound / self.value if self.value > 0.0 else float("inf")
+        return self.value / self.bound
+
+    def __str__(self) -> str:
+        side = "at least" if self.name in ("gain margin", "phase margin") else "at most"
+        unit = UNITS[self.name]
+        return f"{self.name} {self.value:.3g}{unit} ({side} {self.bound:.3g}{unit}), {self.plant}"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class TuningReport:
+    """What a search for gains found, and how.
+
+    Attributes
+    ----------
+    figure : str
+        What was made small.
+    value : float
+        Its value [m]; without a reference the integral of the error after a step disturbance of
+        1 V at the input of the stage [m s/V].
+    runs : tuple of Tracking
+        Full simulations of the tuned loop, one for each reference.
+    kept : tuple of Kept
+        The margins over the set of plants.
+    margins : Margins
+        What was asked for.
+    plants : tuple of str
+        The plants of the set.
+    binding : tuple of str
+        What forbids a smaller figure: margins at their bounds, settings at the ends of their ranges.
+        Empty where the figure itself has its minimum inside.
+    dt : float
+        Sampling interval [s].
+    candidates, loops : int
+        Controllers looked at, and closed loops simulated.
+    history : tuple of float
+        Best figure after each iteration; infinite as long as no candidate kept the margins.
+    """
+
+    figure: str
+    value: float
+    runs: tuple[Tracking, ...]
+    kept: tuple[Kept, ...]
+    margins: Margins
+    plants: tuple[str, ...]
+    binding: tuple[str, ...]
+    dt: float
+    candidates: int
+    loops: int
+    history: tuple[float, ...]
+
+    def __str__(self) -> str:
+        lines = [f"{self.figure}, at {1.0 / self.dt:.6g} Hz: {self.candidates} controllers looked at, "
+                 f"{self.loops} loops simulated"]
+        for run in self.runs:
+            lines.append(f"{run.reference!r}: {run.metrics}")
+        lines.append(f"over {len(self.plants)} plants:")
+        lines += [f"  {one}" for one in self.kept]
+        binding = "; ".join(self.binding) or "nothing: the figure has its minimum inside of the bounds"
+        lines.append(f"what binds: {binding}")
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return f"<TuningReport: {self.figure}, {len(self.plants)} plants>"
+
+
+class Tuned(NamedTuple):
+    """A tuned controller and the report of its search.
+
+    Attributes
+    ----------
+    controller : Controller
+        To be used as it is.
+    report : TuningReport
+        What it keeps, what binds.
+    """
+
+    controller: Controller
+    report: TuningReport
+
+    def __str__(self) -> str:
+        return f"{parts_text(self.controller)}\n{self.report}"
+
+
+def parts_text(controller: Controller) -> str:
+    """Write the gains of a controller with their units."""
+    unit, scale = shown_unit(controller.drive_unit)
+    text = []
+    pid: Pid | None = controller.feedback if hasattr(controller.feedback, "kp") else None  # type: ignore[assignment]
+    if pid is not None:
+        text.append(
+            f"PID: kp {1e-6 * scale * pid.kp:.4g} {unit}/um, ti {1e3 * pid.ti:.4g} ms, "
+            f"td {1e3 * pid.td:.4g} ms"
+        )
+    text += [_filter_text(one) for one in controller.filters]
+    if controller.repetitive is not None:
+        text.append(_repetitive_text(controller.repetitive, unit, scale))
+    return "\n".join(text) or "no feedback"
+
+
+def _filter_text(one: LowPass | Notch) -> str:
+    if hasattr(one, "cutoff"):
+        return f"low-pass: {one.cutoff:.4g} Hz"
+    return f"notch: {one.frequency:.4g} Hz, width {one.width:.3g}, depth {one.depth:.3g}"
+
+
+def _repetitive_text(part: Repetitive, unit: str, scale: float) -> str:
+    return (
+        f"repetitive: kq {1e-6 * scale * part.kq:.3g} {unit}/um, {part.smoothing}, "
+        f"lead {part.lead} samples, forgetting factor {part.forgetting_factor:.4g}"
+    )

@@ -1,0 +1,211 @@
+//! The search for the settings of a controller.
+
+use piezotrack_core::Result;
+use piezotrack_core::simulate::{ReferenceSamples, Timing, VirtualStage};
+use piezotrack_core::tune::{
+    Aim, Figures, Found, Judged, PlantSet, Requirements, Robustness, Setting, Sought, Task,
+    Template, Tuning, Worst,
+};
+use pyo3::prelude::*;
+
+use crate::arrays::samples;
+use crate::control::PyController;
+use crate::design::PyLoopPlant;
+use crate::enter::{Watchers, enter_pool};
+use crate::errors::raise;
+use crate::virtual_stage::PyVirtualStage;
+
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<PyTask>()?;
+    module.add_function(wrap_pyfunction!(tune, module)?)
+}
+
+/// A motion that controllers are judged by.
+#[pyclass(name = "Task", frozen, module = "piezotrack._core")]
+pub struct PyTask {
+    stage: VirtualStage,
+    visited: Vec<f64>,
+    timing: Timing,
+    reference: Vec<f64>,
+    feedforward: Vec<f64>,
+    from: usize,
+    judged: Judged,
+}
+
+#[pymethods]
+impl PyTask {
+    #[new]
+    #[pyo3(signature = (*, stage, visited, dt, delay, jitter, reference, feedforward, first, measured))]
+    #[expect(clippy::too_many_arguments, reason = "all named in Python")]
+    fn new(
+        stage: &PyVirtualStage,
+        visited: &Bound<'_, PyAny>,
+        dt: f64,
+        delay: f64,
+        jitter: f64,
+        reference: &Bound<'_, PyAny>,
+        feedforward: &Bound<'_, PyAny>,
+        first: usize,
+        measured: bool,
+    ) -> PyResult<Self> {
+        let reference = samples("reference", reference)?;
+        let timing = Timing { interval: dt, samples: reference.len(), delay, jitter, substeps: 1 };
+        Ok(Self {
+            stage: stage.0,
+            visited: samples("visited", visited)?,
+            timing,
+            reference,
+            feedforward: samples("feedforward", feedforward)?,
+            from: first,
+            judged: if measured { Judged::Measured } else { Judged::True },
+        })
+    }
+
+    /// Rms and largest error, effort, slew and clipped share of each controller's loop.
+    fn figures(
+        &self,
+        py: Python<'_>,
+        controllers: Vec<PyRef<'_, PyController>>,
+        threads: usize,
+    ) -> PyResult<Vec<FigureNumbers>> {
+        let controllers: Vec<_> = controllers.iter().map(|one| one.controller).collect();
+        let found = enter_pool(py, threads, &QUIET, |_, stop| {
+            self.task().ready()?.figures(&controllers, stop)
+        })?;
+        Ok(found.iter().map(numbers).collect())
+    }
+}
+
+const QUIET: Watchers = Watchers { callback: None, progress: None, journal: None };
+
+impl PyTask {
+    fn task(&self) -> Task<'_> {
+        let samples =
+            ReferenceSamples { reference: &self.reference, feedforward: &self.feedforward };
+        Task {
+            stage: &self.stage,
+            visited: &self.visited,
+            timing: self.timing,
+            samples,
+            from: self.from,
+            judged: self.judged,
+        }
+    }
+}
+
+/// Rms error, largest error, effort, slew, clipped share.
+type FigureNumbers = (f64, f64, f64, f64, f64);
+
+fn numbers(of: &Figures) -> FigureNumbers {
+    (of.rms, of.largest, of.effort, of.slew, of.clipped)
+}
+
+/// A value and the plant that has it.
+type WorstNumbers = (f64, usize);
+
+/// Roots outside, gain margin, phase margin, sensitivity, learning gain.
+type RobustnessNumbers = (WorstNumbers, WorstNumbers, WorstNumbers, WorstNumbers, WorstNumbers);
+
+fn robustness(of: &Robustness) -> RobustnessNumbers {
+    let pair = |worst: Worst| (worst.value, worst.plant);
+    (
+        pair(of.unstable),
+        pair(of.gain_margin),
+        pair(of.phase_margin),
+        pair(of.sensitivity),
+        pair(of.learning),
+    )
+}
+
+/// What was found, as a dict in Python.
+#[derive(IntoPyObject)]
+struct FoundSettings {
+    settings: Vec<(&'static str, f64)>,
+    robustness: RobustnessNumbers,
+    figures: Vec<FigureNumbers>,
+    excess: f64,
+    cost: f64,
+    candidates: usize,
+    loops: usize,
+    history: Vec<f64>,
+}
+
+impl FoundSettings {
+    fn of(found: &Found) -> Self {
+        Self {
+            settings: found.settings.iter().map(|(one, value)| (one.name(), *value)).collect(),
+            robustness: robustness(&found.robustness),
+            figures: found.figures.iter().map(numbers).collect(),
+            excess: found.excess,
+            cost: found.cost,
+            candidates: found.candidates,
+            loops: found.loops,
+            history: found.history.clone(),
+        }
+    }
+}
+
+/// Gain margin, phase margin (rad), sensitivity, learning gain, slew (V/s), clipped share.
+type RequiredNumbers = (f64, f64, f64, f64, f64, f64);
+
+/// Searches the settings of a controller.
+#[pyfunction]
+#[pyo3(signature = (*, controller, period, sign, sought, tasks, plants, required, aim, effort, particles,
+    iterations, seed, threads))]
+#[expect(clippy::too_many_arguments, reason = "all named in Python")]
+#[expect(clippy::needless_pass_by_value, reason = "extracted from lists")]
+fn tune(
+    py: Python<'_>,
+    controller: &PyController,
+    period: Option<f64>,
+    sign: f64,
+    sought: Vec<(String, f64, f64, bool)>,
+    tasks: Vec<PyRef<'_, PyTask>>,
+    plants: Vec<PyRef<'_, PyLoopPlant>>,
+    required: RequiredNumbers,
+    aim: &str,
+    effort: f64,
+    particles: usize,
+    iterations: usize,
+    seed: u64,
+    threads: usize,
+) -> PyResult<FoundSettings> {
+    let dt = controller.dt;
+    let build = || -> Result<Tuning<'_>> {
+        let sought: Result<Vec<Sought>> = sought
+            .iter()
+            .map(|(name, low, high, logarithmic)| {
+                let setting = Setting::named(name)?;
+                Ok(Sought { setting, low: *low, high: *high, logarithmic: *logarithmic })
+            })
+            .collect();
+        let plants: Vec<_> = plants.iter().map(|plant| plant.plant().clone()).collect();
+        let (gain_margin, phase_margin, sensitivity, learning, slew, clipped) = required;
+        Ok(Tuning {
+            sought: sought?,
+            template: Template { base: controller.controller, dt, period, sign },
+            tasks: tasks.iter().map(|task| task.task()).collect(),
+            plants: PlantSet::new(&plants, dt)?,
+            required: Requirements {
+                gain_margin,
+                phase_margin,
+                sensitivity,
+                learning,
+                slew,
+                clipped,
+            },
+            aim: match aim {
+                "largest" => Aim::Largest,
+                "disturbance" => Aim::Disturbance,
+                _ => Aim::Rms,
+            },
+            effort,
+            particles,
+            iterations,
+            seed,
+        })
+    };
+    let tuning = build().map_err(|error| raise(&error))?;
+    let found = enter_pool(py, threads, &QUIET, |_, stop| tuning.search(stop))?;
+    Ok(FoundSettings::of(&found))
+}
