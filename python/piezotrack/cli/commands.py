@@ -21,6 +21,7 @@ from .reproduce import reproduce_command
 from .simulate import simulate_command
 from .step import step_command
 from .track import feedforward_command, track_command
+from .tune import tune_command
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -85,6 +86,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "simulate": simulate_command,
     "feedforward": feedforward_command,
     "track": track_command,
+    "tune": tune_command,
     "contour": contour_command,
     "noise": noise_command,
     "reproduce": reproduce_command,

@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from ..identification.identified import IdentifiedModel
     from ..references.reference import Reference
 
-__all__ = ["feedforward_command", "track_command"]
+__all__ = ["feedforward_command", "parsed_reference", "track_command"]
 
 Online = Annotated[
     bool,
@@ -156,7 +156,7 @@ def track_command(
     if own and not (noise_nm or jitter):
         refuse_without_effect(context, ["seed"], "without --noise-nm or --jitter")
     known = load(model) if own else driven_by_voltage(load(model), model)
-    desired = _reference(reference, duration, period)
+    desired = parsed_reference(reference, duration, period)
     playback: Literal["table", "online"] = "online" if online else "table"
     loop = Controller(
         dt=settings.dt(known, desired),
@@ -226,7 +226,7 @@ def feedforward_command(
     from ..identification.identified import load
 
     known = load(model)
-    desired = _reference(reference, duration, period)
+    desired = parsed_reference(reference, duration, period)
     settings = Loop(True, dt, limits, None, None, None, None)
     interval = settings.dt(known, desired)
     # A file without a record has no range.
@@ -272,7 +272,7 @@ def feedforward_command(
     result.show("\n".join(lines), document, written)
 
 
-def _reference(text: str, duration: float | None, period: float | None) -> Reference:
+def parsed_reference(text: str, duration: float | None, period: float | None) -> Reference:
     """Read the reference from a file if the text names one, else parse the text."""
     from ..references.parse import parse_reference
     from ..references.reference import read_reference

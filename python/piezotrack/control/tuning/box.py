@@ -140,7 +140,7 @@ def box_of(
             raise ParameterError("parts has 'repetitive': expected references that repeat")
         if sign < 0.0:
             raise ParameterError(
-                "parts has 'repetitive', but the stage falls as the voltage rises: expected a stage "
+                "parts has 'repetitive', but the stage falls as the voltage rises: expected one "
                 "that rises, for its learning gain is above 0"
             )
         longest = min(24.0, math.floor(period / dt / 4.0))

@@ -147,9 +147,9 @@ def _spread(text: str, plant: _core.LoopPlant, spread: Spread) -> list[NamedPlan
     found = []
     for rate, tempo in _ends(spread.mode, "dynamics", ("slower", "faster")):
         for gain, size in _ends(spread.gain, "gain", ("lower", "higher")):
-            scaled = [(rate * np.array(rows)).tolist() for rows in (a, b)]
-            out = [(gain * np.array(row)).tolist() for row in (c, [d])]
-            varied = _core.LoopPlant.from_matrices(*scaled, out[0], out[1][0], delay)
+            scaled = ((rate, a), (rate, b), (gain, c))
+            rows, inputs, outputs = ((factor * np.array(part)).tolist() for factor, part in scaled)
+            varied = _core.LoopPlant.from_matrices(rows, inputs, outputs, gain * d, delay)
             found.append(NamedPlant(text + tempo + size, varied))
     return found
 

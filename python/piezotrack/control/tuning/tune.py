@@ -3,66 +3,38 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from ... import _core
-from ..._support.arguments import not_negative
-from ..._support.arrays import check_dt
-from ..._support.messages import quoted
 from ...errors import ParameterError
-from ...identification.identified import IdentifiedModel
-from ...references.reference import Reference
-from ...stages.base import Stage
-from ...stages.inverse import Inverse
 from ..checks import check_drive_unit, check_within_reach
-from ..controller import Controller, number_pair
-from ..plant import Plant, plant_of, stepped, voltages_before
+from ..controller import Controller
+from ..plant import plant_of, stepped
 from ..tracking import feedforward_of, settled_from, track
-from .box import Box, box_of, parts_named, resonance
+from .box import Box, box_of, resonance
 from .margins import Margins, NamedPlant, Spread, plants_of
+from .question import FIGURES, Question, asked
+from .refusal import refusal
 from .tuned import Kept, Tuned, TuningReport
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ...identification.identified import IdentifiedModel
+    from ...references.reference import Reference
+    from ...stages.inverse import Inverse
     from ...stages.virtual import VirtualStage
+    from ..plant import Plant
 
 __all__ = ["tune"]
 
-Figure = Literal["rms", "largest"]
-FIGURES = {"rms": "rms error", "largest": "largest error"}
 # A margin that uses up this share of what was asked for binds.
 BINDS = 0.98
 # The grid of the search is accurate to this; what the exact check finds beyond is asked again.
 SLACK = 0.003
 # Periods after which a repetitive part has learnt.
 LEARNT = 3
-
-
-class _Question(NamedTuple):
-    """What is common to the searches at all sampling intervals."""
-
-    stages: list[Plant | IdentifiedModel]
-    references: list[Reference]
-    limits: tuple[float, float]
-    drive_unit: str
-    feedforward: Inverse | None
-    parts: tuple[str, ...] | None
-    margins: Margins
-    spread: Spread
-    figure: str
-    effort: float
-    slew: float
-    clipped: float
-    delay: float
-    jitter: float
-    visited: tuple[float, ...]
-    measured: bool
-    seeds: int
-    particles: int
-    iterations: int
-    seed: int
-    threads: int
 
 
 class _Answer(NamedTuple):
@@ -84,10 +56,10 @@ def tune(
     parts: Sequence[str] | str | None = None,
     margins: Margins | None = None,
     spread: Spread | None = None,
-    figure: Figure = "rms",
+    figure: Literal["rms", "largest"] = "rms",
     effort: float = 0.0,
     slew: float = math.inf,
-    clipped: float = 0.0,
+    clipped: float = 0.05,
     delay: float = 0.0,
     jitter: float = 0.0,
     visited: float | Sequence[float] = (),
@@ -137,7 +109,8 @@ def tune(
     slew : float, optional
         Fastest change of the command [V/s].
     clipped : float, optional
-        Largest share of the samples at which the command may be clipped.
+        Largest share of the samples at which the command may be clipped, as noise does where the
+        reference touches the end of the stroke. From 0.5 on the references may be beyond reach.
     delay, jitter, visited : optional
         As of `track`.
     error : {"measured", "true"}, optional
@@ -172,7 +145,7 @@ def tune(
     >>> report.kept[-1].name, report.kept[-1].value < 2.01
     ('sensitivity', True)
     """
-    question, intervals = _question(
+    question, intervals = asked(
         stage, reference, dt, limits, feedforward, parts, margins, spread, figure,
         effort, slew, clipped, delay, jitter, visited, error, seeds, particles, iterations,
         seed, threads,
@@ -180,118 +153,12 @@ def tune(
     answers = [_searched(question, one) for one in intervals]
     best = min(answers, key=lambda one: (max(1.0, one.found["excess"]), one.found["cost"]))
     if best.found["excess"] > 1.0 + 1e-9:
-        raise ParameterError(_refusal(question, best))
+        names = [one.name for one in best.plants]
+        raise ParameterError(refusal(question, best.found, names))
     return _answered(question, best, answers)
 
 
-def _question(
-    stage: Any,
-    reference: Any,
-    dt: Any,
-    limits: Any,
-    feedforward: Any,
-    parts: Any,
-    margins: Any,
-    spread: Any,
-    figure: Any,
-    effort: float,
-    slew: float,
-    clipped: float,
-    delay: float,
-    jitter: float,
-    visited: Any,
-    error: Any,
-    seeds: int,
-    particles: int,
-    iterations: int,
-    seed: int,
-    threads: int,
-) -> tuple[_Question, list[float]]:
-    """Check all arguments."""
-    stages = list(stage) if isinstance(stage, Sequence) else [stage]
-    if not stages:
-        raise ParameterError("stage is empty: expected a stage or more")
-    first = plant_of(stages[0])
-    for one in stages:
-        plant_of(one)
-    references = [] if reference is None else reference
-    references = list(references) if isinstance(references, Sequence) else [references]
-    for one in references:
-        if not isinstance(one, Reference):
-            raise ParameterError(f"reference is {type(one).__name__}: expected pt.Reference")
-    _check_kind("margins", margins, Margins)
-    _check_kind("spread", spread, Spread)
-    if figure not in FIGURES:
-        raise ParameterError(f"figure is {quoted(figure)}: expected 'rms' or 'largest'")
-    if error not in ("measured", "true"):
-        raise ParameterError(f"error is {quoted(error)}: expected 'measured' or 'true'")
-    model = stages[0] if isinstance(stages[0], IdentifiedModel) else None
-    intervals = _intervals(dt, model)
-    if limits is None:
-        limits = model.drive_range if model is not None else None
-        if limits is None:
-            raise ParameterError("limits are missing: expected (low, high) in V")
-    unit = model.drive_unit if model is not None else "V"
-    limits = number_pair("limits", limits, unit)
-    if not 1 <= _core.as_count("seeds", seeds) <= 100:
-        raise ParameterError(f"seeds is {seeds}: expected 1 to 100")
-    if not _core.as_number("slew", slew) > 0.0:
-        raise ParameterError(f"slew is {slew} V/s: expected above 0")
-    question = _Question(
-        stages=stages,
-        references=references,
-        limits=limits,
-        drive_unit=unit,
-        feedforward=_inverse_of(stages[0], feedforward),
-        parts=parts_named(parts),
-        margins=margins or Margins(),
-        spread=spread or Spread(),
-        figure=figure,
-        effort=not_negative("effort", effort, "m/V"),
-        slew=slew,
-        clipped=_core.as_number("clipped", clipped),
-        delay=not_negative("delay", delay, "s"),
-        jitter=not_negative("jitter", jitter, "s"),
-        visited=voltages_before(first, visited, limits),
-        measured=error == "measured",
-        seeds=seeds,
-        particles=_core.as_count("particles", particles),
-        iterations=_core.as_count("iterations", iterations),
-        seed=_core.as_count("seed", seed),
-        threads=_core.as_count("threads", threads),
-    )
-    return question, intervals
-
-
-def _check_kind(name: str, value: object, kind: type) -> None:
-    if value is not None and not isinstance(value, kind):
-        raise ParameterError(f"{name} is {type(value).__name__}: expected pt.{kind.__name__}")
-
-
-def _intervals(dt: Any, model: IdentifiedModel | None) -> list[float]:
-    if dt is None:
-        if model is None or model.dt is None:
-            raise ParameterError("dt is missing: expected the sampling interval of the loop in s")
-        dt = model.dt
-    several = list(dt) if isinstance(dt, Sequence) else [dt]
-    if not several:
-        raise ParameterError("dt is empty: expected a sampling interval in s or more")
-    return [check_dt(one) for one in several]
-
-
-def _inverse_of(stage: Plant | IdentifiedModel, feedforward: Any) -> Inverse | None:
-    if feedforward is None or isinstance(feedforward, Inverse):
-        return feedforward
-    if feedforward != "inverse":
-        raise ParameterError(
-            f"feedforward is {quoted(feedforward)}: expected 'inverse', a pt.Inverse or None"
-        )
-    if isinstance(stage, (IdentifiedModel, Stage)):
-        return stage.inverse()
-    return None
-
-
-def _searched(question: _Question, dt: float) -> _Answer:
+def _searched(question: Question, dt: float) -> _Answer:
     """Search at one sampling interval; where the exact margins are beyond, with some in reserve."""
     named = plants_of(question.stages, question.limits, question.delay, question.spread)
     plants = [one.plant for one in named]
@@ -339,9 +206,9 @@ def _searched(question: _Question, dt: float) -> _Answer:
 
 
 def _required(
-    question: _Question, reserve: float
+    question: Question, reserve: float
 ) -> tuple[float, float, float, float, float, float]:
-    """What is asked for, with a factor in reserve for what the grid does not show."""
+    """Return what is asked for, with a factor in reserve for what the grid does not show."""
     margins = question.margins
     gain = 1.0 + (margins.gain - 1.0) * reserve
     sensitivity = 1.0 + (margins.sensitivity - 1.0) / reserve
@@ -350,9 +217,7 @@ def _required(
     return gain, phase, sensitivity, learning, question.slew, question.clipped
 
 
-def _usual_parts(
-    question: _Question, plants: list[_core.LoopPlant], dt: float
-) -> tuple[str, ...]:
+def _usual_parts(question: Question, plants: list[_core.LoopPlant], dt: float) -> tuple[str, ...]:
     parts = ["pid", "low-pass"]
     if resonance(plants, dt) is not None:
         parts.append("notch")
@@ -364,14 +229,14 @@ def _usual_parts(
     return tuple(parts)
 
 
-def _tasks(question: _Question, base: Controller, repeats: bool) -> list[_core.Task]:
+def _tasks(question: Question, base: Controller, repeats: bool) -> list[_core.Task]:
     """Make the motions that the controllers are judged by."""
     tasks = []
     plant = plant_of(question.stages[0])
     check_drive_unit(question.stages[0], base)
     for reference in question.references:
         samples = reference.sample(base.dt)
-        if question.clipped == 0.0:
+        if question.clipped < 0.5:
             check_within_reach(plant, question.limits, samples, question.drive_unit)
         voltage = feedforward_of(base, reference, samples).voltage
         first = _first(reference, float(samples.t[-1]), base.dt, repeats)
@@ -402,7 +267,7 @@ def _first(reference: Reference, end: float, dt: float, repeats: bool) -> int:
     return math.ceil(start / dt - 1e-9)
 
 
-def _kept(question: _Question, answer: _Answer) -> list[Kept]:
+def _kept(question: Question, answer: _Answer) -> list[Kept]:
     """Check the margins of what was found, exactly, over all plants."""
     controller = _controller(answer)
     margins = question.margins
@@ -442,7 +307,7 @@ def _controller(answer: _Answer) -> Controller:
     )
 
 
-def _answered(question: _Question, best: _Answer, answers: list[_Answer]) -> Tuned:
+def _answered(question: Question, best: _Answer, answers: list[_Answer]) -> Tuned:
     """Check and simulate what was found in full."""
     controller = _controller(best)
     runs = tuple(
@@ -478,46 +343,3 @@ def _answered(question: _Question, best: _Answer, answers: list[_Answer]) -> Tun
         history=tuple(best.found["history"]),
     )
     return Tuned(controller, report)
-
-
-def _refusal(question: _Question, best: _Answer) -> str:
-    """Say which constraint forbids any controller, and how far the nearest one is off."""
-    unstable, gain, phase, sensitivity, learning = best.found["robustness"]
-    names = [one.name for one in best.plants]
-    margins = question.margins
-    if unstable[0] > 0.0:
-        return (
-            f"models: no gains in the search make all {len(names)} plants stable; the nearest leave "
-            f"{names[unstable[1]]} unstable: expected a smaller spread, or plants nearer to each other"
-        )
-    ratios = {
-        "gain": (margins.gain / gain[0], gain, margins.gain, "or more", ""),
-        "phase": (margins.phase / max(phase[0], 1e-9), phase, margins.phase, "or more", " rad"),
-        "sensitivity": (
-            sensitivity[0] / margins.sensitivity,
-            sensitivity,
-            margins.sensitivity,
-            "or less",
-            "",
-        ),
-        "learning": (learning[0] / margins.learning, learning, margins.learning, "or less", ""),
-    }
-    name, (ratio, (value, plant), bound, side, unit) = max(
-        ratios.items(), key=lambda item: item[1][0]
-    )
-    if ratio > 1.0:
-        return (
-            f"margins.{name} is {bound:.4g}{unit}: expected one that some gains can keep; the nearest "
-            f"have {value:.4g}{unit} ({names[plant]}), where {bound:.4g}{unit} {side} was asked for"
-        )
-    figures = best.found["figures"]
-    fastest, share = max(one[3] for one in figures), max(one[4] for one in figures)
-    if fastest > question.slew:
-        return (
-            f"slew is {question.slew:.4g} V/s: expected {fastest:.4g} V/s, which the slowest "
-            "controller needs along these references"
-        )
-    return (
-        f"clipped is {question.clipped:.3g}: expected {share:.3g} at least, the share of the samples "
-        "at which every controller is clipped along these references"
-    )

@@ -71,8 +71,8 @@ class TuningReport:
     plants : tuple of str
         The plants of the set.
     binding : tuple of str
-        What forbids a smaller figure: margins at their bounds, settings at the ends of their ranges.
-        Empty where the figure itself has its minimum inside.
+        What forbids a smaller figure: margins at their bounds, settings at the ends of their
+        ranges. Empty where the figure itself has its minimum inside.
     dt : float
         Sampling interval [s].
     candidates, loops : int
@@ -94,13 +94,17 @@ class TuningReport:
     history: tuple[float, ...]
 
     def __str__(self) -> str:
-        lines = [f"{self.figure}, at {1.0 / self.dt:.6g} Hz: {self.candidates} controllers looked at, "
-                 f"{self.loops} loops simulated"]
+        lines = [
+            f"{self.figure}, at {1.0 / self.dt:.6g} Hz: {self.candidates} controllers looked at, "
+            f"{self.loops} loops simulated"
+        ]
         for run in self.runs:
             lines.append(f"{run.reference!r}: {run.metrics}")
         lines.append(f"over {len(self.plants)} plants:")
         lines += [f"  {one}" for one in self.kept]
-        binding = "; ".join(self.binding) or "nothing: the figure has its minimum inside of the bounds"
+        binding = (
+            "; ".join(self.binding) or "nothing: the figure has its minimum inside of the bounds"
+        )
         lines.append(f"what binds: {binding}")
         return "\n".join(lines)
 

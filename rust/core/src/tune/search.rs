@@ -89,9 +89,14 @@ struct Tried {
 }
 
 impl Tried {
-    /// What the swarm makes small: any that keeps what is required before any that does not.
+    /// What the swarm makes small: any that keeps what is required before any that does not, and
+    /// one that keeps the margins before one that does not.
     fn rank(&self) -> f64 {
-        if self.excess <= 1.0 { self.cost } else { 1e6 * self.excess }
+        match (self.excess <= 1.0, self.figures.is_empty()) {
+            (true, _) => self.cost,
+            (false, false) => 1e6 * self.excess,
+            (false, true) => 1e12 * self.excess,
+        }
     }
 }
 

@@ -1,0 +1,158 @@
+"""``piezotrack tune``: the gains of a controller for an identified model."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import ParameterError
+from .error_messages import in_words
+from .loop_options import AmplifierBandwidth, Interval, Limits, Loop, LoopDelay, Noise
+from .options import Duration, Json, ModelFile, Out, Overwrite, Period, Quiet  # noqa: TC001
+from .output import Output
+from .track import parsed_reference
+
+if TYPE_CHECKING:
+    from ..control.tuning.tuned import Tuned
+
+__all__ = ["tune_command"]
+
+
+@in_words
+def tune_command(
+    model: ModelFile,
+    reference: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="TEXT|FILE",
+            help="Reference, as of `track`; may be given several times. Without one the gains "
+            "follow from the margins alone.",
+            show_default=False,
+        ),
+    ] = None,
+    out: Out = Path("results"),
+    overwrite: Overwrite = False,
+    dt: Interval = None,
+    limits: Limits = None,
+    parts: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Parts of the controller, of pid,low-pass,notch,repetitive; default those that "
+            "stage and references ask for.",
+            show_default=False,
+        ),
+    ] = None,
+    figure: Annotated[
+        str, typer.Option(metavar="rms|largest", help="Error that is made small.")
+    ] = "rms",
+    gain_margin: Annotated[float, typer.Option(help="Least gain margin, a factor.")] = 2.0,
+    phase_margin: Annotated[float, typer.Option(help="Least phase margin in degrees.")] = 30.0,
+    sensitivity: Annotated[float, typer.Option(help="Largest sensitivity Ms.")] = 2.0,
+    mode_spread: Annotated[
+        float,
+        typer.Option(
+            help="Percent by which the dynamics may be slower or faster than the model's."
+        ),
+    ] = 0.0,
+    gain_spread: Annotated[
+        float, typer.Option(help="Percent by which the gain may differ from the model's.")
+    ] = 0.0,
+    delay_spread: Annotated[
+        float, typer.Option(help="Largest delay in s in addition to --delay.")
+    ] = 0.0,
+    feedforward: Annotated[
+        bool, typer.Option(help="Feedforward by the inverse of the model.")
+    ] = True,
+    delay: LoopDelay = 0.0,
+    noise_nm: Noise = 0.0,
+    bandwidth: AmplifierBandwidth = math.inf,
+    duration: Duration = None,
+    period: Period = None,
+    seed: Annotated[int, typer.Option(help="Random seed of the search and the sensor noise.")] = 1,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Find the gains of a controller under margins for a set of plants."""
+    from .._support.files import picture_files
+    from ..control.tuning.margins import Margins, Spread
+    from ..control.tuning.tune import tune
+    from ..identification.identified import load
+    from ..stages.virtual import VirtualStage
+
+    known = load(model)
+    desired = [parsed_reference(text, duration, period) for text in reference or ()]
+    settings = Loop(True, dt, limits, None, None, None, None)
+    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
+    pictures = [name for i in range(len(desired)) for name in picture_files(_name(i))]
+    result.will_write(["tuning.json", *pictures])
+    tuned = tune(
+        [VirtualStage.of(known, noise=1e-9 * noise_nm, bandwidth=bandwidth, seed=seed)],
+        desired or None,
+        dt=settings.dt(known, desired[0] if desired else None),
+        limits=settings.volts(known),
+        feedforward=known.inverse() if feedforward else None,
+        parts=None if parts is None else [one.strip() for one in parts.split(",")],
+        margins=Margins(
+            gain=gain_margin, phase=math.radians(phase_margin), sensitivity=sensitivity
+        ),
+        spread=Spread(delay=(0.0, delay_spread), mode=0.01 * mode_spread, gain=0.01 * gain_spread),
+        figure=_figure(figure),
+        delay=delay,
+        seed=seed,
+    )
+    document = _document(tuned)
+    result.show(str(tuned), document, _write(tuned, document, out))
+
+
+def _figure(figure: str) -> Any:
+    if figure not in ("rms", "largest"):
+        raise ParameterError(f"--figure is {figure}: expected rms or largest")
+    return figure
+
+
+def _name(i: int) -> str:
+    return "tuned" if i == 0 else f"tuned_{i + 1}"
+
+
+def _document(tuned: Tuned) -> dict[str, Any]:
+    """Content of the JSON file: the controller and what it keeps."""
+    from .. import __version__
+
+    controller, report = tuned
+    return {
+        "format": "piezotrack-tuning",
+        "schema_version": 1,
+        "dt": {"value": controller.dt, "unit": "s"},
+        "limits": {"value": list(controller.limits), "unit": controller.drive_unit},
+        "feedback": None if controller.feedback is None else asdict(controller.feedback),
+        "filters": [{"kind": type(one).__name__, **asdict(one)} for one in controller.filters],
+        "repetitive": None if controller.repetitive is None else asdict(controller.repetitive),
+        "unit": "gains in V/m, times in s, frequencies in Hz, errors in m, phase margin in rad",
+        "references": [
+            {"reference": repr(run.reference), "metrics": asdict(run.metrics)}
+            for run in report.runs
+        ],
+        "kept": [one._asdict() for one in report.kept],
+        "plants": list(report.plants),
+        "binding": list(report.binding),
+        "controllers": report.candidates,
+        "loops": report.loops,
+        "provenance": {"package": "piezotrack", "version": __version__},
+    }
+
+
+def _write(tuned: Tuned, document: dict[str, Any], out: Path) -> list[Path]:
+    """Write the settings as JSON, and a picture of the loop along each reference."""
+    from .._support.files import make_folder, save_figures, together, write_document
+
+    with together(make_folder(out)) as folder:
+        pictures = {_name(i): run.plot() for i, run in enumerate(tuned.report.runs)}
+        return [
+            write_document(folder / "tuning.json", document),
+            *save_figures(pictures, folder),
+        ]

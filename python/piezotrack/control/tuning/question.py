@@ -1,0 +1,157 @@
+"""What a search for gains is asked, checked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from ... import _core
+from ..._support.arguments import not_negative
+from ..._support.arrays import check_dt
+from ..._support.messages import quoted
+from ...errors import ParameterError
+from ...identification.identified import IdentifiedModel
+from ...references.reference import Reference
+from ...stages.base import Stage
+from ...stages.inverse import Inverse
+from ..controller import number_pair
+from ..plant import Plant, plant_of, voltages_before
+from .box import parts_named
+from .margins import Margins, Spread
+
+__all__ = ["FIGURES", "Question", "asked"]
+
+FIGURES = {"rms": "rms error", "largest": "largest error"}
+
+
+class Question(NamedTuple):
+    """What is common to the searches at all sampling intervals."""
+
+    stages: list[Plant | IdentifiedModel]
+    references: list[Reference]
+    limits: tuple[float, float]
+    drive_unit: str
+    feedforward: Inverse | None
+    parts: tuple[str, ...] | None
+    margins: Margins
+    spread: Spread
+    figure: str
+    effort: float
+    slew: float
+    clipped: float
+    delay: float
+    jitter: float
+    visited: tuple[float, ...]
+    measured: bool
+    seeds: int
+    particles: int
+    iterations: int
+    seed: int
+    threads: int
+
+
+def asked(
+    stage: Any,
+    reference: Any,
+    dt: Any,
+    limits: Any,
+    feedforward: Any,
+    parts: Any,
+    margins: Any,
+    spread: Any,
+    figure: Any,
+    effort: float,
+    slew: float,
+    clipped: float,
+    delay: float,
+    jitter: float,
+    visited: Any,
+    error: Any,
+    seeds: int,
+    particles: int,
+    iterations: int,
+    seed: int,
+    threads: int,
+) -> tuple[Question, list[float]]:
+    """Check all arguments."""
+    stages = list(stage) if isinstance(stage, Sequence) else [stage]
+    if not stages:
+        raise ParameterError("stage is empty: expected a stage or more")
+    first = plant_of(stages[0])
+    for one in stages:
+        plant_of(one)
+    references = [] if reference is None else reference
+    references = list(references) if isinstance(references, Sequence) else [references]
+    for one in references:
+        if not isinstance(one, Reference):
+            raise ParameterError(f"reference is {type(one).__name__}: expected pt.Reference")
+    _check_kind("margins", margins, Margins)
+    _check_kind("spread", spread, Spread)
+    if figure not in FIGURES:
+        raise ParameterError(f"figure is {quoted(figure)}: expected 'rms' or 'largest'")
+    if error not in ("measured", "true"):
+        raise ParameterError(f"error is {quoted(error)}: expected 'measured' or 'true'")
+    model = stages[0] if isinstance(stages[0], IdentifiedModel) else None
+    intervals = _intervals(dt, model)
+    if limits is None:
+        limits = model.drive_range if model is not None else None
+        if limits is None:
+            raise ParameterError("limits are missing: expected (low, high) in V")
+    unit = model.drive_unit if model is not None else "V"
+    limits = number_pair("limits", limits, unit)
+    if not 1 <= _core.as_count("seeds", seeds) <= 100:
+        raise ParameterError(f"seeds is {seeds}: expected 1 to 100")
+    if not _core.as_number("slew", slew) > 0.0:
+        raise ParameterError(f"slew is {slew} V/s: expected above 0")
+    question = Question(
+        stages=stages,
+        references=references,
+        limits=limits,
+        drive_unit=unit,
+        feedforward=_inverse_of(stages[0], feedforward),
+        parts=parts_named(parts),
+        margins=margins or Margins(),
+        spread=spread or Spread(),
+        figure=figure,
+        effort=not_negative("effort", effort, "m/V"),
+        slew=slew,
+        clipped=_core.as_number("clipped", clipped),
+        delay=not_negative("delay", delay, "s"),
+        jitter=not_negative("jitter", jitter, "s"),
+        visited=voltages_before(first, visited, limits),
+        measured=error == "measured",
+        seeds=seeds,
+        particles=_core.as_count("particles", particles),
+        iterations=_core.as_count("iterations", iterations),
+        seed=_core.as_count("seed", seed),
+        threads=_core.as_count("threads", threads),
+    )
+    return question, intervals
+
+
+def _check_kind(name: str, value: object, kind: type) -> None:
+    if value is not None and not isinstance(value, kind):
+        raise ParameterError(f"{name} is {type(value).__name__}: expected pt.{kind.__name__}")
+
+
+def _intervals(dt: Any, model: IdentifiedModel | None) -> list[float]:
+    if dt is None:
+        if model is None or model.dt is None:
+            raise ParameterError("dt is missing: expected the sampling interval of the loop in s")
+        dt = model.dt
+    several = list(dt) if isinstance(dt, Sequence) else [dt]
+    if not several:
+        raise ParameterError("dt is empty: expected a sampling interval in s or more")
+    return [check_dt(one) for one in several]
+
+
+def _inverse_of(stage: Plant | IdentifiedModel, feedforward: Any) -> Inverse | None:
+    if feedforward is None or isinstance(feedforward, Inverse):
+        return feedforward
+    if feedforward != "inverse":
+        raise ParameterError(
+            f"feedforward is {quoted(feedforward)}: expected 'inverse', a pt.Inverse or None"
+        )
+    if isinstance(stage, (IdentifiedModel, Stage)):
+        return stage.inverse()
+    return None

@@ -1,0 +1,214 @@
+"""Tuned gains: what they keep, what they beat, what is refused."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezotrack as pt
+from piezotrack.control import Kept
+
+LIMITS = (0.0, 75.0)
+QUICK: dict[str, Any] = {"particles": 24, "iterations": 25}
+
+
+def published_stage() -> pt.VirtualStage:
+    return pt.VirtualStage.xu_li_2010(seed=1)
+
+
+def motion(duration: float = 15.0) -> pt.Reference:
+    return pt.sine(frequency=0.2, low=0.0, high=100e-6, duration=duration)
+
+
+def test_tuned_gains_beat_the_published_ones_with_more_margin() -> None:
+    stage, reference = published_stage(), motion()
+    tuned, report = pt.tune(stage, reference, dt=0.02, limits=LIMITS, parts="pid", **QUICK)
+    published = pt.Controller(dt=0.02, limits=LIMITS, feedback=pt.Pid.xu_li_2010())
+    for seed in (11, 12):
+        other = pt.VirtualStage.xu_li_2010(seed=seed)
+        before = pt.track(other, published, reference).metrics
+        after = pt.track(other, tuned, reference).metrics
+        assert after.rms_error < 0.8 * before.rms_error
+    loops = pt.check_loop(stage, tuned)
+    for one in (loops.low, loops.middle, loops.high):
+        assert one.stable
+        assert one.sensitivity <= 2.0 * 1.01
+        assert one.gain_margin is not None
+        assert one.gain_margin >= 2.0 * 0.99
+    before_margin = pt.check_loop(stage, published).high.gain_margin
+    assert before_margin is not None
+    assert before_margin < 2.0
+    # Either a margin or a setting is at its bound, or the figure has its minimum inside.
+    assert report.binding
+    assert all(one.share <= 1.01 for one in report.kept)
+
+
+def test_the_report_is_that_of_the_exact_check_and_of_a_full_simulation() -> None:
+    stage, reference = published_stage(), motion()
+    tuned, report = pt.tune(stage, reference, dt=0.02, limits=LIMITS, parts="pid", **QUICK)
+    again = pt.track(stage, tuned, reference)
+    assert report.runs[0].metrics == again.metrics
+    # The loops of the search take longer steps.
+    assert report.value == pytest.approx(again.metrics.rms_error, rel=0.02)
+    worst = max(
+        one.sensitivity
+        for one in (pt.check_loop(stage, tuned).low, pt.check_loop(stage, tuned).high)
+    )
+    kept = {one.name: one for one in report.kept}
+    assert kept["sensitivity"].value == pytest.approx(worst)
+    assert "what binds" in str(report)
+
+
+def test_a_spread_is_kept_at_its_ends() -> None:
+    stage = published_stage()
+    spread = pt.Spread(delay=(0.0, 1e-3), mode=0.1, gain=0.2)
+    tuned, report = pt.tune(stage, dt=2e-3, limits=LIMITS, spread=spread, **QUICK)
+    assert len(report.plants) == 3 * 2 * 3 * 3
+    late = pt.check_loop(stage, tuned, delay=1e-3)
+    assert late.high.stable
+    gain = late.high.gain_margin
+    assert gain is not None
+    # 20 % more gain still has a margin of 2.
+    assert gain / 1.2 >= 2.0 * 0.99
+    alone, _ = pt.tune(stage, dt=2e-3, limits=LIMITS, **QUICK)
+    assert isinstance(alone.feedback, pt.Pid)
+    assert isinstance(tuned.feedback, pt.Pid)
+    # What is kept for more plants costs integral gain.
+    assert tuned.feedback.kp / tuned.feedback.ti < alone.feedback.kp / alone.feedback.ti
+
+
+def test_a_repetitive_part_is_tuned_where_the_reference_repeats() -> None:
+    stage = published_stage()
+    reference = pt.sine(frequency=0.5, low=0.0, high=100e-6, duration=14.0)
+    tuned, report = pt.tune(stage, reference, dt=0.02, limits=LIMITS, **QUICK)
+    assert tuned.repetitive is not None
+    assert tuned.repetitive.period == 2.0
+    plain, _ = pt.tune(stage, reference, dt=0.02, limits=LIMITS, parts=("pid", "low-pass"), **QUICK)
+    learnt = pt.track(stage, tuned, reference).score(8.0).rms_error
+    assert learnt < 0.95 * pt.track(stage, plain, reference).score(8.0).rms_error
+    assert {one.name for one in report.kept} >= {"learning"}
+
+
+def test_the_fastest_of_the_allowed_sampling_rates_wins_on_a_clean_stage() -> None:
+    stage = replace(published_stage(), sensor=pt.stages.Sensor())
+    tuned, report = pt.tune(
+        stage, motion(10.0), dt=(0.02, 0.005), limits=LIMITS, parts="pid", **QUICK
+    )
+    assert tuned.dt == report.dt == 0.005
+
+
+def test_the_same_bits_for_any_number_of_threads() -> None:
+    stage, reference = published_stage(), motion(7.5)
+    found = [
+        pt.tune(stage, reference, dt=0.02, limits=LIMITS, threads=threads, **QUICK).controller
+        for threads in (1, 2)
+    ]
+    assert found[0] == found[1]
+
+
+def test_less_effort_where_it_costs() -> None:
+    stage, reference = published_stage(), motion()
+    at: dict[str, Any] = {"dt": 5e-3, "limits": LIMITS, "parts": ("pid", "low-pass"), **QUICK}
+    free = pt.tune(stage, reference, **at).report.runs[0]
+    calm = pt.tune(stage, reference, effort=5e-6, **at).report.runs[0]
+    changes = [np.diff(run.voltage[run.t > run.settled]).std() for run in (free, calm)]
+    assert changes[1] < changes[0]
+
+
+def test_gains_of_a_stage_that_falls_as_the_voltage_rises_are_negative() -> None:
+    stage = pt.stages.PrandtlIshlinskiiStage(
+        linear=-1e-6, thresholds=(10.0,), weights=(-0.2e-6,), frequency=300.0, damping_ratio=0.1
+    )
+    tuned, report = pt.tune(stage, dt=1e-3, limits=LIMITS, parts="pid", **QUICK)
+    assert isinstance(tuned.feedback, pt.Pid)
+    assert tuned.feedback.kp < 0.0
+    assert pt.check_loop(stage, tuned).stable
+    assert max(one.share for one in report.kept) <= 1.01
+
+
+def test_shares_of_what_was_asked_for() -> None:
+    assert Kept("gain margin", 4.0, 2.0, "low gain").share == 0.5
+    assert Kept("sensitivity", 1.5, 2.0, "low gain").share == 0.75
+    assert Kept("phase margin", 0.0, 0.5, "low gain").share == math.inf
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"dt": None}, "dt is missing"),
+        ({"dt": -1.0}, "dt is -1"),
+        ({"dt": []}, "dt is empty"),
+        ({"limits": None}, "limits are missing"),
+        ({"limits": (75.0, 0.0)}, "expected the lower one first"),
+        ({"parts": "pdi"}, "parts is 'pdi'"),
+        ({"parts": "notch"}, "expected a mode that rings below half the sampling rate, 25 Hz"),
+        ({"parts": "repetitive", "reference": None}, "expected references that repeat"),
+        ({"figure": "max"}, "figure is 'max'"),
+        ({"error": "both"}, "error is 'both'"),
+        ({"margins": 2.0}, "margins is float"),
+        ({"spread": 0.1}, "spread is float"),
+        ({"reference": "sine"}, "reference is str"),
+        ({"feedforward": "dahl"}, "feedforward is 'dahl'"),
+        ({"effort": -1.0}, "effort is -1"),
+        ({"slew": 0.0}, "slew is 0"),
+        ({"seeds": 0}, "seeds is 0"),
+        ({"clipped": 2.0}, "clipped is 2"),
+        ({"stage": []}, "stage is empty"),
+        ({"stage": "mine"}, "stage is str"),
+    ],
+)
+def test_wrong_arguments_are_named(changes: dict[str, Any], words: str) -> None:
+    given: dict[str, Any] = {
+        "stage": published_stage(),
+        "reference": motion(5.0),
+        "dt": 0.02,
+        "limits": LIMITS,
+    }
+    with pytest.raises(pt.ParameterError, match=words.replace("(", r"\(")):
+        pt.tune(**{**given, **QUICK, **changes})
+
+
+def test_margins_that_no_gains_keep_are_refused_with_the_nearest() -> None:
+    # The least gains of the search still have a sensitivity above 1.0001.
+    with pytest.raises(
+        pt.ParameterError, match=r"margins\.sensitivity is 1\.0001: .* nearest have"
+    ):
+        pt.tune(
+            published_stage(), motion(10.0), dt=0.02, limits=LIMITS, parts="pid",
+            margins=pt.Margins(sensitivity=1.0001), delay=0.2, **QUICK,
+        )  # fmt: skip
+
+
+def test_a_slew_that_the_reference_itself_exceeds_is_refused_with_what_is_needed() -> None:
+    stage = pt.stages.PrandtlIshlinskiiStage(
+        linear=1.2e-6, thresholds=(10.0,), weights=(0.2e-6,), time_constant=1e-3
+    )
+    reference = pt.sine(frequency=0.2, low=4e-6, high=64e-6, duration=10.0)
+    # The feedforward alone: 60 um in 2.5 s, at some 1.3 um/V.
+    with pytest.raises(pt.ParameterError, match=r"slew is 10 V/s: expected [23]\d\.\d* V/s"):
+        pt.tune(stage, reference, dt=0.02, limits=LIMITS, slew=10.0, **QUICK)
+
+
+def test_a_reference_beyond_reach_is_refused() -> None:
+    far = pt.sine(frequency=0.2, low=0.0, high=150e-6, duration=10.0)
+    with pytest.raises(pt.ParameterError, match="beyond"):
+        pt.tune(published_stage(), far, dt=0.02, limits=LIMITS, **QUICK)
+
+
+def test_plants_of_both_signs_are_refused() -> None:
+    one = pt.stages.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(10.0,), weights=(0.2e-6,))
+    other = pt.stages.PrandtlIshlinskiiStage(linear=-1e-6, thresholds=(10.0,), weights=(-0.2e-6,))
+    with pytest.raises(pt.ParameterError, match="all of one sign"):
+        pt.tune([one, other], dt=1e-3, limits=LIMITS, parts="pid", **QUICK)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("gain", 1.0), ("phase", 30.0), ("sensitivity", 0.5), ("learning", 2.0)]
+)
+def test_impossible_margins_are_named(name: str, value: float) -> None:
+    with pytest.raises(pt.ParameterError, match=f"{name} is {value}"):
+        pt.Margins(**{name: value})
