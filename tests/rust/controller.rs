@@ -1,7 +1,9 @@
 //! PID, antiwindup and the composed controller, on plants whose answers are known.
 #![allow(missing_docs, clippy::unwrap_used)]
 
-use piezotrack_control::{Command, Controller, Feedback, Limits, Pid, Repetitive, SampledPid};
+use piezotrack_control::{
+    Command, Controller, Feedback, FeedbackSample, Limits, Pid, Repetitive, SampledPid,
+};
 
 const DT: f64 = 0.02;
 /// Static gain of the plant, m/V; with one sample of delay the published gains ring above 1.28.
@@ -53,7 +55,7 @@ fn incremental_form_equals_the_position_form() {
     for &e in &errors {
         sum += e;
         let position = kp * (e - errors[0] + DT / ti * sum + td / DT * (e - before));
-        close(pid.step(&mut state, e, 0.0), 5.0 + position, 1e-12);
+        close(pid.step(&mut state, &FeedbackSample::new(e)), 5.0 + position, 1e-12);
         before = e;
     }
 }

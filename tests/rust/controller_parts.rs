@@ -4,7 +4,7 @@
 use core::f64::consts::TAU;
 
 use piezotrack_control::{
-    Command, Controller, DahlInverse, Feedback, Filter, Limits, Pid, StateSpace,
+    Command, Controller, DahlInverse, Feedback, FeedbackSample, Filter, Limits, Pid, StateSpace,
 };
 
 /// Gain and phase of a filter at `frequency`, from its response to a sine.
@@ -105,8 +105,8 @@ fn state_space_equals_the_pid_that_it_describes() {
     let (mut one, mut other) = (pid.rest(), pi(None).rest());
     for k in 0..100 {
         let e = 1e-6 * f64::from(k % 13);
-        let volts = pid.step(&mut one, e, 0.0);
-        assert!((volts - pi(None).step(&mut other, e, 0.0)).abs() < 1e-12);
+        let volts = pid.step(&mut one, &FeedbackSample::new(e));
+        assert!((volts - pi(None).step(&mut other, &FeedbackSample::new(e))).abs() < 1e-12);
     }
 }
 
@@ -144,7 +144,7 @@ fn several_states_follow_their_equations() {
     for k in 0..30 {
         let e = (0.3 * f64::from(k)).sin();
         let u = 3.0 * x[0] - x[1] + 0.5 * e;
-        assert!((law.step(&mut state, e, 0.0) - u).abs() < 1e-12);
+        assert!((law.step(&mut state, &FeedbackSample::new(e)) - u).abs() < 1e-12);
         x = [0.5 * x[0] + 0.2 * x[1] + e, -0.1 * x[0] + 0.9 * x[1] + 2.0 * e];
     }
 }
@@ -171,9 +171,9 @@ fn bad_parameters_are_named() {
     let pd = Pid::new(1e5, inf, 0.01, None).unwrap().at(0.02).unwrap();
     let mut state = pd.rest();
     for (e, excess) in [(0.0, 0.0), (1e-5, -7.0), (0.0, -7.0), (0.0, -7.0), (0.0, 0.0)] {
-        pd.step(&mut state, e, excess);
+        pd.step(&mut state, &FeedbackSample { excess, ..FeedbackSample::new(e) });
     }
-    assert!(pd.step(&mut state, 0.0, 0.0).abs() < 1e-12);
+    assert!(pd.step(&mut state, &FeedbackSample::new(0.0)).abs() < 1e-12);
 
     assert_eq!(Limits::new(f64::NAN, 1.0).unwrap_err().name, "low");
     assert_eq!(Limits::new(0.0, inf).unwrap_err().name, "high");

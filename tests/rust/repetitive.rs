@@ -4,7 +4,7 @@
 use core::f64::consts::TAU;
 
 use piezotrack_control::{
-    Command, Controller, Limits, Outcome, Pid, Repetitive, SampledPid, Smoothing,
+    Command, Controller, FeedbackSample, Limits, Outcome, Pid, Repetitive, SampledPid, Smoothing,
 };
 
 const DT: f64 = 0.02;
@@ -105,7 +105,8 @@ fn printed_coefficients_diverge_and_ours_do_not() {
             1.81 * u[k - 1] - 0.8187 * u[k - 2] + 0.0952 * u[k - n - 1] - 0.0861 * u[k - n - 2]
                 + 1e6 * (0.0952 * e[k - n - 1] - 0.0861 * e[k - n - 2]),
         );
-        let feedback = piezotrack_control::Feedback::step(&pid, &mut state, e[k], 0.0);
+        let feedback =
+            piezotrack_control::Feedback::step(&pid, &mut state, &FeedbackSample::new(e[k]));
         y = gain * (feedback + 0.9 * r / gain + u[k]);
     }
     let most =

@@ -8,7 +8,7 @@
 //! [`crate::pid`] and [`crate::repetitive`].
 
 use crate::error::{Error, Result, check, usable};
-use crate::feedback_law::Feedback;
+use crate::feedback_law::{Feedback, FeedbackSample};
 use crate::filters::{Filter, FilterState};
 use crate::limits::Limits;
 use crate::measurement::{LONGEST, Readings, Refused, Span};
@@ -258,6 +258,7 @@ impl<F: Feedback> Controller<F> {
         if !(feedforward >= low - (high - low) && feedforward <= high + (high - low)) {
             (feedforward_ok, used) = self.far_feedforward(feedforward, state.last.feedforward);
         }
+        let applied = state.voltage();
         let (mut present, mut learns) = (None, state.excess);
         if state.apart {
             (present, learns) = self.first(state);
@@ -279,8 +280,12 @@ impl<F: Feedback> Controller<F> {
         let mut error = last.error;
         state.unlearnt = 0.0;
         if measurement_ok && reference_fits {
-            error = reference - self.filtered(&mut state.filters, measured);
-            let volts = self.feedback.step(&mut state.feedback, error, state.excess);
+            let measured = self.filtered(&mut state.filters, measured);
+            error = reference - measured;
+            let (excess, feedforward) = (state.excess, used + repetitive);
+            let sample =
+                FeedbackSample { error, reference, measured, excess, applied, feedforward };
+            let volts = self.feedback.step(&mut state.feedback, &sample);
             feedback = if volts.is_finite() { volts } else { feedback };
             state.unlearnt = error;
         }

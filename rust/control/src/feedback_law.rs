@@ -1,10 +1,40 @@
 //! The interface of a feedback law.
 
+/// What a feedback law is told of a sample: finite numbers, all of them.
+///
+/// ```
+/// use piezotrack_control::FeedbackSample;
+///
+/// let sample = FeedbackSample { excess: -0.5, ..FeedbackSample::new(1e-6) };
+/// assert_eq!(sample.error, sample.reference - sample.measured);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FeedbackSample {
+    /// Tracking error: reference less filtered measurement, m.
+    pub error: f64,
+    /// Reference, m.
+    pub reference: f64,
+    /// Filtered measurement, m.
+    pub measured: f64,
+    /// For antiwindup: the voltage applied in the sample before, less the unclipped sum of all
+    /// parts of the controller, V; 0 where nothing saturated.
+    pub excess: f64,
+    /// For observers: the voltage at the actuator since the sample before, V.
+    pub applied: f64,
+    /// The other parts of this sample's command, feedforward and repetitive part, V.
+    pub feedforward: f64,
+}
+
+impl FeedbackSample {
+    /// A sample with this tracking error (m), measured at 0 m, with 0 V all around.
+    #[must_use]
+    pub fn new(error: f64) -> Self {
+        Self { error, reference: error, ..Self::default() }
+    }
+}
+
 /// A law that computes a voltage from the tracking error: configuration in `&self`, state in
 /// `State`.
-///
-/// `excess` (V) is for antiwindup: the voltage applied in the sample before, less the unclipped
-/// sum of all parts of the controller; 0 where nothing saturated.
 pub trait Feedback {
     /// The state of the law.
     type State: Clone;
@@ -26,8 +56,9 @@ pub trait Feedback {
         false
     }
 
-    /// The voltage (V) for the tracking error `error` (reference less displacement, m).
-    fn step(&self, state: &mut Self::State, error: f64, excess: f64) -> f64;
+    /// The voltage (V) for a sample. Where that overflows it is one that the law had before, or 0,
+    /// and the state stays finite.
+    fn step(&self, state: &mut Self::State, sample: &FeedbackSample) -> f64;
 }
 
 /// No feedback: 0 V, for tracking by feedforward only.
@@ -42,7 +73,7 @@ impl Feedback for () {
         false
     }
 
-    fn step(&self, _state: &mut (), _error: f64, _excess: f64) -> f64 {
+    fn step(&self, _state: &mut (), _sample: &FeedbackSample) -> f64 {
         0.0
     }
 }

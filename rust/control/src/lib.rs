@@ -60,7 +60,7 @@ pub use controller::{Command, Controller, ControllerState};
 pub use creep::{Creep, CreepState};
 pub use dynamics::{Dynamics, MOST_MODES, Mode, Modes};
 pub use error::{Error, Result};
-pub use feedback_law::Feedback;
+pub use feedback_law::{Feedback, FeedbackSample};
 pub use filters::{Filter, FilterState};
 pub use inverse::{
     BoucWenInverse, BoucWenInverseState, CreepingInverse, CreepingInverseState, DahlInverse,

@@ -12,7 +12,7 @@
 //! the total command `u = uFB + uFF + uRC`.
 
 use crate::error::{Error, Result, check, finite, not_negative};
-use crate::feedback_law::Feedback;
+use crate::feedback_law::{Feedback, FeedbackSample};
 
 /// Gains of a PID controller, in continuous time.
 ///
@@ -24,11 +24,11 @@ use crate::feedback_law::Feedback;
 /// | `tt` | Tt | s | > Ts/2, or infinite: no antiwindup |
 ///
 /// ```
-/// use piezotrack_control::{Feedback, Pid};
+/// use piezotrack_control::{Feedback, FeedbackSample, Pid};
 ///
 /// let pid = Pid::new(0.120e6, 0.009, 0.044, None)?.at(0.02)?;
 /// let mut state = pid.rest();
-/// let volts = pid.step(&mut state, 1e-6, 0.0);
+/// let volts = pid.step(&mut state, &FeedbackSample::new(1e-6));
 /// assert!((volts - 0.120 * 0.02 / 0.009).abs() < 1e-12);
 /// # Ok::<(), piezotrack_control::Error>(())
 /// ```
@@ -177,7 +177,8 @@ impl Feedback for SampledPid {
     }
 
     #[inline]
-    fn step(&self, state: &mut PidState, error: f64, excess: f64) -> f64 {
+    fn step(&self, state: &mut PidState, sample: &FeedbackSample) -> f64 {
+        let FeedbackSample { error, excess, .. } = *sample;
         let [e1, e2] = state.errors.unwrap_or([error; 2]);
         let rise = error - e1;
         let bend = rise - (e1 - e2);

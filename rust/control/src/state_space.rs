@@ -6,7 +6,7 @@
 
 use crate::back_calculation::gain;
 use crate::error::{Error, Result, check, finite};
-use crate::feedback_law::Feedback;
+use crate::feedback_law::{Feedback, FeedbackSample};
 
 /// A linear controller with up to `N` states: tracking error (m) in, voltage (V) out.
 ///
@@ -18,13 +18,14 @@ use crate::feedback_law::Feedback;
 /// beyond the limit is omitted.
 ///
 /// ```
-/// use piezotrack_control::{Feedback, StateSpace};
+/// use piezotrack_control::{Feedback, FeedbackSample, StateSpace};
 ///
 /// // An integrator of 1e5 V/(m sample).
 /// let law = StateSpace::<1>::new(&[1.0], &[1e5], &[1.0], 0.0, None)?;
 /// let mut state = law.rest();
-/// law.step(&mut state, 1e-6, 0.0);
-/// assert!((law.step(&mut state, 1e-6, 0.0) - 0.1).abs() < 1e-15);
+/// let sample = FeedbackSample::new(1e-6);
+/// law.step(&mut state, &sample);
+/// assert!((law.step(&mut state, &sample) - 0.1).abs() < 1e-15);
 /// # Ok::<(), piezotrack_control::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,7 +135,8 @@ impl<const N: usize> Feedback for StateSpace<N> {
     }
 
     #[inline]
-    fn step(&self, state: &mut Self::State, error: f64, excess: f64) -> f64 {
+    fn step(&self, state: &mut Self::State, sample: &FeedbackSample) -> f64 {
+        let FeedbackSample { error, excess, .. } = *sample;
         if let Some(last) = state.error {
             self.advance(&mut state.x, last, excess);
         } else if let Some(first) = state.first {

@@ -1,8 +1,8 @@
 //! Closed-loop tracking: reference and feedforward in, motion and commands out.
 
 use piezotrack_control::{
-    Command, Controller, ControllerState, Feedback, PidState, SampledPid, Snapshot, StateSpace,
-    StateSpaceState,
+    Command, Controller, ControllerState, Feedback, FeedbackSample, PidState, SampledPid, Snapshot,
+    StateSpace, StateSpaceState,
 };
 
 use super::apparatus::{Apparatus, ApparatusState};
@@ -95,10 +95,10 @@ impl Feedback for Law {
         }
     }
 
-    fn step(&self, state: &mut LawState, error: f64, excess: f64) -> f64 {
+    fn step(&self, state: &mut LawState, sample: &FeedbackSample) -> f64 {
         match (self, state) {
-            (Self::Pid(law), LawState::Pid(state)) => law.step(state, error, excess),
-            (Self::StateSpace(law), LawState::StateSpace(state)) => law.step(state, error, excess),
+            (Self::Pid(law), LawState::Pid(state)) => law.step(state, sample),
+            (Self::StateSpace(law), LawState::StateSpace(state)) => law.step(state, sample),
             _ => 0.0,
         }
     }
