@@ -13,7 +13,7 @@ const CORE: [&str; 9] =
     ["error", "math", "signal", "integrator", "design", "models", "simulate", "identify", "tune"];
 
 /// From the bottom up.
-const CONTROL: [&str; 19] = [
+const CONTROL: [&str; 20] = [
     "error",
     "number",
     "unfused",
@@ -30,6 +30,7 @@ const CONTROL: [&str; 19] = [
     "back_calculation",
     "state_space",
     "pid",
+    "scheduled_pid",
     "repetitive",
     "measurement",
     "controller",

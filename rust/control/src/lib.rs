@@ -52,6 +52,7 @@ mod number;
 pub mod online_feedforward;
 pub mod pid;
 pub mod repetitive;
+pub mod scheduled_pid;
 pub mod snapshot;
 pub mod state_space;
 pub mod unfused;
@@ -76,5 +77,6 @@ pub use pid::{Pid, PidState, SampledPid};
 pub use repetitive::{
     Outcome, Recursion, Repetitive, RepetitiveState, SampledRepetitive, Smoothing,
 };
+pub use scheduled_pid::{MOST_GRADES, ScheduledPid, ScheduledPidState};
 pub use snapshot::Snapshot;
 pub use state_space::{StateSpace, StateSpaceState};

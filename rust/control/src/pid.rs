@@ -150,6 +150,7 @@ pub struct PidState {
 }
 
 crate::snapshot!(PidState { volts, errors });
+crate::snapshot!(SampledPid { proportional, integral, derivative, tracking });
 
 impl SampledPid {
     /// Kp, Kp Ts/Ti and Kp Td/Ts, V/m: the weights of `e[k] - e[k-1]`, `e[k]` and
@@ -157,6 +158,18 @@ impl SampledPid {
     #[must_use]
     pub fn weights(&self) -> [f64; 3] {
         [self.proportional, self.integral, self.derivative]
+    }
+
+    /// The controller whose coefficients are a share, 0 to 1, of the way to those of another.
+    #[must_use]
+    pub fn towards(&self, other: &Self, share: f64) -> Self {
+        let between = |from: f64, to: f64| from + share * (to - from);
+        Self {
+            proportional: between(self.proportional, other.proportional),
+            integral: between(self.integral, other.integral),
+            derivative: between(self.derivative, other.derivative),
+            tracking: between(self.tracking, other.tracking),
+        }
     }
 }
 

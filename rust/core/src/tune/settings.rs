@@ -136,7 +136,8 @@ impl Template {
             let pid = pid(kp, ki, kd, self.dt).ok()?;
             out.feedback = Law::Pid(pid.at(self.dt).ok()?);
         }
-        let mut slots = out.filters.iter_mut();
+        // Those of the base stay.
+        let mut slots = out.filters.iter_mut().filter(|slot| slot.is_none());
         if let Some(cutoff) = value(Setting::Cutoff) {
             *slots.next()? = Some(Filter::low_pass(cutoff, self.dt).ok()?);
         }
