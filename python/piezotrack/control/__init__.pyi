@@ -16,6 +16,12 @@ from .contouring_plot import plot_contour_error as plot_contour_error
 from .contouring_plot import plot_magnified as plot_magnified
 from .contouring_plot import plot_path as plot_path
 from .controller import Controller as Controller
+from .laws import Chatter as Chatter
+from .laws import DisturbanceObserver as DisturbanceObserver
+from .laws import LeadLag as LeadLag
+from .laws import PerturbationEstimator as PerturbationEstimator
+from .laws import SlidingMode as SlidingMode
+from .laws import chatter as chatter
 from .linear_systems import to_control as to_control
 from .plant import Plant as Plant
 from .session import Command as Command
