@@ -19,6 +19,7 @@ from .control.stability import check_loop as check_loop
 from .control.tracking import track as track
 from .control.tuning.margins import Margins as Margins
 from .control.tuning.margins import Spread as Spread
+from .control.tuning.schedule import schedule as schedule
 from .control.tuning.tune import tune as tune
 from .data import datasets as datasets
 from .data.dataset import Dataset as Dataset

@@ -267,12 +267,15 @@ class Controller:
         max_jump: float | None,
         pid: tuple[float, float, float, float | None] | None,
         state_space: tuple[list[float], list[float], list[float], float, list[float] | None] | None,
+        law: tuple[str, list[float]] | None,
         repetitive: tuple[float, float, str, float, float, int, bool] | None,
         filters: list[tuple[str, float, float, float]],
     ) -> Controller: ...
     @property
     def line_length(self) -> int: ...
     def start(self, present: float | None) -> Session: ...
+
+def law_transfer_function(law: tuple[str, list[float]], dt: float) -> list[list[float]]: ...
 
 @final
 class Session:

@@ -16,8 +16,15 @@ from .contouring_plot import plot_contour_error as plot_contour_error
 from .contouring_plot import plot_magnified as plot_magnified
 from .contouring_plot import plot_path as plot_path
 from .controller import Controller as Controller
+from .laws import Chatter as Chatter
+from .laws import DisturbanceObserver as DisturbanceObserver
+from .laws import LeadLag as LeadLag
+from .laws import PerturbationEstimator as PerturbationEstimator
+from .laws import SlidingMode as SlidingMode
+from .laws import chatter as chatter
 from .linear_systems import to_control as to_control
 from .plant import Plant as Plant
+from .scheduled_pid import ScheduledPid as ScheduledPid
 from .session import Command as Command
 from .session import RefusedReadings as RefusedReadings
 from .session import Session as Session
@@ -34,6 +41,8 @@ from .tracking_plot import plot_following as plot_following
 from .tracking_plot import plot_motion as plot_motion
 from .tuning.margins import Margins as Margins
 from .tuning.margins import Spread as Spread
+from .tuning.schedule import Schedule as Schedule
+from .tuning.schedule import schedule as schedule
 from .tuning.tune import tune as tune
 from .tuning.tuned import Kept as Kept
 from .tuning.tuned import Tuned as Tuned

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeAlias, TypeVar
 
 from .. import _core
 from .._support.arguments import TOO_FAR, finite
@@ -14,11 +14,23 @@ from ..identification.identified import IdentifiedModel
 from ..stages.inverse import Inverse
 from .components import LowPass, Notch, Pid, Repetitive, StateSpace
 from .description import controller_text
+from .laws import NAMED_LAWS, DisturbanceObserver, LeadLag, PerturbationEstimator, SlidingMode
 from .plant import reach
+from .scheduled_pid import ScheduledPid
 from .session import Session
 
 __all__ = ["Controller", "number_pair"]
 
+# The feedback laws.
+Feedback: TypeAlias = (
+    Pid
+    | StateSpace
+    | LeadLag
+    | SlidingMode
+    | PerturbationEstimator
+    | DisturbanceObserver
+    | ScheduledPid
+)
 # Sampling interval for the reach of a stage [s]: its drive takes seconds.
 REACH_STEP = 0.05
 DRIVE_UNITS = ("V", "m", "N")
@@ -40,8 +52,8 @@ class Controller:
         Lowest and highest voltage [V].
     feedforward : Inverse, optional
         From ``fit.inverse()`` or ``stage.inverse()``.
-    feedback : Pid or StateSpace, optional
-        The feedback law.
+    feedback : Pid, StateSpace, LeadLag, SlidingMode, PerturbationEstimator or DisturbanceObserver
+        The feedback law, optional.
     repetitive : Repetitive, optional
         Repetitive control, for a reference that repeats.
     filters : sequence of LowPass or Notch, optional
@@ -78,7 +90,7 @@ class Controller:
     dt: float
     limits: tuple[float, float]
     feedforward: Inverse | None = None
-    feedback: Pid | StateSpace | None = None
+    feedback: Feedback | None = None
     repetitive: Repetitive | None = None
     filters: Sequence[LowPass | Notch] = ()
     span: tuple[float, float] | None = None
@@ -95,7 +107,12 @@ class Controller:
         low, high = number_pair("limits", self.limits, self.drive_unit)
         object.__setattr__(self, "limits", (low, high))
         _check_part("feedforward", self.feedforward, Inverse, "pt.Inverse")
-        _check_part("feedback", self.feedback, (Pid, StateSpace), "pt.Pid or pt.control.StateSpace")
+        _check_part(
+            "feedback",
+            self.feedback,
+            (Pid, StateSpace, *NAMED_LAWS),
+            "pt.Pid, pt.control.StateSpace or another law of pt.control",
+        )
         _check_part("repetitive", self.repetitive, Repetitive, "pt.Repetitive")
         if not isinstance(self.filters, Sequence):
             raise ParameterError(f"filters is {self.filters!r}: expected a list of filters")
@@ -104,6 +121,8 @@ class Controller:
                 raise ParameterError(f"filters has {one!r}: expected pt.LowPass or pt.Notch")
         if isinstance(self.feedback, Pid):
             _check_unit("kp", self.feedback.kp, high - low, "Pid", self.drive_unit)
+        if isinstance(self.feedback, DisturbanceObserver):
+            _check_unit("kp", self.feedback.pid.kp, high - low, "Pid", self.drive_unit)
         if isinstance(self.repetitive, Repetitive):
             _check_unit("kq", self.repetitive.kq, high - low, "Repetitive", self.drive_unit)
         pid, law = self.feedback, self.feedback
@@ -115,6 +134,7 @@ class Controller:
             max_jump=None if self.max_jump is None else _core.as_number("max_jump", self.max_jump),
             pid=(pid.kp, pid.ti, pid.td, pid.tt) if isinstance(pid, Pid) else None,
             state_space=law._matrices if isinstance(law, StateSpace) else None,
+            law=law._settings if isinstance(law, NAMED_LAWS) else None,
             repetitive=None if self.repetitive is None else self.repetitive._settings,
             filters=[one._settings for one in self.filters],
         )
@@ -129,7 +149,7 @@ class Controller:
         dt: float | None = None,
         limits: tuple[float, float] | None = None,
         playback: Literal["table", "online"] = "table",
-        feedback: Pid | StateSpace | None = None,
+        feedback: Feedback | None = None,
         repetitive: Repetitive | None = None,
         filters: Sequence[LowPass | Notch] = (),
         span: tuple[float, float] | None = None,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from .._support.plot_style import literal
 from .._support.units import best_length_unit, shown_unit
-from .components import Pid
+from .components import Pid, StateSpace
 
 if TYPE_CHECKING:
     from ..references.reference import Reference
@@ -21,7 +21,11 @@ def parts_text(controller: Controller) -> str:
     if controller.feedforward is not None:
         parts.append(f"feedforward ({controller.feedforward.stage.info.title})")
     if controller.feedback is not None:
-        parts.append("PID" if isinstance(controller.feedback, Pid) else "state-space feedback")
+        law = controller.feedback
+        if isinstance(law, Pid):
+            parts.append("PID")
+        else:
+            parts.append("state-space feedback" if isinstance(law, StateSpace) else law.title)
     if controller.repetitive is not None:
         parts.append("repetitive control")
     return " + ".join(parts) or "no control"

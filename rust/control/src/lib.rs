@@ -40,12 +40,14 @@ mod back_calculation;
 pub mod controller;
 pub mod creep;
 mod cubic_segment;
+pub mod disturbance_observer;
 pub mod dynamics;
 mod error;
 pub mod feedback_law;
 pub mod filters;
 pub mod hysteresis;
 pub mod inverse;
+pub mod lead_lag;
 pub mod limits;
 pub mod measurement;
 mod number;
@@ -53,12 +55,14 @@ pub mod online_feedforward;
 pub mod pid;
 pub mod repetitive;
 pub mod scheduled_pid;
+pub mod sliding_mode;
 pub mod snapshot;
 pub mod state_space;
 pub mod unfused;
 
 pub use controller::{Command, Controller, ControllerState};
 pub use creep::{Creep, CreepState};
+pub use disturbance_observer::{DisturbanceObserver, Observed, ObservedState};
 pub use dynamics::{Dynamics, MOST_MODES, Mode, Modes};
 pub use error::{Error, Result};
 pub use feedback_law::{Feedback, FeedbackSample};
@@ -69,6 +73,7 @@ pub use inverse::{
     Inverse, InverseState, ModesInverse, ModesInverseState, OperatorInverse, OscillatorInverse,
     ParallelDahlInverse, PlayInverse, PrandtlIshlinskiiInverse, SampledDahlInverse,
 };
+pub use lead_lag::LeadLag;
 pub use limits::Limits;
 pub use measurement::{Refused, Span};
 pub use number::Number;
@@ -78,5 +83,6 @@ pub use repetitive::{
     Outcome, Recursion, Repetitive, RepetitiveState, SampledRepetitive, Smoothing,
 };
 pub use scheduled_pid::{MOST_GRADES, ScheduledPid, ScheduledPidState};
+pub use sliding_mode::{SampledSlidingMode, SlidingMode, SlidingModeState};
 pub use snapshot::Snapshot;
 pub use state_space::{StateSpace, StateSpaceState};

@@ -149,16 +149,7 @@ pub struct ScheduledPidState {
     begun: bool,
 }
 
-crate::snapshot!(ScheduledPidState {
-    pid,
-    gains,
-    turn,
-    furthest,
-    half_wave,
-    since,
-    turns,
-    begun
-});
+crate::snapshot!(ScheduledPidState { pid, gains, turn, furthest, half_wave, since, turns, begun });
 
 impl ScheduledPidState {
     fn new(pid: PidState, gains: SampledPid) -> Self {

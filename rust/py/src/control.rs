@@ -1,9 +1,10 @@
 //! Controllers, as configuration and as sessions.
 
 use piezotrack_control::{
-    Command, Controller, ControllerState, Filter, Limits, Pid, Repetitive, Smoothing, Span,
-    StateSpace,
+    Command, Controller, ControllerState, DisturbanceObserver, Filter, LeadLag, Limits, Pid,
+    Repetitive, ScheduledPid, SlidingMode, Smoothing, Span, StateSpace,
 };
+use piezotrack_core::design::LinearFeedback;
 use piezotrack_core::math::zeros;
 use piezotrack_core::simulate::{DELAY_LINE, Law, LawState};
 use piezotrack_core::{Error, Result};
@@ -16,6 +17,7 @@ use crate::snapshots::{load, saved};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyController>()?;
+    module.add_function(wrap_pyfunction!(law_transfer_function, module)?)?;
     module.add_class::<PySession>()
 }
 
@@ -24,6 +26,9 @@ type PidGains = (f64, f64, f64, Option<f64>);
 
 /// A row by row, B, C, D, and the vector of back-calculation where it is given.
 type Matrices = (Vec<f64>, Vec<f64>, Vec<f64>, f64, Option<Vec<f64>>);
+
+/// Another law by its name, with its numbers.
+type NamedLaw = (String, Vec<f64>);
 
 /// period, kq, smoothing by its name, its number, forgetting factor, lead, pause.
 type RepetitiveSettings = (f64, f64, String, f64, f64, u32, bool);
@@ -38,7 +43,7 @@ pub struct PyController {
 #[pymethods]
 impl PyController {
     #[new]
-    #[pyo3(signature = (*, dt, limits, span, max_jump, pid, state_space, repetitive, filters))]
+    #[pyo3(signature = (*, dt, limits, span, max_jump, pid, state_space, law, repetitive, filters))]
     #[expect(clippy::too_many_arguments, reason = "all named in Python")]
     fn new(
         dt: f64,
@@ -47,12 +52,16 @@ impl PyController {
         max_jump: Option<f64>,
         pid: Option<PidGains>,
         state_space: Option<Matrices>,
+        law: Option<NamedLaw>,
         repetitive: Option<RepetitiveSettings>,
         filters: Vec<(String, f64, f64, f64)>,
     ) -> PyResult<Self> {
         let build = move || -> Result<Self> {
             piezotrack_core::error::positive("dt", dt, "s")?;
-            let law = law(dt, pid, state_space)?;
+            let law = match law {
+                Some(named) => law_from(&named, dt)?,
+                None => pid_or_state_space(dt, pid, state_space)?,
+            };
             let mut controller = Controller::new(Limits::new(limits.0, limits.1)?, law);
             if let Some((low, high)) = span {
                 controller.span = Span::new(low, high)?;
@@ -94,7 +103,11 @@ impl PyController {
     }
 }
 
-fn law(dt: f64, pid: Option<PidGains>, state_space: Option<Matrices>) -> Result<Law> {
+fn pid_or_state_space(
+    dt: f64,
+    pid: Option<PidGains>,
+    state_space: Option<Matrices>,
+) -> Result<Law> {
     match (pid, state_space) {
         (Some((kp, ti, td, tt)), _) => Ok(Law::Pid(Pid::new(kp, ti, td, tt)?.at(dt)?)),
         (None, Some((a, b, c, d, back))) => {
@@ -102,6 +115,62 @@ fn law(dt: f64, pid: Option<PidGains>, state_space: Option<Matrices>) -> Result<
         }
         (None, None) => Ok(Law::None),
     }
+}
+
+/// A law from its name and its numbers.
+fn law_from((kind, numbers): &NamedLaw, dt: f64) -> Result<Law> {
+    let sliding = |[switching, layer, ti, td, tf]: [f64; 5]| {
+        SlidingMode::new(switching, layer, ti, td, tf)?.at(dt)
+    };
+    Ok(match (kind.as_str(), numbers.as_slice()) {
+        ("lead-lag", &[kp, lead, lag, matched]) => {
+            let mut law = LeadLag::new(kp, lead, lag)?;
+            law.matched = matched > 0.0;
+            Law::StateSpace(law.at(dt)?)
+        }
+        ("sliding mode", &[switching, layer, ti, td, tf]) => {
+            Law::SlidingMode(sliding([switching, layer, ti, td, tf])?)
+        }
+        ("perturbation", &[switching, layer, ti, td, tf, gain, time, cutoff]) => {
+            let inner = sliding([switching, layer, ti, td, tf])?;
+            let observer = DisturbanceObserver::new(gain, time, cutoff)?;
+            Law::ObservedSlidingMode(observer.around(inner, dt)?)
+        }
+        ("disturbance observer", &[kp, ti, td, tt, gain, time, cutoff]) => {
+            let tt = (!tt.is_nan()).then_some(tt);
+            let observer = DisturbanceObserver::new(gain, time, cutoff)?;
+            Law::ObservedPid(observer.around(Pid::new(kp, ti, td, tt)?.at(dt)?, dt)?)
+        }
+        ("scheduled pid", numbers) => Law::Scheduled(scheduled(numbers, dt)?),
+        (other, _) => {
+            let expected = "the name of a feedback law with its numbers";
+            return Err(Error::parameter("law", format!("'{other}'"), expected));
+        }
+    })
+}
+
+/// Counts of amplitudes and rates, their values, those at first, then four numbers of each PID.
+fn scheduled(numbers: &[f64], dt: f64) -> Result<ScheduledPid> {
+    let short = || Error::parameter("law", format!("{} numbers", numbers.len()), "a whole grid");
+    let (counts, rest) = numbers.split_at_checked(2).ok_or_else(short)?;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+    let (along, across) = (counts[0] as usize, counts[1] as usize);
+    let (amplitudes, rest) = rest.split_at_checked(along).ok_or_else(short)?;
+    let (rates, rest) = rest.split_at_checked(across).ok_or_else(short)?;
+    let (first, gains) = rest.split_at_checked(2).ok_or_else(short)?;
+    let pids: Result<Vec<Pid>> = gains
+        .chunks_exact(4)
+        .map(|one| Ok(Pid::new(one[0], one[1], one[2], (!one[3].is_nan()).then_some(one[3]))?))
+        .collect();
+    Ok(ScheduledPid::new(amplitudes, rates, &pids?, (first[0], first[1]), dt)?)
+}
+
+/// Numerator and denominator of a law in powers of `z - 1`, constant term first.
+#[pyfunction]
+#[expect(clippy::needless_pass_by_value, reason = "as Python gives them")]
+fn law_transfer_function(law: NamedLaw, dt: f64) -> PyResult<[Vec<f64>; 2]> {
+    let law = law_from(&law, dt).map_err(|error| raise(&error))?;
+    Ok(law.transfer_function())
 }
 
 /// A repetitive part from plain numbers.

@@ -14,6 +14,7 @@ from ...identification.identified import IdentifiedModel
 from ...references.reference import Reference
 from ...stages.base import Stage
 from ...stages.inverse import Inverse
+from ..components import LowPass, Notch
 from ..controller import number_pair
 from ..plant import Plant, plant_of, voltages_before
 from .box import parts_named
@@ -33,6 +34,7 @@ class Question(NamedTuple):
     drive_unit: str
     feedforward: Inverse | None
     parts: tuple[str, ...] | None
+    filters: tuple[LowPass | Notch, ...]
     margins: Margins
     spread: Spread
     figure: str
@@ -57,6 +59,7 @@ def asked(
     limits: Any,
     feedforward: Any,
     parts: Any,
+    filters: Any,
     margins: Any,
     spread: Any,
     figure: Any,
@@ -110,6 +113,7 @@ def asked(
         drive_unit=unit,
         feedforward=_inverse_of(stages[0], feedforward),
         parts=parts_named(parts),
+        filters=_filters(filters),
         margins=margins or Margins(),
         spread=spread or Spread(),
         figure=figure,
@@ -127,6 +131,13 @@ def asked(
         threads=_core.as_count("threads", threads),
     )
     return question, intervals
+
+
+def _filters(filters: Any) -> tuple[LowPass | Notch, ...]:
+    listed = tuple(filters) if isinstance(filters, Sequence) else None
+    if listed is None or not all(isinstance(one, (LowPass, Notch)) for one in listed):
+        raise ParameterError(f"filters is {filters!r}: expected a list of pt.LowPass and pt.Notch")
+    return listed
 
 
 def _check_kind(name: str, value: object, kind: type) -> None:

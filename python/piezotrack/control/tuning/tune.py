@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from ...references.reference import Reference
     from ...stages.inverse import Inverse
     from ...stages.virtual import VirtualStage
+    from ..components import LowPass, Notch
     from ..plant import Plant
 
 __all__ = ["tune"]
@@ -54,6 +55,7 @@ def tune(
     limits: tuple[float, float] | None = None,
     feedforward: Inverse | Literal["inverse"] | None = "inverse",
     parts: Sequence[str] | str | None = None,
+    filters: Sequence[LowPass | Notch] = (),
     margins: Margins | None = None,
     spread: Spread | None = None,
     figure: Literal["rms", "largest"] = "rms",
@@ -98,6 +100,8 @@ def tune(
         Some of ``"pid"``, ``"low-pass"``, ``"notch"`` and ``"repetitive"``. By default PID and
         low-pass, a notch where a mode rings below half the sampling rate, and a repetitive part
         where all references repeat more than four times with one period.
+    filters : sequence of LowPass or Notch, optional
+        Filters of the measurement that are there in any case; two with those of `parts`.
     margins : Margins, optional
         What every loop keeps.
     spread : Spread, optional
@@ -146,7 +150,7 @@ def tune(
     ('sensitivity', True)
     """
     question, intervals = asked(
-        stage, reference, dt, limits, feedforward, parts, margins, spread, figure,
+        stage, reference, dt, limits, feedforward, parts, filters, margins, spread, figure,
         effort, slew, clipped, delay, jitter, visited, error, seeds, particles, iterations,
         seed, threads,
     )  # fmt: skip
@@ -163,6 +167,11 @@ def _searched(question: Question, dt: float) -> _Answer:
     named = plants_of(question.stages, question.limits, question.delay, question.spread)
     plants = [one.plant for one in named]
     parts = question.parts or _usual_parts(question, plants, dt)
+    of_parts = sum(one in parts for one in ("low-pass", "notch"))
+    if len(question.filters) + of_parts > 2:
+        raise ParameterError(
+            f"filters has {len(question.filters)} beside {of_parts} of the parts: expected 2 in all"
+        )
     periods = {one.period for one in question.references}
     if "repetitive" in parts and len(periods) > 1:
         listed = ", ".join(f"{one:g} s" if one else "none" for one in sorted(periods, key=str))
@@ -175,6 +184,7 @@ def _searched(question: Question, dt: float) -> _Answer:
         dt=dt,
         limits=question.limits,
         feedforward=question.feedforward,
+        filters=question.filters,
         drive_unit=question.drive_unit,
     )
     tasks = _tasks(question, base, "repetitive" in parts)
@@ -302,7 +312,7 @@ def _controller(answer: _Answer) -> Controller:
     return replace(
         answer.base,
         feedback=parts.feedback,
-        filters=parts.filters,
+        filters=(*answer.base.filters, *parts.filters),
         repetitive=parts.repetitive,
     )
 

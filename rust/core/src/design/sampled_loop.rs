@@ -1,6 +1,9 @@
 //! The sampled closed loop: stage, feedback, filters and repetitive part.
 
-use piezotrack_control::{Controller, Feedback, Filter, SampledPid, SampledRepetitive, StateSpace};
+use piezotrack_control::{
+    Controller, Feedback, Filter, Observed, SampledPid, SampledRepetitive, SampledSlidingMode,
+    StateSpace,
+};
 
 use nalgebra::{DMatrix, DVector};
 
@@ -55,6 +58,36 @@ impl<const N: usize> LinearFeedback for StateSpace<N> {
         let of = |v: &[f64; N]| DVector::from_column_slice(&v[..n]);
         let ratio = Ratio::of_matrices(&change, &of(b), &of(c), d);
         [ratio.above, ratio.below]
+    }
+}
+
+/// Inside the boundary layer: `eta/phi (1 + Ts/Ti z/(z-1) + Td/Ts c (z-1)/(z-1+c))`, c the share of
+/// a new difference in the filtered one. Slotine and Li 1991, section 7.2.
+impl LinearFeedback for SampledSlidingMode {
+    fn transfer_function(&self) -> [Vec<f64>; 2] {
+        let [gain, ki, td, c] = self.inside();
+        let kd = td * c;
+        if ki > 0.0 {
+            let above = vec![gain * ki * c, gain * (c + ki * (1.0 + c)), gain * (1.0 + ki + kd)];
+            return [above, vec![0.0, c, 1.0]];
+        }
+        [vec![gain * c, gain * (1.0 + kd)], vec![c, 1.0]]
+    }
+}
+
+/// `((z - q) C + (1 - q)(z - p)/(g (1 - p)))/(z - 1)` around the law C: the estimate has seen the
+/// law's own output, so that the observer integrates.
+impl<F: LinearFeedback> LinearFeedback for Observed<F> {
+    fn transfer_function(&self) -> [Vec<f64>; 2] {
+        let [fresh, pole, inverse] = self.coefficients();
+        let [above, below] = self.inner().transfer_function();
+        let mut sum = product(&above, &[fresh, 1.0]);
+        let observed = product(&below, &[fresh * inverse * (1.0 - pole), fresh * inverse]);
+        sum.resize(sum.len().max(observed.len()), 0.0);
+        for (sum, more) in sum.iter_mut().zip(&observed) {
+            *sum += more;
+        }
+        [sum, product(&below, &[0.0, 1.0])]
     }
 }
 

@@ -1,8 +1,9 @@
 //! Closed-loop tracking: reference and feedforward in, motion and commands out.
 
 use piezotrack_control::{
-    Command, Controller, ControllerState, Feedback, FeedbackSample, PidState, SampledPid, Snapshot,
-    StateSpace, StateSpaceState,
+    Command, Controller, ControllerState, Feedback, FeedbackSample, Observed, ObservedState,
+    PidState, SampledPid, SampledSlidingMode, ScheduledPid, ScheduledPidState, SlidingModeState,
+    Snapshot, StateSpace, StateSpaceState,
 };
 
 use super::apparatus::{Apparatus, ApparatusState};
@@ -28,8 +29,16 @@ pub enum Law {
     None,
     /// Incremental PID.
     Pid(SampledPid),
+    /// PID whose gains follow amplitude and rate of the reference.
+    Scheduled(ScheduledPid),
     /// Discrete state space.
     StateSpace(StateSpace<MOST_STATES>),
+    /// Sliding mode with a boundary layer.
+    SlidingMode(SampledSlidingMode),
+    /// Disturbance observer around a PID.
+    ObservedPid(Observed<SampledPid>),
+    /// Sliding mode with perturbation estimation.
+    ObservedSlidingMode(Observed<SampledSlidingMode>),
 }
 
 /// Memory of a [`Law`].
@@ -39,8 +48,16 @@ pub enum LawState {
     None,
     /// Of a PID controller.
     Pid(PidState),
+    /// Of a PID controller with scheduled gains.
+    Scheduled(ScheduledPidState),
     /// Of a controller in state space.
     StateSpace(StateSpaceState<MOST_STATES>),
+    /// Of sliding mode control.
+    SlidingMode(SlidingModeState),
+    /// Of a PID controller with a disturbance observer.
+    ObservedPid(ObservedState<PidState>),
+    /// Of sliding mode control with perturbation estimation.
+    ObservedSlidingMode(ObservedState<SlidingModeState>),
 }
 
 impl Snapshot for LawState {
@@ -48,7 +65,11 @@ impl Snapshot for LawState {
         match self {
             Self::None => {}
             Self::Pid(state) => state.save(write),
+            Self::Scheduled(state) => state.save(write),
             Self::StateSpace(state) => state.save(write),
+            Self::SlidingMode(state) => state.save(write),
+            Self::ObservedPid(state) => state.save(write),
+            Self::ObservedSlidingMode(state) => state.save(write),
         }
     }
 
@@ -56,7 +77,11 @@ impl Snapshot for LawState {
         match self {
             Self::None => Some(()),
             Self::Pid(state) => state.load(read),
+            Self::Scheduled(state) => state.load(read),
             Self::StateSpace(state) => state.load(read),
+            Self::SlidingMode(state) => state.load(read),
+            Self::ObservedPid(state) => state.load(read),
+            Self::ObservedSlidingMode(state) => state.load(read),
         }
     }
 }
@@ -68,7 +93,11 @@ impl Feedback for Law {
         match self {
             Self::None => LawState::None,
             Self::Pid(law) => LawState::Pid(law.rest()),
+            Self::Scheduled(law) => LawState::Scheduled(law.rest()),
             Self::StateSpace(law) => LawState::StateSpace(law.rest()),
+            Self::SlidingMode(law) => LawState::SlidingMode(law.rest()),
+            Self::ObservedPid(law) => LawState::ObservedPid(law.rest()),
+            Self::ObservedSlidingMode(law) => LawState::ObservedSlidingMode(law.rest()),
         }
     }
 
@@ -76,7 +105,11 @@ impl Feedback for Law {
         match self {
             Self::None => LawState::None,
             Self::Pid(law) => LawState::Pid(law.start(volts)),
+            Self::Scheduled(law) => LawState::Scheduled(law.start(volts)),
             Self::StateSpace(law) => LawState::StateSpace(law.start(volts)),
+            Self::SlidingMode(law) => LawState::SlidingMode(law.start(volts)),
+            Self::ObservedPid(law) => LawState::ObservedPid(law.start(volts)),
+            Self::ObservedSlidingMode(law) => LawState::ObservedSlidingMode(law.start(volts)),
         }
     }
 
@@ -87,9 +120,23 @@ impl Feedback for Law {
     fn adopt(&self, before: &Self, state: &mut LawState) -> bool {
         match (self, before, state) {
             (Self::Pid(law), Self::Pid(before), LawState::Pid(state)) => law.adopt(before, state),
+            (Self::Scheduled(law), Self::Scheduled(before), LawState::Scheduled(state)) => {
+                law.adopt(before, state)
+            }
             (Self::StateSpace(law), Self::StateSpace(before), LawState::StateSpace(state)) => {
                 law.adopt(before, state)
             }
+            (Self::SlidingMode(law), Self::SlidingMode(before), LawState::SlidingMode(state)) => {
+                law.adopt(before, state)
+            }
+            (Self::ObservedPid(law), Self::ObservedPid(before), LawState::ObservedPid(state)) => {
+                law.adopt(before, state)
+            }
+            (
+                Self::ObservedSlidingMode(law),
+                Self::ObservedSlidingMode(before),
+                LawState::ObservedSlidingMode(state),
+            ) => law.adopt(before, state),
             (Self::None, Self::None, _) => true,
             _ => false,
         }
@@ -98,7 +145,13 @@ impl Feedback for Law {
     fn step(&self, state: &mut LawState, sample: &FeedbackSample) -> f64 {
         match (self, state) {
             (Self::Pid(law), LawState::Pid(state)) => law.step(state, sample),
+            (Self::Scheduled(law), LawState::Scheduled(state)) => law.step(state, sample),
             (Self::StateSpace(law), LawState::StateSpace(state)) => law.step(state, sample),
+            (Self::SlidingMode(law), LawState::SlidingMode(state)) => law.step(state, sample),
+            (Self::ObservedPid(law), LawState::ObservedPid(state)) => law.step(state, sample),
+            (Self::ObservedSlidingMode(law), LawState::ObservedSlidingMode(state)) => {
+                law.step(state, sample)
+            }
             _ => 0.0,
         }
     }
@@ -109,14 +162,19 @@ impl LinearFeedback for Law {
         match self {
             Self::None => ().transfer_function(),
             Self::Pid(law) => law.transfer_function(),
+            Self::Scheduled(law) => law.first().transfer_function(),
             Self::StateSpace(law) => law.transfer_function(),
+            Self::SlidingMode(law) => law.transfer_function(),
+            Self::ObservedPid(law) => law.transfer_function(),
+            Self::ObservedSlidingMode(law) => law.transfer_function(),
         }
     }
 
     fn named_gain(&self) -> Option<f64> {
         match self {
             Self::Pid(law) => law.named_gain(),
-            Self::None | Self::StateSpace(_) => None,
+            Self::Scheduled(law) => law.first().named_gain(),
+            _ => None,
         }
     }
 }

@@ -1,0 +1,167 @@
+//! Disturbance observer around a feedback law.
+//!
+//! ```text
+//! d = Q (Gn^-1 (y - r) - (u - uFF)),   uFB = uC - d,   Gn = g/(1 + T s),   Q = 1/(1 + s/wc)
+//! ```
+//!
+//! After Ohnishi's disturbance observer, and Yi, Chang and Shen 2009 for the hysteresis of piezo
+//! actuators, whose hysteresis is the disturbance of a linear nominal plant. Here plant and voltage
+//! are counted from reference and feedforward: what a feedforward compensates, be it linear or the
+//! inverse of the hysteresis, is not compensated twice. Without feedforward the two forms differ by
+//! what the reference asks for only, and their loops are the same.
+//!
+//! Around a sliding mode law this is sliding mode control with perturbation estimation (Elmali and
+//! Olgac 1992), in which the estimate takes the place of most of the switching gain.
+//!
+//! Sampled, with the voltage held: p = exp(-Ts/T), q = exp(-wc Ts),
+//!
+//! ```text
+//! d[k] = q d[k-1] + (1 - q) (-(e[k] - p e[k-1])/(g (1 - p)) - (v[k-1] - uFF[k-1]))
+//! ```
+//!
+//! where v is the voltage that was applied, so that the estimate does not wind up.
+
+use core::f64::consts::TAU;
+
+use crate::error::{Result, check, finite, not_negative, positive};
+use crate::feedback_law::{Feedback, FeedbackSample};
+
+/// Nominal plant and filter of an observer, in continuous time.
+///
+/// | field | symbol | unit | range |
+/// | --- | --- | --- | --- |
+/// | `gain` | g | m/V | not 0 |
+/// | `time` | T | s | >= 0 |
+/// | `cutoff` | wc/(2 pi) | Hz | > 0, or infinite: no filter |
+///
+/// ```
+/// use piezotrack_control::{DisturbanceObserver, Feedback, FeedbackSample};
+///
+/// let observer = DisturbanceObserver::new(1e-6, 0.0, f64::INFINITY)?;
+/// let law = observer.around((), 0.001)?;
+/// let mut state = law.rest();
+/// law.step(&mut state, &FeedbackSample::new(0.0));
+/// // 1 um short of the reference at 0 V: a disturbance of -1 V
+/// let volts = law.step(&mut state, &FeedbackSample::new(1e-6));
+/// assert!((volts - 1.0).abs() < 1e-12);
+/// # Ok::<(), piezotrack_control::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DisturbanceObserver {
+    gain: f64,
+    time: f64,
+    cutoff: f64,
+}
+
+impl DisturbanceObserver {
+    /// Gain (m/V) and time constant (s) of the nominal plant, cutoff of the filter (Hz).
+    ///
+    /// # Errors
+    /// Names the number that is out of its range.
+    pub fn new(gain: f64, time: f64, cutoff: f64) -> Result<Self> {
+        finite("plant_gain", gain, "m/V")?;
+        check("plant_gain", gain, "m/V", gain.abs() > 0.0, "a gain other than 0")?;
+        not_negative("plant_time", time, "s")?;
+        let expected = "a frequency above 0, or infinity for no filter";
+        check("cutoff", cutoff, "Hz", cutoff > 0.0, expected)?;
+        Ok(Self { gain, time, cutoff })
+    }
+
+    /// The observer around the law `inner`, both for the sampling interval `dt`, s.
+    ///
+    /// # Errors
+    /// Names `dt` where it is not above 0; `plant_gain` where a coefficient overflows.
+    pub fn around<F>(&self, inner: F, dt: f64) -> Result<Observed<F>> {
+        positive("dt", dt, "s")?;
+        let fresh = -libm::expm1(-TAU * self.cutoff * dt);
+        let rest = if self.time > 0.0 { -libm::expm1(-dt / self.time) } else { 1.0 };
+        let inverse = 1.0 / (self.gain * rest);
+        let expected = "a nominal plant whose sampled inverse is finite";
+        check("plant_gain", self.gain, "m/V", inverse.is_finite() && fresh > 0.0, expected)?;
+        Ok(Observed { inner, fresh, pole: 1.0 - rest, inverse })
+    }
+}
+
+/// A feedback law with a disturbance observer, for one sampling interval; see
+/// [`DisturbanceObserver::around`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Observed<F> {
+    inner: F,
+    /// 1 - q.
+    fresh: f64,
+    /// p.
+    pole: f64,
+    /// 1/(g (1 - p)), V/m.
+    inverse: f64,
+}
+
+/// State of an [`Observed`] law.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ObservedState<S> {
+    inner: S,
+    /// d, V.
+    disturbance: f64,
+    /// Error (m) and feedforward (V) of the last sample; `None` before the first.
+    last: Option<[f64; 2]>,
+    /// The last output, V.
+    volts: f64,
+}
+
+crate::snapshot!(
+    [S: crate::Snapshot] ObservedState<S> { inner, disturbance, last, volts }
+);
+
+impl<F> Observed<F> {
+    /// The law inside.
+    #[must_use]
+    pub fn inner(&self) -> &F {
+        &self.inner
+    }
+
+    /// 1 - q, p and 1/(g (1 - p)) in V/m.
+    #[must_use]
+    pub fn coefficients(&self) -> [f64; 3] {
+        [self.fresh, self.pole, self.inverse]
+    }
+}
+
+impl<F: Feedback> Feedback for Observed<F> {
+    type State = ObservedState<F::State>;
+
+    fn rest(&self) -> Self::State {
+        ObservedState { inner: self.inner.rest(), disturbance: 0.0, last: None, volts: 0.0 }
+    }
+
+    fn start(&self, volts: f64) -> Self::State {
+        ObservedState { inner: self.inner.start(volts), volts, ..self.rest() }
+    }
+
+    fn holds(&self) -> bool {
+        self.inner.holds()
+    }
+
+    fn adopt(&self, before: &Self, state: &mut Self::State) -> bool {
+        let pairs = self.coefficients().into_iter().zip(before.coefficients());
+        let same = pairs.into_iter().all(|(one, other)| one.to_bits() == other.to_bits());
+        same && self.inner.adopt(&before.inner, &mut state.inner)
+    }
+
+    #[inline]
+    fn step(&self, state: &mut Self::State, sample: &FeedbackSample) -> f64 {
+        let FeedbackSample { error, applied, feedforward, .. } = *sample;
+        if let Some([before, forward]) = state.last {
+            let needed = -self.inverse * (error - self.pole * before);
+            let found = needed - (applied - forward);
+            state.disturbance += self.fresh * (found - state.disturbance);
+        }
+        let volts = self.inner.step(&mut state.inner, sample) - state.disturbance;
+        if volts.is_finite() {
+            state.last = Some([error, feedforward]);
+            state.volts = volts;
+        } else {
+            // Overflow: hold the output, and observe again from the next sample on.
+            (state.disturbance, state.last) = (0.0, None);
+        }
+        state.volts
+    }
+}
