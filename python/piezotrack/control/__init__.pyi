@@ -16,6 +16,13 @@ from .contouring_plot import plot_contour_error as plot_contour_error
 from .contouring_plot import plot_magnified as plot_magnified
 from .contouring_plot import plot_path as plot_path
 from .controller import Controller as Controller
+from .iterative_learning import IterativeLearning as IterativeLearning
+from .iterative_learning import LearningTrial as LearningTrial
+from .learning import Learning as Learning
+from .learning import learn as learn
+from .learning_rules import Convergence as Convergence
+from .learning_rules import FrequencyRule as FrequencyRule
+from .learning_rules import LiftedRule as LiftedRule
 from .linear_systems import to_control as to_control
 from .plant import Plant as Plant
 from .session import Command as Command
