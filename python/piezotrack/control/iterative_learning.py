@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["IterativeLearning", "LearningTrial", "Method"]
 
 Method = Literal["frequency", "lifted"]
-# The rms of an error that is nothing but noise, over that of the noise, at most.
+# The rms of an error that is nothing but noise, over what it should be, at most.
 ABOVE_NOISE = 1.1
 # Trials without a change for the better after which no more is expected, and what counts as one.
 STALLED, BETTER = 4, 0.98
@@ -173,6 +173,8 @@ class IterativeLearning:
         step = positive("gain", gain, "parts of 1")
         if step >= 2.0:
             raise ParameterError(f"gain is {step:g}: expected below 2")
+        # The noise of earlier trials is in the table: gain^2 (1 + (1 - gain)^2 + ...) of it.
+        self._only_noise = ABOVE_NOISE * float(np.sqrt(2.0 / (2.0 - step)))
         kept = in_range("forgetting_factor", forgetting_factor, 1.0, "parts of 1")
         if kept == 0.0:
             raise ParameterError("forgetting_factor is 0: expected above 0, at most 1")
@@ -273,7 +275,8 @@ class IterativeLearning:
         if not self._trials:
             return None
         last, errors = self._trials[-1], [one.rms_error for one in self._trials]
-        if last.noise is not None and last.rms_error <= ABOVE_NOISE * last.noise:
+        known = [one.noise**2 for one in self._trials if one.noise is not None]
+        if known and last.rms_error <= self._only_noise * float(np.sqrt(np.mean(known))):
             return "noise"
         if last.rms_error > GROWN * min(errors):
             return "grows"

@@ -54,8 +54,8 @@ class LearningPlant:
     def response(self, frequency: Array) -> Complex:
         """Return the frequency response [m/V] at frequencies [Hz] up to half the sampling rate."""
         dt = self.controller.dt
-        # Neither at 0, where an integrator is infinite, nor beyond half the sampling rate.
-        points = np.clip(frequency, 1e-7 / dt, 0.5 / dt).tolist()
+        # Not at 0, where an integrator is infinite, nor beyond half the sampling rate.
+        points = np.clip(frequency, 1e-12 / dt, 0.5 / dt).tolist()
         alone = Controller(dt=dt, limits=(-1.0, 1.0), feedback=StateSpace([[0.0]], [0.0], [0.0], 1))
         stage = _complex(_core.loop_response(alone._core, self.plant, points)[0])
         if self.controller.feedback is None:

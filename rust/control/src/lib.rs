@@ -46,6 +46,7 @@ pub mod feedback_law;
 pub mod filters;
 pub mod hysteresis;
 pub mod inverse;
+pub mod iterative_learning;
 pub mod limits;
 pub mod measurement;
 mod number;
@@ -68,6 +69,7 @@ pub use inverse::{
     Inverse, InverseState, ModesInverse, ModesInverseState, OperatorInverse, OscillatorInverse,
     ParallelDahlInverse, PlayInverse, PrandtlIshlinskiiInverse, SampledDahlInverse,
 };
+pub use iterative_learning::IterativeLearning;
 pub use limits::Limits;
 pub use measurement::{Refused, Span};
 pub use number::Number;
