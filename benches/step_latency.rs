@@ -5,7 +5,9 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use piezotrack_control::{Controller, DahlInverse, IterativeLearning, Limits, Pid, Repetitive, Smoothing};
+use piezotrack_control::{
+    Controller, DahlInverse, IterativeLearning, Limits, Pid, Repetitive, Smoothing,
+};
 use piezotrack_core::integrator::{FEW_TERMS, TERMS};
 use piezotrack_core::models::DahlStage;
 use piezotrack_core::models::dahl::SmoothKernel;

@@ -327,14 +327,17 @@ def _largest(matrix: Array, dt: float) -> tuple[float, float]:
 
 
 def _highest(made: Callable[[float], Rule], low: float, high: float, closely: float) -> float:
-    """Find the highest cutoff with which what remains is below `TARGET`: it rises with it."""
-    if made(high).convergence.factor <= TARGET:
-        return high
-    if made(low).convergence.factor > TARGET:
+    """Find the highest cutoff with which little remains: what remains rises with the cutoff."""
+    least = made(low).convergence.factor
+    # A stage of small gain learns slowly at any cutoff: a tenth more is what the cutoff may cost.
+    most = max(TARGET, least + (1.0 - TARGET) * (1.0 - least))
+    if least >= 1.0:
         return low
+    if made(high).convergence.factor <= most:
+        return high
     while high > closely * low:
         middle = float(np.sqrt(low * high))
-        if made(middle).convergence.factor <= TARGET:
+        if made(middle).convergence.factor <= most:
             low = middle
         else:
             high = middle
