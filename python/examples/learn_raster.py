@@ -1,6 +1,6 @@
 """Scan a test pattern forward and backward, before and after learning between the lines.
 
-Writes docs/raster.png: what a microscope shows whose fast axis follows a triangle at 20 Hz.
+Writes raster.png: what a microscope shows whose fast axis follows a triangle at 20 Hz.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def pixels(desired: Array, actual: Array) -> tuple[Array, Array]:
     return forward, backward
 
 
-def main(path: str = "docs/raster.png") -> None:
+def main(path: str = "raster.png") -> None:
     """Learn, print the errors, and draw."""
     stage = virtual_stage()
     model = identified(stage)

@@ -98,8 +98,8 @@ class IterativeLearning:
     gain : float, optional
         Learning gain, above 0 and below 2.
     cutoff : float, optional
-        Frequency at which Q is a half [Hz]; default the highest with which a trial leaves 0.9 at
-        most of the distance to the final table on every model.
+        Frequency at which Q is a half [Hz]; default the highest, up to a quarter of the sampling
+        rate, with which a trial leaves 0.9 at most of the distance to the final table.
     forgetting_factor : float, optional
         Share of the learnt voltage that is kept from trial to trial, above 0, at most 1.
     change_weight : float, optional
@@ -123,7 +123,7 @@ class IterativeLearning:
     >>> reference = pt.sine(frequency=1.0, low=5e-6, high=50e-6, duration=3.0)
     >>> learner = pt.control.IterativeLearning(stage, reference, loop)
     >>> for _ in range(12):
-    ...     run = stage.simulate(np.tile(learner.table, 3), 0.01)
+    ...     run = stage.simulate(np.tile(learner.table, 3), 0.01, hold="zoh")
     ...     table = learner.update(run.x[-100:])
     >>> learner.trials[-1].rms_error < 1e-3 * learner.trials[0].rms_error
     True

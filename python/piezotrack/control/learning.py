@@ -310,7 +310,7 @@ def learn(
     >>> stage = pt.VirtualStage.of(plays, noise=5e-9, mode=(160.0, 0.065))
     >>> loop = pt.Controller(dt=1e-3, limits=(0.0, 75.0), feedforward=plays.inverse())
     >>> reference = pt.triangle(frequency=10.0, low=10e-6, high=50e-6, duration=0.5)
-    >>> found = pt.learn(stage, reference, loop, model=stage)
+    >>> found = pt.learn(stage, reference, loop, model=stage, mode_scales=1.0)
     >>> found.errors[found.best] < 0.1 * found.errors[0]
     np.True_
     """

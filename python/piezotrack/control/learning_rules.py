@@ -32,6 +32,8 @@ LONGEST_LIFTED = 2000
 # Cutoffs of the lifted form, in parts of the sampling rate: below them its equations are ill
 # conditioned, and none is above half of it.
 LOWEST_EDGE, HIGHEST_EDGE = 0.002, 0.5
+# The highest that is chosen, in the same parts: beyond it a sample more or less is half a turn.
+HIGHEST_CHOSEN = 0.25
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,7 +130,20 @@ class FrequencyRule:
     convergence: Convergence
 
     def after(self, learnt: Array, error: Array) -> Array:
-        """Return the next learnt voltage [V] from the last one and its error [m]."""
+        """Return the next learnt voltage from the last one and its error.
+
+        Parameters
+        ----------
+        learnt : ndarray, shape (n,)
+            What the last trial had above the feedforward [V].
+        error : ndarray, shape (n,)
+            Desired less measured displacement [m].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            For the next trial [V], before the limits.
+        """
         before, wrong = np.fft.rfft(learnt), np.fft.rfft(error)
         return np.fft.irfft(
             self.smoothing * (self.forgetting_factor * before + self.learning * wrong), self.samples
@@ -198,10 +213,10 @@ def frequency_rule(
             convergence=Convergence._worst(cases),
         )
 
-    if cutoff is not None:
-        return _converging(made(cutoff), f"a cutoff below {cutoff:.3g} Hz")
-    edge = _highest(made, 0.5 * frequency[1], 5.0 / dt, 1.01)
-    return _converging(made(edge), "a smaller learning gain, or models less far apart")
+    if cutoff is not None and (asked := made(cutoff)).convergence.monotone:
+        return asked
+    edge = _highest(made, 0.5 * frequency[1], HIGHEST_CHOSEN / dt, 1.01)
+    return _converging(made(edge), None if cutoff is None else asked)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -232,7 +247,20 @@ class LiftedRule:
     convergence: Convergence
 
     def after(self, learnt: Array, error: Array) -> Array:
-        """Return the next learnt voltage [V] from the last one and its error [m]."""
+        """Return the next learnt voltage from the last one and its error.
+
+        Parameters
+        ----------
+        learnt : ndarray, shape (n,)
+            What the last trial had above the feedforward [V].
+        error : ndarray, shape (n,)
+            Desired less measured displacement [m].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            For the next trial [V], before the limits.
+        """
         count = learnt.size - self.late
         following = self.keeping @ learnt[:count] + self.learning @ error[self.late :]
         # The last voltages show in no reading.
@@ -290,10 +318,10 @@ def lifted_rule(
             convergence=Convergence._worst(cases),
         )
 
-    if cutoff is not None:
-        return _converging(made(cutoff), f"a cutoff below {cutoff:.3g} Hz")
-    edge = _highest(made, LOWEST_EDGE / dt, HIGHEST_EDGE / dt, 1.1)
-    return _converging(made(edge), "a smaller learning gain, or models less far apart")
+    if cutoff is not None and (asked := made(cutoff)).convergence.monotone:
+        return asked
+    edge = _highest(made, LOWEST_EDGE / dt, HIGHEST_CHOSEN / dt, 1.1)
+    return _converging(made(edge), None if cutoff is None else asked)
 
 
 def _smoothed(columns: NDArray[np.floating[Any]], edge: float) -> Array:
@@ -344,13 +372,24 @@ def _highest(made: Callable[[float], Rule], low: float, high: float, closely: fl
     return low
 
 
-def _converging(rule: R, remedy: str) -> R:
-    """Refuse an update that does not converge monotonically on all models."""
+def _converging(best: R, asked: R | None) -> R:
+    """Return the best update, or refuse that which was asked for, or both.
+
+    Parameters
+    ----------
+    best : FrequencyRule or LiftedRule
+        That of the highest cutoff that converges, if any does.
+    asked : FrequencyRule or LiftedRule or None
+        That of a cutoff that was given, which does not.
+    """
+    if asked is None and best.convergence.monotone:
+        return best
+    rule = best if asked is None else asked
+    remedy = "a smaller learning gain, or models less far apart"
+    if best.convergence.monotone:
+        remedy = f"a cutoff of {best.cutoff:.3g} Hz in place of {rule.cutoff:.3g}, or {remedy}"
     found = rule.convergence
-    if not found.monotone:
-        raise ParameterError(
-            f"learning does not converge on {found.model}: at {found.frequency:.4g} Hz a trial "
-            f"leaves {found.factor:.4g} times the distance to the final table: expected below 1, "
-            f"with {remedy}"
-        )
-    return rule
+    raise ParameterError(
+        f"learning does not converge on {found.model}: at {found.frequency:.4g} Hz a trial leaves "
+        f"{found.factor:.4g} times the distance to the final table: expected below 1, with {remedy}"
+    )
