@@ -26,6 +26,8 @@ from .learning_rules import LiftedRule as LiftedRule
 from .linear_systems import to_control as to_control
 from .mixed_sensitivity import MixedSensitivity as MixedSensitivity
 from .mixed_sensitivity import mixed_sensitivity as mixed_sensitivity
+from .neural_network import NetworkInverse as NetworkInverse
+from .neural_network import train_network as train_network
 from .plant import Plant as Plant
 from .session import Command as Command
 from .session import RefusedReadings as RefusedReadings
