@@ -11,7 +11,7 @@ import pytest
 
 import piezotrack as pt
 from piezotrack.control import train_network
-from piezotrack.control.neural_network import _Network
+from piezotrack.control.neural_network import _motion, _Network
 
 DT = 2e-3
 LIMITS = (0.0, 75.0)
@@ -134,3 +134,21 @@ def test_records_that_cannot_be_trained_on() -> None:
         train_network(pt.Dataset(u=np.arange(300.0), y=np.zeros(300), dt=DT))
     with pytest.raises(pt.ParameterError, match="record is list"):
         train_network([1.0])  # type: ignore[arg-type]
+
+
+def test_on_measured_logs_beside_the_inverse_of_the_plays() -> None:
+    """The figures of docs/tracking.md: the drive of one log, by inverses from the other."""
+    rich = pt.datasets.dbo_tracking()[3.0:43.0]
+    other = pt.datasets.dbo_training().full
+    network = train_network(rich, delay=0.005)
+    plays = pt.identify(rich, "prandtl-ishlinskii").inverse()
+    apart = []
+    for inverse in (network, plays):
+        # A sample of delay, and after 23 s; the logs have zeros of their own.
+        late = round(inverse.delay / other.dt)
+        motion = _motion(other.y - inverse.offset, other.dt)[late:]
+        x, v, a = np.ascontiguousarray(motion.T)
+        volts = inverse._begun(other.dt).along(x, v, a)
+        apart.append(float(np.std((volts - other.u[: volts.size])[4600:-5])))
+    assert apart[0] == pytest.approx(8.5e-3, abs=2e-3)
+    assert apart[0] < 0.6 * apart[1]
