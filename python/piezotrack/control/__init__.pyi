@@ -16,6 +16,8 @@ from .contouring_plot import plot_contour_error as plot_contour_error
 from .contouring_plot import plot_magnified as plot_magnified
 from .contouring_plot import plot_path as plot_path
 from .controller import Controller as Controller
+from .h_infinity import MixedSensitivity as MixedSensitivity
+from .h_infinity import mixed_sensitivity as mixed_sensitivity
 from .iterative_learning import IterativeLearning as IterativeLearning
 from .iterative_learning import LearningTrial as LearningTrial
 from .learning import Learning as Learning
@@ -24,8 +26,6 @@ from .learning_rules import Convergence as Convergence
 from .learning_rules import FrequencyRule as FrequencyRule
 from .learning_rules import LiftedRule as LiftedRule
 from .linear_systems import to_control as to_control
-from .mixed_sensitivity import MixedSensitivity as MixedSensitivity
-from .mixed_sensitivity import mixed_sensitivity as mixed_sensitivity
 from .neural_network import NetworkInverse as NetworkInverse
 from .neural_network import train_network as train_network
 from .plant import Plant as Plant
