@@ -31,6 +31,7 @@ const CONTROL: [&str; 19] = [
     "state_space",
     "pid",
     "repetitive",
+    "iterative_learning",
     "measurement",
     "controller",
 ];
