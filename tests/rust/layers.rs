@@ -13,7 +13,7 @@ const CORE: [&str; 8] =
     ["error", "math", "signal", "integrator", "design", "models", "simulate", "identify"];
 
 /// From the bottom up.
-const CONTROL: [&str; 19] = [
+const CONTROL: [&str; 20] = [
     "error",
     "number",
     "unfused",
