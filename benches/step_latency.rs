@@ -5,7 +5,9 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use piezotrack_control::{Controller, DahlInverse, Limits, Pid, Repetitive, Smoothing};
+use piezotrack_control::{
+    Controller, DahlInverse, IterativeLearning, Limits, Pid, Repetitive, Smoothing,
+};
 use piezotrack_core::integrator::{FEW_TERMS, TERMS};
 use piezotrack_core::models::DahlStage;
 use piezotrack_core::models::dahl::SmoothKernel;
@@ -78,5 +80,22 @@ fn controller(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, latency, controller);
+/// The update of a table of 5000 samples between two periods: what a sample of it takes.
+fn learning(criterion: &mut Criterion) {
+    let taps = [1.0 / 65.0; 65];
+    let gains = [1e4; 65];
+    let limits = Limits::new(0.0, 75.0).unwrap();
+    let rule = IterativeLearning::new(&gains, &taps, limits).unwrap();
+    let error: Vec<f64> = (0..5000).map(|k| 1e-6 * f64::from(k % 7)).collect();
+    let feedforward = vec![20.0; 5000];
+    let mut table = feedforward.clone();
+    let mut group = criterion.benchmark_group("step_latency");
+    group.throughput(Throughput::Elements(5000));
+    group.bench_function("iterative learning, 65 taps each", |bencher| {
+        bencher.iter(|| rule.update(black_box(&mut table), &feedforward, &error).unwrap());
+    });
+    group.finish();
+}
+
+criterion_group!(benches, latency, controller, learning);
 criterion_main!(benches);

@@ -78,6 +78,14 @@ TAKERS: dict[str, Taker] = {
     "Reference.from_samples": Taker(
         lambda x: pt.Reference.from_samples(x, DT).sample(DT), scale=1e-6
     ),
+    "IterativeLearning.update": Taker(
+        lambda y: pt.control.IterativeLearning(
+            STAGES["prandtl-ishlinskii"],
+            pt.sine(frequency=1.0, low=0.0, high=10e-6, duration=1.0),
+            pt.Controller(dt=0.1, limits=(0.0, 75.0)),
+        ).update(y),
+        scale=1e-6,
+    ),
     "Reference.at": Taker(lambda t: CIRCLE.x.at(t), scale=0.1),
     "XYReference.errors, circle": Taker(CIRCLE.errors, arrays=2, scale=1e-6),
     "XYReference.errors, path": Taker(FIGURE.errors, arrays=2, scale=1e-6),
@@ -283,6 +291,7 @@ def test_an_interruption_is_no_fault_of_a_number() -> None:
 # Matrices of 2 by 2, which no record gives.
 NO_RECORD = (
     *("XYReference.transformed", "contour", "run_table_2", "control.StateSpace"),
+    "control.MixedSensitivity",
     *("Objective.descend", "Objective.parameters"),
 )
 ROOMS = (pt, pt.control, pt.data, pt.identification, pt.references, pt.stages, pt.xu_li_2010)

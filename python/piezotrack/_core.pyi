@@ -122,6 +122,22 @@ class Response:
 
 @final
 class Inverse:
+    @staticmethod
+    def network(
+        numbers: tuple[
+            float,
+            tuple[float, float, float],
+            list[float],
+            list[float],
+            list[float],
+            list[float],
+            list[float],
+            float,
+        ],
+        dt: float,
+        offset: float,
+        delay: float,
+    ) -> Inverse: ...
     def step(
         self,
         reference: float,

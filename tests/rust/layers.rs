@@ -32,6 +32,7 @@ const CONTROL: [&str; 20] = [
     "pid",
     "scheduled_pid",
     "repetitive",
+    "iterative_learning",
     "measurement",
     "controller",
 ];

@@ -21,7 +21,7 @@ from .plant import linearised_plants, plant_of
 if TYPE_CHECKING:
     from .plant import Plant
 
-__all__ = ["to_control"]
+__all__ = ["sampled", "to_control"]
 
 CASES = ("low", "middle", "high")
 
@@ -126,11 +126,11 @@ def _stage(
         system = (a, np.reshape(b, (-1, 1)), np.reshape(c, (1, -1)), [[d]])
         return _control().ss(*system, name=name, inputs=["voltage_V"], outputs=["displacement_m"])
     dt = check_dt(dt)
-    system = _sampled(a, np.array(b), np.array(c), d, late, dt)
+    system = sampled(a, np.array(b), np.array(c), d, late, dt)
     return _control().ss(*system, dt, name=name, inputs=["voltage_V"], outputs=["displacement_m"])
 
 
-def _sampled(
+def sampled(
     a: np.ndarray[Any, np.dtype[np.float64]],
     b: np.ndarray[Any, np.dtype[np.float64]],
     c: np.ndarray[Any, np.dtype[np.float64]],

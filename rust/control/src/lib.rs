@@ -47,6 +47,7 @@ pub mod feedback_law;
 pub mod filters;
 pub mod hysteresis;
 pub mod inverse;
+pub mod iterative_learning;
 pub mod lead_lag;
 pub mod limits;
 pub mod measurement;
@@ -73,6 +74,7 @@ pub use inverse::{
     Inverse, InverseState, ModesInverse, ModesInverseState, OperatorInverse, OscillatorInverse,
     ParallelDahlInverse, PlayInverse, PrandtlIshlinskiiInverse, SampledDahlInverse,
 };
+pub use iterative_learning::IterativeLearning;
 pub use lead_lag::LeadLag;
 pub use limits::Limits;
 pub use measurement::{Refused, Span};

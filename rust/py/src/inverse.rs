@@ -1,8 +1,12 @@
 //! The inverse of a stage, for feedforward.
 
 use numpy::PyArray1;
-use piezotrack_control::inverse::{Inverse, after_drive};
-use piezotrack_control::{Limits, OnlineFeedforward, OnlineFeedforwardState, ReferenceSample};
+use piezotrack_control::inverse::{
+    Inverse, NetworkNumbers, NeuralNetworkInverse, NeuralNetworkState, after_drive,
+};
+use piezotrack_control::{
+    Limits, OnlineFeedforward, OnlineFeedforwardState, ReferenceSample, Snapshot,
+};
 use piezotrack_core::math::room;
 use piezotrack_core::models::{StageInverse, StageInverseState};
 use piezotrack_core::{Error, Result};
@@ -21,22 +25,107 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 /// The inverse of a stage, sample by sample or along a whole reference.
 #[pyclass(name = "Inverse", module = "piezotrack._core")]
 pub struct PyInverse {
-    online: OnlineFeedforward<StageInverse>,
-    start: StageInverseState,
-    state: OnlineFeedforwardState<StageInverseState>,
+    online: OnlineFeedforward<AnyInverse>,
+    start: AnyState,
+    state: OnlineFeedforwardState<AnyState>,
     /// Drives that reach the stage, where that is known.
     limits: Option<Limits>,
 }
 
 impl PyInverse {
     /// An inverse that starts from what it remembers.
-    pub fn new(online: OnlineFeedforward<StageInverse>, start: &StageInverseState) -> Self {
+    pub fn of_stage(
+        inverse: StageInverse,
+        start: &StageInverseState,
+        dt: f64,
+        offset: f64,
+        delay: f64,
+    ) -> Result<Self> {
+        let any = AnyInverse::Stage(Box::new(inverse));
+        Ok(Self::new(OnlineFeedforward::new(any, dt, offset, delay)?, &AnyState::Stage(*start)))
+    }
+
+    fn new(online: OnlineFeedforward<AnyInverse>, start: &AnyState) -> Self {
         Self { state: online.start(*start), online, start: *start, limits: None }
     }
 }
 
+/// The inverse of a stage, or a network in its place.
+enum AnyInverse {
+    Stage(Box<StageInverse>),
+    Network(Box<NeuralNetworkInverse>),
+}
+
+/// State of the same kind.
+#[derive(Clone, Copy)]
+#[expect(clippy::large_enum_variant, reason = "a state is copied, as each of an inverse is")]
+enum AnyState {
+    Stage(StageInverseState),
+    Network(NeuralNetworkState),
+}
+
+impl Inverse for AnyInverse {
+    type State = AnyState;
+
+    fn rest(&self) -> AnyState {
+        match self {
+            Self::Stage(inverse) => AnyState::Stage(inverse.rest()),
+            Self::Network(inverse) => AnyState::Network(inverse.rest()),
+        }
+    }
+
+    fn step(&self, state: &mut AnyState, x: f64, v: f64, a: f64) -> f64 {
+        match (self, state) {
+            (Self::Stage(inverse), AnyState::Stage(state)) => inverse.step(state, x, v, a),
+            (Self::Network(inverse), AnyState::Network(state)) => inverse.step(state, x, v, a),
+            _ => f64::NAN,
+        }
+    }
+}
+
+impl Snapshot for AnyState {
+    fn save(&self, write: &mut dyn FnMut(f64)) {
+        match self {
+            Self::Stage(state) => state.save(write),
+            Self::Network(state) => state.save(write),
+        }
+    }
+
+    fn load(&mut self, read: &mut dyn FnMut() -> Option<f64>) -> Option<()> {
+        match self {
+            Self::Stage(state) => state.load(read),
+            Self::Network(state) => state.load(read),
+        }
+    }
+}
+
+/// Centre, scales, thresholds, hidden rows, biases, outputs, direct weights and offset.
+type Network = (f64, [f64; 3], Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>, f64);
+
 #[pymethods]
 impl PyInverse {
+    /// A network for samples every `dt` seconds.
+    #[staticmethod]
+    fn network(numbers: Network, dt: f64, offset: f64, delay: f64) -> PyResult<Self> {
+        let (centre, scales, thresholds, hidden, biases, outputs, direct, constant) = numbers;
+        let build = || -> Result<Self> {
+            let network = NeuralNetworkInverse::new(&NetworkNumbers {
+                centre,
+                scales,
+                thresholds: &thresholds,
+                hidden: &hidden,
+                biases: &biases,
+                outputs: &outputs,
+                direct: &direct,
+                offset: constant,
+            })?;
+            let start = AnyState::Network(network.rest());
+            let any = AnyInverse::Network(Box::new(network));
+            Ok(Self::new(OnlineFeedforward::new(any, dt, offset, delay)?, &start))
+        };
+        build().map_err(|error| raise(&error))
+    }
+
     /// The drive for the next sample of a reference; NaN where there is none.
     fn step(
         &mut self,
@@ -93,8 +182,8 @@ impl PyInverse {
 
 /// What is beyond the limits does not reach the stage, and the inverse does not remember it.
 fn along(
-    inverse: &StageInverse,
-    mut state: StageInverseState,
+    inverse: &AnyInverse,
+    mut state: AnyState,
     limits: Option<&Limits>,
     [x, v, a]: [&[f64]; 3],
 ) -> Result<Vec<f64>> {

@@ -1,7 +1,6 @@
 //! Stages of every model: their simulation, their inverse and their loop.
 
 use numpy::PyArray1;
-use piezotrack_control::OnlineFeedforward;
 use piezotrack_core::error::finite;
 use piezotrack_core::models::{Experiment, Method, Model, Response, Stage, Values};
 use piezotrack_core::signal::{self, Drive, Hold};
@@ -117,8 +116,7 @@ impl PyStage {
     ) -> PyResult<PyInverse> {
         let build = || -> Result<PyInverse> {
             let (inverse, start) = self.0.inverse(dt, self.state(initial)?.as_ref())?;
-            let online = OnlineFeedforward::new(inverse, dt, offset, delay)?;
-            Ok(PyInverse::new(online, &start))
+            PyInverse::of_stage(inverse, &start, dt, offset, delay)
         };
         build().map_err(|error| raise(&error))
     }

@@ -11,6 +11,7 @@ mod drive;
 mod feedback;
 mod input;
 mod modes;
+mod neural_network;
 mod play;
 
 pub use bouc_wen::{BoucWenInverse, BoucWenInverseState};
@@ -23,6 +24,9 @@ pub use feedback::{
 };
 pub use input::{InputInverse, InputInverseState, OperatorInverse, PrandtlIshlinskiiInverse};
 pub use modes::{ModesInverse, ModesInverseState};
+pub use neural_network::{
+    MOST_NETWORK_PLAYS, MOST_UNITS, NetworkNumbers, NeuralNetworkInverse, NeuralNetworkState,
+};
 pub use play::PlayInverse;
 
 /// Inverse of a stage model: configuration in `&self`, memory in `State`.

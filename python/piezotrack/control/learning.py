@@ -1,0 +1,391 @@
+"""Learning on a stage: trials are simulated until the error is noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import _core
+from .._support.arguments import not_negative
+from .._support.files import write_columns
+from .._support.units import drive_word, shown_unit
+from ..errors import ParameterError
+from .checks import check_drive_unit, check_stable, check_within_reach
+from .controller import Controller
+from .iterative_learning import IterativeLearning
+from .plant import plant_of, run_closed_loop, voltages_before
+from .tracking import collected
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Sequence
+
+    from matplotlib.figure import Figure, SubFigure
+    from numpy.typing import NDArray
+
+    from ..identification.identified import IdentifiedModel
+    from ..references.reference import Reference
+    from ..stages.virtual import VirtualStage
+    from .iterative_learning import LearningTrial, Method
+    from .learning_rules import Convergence
+    from .plant import Plant
+    from .tracking import Tracking
+
+    Array = NDArray[np.float64]
+
+__all__ = ["Learning", "learn"]
+
+# Instants kept in each sampling interval of a trial.
+SUBSTEPS = 4
+MOST_TRIALS = 10_000
+WHY = {
+    "noise": "what repeats in the error is not distinguishable from the noise",
+    "no change": "the error falls no further",
+    "grows": "the error grows",
+    "trials": "all trials were made",
+}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Learning:
+    """A voltage table that was learnt.
+
+    Attributes
+    ----------
+    learner : IterativeLearning
+        The learning: its `update` goes on from here with records of your own.
+    trials : tuple of LearningTrial
+        Errors, trial by trial.
+    tables : ndarray, shape (trials, n)
+        Table of each trial [V].
+    best : int
+        Place of the trial with the smallest rms error.
+    stopped : str
+        "noise", "no change", "grows" or "trials".
+    first, final : Tracking
+        The runs of the first trial and of the best.
+    """
+
+    learner: IterativeLearning
+    trials: tuple[LearningTrial, ...]
+    tables: Array
+    best: int
+    stopped: str
+    first: Tracking
+    final: Tracking
+
+    def __repr__(self) -> str:
+        before, after = self.trials[0], self.trials[self.best]
+        return (
+            f"<Learning in {len(self.trials)} trials: rms {1e9 * before.rms_error:.4g} to "
+            f"{1e9 * after.rms_error:.4g} nm>"
+        )
+
+    @property
+    def table(self) -> Array:
+        """Table of the best trial [V], shape (n,)."""
+        table: Array = self.tables[self.best].copy()
+        return table
+
+    @property
+    def errors(self) -> Array:
+        """Rms error of each trial [m]."""
+        return np.array([one.rms_error for one in self.trials])
+
+    @property
+    def convergence(self) -> Convergence:
+        """What a trial leaves of the distance to the final table, on each of the models."""
+        return self.learner.convergence
+
+    def summary(self) -> str:
+        """Table of the trials.
+
+        Returns
+        -------
+        str
+            Several lines.
+        """
+        kind = {"frequency": "settled period", "lifted": "whole motion from rest"}
+        lines = [
+            f"{self.learner.reference!r}, {kind[self.learner.method]}, cutoff "
+            f"{self.learner.cutoff:.4g} Hz",
+            str(self.convergence),
+            f"{'trial':>5}  {'rms nm':>9}  {'max nm':>9}  {'noise nm':>9}",
+        ]
+        for i, one in enumerate(self.trials):
+            noise = "" if one.noise is None else f"{1e9 * one.noise:.4g}"
+            rms, most = 1e9 * one.rms_error, 1e9 * one.max_error
+            mark = " *" if i == self.best else ""
+            lines.append(f"{i:>5}  {rms:>9.4g}  {most:>9.4g}  {noise:>9}{mark}")
+        if (clipped := self.trials[self.best].clipped) > 0.0:
+            lines.append(f"the table is at a limit in {100.0 * clipped:.1f} % of its samples")
+        return "\n".join([*lines, f"ended: {WHY[self.stopped]}"])
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the best table as a CSV file: time, desired displacement, voltage.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+
+        Returns
+        -------
+        pathlib.Path
+            The file.
+
+        Raises
+        ------
+        DataError
+            It cannot be written.
+        """
+        unit, scale = shown_unit(self.learner.controller.drive_unit)
+        word = drive_word(self.learner.controller.drive_unit)
+        return write_columns(
+            Path(path),
+            {
+                "time_s": self.learner.t,
+                "desired_um": 1e6 * self.learner.desired,
+                f"{word}_{unit}": scale * self.table,
+                f"feedforward_{unit}": scale * self.learner.feedforward,
+            },
+        )
+
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
+        """Errors of the first and the best trial, their tables, and the rms error of all trials.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
+        """
+        from .learning_plot import plot_learning
+
+        return plot_learning(self, fig)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Trials:
+    """How a table is played and recorded on a simulated stage."""
+
+    plant: VirtualStage
+    learner: IterativeLearning
+    delay: float
+    settle: int
+    repeats: int
+    before: tuple[float, ...]
+
+    def run(self, table: Array, trial: int, repeat: int = 0) -> Tracking:
+        """Simulate a trial with noise of its own."""
+        learner, sensor = self.learner, self.plant.sensor
+        seed = (sensor.seed + trial * self.repeats + repeat) % 2**63
+        plant = replace(self.plant, sensor=replace(sensor, seed=seed))
+        controller = learner.controller
+        whole = self._whole()
+        samples = whole.sample(controller.dt)
+        learnt, played = table - learner.feedforward, np.zeros(len(samples))
+        if controller.feedforward is not None:
+            played = self._played(whole)
+        if learner.method == "lifted":
+            volts = played + learnt
+        else:
+            volts = played + np.resize(learnt, played.size) * _start(samples.t, whole.ramp)
+        run = run_closed_loop(
+            plant, controller, samples.x, volts, (self.delay, 0.0, SUBSTEPS), self.before
+        )
+        return collected(run, controller, whole, samples, "feedforward learnt", SUBSTEPS)
+
+    def record(self, run: Tracking) -> Array:
+        """Return the readings of the trial in a run [m], of shape (records, n)."""
+        count = self.learner.t.size
+        kept = 1 if self.learner.method == "lifted" else self.repeats
+        return run.measured[run.measured.size - kept * count :].reshape(kept, count)
+
+    def _played(self, whole: Reference) -> Array:
+        """Return the controller's own feedforward along a run [V]."""
+        inverse, dt = self.learner.controller.feedforward, self.learner.controller.dt
+        assert inverse is not None
+        if self.learner.method == "lifted":
+            return self.learner.feedforward
+        # Always from a table: what is learnt is added to the same voltage in each period.
+        as_table = replace(inverse, playback="table")
+        return as_table.played(whole, dt, limits=self.learner.controller.limits).voltage
+
+    def _whole(self) -> Reference:
+        """Return the reference of a run."""
+        reference = self.learner.reference
+        if self.learner.method == "lifted" or reference.period is None:
+            return reference
+        inverse = self.learner.controller.feedforward
+        started = int(np.ceil(reference.ramp / reference.period - 1e-9))
+        # Until the table begins to repeat, and as many periods for the stage to follow.
+        head = max(1 if inverse is None else inverse.settle, started) + self.settle
+        return replace(reference, duration=(head + self.repeats) * reference.period)
+
+
+def _start(t: Array, ramp: float) -> Array:
+    """Share of the learnt voltage during the smooth start: that of the motion."""
+    u = np.clip(t / ramp, 0.0, 1.0) if ramp > 0.0 else np.ones_like(t)
+    share: Array = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+    return share
+
+
+def learn(
+    stage: Plant | IdentifiedModel,
+    reference: Reference,
+    controller: Controller,
+    *,
+    model: Plant | IdentifiedModel | None = None,
+    trials: int = 30,
+    settle: int = 2,
+    repeats: int = 2,
+    method: Method = "frequency",
+    models: Sequence[Plant | IdentifiedModel] = (),
+    delay: float = 0.0,
+    more_delays: float | Sequence[float] | None = None,
+    mode_scales: float | Sequence[float] = (0.9, 1.0, 1.1),
+    gain: float = 0.7,
+    cutoff: float | None = None,
+    forgetting_factor: float = 1.0,
+    change_weight: float = 0.01,
+    noise: float | None = None,
+    visited: float | Sequence[float] = (),
+    beyond_reach: bool = False,
+) -> Learning:
+    r"""Learn the voltage with which a stage follows a reference, from trial to trial.
+
+    A trial plays the feedforward of the controller's inverse with what was learnt added to it,
+    beside the feedback if there is any; the record of its errors gives the next table. Before the
+    first is played, monotone convergence is tested on a set of models. It ends where what repeats
+    in the error is not distinguishable from what does not, or where the error falls no further.
+    For a stage of your own: `control.IterativeLearning`, which this runs.
+
+    Parameters
+    ----------
+    stage : Stage, VirtualStage or IdentifiedModel
+        The plant. Each trial begins where its experiments begin, with noise of its own.
+    reference : Reference
+        The reference; of one that repeats, a settled period is learnt, however long it lasts.
+    controller : Controller
+        As of `control.IterativeLearning`.
+    model : Stage, VirtualStage or IdentifiedModel, optional
+        The model to learn with; default that of the controller's feedforward, or else the stage.
+    trials : int, optional
+        Trials at most, the one without learning included.
+    settle : int, optional
+        Periods before the recorded ones, after the smooth start and the first period of the table.
+    repeats : int, optional
+        Records of each trial: periods, or runs of method ``"lifted"``. Two show what is noise.
+    method, models, delay, more_delays, mode_scales, gain, cutoff : optional
+        As of `control.IterativeLearning`.
+    forgetting_factor, change_weight, noise : optional
+        As there.
+    visited, beyond_reach : optional
+        As of `track`.
+
+    Returns
+    -------
+    Learning
+        Tables, errors, and the runs before and after.
+
+    Raises
+    ------
+    ParameterError
+        As of `control.IterativeLearning` and `track`.
+    NumericalError
+        The loop diverges.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> plays = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(5.0,), weights=(5e-7,))
+    >>> stage = pt.VirtualStage.of(plays, noise=5e-9, mode=(160.0, 0.065))
+    >>> loop = pt.Controller(dt=1e-3, limits=(0.0, 75.0), feedforward=plays.inverse())
+    >>> reference = pt.triangle(frequency=10.0, low=10e-6, high=50e-6, duration=0.5)
+    >>> found = pt.learn(stage, reference, loop, model=stage, mode_scales=1.0)
+    >>> found.errors[found.best] < 0.1 * found.errors[0]
+    np.True_
+    """
+    plant = plant_of(stage)
+    known = _model_of(stage, controller) if model is None else model
+    learner = IterativeLearning(
+        known,
+        reference,
+        controller,
+        method=method,
+        models=models,
+        delay=delay,
+        more_delays=more_delays,
+        mode_scales=mode_scales,
+        gain=gain,
+        cutoff=cutoff,
+        forgetting_factor=forgetting_factor,
+        change_weight=change_weight,
+        noise=noise,
+    )
+    check_drive_unit(stage, controller)
+    check_stable(plant, controller, delay)
+    if not _core.as_truth("beyond_reach", beyond_reach):
+        samples = reference.sample(controller.dt)
+        check_within_reach(plant, controller.limits, samples, controller.drive_unit)
+    most = _counted("trials", trials, MOST_TRIALS)
+    runs = _Trials(
+        plant=plant,
+        learner=learner,
+        delay=not_negative("delay", delay, "s"),
+        settle=_counted("settle", settle, 1000),
+        repeats=_counted("repeats", repeats, 1000),
+        before=voltages_before(plant, visited, controller.limits),
+    )
+    return _learnt(runs, most)
+
+
+def _learnt(runs: _Trials, most: int) -> Learning:
+    """Play and learn until it ends."""
+    learner, first, final = runs.learner, None, None
+    while True:
+        trial = len(learner.trials)
+        made = [runs.run(learner.table, trial)]
+        if learner.method == "lifted":
+            made += [runs.run(learner.table, trial, i) for i in range(1, runs.repeats)]
+        learner.update(np.concatenate([runs.record(one) for one in made]))
+        first = first or made[0]
+        if learner.best == trial:
+            final = made[0]
+        stopped = learner.stopped or ("trials" if trial + 1 >= most else None)
+        if stopped is not None:
+            break
+    assert final is not None
+    return Learning(
+        learner=learner,
+        trials=learner.trials,
+        tables=learner.tables[:-1],
+        best=learner.best,
+        stopped=stopped,
+        first=first,
+        final=final,
+    )
+
+
+def _model_of(stage: Plant | IdentifiedModel, controller: Controller) -> Plant | IdentifiedModel:
+    """Return the model of the controller's feedforward with its delay, or else the stage."""
+    from ..stages.virtual import VirtualStage
+
+    if not isinstance(controller, Controller) or controller.feedforward is None:
+        return stage
+    return VirtualStage.of(controller.feedforward.stage, delay=controller.feedforward.delay)
+
+
+def _counted(name: str, value: object, most: int) -> int:
+    count = _core.as_count(name, value)
+    if not 1 <= count <= most:
+        raise ParameterError(f"{name} is {count}: expected 1 to {most}")
+    return count

@@ -1,0 +1,103 @@
+"""H-infinity design: what is asked for is what the loop has, on every gain of a stage."""
+
+from __future__ import annotations
+
+import builtins
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezotrack as pt
+from piezotrack.control import mixed_sensitivity
+
+STAGE = pt.VirtualStage.xu_li_2010(seed=1)
+LIMITS = (0.0, 75.0)
+
+
+@pytest.mark.parametrize(("dt", "bandwidth"), [(1e-3, 10.0), (1e-3, 60.0), (2e-4, 40.0)])
+def test_the_loop_is_stable_and_below_the_peak_at_every_gain(dt: float, bandwidth: float) -> None:
+    law = mixed_sensitivity(STAGE, dt=dt, limits=LIMITS, bandwidth=bandwidth)
+    loop = pt.Controller(dt=dt, limits=LIMITS, feedback=law)
+    report = pt.check_loop(STAGE, loop)
+    assert law.gamma < 1.0
+    assert report.everywhere
+    assert max(one.sensitivity for one in (report.low, report.middle, report.high)) < 2.0
+    # The weight W1 is kept by gamma at every frequency, in the scale of the bilinear transform.
+    found = report.response()
+    s = 1j * np.tan(math.pi * found.frequency * dt)
+    edge = math.tan(math.pi * bandwidth * dt)
+    weighted = np.abs((s / 2.0 + edge) / (s + 1e-4 * edge) * found.sensitivity)
+    assert weighted.max() <= 1.001 * law.gamma
+    assert np.abs(found.sensitivity[found.frequency < 0.5 * bandwidth]).max() < 0.71
+
+
+def test_the_effort_and_the_roll_off_are_kept() -> None:
+    dt, gain = 2e-4, pt.check_loop(STAGE, pt.Controller(dt=1e-3, limits=LIMITS)).middle.gain
+    law = mixed_sensitivity(STAGE, dt=dt, limits=LIMITS, bandwidth=20.0, effort=3.0, roll_off=100.0)
+    loop = pt.Controller(dt=dt, limits=LIMITS, feedback=law)
+    found = pt.check_loop(STAGE, loop).response()
+    rows, b, c, d, _ = law._matrices
+    a = np.reshape(rows, (len(b), len(b)))
+    z = np.exp(2j * math.pi * found.frequency * dt)
+    gains = [c @ np.linalg.solve(one * np.eye(len(b)) - a, b) + d for one in z]
+    effort = gain * np.abs(np.array(gains) * found.sensitivity)
+    assert effort.max() <= 1.001 * 3.0 * law.gamma
+    beyond = found.frequency > 200.0
+    assert np.abs(found.complementary[beyond]).max() < 0.51 * law.gamma
+
+
+def test_it_follows_a_reference_on_the_stage_with_hysteresis() -> None:
+    law = mixed_sensitivity(STAGE, dt=2e-4, limits=LIMITS, bandwidth=40.0)
+    loop = pt.Controller(dt=2e-4, limits=LIMITS, feedback=law)
+    reference = pt.sine(frequency=1.0, low=10e-6, high=80e-6, duration=2.0)
+    run = pt.track(STAGE, loop, reference)
+    # |S| is about f over the bandwidth below it: 1/40 of 35 um and the noise of the sensor.
+    assert run.metrics.max_error < 1.5 * 35e-6 / 40.0 + 4 * 0.1e-6
+
+
+def test_a_stage_that_falls_as_the_voltage_rises_gets_a_negative_law() -> None:
+    falling = pt.PrandtlIshlinskiiStage(linear=-1e-6, thresholds=(5.0,), weights=(-5e-7,))
+    law = mixed_sensitivity(falling, dt=1e-3, limits=LIMITS, bandwidth=20.0)
+    loop = pt.Controller(dt=1e-3, limits=LIMITS, feedback=law)
+    assert pt.check_loop(falling, loop).everywhere
+
+
+def test_a_delay_is_in_the_design_and_too_long_a_one_is_refused() -> None:
+    law = mixed_sensitivity(STAGE, dt=2e-4, limits=LIMITS, bandwidth=20.0, delay=1e-3)
+    loop = pt.Controller(dt=2e-4, limits=LIMITS, feedback=law)
+    assert pt.check_loop(STAGE, loop, delay=1e-3).everywhere
+    with pytest.raises(pt.NumericalError, match=r"expected less delay than .* samples"):
+        mixed_sensitivity(STAGE, dt=2e-4, limits=LIMITS, bandwidth=10.0, delay=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"bandwidth": 200.0}, r"bandwidth is 200 Hz, with which gamma is 1.8"),
+        ({"bandwidth": 300.0}, "expected below 250 Hz"),
+        ({"effort": 0.3}, "an effort above 0.3"),
+        ({"largest_sensitivity": 1.0}, "largest_sensitivity is 1: expected above 1"),
+        ({"roll_off": 5.0}, "roll_off is 5 Hz"),
+        ({"limits": None}, "limits are missing"),
+        ({"dt": math.nan}, "dt is nan"),
+    ],
+)
+def test_what_cannot_be_had_is_refused(options: dict[str, Any], words: str) -> None:
+    given: dict[str, Any] = {"dt": 1e-3, "limits": LIMITS, "bandwidth": 40.0, **options}
+    with pytest.raises(pt.ParameterError, match=words):
+        mixed_sensitivity(STAGE, **given)
+
+
+def test_without_slycot_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = builtins.__import__
+
+    def without(name: str, *rest: Any, **named: Any) -> Any:
+        if name == "slycot":
+            raise ImportError(name=name)
+        return real(name, *rest, **named)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.raises(pt.ParameterError, match=r"needs slycot: .*piezotrack\[robust\]"):
+        mixed_sensitivity(STAGE, dt=1e-3, limits=LIMITS, bandwidth=10.0)
