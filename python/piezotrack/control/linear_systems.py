@@ -201,7 +201,9 @@ def _feedback_law(part: Controller | Feedback, dt: float | None) -> Any:
         system = (a, np.reshape(b, (-1, 1)), np.reshape(c, (1, -1)), [[d]])
         return control.ss(*system, dt, name="feedback law in state space", **labels)
     if isinstance(law, NAMED_LAWS):
-        above, below = (_in_powers_of_z(one) for one in _core.law_transfer_function(law._settings, dt))
+        above, below = (
+            _in_powers_of_z(one) for one in _core.law_transfer_function(law._settings, dt)
+        )
         return control.ss(control.tf(above, below, dt), name=law.title, **labels)
     ki = 0.0 if np.isinf(law.ti) else dt / law.ti
     kd = law.td / dt
