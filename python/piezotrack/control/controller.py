@@ -14,8 +14,8 @@ from ..identification.identified import IdentifiedModel
 from ..stages.inverse import Inverse
 from .components import LowPass, Notch, Pid, Repetitive, StateSpace
 from .description import controller_text
-from .plant import reach
 from .laws import NAMED_LAWS, DisturbanceObserver, LeadLag, PerturbationEstimator, SlidingMode
+from .plant import reach
 from .session import Session
 
 __all__ = ["Controller", "number_pair"]
