@@ -6,7 +6,8 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use piezotrack_control::{
-    Controller, DahlInverse, IterativeLearning, Limits, Pid, Repetitive, Smoothing,
+    Controller, DahlInverse, DisturbanceObserver, Feedback, IterativeLearning, LeadLag, Limits,
+    Pid, Repetitive, SlidingMode, Smoothing, StateSpace,
 };
 use piezotrack_core::integrator::{FEW_TERMS, TERMS};
 use piezotrack_core::models::DahlStage;
@@ -97,5 +98,37 @@ fn learning(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, latency, controller, learning);
+/// The whole step of a controller with one law, without inverse and repetitive part.
+fn laws(criterion: &mut Criterion) {
+    let dt = 0.02;
+    let pid = Pid::xu_li_2010().at(dt).unwrap();
+    let sliding = SlidingMode::new(5.0, 20e-6, 0.05, 0.01, 0.03).unwrap().at(dt).unwrap();
+    let observer = DisturbanceObserver::new(1.1e-6, 0.05, 0.5).unwrap();
+    let lead_lag: StateSpace<1> = LeadLag::new(1e5, 0.01, 0.1).unwrap().at(dt).unwrap();
+    law(criterion, "PID", pid);
+    law(criterion, "lead-lag", lead_lag);
+    law(criterion, "sliding mode", sliding);
+    law(criterion, "disturbance observer around a PID", observer.around(pid, dt).unwrap());
+    law(criterion, "perturbation estimation", observer.around(sliding, dt).unwrap());
+}
+
+fn law<F: Feedback>(criterion: &mut Criterion, name: &str, feedback: F) {
+    let controller = Controller::new(Limits::new(0.0, 75.0).unwrap(), feedback);
+    let path: Vec<f64> = (0..5000).map(|k| 30e-6 * (1.0 - (f64::from(k) * 0.025).cos())).collect();
+    let mut group = criterion.benchmark_group("step_latency");
+    group.throughput(Throughput::Elements(5000));
+    group.bench_function(format!("law, {name}"), |bencher| {
+        let mut state = controller.rest([]).unwrap();
+        let mut y = 0.0;
+        bencher.iter(|| {
+            for x in black_box(&path) {
+                y = 1.1e-6 * controller.step(&mut state, *x, y, *x / 1.2e-6).volts;
+            }
+            y
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, latency, controller, learning, laws);
 criterion_main!(benches);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import re
 from typing import Any
 
@@ -18,7 +19,7 @@ PI = pt.Pid.from_um(kp=0.05, ti=0.1)
 # Gain of the stage, m/V
 GAIN = 1.5e-6
 SLIDING = SlidingMode(switching=5.0, layer=20e-6, ti=0.05)
-LAWS = {
+LAWS: dict[str, Any] = {
     "lead-lag": LeadLag(kp=0.4e6, lead=0.0, lag=0.2),
     "matched lead-lag": LeadLag(kp=0.4e6, lead=0.01, lag=0.2, method="matched"),
     "sliding": SLIDING,
@@ -69,9 +70,6 @@ def test_a_start_is_bumpless_and_a_session_is_kept_to_the_bit(name: str) -> None
     assert session.step(40e-6, 40e-6) == pytest.approx(30.0, abs=1e-9)
     for k in range(50):
         session.step(40e-6 + 1e-7 * (k % 3), 40e-6)
-    other = loop(LAWS[name]).start()
-    import pickle
-
     other = pickle.loads(pickle.dumps(session))
     for k in range(50):
         assert session.step(41e-6, 40e-6 + 1e-8 * k) == other.step(41e-6, 40e-6 + 1e-8 * k)
@@ -90,18 +88,18 @@ def test_a_law_recovers_after_saturation_and_bad_readings(name: str) -> None:
                 volts = session.step(900e-6, float(reading), feedforward=67.0)
                 assert LIMITS[0] <= volts <= LIMITS[1]
                 x += 0.9 * (GAIN * volts - x)
-            for _ in range(250):
+            for _ in range(400):
                 volts = session.step(50e-6, x, feedforward=32.0)
                 x += 0.9 * (GAIN * volts - x)
             late.append(abs(50e-6 - x))
         # The same small error as of a loop that never saturated
-        assert late[1] < late[0] + 0.1e-6
+        assert late[1] < late[0] + 0.2e-6
         assert late[0] < 2e-6
 
 
-def test_the_observer_takes_off_a_wrong_gain_of_the_plant_without_an_integrator() -> None:
-    proportional = pt.Pid.from_um(kp=0.1, ti=float("inf"))
-    law = DisturbanceObserver(pid=proportional, plant_gain=GAIN, cutoff=0.5)
+def test_the_estimate_takes_off_a_wrong_gain_of_the_plant_without_an_integrator() -> None:
+    proportional = SlidingMode(switching=5.0, layer=50e-6)
+    law = PerturbationEstimator(sliding=proportional, plant_gain=GAIN, cutoff=0.5)
     left = []
     for one in (proportional, law):
         session, x = loop(one).start(), 0.0
@@ -137,12 +135,21 @@ def test_sliding_mode_gives_no_more_than_its_switching_gain() -> None:
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
-        (lambda: LeadLag(kp=np.nan, lead=0.0, lag=0.1), "kp is nan V/m: expected"),
-        (lambda: LeadLag(kp=1e5, lead=-1.0, lag=0.1), "lead is -1 s: expected"),
-        (lambda: LeadLag(kp=1e5, lead=0.0, lag=0.1, method="zoh"), "method is 'zoh': expected"),
+        (
+            lambda: DisturbanceObserver(
+                pid=pt.Pid(kp=1e5, ti=float("inf")), plant_gain=1e-6, cutoff=1.0
+            ),
+            "pid has ti = inf: expected a finite",
+        ),
+        (lambda: LeadLag(kp=np.nan, lead=0.0, lag=0.1), "kp is nan: expected"),
+        (lambda: LeadLag(kp=1e5, lead=-1.0, lag=0.1), "lead is -1: expected"),
+        (
+            lambda: LeadLag(kp=1e5, lead=0.0, lag=0.1, method="zoh"),  # type: ignore[arg-type]
+            "method is 'zoh': expected",
+        ),
         (lambda: loop(LeadLag(kp=1e5, lead=0.0, lag=0.0)), "lag is 0 s: expected"),
-        (lambda: SlidingMode(switching=0.0, layer=1e-6), "switching is 0 V: expected"),
-        (lambda: SlidingMode(switching=1.0, layer=-1e-6), "layer is -1e-06 m: expected"),
+        (lambda: SlidingMode(switching=0.0, layer=1e-6), "switching is 0: expected"),
+        (lambda: SlidingMode(switching=1.0, layer=-1e-6), "layer is -1e-06: expected"),
         (lambda: SlidingMode(switching=1.0, layer=1e-6, ti=0.0), "ti is 0.0 s: expected"),
         (
             lambda: DisturbanceObserver(pid=PI, plant_gain=0.0, cutoff=1.0),

@@ -13,7 +13,7 @@ const CORE: [&str; 9] =
     ["error", "math", "signal", "integrator", "design", "models", "simulate", "identify", "tune"];
 
 /// From the bottom up.
-const CONTROL: [&str; 20] = [
+const CONTROL: [&str; 24] = [
     "error",
     "number",
     "unfused",
@@ -31,6 +31,9 @@ const CONTROL: [&str; 20] = [
     "state_space",
     "pid",
     "scheduled_pid",
+    "lead_lag",
+    "sliding_mode",
+    "disturbance_observer",
     "repetitive",
     "iterative_learning",
     "measurement",

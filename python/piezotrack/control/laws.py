@@ -158,14 +158,14 @@ class DisturbanceObserver:
 
     After Ohnishi, and Yi, Chang and Shen 2009 for piezo hysteresis, which is the disturbance of a
     linear plant. Here plant and voltage are counted from reference and feedforward, so that what
-    an inverse compensates is not compensated twice. The voltage is the one that was applied, so the
-    estimate does not wind up. `check_loop` and `to_control` take the law exactly: the observer adds
-    an integrator of bandwidth omega_c.
+    an inverse compensates is not compensated twice. The voltage is the one that was applied, and
+    while it is clipped the estimate takes no step further out. `check_loop` and `to_control` take
+    the law exactly: the observer adds an integrator of bandwidth omega_c.
 
     Parameters
     ----------
     pid : Pid
-        The controller inside.
+        The controller inside, with a finite integral time.
     plant_gain : float
         Static gain g of the nominal plant [m/V], not 0.
     plant_time : float, optional
@@ -198,6 +198,11 @@ class DisturbanceObserver:
     def __post_init__(self) -> None:
         if not isinstance(self.pid, Pid):
             raise ParameterError(f"pid is {type(self.pid).__name__}: expected pt.Pid")
+        if math.isinf(self.pid.ti):
+            raise ParameterError(
+                "pid has ti = inf: expected a finite integral time, since the observer would keep "
+                "the constant that an incremental PID starts with"
+            )
         _check_nominal(self.plant_gain, self.plant_time, self.cutoff)
 
     @property
@@ -236,9 +241,8 @@ class PerturbationEstimator:
     Examples
     --------
     >>> import piezotrack as pt
-    >>> law = pt.control.PerturbationEstimator(
-    ...     sliding=pt.control.SlidingMode(switching=1.0, layer=20e-6), plant_gain=1.5e-6, cutoff=1.0
-    ... )
+    >>> sliding = pt.control.SlidingMode(switching=1.0, layer=20e-6)
+    >>> law = pt.control.PerturbationEstimator(sliding=sliding, plant_gain=1.5e-6, cutoff=1.0)
     >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=law)
     >>> pt.check_loop(pt.VirtualStage.xu_li_2010(), loop).stable
     True

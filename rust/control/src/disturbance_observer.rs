@@ -19,7 +19,9 @@
 //! d[k] = q d[k-1] + (1 - q) (-(e[k] - p e[k-1])/(g (1 - p)) - (v[k-1] - uFF[k-1]))
 //! ```
 //!
-//! where v is the voltage that was applied, so that the estimate does not wind up.
+//! where v is the voltage that was applied. While the command is clipped, the estimate takes no step
+//! that would move it further beyond the limit. A constant in the output of the law inside is not
+//! observed: a law without an integral must not keep one, as an incremental PID does.
 
 use core::f64::consts::TAU;
 
@@ -103,12 +105,14 @@ pub struct ObservedState<S> {
     disturbance: f64,
     /// Error (m) and feedforward (V) of the last sample; `None` before the first.
     last: Option<[f64; 2]>,
+    /// Voltage to begin with, V.
+    first: Option<f64>,
     /// The last output, V.
     volts: f64,
 }
 
 crate::snapshot!(
-    [S: crate::Snapshot] ObservedState<S> { inner, disturbance, last, volts }
+    [S: crate::Snapshot] ObservedState<S> { inner, disturbance, last, first, volts }
 );
 
 impl<F> Observed<F> {
@@ -129,15 +133,12 @@ impl<F: Feedback> Feedback for Observed<F> {
     type State = ObservedState<F::State>;
 
     fn rest(&self) -> Self::State {
-        ObservedState { inner: self.inner.rest(), disturbance: 0.0, last: None, volts: 0.0 }
+        let inner = self.inner.rest();
+        ObservedState { inner, disturbance: 0.0, last: None, first: None, volts: 0.0 }
     }
 
     fn start(&self, volts: f64) -> Self::State {
-        ObservedState { inner: self.inner.start(volts), volts, ..self.rest() }
-    }
-
-    fn holds(&self) -> bool {
-        self.inner.holds()
+        ObservedState { first: Some(volts), volts, ..self.rest() }
     }
 
     fn adopt(&self, before: &Self, state: &mut Self::State) -> bool {
@@ -148,13 +149,19 @@ impl<F: Feedback> Feedback for Observed<F> {
 
     #[inline]
     fn step(&self, state: &mut Self::State, sample: &FeedbackSample) -> f64 {
-        let FeedbackSample { error, applied, feedforward, .. } = *sample;
+        let FeedbackSample { error, excess, applied, feedforward, .. } = *sample;
         if let Some([before, forward]) = state.last {
             let needed = -self.inverse * (error - self.pole * before);
             let found = needed - (applied - forward);
-            state.disturbance += self.fresh * (found - state.disturbance);
+            let step = self.fresh * (found - state.disturbance);
+            state.disturbance += if excess * step > 0.0 { 0.0 } else { step };
         }
-        let volts = self.inner.step(&mut state.inner, sample) - state.disturbance;
+        let inside = self.inner.step(&mut state.inner, sample);
+        if let Some(first) = state.first.take() {
+            // A bumpless start is a disturbance that is forgotten as it is observed.
+            state.disturbance = inside - first;
+        }
+        let volts = inside - state.disturbance;
         if volts.is_finite() {
             state.last = Some([error, feedforward]);
             state.volts = volts;
