@@ -358,6 +358,7 @@ def tune(
     controller: Controller,
     period: float | None,
     sign: float,
+    law: tuple[str, float, float],
     sought: list[tuple[str, float, float, bool]],
     tasks: Sequence[Task],
     plants: Sequence[LoopPlant],

@@ -7,7 +7,8 @@ use piezotrack_core::models::Model;
 use piezotrack_core::signal::NEVER;
 use piezotrack_core::simulate::{Law, ReferenceSamples, Timing, VirtualStage, track};
 use piezotrack_core::tune::{
-    Aim, Figures, Judged, PlantSet, Requirements, Setting, Sought, Task, Template, Tuning, pid,
+    Aim, Figures, Judged, Nominal, PlantSet, Requirements, Setting, Sought, Structure, Task,
+    Template, Tuning, pid,
 };
 
 const DT: f64 = 0.02;
@@ -188,7 +189,7 @@ fn the_integral_gain_from_margins_alone_is_the_known_one() {
     let base = Controller::new(limits, Law::None);
     let tuning = Tuning {
         sought: vec![one(Setting::Proportional, 1.0, 1.000_001), one(Setting::Integral, 1e4, 1e7)],
-        template: Template { base, dt, period: None, sign: 1.0 },
+        template: Template { base, dt, period: None, structure: Structure::Pid, sign: 1.0 },
         tasks: Vec::new(),
         plants: PlantSet::new(&[plant], dt).unwrap(),
         required: Requirements { phase_margin: 0.0, gain_margin: 1.001, ..required() },
@@ -223,6 +224,7 @@ fn a_search_beats_the_published_gains_and_keeps_its_margins() {
             dt: DT,
             period: None,
             sign: 1.0,
+            structure: Structure::Pid,
         },
         tasks: vec![task],
         plants: PlantSet::new(&plants, DT).unwrap(),
@@ -243,4 +245,36 @@ fn a_search_beats_the_published_gains_and_keeps_its_margins() {
     }
     let again = tuning.search(NEVER).unwrap();
     assert_eq!(again.settings, found.settings);
+}
+
+/// A disturbance observer around a PID integrates twice: the grid begins 180 degrees behind.
+#[test]
+fn margins_with_two_integrators_are_the_exact_ones() {
+    let dt = 1e-3;
+    let plant = LoopPlant::mode(1.5e-6, 160.0, 0.2).unwrap();
+    let limits = Limits::new(0.0, 75.0).unwrap();
+    let structure = Structure::DisturbanceObserver(Nominal { gain: 1.5e-6, time: 1e-3 });
+    let base = Controller::new(limits, Law::None);
+    let template = Template { base, dt, period: None, structure, sign: 1.0 };
+    let set = PlantSet::new(std::slice::from_ref(&plant), dt).unwrap();
+    let (mut stable, mut unstable) = (0, 0);
+    for cutoff in [0.3, 3.0, 30.0, 200.0] {
+        for gain in [3e2, 3e3, 2e4, 1e5, 4e5] {
+            let settings = [
+                (Setting::Proportional, gain),
+                (Setting::Integral, 0.1 * gain),
+                (Setting::Observer, cutoff),
+            ];
+            let controller = template.controller(&settings).unwrap();
+            let exact = SampledLoop::of(&plant, &controller, dt).unwrap().margins();
+            let found = set.robustness(&controller);
+            assert_eq!(found.unstable.value == 0.0, exact.stable, "{cutoff} {gain}: {exact:?}");
+            if exact.stable && exact.sensitivity < 5.0 {
+                let off = found.sensitivity.value / exact.sensitivity - 1.0;
+                assert!(off.abs() < 0.01, "{cutoff} {gain}: {found:?} {exact:?}");
+            }
+            *(if exact.stable { &mut stable } else { &mut unstable }) += 1;
+        }
+    }
+    assert!(stable > 4 && unstable > 2, "{stable} {unstable}");
 }

@@ -1,11 +1,11 @@
 //! The search for the settings of a controller.
 
-use piezotrack_core::Result;
 use piezotrack_core::simulate::{ReferenceSamples, Timing, VirtualStage};
 use piezotrack_core::tune::{
-    Aim, Figures, Found, Judged, PlantSet, Requirements, Robustness, Setting, Sought, Task,
-    Template, Tuning, Worst,
+    Aim, Figures, Found, Judged, Nominal, PlantSet, Requirements, Robustness, Setting, Sought,
+    Structure, Task, Template, Tuning, Worst,
 };
+use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
 use crate::arrays::samples;
@@ -145,12 +145,28 @@ impl FoundSettings {
     }
 }
 
+/// A feedback law from its name, and the nominal plant of an observer.
+fn structure((name, gain, time): &(String, f64, f64)) -> Result<Structure> {
+    let nominal = Nominal { gain: *gain, time: *time };
+    Ok(match name.as_str() {
+        "pid" | "pd" => Structure::Pid,
+        "lead-lag" => Structure::LeadLag,
+        "sliding mode" => Structure::SlidingMode,
+        "disturbance observer" => Structure::DisturbanceObserver(nominal),
+        "perturbation estimation" => Structure::PerturbationEstimation(nominal),
+        other => {
+            let expected = "the name of a feedback law";
+            return Err(Error::parameter("law", format!("'{other}'"), expected));
+        }
+    })
+}
+
 /// Gain margin, phase margin (rad), sensitivity, learning gain, slew (V/s), clipped share.
 type RequiredNumbers = (f64, f64, f64, f64, f64, f64);
 
 /// Searches the settings of a controller.
 #[pyfunction]
-#[pyo3(signature = (*, controller, period, sign, sought, tasks, plants, required, aim, effort, particles,
+#[pyo3(signature = (*, controller, period, sign, law, sought, tasks, plants, required, aim, effort, particles,
     iterations, seed, threads))]
 #[expect(clippy::too_many_arguments, reason = "all named in Python")]
 #[expect(clippy::needless_pass_by_value, reason = "extracted from lists")]
@@ -159,6 +175,7 @@ fn tune(
     controller: &PyController,
     period: Option<f64>,
     sign: f64,
+    law: (String, f64, f64),
     sought: Vec<(String, f64, f64, bool)>,
     tasks: Vec<PyRef<'_, PyTask>>,
     plants: Vec<PyRef<'_, PyLoopPlant>>,
@@ -183,7 +200,13 @@ fn tune(
         let (gain_margin, phase_margin, sensitivity, learning, slew, clipped) = required;
         Ok(Tuning {
             sought: sought?,
-            template: Template { base: controller.controller, dt, period, sign },
+            template: Template {
+                base: controller.controller,
+                dt,
+                period,
+                structure: structure(&law)?,
+                sign,
+            },
             tasks: tasks.iter().map(|task| task.task()).collect(),
             plants: PlantSet::new(&plants, dt)?,
             required: Requirements {

@@ -10,10 +10,12 @@ import numpy as np
 
 from ..._support.messages import quoted
 from ...errors import ParameterError
-from ..components import LowPass, Notch, Pid, Repetitive, ZeroPhase
+from ..components import LowPass, Notch, Repetitive, ZeroPhase
+from .structures import SLIDING, Nominal, law_of, law_ranges, nominal_of
 
 if TYPE_CHECKING:
     from ... import _core
+    from .structures import SoughtLaw
 
 __all__ = ["PARTS", "Box", "Parts", "box_of", "parts_named", "resonance"]
 
@@ -27,7 +29,7 @@ NYQUIST = 0.475
 class Parts(NamedTuple):
     """The parts of a controller with their settings."""
 
-    feedback: Pid
+    feedback: SoughtLaw
     filters: tuple[LowPass | Notch, ...]
     repetitive: Repetitive | None
 
@@ -39,13 +41,12 @@ class Box(NamedTuple):
     dt: float
     period: float | None
     sign: float
+    law: str
+    nominal: Nominal
 
     def parts(self, settings: dict[str, float]) -> Parts:
         """Make the parts of a controller from the settings that were found."""
-        gains = [self.sign * settings[name] for name in ("kp", "ki", "kd")]
-        kp, ki, kd = gains
-        ti, td = kp * self.dt / ki, kd * self.dt / kp
-        pid = Pid(kp=kp, ti=ti, td=td, tt=max(math.sqrt(ti * td), self.dt))
+        law = law_of(self.law, settings, self.dt, self.sign, self.nominal)
         filters: list[LowPass | Notch] = []
         if "cutoff" in settings:
             filters.append(LowPass(settings["cutoff"]))
@@ -62,7 +63,7 @@ class Box(NamedTuple):
                 lead=_whole(settings["lead"]),
                 forgetting_factor=settings["forgetting_factor"],
             )
-        return Parts(pid, tuple(filters), repetitive)
+        return Parts(law, tuple(filters), repetitive)
 
     def edges(self, settings: dict[str, float]) -> list[str]:
         """Name the settings that are at an end of their range."""
@@ -114,6 +115,7 @@ def box_of(
     dt: float,
     period: float | None,
     limits: tuple[float, float],
+    law: str = "pid",
 ) -> Box:
     """Set the ranges for plants that are sampled every `dt` seconds."""
     gains = [plant.static_gain for plant in plants]
@@ -124,13 +126,11 @@ def box_of(
             "finite ones, all of one sign"
         )
     sign = math.copysign(1.0, gains[0])
-    # A controller refuses gains with which 1 mm asks for less than a thousandth of the range.
-    least = max(1e-4 / largest, 1.001 * (limits[1] - limits[0]))
-    ranges = [
-        ("kp", least, 10.0 / largest, True),
-        ("ki", 1e-4 / largest, 3.0 / largest, True),
-        ("kd", 1e-4 / largest, 100.0 / largest, True),
-    ]
+    if sign < 0.0 and law in SLIDING:
+        raise ParameterError(
+            f"law is {law!r}, but the stage falls as the voltage rises: expected one that rises"
+        )
+    ranges = law_ranges(law, largest, dt, limits)
     if "low-pass" in parts:
         ranges.append(("cutoff", 0.02 / dt, 2.0 / dt, True))
     if "notch" in parts:
@@ -150,7 +150,8 @@ def box_of(
             ("lead", -0.49, longest + 0.49, False),
             ("forgetting_factor", 0.9, 1.0, False),
         ]
-    return Box(ranges, dt, period if "repetitive" in parts else None, sign)
+    nominal = nominal_of(plants[len(plants) // 2])
+    return Box(ranges, dt, period if "repetitive" in parts else None, sign, law, nominal)
 
 
 def _notch(plants: Sequence[_core.LoopPlant], dt: float) -> list[tuple[str, float, float, bool]]:

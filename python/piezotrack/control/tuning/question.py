@@ -19,6 +19,7 @@ from ..controller import number_pair
 from ..plant import Plant, plant_of, voltages_before
 from .box import parts_named
 from .margins import Margins, Spread
+from .structures import LAWS
 
 __all__ = ["FIGURES", "Question", "asked"]
 
@@ -35,6 +36,7 @@ class Question(NamedTuple):
     feedforward: Inverse | None
     parts: tuple[str, ...] | None
     filters: tuple[LowPass | Notch, ...]
+    law: str
     margins: Margins
     spread: Spread
     figure: str
@@ -60,6 +62,7 @@ def asked(
     feedforward: Any,
     parts: Any,
     filters: Any,
+    law: Any,
     margins: Any,
     spread: Any,
     figure: Any,
@@ -88,6 +91,13 @@ def asked(
     for one in references:
         if not isinstance(one, Reference):
             raise ParameterError(f"reference is {type(one).__name__}: expected pt.Reference")
+    if law not in LAWS:
+        raise ParameterError(f"law is {quoted(law)}: expected {', '.join(map(repr, LAWS))}")
+    if not references and law in ("pd", "lead-lag"):
+        raise ParameterError(
+            f"law is {law!r} without a reference: expected one with an integral part, whose gain is "
+            "made large then"
+        )
     _check_kind("margins", margins, Margins)
     _check_kind("spread", spread, Spread)
     if figure not in FIGURES:
@@ -114,6 +124,7 @@ def asked(
         feedforward=_inverse_of(stages[0], feedforward),
         parts=parts_named(parts),
         filters=_filters(filters),
+        law=law,
         margins=margins or Margins(),
         spread=spread or Spread(),
         figure=figure,

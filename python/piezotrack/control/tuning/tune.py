@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from ...stages.virtual import VirtualStage
     from ..components import LowPass, Notch
     from ..plant import Plant
+    from .structures import LawName
 
 __all__ = ["tune"]
 
@@ -56,6 +57,7 @@ def tune(
     feedforward: Inverse | Literal["inverse"] | None = "inverse",
     parts: Sequence[str] | str | None = None,
     filters: Sequence[LowPass | Notch] = (),
+    law: LawName = "pid",
     margins: Margins | None = None,
     spread: Spread | None = None,
     figure: Literal["rms", "largest"] = "rms",
@@ -102,6 +104,11 @@ def tune(
         where all references repeat more than four times with one period.
     filters : sequence of LowPass or Notch, optional
         Filters of the measurement that are there in any case; two with those of `parts`.
+    law : str, optional
+        The feedback law: ``"pid"``; ``"pd"``, which needs a feedforward; ``"lead-lag"``;
+        ``"sliding mode"``, ``"disturbance observer"`` around a PID, or
+        ``"perturbation estimation"``, an observer around sliding mode. An observer expects the
+        middle plant's static gain and its time constant at low frequencies.
     margins : Margins, optional
         What every loop keeps.
     spread : Spread, optional
@@ -150,7 +157,7 @@ def tune(
     ('sensitivity', True)
     """
     question, intervals = asked(
-        stage, reference, dt, limits, feedforward, parts, filters, margins, spread, figure,
+        stage, reference, dt, limits, feedforward, parts, filters, law, margins, spread, figure,
         effort, slew, clipped, delay, jitter, visited, error, seeds, particles, iterations,
         seed, threads,
     )  # fmt: skip
@@ -179,7 +186,7 @@ def _searched(question: Question, dt: float) -> _Answer:
             f"references have periods of {listed}: expected one period for the repetitive part"
         )
     period = next(iter(periods), None)
-    box = box_of(parts, plants, dt, period, question.limits)
+    box = box_of(parts, plants, dt, period, question.limits, question.law)
     base = Controller(
         dt=dt,
         limits=question.limits,
@@ -194,6 +201,7 @@ def _searched(question: Question, dt: float) -> _Answer:
             controller=base._core,
             period=box.period,
             sign=box.sign,
+            law=(box.law, *box.nominal),
             sought=box.ranges,
             tasks=tasks,
             plants=plants,

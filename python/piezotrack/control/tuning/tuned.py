@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..._support.units import shown_unit
+from ..components import Pid
 
 if TYPE_CHECKING:
-    from ..components import LowPass, Notch, Pid, Repetitive
+    from ..components import LowPass, Notch, Repetitive
     from ..controller import Controller
     from ..tracking import Tracking
     from .margins import Margins
@@ -134,12 +135,14 @@ def parts_text(controller: Controller) -> str:
     """Write the gains of a controller with their units."""
     unit, scale = shown_unit(controller.drive_unit)
     text = []
-    pid: Pid | None = controller.feedback if hasattr(controller.feedback, "kp") else None  # type: ignore[assignment]
-    if pid is not None:
+    law = controller.feedback
+    if isinstance(law, Pid):
         text.append(
-            f"PID: kp {1e-6 * scale * pid.kp:.4g} {unit}/um, ti {1e3 * pid.ti:.4g} ms, "
-            f"td {1e3 * pid.td:.4g} ms"
+            f"PID: kp {1e-6 * scale * law.kp:.4g} {unit}/um, ti {1e3 * law.ti:.4g} ms, "
+            f"td {1e3 * law.td:.4g} ms"
         )
+    elif law is not None:
+        text.append(repr(law))
     text += [_filter_text(one) for one in controller.filters]
     if controller.repetitive is not None:
         text.append(_repetitive_text(controller.repetitive, unit, scale))

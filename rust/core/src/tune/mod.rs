@@ -9,4 +9,4 @@ mod settings;
 pub use loops::{Figures, Judged, ReadyTask, Task};
 pub use requirements::{PlantSet, Requirements, Robustness, Worst};
 pub use search::{Aim, Found, Tuning};
-pub use settings::{Setting, Sought, Template, pid};
+pub use settings::{Nominal, Setting, Sought, Structure, Template, pid};

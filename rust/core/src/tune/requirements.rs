@@ -168,7 +168,9 @@ impl PlantSet {
     /// What is least good of a controller over the set.
     #[must_use]
     pub fn robustness(&self, controller: &Controller<Law>) -> Robustness {
-        let law = self.along(&polynomials(&controller.feedback.transfer_function()));
+        let ratio = polynomials(&controller.feedback.transfer_function());
+        let integrators = integrators(&ratio);
+        let law = self.along(&ratio);
         let filters = controller.filters.iter().flatten();
         let passed = filters.fold(None, |before: Option<Vec<C>>, filter| {
             let this = self.along(&filter_ratio(filter));
@@ -184,7 +186,7 @@ impl PlantSet {
                 Some(filter) => response[k] * filter[k],
                 None => response[k],
             };
-            let mut one = walk(law.len(), |k| forward(k) * law[k]);
+            let mut one = walk(law.len(), integrators, |k| forward(k) * law[k]);
             if let Some(learnt) = &learnt {
                 let gain = (0..law.len()).map(|k| {
                     let closed = forward(k) / (C::new(1.0, 0.0) + forward(k) * law[k]);
@@ -195,7 +197,7 @@ impl PlantSet {
             out = Some(out.map_or(one, |before| worse(before, one, plant)));
         }
         // There is a plant: `new` saw to it.
-        out.unwrap_or_else(|| walk(0, |_| C::new(0.0, 0.0)))
+        out.unwrap_or_else(|| walk(0, 0, |_| C::new(0.0, 0.0)))
     }
 
     fn along(&self, ratio: &Ratio) -> Vec<C> {
@@ -221,8 +223,14 @@ impl PlantSet {
     }
 }
 
+/// Poles at 1 that do not cancel.
+fn integrators(law: &Ratio) -> usize {
+    let zeros = |of: &[f64]| of.iter().take_while(|one| **one == 0.0).count();
+    zeros(&law.below).saturating_sub(zeros(&law.above))
+}
+
 /// The loop along the grid: margins, and roots outside.
-fn walk(count: usize, open: impl Fn(usize) -> C) -> Robustness {
+fn walk(count: usize, integrators: usize, open: impl Fn(usize) -> C) -> Robustness {
     let one = C::new(1.0, 0.0);
     let mut nearest = f64::INFINITY;
     let (mut phase, mut gain) = (PI, f64::INFINITY);
@@ -260,9 +268,11 @@ fn walk(count: usize, open: impl Fn(usize) -> C) -> Robustness {
         gain = gain.min(-1.0 / last.re);
     }
     // Along the upper half of the circle 1 + L turns from where it begins to 0 where no root is
-    // outside; an integrator begins at -90 degrees.
-    let lost = (first + turned) / PI;
-    let outside = if lost.is_nan() || first.abs() > 0.75 * PI { 1.0 } else { lost.abs().round() };
+    // outside; each integrator lets it begin 90 degrees earlier.
+    let begin = if integrators > 1 && first > 0.0 { first - 2.0 * PI } else { first };
+    let lost = (begin + turned) / PI;
+    let reversed = integrators < 2 && first.abs() > 0.75 * PI;
+    let outside = if lost.is_nan() || reversed { 1.0 } else { lost.abs().round() };
     let worst = |value| Worst { value, plant: 0 };
     Robustness {
         unstable: worst(outside),

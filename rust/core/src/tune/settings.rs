@@ -1,6 +1,8 @@
 //! The settings of a controller that a search may change, by their names.
 
-use piezotrack_control::{Controller, Filter, Pid, Repetitive, Smoothing};
+use piezotrack_control::{
+    Controller, DisturbanceObserver, Filter, LeadLag, Pid, Repetitive, SlidingMode, Smoothing,
+};
 
 use crate::error::{Error, Result};
 use crate::simulate::Law;
@@ -32,10 +34,42 @@ pub enum Setting {
     Lead,
     /// Its forgetting factor.
     Forgetting,
+    /// Time constant of the zero of a lead-lag law, s.
+    LeadTime,
+    /// Time constant of its pole, s.
+    LagTime,
+    /// Switching gain of sliding mode control, V.
+    Switching,
+    /// Cutoff of a disturbance observer, Hz.
+    Observer,
+}
+
+/// Which feedback law has the gains.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Structure {
+    /// PID; without an integral gain PD.
+    Pid,
+    /// Lead-lag.
+    LeadLag,
+    /// Sliding mode, which inside its boundary layer is a PID.
+    SlidingMode,
+    /// Disturbance observer around a PID.
+    DisturbanceObserver(Nominal),
+    /// Disturbance observer around sliding mode.
+    PerturbationEstimation(Nominal),
+}
+
+/// The plant that an observer expects.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Nominal {
+    /// Static gain, m/V.
+    pub gain: f64,
+    /// Time constant, s.
+    pub time: f64,
 }
 
 /// All of them, with the names that both languages use.
-const NAMES: [(&str, Setting); 12] = [
+const NAMES: [(&str, Setting); 16] = [
     ("kp", Setting::Proportional),
     ("ki", Setting::Integral),
     ("kd", Setting::Derivative),
@@ -48,6 +82,10 @@ const NAMES: [(&str, Setting); 12] = [
     ("tq", Setting::Lag),
     ("lead", Setting::Lead),
     ("forgetting_factor", Setting::Forgetting),
+    ("lead_time", Setting::LeadTime),
+    ("lag_time", Setting::LagTime),
+    ("switching", Setting::Switching),
+    ("observer", Setting::Observer),
 ];
 
 impl Setting {
@@ -117,7 +155,9 @@ pub struct Template {
     pub dt: f64,
     /// Period of a repetitive part, s; `None` for none.
     pub period: Option<f64>,
-    /// Sign of the PID's gains: that of the plant's gain.
+    /// The feedback law.
+    pub structure: Structure,
+    /// Sign of its gains: that of the plant's gain.
     pub sign: f64,
 }
 
@@ -130,11 +170,7 @@ impl Template {
         };
         let mut out = self.base;
         if let Some(kp) = value(Setting::Proportional) {
-            let ki = value(Setting::Integral).unwrap_or(0.0);
-            let kd = value(Setting::Derivative).unwrap_or(0.0);
-            let [kp, ki, kd] = [kp, ki, kd].map(|gain| self.sign * gain);
-            let pid = pid(kp, ki, kd, self.dt).ok()?;
-            out.feedback = Law::Pid(pid.at(self.dt).ok()?);
+            out.feedback = self.law(kp, &value)?;
         }
         // Those of the base stay.
         let mut slots = out.filters.iter_mut().filter(|slot| slot.is_none());
@@ -150,6 +186,37 @@ impl Template {
             out.repetitive = Some(self.repetitive(period, kq, &value)?.at(self.dt).ok()?);
         }
         Some(out)
+    }
+
+    fn law(&self, kp: f64, value: &impl Fn(Setting) -> Option<f64>) -> Option<Law> {
+        let dt = self.dt;
+        let ki = value(Setting::Integral).unwrap_or(0.0);
+        let kd = value(Setting::Derivative).unwrap_or(0.0);
+        let inside = || pid(self.sign * kp, self.sign * ki, self.sign * kd, dt).ok()?.at(dt).ok();
+        let sliding = || {
+            let switching = value(Setting::Switching)?;
+            let ti = if ki > 0.0 { kp * dt / ki } else { f64::INFINITY };
+            let law = SlidingMode::new(switching, switching / kp, ti, kd * dt / kp, dt).ok()?;
+            law.at(dt).ok()
+        };
+        let observer = |of: Nominal| {
+            DisturbanceObserver::new(of.gain, of.time, value(Setting::Observer)?).ok()
+        };
+        Some(match self.structure {
+            Structure::Pid => Law::Pid(inside()?),
+            Structure::LeadLag => {
+                let (lead, lag) = (value(Setting::LeadTime)?, value(Setting::LagTime)?);
+                let law = LeadLag::new(self.sign * kp, lead, lag).ok()?;
+                Law::StateSpace(law.at(dt).ok()?)
+            }
+            Structure::SlidingMode => Law::SlidingMode(sliding()?),
+            Structure::DisturbanceObserver(of) => {
+                Law::ObservedPid(observer(of)?.around(inside()?, dt).ok()?)
+            }
+            Structure::PerturbationEstimation(of) => {
+                Law::ObservedSlidingMode(observer(of)?.around(sliding()?, dt).ok()?)
+            }
+        })
     }
 
     fn repetitive(
