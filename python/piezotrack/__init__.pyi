@@ -8,6 +8,7 @@ from . import references as references
 from . import stages as stages
 from . import xu_li_2010 as xu_li_2010
 from ._core import __version__ as __version__
+from .control.comparing.compare import compare_controllers as compare_controllers
 from .control.components import LowPass as LowPass
 from .control.components import Notch as Notch
 from .control.components import Pid as Pid

@@ -12,6 +12,7 @@ from typer.core import TyperCommand
 from .. import __version__
 from .campaign import campaign_command
 from .compare import compare_command
+from .compare_controllers import compare_controllers_command
 from .contour import contour_command
 from .demo import demo_command
 from .error_messages import of_the_system
@@ -87,6 +88,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "feedforward": feedforward_command,
     "track": track_command,
     "tune": tune_command,
+    "compare-controllers": compare_controllers_command,
     "contour": contour_command,
     "noise": noise_command,
     "reproduce": reproduce_command,

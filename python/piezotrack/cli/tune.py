@@ -12,7 +12,7 @@ import typer
 from ..errors import ParameterError
 from .error_messages import in_words
 from .loop_options import AmplifierBandwidth, Interval, Limits, Loop, LoopDelay, Noise
-from .options import Duration, Json, ModelFile, Out, Overwrite, Period, Quiet  # noqa: TC001
+from .options import Duration, Json, ModelFile, Out, Overwrite, Period, Quiet  # noqa: TC001 - read by typer
 from .output import Output
 from .track import parsed_reference
 

@@ -1,6 +1,10 @@
 # The public names and their homes, each written once: type checkers read them here, and
 # _support/lazy.py does at run time. One name a line, as `ruff format` keeps it.
 from .._support.statistics import ErrorStatistics as ErrorStatistics
+from .comparing.compare import compare_controllers as compare_controllers
+from .comparing.comparison import Cell as Cell
+from .comparing.comparison import ControllerComparison as ControllerComparison
+from .comparing.comparison import Row as Row
 from .components import Lag as Lag
 from .components import LowPass as LowPass
 from .components import Notch as Notch

@@ -35,6 +35,8 @@ pub struct StateSpace<const N: usize> {
     c: [f64; N],
     d: f64,
     back: Option<[f64; N]>,
+    /// States that are used: the others stay 0.
+    used: usize,
 }
 
 impl<const N: usize> StateSpace<N> {
@@ -51,8 +53,14 @@ impl<const N: usize> StateSpace<N> {
         entries("a", a, n, a.len() == n * n, "a square of as many rows as b has entries")?;
         entries("c", c, n, c.len() == n, "as many entries as b")?;
         finite("d", d, "V/m")?;
-        let mut out =
-            Self { a: [[0.0; N]; N], b: [0.0; N], c: [0.0; N], d, back: back.map(|_| [0.0; N]) };
+        let mut out = Self {
+            a: [[0.0; N]; N],
+            b: [0.0; N],
+            c: [0.0; N],
+            d,
+            back: back.map(|_| [0.0; N]),
+            used: n,
+        };
         for (to, from) in out.a.iter_mut().zip(a.chunks(n.max(1))) {
             fill(to, from);
         }
@@ -143,7 +151,7 @@ impl<const N: usize> Feedback for StateSpace<N> {
             state.offset = first - self.d * error;
         }
         state.error = Some(error);
-        let volts = dot(&self.c, &state.x) + self.d * error + state.offset;
+        let volts = self.dot(&self.c, &state.x) + self.d * error + state.offset;
         if volts.is_finite() {
             return volts;
         }
@@ -158,21 +166,21 @@ impl<const N: usize> StateSpace<N> {
     #[inline]
     fn advance(&self, x: &mut [f64; N], error: f64, excess: f64) {
         let mut next = [0.0; N];
-        for ((next, row), b) in next.iter_mut().zip(&self.a).zip(&self.b) {
-            *next = dot(row, x) + b * error;
+        for ((next, row), b) in next.iter_mut().zip(&self.a).zip(&self.b).take(self.used) {
+            *next = self.dot(row, x) + b * error;
         }
         if let Some(back) = &self.back {
-            for (next, gain) in next.iter_mut().zip(back) {
+            for (next, gain) in next.iter_mut().zip(back).take(self.used) {
                 *next += gain * excess;
             }
-        } else if excess * (dot(&self.c, &next) - dot(&self.c, x)) < 0.0 {
+        } else if excess * (self.dot(&self.c, &next) - self.dot(&self.c, x)) < 0.0 {
             return;
         }
         *x = next;
     }
-}
 
-#[inline]
-fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
-    a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + a * b)
+    #[inline]
+    fn dot(&self, a: &[f64; N], b: &[f64; N]) -> f64 {
+        a.iter().zip(b).take(self.used).fold(0.0, |sum, (a, b)| sum + a * b)
+    }
 }

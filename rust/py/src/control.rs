@@ -91,6 +91,23 @@ impl PyController {
         self.controller.repetitive.map_or(0, |part| part.length())
     }
 
+    /// Time of a step, s: the mean over some samples of a slow motion, measured.
+    fn step_time(&self, samples: u32) -> PyResult<f64> {
+        let line = zeros(DELAY_LINE, self.line_length()).map_err(|error| raise(&error))?;
+        let mut state = self.controller.rest(line).map_err(|error| raise(&error.into()))?;
+        let mut measured = 0.0;
+        let begin = std::time::Instant::now();
+        for k in 0..samples {
+            // A triangle of 1 um.
+            let place = f64::from(k % 1000) / 1000.0;
+            let reference = 1e-6 * (0.5 - (place - 0.5).abs());
+            let volts = self.controller.step(&mut state, reference, measured, 0.0).volts;
+            measured = 0.5 * reference + 1e-12 * volts;
+        }
+        core::hint::black_box(measured);
+        Ok(begin.elapsed().as_secs_f64() / f64::from(samples.max(1)))
+    }
+
     /// A session of its own, going on from the voltage `present` where that is given.
     fn start(&self, present: Option<f64>) -> PyResult<PySession> {
         let line = zeros(DELAY_LINE, self.line_length()).map_err(|error| raise(&error))?;

@@ -95,8 +95,8 @@ def asked(
         raise ParameterError(f"law is {quoted(law)}: expected {', '.join(map(repr, LAWS))}")
     if not references and law in ("pd", "lead-lag"):
         raise ParameterError(
-            f"law is {law!r} without a reference: expected one with an integral part, whose gain is "
-            "made large then"
+            f"law is {law!r} without a reference: expected one with an integral part, whose gain "
+            "is made large then"
         )
     _check_kind("margins", margins, Margins)
     _check_kind("spread", spread, Spread)

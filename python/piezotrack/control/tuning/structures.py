@@ -83,11 +83,10 @@ def law_ranges(
         case "pd":
             return [kp, kd]
         case "lead-lag":
-            return [
-                kp,
-                ("lead_time", 0.1 * dt, 1e4 * dt, True),
-                ("lag_time", 0.1 * dt, 1e4 * dt, True),
-            ]
+            # Its static gain is the only thing that stands for an integral part.
+            static = ("kp", least, 1e4 / largest, True)
+            times = [(f"{one}_time", 0.1 * dt, 1e6 * dt, True) for one in ("lead", "lag")]
+            return [static, *times]
         case "sliding mode":
             return [kp, ki, kd, switching]
         case "disturbance observer":

@@ -1,0 +1,119 @@
+"""``piezotrack compare-controllers``: controllers side by side on one stage."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..errors import ParameterError
+from .error_messages import in_words
+from .loop_options import PAPER, AmplifierBandwidth, Interval, Limits, Loop, LoopDelay, Noise
+from .options import Json, ModelFile, Out, Overwrite, Quiet  # noqa: TC001 - read by typer
+from .output import Output
+
+if TYPE_CHECKING:
+    from ..identification.identified import IdentifiedModel
+    from ..stages.virtual import VirtualStage
+
+__all__ = ["compare_controllers_command"]
+
+
+@in_words
+def compare_controllers_command(
+    model: ModelFile,
+    stage: Annotated[
+        str | None,
+        typer.Option(
+            metavar=f"FILE|{PAPER}",
+            help=f"Stage to simulate: another model file, or {PAPER}. Default the model itself.",
+            show_default=False,
+        ),
+    ] = None,
+    out: Out = Path("results"),
+    overwrite: Overwrite = False,
+    dt: Interval = None,
+    limits: Limits = None,
+    rates: Annotated[
+        str,
+        typer.Option(metavar="A,B,C", help="Rates of the references in Hz: slow, medium, fast."),
+    ] = "1,5,20",
+    controllers: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Controllers, separated by commas; default all.",
+            show_default=False,
+        ),
+    ] = None,
+    sensitivity: Annotated[float, typer.Option(help="Largest sensitivity Ms of each.")] = 2.0,
+    delay: LoopDelay = 0.0,
+    noise_nm: Noise = 0.0,
+    bandwidth: AmplifierBandwidth = math.inf,
+    seed: Annotated[int, typer.Option(help="Random seed of the searches and sensor noise.")] = 1,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Compare controllers, each tuned under the same margins."""
+    from .._support.files import (
+        make_folder,
+        picture_files,
+        save_figures,
+        together,
+        write_document,
+    )
+    from ..control.comparing.compare import compare_controllers
+    from ..control.tuning.margins import Margins
+    from ..identification.identified import load
+
+    known = load(model)
+    settings = Loop(stage != PAPER, dt, limits, None, None, None, None)
+    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
+    result.will_write(["controllers.json", *picture_files("controllers")])
+    plant = _plant(stage, known, 1e-9 * noise_nm, bandwidth, seed)
+    found = compare_controllers(
+        plant,
+        known,
+        dt=settings.dt(known, None),
+        limits=settings.volts(known),
+        rates=_rates(rates),
+        controllers=None
+        if controllers is None
+        else [one.strip() for one in controllers.split(",")],
+        margins=Margins(sensitivity=sensitivity),
+        delay=delay,
+        seed=seed,
+    )
+    document = found.document()
+    with together(make_folder(out)) as folder:
+        written = [
+            write_document(folder / "controllers.json", document),
+            *save_figures({"controllers": found.plot()}, folder),
+        ]
+    result.show(str(found), document, written)
+
+
+def _plant(
+    stage: str | None, known: IdentifiedModel, noise: float, bandwidth: float, seed: int
+) -> VirtualStage:
+    from ..identification.identified import load
+    from ..stages.virtual import VirtualStage
+
+    if stage == PAPER:
+        return VirtualStage.xu_li_2010(seed=seed)
+    other = known if stage is None else load(Path(stage))
+    return VirtualStage.of(other, noise=noise, bandwidth=bandwidth, seed=seed)
+
+
+def _rates(text: str) -> tuple[float, float, float]:
+    try:
+        slow, medium, fast = (float(one) for one in text.split(","))
+    except ValueError:
+        raise ParameterError(
+            f"--rates is {text!r}: expected three rates in Hz, as 1,5,20"
+        ) from None
+    if not 0.0 < slow < medium < fast < math.inf:
+        raise ParameterError(f"--rates is {text!r}: expected three rates in Hz in rising order")
+    return slow, medium, fast

@@ -1,0 +1,231 @@
+"""One stage, many controllers: each tuned under the same margins, judged by the same motions."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from ... import _core
+from ..._support.arguments import not_negative
+from ..._support.arrays import check_dt
+from ..._support.messages import quoted
+from ...errors import ParameterError, PiezotrackError
+from ...identification.identified import IdentifiedModel
+from ...references.reference import Reference
+from ...stages.base import Stage
+from ..controller import number_pair
+from ..plant import plant_of, stepped, voltages_before
+from ..tracking import feedforward_of, settled_from
+from ..tuning.margins import Margins, Spread, plants_of
+from .comparison import Cell, ControllerComparison, Row
+from .contenders import CONTENDERS, Entry, Task
+from .variants import Variant, usual_references, variants
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from ...data.dataset import Dataset
+    from ..controller import Controller
+    from ..plant import Plant
+
+__all__ = ["compare_controllers"]
+
+# Periods after which everything that learns has learnt.
+LEARNT = 3
+# Samples over which the time of a step is measured.
+TIMED = 20_000
+
+
+def compare_controllers(
+    stage: Plant | IdentifiedModel,
+    model: Stage | IdentifiedModel,
+    *,
+    dt: float,
+    limits: tuple[float, float],
+    references: Sequence[Reference] | None = None,
+    rates: tuple[float, float, float] = (1.0, 5.0, 20.0),
+    controllers: Sequence[str] | None = None,
+    models: Mapping[str, Stage | IdentifiedModel] | None = None,
+    record: Dataset | None = None,
+    margins: Margins | None = None,
+    spread: Spread | None = None,
+    delay: float = 0.0,
+    **options: Any,
+) -> ControllerComparison:
+    """Compare controllers on one stage.
+
+    Every controller is tuned by `tune` under the same margins for the same references, and then
+    judged by its true error on the stage, on stages with 1.3 and 0.7 times the gain and with 10 %
+    slower dynamics, and with 1 ms more delay.
+
+    Parameters
+    ----------
+    stage : Stage, VirtualStage or IdentifiedModel
+        The stage, simulated.
+    model : Stage or IdentifiedModel
+        The model whose inverse is the feedforward.
+    dt : float
+        Sampling interval [s].
+    limits : (float, float)
+        Lowest and highest voltage [V].
+    references : sequence of Reference, optional
+        What is followed; default a sine at three rates, a triangle, a staircase and a random
+        motion over 60 % of the stroke. The scheduled PID takes the first three, which have to
+        be sines.
+    rates : (float, float, float), optional
+        Rates of the default references [Hz].
+    controllers : sequence of str, optional
+        Names of those that are compared; default all for which there is what they need.
+    models : mapping of str to Stage or IdentifiedModel, optional
+        Models under the names ``"dahl"`` and ``"bouc-wen"``, for their inverses.
+    record : Dataset, optional
+        To train the network with.
+    margins, spread, delay : optional
+        As of `tune`.
+    **options
+        Further arguments of `tune`, as `particles`.
+
+    Returns
+    -------
+    ControllerComparison
+        A row for each controller; printed, a table.
+
+    Raises
+    ------
+    ParameterError
+        An argument cannot be used, or not one controller could be made.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> plays = pt.stages.PrandtlIshlinskiiStage(
+    ...     linear=1e-6, thresholds=(10.0,), weights=(0.2e-6,), frequency=300.0, damping_ratio=0.1
+    ... )
+    >>> found = pt.compare_controllers(
+    ...     pt.VirtualStage.of(plays, noise=5e-9), plays, dt=1e-3, limits=(0.0, 75.0),
+    ...     references=[pt.sine(frequency=5.0, low=20e-6, high=60e-6, duration=1.2)],
+    ...     controllers=["inverse", "inverse + PID"], particles=12, iterations=8,
+    ... )
+    >>> [row.name for row in found.rows]
+    ['inverse', 'inverse + PID']
+    """
+    plant = plant_of(stage)
+    low, high = number_pair("limits", limits, "V")
+    if not isinstance(model, (Stage, IdentifiedModel)):
+        raise ParameterError(
+            f"model is {type(model).__name__}: expected a stage or identified model"
+        )
+    task = Task(
+        stage=plant,
+        inverse=model.inverse(),
+        models=models or {},
+        record=record,
+        references=_references(references) or usual_references(plant, (low, high), rates),
+        dt=check_dt(dt),
+        limits=(low, high),
+        margins=margins or Margins(),
+        spread=spread or Spread(),
+        delay=not_negative("delay", delay, "s"),
+        options=options,
+    )
+    rows, refused = [], {}
+    for name in _names(controllers, task):
+        try:
+            rows.append(_row(name, CONTENDERS[name](task), task))
+        except PiezotrackError as error:
+            refused[name] = str(error)
+    if not rows:
+        name, words = next(iter(refused.items()))
+        raise ParameterError(f"controllers: not one could be made; {name}: {words}")
+    return ControllerComparison(
+        rows=tuple(rows),
+        references=tuple(one.name for one in task.references),
+        variants=tuple(one.name for one in variants(plant)),
+        refused=refused,
+        dt=task.dt,
+        margins=task.margins,
+    )
+
+
+def _references(given: Sequence[Reference] | None) -> list[Reference]:
+    listed = [] if given is None else list(given)
+    for one in listed:
+        if not isinstance(one, Reference):
+            raise ParameterError(f"references has {type(one).__name__}: expected pt.Reference")
+    if given is not None and not listed:
+        raise ParameterError("references is empty: expected one or more")
+    return listed
+
+
+def _names(controllers: Sequence[str] | None, task: Task) -> list[str]:
+    if controllers is not None:
+        for one in controllers:
+            if one not in CONTENDERS:
+                raise ParameterError(
+                    f"controllers has {quoted(one)}: expected some of "
+                    f"{', '.join(map(repr, CONTENDERS))}"
+                )
+        return list(controllers)
+    missing = set()
+    if task.record is None:
+        missing.add("network")
+    for model, name in (("dahl", "Dahl inverse + PID"), ("bouc-wen", "Bouc-Wen inverse + PID")):
+        if model not in task.models:
+            missing.add(name)
+    return [name for name in CONTENDERS if name not in missing]
+
+
+def _row(name: str, entries: list[Entry | None], task: Task) -> Row:
+    """Judge a controller by all references, on all variants of the stage."""
+    cells = []
+    for variant in variants(task.stage):
+        cells.append(tuple(_cell(entry, variant, task) for entry in entries))
+    first = next(entry for entry in entries if entry is not None)
+    sensitivity, margin = _robustness(first.controller, task)
+    return Row(
+        name=name,
+        controller=first.controller,
+        cells=tuple(cells),
+        sensitivity=sensitivity,
+        gain_margin=margin,
+        step_time=first.controller._core.step_time(TIMED),
+    )
+
+
+def _cell(entry: Entry | None, variant: Variant, task: Task) -> Cell | None:
+    """Simulate a controller along a reference: its true errors once it has settled."""
+    if entry is None:
+        return None
+    controller, reference = entry.controller, entry.reference
+    samples = reference.sample(controller.dt)
+    voltage = entry.voltage
+    if voltage is None:
+        voltage = feedforward_of(controller, reference, samples).voltage
+    stage = stepped(variant.stage, controller)
+    end = float(samples.t[-1])
+    start = settled_from(reference, end)
+    if reference.period is not None and reference.duration > 4.0 * reference.period:
+        start = min(start + LEARNT * reference.period, end - reference.period)
+    motion = _core.Task(
+        stage=stage._core,
+        visited=voltages_before(stage, (), controller.limits),
+        dt=controller.dt,
+        delay=task.delay + variant.delay,
+        jitter=0.0,
+        reference=samples.x,
+        feedforward=voltage,
+        first=math.ceil(start / controller.dt - 1e-9),
+        measured=False,
+    )
+    rms, largest, effort, _, clipped = motion.figures([controller._core], 1)[0]
+    return Cell(rms, largest, effort, clipped)
+
+
+def _robustness(controller: Controller, task: Task) -> tuple[float | None, float | None]:
+    """Largest sensitivity and least gain margin over the plants; None without feedback."""
+    if controller.feedback is None:
+        return None, None
+    plants = plants_of([task.stage], task.limits, task.delay, task.spread)
+    checks = [_core.check_loop(controller._core, one.plant) for one in plants]
+    gains = [one["gain_margin"] for one in checks if one["gain_margin"] is not None]
+    return max(one["sensitivity"] for one in checks), min(gains, default=math.inf)

@@ -1,0 +1,260 @@
+"""The controllers that are compared, and how each is made for a stage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from ... import _core
+from ...errors import ParameterError
+from ..controller import Controller
+from ..h_infinity import mixed_sensitivity
+from ..learning import learn
+from ..neural_network import train_network
+from ..tuning.margins import Margins, Spread, plants_of
+from ..tuning.schedule import schedule
+from ..tuning.tune import tune
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ...data.dataset import Dataset
+    from ...identification.identified import IdentifiedModel
+    from ...references.reference import Reference
+    from ...stages.base import Stage
+    from ...stages.inverse import Inverse
+    from ...stages.virtual import VirtualStage
+
+    Array = NDArray[np.float64]
+
+__all__ = ["CONTENDERS", "Entry", "Task"]
+
+# Bandwidths that a design by H-infinity is tried with, as parts of the sampling rate.
+BANDWIDTHS = (0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12)
+
+
+class Entry(NamedTuple):
+    """A controller for one reference.
+
+    Attributes
+    ----------
+    controller : Controller
+        With its feedforward.
+    reference : Reference
+        What it follows: that asked for, or one with more periods.
+    voltage : ndarray or None
+        Feedforward in place of that of the controller [V].
+    """
+
+    controller: Controller
+    reference: Reference
+    voltage: Array | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """What all controllers are made for.
+
+    Attributes
+    ----------
+    stage : VirtualStage
+        The stage, simulated with its noise.
+    inverse : Inverse
+        Of the model.
+    models : mapping of str to Stage or IdentifiedModel
+        Other models.
+    record : Dataset or None
+        To train a network with.
+    references : list of Reference
+        What is followed.
+    dt : float
+        Sampling interval [s].
+    limits : (float, float)
+        Of the voltage [V].
+    margins, spread : Margins, Spread
+        The same for all.
+    delay : float
+        Of the loop [s].
+    options : dict
+        Further arguments of `tune`.
+    """
+
+    stage: VirtualStage
+    inverse: Inverse
+    models: Mapping[str, Stage | IdentifiedModel]
+    record: Dataset | None
+    references: list[Reference]
+    dt: float
+    limits: tuple[float, float]
+    margins: Margins
+    spread: Spread
+    delay: float
+    options: dict[str, Any]
+
+    def tuned(self, references: Any = None, inverse: Any = "model", **changes: Any) -> Controller:
+        """Tune a controller for the references: for all of them by default."""
+        return tune(
+            self.stage,
+            self.references if references is None else references,
+            dt=self.dt,
+            limits=self.limits,
+            feedforward=self.inverse if inverse == "model" else inverse,
+            margins=self.margins,
+            spread=self.spread,
+            delay=self.delay,
+            error="true",
+            **{"parts": ("pid", "low-pass"), **self.options, **changes},
+        ).controller
+
+    def alone(self, inverse: Inverse) -> Controller:
+        """Make a controller without feedback."""
+        return Controller(dt=self.dt, limits=self.limits, feedforward=inverse)
+
+    def each(self, controller: Controller) -> list[Entry | None]:
+        """Take the same controller for every reference."""
+        return [Entry(controller, reference) for reference in self.references]
+
+
+Maker = Callable[[Task], list[Entry | None]]
+
+
+def _inverse(task: Task) -> list[Entry | None]:
+    return task.each(task.alone(task.inverse))
+
+
+def _other(name: str) -> Maker:
+    def make(task: Task) -> list[Entry | None]:
+        return task.each(task.tuned(inverse=task.models[name].inverse()))
+
+    return make
+
+
+def _network(task: Task) -> list[Entry | None]:
+    if task.record is None:
+        raise ParameterError("record is missing: expected one to train the network with")
+    return task.each(task.alone(train_network(task.record)))
+
+
+def _law(law: str) -> Maker:
+    def make(task: Task) -> list[Entry | None]:
+        return task.each(task.tuned(law=law))
+
+    return make
+
+
+def _pid_alone(task: Task) -> list[Entry | None]:
+    return task.each(task.tuned(inverse=None))
+
+
+def _notched(task: Task) -> list[Entry | None]:
+    return task.each(task.tuned(parts=("pid", "low-pass", "notch")))
+
+
+def _scheduled(task: Task) -> list[Entry | None]:
+    sines = task.references[:3]
+    half = 0.5 * (sines[0].high - sines[0].low)
+    made = {(half, 1.0 / one.period): one for one in sines if one.period is not None}
+    rates = sorted(rate for _, rate in made)
+    found = schedule(
+        task.stage,
+        [half],
+        rates,
+        centre=0.5 * (sines[0].high + sines[0].low),
+        waveform=lambda amplitude, rate: made[amplitude, rate],
+        dt=task.dt,
+        limits=task.limits,
+        feedforward=task.inverse,
+        margins=task.margins,
+        spread=task.spread,
+        delay=task.delay,
+        error="true",
+        **task.options,
+    )
+    return task.each(found.controller)
+
+
+def _repetitive(task: Task) -> list[Entry | None]:
+    return [
+        Entry(task.tuned(one, parts=("pid", "low-pass", "repetitive")), one)
+        if _repeats(one)
+        else None
+        for one in task.references
+    ]
+
+
+def _learnt(task: Task) -> list[Entry | None]:
+    controller = task.tuned()
+    entries: list[Entry | None] = []
+    for one in task.references:
+        if not _repeats(one):
+            entries.append(None)
+            continue
+        try:
+            found = learn(task.stage, one, controller, delay=task.delay, trials=12)
+        except ParameterError:
+            # No table of this period converges on the set of models.
+            entries.append(None)
+            continue
+        entries.append(Entry(controller, found.final.reference, found.final.feedforward))
+    return entries
+
+
+def _repeats(reference: Reference) -> bool:
+    return reference.period is not None and reference.duration > 4.0 * reference.period
+
+
+def _h_infinity(task: Task) -> list[Entry | None]:
+    """Take the highest bandwidth that keeps the margins for all plants."""
+    plants = plants_of([task.stage], task.limits, task.delay, task.spread)
+    base, best = task.alone(task.inverse), None
+    why = "no bandwidth tried keeps the margins for all plants"
+    for share in BANDWIDTHS:
+        try:
+            law = mixed_sensitivity(
+                task.stage,
+                dt=task.dt,
+                bandwidth=share / task.dt,
+                limits=task.limits,
+                largest_sensitivity=task.margins.sensitivity,
+                delay=task.delay,
+            )
+        except ParameterError as error:
+            why = str(error)
+            continue
+        controller = replace(base, feedback=law)
+        checks = [_core.check_loop(controller._core, one.plant) for one in plants]
+        kept = all(
+            one["stable"]
+            and one["sensitivity"] <= task.margins.sensitivity
+            and (one["gain_margin"] or 1e9) >= task.margins.gain
+            for one in checks
+        )
+        if kept:
+            best = controller
+    if best is None:
+        raise ParameterError(f"margins: expected some that a law by H-infinity keeps; {why}")
+    return task.each(best)
+
+
+CONTENDERS: dict[str, Maker] = {
+    "inverse": _inverse,
+    "network": _network,
+    "PID": _pid_alone,
+    "inverse + PD": _law("pd"),
+    "inverse + lead-lag": _law("lead-lag"),
+    "inverse + PID": _law("pid"),
+    "inverse + PID + notch": _notched,
+    "Dahl inverse + PID": _other("dahl"),
+    "Bouc-Wen inverse + PID": _other("bouc-wen"),
+    "inverse + sliding mode": _law("sliding mode"),
+    "inverse + perturbation estimation": _law("perturbation estimation"),
+    "inverse + disturbance observer": _law("disturbance observer"),
+    "inverse + H-infinity": _h_infinity,
+    "inverse + scheduled PID": _scheduled,
+    "inverse + PID + repetitive": _repetitive,
+    "inverse + PID + learning": _learnt,
+}

@@ -1,0 +1,95 @@
+"""Stages that differ from the one that the controllers were tuned for, and usual references."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ...references.waveforms import multisine, sine, staircase, triangle
+from ..plant import reach
+
+if TYPE_CHECKING:
+    from ...references.reference import Reference
+    from ...stages.base import Stage
+    from ...stages.virtual import VirtualStage
+
+__all__ = ["Variant", "usual_references", "variants"]
+
+# Periods of a usual reference, the first of which is its smooth start.
+PERIODS = 6
+# Part of the stroke about its middle.
+STROKE = 0.6
+# Reach of the stage, sampled like this [s].
+REACH_STEP = 1e-3
+
+
+class Variant(NamedTuple):
+    """A stage, and the delay of its loop [s] in addition to the usual one."""
+
+    name: str
+    stage: VirtualStage
+    delay: float
+
+
+def variants(stage: VirtualStage) -> list[Variant]:
+    """Make the stage itself, and with other gains, more delay and a slower mode."""
+    return [
+        Variant("as tuned for", stage, 0.0),
+        Variant("1.3 times the gain", replace(stage, stage=_amplified(stage.stage, 1.3)), 0.0),
+        Variant("0.7 times the gain", replace(stage, stage=_amplified(stage.stage, 0.7)), 0.0),
+        Variant("1 ms more delay", stage, 1e-3),
+        Variant("dynamics 10 % slower", replace(stage, stage=_slowed(stage.stage, 0.9)), 0.0),
+    ]
+
+
+def _amplified(stage: Stage, factor: float) -> Stage:
+    """Scale the displacement of a stage for the same voltage, as far as its model allows."""
+    names: tuple[str, ...] = ("linear", "weights", "dead_zone_thresholds")
+    if any(one.name == "piezo_coefficient" for one in fields(stage)):  # type: ignore[arg-type]
+        names = ("piezo_coefficient",)
+    return _scaled(stage, dict.fromkeys(names, factor))
+
+
+def _slowed(stage: Stage, rate: float) -> Stage:
+    """Make all linear dynamics of a stage slower."""
+    factors = {
+        "frequency": rate,
+        "mode_frequencies": rate,
+        "time_constant": 1.0 / rate,
+        "mass": 1.0 / rate**2,
+        "damping": 1.0 / rate,
+    }
+    return _scaled(stage, factors)
+
+
+def _scaled(stage: Stage, factors: dict[str, float]) -> Stage:
+    """Multiply those parameters of a stage that it has."""
+    changed: dict[str, Any] = {}
+    for one in fields(stage):  # type: ignore[arg-type]
+        value = getattr(stage, one.name)
+        if one.name in factors and value is not None:
+            changed[one.name] = (np.array(value) * factors[one.name]).tolist()
+    return replace(stage, **changed)  # type: ignore[type-var]
+
+
+def usual_references(
+    stage: VirtualStage, limits: tuple[float, float], rates: tuple[float, float, float]
+) -> list[Reference]:
+    """Make a sine at three rates, a triangle, a staircase and a random motion within reach."""
+    bottom, top = reach(stage, limits, REACH_STEP)
+    middle, half = 0.5 * (bottom + top), 0.5 * STROKE * (top - bottom)
+    low, high = middle - half, middle + half
+    slow, medium, fast = rates
+    sines = [sine(frequency=rate, low=low, high=high, duration=PERIODS / rate) for rate in rates]
+    draws = np.random.default_rng(1)
+    # Whole multiples of a basis, so that the motion repeats.
+    basis = slow / 2.0
+    tones = basis * np.sort(draws.choice(np.arange(1, max(8, int(fast / basis))), 6, replace=False))
+    return [
+        *sines,
+        triangle(frequency=medium, low=low, high=high, duration=PERIODS / medium),
+        staircase(dwell=1.0 / medium, steps=6, low=low, high=high),
+        multisine(frequencies=tones, low=low, high=high, duration=3.0 / basis, seed=1),
+    ]
