@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ...references.waveforms import multisine, sine, staircase, triangle
-from ..plant import reach
+from ..plant import reach, settled_bottom
 
 if TYPE_CHECKING:
     from ...references.reference import Reference
@@ -78,7 +78,9 @@ def usual_references(
     stage: VirtualStage, limits: tuple[float, float], rates: tuple[float, float, float]
 ) -> list[Reference]:
     """Make a sine at three rates, a triangle, a staircase and a random motion within reach."""
-    bottom, top = reach(stage, limits, REACH_STEP)
+    _, top = reach(stage, limits, REACH_STEP)
+    # Once up, the stage no longer comes all the way down.
+    bottom = settled_bottom(stage, limits, top, REACH_STEP)
     middle, half = 0.5 * (bottom + top), 0.5 * STROKE * (top - bottom)
     low, high = middle - half, middle + half
     slow, medium, fast = rates
