@@ -24,7 +24,7 @@ def plot_controllers(
 ) -> Figure:
     """Draw errors along each reference, and over all of them on each stage."""
     rows = comparison.rows
-    drawn = panels(fig, (12.0, 1.8 + 0.36 * len(rows)))
+    drawn = panels(fig, (12.0, 2.2 + 0.36 * len(rows)))
     left, right = drawn.subplots(1, 2)
     places = np.arange(len(rows))[::-1]
     for k, name in enumerate(comparison.references):
@@ -41,5 +41,7 @@ def plot_controllers(
         axis.set_title(title)
         axis.grid(axis="y", alpha=0.3)
         axis.set_yticks(places, [row.name for row in rows] if axis is left else [""] * len(rows))
-        axis.legend(fontsize="x-small", loc="upper right")
+        # Below: above any row there may be a mark.
+        place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.55 / drawn.get_figheight())}
+        axis.legend(fontsize="small", ncol=3, **place)
     return whole(drawn)

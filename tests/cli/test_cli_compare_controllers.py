@@ -1,0 +1,46 @@
+"""``piezotrack compare-controllers``: what it writes, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from commands import ran, refusal
+from loops import model_text
+
+COMPARE = ("compare-controllers", "dahl.json", "--stage", "xu-li-2010", "--dt", "0.02")
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("dahl.json").write_text(model_text(), encoding="utf-8")
+
+
+def test_controllers_are_compared_and_written() -> None:
+    words = ran(*COMPARE, "--controllers", "inverse, PID", "--rates", "0.5,1,2")
+    assert "true rms error in nm at 50 Hz" in words
+    document = json.loads(Path("results/controllers.json").read_text(encoding="utf-8"))
+    inverse, pid = document["controllers"]
+    assert (inverse["name"], pid["name"]) == ("inverse", "PID")
+    # The second-order Dahl model leaves micrometres, feedback less.
+    assert pid["figures"][0][0]["rms"] < inverse["figures"][0][0]["rms"]
+    assert pid["sensitivity"] <= 2.02
+    assert inverse["sensitivity"] is None
+    assert Path("results/controllers.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--rates", "1,2"], "--rates is '1,2'"),
+        (["--rates", "3,2,1"], "in rising order"),
+        (["--controllers", "pid"], "has 'pid'"),
+        (["--sensitivity", "0.5"], "is 0.5"),
+    ],
+)
+def test_wrong_options_are_named(options: list[str], words: str) -> None:
+    assert words in refusal(*COMPARE, *options)
+    assert not Path("results").exists()
