@@ -98,7 +98,7 @@ def documented(value: Any, *sections: str) -> set[str]:
         if line and set(below) == {"-"}:
             section = line
         elif section in sections and line and not line.startswith((" ", "-")):
-            names.update(name.strip() for name in line.partition(" : ")[0].split(","))
+            names.update(name.strip(" *") for name in line.partition(" : ")[0].split(","))
     return names
 
 

@@ -34,6 +34,7 @@ __all__ = [
     "delayed",
     "identify",
     "identify_weights",
+    "law_transfer_function",
     "loop_response",
     "models",
     "nnls",

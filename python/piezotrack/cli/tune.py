@@ -84,6 +84,14 @@ def tune_command(
     from ..identification.identified import load
     from ..stages.virtual import VirtualStage
 
+    _within("--gain-margin", gain_margin, 1.0, math.inf, "a factor above 1")
+    _within("--phase-margin", phase_margin, 0.0, 180.0, "degrees, 0 to below 180")
+    _within("--sensitivity", sensitivity, 1.0, math.inf, "a factor above 1")
+    _within("--mode-spread", mode_spread, 0.0, 95.0, "per cent, 0 to below 95")
+    _within("--gain-spread", gain_spread, 0.0, 95.0, "per cent, 0 to below 95")
+    _within("--delay-spread", delay_spread, 0.0, math.inf, "seconds, 0 or above")
+    margins = Margins(gain=gain_margin, phase=math.radians(phase_margin), sensitivity=sensitivity)
+    spread = Spread(delay=(0.0, delay_spread), mode=0.01 * mode_spread, gain=0.01 * gain_spread)
     known = load(model)
     desired = [parsed_reference(text, duration, period) for text in reference or ()]
     settings = Loop(True, dt, limits, None, None, None, None)
@@ -97,16 +105,23 @@ def tune_command(
         limits=settings.volts(known),
         feedforward=known.inverse() if feedforward else None,
         parts=None if parts is None else [one.strip() for one in parts.split(",")],
-        margins=Margins(
-            gain=gain_margin, phase=math.radians(phase_margin), sensitivity=sensitivity
-        ),
-        spread=Spread(delay=(0.0, delay_spread), mode=0.01 * mode_spread, gain=0.01 * gain_spread),
+        margins=margins,
+        spread=spread,
         figure=_figure(figure),
         delay=delay,
         seed=seed,
     )
     document = _document(tuned)
     result.show(str(tuned), document, _write(tuned, document, out))
+
+
+def _within(option: str, value: float, low: float, high: float, expected: str) -> None:
+    """Refuse a value by the name and in the unit of its option, which the library does not know.
+
+    0 is in its range, 1 is not.
+    """
+    if not (low < value < high or value == low == 0.0):
+        raise ParameterError(f"{option} is {value:g}: expected {expected}")
 
 
 def _figure(figure: str) -> Any:

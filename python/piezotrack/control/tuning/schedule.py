@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Sized
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -132,7 +132,7 @@ def schedule(
     nothing = Pid(kp=1.0, ti=1.0)
     # The grid is checked before anything is searched.
     grid = ScheduledPid(
-        amplitudes=amplitudes, rates=rates, gains=[nothing] * (len(amplitudes) * len(rates))
+        amplitudes=amplitudes, rates=rates, gains=[nothing] * (_count(amplitudes) * _count(rates))
     )
     parts = options.pop("parts", ("pid", "low-pass"))
     if "repetitive" in parts:
@@ -158,6 +158,11 @@ def schedule(
     _check_between(controller, law, [one.plant for one in plants], margins or Margins())
     table = np.array(errors).reshape(len(grid.amplitudes), len(grid.rates), 2)
     return Schedule(controller, fixed, tuple(tuned), table)
+
+
+def _count(values: object) -> int:
+    """Return how many there are; of what is no sequence none, which the grid refuses."""
+    return len(values) if isinstance(values, Sized) else 0
 
 
 def _sines(centre: float) -> Waveform:
