@@ -2,7 +2,7 @@
 
 use piezotrack_control::{
     Controller, ControllerState, DisturbanceObserver, Feedback, Filter, LeadLag, Limits, Pid,
-    Repetitive, ScheduledPid, SlidingMode, Smoothing, Snapshot, StateSpace,
+    Repetitive, ScheduledPid, SlidingMode, Smoothing, Snapshot, Span, StateSpace,
 };
 use piezotrack_core::simulate::{Law, LawState, MOST_STATES};
 use proptest::prelude::*;
@@ -14,6 +14,9 @@ type State = ControllerState<LawState, [f64; ROOM]>;
 
 /// Gain of the stage, m/V: it goes 0.9 of the way to where its voltage leads in a sample.
 const GAIN: f64 = 1.5e-6;
+
+/// What the sensor can show, m. A session refuses references beyond it.
+const SPAN: f64 = 0.5e-3;
 
 fn sliding(switching: f64, ti: f64, td: f64) -> Option<SlidingMode> {
     SlidingMode::new(switching, 20e-6, ti, td, 0.03).ok()
@@ -70,6 +73,7 @@ fn stable() -> Vec<Controller<Law>> {
         for parts in 0..4 {
             let mut controller = Controller::new(limits, law);
             controller.repetitive = (parts & 1 > 0).then(|| learner.at(DT).unwrap());
+            controller.span = Span::new(-SPAN, SPAN).unwrap();
             controller.filters = [(parts & 2 > 0).then_some(filter), None];
             out.push(controller);
         }
@@ -163,7 +167,8 @@ proptest! {
             x += 0.9 * (GAIN * controller.step(&mut state, far, x, 60.0).volts - x);
         }
         for (r, y, u) in &bad {
-            x += 0.9 * (GAIN * controller.step(&mut state, *r, *y, *u).volts - x);
+            let r = if r.is_finite() { r.max(-SPAN).min(SPAN) } else { *r };
+            x += 0.9 * (GAIN * controller.step(&mut state, r, *y, *u).volts - x);
         }
         if let Some(volts) = applied {
             let _ = controller.applied(&mut state, volts);
