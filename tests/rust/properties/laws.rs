@@ -1,8 +1,10 @@
 //! Every feedback law of `Law` in the controller: limits, recovery, snapshots, bumpless start.
 
+use piezotrack_control::hysteresis::{BoucWen, Dahl};
 use piezotrack_control::{
-    Controller, ControllerState, DisturbanceObserver, Feedback, Filter, LeadLag, Limits, Pid,
-    Repetitive, ScheduledPid, SlidingMode, Smoothing, Snapshot, Span, StateSpace,
+    Controller, ControllerState, DisturbanceObserver, Feedback, Filter, HysteresisObserver,
+    LeadLag, Limits, ObservedOperator, Pid, Repetitive, ScheduledPid, SlidingMode, Smoothing,
+    Snapshot, Span, StateSpace,
 };
 use piezotrack_core::simulate::{Law, LawState, MOST_STATES};
 use proptest::prelude::*;
@@ -20,6 +22,19 @@ const SPAN: f64 = 0.5e-3;
 
 fn sliding(switching: f64, ti: f64, td: f64) -> Option<SlidingMode> {
     SlidingMode::new(switching, 20e-6, ti, td, 0.03).ok()
+}
+
+fn hysteresis<O: ObservedOperator + Copy>(operator: O, correction: f64) -> Option<HysteresisObserver<O>> {
+    HysteresisObserver::new(operator, GAIN, 0.0, correction, 100e-6).ok()
+}
+
+/// A weak hysteresis, up to 2 V, which the stage here does not have.
+fn dahl() -> Dahl<f64> {
+    Dahl { a1: 120.0, a2: 1.2e6, gain: 4e8 }
+}
+
+fn bouc_wen() -> BoucWen<f64> {
+    BoucWen { rise: 0.1, beta: 0.04, gamma: 0.03, exponent: 1.0 }
 }
 
 /// All laws with one gain (V/m) and time (s), where they can be sampled.
@@ -54,6 +69,15 @@ fn laws(kp: f64, time: f64, cutoff: f64) -> Vec<Law> {
         sampled.and_then(|law| lagging.and_then(around(law))).map(Law::ObservedPid),
         bare.and_then(|law| observer.and_then(|one| one.around(law, DT).ok()))
             .map(Law::ObservedSlidingMode),
+        sampled
+            .and_then(|law| hysteresis(dahl(), 0.0)?.around(law, DT).ok())
+            .map(Law::DahlObserver),
+        sampled
+            .and_then(|law| hysteresis(dahl(), 0.3)?.around(law, DT).ok())
+            .map(Law::DahlObserver),
+        sampled
+            .and_then(|law| hysteresis(bouc_wen(), 0.2)?.around(law, DT).ok())
+            .map(Law::BoucWenObserver),
     ]
     .into_iter()
     .flatten()
@@ -119,7 +143,7 @@ fn act_on(controller: &Controller<Law>, state: &mut State, act: &Act) -> f64 {
 fn the_table_has_every_law() {
     let kinds: Vec<_> = laws(0.1e6, 0.1, 0.5).iter().map(std::mem::discriminant).collect();
     for (i, kind) in kinds.iter().enumerate() {
-        // Adjacent laws of one kind only: seven kinds, all of them sampled.
+        // Adjacent laws of one kind only: nine kinds, all of them sampled.
         assert_eq!(kinds.iter().rposition(|other| other == kind), {
             let run = kinds[i..].iter().take_while(|other| *other == kind).count();
             Some(i + run - 1)
@@ -129,7 +153,7 @@ fn the_table_has_every_law() {
     for pair in kinds.windows(2) {
         changes += usize::from(pair[0] != pair[1]);
     }
-    assert_eq!((kinds.len(), changes), (10, 7));
+    assert_eq!((kinds.len(), changes), (13, 9));
 }
 
 proptest! {
