@@ -24,7 +24,10 @@ fn sliding(switching: f64, ti: f64, td: f64) -> Option<SlidingMode> {
     SlidingMode::new(switching, 20e-6, ti, td, 0.03).ok()
 }
 
-fn hysteresis<O: ObservedOperator + Copy>(operator: O, correction: f64) -> Option<HysteresisObserver<O>> {
+fn hysteresis<O: ObservedOperator + Copy>(
+    operator: O,
+    correction: f64,
+) -> Option<HysteresisObserver<O>> {
     HysteresisObserver::new(operator, GAIN, 0.0, correction, 100e-6).ok()
 }
 
