@@ -13,11 +13,11 @@ import piezotrack as pt
 from piezotrack.control import HysteresisObserver
 
 DT = 0.005
-PI = pt.Pid.from_um(kp=0.05, ti=0.1)
+PI = pt.Pid.from_um(kp=0.2, ti=0.1)
 DAHL = pt.DahlStage.xu_li_2010()
 BOUC_WEN = pt.BoucWenStage.xu_li_2010_corrected()
 STAGES: dict[str, Any] = {"dahl": DAHL, "bouc-wen": BOUC_WEN}
-REFERENCE = pt.sine(frequency=0.5, low=10e-6, high=60e-6, duration=8.0)
+REFERENCE = pt.sine(frequency=0.1, low=10e-6, high=60e-6, duration=20.0)
 
 
 def loop(feedback: Any) -> pt.Controller:
@@ -33,7 +33,7 @@ def test_the_error_is_below_that_of_the_pid_alone(name: str, correction: float) 
     assert pt.check_loop(stage, loop(law)).stable
     alone = pt.track(stage, loop(PI), REFERENCE)
     run = pt.track(stage, loop(law), REFERENCE)
-    assert run.metrics.rms_error < 0.9 * alone.metrics.rms_error
+    assert run.metrics.rms_error < 0.97 * alone.metrics.rms_error
 
 
 @pytest.mark.parametrize("name", STAGES)
@@ -44,7 +44,8 @@ def test_a_linear_feedforward_beside_it_leaves_little(name: str) -> None:
     for law in (PI, HysteresisObserver(stage=stage, pid=PI, correction=0.05)):
         session = loop(law).start()
         t = np.arange(1600) * DT
-        r = 25e-6 * (1.0 - np.cos(2 * np.pi * 0.25 * t))
+        # High enough that no voltage below 0 is asked for
+        r = 45e-6 - 25e-6 * np.cos(2 * np.pi * 0.25 * t)
         linear = (r + stage.damping / stage.stiffness * np.gradient(r, DT)) / gain
         state, x, seen = None, 0.0, []
         volts = 0.0
