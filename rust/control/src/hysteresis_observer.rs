@@ -298,7 +298,9 @@ impl<O: ObservedOperator + PartialEq, F: Feedback> Feedback for HysteresisObserv
     }
 
     fn adopt(&self, before: &Self, state: &mut Self::State) -> bool {
-        let same = self.operator == before.operator && self.coefficients() == before.coefficients();
+        let pairs = self.coefficients().into_iter().zip(before.coefficients());
+        let mut pairs = pairs.map(|(one, other)| one.to_bits() == other.to_bits());
+        let same = self.operator == before.operator && pairs.all(|same| same);
         same && self.inner.adopt(&before.inner, &mut state.inner)
     }
 
