@@ -58,7 +58,7 @@ fn laws(kp: f64, time: f64, cutoff: f64) -> Vec<Law> {
     let back = [0.3];
     let lead_lag = LeadLag::new(kp, 0.0, time).ok();
     let around = |law| move |one: DisturbanceObserver| one.around(law, DT).ok();
-    [
+    vec![
         Some(Law::None),
         sampled.map(Law::Pid),
         scheduled().map(Law::Scheduled),
@@ -194,7 +194,7 @@ proptest! {
             x += 0.9 * (GAIN * controller.step(&mut state, far, x, 60.0).volts - x);
         }
         for (r, y, u) in &bad {
-            let r = if r.is_finite() { r.max(-SPAN).min(SPAN) } else { *r };
+            let r = if r.is_finite() { r.clamp(-SPAN, SPAN) } else { *r };
             x += 0.9 * (GAIN * controller.step(&mut state, r, *y, *u).volts - x);
         }
         if let Some(volts) = applied {
