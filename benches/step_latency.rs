@@ -5,9 +5,10 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use piezotrack_control::hysteresis::{BoucWen, Dahl};
 use piezotrack_control::{
-    Controller, DahlInverse, DisturbanceObserver, Feedback, IterativeLearning, LeadLag, Limits,
-    Pid, Repetitive, SlidingMode, Smoothing, StateSpace,
+    Controller, DahlInverse, DisturbanceObserver, Feedback, HysteresisObserver, IterativeLearning,
+    LeadLag, Limits, Pid, Repetitive, ScheduledPid, SlidingMode, Smoothing, StateSpace,
 };
 use piezotrack_core::integrator::{FEW_TERMS, TERMS};
 use piezotrack_core::models::DahlStage;
@@ -110,6 +111,15 @@ fn laws(criterion: &mut Criterion) {
     law(criterion, "sliding mode", sliding);
     law(criterion, "disturbance observer around a PID", observer.around(pid, dt).unwrap());
     law(criterion, "perturbation estimation", observer.around(sliding, dt).unwrap());
+    let gains = [Pid::xu_li_2010(); 4];
+    let scheduled = ScheduledPid::new(&[5e-6, 50e-6], &[0.1, 1.0], &gains, (20e-6, 0.3), dt);
+    law(criterion, "scheduled PID", scheduled.unwrap());
+    let dahl: Dahl<f64> = Dahl { a1: 122.0, a2: 1.18e6, gain: 1.2e9 };
+    let observer = HysteresisObserver::new(dahl, 1.1e-6, 0.05, 0.1, 100e-6).unwrap();
+    law(criterion, "observer of a Dahl hysteresis", observer.around(pid, dt).unwrap());
+    let bouc_wen = BoucWen { rise: 0.36, beta: 0.036, gamma: 0.027, exponent: 1.0 };
+    let observer = HysteresisObserver::new(bouc_wen, 1.1e-6, 0.05, 0.1, 100e-6).unwrap();
+    law(criterion, "observer of a Bouc-Wen hysteresis", observer.around(pid, dt).unwrap());
 }
 
 fn law<F: Feedback>(criterion: &mut Criterion, name: &str, feedback: F) {

@@ -22,6 +22,7 @@ from .contouring_plot import plot_path as plot_path
 from .controller import Controller as Controller
 from .h_infinity import MixedSensitivity as MixedSensitivity
 from .h_infinity import mixed_sensitivity as mixed_sensitivity
+from .hysteresis_observer import HysteresisObserver as HysteresisObserver
 from .iterative_learning import IterativeLearning as IterativeLearning
 from .iterative_learning import LearningTrial as LearningTrial
 from .laws import Chatter as Chatter

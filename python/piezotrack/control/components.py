@@ -246,7 +246,8 @@ class Repetitive:
         the drift of uRC against uFB, which is not observable in the error.
     pause : bool, optional
         Whether learning pauses while the voltage is clipped. Where more than a quarter of a period
-        is clipped, what was learnt before is repeated unchanged until that ends.
+        is clipped, what was learnt before is repeated unchanged until that ends; where that itself
+        is what clips, half of it is forgotten with each period.
 
     Raises
     ------

@@ -14,6 +14,7 @@ from ..identification.identified import IdentifiedModel
 from ..stages.inverse import Inverse
 from .components import LowPass, Notch, Pid, Repetitive, StateSpace
 from .description import controller_text
+from .hysteresis_observer import HysteresisObserver
 from .laws import NAMED_LAWS, DisturbanceObserver, LeadLag, PerturbationEstimator, SlidingMode
 from .plant import reach
 from .scheduled_pid import ScheduledPid
@@ -30,6 +31,7 @@ Feedback: TypeAlias = (
     | PerturbationEstimator
     | DisturbanceObserver
     | ScheduledPid
+    | HysteresisObserver
 )
 # Sampling interval for the reach of a stage [s]: its drive takes seconds.
 REACH_STEP = 0.05
@@ -52,7 +54,7 @@ class Controller:
         Lowest and highest voltage [V].
     feedforward : Inverse, optional
         From ``fit.inverse()`` or ``stage.inverse()``.
-    feedback : Pid, StateSpace, LeadLag, SlidingMode, PerturbationEstimator or DisturbanceObserver
+    feedback : Pid, StateSpace or another law of `piezotrack.control`
         The feedback law, optional.
     repetitive : Repetitive, optional
         Repetitive control, for a reference that repeats.
@@ -121,7 +123,7 @@ class Controller:
                 raise ParameterError(f"filters has {one!r}: expected pt.LowPass or pt.Notch")
         if isinstance(self.feedback, Pid):
             _check_unit("kp", self.feedback.kp, high - low, "Pid", self.drive_unit)
-        if isinstance(self.feedback, DisturbanceObserver):
+        if isinstance(self.feedback, (DisturbanceObserver, HysteresisObserver)):
             _check_unit("kp", self.feedback.pid.kp, high - low, "Pid", self.drive_unit)
         if isinstance(self.repetitive, Repetitive):
             _check_unit("kq", self.repetitive.kq, high - low, "Repetitive", self.drive_unit)

@@ -12,6 +12,7 @@ from .. import _core
 from .._support.arguments import finite, not_negative, positive
 from ..errors import ParameterError
 from .components import Pid
+from .hysteresis_observer import HysteresisObserver
 from .scheduled_pid import ScheduledPid
 
 if TYPE_CHECKING:
@@ -269,7 +270,14 @@ class PerturbationEstimator:
         return "perturbation", [*inside, *(float(number) for number in nominal)]
 
 
-NAMED_LAWS = (LeadLag, SlidingMode, DisturbanceObserver, PerturbationEstimator, ScheduledPid)
+NAMED_LAWS = (
+    LeadLag,
+    SlidingMode,
+    DisturbanceObserver,
+    PerturbationEstimator,
+    ScheduledPid,
+    HysteresisObserver,
+)
 
 
 def _check_nominal(gain: float, time: float, cutoff: float) -> None:

@@ -20,7 +20,7 @@
 //! ```
 //!
 //! where v is the voltage that was applied. While the command is clipped, the estimate takes no step
-//! that would move it further beyond the limit. A constant in the output of the law inside is not
+//! that makes it larger and moves the command further beyond the limit. A constant in the output of the law inside is not
 //! observed: a law without an integral must not keep one, as an incremental PID does.
 
 use core::f64::consts::TAU;
@@ -154,7 +154,10 @@ impl<F: Feedback> Feedback for Observed<F> {
             let needed = -self.inverse * (error - self.pole * before);
             let found = needed - (applied - forward);
             let step = self.fresh * (found - state.disturbance);
-            state.disturbance += if excess * step > 0.0 { 0.0 } else { step };
+            let next = state.disturbance + step;
+            // One that gets smaller may step: it could keep the command clipped for ever otherwise.
+            let outward = excess * step > 0.0 && next.abs() > state.disturbance.abs();
+            state.disturbance = if outward { state.disturbance } else { next };
         }
         let inside = self.inner.step(&mut state.inner, sample);
         if let Some(first) = state.first.take() {

@@ -46,6 +46,7 @@ mod error;
 pub mod feedback_law;
 pub mod filters;
 pub mod hysteresis;
+pub mod hysteresis_observer;
 pub mod inverse;
 pub mod iterative_learning;
 pub mod lead_lag;
@@ -68,6 +69,9 @@ pub use dynamics::{Dynamics, MOST_MODES, Mode, Modes};
 pub use error::{Error, Result};
 pub use feedback_law::{Feedback, FeedbackSample};
 pub use filters::{Filter, FilterState};
+pub use hysteresis_observer::{
+    HysteresisObserved, HysteresisObservedState, HysteresisObserver, ObservedOperator,
+};
 pub use inverse::{
     BoucWenInverse, BoucWenInverseState, CreepingInverse, CreepingInverseState, DahlInverse,
     FeedbackInverse, FeedbackInverseState, FirstOrderDahlInverse, InputInverse, InputInverseState,

@@ -1,8 +1,9 @@
 //! Controllers, as configuration and as sessions.
 
+use piezotrack_control::hysteresis::{BoucWen, Dahl};
 use piezotrack_control::{
-    Command, Controller, ControllerState, DisturbanceObserver, Filter, LeadLag, Limits, Pid,
-    Repetitive, ScheduledPid, SlidingMode, Smoothing, Span, StateSpace,
+    Command, Controller, ControllerState, DisturbanceObserver, Filter, HysteresisObserver, LeadLag,
+    Limits, Pid, Repetitive, SampledPid, ScheduledPid, SlidingMode, Smoothing, Span, StateSpace,
 };
 use piezotrack_core::design::LinearFeedback;
 use piezotrack_core::math::zeros;
@@ -154,9 +155,21 @@ fn law_from((kind, numbers): &NamedLaw, dt: f64) -> Result<Law> {
             Law::ObservedSlidingMode(observer.around(inner, dt)?)
         }
         ("disturbance observer", &[kp, ti, td, tt, gain, time, cutoff]) => {
-            let tt = (!tt.is_nan()).then_some(tt);
             let observer = DisturbanceObserver::new(gain, time, cutoff)?;
-            Law::ObservedPid(observer.around(Pid::new(kp, ti, td, tt)?.at(dt)?, dt)?)
+            Law::ObservedPid(observer.around(pid_at([kp, ti, td, tt], dt)?, dt)?)
+        }
+        ("Dahl observer", &[kp, ti, td, tt, gain, time, correction, stroke, a1, a2, curvature]) => {
+            let operator = Dahl { a1, a2, gain: curvature };
+            let observer = HysteresisObserver::new(operator, gain, time, correction, stroke)?;
+            Law::DahlObserver(observer.around(pid_at([kp, ti, td, tt], dt)?, dt)?)
+        }
+        (
+            "Bouc-Wen observer",
+            &[kp, ti, td, tt, gain, time, correction, stroke, rise, beta, gamma, exponent],
+        ) => {
+            let operator = BoucWen { rise, beta, gamma, exponent };
+            let observer = HysteresisObserver::new(operator, gain, time, correction, stroke)?;
+            Law::BoucWenObserver(observer.around(pid_at([kp, ti, td, tt], dt)?, dt)?)
         }
         ("scheduled pid", numbers) => Law::Scheduled(scheduled(numbers, dt)?),
         (other, _) => {
@@ -164,6 +177,11 @@ fn law_from((kind, numbers): &NamedLaw, dt: f64) -> Result<Law> {
             return Err(Error::parameter("law", format!("'{other}'"), expected));
         }
     })
+}
+
+/// A PID from its numbers, the last NaN for the default of tt.
+fn pid_at([kp, ti, td, tt]: [f64; 4], dt: f64) -> Result<SampledPid> {
+    Ok(Pid::new(kp, ti, td, (!tt.is_nan()).then_some(tt))?.at(dt)?)
 }
 
 /// Counts of amplitudes and rates, their values, those at first, then four numbers of each PID.

@@ -9,19 +9,19 @@ use proptest::test_runner::TestCaseError;
 
 use crate::{any_number, around, cases, decades};
 
-const DT: f64 = 0.02;
+pub const DT: f64 = 0.02;
 /// Room for every period drawn here.
-const ROOM: usize = Repetitive::room(64);
+pub const ROOM: usize = Repetitive::room(64);
 
 /// What a program does with a session in one sampling interval.
 #[derive(Clone, Debug)]
-enum Act {
+pub enum Act {
     Step(f64, f64, f64),
     Applied(f64),
     Reset,
 }
 
-fn acts() -> impl Strategy<Value = Vec<Act>> {
+pub fn acts() -> impl Strategy<Value = Vec<Act>> {
     let good = || (around(1e-4), around(1e-4), around(100.0));
     let act = prop_oneof![
         6 => good().prop_map(|(r, y, u)| Act::Step(r, y, u)),
@@ -42,7 +42,7 @@ fn smoothing() -> impl Strategy<Value = Smoothing> {
 }
 
 prop_compose! {
-    fn learner()(
+    pub fn learner()(
         period in 2.0..60.0_f64, whole in any::<bool>(), smoothing in smoothing(),
         kq in 0.01..1.99_f64, forgetting_factor in 0.5..=1.0_f64, lead in 0..4_u32,
         pause in any::<bool>(),
@@ -53,7 +53,7 @@ prop_compose! {
 }
 
 /// A controller with what can be sampled of the parts drawn.
-fn composed<F: Feedback>(
+pub fn composed<F: Feedback>(
     feedback: F,
     (low, range): (f64, f64),
     learner: Option<Repetitive>,
@@ -66,7 +66,7 @@ fn composed<F: Feedback>(
     Some(controller)
 }
 
-fn stays_within<F: Feedback>(
+pub fn stays_within<F: Feedback>(
     controller: &Controller<F>,
     acts: &[Act],
 ) -> Result<(), TestCaseError> {
@@ -92,7 +92,7 @@ fn stays_within<F: Feedback>(
     Ok(())
 }
 
-fn limits() -> impl Strategy<Value = (f64, f64)> {
+pub fn limits() -> impl Strategy<Value = (f64, f64)> {
     prop_oneof![
         3 => (around(100.0), decades(75.0, 2.0)),
         1 => (decades(-1e3, 5.0), decades(1e3, 9.0)),

@@ -5,6 +5,7 @@
 #![allow(missing_docs, clippy::unwrap_used, clippy::float_cmp)]
 
 mod control;
+mod laws;
 mod operators;
 mod signals;
 mod swarm;

@@ -24,7 +24,7 @@ use crate::Number;
 /// | `a1` | a1 | 1/m | >= 0 |
 /// | `a2` | a2 | 1/m^2 | >= 0 |
 /// | `gain` | b1 up | N/m^2 | any |
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dahl<N, const TERMS: usize = 6> {
     /// Decay along the path, 1/m.
     pub a1: N,
@@ -35,7 +35,7 @@ pub struct Dahl<N, const TERMS: usize = 6> {
 }
 
 /// State of the operator: the force b1 q1 and its slope b1 q2.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DahlState<N> {
     /// Hysteresis force b1 q1, N.
     pub force: N,

@@ -72,7 +72,8 @@ pub enum Smoothing {
 /// uFB that cancel each other are not observable, and they drift under saturation.
 /// `forgetting_factor` below 1 and `pause` (no learning from saturated samples) prevent this.
 /// With `pause`, learning also stops as a whole, and what was learnt is held, while more than a
-/// quarter of a period is saturated: such a reference is beyond the reach of the stage.
+/// quarter of a period is saturated: such a reference is beyond the reach of the stage. Where what
+/// is held would itself keep the command at a limit, half of it is forgotten in each period.
 ///
 /// ```
 /// use piezotrack_control::{Outcome, Repetitive, Smoothing};

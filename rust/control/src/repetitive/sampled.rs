@@ -194,7 +194,8 @@ impl SampledRepetitive {
     ///
     /// With `pause`, a saturated sample learns no error and keeps no more voltage than pushes the
     /// command to the limit. Where more than a quarter of a period is saturated, the period before
-    /// the saturation is repeated unchanged until it ends.
+    /// the saturation is repeated unchanged until it ends. Where the repeated voltage itself is
+    /// what saturates, as the errors then tell, half of it is forgotten with each period.
     #[inline]
     pub fn step<L: AsMut<[f64]>>(
         &self,
@@ -227,6 +228,11 @@ impl SampledRepetitive {
         let RepetitiveState { line, next, volts, saturation } = state;
         let Some(lines) = line.as_mut().get_mut(..2 * self.entries) else { return 0.0 };
         let was_held = matches!(saturation.learning, Learning::Held { .. });
+        if saturation.is_latched(before, clipped, &self.lengths) {
+            for entry in lines.iter_mut() {
+                *entry *= 0.5;
+            }
+        }
         saturation.follow(clipped, &self.lengths);
         if !was_held {
             let (sum, learns) = if clipped {

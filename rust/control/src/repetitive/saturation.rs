@@ -1,5 +1,6 @@
 //! Antiwindup of a repetitive controller: when to learn, and when to hold what was learnt.
 
+use super::sampled::Outcome;
 use crate::snapshot::Snapshot;
 
 /// Clipped samples in a period, as its part, above which learning stops as a whole.
@@ -65,17 +66,25 @@ pub(super) struct Saturation {
     since: u32,
     /// Clipped samples in the count.
     clipped: u32,
+    /// Clipped samples in a held period whose error pointed away from the limit.
+    inward: u32,
     /// Held periods with few clipped samples, one after the other.
     well: u32,
     /// Time by which the held periods are shorter than those of the reference, in samples.
     behind: f64,
 }
 
-crate::snapshot!(Saturation { learning, since, clipped, well, behind });
+crate::snapshot!(Saturation { learning, since, clipped, inward, well, behind });
 
 impl Saturation {
-    pub(super) const NONE: Self =
-        Self { learning: Learning::On, since: u32::MAX, clipped: 0, well: 0, behind: 0.0 };
+    pub(super) const NONE: Self = Self {
+        learning: Learning::On,
+        since: u32::MAX,
+        clipped: 0,
+        inward: 0,
+        well: 0,
+        behind: 0.0,
+    };
 
     /// Continues with the next sample where nothing was clipped and learning is on.
     #[inline]
@@ -100,7 +109,7 @@ impl Saturation {
         }
         self.clipped = self.clipped.saturating_add(u32::from(clipped));
         if clipped && self.clipped > lengths.whole / PART {
-            (self.since, self.clipped) = (u32::MAX, 0);
+            (self.since, self.clipped, self.inward) = (u32::MAX, 0, 0);
             self.behind = 0.0;
             self.learning = self.another(lengths);
         }
@@ -115,6 +124,7 @@ impl Saturation {
         if left > 0 {
             return;
         }
+        self.inward = 0;
         self.well =
             if self.clipped > lengths.whole / PART { 0 } else { self.well.saturating_add(1) };
         self.clipped = 0;
@@ -124,6 +134,16 @@ impl Saturation {
             self.well = 0;
             Learning::Resuming { left: lengths.entries }
         };
+    }
+
+    /// Counts a clipped sample of a held period by the sign of its error; true in the last sample
+    /// of a period that was clipped by what is held and not by the reference: most of what was
+    /// clipped would have been brought back by its errors, and would stay clipped for ever.
+    #[inline]
+    pub(super) fn is_latched(&mut self, before: Outcome, clipped: bool, lengths: &Lengths) -> bool {
+        let Learning::Held { left } = self.learning else { return false };
+        self.inward += u32::from(clipped && before.excess * before.error > 0.0);
+        left <= 1 && self.inward > lengths.whole / PART && self.inward > self.clipped / 2
     }
 
     /// Another held period, of as many samples as keeps it in phase.

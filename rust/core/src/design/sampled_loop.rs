@@ -1,8 +1,8 @@
 //! The sampled closed loop: stage, feedback, filters and repetitive part.
 
 use piezotrack_control::{
-    Controller, Feedback, Filter, Observed, SampledPid, SampledRepetitive, SampledSlidingMode,
-    StateSpace,
+    Controller, Feedback, Filter, HysteresisObserved, Observed, ObservedOperator, SampledPid,
+    SampledRepetitive, SampledSlidingMode, StateSpace,
 };
 
 use nalgebra::{DMatrix, DVector};
@@ -83,11 +83,52 @@ impl<F: LinearFeedback> LinearFeedback for Observed<F> {
         let [above, below] = self.inner().transfer_function();
         let mut sum = product(&above, &[fresh, 1.0]);
         let observed = product(&below, &[fresh * inverse * (1.0 - pole), fresh * inverse]);
-        sum.resize(sum.len().max(observed.len()), 0.0);
-        for (sum, more) in sum.iter_mut().zip(&observed) {
-            *sum += more;
-        }
+        add(&mut sum, 1.0, &observed);
         [sum, product(&below, &[0.0, 1.0])]
+    }
+}
+
+/// At the larger slope s of the operator, about a point: w^ = Hy y + Hu u of the observer, so that
+/// u/e = (C - Hy)/(1 - Hu) around the law C. The states are x^, w^ and the last two voltages.
+impl<O: ObservedOperator, F: LinearFeedback> LinearFeedback for HysteresisObserved<O, F> {
+    fn transfer_function(&self) -> [Vec<f64>; 2] {
+        let ([p, g, l], [_, slope]) = (self.coefficients(), self.slopes());
+        // Of x-, x^, w- and w^ the weights of x^, w^, v[k-1], v[k-2] before and of y.
+        let sum = |pairs: &[(f64, [f64; 5])]| -> [f64; 5] {
+            std::array::from_fn(|i| pairs.iter().map(|(factor, row)| factor * row[i]).sum())
+        };
+        let unit =
+            |at: usize| -> [f64; 5] { std::array::from_fn(|i| f64::from(u8::from(i == at))) };
+        let [x, w, last, before, y] = [0, 1, 2, 3, 4].map(unit);
+        let along_drive = sum(&[(1.0, w), (slope, last), (-slope, before)]);
+        let at = if self.is_of_drive() { along_drive } else { w };
+        let ahead = sum(&[(p, x), (g, last), (-g, at)]);
+        let place = sum(&[(1.0 - l, ahead), (l, y)]);
+        let along_path = sum(&[(1.0, w), (slope, place), (-slope, x)]);
+        let moved = if self.is_of_drive() { along_drive } else { along_path };
+        let estimate = sum(&[(1.0 - l, moved), (l, last), (l * p / g, x), (-l / g, y)]);
+
+        let rows = [place, estimate, [0.0; 5], last];
+        let change = DMatrix::from_fn(4, 4, |i, j| rows[i][j] - f64::from(u8::from(i == j)));
+        let column = |numbers: [f64; 4]| DVector::from_column_slice(&numbers);
+        let out = column([estimate[0], estimate[1], estimate[2], estimate[3]]);
+        let of_y = Ratio::of_matrices(&change, &column(rows.map(|row| row[4])), &out, estimate[4]);
+        let of_u = Ratio::of_matrices(&change, &column([0.0, 0.0, 1.0, 0.0]), &out, 0.0);
+
+        let [above, below] = self.inner().transfer_function();
+        let mut top = product(&above, &of_y.below);
+        add(&mut top, -1.0, &product(&below, &of_y.above));
+        let mut bottom = of_u.below;
+        add(&mut bottom, -1.0, &of_u.above);
+        [top, product(&below, &bottom)]
+    }
+}
+
+/// Adds a multiple of a polynomial.
+fn add(sum: &mut Vec<f64>, factor: f64, more: &[f64]) {
+    sum.resize(sum.len().max(more.len()), 0.0);
+    for (sum, more) in sum.iter_mut().zip(more) {
+        *sum += factor * more;
     }
 }
 

@@ -1,9 +1,10 @@
 //! Closed-loop tracking: reference and feedforward in, motion and commands out.
 
+use piezotrack_control::hysteresis::{BoucWen, BoucWenState, Dahl, DahlState};
 use piezotrack_control::{
-    Command, Controller, ControllerState, Feedback, FeedbackSample, Observed, ObservedState,
-    PidState, SampledPid, SampledSlidingMode, ScheduledPid, ScheduledPidState, SlidingModeState,
-    Snapshot, StateSpace, StateSpaceState,
+    Command, Controller, ControllerState, Feedback, FeedbackSample, HysteresisObserved,
+    HysteresisObservedState, Observed, ObservedState, PidState, SampledPid, SampledSlidingMode,
+    ScheduledPid, ScheduledPidState, SlidingModeState, Snapshot, StateSpace, StateSpaceState,
 };
 
 use super::apparatus::{Apparatus, ApparatusState};
@@ -39,6 +40,10 @@ pub enum Law {
     ObservedPid(Observed<SampledPid>),
     /// Sliding mode with perturbation estimation.
     ObservedSlidingMode(Observed<SampledSlidingMode>),
+    /// Observer of a Dahl hysteresis around a PID.
+    DahlObserver(HysteresisObserved<Dahl<f64>, SampledPid>),
+    /// Observer of a Bouc-Wen hysteresis around a PID.
+    BoucWenObserver(HysteresisObserved<BoucWen<f64>, SampledPid>),
 }
 
 /// Memory of a [`Law`].
@@ -58,6 +63,10 @@ pub enum LawState {
     ObservedPid(ObservedState<PidState>),
     /// Of sliding mode control with perturbation estimation.
     ObservedSlidingMode(ObservedState<SlidingModeState>),
+    /// Of a PID controller with an observer of a Dahl hysteresis.
+    DahlObserver(HysteresisObservedState<DahlState<f64>, PidState>),
+    /// Of a PID controller with an observer of a Bouc-Wen hysteresis.
+    BoucWenObserver(HysteresisObservedState<BoucWenState<f64>, PidState>),
 }
 
 impl Snapshot for LawState {
@@ -70,6 +79,8 @@ impl Snapshot for LawState {
             Self::SlidingMode(state) => state.save(write),
             Self::ObservedPid(state) => state.save(write),
             Self::ObservedSlidingMode(state) => state.save(write),
+            Self::DahlObserver(state) => state.save(write),
+            Self::BoucWenObserver(state) => state.save(write),
         }
     }
 
@@ -82,6 +93,8 @@ impl Snapshot for LawState {
             Self::SlidingMode(state) => state.load(read),
             Self::ObservedPid(state) => state.load(read),
             Self::ObservedSlidingMode(state) => state.load(read),
+            Self::DahlObserver(state) => state.load(read),
+            Self::BoucWenObserver(state) => state.load(read),
         }
     }
 }
@@ -98,6 +111,8 @@ impl Feedback for Law {
             Self::SlidingMode(law) => LawState::SlidingMode(law.rest()),
             Self::ObservedPid(law) => LawState::ObservedPid(law.rest()),
             Self::ObservedSlidingMode(law) => LawState::ObservedSlidingMode(law.rest()),
+            Self::DahlObserver(law) => LawState::DahlObserver(law.rest()),
+            Self::BoucWenObserver(law) => LawState::BoucWenObserver(law.rest()),
         }
     }
 
@@ -110,6 +125,8 @@ impl Feedback for Law {
             Self::SlidingMode(law) => LawState::SlidingMode(law.start(volts)),
             Self::ObservedPid(law) => LawState::ObservedPid(law.start(volts)),
             Self::ObservedSlidingMode(law) => LawState::ObservedSlidingMode(law.start(volts)),
+            Self::DahlObserver(law) => LawState::DahlObserver(law.start(volts)),
+            Self::BoucWenObserver(law) => LawState::BoucWenObserver(law.start(volts)),
         }
     }
 
@@ -137,6 +154,16 @@ impl Feedback for Law {
                 Self::ObservedSlidingMode(before),
                 LawState::ObservedSlidingMode(state),
             ) => law.adopt(before, state),
+            (
+                Self::DahlObserver(law),
+                Self::DahlObserver(before),
+                LawState::DahlObserver(state),
+            ) => law.adopt(before, state),
+            (
+                Self::BoucWenObserver(law),
+                Self::BoucWenObserver(before),
+                LawState::BoucWenObserver(state),
+            ) => law.adopt(before, state),
             (Self::None, Self::None, _) => true,
             _ => false,
         }
@@ -150,6 +177,10 @@ impl Feedback for Law {
             (Self::SlidingMode(law), LawState::SlidingMode(state)) => law.step(state, sample),
             (Self::ObservedPid(law), LawState::ObservedPid(state)) => law.step(state, sample),
             (Self::ObservedSlidingMode(law), LawState::ObservedSlidingMode(state)) => {
+                law.step(state, sample)
+            }
+            (Self::DahlObserver(law), LawState::DahlObserver(state)) => law.step(state, sample),
+            (Self::BoucWenObserver(law), LawState::BoucWenObserver(state)) => {
                 law.step(state, sample)
             }
             _ => 0.0,
@@ -167,6 +198,8 @@ impl LinearFeedback for Law {
             Self::SlidingMode(law) => law.transfer_function(),
             Self::ObservedPid(law) => law.transfer_function(),
             Self::ObservedSlidingMode(law) => law.transfer_function(),
+            Self::DahlObserver(law) => law.transfer_function(),
+            Self::BoucWenObserver(law) => law.transfer_function(),
         }
     }
 

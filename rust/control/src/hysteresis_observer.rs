@@ -1,0 +1,325 @@
+//! Luenberger observer of the hysteresis, whose estimate compensates it, around a feedback law.
+//!
+//! ```text
+//! T x' + x = g (u - w),   uFB = uC + w^
+//! ```
+//!
+//! w is the hysteresis as a voltage: Fh/T of a Dahl stage, an operator along the displacement, or
+//! h/d of a Bouc-Wen stage, an operator along the voltage. After Luenberger 1971, doi
+//! 10.1109/TAC.1971.1099826; equations (2) and (20) of Xu and Li 2010, doi 10.1115/1.4001712,
+//! without mass. Sampled, p = exp(-Ts/T), v the voltage that was applied, y the measurement:
+//!
+//! ```text
+//! x-[k] = p x^[k-1] + (1 - p) g (v[k-1] - w^[k-1]),   x^[k] = x-[k] + L (y[k] - x-[k])
+//! w^[k] = w-[k] + L (v[k-1] - w-[k] - (y[k] - p x^[k-1])/(g (1 - p)))
+//! ```
+//!
+//! w- is the operator's output after the way to x^[k], or to v[k-1]. With L = 0 the model runs
+//! beside the stage; with L = 1 everything that the linear part does not explain counts as
+//! hysteresis, creep and disturbances too. Of the operator only the output is corrected, not its
+//! slope. The compensation takes the place of a feedforward by the inverse of the hysteresis, which
+//! would compensate it twice; a linear feedforward r/g, or none, goes with it.
+
+use crate::error::{Result, check, finite, not_negative, positive};
+use crate::feedback_law::{Feedback, FeedbackSample};
+use crate::hysteresis::{BoucWen, BoucWenState, Dahl, DahlState, Operator};
+
+/// Most pieces of a way that is too long for one.
+const MOST_PIECES: u32 = 16;
+
+/// A hysteresis operator with its output in volts whose state can be corrected.
+pub trait ObservedOperator: Operator<f64> {
+    /// Whether its path is the applied voltage; otherwise it is the displacement.
+    const OF_DRIVE: bool;
+
+    /// The longest way, m or V, along which one branch is exact.
+    fn longest(&self) -> f64;
+
+    /// The state with an output larger by `volts`.
+    fn corrected(&self, state: &Self::State, volts: f64) -> Self::State;
+
+    /// Smallest and largest slope of the output, V/m or V/V, for displacements up to `stroke`, m.
+    fn slopes(&self, stroke: f64) -> [f64; 2];
+
+    /// Its state from a state at a place to the next place on the path.
+    #[inline]
+    fn moved(&self, state: &Self::State, way: f64) -> Self::State {
+        let (mut out, longest) = (*state, self.longest());
+        let direction = if way < 0.0 { -1.0 } else { 1.0 };
+        let mut left = way.abs();
+        for _ in 0..MOST_PIECES {
+            if left <= 0.0 {
+                break;
+            }
+            let piece = left.min(longest);
+            out = self.along(&self.branch(&out, direction), direction * piece);
+            left -= piece;
+        }
+        out
+    }
+}
+
+impl ObservedOperator for Dahl<f64> {
+    const OF_DRIVE: bool = false;
+
+    /// A tenth of a radian: the series leaves out less than 1e-9 of the change.
+    #[inline]
+    fn longest(&self) -> f64 {
+        0.1 / libm::sqrt(self.a2).max(self.a1)
+    }
+
+    #[inline]
+    fn corrected(&self, state: &DahlState<f64>, volts: f64) -> DahlState<f64> {
+        DahlState { force: state.force + volts, ..*state }
+    }
+
+    /// 0 at the origin; on the virgin branch it rises to b1 up x, at most to that of a2.
+    fn slopes(&self, stroke: f64) -> [f64; 2] {
+        let most = self.gain * stroke.min(1.0 / libm::sqrt(self.a2));
+        [most.min(0.0), most.max(0.0)]
+    }
+}
+
+impl ObservedOperator for BoucWen<f64> {
+    const OF_DRIVE: bool = true;
+
+    fn longest(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    #[inline]
+    fn corrected(&self, state: &BoucWenState<f64>, volts: f64) -> BoucWenState<f64> {
+        BoucWenState { value: state.value + volts, ..*state }
+    }
+
+    /// 0 at the limit; A at the origin or, if that is more, 2 A beta/(beta + gamma) after a
+    /// reversal at the limit.
+    fn slopes(&self, _stroke: f64) -> [f64; 2] {
+        let both = self.beta + self.gamma;
+        let reversed = if both > 0.0 { 2.0 * self.beta / both } else { 1.0 };
+        let most = self.rise * reversed.max(1.0);
+        [most.min(0.0), most.max(0.0)]
+    }
+}
+
+/// Nominal plant and gain of an observer, in continuous time.
+///
+/// | field | symbol | unit | range |
+/// | --- | --- | --- | --- |
+/// | `operator` | w | V | finite coefficients |
+/// | `gain` | g | m/V | not 0 |
+/// | `time` | T | s | >= 0 |
+/// | `correction` | L | 1 | 0 to 1 |
+/// | `stroke` | | m | > 0 |
+///
+/// ```
+/// use piezotrack_control::hysteresis::BoucWen;
+/// use piezotrack_control::{Feedback, FeedbackSample, HysteresisObserver};
+///
+/// let operator = BoucWen { rise: 0.36, beta: 0.04, gamma: 0.03, exponent: 1.0 };
+/// let observer = HysteresisObserver::new(operator, 1.7e-6, 0.0, 0.0, 100e-6)?;
+/// let law = observer.around((), 0.02)?;
+/// let mut state = law.rest();
+/// let sample = FeedbackSample { applied: 10.0, ..FeedbackSample::new(0.0) };
+/// let volts = law.step(&mut state, &sample);
+/// // What the hysteresis takes from 10 V
+/// assert!((volts - 0.36 / 0.07 * (1.0 - (-0.7_f64).exp())).abs() < 1e-12);
+/// # Ok::<(), piezotrack_control::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HysteresisObserver<O> {
+    operator: O,
+    gain: f64,
+    time: f64,
+    correction: f64,
+    stroke: f64,
+}
+
+impl<O: ObservedOperator + Copy> HysteresisObserver<O> {
+    /// The operator with its output in V; gain (m/V) and time constant (s) of the linear part; the
+    /// share (0 to 1) of the difference to the measurement that corrects the estimate in a sample;
+    /// and the largest displacement (m), for the stability check.
+    ///
+    /// # Errors
+    /// Names the number that is out of its range; the operator where its slope is not finite.
+    pub fn new(operator: O, gain: f64, time: f64, correction: f64, stroke: f64) -> Result<Self> {
+        finite("plant_gain", gain, "m/V")?;
+        check("plant_gain", gain, "m/V", gain.abs() > 0.0, "a gain other than 0")?;
+        not_negative("plant_time", time, "s")?;
+        let right = (0.0..=1.0).contains(&correction);
+        check("correction", correction, "", right, "a share from 0 to 1")?;
+        positive("stroke", stroke, "m")?;
+        let [_, largest] = operator.slopes(stroke);
+        finite("slope of the hysteresis", largest, "")?;
+        Ok(Self { operator, gain, time, correction, stroke })
+    }
+
+    /// The observer around the law `inner`, both for the sampling interval `dt`, s.
+    ///
+    /// # Errors
+    /// Names `dt` where it is not above 0; `plant_gain` where the sampled gain has no inverse.
+    pub fn around<F>(&self, inner: F, dt: f64) -> Result<HysteresisObserved<O, F>> {
+        positive("dt", dt, "s")?;
+        let rest = if self.time > 0.0 { -libm::expm1(-dt / self.time) } else { 1.0 };
+        let fresh = self.gain * rest;
+        let expected = "a linear part whose sampled inverse is finite";
+        check("plant_gain", self.gain, "m/V", (1.0 / fresh).is_finite(), expected)?;
+        let slopes = self.operator.slopes(self.stroke);
+        let (operator, correction) = (self.operator, self.correction);
+        Ok(HysteresisObserved { operator, inner, pole: 1.0 - rest, fresh, correction, slopes })
+    }
+}
+
+/// A feedback law with an observer of the hysteresis, for one sampling interval; see
+/// [`HysteresisObserver::around`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HysteresisObserved<O, F> {
+    operator: O,
+    inner: F,
+    /// p.
+    pole: f64,
+    /// g (1 - p), m/V.
+    fresh: f64,
+    /// L.
+    correction: f64,
+    /// Smallest and largest slope of the operator.
+    slopes: [f64; 2],
+}
+
+/// State of a [`HysteresisObserved`] law; `O` is that of the operator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HysteresisObservedState<O, S> {
+    inner: S,
+    operator: O,
+    /// x^, m.
+    displacement: f64,
+    /// The operator's place on its path, m or V.
+    place: f64,
+    /// Whether there was a sample.
+    begun: bool,
+    /// Voltage to begin with, V.
+    first: Option<f64>,
+    /// The last output, V.
+    volts: f64,
+}
+
+crate::snapshot!(
+    [O: crate::Snapshot, S: crate::Snapshot]
+    HysteresisObservedState<O, S> { inner, operator, displacement, place, begun, first, volts }
+);
+
+impl<O: ObservedOperator, F> HysteresisObserved<O, F> {
+    /// The law inside.
+    #[must_use]
+    pub fn inner(&self) -> &F {
+        &self.inner
+    }
+
+    /// p, g (1 - p) in m/V, and L.
+    #[must_use]
+    pub fn coefficients(&self) -> [f64; 3] {
+        [self.pole, self.fresh, self.correction]
+    }
+
+    /// Smallest and largest slope of the operator, V/m or V/V.
+    #[must_use]
+    pub fn slopes(&self) -> [f64; 2] {
+        self.slopes
+    }
+
+    /// Whether the operator's path is the applied voltage; otherwise it is the displacement.
+    #[must_use]
+    pub fn is_of_drive(&self) -> bool {
+        O::OF_DRIVE
+    }
+
+    /// The estimated hysteresis, V.
+    #[must_use]
+    pub fn estimate<S>(&self, state: &HysteresisObservedState<O::State, S>) -> f64 {
+        self.operator.output(&state.operator).0
+    }
+
+    /// Moves the operator to a place on its path; its output there.
+    #[inline]
+    fn follow<S>(&self, state: &mut HysteresisObservedState<O::State, S>, place: f64) -> f64 {
+        state.operator = self.operator.moved(&state.operator, place - state.place);
+        state.place = place;
+        self.operator.output(&state.operator).0
+    }
+
+    /// The estimate at this sample, V.
+    #[inline]
+    fn observe<S>(
+        &self,
+        state: &mut HysteresisObservedState<O::State, S>,
+        sample: &FeedbackSample,
+    ) -> f64 {
+        let FeedbackSample { measured, applied, .. } = *sample;
+        if !state.begun {
+            // The way from the origin; nothing is known of what was before.
+            (state.begun, state.displacement) = (true, measured);
+            return self.follow(state, if O::OF_DRIVE { applied } else { measured });
+        }
+        let mut before = self.operator.output(&state.operator).0;
+        if O::OF_DRIVE {
+            before = self.follow(state, applied);
+        }
+        let kept = self.pole * state.displacement;
+        let ahead = kept + self.fresh * (applied - before);
+        state.displacement = ahead + self.correction * (measured - ahead);
+        let moved = if O::OF_DRIVE { before } else { self.follow(state, state.displacement) };
+        let step = self.correction * (applied - moved - (measured - kept) / self.fresh);
+        state.operator = self.operator.corrected(&state.operator, step);
+        moved + step
+    }
+}
+
+impl<O: ObservedOperator + PartialEq, F: Feedback> Feedback for HysteresisObserved<O, F> {
+    type State = HysteresisObservedState<O::State, F::State>;
+
+    fn rest(&self) -> Self::State {
+        HysteresisObservedState {
+            inner: self.inner.rest(),
+            operator: self.operator.rest(),
+            displacement: 0.0,
+            place: 0.0,
+            begun: false,
+            first: None,
+            volts: 0.0,
+        }
+    }
+
+    fn start(&self, volts: f64) -> Self::State {
+        HysteresisObservedState { first: Some(volts), volts, ..self.rest() }
+    }
+
+    fn holds(&self) -> bool {
+        self.inner.holds()
+    }
+
+    fn adopt(&self, before: &Self, state: &mut Self::State) -> bool {
+        let pairs = self.coefficients().into_iter().zip(before.coefficients());
+        let mut pairs = pairs.map(|(one, other)| one.to_bits() == other.to_bits());
+        let same = self.operator == before.operator && pairs.all(|same| same);
+        same && self.inner.adopt(&before.inner, &mut state.inner)
+    }
+
+    #[inline]
+    fn step(&self, state: &mut Self::State, sample: &FeedbackSample) -> f64 {
+        let estimate = self.observe(state, sample);
+        if let Some(first) = state.first.take() {
+            // Started once the estimate is known, and as if the error had been 0 so far.
+            state.inner = self.inner.start(first - estimate);
+        }
+        let volts = self.inner.step(&mut state.inner, sample) + estimate;
+        if volts.is_finite() {
+            state.volts = volts;
+        } else {
+            // Overflow: hold the output, and observe again from the next sample on.
+            let HysteresisObservedState { operator, displacement, place, begun, .. } = self.rest();
+            *state =
+                HysteresisObservedState { operator, displacement, place, begun, ..state.clone() };
+        }
+        state.volts
+    }
+}
