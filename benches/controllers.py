@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+
 import piezotrack as pt
 
 mpl.use("Agg")

@@ -140,7 +140,7 @@ fn law_from((kind, numbers): &NamedLaw, dt: f64) -> Result<Law> {
     let sliding = |[switching, layer, ti, td, tf]: [f64; 5]| {
         SlidingMode::new(switching, layer, ti, td, tf)?.at(dt)
     };
-    Ok(match (kind.as_str(), numbers.as_slice()) {
+    Ok(match (kind.as_str(), &numbers[..]) {
         ("lead-lag", &[kp, lead, lag, matched]) => {
             let mut law = LeadLag::new(kp, lead, lag)?;
             law.matched = matched > 0.0;

@@ -169,7 +169,11 @@ def _names(controllers: Sequence[str] | None, task: Task) -> list[str]:
     missing = set()
     if task.record is None:
         missing.add("network")
-    for model, name in (("dahl", "Dahl inverse + PID"), ("bouc-wen", "Bouc-Wen inverse + PID")):
+    for model, name in (
+        ("dahl", "Dahl inverse + PID"),
+        ("bouc-wen", "Bouc-Wen inverse + PID"),
+        ("dahl", "PID + hysteresis observer"),
+    ):
         if model not in task.models:
             missing.add(name)
     return [name for name in CONTENDERS if name not in missing]

@@ -42,6 +42,9 @@ def plot_controllers(
         axis.grid(axis="y", alpha=0.3)
         axis.set_yticks(places, [row.name for row in rows] if axis is left else [""] * len(rows))
         # Below: above any row there may be a mark.
-        place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.55 / drawn.get_figheight())}
+        place = {
+            "loc": "upper center",
+            "bbox_to_anchor": (0.5, -0.55 / whole(drawn).get_figheight()),
+        }
         axis.legend(fontsize="small", ncol=3, **place)
     return whole(drawn)

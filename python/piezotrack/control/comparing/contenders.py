@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ... import _core
 from ...errors import ParameterError
+from ...stages.dahl import DahlStage
+from ..components import Pid
 from ..controller import Controller
 from ..h_infinity import mixed_sensitivity
+from ..hysteresis_observer import HysteresisObserver
 from ..learning import learn
 from ..neural_network import train_network
 from ..tuning.margins import Margins, Spread, plants_of
@@ -33,6 +37,8 @@ if TYPE_CHECKING:
 
 __all__ = ["CONTENDERS", "Entry", "Task"]
 
+# Shares of the gains of a PID alone that one around an observer is tried with.
+SHARES = (1.0, 0.8, 0.6, 0.4, 0.25, 0.1, 0.03)
 # Bandwidths that a design by H-infinity is tried with, as parts of the sampling rate.
 BANDWIDTHS = (0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12)
 
@@ -150,6 +156,36 @@ def _pid_alone(task: Task) -> list[Entry | None]:
     return task.each(task.tuned(inverse=None))
 
 
+def _observed(task: Task) -> list[Entry | None]:
+    """Compensate an observed hysteresis on top of a PID with as much gain as the margins allow."""
+    model = task.models["dahl"]
+    stage = model if isinstance(model, DahlStage) else getattr(model, "model", None)
+    if not isinstance(stage, DahlStage):
+        raise ParameterError("models['dahl'] is no Dahl stage: expected one to observe")
+    tuned = task.tuned(inverse=None)
+    assert isinstance(tuned.feedback, Pid)
+    plants = plants_of([task.stage], task.limits, task.delay, task.spread)
+    for share in SHARES:
+        pid = replace(tuned.feedback, kp=share * tuned.feedback.kp)
+        controller = replace(tuned, feedback=HysteresisObserver(stage=stage, pid=pid))
+        if all(_keeps(controller, one.plant, task.margins) for one in plants):
+            return task.each(controller)
+    raise ParameterError(
+        "margins: expected some that a PID around the observer keeps, of which its gains of 1 to "
+        f"{SHARES[-1]:g} times those of the PID alone do not"
+    )
+
+
+def _keeps(controller: Controller, plant: _core.LoopPlant, margins: Margins) -> bool:
+    """Check the margins that every controller keeps."""
+    found = _core.check_loop(controller._core, plant)
+    return bool(
+        found["stable"]
+        and found["sensitivity"] <= margins.sensitivity
+        and (found["gain_margin"] or math.inf) >= margins.gain
+    )
+
+
 def _notched(task: Task) -> list[Entry | None]:
     return task.each(task.tuned(parts=("pid", "low-pass", "notch")))
 
@@ -226,14 +262,7 @@ def _h_infinity(task: Task) -> list[Entry | None]:
             why = str(error)
             continue
         controller = replace(base, feedback=law)
-        checks = [_core.check_loop(controller._core, one.plant) for one in plants]
-        kept = all(
-            one["stable"]
-            and one["sensitivity"] <= task.margins.sensitivity
-            and (one["gain_margin"] or 1e9) >= task.margins.gain
-            for one in checks
-        )
-        if kept:
+        if all(_keeps(controller, one.plant, task.margins) for one in plants):
             best = controller
     if best is None:
         raise ParameterError(f"margins: expected some that a law by H-infinity keeps; {why}")
@@ -244,6 +273,7 @@ CONTENDERS: dict[str, Maker] = {
     "inverse": _inverse,
     "network": _network,
     "PID": _pid_alone,
+    "PID + hysteresis observer": _observed,
     "inverse + PD": _law("pd"),
     "inverse + lead-lag": _law("lead-lag"),
     "inverse + PID": _law("pid"),

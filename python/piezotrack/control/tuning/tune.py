@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ...identification.identified import IdentifiedModel
-    from ...references.reference import Reference
+    from ...references.reference import Reference, SampledReference
     from ...stages.inverse import Inverse
     from ...stages.virtual import VirtualStage
     from ..components import LowPass, Notch
@@ -255,7 +255,7 @@ def _tasks(question: Question, base: Controller, repeats: bool) -> list[_core.Ta
     for reference in question.references:
         samples = reference.sample(base.dt)
         if question.clipped < 0.5:
-            check_within_reach(plant, question.limits, samples, question.drive_unit)
+            _check_reach(plant, question, samples)
         voltage = feedforward_of(base, reference, samples).voltage
         first = _first(reference, float(samples.t[-1]), base.dt, repeats)
         for k in range(question.seeds):
@@ -274,6 +274,15 @@ def _tasks(question: Question, base: Controller, repeats: bool) -> list[_core.Ta
             )
             tasks.append(task)
     return tasks
+
+
+def _check_reach(plant: VirtualStage, question: Question, samples: SampledReference) -> None:
+    """Refuse a reference beyond the reach, with the argument that allows it here."""
+    try:
+        check_within_reach(plant, question.limits, samples, question.drive_unit)
+    except ParameterError as error:
+        words = str(error).replace("or beyond_reach=True", "or clipped=0.5 or more")
+        raise ParameterError(words) from None
 
 
 def _first(reference: Reference, end: float, dt: float, repeats: bool) -> int:
