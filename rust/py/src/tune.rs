@@ -62,6 +62,7 @@ impl PyTask {
     }
 
     /// Rms and largest error, effort, slew and clipped share of each controller's loop.
+    #[expect(clippy::needless_pass_by_value, reason = "extracted from a list")]
     fn figures(
         &self,
         py: Python<'_>,

@@ -34,6 +34,8 @@ def plot_controllers(
     for k, name in enumerate(comparison.variants):
         errors = [1e9 * row.rms(k) for row in rows]
         right.plot(errors, places, MARKERS[k % len(MARKERS)], label=name, alpha=0.8)
+    # Below the panels: above any row there may be a mark.
+    below = -0.55 / whole(drawn).get_figheight()
     titles = ("each reference, as tuned for", "all references, each stage")
     for axis, title in zip((left, right), titles, strict=True):
         axis.set_xscale("log")
@@ -41,10 +43,5 @@ def plot_controllers(
         axis.set_title(title)
         axis.grid(axis="y", alpha=0.3)
         axis.set_yticks(places, [row.name for row in rows] if axis is left else [""] * len(rows))
-        # Below: above any row there may be a mark.
-        place = {
-            "loc": "upper center",
-            "bbox_to_anchor": (0.5, -0.55 / whole(drawn).get_figheight()),
-        }
-        axis.legend(fontsize="small", ncol=3, **place)
+        axis.legend(fontsize="small", ncol=3, loc="upper center", bbox_to_anchor=(0.5, below))
     return whole(drawn)

@@ -369,17 +369,16 @@ impl<P: LanedPlant> WithSimd for Bundle<'_, P> {
         // The newest last.
         let mut issued = vec![held; whole + 2];
         let mut scores = vec![Score::new(task.timing.interval); controllers.len()];
-        let n = task.samples.reference.len();
-        for k in 0..n {
+        let samples = task.samples.reference.iter().zip(task.samples.feedforward);
+        for (k, ((&reference, &feedforward), &drawn)) in samples.zip(noise).enumerate() {
             if k % POLL == POLL - 1 && stop() {
                 return vec![Figures::FAILED; controllers.len()];
             }
             let shown = plant.displacement(&state);
-            let (reference, feedforward) = (task.samples.reference[k], task.samples.feedforward[k]);
             let mut volts = [0.0; MOST_LANES];
             for (lane, (controller, state)) in controllers.iter().zip(&mut states).enumerate() {
                 let x = shown.as_slice()[lane];
-                let reading = stage.sensor.quantised(x + noise[k]) - start.sensor.zero;
+                let reading = stage.sensor.quantised(x + drawn) - start.sensor.zero;
                 let command = controller.step(state, reference, reading, feedforward);
                 volts[lane] = command.volts;
                 let actual = match task.judged {

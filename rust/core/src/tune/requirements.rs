@@ -48,7 +48,7 @@ impl Requirements {
             let found = format!("{} rad", self.phase_margin);
             return Err(Error::parameter("phase_margin", found, "from 0 to below pi rad"));
         }
-        if !(self.slew > 0.0) {
+        if self.slew.is_nan() || self.slew <= 0.0 {
             let found = format!("{} V/s", self.slew);
             return Err(Error::parameter("slew", found, "above 0, or infinity"));
         }

@@ -183,7 +183,7 @@ impl Template {
             *slots.next()? = Some(Filter::notch(frequency, width, depth, self.dt).ok()?);
         }
         if let (Some(period), Some(kq)) = (self.period, value(Setting::Learning)) {
-            out.repetitive = Some(self.repetitive(period, kq, &value)?.at(self.dt).ok()?);
+            out.repetitive = Some(Self::repetitive(period, kq, &value)?.at(self.dt).ok()?);
         }
         Some(out)
     }
@@ -220,7 +220,6 @@ impl Template {
     }
 
     fn repetitive(
-        &self,
         period: f64,
         kq: f64,
         value: &impl Fn(Setting) -> Option<f64>,
