@@ -59,6 +59,7 @@ fn loops(c: &mut Criterion) {
             };
             let judged = Judged::Measured;
             let task = Task { stage, visited: &[], timing, samples, from: 250, judged };
+            let task = task.ready().expect("usual lengths");
             let all = controllers(dt, repeats);
             let law = if repeats { "PID + repetitive" } else { "PID" };
             group.bench_function(format!("{name}, {law}"), |b| {
