@@ -1,5 +1,5 @@
 //! Closed loops a second, of 1000 samples each, as a search for gains simulates them.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::unwrap_used)]
 
 use std::hint::black_box;
 use std::time::Duration;
@@ -15,16 +15,16 @@ const SAMPLES: u32 = 1000;
 const LOOPS: u32 = 512;
 
 fn controllers(dt: f64, repeats: bool) -> Vec<Controller<Law>> {
-    let limits = Limits::new(0.0, 75.0).expect("in order");
+    let limits = Limits::new(0.0, 75.0).unwrap();
     (0..LOOPS)
         .map(|i| {
             let kp = 0.02e6 + 50.0 * f64::from(i);
             let pid = Pid::new(kp, dt, 0.5 * dt, None).and_then(|pid| pid.at(dt));
-            let mut one = Controller::new(limits, Law::Pid(pid.expect("usual gains")));
+            let mut one = Controller::new(limits, Law::Pid(pid.unwrap()));
             if repeats {
                 let smoothing = Smoothing::ZeroPhase { order: 2 };
                 let part = Repetitive::new(250.0 * dt, smoothing, 0.2);
-                one.repetitive = Some(part.and_then(|part| part.at(dt)).expect("usual gains"));
+                one.repetitive = Some(part.and_then(|part| part.at(dt)).unwrap());
             }
             one
         })
@@ -33,7 +33,7 @@ fn controllers(dt: f64, repeats: bool) -> Vec<Controller<Law>> {
 
 fn loops(c: &mut Criterion) {
     let published = VirtualStage::xu_li_2010(1);
-    let dahl = Model::Dahl.build(&(Model::Dahl.info().published[0].1)()).expect("published");
+    let dahl = Model::Dahl.build(&(Model::Dahl.info().published[0].1)()).unwrap();
     let mut dahl = VirtualStage::bare(dahl, 5e-5);
     dahl.sensor.noise = 20e-9;
     let mut group = c.benchmark_group("tuning loops");
@@ -59,11 +59,11 @@ fn loops(c: &mut Criterion) {
             };
             let judged = Judged::Measured;
             let task = Task { stage, visited: &[], timing, samples, from: 250, judged };
-            let task = task.ready().expect("usual lengths");
+            let task = task.ready().unwrap();
             let all = controllers(dt, repeats);
             let law = if repeats { "PID + repetitive" } else { "PID" };
             group.bench_function(format!("{name}, {law}"), |b| {
-                b.iter(|| task.figures(black_box(&all), NEVER).expect("usual numbers"));
+                b.iter(|| task.figures(black_box(&all), NEVER).unwrap());
             });
         }
     }
