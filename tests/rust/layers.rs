@@ -13,7 +13,7 @@ const CORE: [&str; 9] =
     ["error", "math", "signal", "integrator", "design", "models", "simulate", "identify", "tune"];
 
 /// From the bottom up.
-const CONTROL: [&str; 24] = [
+const CONTROL: [&str; 25] = [
     "error",
     "number",
     "unfused",
@@ -34,6 +34,7 @@ const CONTROL: [&str; 24] = [
     "lead_lag",
     "sliding_mode",
     "disturbance_observer",
+    "hysteresis_observer",
     "repetitive",
     "iterative_learning",
     "measurement",

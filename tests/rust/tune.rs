@@ -50,10 +50,10 @@ fn alone(task: &Task<'_>, controller: &Controller<Law>) -> (f64, f64) {
     let run = track(&apparatus, start, &task.timing, controller, task.samples, NEVER);
     let run = run.unwrap().unwrap();
     let pairs = run.motion.measured.iter().zip(task.samples.reference);
-    let errors = pairs.skip(task.from).map(|(y, r)| (r - y).abs());
-    let rms =
-        libm::sqrt(errors.clone().map(|e| e * e).sum::<f64>() / errors.clone().count() as f64);
-    (errors.fold(0.0, f64::max), rms)
+    let errors: Vec<f64> = pairs.skip(task.from).map(|(y, r)| (r - y).abs()).collect();
+    let count = errors.iter().fold(0.0, |count, _| count + 1.0);
+    let rms = libm::sqrt(errors.iter().map(|e| e * e).sum::<f64>() / count);
+    (errors.into_iter().fold(0.0, f64::max), rms)
 }
 
 fn agrees(stage: &VirtualStage, delay: f64, tolerance: f64) {

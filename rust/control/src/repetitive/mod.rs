@@ -16,7 +16,8 @@ mod saturation;
 
 use saturation::Lengths;
 
-pub use sampled::{Outcome, Recursion, RepetitiveState, SampledRepetitive};
+pub use sampled::{Recursion, RepetitiveState, SampledRepetitive};
+pub use saturation::Outcome;
 
 use crate::error::{Result, check, positive};
 

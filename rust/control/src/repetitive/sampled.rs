@@ -1,6 +1,6 @@
 //! The recursion of a repetitive controller for one sampling interval, and its delay line.
 
-use super::saturation::{Learning, Lengths, Saturation};
+use super::saturation::{Learning, Lengths, Outcome, Saturation};
 use super::{TAPS, count, samples};
 use crate::error::{Error, Result};
 use crate::snapshot::Snapshot;
@@ -123,15 +123,6 @@ impl<L: AsRef<[f64]> + AsMut<[f64]>> Snapshot for Option<RepetitiveState<L>> {
 /// Number of entries, of which a line has fewer than 2^32.
 fn length(line: &[f64]) -> u32 {
     u32::try_from(line.len()).unwrap_or(u32::MAX)
-}
-
-/// What came of the command of the sample before: what a repetitive part learns from.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Outcome {
-    /// Its tracking error, m.
-    pub error: f64,
-    /// Applied voltage less the unclipped command, V; 0 where it was not saturated.
-    pub excess: f64,
 }
 
 impl SampledRepetitive {

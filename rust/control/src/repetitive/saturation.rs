@@ -1,10 +1,18 @@
 //! Antiwindup of a repetitive controller: when to learn, and when to hold what was learnt.
 
-use super::sampled::Outcome;
 use crate::snapshot::Snapshot;
 
 /// Clipped samples in a period, as its part, above which learning stops as a whole.
 const PART: u32 = 4;
+
+/// What came of the command of the sample before: what a repetitive part learns from.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Outcome {
+    /// Its tracking error, m.
+    pub error: f64,
+    /// Applied voltage less the unclipped command, V; 0 where it was not saturated.
+    pub excess: f64,
+}
 
 /// What the repetitive part does in a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
