@@ -56,7 +56,7 @@ def compare_controllers_command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compare controllers, each tuned under the same margins."""
+    """Compare controllers on one stage."""
     from .._support.files import (
         make_folder,
         picture_files,

@@ -62,7 +62,18 @@ class Row(NamedTuple):
     step_time: float
 
     def rms(self, variant: int = 0) -> float:
-        """Rms error over the references that it follows [m]."""
+        """Rms error over the references that it follows.
+
+        Parameters
+        ----------
+        variant : int, optional
+            Which stage, a place in `ControllerComparison.variants`.
+
+        Returns
+        -------
+        float
+            Root of the mean square over the references [m]; NaN where it follows none.
+        """
         found = [one.rms for one in self.cells[variant] if one is not None]
         return math.sqrt(sum(one**2 for one in found) / len(found)) if found else math.nan
 
