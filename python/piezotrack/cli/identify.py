@@ -131,7 +131,7 @@ def identify_command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Identify models of a stage from a log, or from several at once."""
+    """Identify models of a stage from one log or several."""
     kinds = Kinds.checked(model)
     kinds.refuse_without_effect(context)
     if len(files) > 1:

@@ -77,7 +77,7 @@ def tune_command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Find the gains of a controller under margins for a set of plants."""
+    """Find the gains of a controller under margins."""
     from .._support.files import picture_files
     from ..control.tuning.margins import Margins, Spread
     from ..control.tuning.tune import tune
