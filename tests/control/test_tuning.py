@@ -199,6 +199,15 @@ def test_a_reference_beyond_reach_is_refused() -> None:
         pt.tune(published_stage(), far, dt=0.02, limits=LIMITS, **QUICK)
 
 
+def test_a_model_of_the_set_that_cannot_follow_is_named() -> None:
+    weak = pt.stages.PrandtlIshlinskiiStage(
+        linear=0.5e-6, thresholds=(10.0,), weights=(0.1e-6,), time_constant=1e-3
+    )
+    words = r"model 2: reference is 100 um .* expected 0 to 4\d\.\d* um .* clipped=0\.5 or more"
+    with pytest.raises(pt.ParameterError, match=words):
+        pt.tune([published_stage(), weak], motion(10.0), dt=0.02, limits=LIMITS, **QUICK)
+
+
 def test_plants_of_both_signs_are_refused() -> None:
     one = pt.stages.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(10.0,), weights=(0.2e-6,))
     other = pt.stages.PrandtlIshlinskiiStage(linear=-1e-6, thresholds=(10.0,), weights=(-0.2e-6,))

@@ -255,7 +255,7 @@ def _tasks(question: Question, base: Controller, repeats: bool) -> list[_core.Ta
     for reference in question.references:
         samples = reference.sample(base.dt)
         if question.clipped < 0.5:
-            _check_reach(plant, question, samples)
+            _check_reach(question, samples)
         voltage = feedforward_of(base, reference, samples).voltage
         first = _first(reference, float(samples.t[-1]), base.dt, repeats)
         for k in range(question.seeds):
@@ -276,13 +276,15 @@ def _tasks(question: Question, base: Controller, repeats: bool) -> list[_core.Ta
     return tasks
 
 
-def _check_reach(plant: VirtualStage, question: Question, samples: SampledReference) -> None:
-    """Refuse a reference beyond the reach, with the argument that allows it here."""
-    try:
-        check_within_reach(plant, question.limits, samples, question.drive_unit)
-    except ParameterError as error:
-        words = str(error).replace("or beyond_reach=True", "or clipped=0.5 or more")
-        raise ParameterError(words) from None
+def _check_reach(question: Question, samples: SampledReference) -> None:
+    """Refuse a reference beyond the reach of a model, with the argument that allows it here."""
+    for i, stage in enumerate(question.stages, 1):
+        try:
+            check_within_reach(plant_of(stage), question.limits, samples, question.drive_unit)
+        except ParameterError as error:
+            words = str(error).replace("or beyond_reach=True", "or clipped=0.5 or more")
+            which = f"model {i}: " if len(question.stages) > 1 else ""
+            raise ParameterError(f"{which}{words}") from None
 
 
 def _first(reference: Reference, end: float, dt: float, repeats: bool) -> int:
