@@ -5,8 +5,7 @@ use core::f64::consts::TAU;
 
 use piezotrack_control::hysteresis::{BoucWen, Dahl, DahlState, Operator};
 use piezotrack_control::{
-    Controller, Feedback, FeedbackSample, HysteresisObserver, Limits, ObservedOperator, Pid,
-    Snapshot,
+    Controller, Feedback, FeedbackSample, HysteresisObserver, Limits, Observable, Pid, Snapshot,
 };
 use piezotrack_core::design::LinearFeedback;
 
@@ -115,7 +114,7 @@ fn rms<F: Feedback>(controller: &Controller<F>) -> f64 {
 }
 
 /// The law and its transfer function driven by the same small errors about rest.
-fn runs_as_linearised<O: ObservedOperator + Copy + PartialEq>(operator: O, time: f64) {
+fn runs_as_linearised<O: Observable<Running: PartialEq>>(operator: O, time: f64) {
     let observer = HysteresisObserver::new(operator, GAIN, time, 0.2, 100e-6).unwrap();
     let law =
         observer.around(Pid::new(0.1e6, 0.1, 0.0, None).unwrap().at(DT).unwrap(), DT).unwrap();

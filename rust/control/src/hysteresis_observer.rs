@@ -23,12 +23,39 @@
 use crate::error::{Result, check, finite, not_negative, positive};
 use crate::feedback_law::{Feedback, FeedbackSample};
 use crate::hysteresis::{BoucWen, BoucWenState, Dahl, DahlState, Operator};
+use crate::unfused::Unfused;
 
 /// Most pieces of a way that is too long for one.
 const MOST_PIECES: u32 = 16;
 
+/// A hysteresis operator that an observer can run.
+pub trait Observable: Copy {
+    /// The operator as it runs on a target without a fused instruction.
+    type Running: ObservedOperator;
+
+    /// That operator.
+    fn running(&self) -> Self::Running;
+}
+
+impl Observable for Dahl<f64> {
+    type Running = Dahl<Unfused>;
+
+    fn running(&self) -> Dahl<Unfused> {
+        Dahl { a1: Unfused(self.a1), a2: Unfused(self.a2), gain: Unfused(self.gain) }
+    }
+}
+
+impl Observable for BoucWen<f64> {
+    type Running = BoucWen<Unfused>;
+
+    fn running(&self) -> BoucWen<Unfused> {
+        let Self { rise, beta, gamma, exponent } = *self;
+        BoucWen { rise: Unfused(rise), beta: Unfused(beta), gamma: Unfused(gamma), exponent }
+    }
+}
+
 /// A hysteresis operator with its output in volts whose state can be corrected.
-pub trait ObservedOperator: Operator<f64> {
+pub trait ObservedOperator: Operator<Unfused> {
     /// Whether its path is the applied voltage; otherwise it is the displacement.
     const OF_DRIVE: bool;
 
@@ -41,46 +68,46 @@ pub trait ObservedOperator: Operator<f64> {
     /// Smallest and largest slope of the output, V/m or V/V, for displacements up to `stroke`, m.
     fn slopes(&self, stroke: f64) -> [f64; 2];
 
-    /// Its state from a state at a place to the next place on the path.
+    /// Its state from a state at a place to the next place on the path, in pieces of `longest`.
     #[inline]
-    fn moved(&self, state: &Self::State, way: f64) -> Self::State {
-        let (mut out, longest) = (*state, self.longest());
-        let direction = if way < 0.0 { -1.0 } else { 1.0 };
+    fn moved(&self, state: &Self::State, way: f64, longest: f64) -> Self::State {
+        let mut out = *state;
+        let direction = Unfused(if way < 0.0 { -1.0 } else { 1.0 });
         let mut left = way.abs();
         for _ in 0..MOST_PIECES {
             if left <= 0.0 {
                 break;
             }
             let piece = left.min(longest);
-            out = self.along(&self.branch(&out, direction), direction * piece);
+            out = self.along(&self.branch(&out, direction), direction * Unfused(piece));
             left -= piece;
         }
         out
     }
 }
 
-impl ObservedOperator for Dahl<f64> {
+impl ObservedOperator for Dahl<Unfused> {
     const OF_DRIVE: bool = false;
 
     /// A tenth of a radian: the series leaves out less than 1e-9 of the change.
     #[inline]
     fn longest(&self) -> f64 {
-        0.1 / libm::sqrt(self.a2).max(self.a1)
+        0.1 / libm::sqrt(self.a2.0).max(self.a1.0)
     }
 
     #[inline]
-    fn corrected(&self, state: &DahlState<f64>, volts: f64) -> DahlState<f64> {
-        DahlState { force: state.force + volts, ..*state }
+    fn corrected(&self, state: &DahlState<Unfused>, volts: f64) -> DahlState<Unfused> {
+        DahlState { force: state.force + Unfused(volts), ..*state }
     }
 
     /// 0 at the origin; on the virgin branch it rises to b1 up x, at most to that of a2.
     fn slopes(&self, stroke: f64) -> [f64; 2] {
-        let most = self.gain * stroke.min(1.0 / libm::sqrt(self.a2));
+        let most = self.gain.0 * stroke.min(1.0 / libm::sqrt(self.a2.0));
         [most.min(0.0), most.max(0.0)]
     }
 }
 
-impl ObservedOperator for BoucWen<f64> {
+impl ObservedOperator for BoucWen<Unfused> {
     const OF_DRIVE: bool = true;
 
     fn longest(&self) -> f64 {
@@ -88,16 +115,16 @@ impl ObservedOperator for BoucWen<f64> {
     }
 
     #[inline]
-    fn corrected(&self, state: &BoucWenState<f64>, volts: f64) -> BoucWenState<f64> {
-        BoucWenState { value: state.value + volts, ..*state }
+    fn corrected(&self, state: &BoucWenState<Unfused>, volts: f64) -> BoucWenState<Unfused> {
+        BoucWenState { value: state.value + Unfused(volts), ..*state }
     }
 
     /// 0 at the limit; A at the origin or, if that is more, 2 A beta/(beta + gamma) after a
     /// reversal at the limit.
     fn slopes(&self, _stroke: f64) -> [f64; 2] {
-        let both = self.beta + self.gamma;
-        let reversed = if both > 0.0 { 2.0 * self.beta / both } else { 1.0 };
-        let most = self.rise * reversed.max(1.0);
+        let both = self.beta.0 + self.gamma.0;
+        let reversed = if both > 0.0 { 2.0 * self.beta.0 / both } else { 1.0 };
+        let most = self.rise.0 * reversed.max(1.0);
         [most.min(0.0), most.max(0.0)]
     }
 }
@@ -135,7 +162,7 @@ pub struct HysteresisObserver<O> {
     stroke: f64,
 }
 
-impl<O: ObservedOperator + Copy> HysteresisObserver<O> {
+impl<O: Observable> HysteresisObserver<O> {
     /// The operator with its output in V; gain (m/V) and time constant (s) of the linear part; the
     /// share (0 to 1) of the difference to the measurement that corrects the estimate in a sample;
     /// and the largest displacement (m), for the stability check.
@@ -149,7 +176,7 @@ impl<O: ObservedOperator + Copy> HysteresisObserver<O> {
         let right = (0.0..=1.0).contains(&correction);
         check("correction", correction, "", right, "a share from 0 to 1")?;
         positive("stroke", stroke, "m")?;
-        let [_, largest] = operator.slopes(stroke);
+        let [_, largest] = operator.running().slopes(stroke);
         finite("slope of the hysteresis", largest, "")?;
         Ok(Self { operator, gain, time, correction, stroke })
     }
@@ -158,15 +185,16 @@ impl<O: ObservedOperator + Copy> HysteresisObserver<O> {
     ///
     /// # Errors
     /// Names `dt` where it is not above 0; `plant_gain` where the sampled gain has no inverse.
-    pub fn around<F>(&self, inner: F, dt: f64) -> Result<HysteresisObserved<O, F>> {
+    pub fn around<F>(&self, inner: F, dt: f64) -> Result<HysteresisObserved<O::Running, F>> {
         positive("dt", dt, "s")?;
         let rest = if self.time > 0.0 { -libm::expm1(-dt / self.time) } else { 1.0 };
         let fresh = self.gain * rest;
         let expected = "a linear part whose sampled inverse is finite";
         check("plant_gain", self.gain, "m/V", (1.0 / fresh).is_finite(), expected)?;
-        let slopes = self.operator.slopes(self.stroke);
-        let (operator, correction) = (self.operator, self.correction);
-        Ok(HysteresisObserved { operator, inner, pole: 1.0 - rest, fresh, correction, slopes })
+        let (operator, correction) = (self.operator.running(), self.correction);
+        let (slopes, longest) = (operator.slopes(self.stroke), operator.longest());
+        let pole = 1.0 - rest;
+        Ok(HysteresisObserved { operator, longest, inner, pole, fresh, correction, slopes })
     }
 }
 
@@ -175,6 +203,8 @@ impl<O: ObservedOperator + Copy> HysteresisObserver<O> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HysteresisObserved<O, F> {
     operator: O,
+    /// The longest piece of its path, m or V.
+    longest: f64,
     inner: F,
     /// p.
     pole: f64,
@@ -236,15 +266,21 @@ impl<O: ObservedOperator, F> HysteresisObserved<O, F> {
     /// The estimated hysteresis, V.
     #[must_use]
     pub fn estimate<S>(&self, state: &HysteresisObservedState<O::State, S>) -> f64 {
-        self.operator.output(&state.operator).0
+        self.output(state)
+    }
+
+    #[inline]
+    fn output<S>(&self, state: &HysteresisObservedState<O::State, S>) -> f64 {
+        self.operator.output(&state.operator).0.0
     }
 
     /// Moves the operator to a place on its path; its output there.
     #[inline]
     fn follow<S>(&self, state: &mut HysteresisObservedState<O::State, S>, place: f64) -> f64 {
-        state.operator = self.operator.moved(&state.operator, place - state.place);
+        let way = place - state.place;
+        state.operator = self.operator.moved(&state.operator, way, self.longest);
         state.place = place;
-        self.operator.output(&state.operator).0
+        self.output(state)
     }
 
     /// The estimate at this sample, V.
@@ -260,7 +296,7 @@ impl<O: ObservedOperator, F> HysteresisObserved<O, F> {
             (state.begun, state.displacement) = (true, measured);
             return self.follow(state, if O::OF_DRIVE { applied } else { measured });
         }
-        let mut before = self.operator.output(&state.operator).0;
+        let mut before = self.output(state);
         if O::OF_DRIVE {
             before = self.follow(state, applied);
         }

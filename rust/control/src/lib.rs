@@ -70,7 +70,7 @@ pub use error::{Error, Result};
 pub use feedback_law::{Feedback, FeedbackSample};
 pub use filters::{Filter, FilterState};
 pub use hysteresis_observer::{
-    HysteresisObserved, HysteresisObservedState, HysteresisObserver, ObservedOperator,
+    HysteresisObserved, HysteresisObservedState, HysteresisObserver, Observable, ObservedOperator,
 };
 pub use inverse::{
     BoucWenInverse, BoucWenInverseState, CreepingInverse, CreepingInverseState, DahlInverse,

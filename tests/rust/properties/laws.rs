@@ -3,8 +3,8 @@
 use piezotrack_control::hysteresis::{BoucWen, Dahl};
 use piezotrack_control::{
     Controller, ControllerState, DisturbanceObserver, Feedback, Filter, HysteresisObserver,
-    LeadLag, Limits, ObservedOperator, Pid, Repetitive, ScheduledPid, SlidingMode, Smoothing,
-    Snapshot, Span, StateSpace,
+    LeadLag, Limits, Observable, Pid, Repetitive, ScheduledPid, SlidingMode, Smoothing, Snapshot,
+    Span, StateSpace,
 };
 use piezotrack_core::simulate::{Law, LawState, MOST_STATES};
 use proptest::prelude::*;
@@ -24,10 +24,7 @@ fn sliding(switching: f64, ti: f64, td: f64) -> Option<SlidingMode> {
     SlidingMode::new(switching, 20e-6, ti, td, 0.03).ok()
 }
 
-fn hysteresis<O: ObservedOperator + Copy>(
-    operator: O,
-    correction: f64,
-) -> Option<HysteresisObserver<O>> {
+fn hysteresis<O: Observable>(operator: O, correction: f64) -> Option<HysteresisObserver<O>> {
     HysteresisObserver::new(operator, GAIN, 0.0, correction, 100e-6).ok()
 }
 

@@ -1,6 +1,7 @@
 //! Closed-loop tracking: reference and feedforward in, motion and commands out.
 
 use piezotrack_control::hysteresis::{BoucWen, BoucWenState, Dahl, DahlState};
+use piezotrack_control::unfused::Unfused;
 use piezotrack_control::{
     Command, Controller, ControllerState, Feedback, FeedbackSample, HysteresisObserved,
     HysteresisObservedState, Observed, ObservedState, PidState, SampledPid, SampledSlidingMode,
@@ -41,9 +42,9 @@ pub enum Law {
     /// Sliding mode with perturbation estimation.
     ObservedSlidingMode(Observed<SampledSlidingMode>),
     /// Observer of a Dahl hysteresis around a PID.
-    DahlObserver(HysteresisObserved<Dahl<f64>, SampledPid>),
+    DahlObserver(HysteresisObserved<Dahl<Unfused>, SampledPid>),
     /// Observer of a Bouc-Wen hysteresis around a PID.
-    BoucWenObserver(HysteresisObserved<BoucWen<f64>, SampledPid>),
+    BoucWenObserver(HysteresisObserved<BoucWen<Unfused>, SampledPid>),
 }
 
 /// Memory of a [`Law`].
@@ -64,9 +65,9 @@ pub enum LawState {
     /// Of sliding mode control with perturbation estimation.
     ObservedSlidingMode(ObservedState<SlidingModeState>),
     /// Of a PID controller with an observer of a Dahl hysteresis.
-    DahlObserver(HysteresisObservedState<DahlState<f64>, PidState>),
+    DahlObserver(HysteresisObservedState<DahlState<Unfused>, PidState>),
     /// Of a PID controller with an observer of a Bouc-Wen hysteresis.
-    BoucWenObserver(HysteresisObservedState<BoucWenState<f64>, PidState>),
+    BoucWenObserver(HysteresisObservedState<BoucWenState<Unfused>, PidState>),
 }
 
 impl Snapshot for LawState {
