@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Metrics", "Tracking", "track"]
 
+# Periods after which what learns has learnt.
+LEARNT = 3
+
 
 @dataclass(frozen=True, kw_only=True)
 class Metrics(ErrorStatistics):
@@ -377,6 +380,22 @@ def settled_from(reference: Reference, end: float) -> float:
         return reference.ramp if reference.ramp < end - 1e-9 else 0.0
     start = math.ceil(reference.ramp / period - 1e-9) * period
     return start if start + period <= reference.duration * (1 + 1e-9) else 0.0
+
+
+def can_be_learnt(reference: Reference) -> bool:
+    """Whether a reference repeats so often that something can learn it, and one period counts."""
+    period = reference.period
+    return period is not None and reference.duration > (LEARNT + 1) * period
+
+
+def first_counted(reference: Reference, samples: SampledReference, *, learns: bool) -> int:
+    """Return the first sample that counts: settled and, where something learns, learnt."""
+    end, dt = float(samples.t[-1]), samples.dt
+    start = settled_from(reference, end)
+    if learns and reference.period is not None:
+        learnt = start + LEARNT * reference.period
+        start = learnt if learnt + reference.period <= end + dt else start
+    return math.ceil(start / dt - 1e-9)
 
 
 def feedforward_of(

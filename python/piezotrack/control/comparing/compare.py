@@ -15,7 +15,7 @@ from ...references.reference import Reference
 from ...stages.base import Stage
 from ..controller import number_pair
 from ..plant import plant_of, stepped, voltages_before
-from ..tracking import feedforward_of, settled_from
+from ..tracking import can_be_learnt, feedforward_of, first_counted
 from ..tuning.margins import Margins, Spread, plants_of
 from .comparison import Cell, ControllerComparison, Row
 from .contenders import CONTENDERS, Entry, Task
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 __all__ = ["compare_controllers"]
 
-# Periods after which everything that learns has learnt.
-LEARNT = 3
 # Samples over which the time of a step is measured.
 TIMED = 20_000
 
@@ -206,10 +204,8 @@ def _cell(entry: Entry | None, variant: Variant, task: Task) -> Cell | None:
     if voltage is None:
         voltage = feedforward_of(controller, reference, samples).voltage
     stage = stepped(variant.stage, controller)
-    end = float(samples.t[-1])
-    start = settled_from(reference, end)
-    if reference.period is not None and reference.duration > 4.0 * reference.period:
-        start = min(start + LEARNT * reference.period, end - reference.period)
+    # The same samples for all of them, whether they learn or not.
+    learns = can_be_learnt(reference)
     motion = _core.Task(
         stage=stage._core,
         visited=voltages_before(stage, (), controller.limits),
@@ -218,7 +214,7 @@ def _cell(entry: Entry | None, variant: Variant, task: Task) -> Cell | None:
         jitter=0.0,
         reference=samples.x,
         feedforward=voltage,
-        first=math.ceil(start / controller.dt - 1e-9),
+        first=first_counted(reference, samples, learns=learns),
         measured=False,
     )
     rms, largest, effort, _, clipped = motion.figures([controller._core], 1)[0]

@@ -16,6 +16,7 @@ from ..h_infinity import mixed_sensitivity
 from ..hysteresis_observer import HysteresisObserver
 from ..learning import learn
 from ..neural_network import train_network
+from ..tracking import can_be_learnt
 from ..tuning.margins import Margins, Spread, plants_of
 from ..tuning.schedule import schedule
 from ..tuning.tune import tune
@@ -216,7 +217,7 @@ def _scheduled(task: Task) -> list[Entry | None]:
 def _repetitive(task: Task) -> list[Entry | None]:
     return [
         Entry(task.tuned(one, parts=("pid", "low-pass", "repetitive")), one)
-        if _repeats(one)
+        if can_be_learnt(one)
         else None
         for one in task.references
     ]
@@ -226,7 +227,7 @@ def _learnt(task: Task) -> list[Entry | None]:
     controller = task.tuned()
     entries: list[Entry | None] = []
     for one in task.references:
-        if not _repeats(one):
+        if not can_be_learnt(one):
             entries.append(None)
             continue
         try:
@@ -237,10 +238,6 @@ def _learnt(task: Task) -> list[Entry | None]:
             continue
         entries.append(Entry(controller, found.final.reference, found.final.feedforward))
     return entries
-
-
-def _repeats(reference: Reference) -> bool:
-    return reference.period is not None and reference.duration > 4.0 * reference.period
 
 
 def _h_infinity(task: Task) -> list[Entry | None]:

@@ -11,7 +11,7 @@ from ...errors import ParameterError
 from ..checks import check_drive_unit, check_within_reach
 from ..controller import Controller
 from ..plant import plant_of, stepped
-from ..tracking import feedforward_of, settled_from, track
+from ..tracking import can_be_learnt, feedforward_of, first_counted, track
 from .box import Box, box_of, resonance
 from .margins import Margins, NamedPlant, Spread, plants_of
 from .question import FIGURES, Question, asked
@@ -35,8 +35,6 @@ __all__ = ["tune"]
 BINDS = 0.98
 # The grid of the search is accurate to this; what the exact check finds beyond is asked again.
 SLACK = 0.003
-# Periods after which a repetitive part has learnt.
-LEARNT = 3
 
 
 class _Answer(NamedTuple):
@@ -241,8 +239,7 @@ def _usual_parts(question: Question, plants: list[_core.LoopPlant], dt: float) -
         parts.append("notch")
     periods = {one.period for one in question.references}
     rising = all(plant.static_gain > 0.0 for plant in plants)
-    repeats = len(periods) == 1 and None not in periods and rising
-    if repeats and all(one.duration > 4.0 * (one.period or 0.0) for one in question.references):
+    if len(periods) == 1 and rising and all(can_be_learnt(one) for one in question.references):
         parts.append("repetitive")
     return tuple(parts)
 
@@ -257,7 +254,7 @@ def _tasks(question: Question, base: Controller, repeats: bool) -> list[_core.Ta
         if question.clipped < 0.5:
             _check_reach(question, samples)
         voltage = feedforward_of(base, reference, samples).voltage
-        first = _first(reference, float(samples.t[-1]), base.dt, repeats)
+        first = first_counted(reference, samples, learns=repeats)
         for k in range(question.seeds):
             sensor = replace(plant.sensor, seed=plant.sensor.seed + k)
             seeded: VirtualStage = stepped(replace(plant, sensor=sensor), base)
@@ -285,15 +282,6 @@ def _check_reach(question: Question, samples: SampledReference) -> None:
             words = str(error).replace("or beyond_reach=True", "or clipped=0.5 or more")
             which = f"model {i}: " if len(question.stages) > 1 else ""
             raise ParameterError(f"{which}{words}") from None
-
-
-def _first(reference: Reference, end: float, dt: float, repeats: bool) -> int:
-    """Return the first sample that counts: settled and, with a repetitive part, learnt."""
-    start = settled_from(reference, end)
-    if repeats and reference.period is not None:
-        learnt = start + LEARNT * reference.period
-        start = learnt if learnt + reference.period <= end + dt else start
-    return math.ceil(start / dt - 1e-9)
 
 
 def _kept(question: Question, answer: _Answer) -> list[Kept]:

@@ -27,4 +27,5 @@ pub use sampled_loop::{LinearFeedback, SampledLoop};
 pub use stability::{GainRange, Root};
 pub use verdict::{Verdict, check_loop};
 
+pub(crate) use sampled_loop::in_series;
 pub(crate) use small_signal_gain::Gains;

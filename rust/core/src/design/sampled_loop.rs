@@ -442,7 +442,7 @@ fn learning(part: &SampledRepetitive) -> Result<Learning> {
 
 /// The filters so far with one more, `b0 z^2 + b1 z + b2` over `z^2 + a1 z + a2`.
 #[expect(clippy::needless_pass_by_value, reason = "the shape of a fold")]
-fn in_series(before: Ratio, filter: &Filter) -> Ratio {
+pub(crate) fn in_series(before: Ratio, filter: &Filter) -> Ratio {
     let ([b0, b1, b2], [a1, a2]) = filter.coefficients();
     let above = [b0 + b1 + b2, 2.0 * b0 + b1, b0];
     let below = [1.0 + a1 + a2, 2.0 + a1, 1.0];

@@ -24,7 +24,7 @@ use super::step_size;
 use crate::integrator::{
     FeedbackState, Kernel, MOST_PARAMETERS, Mechanics, Stepping, SteppingLoop, halvings,
 };
-use crate::math::{Lanes, dispatch_vectors};
+use crate::math::{Lanes, dispatch_vectors, width};
 use crate::models::{Held, KernelVisitor, relaxed};
 use crate::signal::{Stop, delayed, index};
 
@@ -191,7 +191,7 @@ impl<'a> KernelVisitor for All<'a> {
 
     fn visit<K: Kernel>(self, kernel: K) -> Vec<Simulated> {
         let Self { of, candidates, stride, stop } = self;
-        let width = of.arch.dispatch(Width);
+        let width = width(of.arch);
         // Every thread gets vectors to fill before any gets a second one.
         let vectors = candidates.len().div_ceil(width);
         // A delay reads a ring in memory, which several vectors do not make faster.
@@ -216,17 +216,6 @@ impl<'a> KernelVisitor for All<'a> {
 
 /// Vectors of a bundle of several.
 const VECTORS: usize = 3;
-
-/// Asks an instruction set for its lanes.
-struct Width;
-
-impl WithSimd for Width {
-    type Output = usize;
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) -> usize {
-        S::F64_LANES
-    }
-}
 
 /// Candidates in one bundle of `V` vectors of lanes; with a delay of one only.
 struct Bundle<'a, K, const V: usize> {

@@ -1,13 +1,27 @@
 //! Dispatch of code to instruction sets, without compiling it for those that do not need it.
 
-use pulp::{Arch, WithSimd};
+use pulp::{Arch, Simd, WithSimd};
+
+/// Lanes in one vector of an instruction set.
+pub(crate) fn width(arch: Arch) -> usize {
+    struct Width;
+
+    impl WithSimd for Width {
+        type Output = usize;
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, _simd: S) -> usize {
+            S::F64_LANES
+        }
+    }
+
+    arch.dispatch(Width)
+}
 
 /// Runs scalar code where the processor has fused multiply-add, without wider vectors than that
 /// needs: they would only be compiled for nothing. The bits are those of every other dispatch.
 pub(crate) fn dispatch_fused<W: WithSimd>(code: W) -> W::Output {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     {
-        use pulp::Simd;
         match pulp::x86::V3::try_new() {
             Some(simd) => Simd::vectorize(simd, code),
             None => Simd::vectorize(pulp::Scalar, code),
@@ -21,7 +35,6 @@ pub(crate) fn dispatch_fused<W: WithSimd>(code: W) -> W::Output {
 pub(crate) fn dispatch_vectors<W: WithSimd>(arch: Arch, code: W) -> Option<W::Output> {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     {
-        use pulp::Simd;
         match arch {
             Arch::V4(simd) => Some(Simd::vectorize(simd, code)),
             Arch::V3(simd) => Some(Simd::vectorize(simd, code)),

@@ -13,7 +13,7 @@ pub use bounded_least_squares::{FREE, NOT_NEGATIVE, Rows, bounded};
 pub use lanes::Lanes;
 pub use memory::{available, room, zeros};
 
-pub(crate) use dispatch::{dispatch_fused, dispatch_vectors};
+pub(crate) use dispatch::{dispatch_fused, dispatch_vectors, width};
 pub(crate) use golden_section::least;
 pub(crate) use random::Draws;
 pub(crate) use transfer_function::{C, Jet, Ratio};

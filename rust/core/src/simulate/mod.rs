@@ -26,3 +26,5 @@ pub use two_axes::{
     TwoAxes, TwoLogs, TwoMotions, TwoStates, TwoTracked, closed_loops, open_loops, track_both,
 };
 pub use virtual_stage::{Preconditioning, VirtualStage};
+
+pub(crate) use timing::{Delay, SAME};

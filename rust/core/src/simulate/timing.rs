@@ -97,18 +97,18 @@ impl MissedTicks {
 }
 
 /// Parts of a control interval nearer than this are one.
-pub(super) const SAME: f64 = 1e-9;
+pub(crate) const SAME: f64 = 1e-9;
 
 /// A time as whole control intervals and a fraction of one.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Delay {
-    pub(super) whole: usize,
-    pub(super) fraction: f64,
+pub(crate) struct Delay {
+    pub(crate) whole: usize,
+    pub(crate) fraction: f64,
 }
 
 impl Delay {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-    pub(super) fn new(seconds: f64, interval: f64) -> Self {
+    pub(crate) fn new(seconds: f64, interval: f64) -> Self {
         let intervals = seconds / interval;
         // 0.06 s are three intervals of 0.02 s, whatever the division says.
         let nearest = intervals.round();

@@ -232,6 +232,16 @@ impl VirtualStage {
         ApparatusState { plant, command: volts, applied: volts, ..self.apparatus().rest() }
     }
 
+    /// Slow visits to voltages, V, that lead to where an experiment starts: those given, or those of
+    /// the preconditioning.
+    #[must_use]
+    pub(crate) fn visits_before(&self, voltages: &[f64]) -> Vec<f64> {
+        match self.preconditioning {
+            Some(cycles) if voltages.is_empty() => [cycles.swing, 0.0].repeat(CYCLES as usize),
+            _ => voltages.to_vec(),
+        }
+    }
+
     /// Drives the stage from its start: true and measured displacement, for a log.
     ///
     /// `None` where `stop` said so meanwhile.

@@ -9,12 +9,12 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::math::{Lanes, room, zeros};
+use crate::math::{Lanes, room, width, zeros};
 use crate::models::{LanedPlant, LanedVisitor, StageState};
 use crate::signal::Stop;
 use crate::simulate::{
-    AmplifierFlow, ApparatusState, DELAY_LINE, Law, LawState, ReferenceSamples, Timing,
-    VirtualStage, track,
+    AmplifierFlow, ApparatusState, DELAY_LINE, Delay, Law, LawState, ReferenceSamples, SAME,
+    Timing, VirtualStage, track,
 };
 
 /// Which error counts.
@@ -94,14 +94,6 @@ impl<'a> Task<'a> {
         Ok(ReadyTask { task: self, start, noise })
     }
 
-    /// Slow visits that lead to where the loops begin, V.
-    fn voltages(&self) -> Vec<f64> {
-        match self.stage.preconditioning {
-            Some(cycles) if self.visited.is_empty() => [cycles.swing, 0.0].repeat(CYCLES),
-            _ => self.visited.to_vec(),
-        }
-    }
-
     /// The loop of one controller.
     fn alone(
         &self,
@@ -153,7 +145,7 @@ impl ReadyTask<'_> {
         let Self { task, start, noise } = self;
         if task.timing.jitter == 0.0 {
             let loops = Loops { task, start, noise, controllers, stop };
-            let voltages = task.voltages();
+            let voltages = task.stage.visits_before(task.visited);
             if let Some(found) = task.stage.stage.in_lanes(&voltages, &start.plant, loops) {
                 return found;
             }
@@ -161,9 +153,6 @@ impl ReadyTask<'_> {
         controllers.par_iter().map(|controller| task.alone(controller, start, stop)).collect()
     }
 }
-
-/// Cycles that bring the memory of a stage to its settled loop.
-const CYCLES: usize = 8;
 
 /// The running sums of a loop.
 #[derive(Clone, Copy)]
@@ -237,7 +226,7 @@ impl LanedVisitor for Loops<'_> {
         let Self { task, start, noise, controllers, stop } = self;
         let stage = task.stage;
         let arch = Arch::new();
-        let width = arch.dispatch(Width);
+        let width = width(arch);
         let parts = parts(task, P::LONGEST);
         let found: Result<Vec<Vec<Figures>>> = controllers
             .par_chunks(width)
@@ -289,10 +278,7 @@ struct Part {
 /// Whole intervals of delay, and the parts of each interval.
 fn parts(task: &Task<'_>, longest: f64) -> (usize, Vec<Part>) {
     let (dt, stage) = (task.timing.interval, task.stage);
-    let late = (task.timing.delay + stage.sensor.delay) / dt;
-    let nearest = late.round();
-    let whole = if (late - nearest).abs() < SAME { nearest } else { late.floor() };
-    let fraction = if (late - nearest).abs() < SAME { 0.0 } else { late - whole };
+    let Delay { whole, fraction } = Delay::new(task.timing.delay + stage.sensor.delay, dt);
     let lag = stage.amplifier.lag();
     let mut edges = vec![fraction, 1.0];
     for settled in SETTLING {
@@ -316,23 +302,7 @@ fn parts(task: &Task<'_>, longest: f64) -> (usize, Vec<Part>) {
         parts.push(Part { step: (edge - from) * dt, newest: from > fraction - SAME });
         from = edge;
     }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-    let whole = whole as usize;
     (whole, parts)
-}
-
-/// Parts of a control interval nearer than this are one.
-const SAME: f64 = 1e-9;
-
-/// Asks an instruction set for its lanes.
-struct Width;
-
-impl WithSimd for Width {
-    type Output = usize;
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) -> usize {
-        S::F64_LANES
-    }
 }
 
 /// Loops in one vector of lanes.

@@ -6,9 +6,9 @@
 
 use core::f64::consts::PI;
 
-use piezotrack_control::{Controller, Filter, SampledRepetitive};
+use piezotrack_control::{Controller, SampledRepetitive};
 
-use crate::design::{LinearFeedback, LoopPlant};
+use crate::design::{LinearFeedback, LoopPlant, in_series};
 use crate::error::{Error, Result, positive};
 use crate::math::{C, Jet, Ratio};
 use crate::simulate::Law;
@@ -168,24 +168,16 @@ impl PlantSet {
     /// What is least good of a controller over the set.
     #[must_use]
     pub fn robustness(&self, controller: &Controller<Law>) -> Robustness {
-        let ratio = polynomials(&controller.feedback.transfer_function());
+        let [above, below] = controller.feedback.transfer_function();
+        let ratio = Ratio { above, below };
         let integrators = integrators(&ratio);
         let law = self.along(&ratio);
         let filters = controller.filters.iter().flatten();
-        let passed = filters.fold(None, |before: Option<Vec<C>>, filter| {
-            let this = self.along(&filter_ratio(filter));
-            Some(match before {
-                None => this,
-                Some(before) => before.iter().zip(&this).map(|(a, b)| a * b).collect(),
-            })
-        });
+        let passed = self.along(&filters.fold(Ratio::constant(1.0), in_series));
         let learnt = controller.repetitive.as_ref().map(|part| self.learnt(part));
         let mut out: Option<Robustness> = None;
         for (plant, response) in self.responses.iter().enumerate() {
-            let forward = |k: usize| match &passed {
-                Some(filter) => response[k] * filter[k],
-                None => response[k],
-            };
+            let forward = |k: usize| response[k] * passed[k];
             let mut one = walk(law.len(), integrators, |k| forward(k) * law[k]);
             if let Some(learnt) = &learnt {
                 let gain = (0..law.len()).map(|k| {
@@ -360,19 +352,6 @@ fn unit(angle: f64) -> C {
 fn of(ratio: &Ratio, delta: C) -> C {
     let (above, below) = ratio.at(Jet { value: delta, slope: C::new(0.0, 0.0) });
     above.value / below.value
-}
-
-fn polynomials([above, below]: &[Vec<f64>; 2]) -> Ratio {
-    Ratio { above: above.clone(), below: below.clone() }
-}
-
-/// A filter in powers of `z - 1`.
-fn filter_ratio(filter: &Filter) -> Ratio {
-    let ([b0, b1, b2], [a1, a2]) = filter.coefficients();
-    Ratio {
-        above: vec![b0 + b1 + b2, 2.0 * b0 + b1, b0],
-        below: vec![1.0 + a1 + a2, 2.0 + a1, 1.0],
-    }
 }
 
 fn small(count: usize) -> f64 {
