@@ -74,8 +74,14 @@ fn agrees(stage: &VirtualStage, delay: f64, tolerance: f64) {
 
 #[test]
 fn loops_on_the_published_stage_are_those_simulated_one_by_one() {
-    agrees(&VirtualStage::xu_li_2010(1), 0.0, 0.02);
-    agrees(&VirtualStage::xu_li_2010(1), 0.7e-3, 0.02);
+    agrees(&VirtualStage::xu_li_2010(1), 0.0, 0.005);
+    agrees(&VirtualStage::xu_li_2010(1), 0.7e-3, 0.005);
+    for slew in [3e4, 6e3, 1e3] {
+        let mut slow = VirtualStage::xu_li_2010(1);
+        slow.amplifier.slew = slew;
+        agrees(&slow, 0.0, 0.005);
+        agrees(&slow, 0.7e-3, 0.005);
+    }
 }
 
 #[test]
@@ -84,26 +90,28 @@ fn loops_of_every_model_are_those_simulated_one_by_one() {
         let stage = model.build(&(model.info().published[0].1)()).unwrap();
         let mut stage = VirtualStage::bare(stage, 5e-5);
         stage.sensor.noise = 20e-9;
-        agrees(&stage, 0.0, 0.02);
-        agrees(&stage, 31e-3, 0.02);
+        agrees(&stage, 0.0, 0.005);
+        agrees(&stage, 31e-3, 0.005);
     }
 }
 
 #[test]
 fn the_bits_do_not_depend_on_the_threads_or_the_neighbours() {
-    let stage = VirtualStage::xu_li_2010(3);
-    let reference = reference(300);
-    let feedforward = vec![0.0; 300];
-    let samples = ReferenceSamples { reference: &reference, feedforward: &feedforward };
-    let task = Task { from: 10, ..task(&stage, samples, 1e-3) };
-    let all = controllers(19);
-    let task = task.ready().unwrap();
-    let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    let one = pool(1).install(|| task.figures(&all, NEVER)).unwrap();
-    let three = pool(3).install(|| task.figures(&all, NEVER)).unwrap();
-    assert_eq!(one, three);
-    let single = task.figures(&all[7..8], NEVER).unwrap();
-    assert_eq!(single[0], one[7]);
+    let dahl = Model::Dahl.build(&(Model::Dahl.info().published[0].1)()).unwrap();
+    for stage in [VirtualStage::xu_li_2010(3), VirtualStage::bare(dahl, 5e-5)] {
+        let reference = reference(300);
+        let feedforward = vec![0.0; 300];
+        let samples = ReferenceSamples { reference: &reference, feedforward: &feedforward };
+        let task = Task { from: 10, ..task(&stage, samples, 1e-3) };
+        let all = controllers(19);
+        let task = task.ready().unwrap();
+        let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let one = pool(1).install(|| task.figures(&all, NEVER)).unwrap();
+        let three = pool(3).install(|| task.figures(&all, NEVER)).unwrap();
+        assert_eq!(one, three);
+        let single = task.figures(&all[7..8], NEVER).unwrap();
+        assert_eq!(single[0], one[7]);
+    }
 }
 
 /// Margins from the grid against the exact ones, over gains from far too low to unstable.

@@ -2,6 +2,8 @@
 //!
 //! The steps are those of [`Plant`](super::Plant), with the same bits in every lane.
 
+use core::f64::consts::TAU;
+
 use piezotrack_control::Number;
 use piezotrack_control::creep::{Lag, advance, output};
 use piezotrack_control::hysteresis::PlayState;
@@ -13,7 +15,9 @@ use super::input_stage::InputStageState;
 use super::plant::KernelModel;
 use super::prandtl_ishlinskii::{MOST_PLAYS, PrandtlIshlinskiiStage};
 use super::registry::{Stage, StageState};
-use crate::integrator::{Coupling, FeedbackState, Kernel, LumpedStage, Memory, TERMS, halvings};
+use crate::integrator::{
+    Coupling, FeedbackState, Kernel, LumpedStage, Mechanics, Memory, TERMS, halvings,
+};
 
 /// A plant whose state may be in lanes: configuration in `&self`.
 pub trait LanedPlant: Sync {
@@ -22,9 +26,12 @@ pub trait LanedPlant: Sync {
     /// All that depends on the length of a step.
     type Flow<N: Number>;
 
-    /// Longest step that is accurate whatever the drive, as a share of the sampling interval;
-    /// infinite where steps under a held voltage are exact.
-    const LONGEST: f64;
+    /// Longest step under a held voltage that is accurate, s; infinite where such steps are exact.
+    fn longest(&self) -> f64;
+
+    /// Vectors of lanes whose steps one after the other hide how long each takes, without a state
+    /// that no longer fits into the registers.
+    const VECTORS: usize;
 
     /// The state in which an experiment begins, in every lane.
     fn start<N: Number>(&self, number: N) -> Self::State<N>;
@@ -120,7 +127,13 @@ impl<K: Kernel> LanedPlant for Kernelled<'_, K> {
     type State<N: Number> = KernelledState<N, Memory<K, N>>;
     type Flow<N: Number> = KernelledFlow<N, K::Coupling<N>>;
 
-    const LONGEST: f64 = 0.25;
+    const VECTORS: usize = 2;
+
+    /// A quarter of the natural period, along which the hysteresis force is smooth.
+    fn longest(&self) -> f64 {
+        let Mechanics { mass, stiffness, .. } = self.stage.mechanics();
+        0.25 * TAU * libm::sqrt(mass / stiffness)
+    }
 
     fn start<N: Number>(&self, number: N) -> Self::State<N> {
         let LumpedStage { kernel, parameters } = &self.stage;
@@ -186,7 +199,11 @@ impl LanedPlant for Plays<'_> {
     type State<N: Number> = PlaysState<N>;
     type Flow<N: Number> = RelaxationFlow;
 
-    const LONGEST: f64 = f64::INFINITY;
+    const VECTORS: usize = 1;
+
+    fn longest(&self) -> f64 {
+        f64::INFINITY
+    }
 
     fn start<N: Number>(&self, number: N) -> PlaysState<N> {
         let PlayState { input, plays, slope } = self.start.operator;

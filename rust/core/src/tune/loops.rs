@@ -9,7 +9,7 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::math::{Lanes, room, width, zeros};
+use crate::math::{Lanes, dispatch_vectors, room, width, zeros};
 use crate::models::{LanedPlant, LanedVisitor, StageState};
 use crate::signal::Stop;
 use crate::simulate::{
@@ -73,7 +73,10 @@ impl Figures {
 const DIVERGED: f64 = 1.0;
 
 /// Ends of the parts in which an amplifier settles after a change of its command, in lags.
-const SETTLING: [f64; 6] = [0.25, 0.6, 1.1, 1.9, 3.2, 6.0];
+const SETTLING: [f64; 3] = [0.5, 1.5, 4.0];
+
+/// Most steps of equal length in a control interval.
+const MOST_STEPS: f64 = 4.0;
 
 impl<'a> Task<'a> {
     /// Brings the stage to where the loops begin, and draws the noise of its sensor.
@@ -227,9 +230,13 @@ impl LanedVisitor for Loops<'_> {
         let stage = task.stage;
         let arch = Arch::new();
         let width = width(arch);
-        let parts = parts(task, P::LONGEST);
+        let parts = parts(task, plant.longest());
+        // Every thread gets a vector to fill before any gets a second one.
+        let vectors = controllers.len().div_ceil(width);
+        let most = if width > 1 { P::VECTORS } else { 1 };
+        let each = vectors.div_ceil(rayon::current_num_threads()).clamp(1, most);
         let found: Result<Vec<Vec<Figures>>> = controllers
-            .par_chunks(width)
+            .par_chunks(width * each)
             .map(|chunk| {
                 let states = chunk.iter().map(|one| {
                     let length = one.repetitive.map_or(0, |part| part.length());
@@ -237,7 +244,8 @@ impl LanedVisitor for Loops<'_> {
                 });
                 let states: Result<Vec<_>> = states.collect();
                 let (plant, parts) = (&plant, &parts);
-                let bundle = Bundle {
+                let states = states?;
+                let loops = Chunk {
                     task,
                     stage,
                     start,
@@ -245,10 +253,14 @@ impl LanedVisitor for Loops<'_> {
                     noise,
                     parts,
                     controllers: chunk,
-                    states: states?,
+                    states,
                     stop,
                 };
-                Ok(arch.dispatch(bundle))
+                if const { P::VECTORS > 1 } && chunk.len() > width {
+                    let bundle = Bundle::<P, VECTORS>(loops);
+                    return Ok(dispatch_vectors(arch, bundle).unwrap_or_default());
+                }
+                Ok(arch.dispatch(Bundle::<P, 1>(loops)))
             })
             .collect();
         Ok(found?.concat())
@@ -281,12 +293,16 @@ fn parts(task: &Task<'_>, longest: f64) -> (usize, Vec<Part>) {
     let Delay { whole, fraction } = Delay::new(task.timing.delay + stage.sensor.delay, dt);
     let lag = stage.amplifier.lag();
     let mut edges = vec![fraction, 1.0];
+    let edge = |after: f64| [fraction + after, fraction + after - 1.0];
     for settled in SETTLING {
-        let after = settled * lag / dt;
-        edges.extend([fraction + after, fraction + after - 1.0]);
+        edges.extend(edge(settled * lag / dt));
     }
-    if stage.amplifier.slew.is_finite() || longest.is_finite() {
-        let count = (1.0 / longest.min(0.25)).ceil();
+    // While it slews, and a command that its lag rounds off.
+    let slewing = (stage.amplifier.high - stage.amplifier.low) / stage.amplifier.slew / dt;
+    let slews = if slewing > 1.0 / MOST_STEPS { MOST_STEPS } else { 1.0 };
+    edges.extend(edge(slewing.min(1.0)));
+    let count = libm::ceil(dt / longest).clamp(slews, MOST_STEPS);
+    if count > 1.0 {
         let mut edge = 1.0;
         while edge < count {
             edges.push(edge / count);
@@ -305,8 +321,8 @@ fn parts(task: &Task<'_>, longest: f64) -> (usize, Vec<Part>) {
     (whole, parts)
 }
 
-/// Loops in one vector of lanes.
-struct Bundle<'a, P> {
+/// Loops that are simulated together.
+struct Chunk<'a, P> {
     task: &'a Task<'a>,
     stage: &'a VirtualStage,
     start: &'a ApparatusState<StageState>,
@@ -318,18 +334,22 @@ struct Bundle<'a, P> {
     stop: Stop<'a>,
 }
 
+/// Loops in `V` vectors of lanes.
+struct Bundle<'a, P, const V: usize>(Chunk<'a, P>);
+
 /// Samples between two questions whether to stop.
 const POLL: usize = 1 << 12;
 
-impl<P: LanedPlant> WithSimd for Bundle<'_, P> {
+impl<P: LanedPlant, const V: usize> WithSimd for Bundle<'_, P, V> {
     type Output = Vec<Figures>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Vec<Figures> {
-        let Self { task, stage, start, plant, noise, parts, controllers, mut states, stop } = self;
+        let Chunk { task, stage, start, plant, noise, parts, controllers, mut states, stop } =
+            self.0;
         let (whole, parts) = parts;
-        let zero = Lanes::<S, 1>::splat(simd, 0.0);
-        let flows: Vec<(P::Flow<Lanes<S, 1>>, AmplifierFlow, bool)> = parts
+        let zero = Lanes::<S, V>::splat(simd, 0.0);
+        let flows: Vec<(P::Flow<Lanes<S, V>>, AmplifierFlow, bool)> = parts
             .iter()
             .map(|part| (plant.flow(zero, part.step), stage.amplifier.flow(part.step), part.newest))
             .collect();
@@ -371,5 +391,8 @@ impl<P: LanedPlant> WithSimd for Bundle<'_, P> {
     }
 }
 
-/// Lanes of the widest vector.
-const MOST_LANES: usize = 8;
+/// Vectors of a bundle of several: steps of one hide how long those of the other take.
+const VECTORS: usize = 2;
+
+/// Lanes of the widest bundle.
+const MOST_LANES: usize = 8 * VECTORS;
