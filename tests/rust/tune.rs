@@ -7,8 +7,8 @@ use piezotrack_core::models::Model;
 use piezotrack_core::signal::NEVER;
 use piezotrack_core::simulate::{Law, ReferenceSamples, Timing, VirtualStage, track};
 use piezotrack_core::tune::{
-    Aim, Figures, Judged, Nominal, PlantSet, Requirements, Setting, Sought, Structure, Task,
-    Template, Tuning, pid,
+    Aim, Figures, Judge, Judged, Nominal, PlantSet, Requirements, Setting, Sought,
+    SoughtController, Structure, Task, Template, Tuning, pid,
 };
 
 const DT: f64 = 0.02;
@@ -40,7 +40,7 @@ fn controllers(count: u32) -> Vec<Controller<Law>> {
 fn task<'a>(stage: &'a VirtualStage, samples: ReferenceSamples<'a>, delay: f64) -> Task<'a> {
     let timing =
         Timing { interval: DT, samples: samples.reference.len(), delay, jitter: 0.0, substeps: 1 };
-    Task { stage, visited: &[], timing, samples, from: 250, judged: Judged::Measured }
+    Task { stage, visited: &[], timing, samples, beside: &[], from: 250, judged: Judged::Measured }
 }
 
 /// Largest and rms error of a loop that is simulated by itself, in fine steps.
@@ -176,6 +176,7 @@ fn required() -> Requirements {
         learning: 1.0,
         slew: f64::INFINITY,
         clipped: 0.0,
+        error: f64::INFINITY,
     }
 }
 
@@ -195,11 +196,14 @@ fn the_integral_gain_from_margins_alone_is_the_known_one() {
     let one = |setting, low: f64, high: f64| Sought { setting, low, high, logarithmic: true };
     let limits = Limits::new(0.0, 75.0).unwrap();
     let base = Controller::new(limits, Law::None);
-    let tuning = Tuning {
+    let axis = SoughtController {
         sought: vec![one(Setting::Proportional, 1.0, 1.000_001), one(Setting::Integral, 1e4, 1e7)],
         template: Template { base, dt, period: None, structure: Structure::Pid, sign: 1.0 },
-        tasks: Vec::new(),
         plants: PlantSet::new(&[plant], dt).unwrap(),
+    };
+    let tuning = Tuning {
+        axes: vec![axis],
+        tasks: Vec::new(),
         required: Requirements { phase_margin: 0.0, gain_margin: 1.001, ..required() },
         aim: Aim::Disturbance,
         effort: 0.0,
@@ -208,7 +212,7 @@ fn the_integral_gain_from_margins_alone_is_the_known_one() {
         seed: 1,
     };
     let found = tuning.search(NEVER).unwrap();
-    let integral = found.settings[1].1 * 1e-6;
+    let integral = found.settings[0][1].1 * 1e-6;
     // The reading of a sample is taken before its command acts: z/(z - 1) behind one sample.
     assert!((integral - 1.0).abs() < 1e-3, "{integral}");
     assert!((found.robustness.sensitivity.value - 2.0).abs() < 2e-3);
@@ -225,7 +229,7 @@ fn a_search_beats_the_published_gains_and_keeps_its_margins() {
     let published = Controller::new(limits, Law::Pid(Pid::xu_li_2010().at(DT).unwrap()));
     let before = task.ready().unwrap().figures(&[published], NEVER).unwrap()[0];
     let plants = stage.loop_plants(0.0, 75.0).unwrap();
-    let tuning = Tuning {
+    let axis = SoughtController {
         sought: sought(1.56e-6),
         template: Template {
             base: Controller::new(limits, Law::None),
@@ -234,8 +238,11 @@ fn a_search_beats_the_published_gains_and_keeps_its_margins() {
             sign: 1.0,
             structure: Structure::Pid,
         },
-        tasks: vec![task],
         plants: PlantSet::new(&plants, DT).unwrap(),
+    };
+    let tuning = Tuning {
+        axes: vec![axis],
+        tasks: vec![Judge::Axis(task)],
         required: required(),
         aim: Aim::Rms,
         effort: 0.0,
@@ -247,7 +254,7 @@ fn a_search_beats_the_published_gains_and_keeps_its_margins() {
     assert!(found.excess <= 1.0);
     assert!(found.cost < before.rms, "{:e} tuned, {:e} published", found.cost, before.rms);
     for plant in &plants {
-        let exact = SampledLoop::of(plant, &found.controller, DT).unwrap().margins();
+        let exact = SampledLoop::of(plant, &found.controllers[0], DT).unwrap().margins();
         assert!(exact.stable && exact.sensitivity < 2.0 * 1.001, "{exact:?}");
         assert!(exact.gain.unwrap() > 2.0 * 0.999);
     }

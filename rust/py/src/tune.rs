@@ -1,9 +1,11 @@
 //! The search for the settings of a controller.
 
+use piezotrack_core::signal::contour_error::Polyline;
 use piezotrack_core::simulate::{ReferenceSamples, Timing, VirtualStage};
 use piezotrack_core::tune::{
-    Aim, Figures, Found, Judged, Nominal, PlantSet, Requirements, Robustness, Setting, Sought,
-    Structure, Task, Template, Tuning, Worst,
+    Aim, Figures, Found, Judge, Judged, Nominal, Outline, PathTask, PlantSet, Requirements,
+    Robustness, Setting, Settings, Sought, SoughtController, Structure, Task, Template, Tuning,
+    Worst,
 };
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
@@ -17,10 +19,13 @@ use crate::virtual_stage::PyVirtualStage;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyTask>()?;
+    module.add_class::<PyPathTask>()?;
+    module.add_class::<PySoughtController>()?;
     module.add_function(wrap_pyfunction!(tune, module)?)
 }
 
 /// A motion that controllers are judged by.
+#[derive(Clone)]
 #[pyclass(name = "Task", frozen, module = "piezotrack._core")]
 pub struct PyTask {
     stage: VirtualStage,
@@ -28,6 +33,7 @@ pub struct PyTask {
     timing: Timing,
     reference: Vec<f64>,
     feedforward: Vec<f64>,
+    beside: Vec<f64>,
     from: usize,
     judged: Judged,
 }
@@ -35,7 +41,8 @@ pub struct PyTask {
 #[pymethods]
 impl PyTask {
     #[new]
-    #[pyo3(signature = (*, stage, visited, dt, delay, jitter, reference, feedforward, first, measured))]
+    #[pyo3(signature = (*, stage, visited, dt, delay, jitter, reference, feedforward,
+        beside, first, measured))]
     #[expect(clippy::too_many_arguments, reason = "all named in Python")]
     fn new(
         stage: &PyVirtualStage,
@@ -45,6 +52,7 @@ impl PyTask {
         jitter: f64,
         reference: &Bound<'_, PyAny>,
         feedforward: &Bound<'_, PyAny>,
+        beside: &Bound<'_, PyAny>,
         first: usize,
         measured: bool,
     ) -> PyResult<Self> {
@@ -56,6 +64,7 @@ impl PyTask {
             timing,
             reference,
             feedforward: samples("feedforward", feedforward)?,
+            beside: samples("beside", beside)?,
             from: first,
             judged: if measured { Judged::Measured } else { Judged::True },
         })
@@ -88,8 +97,79 @@ impl PyTask {
             visited: &self.visited,
             timing: self.timing,
             samples,
+            beside: &self.beside,
             from: self.from,
             judged: self.judged,
+        }
+    }
+}
+
+/// A path that controllers are judged by, on both axes of an XY stage.
+#[pyclass(name = "PathTask", frozen, module = "piezotrack._core")]
+pub struct PyPathTask {
+    axes: [PyTask; 2],
+    lag: f64,
+    outline: Outline,
+}
+
+#[pymethods]
+impl PyPathTask {
+    /// `circle` has centre and radius, m; without it `path` has points along x and y.
+    #[new]
+    #[pyo3(signature = (x, y, *, lag, circle, path))]
+    #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
+    fn new(
+        x: PyRef<'_, PyTask>,
+        y: PyRef<'_, PyTask>,
+        lag: f64,
+        circle: Option<(f64, f64, f64)>,
+        path: (Bound<'_, PyAny>, Bound<'_, PyAny>),
+    ) -> PyResult<Self> {
+        let outline = if let Some((at_x, at_y, radius)) = circle {
+            Outline::Circle([at_x, at_y], radius)
+        } else {
+            let (along_x, along_y) = (samples("path_x", &path.0)?, samples("path_y", &path.1)?);
+            Outline::Points(Polyline::new(&along_x, &along_y).map_err(|error| raise(&error))?)
+        };
+        Ok(Self { axes: [x.clone(), y.clone()], lag, outline })
+    }
+
+    /// As of `Task`, of the contour error, for pairs of controllers.
+    #[expect(clippy::needless_pass_by_value, reason = "extracted from a list")]
+    fn figures(
+        &self,
+        py: Python<'_>,
+        controllers: Vec<(PyRef<'_, PyController>, PyRef<'_, PyController>)>,
+        threads: usize,
+    ) -> PyResult<Vec<FigureNumbers>> {
+        let (x, y): (Vec<_>, Vec<_>) =
+            controllers.iter().map(|(x, y)| (x.controller, y.controller)).unzip();
+        let found = enter_pool(py, threads, &QUIET, |_, stop| {
+            self.task().ready()?.figures([&x, &y], stop)
+        })?;
+        Ok(found.iter().map(numbers).collect())
+    }
+}
+
+impl PyPathTask {
+    fn task(&self) -> PathTask<'_> {
+        let [x, y] = &self.axes;
+        PathTask { x: x.task(), y: y.task(), lag: self.lag, outline: self.outline.clone() }
+    }
+}
+
+/// Either of them.
+#[derive(FromPyObject)]
+enum AnyTask<'py> {
+    Axis(PyRef<'py, PyTask>),
+    Path(PyRef<'py, PyPathTask>),
+}
+
+impl AnyTask<'_> {
+    fn judge(&self) -> Judge<'_> {
+        match self {
+            Self::Axis(task) => Judge::Axis(task.task()),
+            Self::Path(task) => Judge::Path(Box::new(task.task())),
         }
     }
 }
@@ -121,7 +201,7 @@ fn robustness(of: &Robustness) -> RobustnessNumbers {
 /// What was found, as a dict in Python.
 #[derive(IntoPyObject)]
 struct FoundSettings {
-    settings: Vec<(&'static str, f64)>,
+    settings: Vec<Vec<(&'static str, f64)>>,
     robustness: RobustnessNumbers,
     figures: Vec<FigureNumbers>,
     excess: f64,
@@ -133,8 +213,10 @@ struct FoundSettings {
 
 impl FoundSettings {
     fn of(found: &Found) -> Self {
+        let named =
+            |axis: &Settings| axis.iter().map(|(one, value)| (one.name(), *value)).collect();
         Self {
-            settings: found.settings.iter().map(|(one, value)| (one.name(), *value)).collect(),
+            settings: found.settings.iter().map(named).collect(),
             robustness: robustness(&found.robustness),
             figures: found.figures.iter().map(numbers).collect(),
             excess: found.excess,
@@ -162,24 +244,55 @@ fn structure((name, gain, time): &(String, f64, f64)) -> Result<Structure> {
     })
 }
 
-/// Gain margin, phase margin (rad), sensitivity, learning gain, slew (V/s), clipped share.
-type RequiredNumbers = (f64, f64, f64, f64, f64, f64);
+/// Gain margin, phase margin (rad), sensitivity, learning gain, slew (V/s), clipped share, rms
+/// error (m).
+type RequiredNumbers = (f64, f64, f64, f64, f64, f64, f64);
 
-/// Searches the settings of a controller.
+/// A controller of which settings are sought.
+#[pyclass(name = "SoughtController", frozen, module = "piezotrack._core")]
+pub struct PySoughtController(SoughtController);
+
+#[pymethods]
+impl PySoughtController {
+    #[new]
+    #[pyo3(signature = (*, controller, period, sign, law, sought, plants))]
+    #[expect(clippy::needless_pass_by_value, reason = "extracted from lists")]
+    fn new(
+        controller: &PyController,
+        period: Option<f64>,
+        sign: f64,
+        law: (String, f64, f64),
+        sought: Vec<(String, f64, f64, bool)>,
+        plants: Vec<PyRef<'_, PyLoopPlant>>,
+    ) -> PyResult<Self> {
+        let dt = controller.dt;
+        let build = || -> Result<SoughtController> {
+            let sought: Result<Vec<Sought>> = sought
+                .iter()
+                .map(|(name, low, high, logarithmic)| {
+                    let setting = Setting::named(name)?;
+                    Ok(Sought { setting, low: *low, high: *high, logarithmic: *logarithmic })
+                })
+                .collect();
+            let plants: Vec<_> = plants.iter().map(|plant| plant.plant().clone()).collect();
+            let structure = structure(&law)?;
+            let template = Template { base: controller.controller, dt, period, structure, sign };
+            let plants = PlantSet::new(&plants, dt)?;
+            Ok(SoughtController { sought: sought?, template, plants })
+        };
+        build().map(Self).map_err(|error| raise(&error))
+    }
+}
+
+/// Searches the settings of a controller, or of those of both axes.
 #[pyfunction]
-#[pyo3(signature = (*, controller, period, sign, law, sought, tasks, plants, required, aim, effort, particles,
-    iterations, seed, threads))]
+#[pyo3(signature = (*, axes, tasks, required, aim, effort, particles, iterations, seed, threads))]
 #[expect(clippy::too_many_arguments, reason = "all named in Python")]
 #[expect(clippy::needless_pass_by_value, reason = "extracted from lists")]
 fn tune(
     py: Python<'_>,
-    controller: &PyController,
-    period: Option<f64>,
-    sign: f64,
-    law: (String, f64, f64),
-    sought: Vec<(String, f64, f64, bool)>,
-    tasks: Vec<PyRef<'_, PyTask>>,
-    plants: Vec<PyRef<'_, PyLoopPlant>>,
+    axes: Vec<PyRef<'_, PySoughtController>>,
+    tasks: Vec<AnyTask<'_>>,
     required: RequiredNumbers,
     aim: &str,
     effort: f64,
@@ -188,48 +301,30 @@ fn tune(
     seed: u64,
     threads: usize,
 ) -> PyResult<FoundSettings> {
-    let dt = controller.dt;
-    let build = || -> Result<Tuning<'_>> {
-        let sought: Result<Vec<Sought>> = sought
-            .iter()
-            .map(|(name, low, high, logarithmic)| {
-                let setting = Setting::named(name)?;
-                Ok(Sought { setting, low: *low, high: *high, logarithmic: *logarithmic })
-            })
-            .collect();
-        let plants: Vec<_> = plants.iter().map(|plant| plant.plant().clone()).collect();
-        let (gain_margin, phase_margin, sensitivity, learning, slew, clipped) = required;
-        Ok(Tuning {
-            sought: sought?,
-            template: Template {
-                base: controller.controller,
-                dt,
-                period,
-                structure: structure(&law)?,
-                sign,
-            },
-            tasks: tasks.iter().map(|task| task.task()).collect(),
-            plants: PlantSet::new(&plants, dt)?,
-            required: Requirements {
-                gain_margin,
-                phase_margin,
-                sensitivity,
-                learning,
-                slew,
-                clipped,
-            },
-            aim: match aim {
-                "largest" => Aim::Largest,
-                "disturbance" => Aim::Disturbance,
-                _ => Aim::Rms,
-            },
-            effort,
-            particles,
-            iterations,
-            seed,
-        })
+    let (gain_margin, phase_margin, sensitivity, learning, slew, clipped, error) = required;
+    let tuning = Tuning {
+        axes: axes.iter().map(|axis| axis.0.clone()).collect(),
+        tasks: tasks.iter().map(AnyTask::judge).collect(),
+        required: Requirements {
+            gain_margin,
+            phase_margin,
+            sensitivity,
+            learning,
+            slew,
+            clipped,
+            error,
+        },
+        aim: match aim {
+            "largest" => Aim::Largest,
+            "disturbance" => Aim::Disturbance,
+            "effort" => Aim::Effort,
+            _ => Aim::Rms,
+        },
+        effort,
+        particles,
+        iterations,
+        seed,
     };
-    let tuning = build().map_err(|error| raise(&error))?;
     let found = enter_pool(py, threads, &QUIET, |_, stop| tuning.search(stop))?;
     Ok(FoundSettings::of(&found))
 }

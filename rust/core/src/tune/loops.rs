@@ -14,7 +14,7 @@ use crate::models::{LanedPlant, LanedVisitor, StageState};
 use crate::signal::Stop;
 use crate::simulate::{
     AmplifierFlow, ApparatusState, DELAY_LINE, Delay, Law, LawState, ReferenceSamples, SAME,
-    Timing, VirtualStage, track,
+    Timing, VirtualStage, closed_loop,
 };
 
 /// Which error counts.
@@ -37,6 +37,8 @@ pub struct Task<'a> {
     pub timing: Timing,
     /// Reference and feedforward.
     pub samples: ReferenceSamples<'a>,
+    /// What other axes add to the displacement at each sample, m; empty for nothing.
+    pub beside: &'a [f64],
     /// Samples before the first that counts.
     pub from: usize,
     /// Which error counts.
@@ -92,9 +94,23 @@ impl<'a> Task<'a> {
                 expected: format!("{expected}, as many as the reference"),
             });
         }
+        let found = self.beside.len();
+        if found != 0 && found != expected {
+            return Err(Error::Shape {
+                name: "beside".into(),
+                found: format!("{found} samples"),
+                expected: format!("{expected}, as many as the reference, or none"),
+            });
+        }
         let start = self.stage.start_after(self.visited);
         let noise = noises(self, &start)?;
         Ok(ReadyTask { task: self, start, noise })
+    }
+
+    /// What other axes add at sample `k`, m.
+    #[inline(always)]
+    fn beside(&self, k: usize) -> f64 {
+        self.beside.get(k).copied().unwrap_or(0.0)
     }
 
     /// The loop of one controller.
@@ -103,26 +119,51 @@ impl<'a> Task<'a> {
         controller: &Controller<Law>,
         start: &ApparatusState<StageState>,
         stop: Stop<'_>,
-    ) -> Result<Figures> {
-        let timing = Timing { samples: self.samples.reference.len(), substeps: 1, ..self.timing };
+    ) -> Result<Motion> {
+        let ReferenceSamples { reference, feedforward } = self.samples;
+        let timing = Timing { samples: reference.len(), substeps: 1, ..self.timing };
+        let length = controller.repetitive.map_or(0, |part| part.length());
+        let mut state = controller.rest(zeros(DELAY_LINE, length)?)?;
+        let mut commands = room("the commands", reference.len())?;
+        let command = |k: usize, measured: f64| {
+            let measured = measured + self.beside(k);
+            let command = controller.step(&mut state, reference[k], measured, feedforward[k]);
+            commands.push(command);
+            command.volts
+        };
         let apparatus = self.stage.apparatus();
-        let run = track(&apparatus, start.clone(), &timing, controller, self.samples, stop);
-        let run = match run {
+        let mut run = match closed_loop(&apparatus, start.clone(), &timing, command, stop) {
             Ok(Some(run)) => run,
             // Also where the loop diverged.
-            Ok(None) | Err(Error::Numerical(_)) => return Ok(Figures::FAILED),
+            Ok(None) | Err(Error::Numerical(_)) => return Ok(Motion::failed()),
             Err(other) => return Err(other),
         };
-        let mut score = Score::new(self.timing.interval);
-        let shown = match self.judged {
-            Judged::Measured => &run.motion.measured,
-            Judged::True => &run.motion.displacement,
+        let mut shown = match self.judged {
+            Judged::Measured => core::mem::take(&mut run.measured),
+            Judged::True => core::mem::take(&mut run.displacement),
         };
-        for (k, (command, shown)) in run.commands.iter().zip(shown).enumerate() {
-            let error = self.samples.reference[k] - shown;
+        let mut score = Score::new(self.timing.interval);
+        for (k, (command, shown)) in commands.iter().zip(&mut shown).enumerate() {
+            *shown += self.beside(k);
+            let error = reference[k] - *shown;
             score.take(k >= self.from, error, command.volts, command.saturated);
         }
-        Ok(score.figures())
+        Ok(Motion { figures: score.figures(), shown })
+    }
+}
+
+/// A loop that was simulated.
+#[derive(Clone, Debug)]
+pub(super) struct Motion {
+    pub(super) figures: Figures,
+    /// What is judged at each sample, reading or true displacement, m; empty where it failed, or
+    /// was not asked for.
+    pub(super) shown: Vec<f64>,
+}
+
+impl Motion {
+    fn failed() -> Self {
+        Self { figures: Figures::FAILED, shown: Vec::new() }
     }
 }
 
@@ -145,9 +186,20 @@ impl ReadyTask<'_> {
     /// # Errors
     /// Those of [`track`], and where memory does not suffice.
     pub fn figures(&self, controllers: &[Controller<Law>], stop: Stop<'_>) -> Result<Vec<Figures>> {
+        let motions = self.motions(controllers, false, stop)?;
+        Ok(motions.into_iter().map(|motion| motion.figures).collect())
+    }
+
+    /// The same, where `shown` with what is judged at each sample.
+    pub(super) fn motions(
+        &self,
+        controllers: &[Controller<Law>],
+        shown: bool,
+        stop: Stop<'_>,
+    ) -> Result<Vec<Motion>> {
         let Self { task, start, noise } = self;
         if task.timing.jitter == 0.0 {
-            let loops = Loops { task, start, noise, controllers, stop };
+            let loops = Loops { task, start, noise, controllers, shown, stop };
             let voltages = task.stage.visits_before(task.visited);
             if let Some(found) = task.stage.stage.in_lanes(&voltages, &start.plant, loops) {
                 return found;
@@ -219,15 +271,15 @@ struct Loops<'a> {
     start: &'a ApparatusState<StageState>,
     noise: &'a [f64],
     controllers: &'a [Controller<Law>],
+    shown: bool,
     stop: Stop<'a>,
 }
 
 impl LanedVisitor for Loops<'_> {
-    type Output = Result<Vec<Figures>>;
+    type Output = Result<Vec<Motion>>;
 
     fn visit<P: LanedPlant>(self, plant: P) -> Self::Output {
-        let Self { task, start, noise, controllers, stop } = self;
-        let stage = task.stage;
+        let Self { task, start, noise, controllers, shown, stop } = self;
         let arch = Arch::new();
         let width = width(arch);
         let parts = parts(task, plant.longest());
@@ -235,7 +287,7 @@ impl LanedVisitor for Loops<'_> {
         let vectors = controllers.len().div_ceil(width);
         let most = if width > 1 { P::VECTORS } else { 1 };
         let each = vectors.div_ceil(rayon::current_num_threads()).clamp(1, most);
-        let found: Result<Vec<Vec<Figures>>> = controllers
+        let found: Result<Vec<Vec<Motion>>> = controllers
             .par_chunks(width * each)
             .map(|chunk| {
                 let states = chunk.iter().map(|one| {
@@ -243,17 +295,19 @@ impl LanedVisitor for Loops<'_> {
                     Ok(one.rest(zeros(DELAY_LINE, length)?)?)
                 });
                 let states: Result<Vec<_>> = states.collect();
-                let (plant, parts) = (&plant, &parts);
-                let states = states?;
+                let (plant, parts, states) = (&plant, &parts, states?);
+                let samples = if shown { noise.len() } else { 0 };
+                let traces = (0..chunk.len()).map(|_| room("the motions", samples));
+                let traces: Result<Vec<_>> = traces.collect();
                 let loops = Chunk {
                     task,
-                    stage,
                     start,
                     plant,
                     noise,
                     parts,
                     controllers: chunk,
                     states,
+                    traces: traces?,
                     stop,
                 };
                 if const { P::VECTORS > 1 } && chunk.len() > width {
@@ -324,13 +378,14 @@ fn parts(task: &Task<'_>, longest: f64) -> (usize, Vec<Part>) {
 /// Loops that are simulated together.
 struct Chunk<'a, P> {
     task: &'a Task<'a>,
-    stage: &'a VirtualStage,
     start: &'a ApparatusState<StageState>,
     plant: &'a P,
     noise: &'a [f64],
     parts: &'a (usize, Vec<Part>),
     controllers: &'a [Controller<Law>],
     states: Vec<ControllerState<LawState, Vec<f64>>>,
+    /// Room for what is judged at each sample, where that is asked for.
+    traces: Vec<Vec<f64>>,
     stop: Stop<'a>,
 }
 
@@ -341,12 +396,13 @@ struct Bundle<'a, P, const V: usize>(Chunk<'a, P>);
 const POLL: usize = 1 << 12;
 
 impl<P: LanedPlant, const V: usize> WithSimd for Bundle<'_, P, V> {
-    type Output = Vec<Figures>;
+    type Output = Vec<Motion>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Vec<Figures> {
-        let Chunk { task, stage, start, plant, noise, parts, controllers, mut states, stop } =
+    fn with_simd<S: Simd>(self, simd: S) -> Vec<Motion> {
+        let Chunk { task, start, plant, noise, parts, controllers, mut states, mut traces, stop } =
             self.0;
+        let stage = task.stage;
         let (whole, parts) = parts;
         let zero = Lanes::<S, V>::splat(simd, 0.0);
         let flows: Vec<(P::Flow<Lanes<S, V>>, AmplifierFlow, bool)> = parts
@@ -362,12 +418,13 @@ impl<P: LanedPlant, const V: usize> WithSimd for Bundle<'_, P, V> {
         let samples = task.samples.reference.iter().zip(task.samples.feedforward);
         for (k, ((&reference, &feedforward), &drawn)) in samples.zip(noise).enumerate() {
             if k % POLL == POLL - 1 && stop() {
-                return vec![Figures::FAILED; controllers.len()];
+                return vec![Motion::failed(); controllers.len()];
             }
             let shown = plant.displacement(&state);
+            let beside = task.beside(k);
             let mut volts = [0.0; MOST_LANES];
             for (lane, (controller, state)) in controllers.iter().zip(&mut states).enumerate() {
-                let x = shown.as_slice()[lane];
+                let x = shown.as_slice()[lane] + beside;
                 let reading = stage.sensor.quantised(x + drawn) - start.sensor.zero;
                 let command = controller.step(state, reference, reading, feedforward);
                 volts[lane] = command.volts;
@@ -376,6 +433,9 @@ impl<P: LanedPlant, const V: usize> WithSimd for Bundle<'_, P, V> {
                     Judged::True => x - start.sensor.zero,
                 };
                 let (error, clipped) = (reference - actual, command.saturated);
+                if traces[lane].capacity() > k {
+                    traces[lane].push(actual);
+                }
                 scores[lane].take(k >= task.from, error, command.volts, clipped);
             }
             issued.rotate_left(1);
@@ -387,7 +447,8 @@ impl<P: LanedPlant, const V: usize> WithSimd for Bundle<'_, P, V> {
                 applied = high;
             }
         }
-        scores.iter().map(Score::figures).collect()
+        let motion = |(score, shown): (&Score, _)| Motion { figures: score.figures(), shown };
+        scores.iter().zip(traces).map(motion).collect()
     }
 }
 

@@ -28,6 +28,8 @@ pub struct Requirements {
     pub slew: f64,
     /// Largest share of samples at which the command is clipped.
     pub clipped: f64,
+    /// Largest rms error over all motions, m; infinite for any.
+    pub error: f64,
 }
 
 impl Requirements {
@@ -51,6 +53,10 @@ impl Requirements {
         if self.slew.is_nan() || self.slew <= 0.0 {
             let found = format!("{} V/s", self.slew);
             return Err(Error::parameter("slew", found, "above 0, or infinity"));
+        }
+        if self.error.is_nan() || self.error <= 0.0 {
+            let found = format!("{} m", self.error);
+            return Err(Error::parameter("allowed", found, "above 0, or infinity"));
         }
         if !(0.0..=1.0).contains(&self.clipped) {
             return Err(Error::parameter("clipped", self.clipped, "a share, 0 to 1"));
@@ -97,6 +103,31 @@ impl Robustness {
             self.learning.value / required.learning,
         ];
         ratios.into_iter().fold(0.0, |most, ratio| if ratio <= most { most } else { ratio })
+    }
+
+    /// The worse of each.
+    pub(super) fn worse(self, other: Self) -> Self {
+        let high = |a: Worst, b: Worst| if b.value > a.value { b } else { a };
+        let low = |a: Worst, b: Worst| if b.value < a.value { b } else { a };
+        Self {
+            unstable: high(self.unstable, other.unstable),
+            gain_margin: low(self.gain_margin, other.gain_margin),
+            phase_margin: low(self.phase_margin, other.phase_margin),
+            sensitivity: high(self.sensitivity, other.sensitivity),
+            learning: high(self.learning, other.learning),
+        }
+    }
+
+    /// The same of plants with numbers higher by `before`.
+    pub(super) fn numbered_from(self, before: usize) -> Self {
+        let later = |one: Worst| Worst { plant: one.plant + before, ..one };
+        Self {
+            unstable: later(self.unstable),
+            gain_margin: later(self.gain_margin),
+            phase_margin: later(self.phase_margin),
+            sensitivity: later(self.sensitivity),
+            learning: later(self.learning),
+        }
     }
 }
 
@@ -186,7 +217,8 @@ impl PlantSet {
                 });
                 one.learning.value = gain.fold(0.0, f64::max);
             }
-            out = Some(out.map_or(one, |before| worse(before, one, plant)));
+            let one = one.numbered_from(plant);
+            out = Some(out.map_or(one, |before| before.worse(one)));
         }
         // There is a plant: `new` saw to it.
         out.unwrap_or_else(|| walk(0, 0, |_| C::new(0.0, 0.0)))
@@ -288,23 +320,6 @@ fn from_zero(a: C, b: C) -> f64 {
 fn between(a: C, b: C, low: f64, high: f64) -> C {
     let share = low / (low - high);
     if share.is_finite() { a + (b - a) * share } else { a }
-}
-
-/// The worse of each, `one` being of plant number `plant`.
-fn worse(before: Robustness, one: Robustness, plant: usize) -> Robustness {
-    let high = |a: Worst, b: Worst| {
-        if b.value > a.value { Worst { value: b.value, plant } } else { a }
-    };
-    let low = |a: Worst, b: Worst| {
-        if b.value < a.value { Worst { value: b.value, plant } } else { a }
-    };
-    Robustness {
-        unstable: high(before.unstable, one.unstable),
-        gain_margin: low(before.gain_margin, one.gain_margin),
-        phase_margin: low(before.phase_margin, one.phase_margin),
-        sensitivity: high(before.sensitivity, one.sensitivity),
-        learning: high(before.learning, one.learning),
-    }
 }
 
 /// Angles from nearly 0 to pi, dense where a plant turns fast.

@@ -8,7 +8,8 @@
 use piezotrack_control::Controller;
 use rayon::prelude::*;
 
-use super::loops::{Figures, ReadyTask, Task};
+use super::judge::{Judge, Ready};
+use super::loops::Figures;
 use super::requirements::{PlantSet, Requirements, Robustness};
 use super::settings::{Setting, Sought, Template};
 use crate::error::{Error, Result};
@@ -23,23 +24,32 @@ pub enum Aim {
     Rms,
     /// The largest error in any task, m.
     Largest,
+    /// The change of the command from sample to sample, V rms over all tasks.
+    Effort,
     /// Nothing is simulated: the integral gain is made large, so that the integral of the error
     /// after a step disturbance is small. Panagopoulos, Astrom and Hagglund 2002,
     /// doi 10.1049/ip-cta:20020013.
     Disturbance,
 }
 
-/// A search for settings.
+/// The controller of an axis, of which settings are sought.
 #[derive(Clone, Debug)]
-pub struct Tuning<'a> {
+pub struct SoughtController {
     /// What is sought in which range.
     pub sought: Vec<Sought>,
     /// What they are settings of.
     pub template: Template,
-    /// Motions that the controllers are judged by.
-    pub tasks: Vec<Task<'a>>,
-    /// Plants for which every controller keeps what is required.
+    /// Plants for which it keeps what is required.
     pub plants: PlantSet,
+}
+
+/// A search for settings.
+#[derive(Clone, Debug)]
+pub struct Tuning<'a> {
+    /// One controller, or those of both axes of an XY stage.
+    pub axes: Vec<SoughtController>,
+    /// Motions that the controllers are judged by.
+    pub tasks: Vec<Judge<'a>>,
     /// What that is.
     pub required: Requirements,
     /// What is made small.
@@ -54,20 +64,24 @@ pub struct Tuning<'a> {
     pub seed: u64,
 }
 
+/// Settings with their values.
+pub type Settings = Vec<(Setting, f64)>;
+
 /// Settings that were found.
 #[derive(Clone, Debug)]
 pub struct Found {
-    /// Each setting with its value.
-    pub settings: Vec<(Setting, f64)>,
-    /// The controller with them.
-    pub controller: Controller<Law>,
-    /// What it keeps over the plants.
+    /// Each setting with its value, for each axis.
+    pub settings: Vec<Settings>,
+    /// The controllers with them.
+    pub controllers: Vec<Controller<Law>>,
+    /// What they keep over the plants, which are numbered through all axes.
     pub robustness: Robustness,
-    /// Its figures in each task; empty where it does not keep the margins.
+    /// Their figures in each task; empty where they do not keep the margins.
     pub figures: Vec<Figures>,
-    /// How far it is from what is required: 1 or less where it keeps it.
+    /// How far they are from what is required: 1 or less where they keep it.
     pub excess: f64,
-    /// Its figure, m; of [`Aim::Disturbance`] 1 over the integral gain, m/V.
+    /// Their figure, m, or V of [`Aim::Effort`]; of [`Aim::Disturbance`] 1 over the integral gain,
+    /// m/V.
     pub cost: f64,
     /// Controllers looked at, and loops simulated.
     pub candidates: usize,
@@ -80,8 +94,8 @@ pub struct Found {
 /// A candidate and what was found of it.
 #[derive(Clone, Debug)]
 struct Tried {
-    settings: Vec<(Setting, f64)>,
-    controller: Option<Controller<Law>>,
+    settings: Vec<Settings>,
+    controllers: Option<Vec<Controller<Law>>>,
     robustness: Option<Robustness>,
     figures: Vec<Figures>,
     excess: f64,
@@ -114,7 +128,7 @@ impl Tuning<'_> {
     /// [`Error::Parameter`] naming what cannot be used; where memory does not suffice.
     pub fn search(&self, stop: Stop<'_>) -> Result<Found> {
         self.validate()?;
-        let tasks: Result<Vec<ReadyTask<'_>>> = self.tasks.iter().map(Task::ready).collect();
+        let tasks: Result<Vec<Ready<'_>>> = self.tasks.iter().map(Judge::ready).collect();
         let tasks = tasks?;
         let mut best: Option<(Vec<f64>, Tried)> = None;
         let mut counts = (0, 0);
@@ -128,7 +142,7 @@ impl Tuning<'_> {
                 min_improvement: 0.0,
                 ..SwarmSettings::spso_2011()
             };
-            let mut swarm = Swarm::new(settings, self.sought.len(), self.seed, look)?;
+            let mut swarm = Swarm::new(settings, self.dimensions(), self.seed, look)?;
             while !(swarm.exhausted() || swarm.stalled() || stop()) {
                 let asked: Vec<Option<Vec<f64>>> = swarm
                     .ask()
@@ -155,11 +169,11 @@ impl Tuning<'_> {
             }
         }
         let none = || Error::Numerical("no controller could be built from the settings".into());
-        let (_, Tried { settings, controller, robustness, figures, excess, cost }) =
+        let (_, Tried { settings, controllers, robustness, figures, excess, cost }) =
             best.ok_or_else(none)?;
         Ok(Found {
             settings,
-            controller: controller.ok_or_else(none)?,
+            controllers: controllers.ok_or_else(none)?,
             robustness: robustness.ok_or_else(none)?,
             figures,
             excess,
@@ -172,21 +186,29 @@ impl Tuning<'_> {
 
     fn validate(&self) -> Result<()> {
         self.required.validate()?;
-        self.sought.iter().try_for_each(Sought::validate)?;
-        if self.sought.is_empty() {
+        self.axes.iter().flat_map(|axis| &axis.sought).try_for_each(Sought::validate)?;
+        if self.dimensions() == 0 {
             return Err(Error::parameter("sought", "nothing", "one setting or more"));
         }
         if self.tasks.is_empty() && self.aim != Aim::Disturbance {
             return Err(Error::parameter("tasks", "none", "a reference or more"));
         }
+        if self.tasks.iter().any(|task| task.axes() != self.axes.len()) {
+            return Err(Error::parameter("axes", self.axes.len(), "as many as the tasks have"));
+        }
         Ok(())
+    }
+
+    /// Settings of all axes.
+    fn dimensions(&self) -> usize {
+        self.axes.iter().map(|axis| axis.sought.len()).sum()
     }
 
     /// Looks at the controllers of some places.
     fn tried(
         &self,
         places: &[&Vec<f64>],
-        tasks: &[ReadyTask<'_>],
+        tasks: &[Ready<'_>],
         stop: Stop<'_>,
     ) -> Result<Vec<Tried>> {
         let mut tried: Vec<Tried> = places.par_iter().map(|place| self.judged(place)).collect();
@@ -196,8 +218,10 @@ impl Tuning<'_> {
         let robust: Vec<usize> = (0..tried.len())
             .filter(|i| tried.get(*i).is_some_and(|one| one.excess <= 1.0))
             .collect();
-        let controllers: Vec<Controller<Law>> =
-            robust.iter().filter_map(|i| tried[*i].controller).collect();
+        let of_axis = |axis: usize| -> Vec<Controller<Law>> {
+            robust.iter().filter_map(|i| Some(tried[*i].controllers.as_ref()?[axis])).collect()
+        };
+        let controllers: Vec<_> = (0..self.axes.len()).map(of_axis).collect();
         for task in tasks {
             let figures = task.figures(&controllers, stop)?;
             for (i, figures) in robust.iter().zip(figures) {
@@ -213,18 +237,37 @@ impl Tuning<'_> {
 
     /// The controller of a place, and what it keeps over the plants.
     fn judged(&self, place: &[f64]) -> Tried {
-        let settings: Vec<(Setting, f64)> = self
-            .sought
-            .iter()
-            .zip(place)
-            .map(|(one, place)| (one.setting, one.at(*place)))
-            .collect();
-        let controller = self.template.controller(&settings);
-        let robustness = controller.as_ref().map(|one| self.plants.robustness(one));
+        let mut rest = place;
+        let mut settings: Vec<Settings> = Vec::with_capacity(self.axes.len());
+        for axis in &self.axes {
+            let (own, others) = rest.split_at_checked(axis.sought.len()).unwrap_or_default();
+            let at = |(one, place): (&Sought, &f64)| (one.setting, one.at(*place));
+            settings.push(axis.sought.iter().zip(own).map(at).collect());
+            rest = others;
+        }
+        let pairs = || self.axes.iter().zip(&settings);
+        let controllers: Option<Vec<Controller<Law>>> =
+            pairs().map(|(axis, settings)| axis.template.controller(settings)).collect();
+        let robustness = controllers.as_ref().and_then(|all| self.robustness(all));
         let excess = robustness.map_or(f64::INFINITY, |one| one.excess(&self.required));
-        let integral = settings.iter().find(|(setting, _)| *setting == Setting::Integral);
-        let cost = integral.map_or(f64::INFINITY, |(_, gain)| 1.0 / gain);
-        Tried { settings, controller, robustness, figures: Vec::new(), excess, cost }
+        let integral = |one: &Settings| {
+            let found = one.iter().find(|(setting, _)| *setting == Setting::Integral);
+            found.map_or(f64::INFINITY, |(_, gain)| 1.0 / gain)
+        };
+        let cost = settings.iter().map(integral).fold(0.0, f64::max);
+        Tried { settings, controllers, robustness, figures: Vec::new(), excess, cost }
+    }
+
+    /// What is least good over the plants of all axes.
+    fn robustness(&self, controllers: &[Controller<Law>]) -> Option<Robustness> {
+        let mut before = 0;
+        let mut all = None;
+        for (axis, controller) in self.axes.iter().zip(controllers) {
+            let one = axis.plants.robustness(controller).numbered_from(before);
+            before += axis.plants.len();
+            all = Some(all.map_or(one, |found: Robustness| found.worse(one)));
+        }
+        all
     }
 
     /// Figure over all tasks, and how far from what is required.
@@ -237,9 +280,12 @@ impl Tuning<'_> {
         let error = match self.aim {
             Aim::Rms | Aim::Disturbance => mean(|one| one.rms),
             Aim::Largest => most(|one| one.largest),
+            Aim::Effort => mean(|one| one.effort),
         };
-        let changes = if self.effort > 0.0 { self.effort * mean(|one| one.effort) } else { 0.0 };
+        let weighs = self.effort > 0.0 && self.aim != Aim::Effort;
+        let changes = if weighs { self.effort * mean(|one| one.effort) } else { 0.0 };
         let mut excess = excess.max(most(|one| one.slew) / self.required.slew);
+        excess = excess.max(mean(|one| one.rms) / self.required.error);
         let clipped = most(|one| one.clipped);
         if clipped > self.required.clipped {
             excess = excess.max(1.0 + clipped - self.required.clipped);
