@@ -31,6 +31,7 @@ class Question(NamedTuple):
 
     stages: list[Plant | IdentifiedModel]
     references: list[Reference]
+    intervals: list[float]
     limits: tuple[float, float]
     drive_unit: str
     feedforward: Inverse | None
@@ -84,7 +85,7 @@ def asked(
     stages = _stages(stage)
     references = _references(reference)
     _check_word("law", law, LAWS)
-    _check_integral_part(law, references)
+    _check_has_integral_part(law, references)
     _check_kind("margins", margins, Margins)
     _check_kind("spread", spread, Spread)
     _check_word("figure", figure, tuple(FIGURES))
@@ -93,14 +94,17 @@ def asked(
     intervals = _intervals(dt, model)
     unit = model.drive_unit if model is not None else "V"
     limits = _limits(limits, model, unit)
+    inverse = _inverse_of(stages[0], feedforward)
+    _check_feedforward(law, inverse)
     question = Question(
         stages=stages,
         references=references,
+        intervals=intervals,
         limits=limits,
         drive_unit=unit,
         seeds=_seeds(seeds),
         slew=_slew(slew),
-        feedforward=_inverse_of(stages[0], feedforward),
+        feedforward=inverse,
         parts=parts_named(parts),
         filters=_filters(filters),
         law=law,
@@ -147,11 +151,19 @@ def _check_word(name: str, value: Any, known: Collection[str]) -> None:
         )
 
 
-def _check_integral_part(law: str, references: list[Reference]) -> None:
+def _check_has_integral_part(law: str, references: list[Reference]) -> None:
     if not references and law in ("pd", "lead-lag"):
         raise ParameterError(
             f"law is {law!r} without a reference: expected one with an integral part, whose gain "
             "is made large then"
+        )
+
+
+def _check_feedforward(law: str, feedforward: Inverse | None) -> None:
+    if law == "pd" and feedforward is None:
+        raise ParameterError(
+            "law is 'pd' without feedforward: expected feedforward=, for nothing else brings the "
+            "stage to where it is to be, or a law with an integral part"
         )
 
 
