@@ -20,13 +20,17 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_controllers_are_compared_and_written() -> None:
-    words = ran(*COMPARE, "--controllers", "inverse, PID", "--rates", "0.5,1,2")
-    assert "true rms error in nm at 50 Hz" in words
+    words = ran(*COMPARE, "--controllers", "inverse, PID", "--rates", "0.5,1,2", "--seeds", "2")
+    assert "true error in nm rms at 50 Hz, mean of 2 draws of the noise" in words
+    assert max(map(len, words.splitlines())) <= 100
     document = json.loads(Path("results/controllers.json").read_text(encoding="utf-8"))
     inverse, pid = document["controllers"]
     assert (inverse["name"], pid["name"]) == ("inverse", "PID")
     # The second-order Dahl model leaves micrometres, feedback less.
     assert pid["figures"][0][0]["rms"] < inverse["figures"][0][0]["rms"]
+    assert [len(one["draws"]) for one in pid["figures"][0]] == [2] * 6
+    assert 0.0 < pid["figures"][0][0]["spread"] < pid["figures"][0][0]["rms"]
+    assert 0.0 < pid["figures"][0][0]["chatter"] < pid["figures"][0][0]["effort"]
     assert pid["sensitivity"] <= 2.02
     assert inverse["sensitivity"] is None
     assert Path("results/controllers.png").exists()
@@ -39,6 +43,7 @@ def test_controllers_are_compared_and_written() -> None:
         (["--rates", "3,2,1"], "in rising order"),
         (["--controllers", "pid"], "has 'pid'"),
         (["--sensitivity", "0.5"], "is 0.5"),
+        (["--seeds", "0"], "seeds is 0: expected 1 to 100"),
     ],
 )
 def test_wrong_options_are_named(options: list[str], words: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -154,7 +155,21 @@ def test_margins_out_of_reach_are_refused() -> None:
     """0.5 s of delay in a loop at 50 Hz: even the lowest gains keep no Ms of 1.0001."""
     options = ("--delay", "0.5", "--sensitivity", "1.0001")
     said = refusal("tune", "dahl.json", *QUICK, *options)
-    assert said.startswith("margins.sensitivity is 1.0001: expected one that some gains can keep")
+    assert said.startswith("--sensitivity is 1.0001: expected one that some gains can keep")
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_a_gain_margin_out_of_reach_is_named_with_the_nearest() -> None:
+    """The search itself ranks unstable gains before those that are short by so much."""
+    said = refusal("tune", "dahl.json", *QUICK, "--gain-margin", "1e9")
+    assert said.startswith("--gain-margin is 1e+09: expected one that some gains can keep")
+    (nearest,) = re.findall(r"the nearest have ([0-9.e+]+) \(", said)
+    (factor,) = re.findall(r", ([0-9.e+]+) times too low$", said)
+    assert float(nearest) * float(factor) == pytest.approx(1e9, rel=1e-3)
+    # What is said to be nearest can be kept, and not much more.
+    ran("tune", "dahl.json", *QUICK, "--gain-margin", f"{0.9 * float(nearest)}")
+    more = ("--gain-margin", f"{1.5 * float(nearest)}", "--overwrite")
+    assert "expected one that" in refusal("tune", "dahl.json", *QUICK, *more)
 
 
 @pytest.mark.usefixtures("_no_pictures")

@@ -6,6 +6,7 @@ import json
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 
 import piezotrack as pt
@@ -88,9 +89,101 @@ def test_what_could_not_be_made_says_why() -> None:
         compared(controllers=["network"])
 
 
+def noisy(seed: int) -> pt.VirtualStage:
+    return pt.VirtualStage.of(plays(), noise=60e-9, seed=seed)
+
+
+def test_each_is_judged_by_draws_of_the_noise_other_than_that_it_was_tuned_with() -> None:
+    sine = pt.sine(frequency=5.0, low=20e-6, high=60e-6, duration=1.2)
+    found = pt.compare_controllers(
+        noisy(3), plays(1.05), dt=1e-3, limits=LIMITS, references=[sine], seeds=8,
+        controllers=["inverse", "inverse + PID"], parts="pid", **QUICK,
+    )  # fmt: skip
+    inverse, pid = found.rows
+    cell = pid.cells[0][0]
+    assert cell is not None
+    assert len(cell.draws) == len(set(cell.draws)) == 8
+    # Runs of other draws belong to the same distribution, and that of the tuning is no draw of it.
+    others = [pt.track(noisy(seed), pid.controller, sine) for seed in range(50, 62)]
+    errors = np.array([(one.desired - one.displacement)[200:] for one in others])
+    rms = np.sqrt(np.mean(errors**2, axis=1))
+    assert cell.spread > 0.0
+    assert abs(rms.mean() - cell.rms) < 4.0 * cell.spread / math.sqrt(8)
+    assert 0.4 < rms.std(ddof=1) / cell.spread < 2.5
+    assert cell.largest == pytest.approx(np.abs(errors).max(), rel=0.3)
+    assert cell.largest > max(cell.draws)
+    tuned = pt.track(noisy(3), pid.controller, sine)
+    of_tuning = np.sqrt(np.mean((tuned.desired - tuned.displacement)[200:] ** 2))
+    assert np.abs(np.array(cell.draws) / of_tuning - 1.0).min() > 1e-6
+    # One reference: over all of them is along it. Without feedback noise does nothing.
+    assert (pid.rms(), pid.spread()) == pytest.approx((cell.rms, cell.spread))
+    assert inverse.spread() == pytest.approx(0.0, abs=1e-15)
+    assert f"± {1e9 * cell.spread:.1g}" in str(found)
+
+
+def test_chatter_is_the_fast_part_of_the_command_of_the_runs() -> None:
+    sine = pt.sine(frequency=5.0, low=20e-6, high=60e-6, duration=1.2)
+    # Above a quarter of the sampling rate.
+    quick = pt.sine(frequency=260.0, low=39.8e-6, high=40.2e-6, duration=0.3)
+    found = pt.compare_controllers(
+        noisy(3), plays(1.05), dt=1e-3, limits=LIMITS, references=[sine, quick, sine],
+        controllers=["inverse", "inverse + PID"], parts="pid", **QUICK,
+    )  # fmt: skip
+    inverse, pid = found.rows
+    cell = pid.cells[0][0]
+    assert cell is not None
+    assert cell.chatter is not None
+    run = pt.track(noisy(50), pid.controller, sine)
+    chatter = pt.control.chatter(run, after=0.2)
+    assert chatter.fast_change == pytest.approx(
+        chatter.rms_change * math.sqrt(chatter.fast_share), rel=1e-12
+    )
+    assert cell.chatter == pytest.approx(chatter.fast_change, rel=0.15)
+    assert cell.chatter < cell.effort
+    # The noise of the sensor goes through the feedback; the inverse knows no sensor.
+    assert inverse.chatter is not None
+    assert pid.chatter is not None
+    assert pid.chatter > 3.0 * inverse.chatter
+    # A motion that asks for fast changes itself does not decide.
+    fast = inverse.cells[0][1]
+    assert fast is not None
+    assert fast.chatter is not None
+    assert fast.chatter > 20.0 * inverse.chatter
+    # It is that of the stage that it was tuned for.
+    assert all(one is None or one.chatter is None for one in pid.cells[1])
+
+
+def test_one_draw_has_no_spread() -> None:
+    found = compared(controllers=["inverse + PID"], seeds=1)
+    assert math.isnan(found.rows[0].spread())
+    assert "±" not in str(found)
+    assert "one draw of the noise" in str(found)
+    figures = found.document()["controllers"][0]["figures"][0][0]
+    assert figures["spread"] is None
+    assert figures["draws"] == [figures["rms"]]
+
+
+def test_the_tables_fit_a_terminal_and_a_notebook() -> None:
+    names = ["inverse", "inverse + perturbation estimation"]
+    found = compared(controllers=names, references=None, rates=(2.0, 5.0, 20.0))
+    lines = str(found).splitlines()
+    assert max(map(len, lines)) <= 100
+    assert lines[0].startswith("true error in nm rms at 1000 Hz, mean of 3 draws of the noise")
+    # Each table has each of them.
+    assert sum(line.startswith("inverse + perturbation") for line in lines) == 4
+    html = found._repr_html_()
+    assert html.count("<table>") == html.count("</table>") == 4
+    assert "<th>inverse + perturbation estimation</th>" in html
+
+
 def test_the_document_is_json() -> None:
     text = json.dumps(compared(controllers=["inverse"]).document(), allow_nan=False)
-    assert json.loads(text)["controllers"][0]["name"] == "inverse"
+    document = json.loads(text)
+    assert document["controllers"][0]["name"] == "inverse"
+    assert document["seeds"] == 3
+    figures = document["controllers"][0]["figures"][0][0]
+    assert len(figures["draws"]) == 3
+    assert {"rms", "spread", "largest", "effort", "clipped", "chatter"} < figures.keys()
 
 
 def test_the_picture_has_a_mark_for_each_reference() -> None:
@@ -109,6 +202,8 @@ def test_the_picture_has_a_mark_for_each_reference() -> None:
         ({"limits": (1.0, 0.0)}, "expected the lower one first"),
         ({"dt": 0.0}, "dt is 0"),
         ({"delay": -1.0}, "delay is -1"),
+        ({"seeds": 0}, "seeds is 0: expected 1 to 100"),
+        ({"seeds": 101}, "seeds is 101: expected 1 to 100"),
     ],
 )
 def test_wrong_arguments_are_named(changes: dict[str, Any], words: str) -> None:

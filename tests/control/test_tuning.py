@@ -183,6 +183,12 @@ def test_margins_that_no_gains_keep_are_refused_with_the_nearest() -> None:
         )  # fmt: skip
 
 
+def test_a_gain_margin_far_out_of_reach_is_named_not_stability() -> None:
+    words = r"margins\.gain is 1e\+09: .* the nearest have \d+\.?\d* .* times too low"
+    with pytest.raises(pt.ParameterError, match=words):
+        pt.tune(published_stage(), dt=0.02, limits=LIMITS, margins=pt.Margins(gain=1e9), **QUICK)
+
+
 def test_a_slew_that_the_reference_itself_exceeds_is_refused_with_what_is_needed() -> None:
     stage = pt.stages.PrandtlIshlinskiiStage(
         linear=1.2e-6, thresholds=(10.0,), weights=(0.2e-6,), time_constant=1e-3

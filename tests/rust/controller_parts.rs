@@ -150,6 +150,26 @@ fn several_states_follow_their_equations() {
 }
 
 #[test]
+fn a_pd_asks_for_its_first_error_too_and_a_pid_does_not() {
+    let run = |ti| {
+        let law = Pid::new(1e5, ti, 0.01, None).unwrap().at(0.02).unwrap();
+        let mut state = law.rest();
+        [2e-5, 3e-5, 3e-5, 3e-5].map(|e| law.step(&mut state, &FeedbackSample::new(e)))
+    };
+    // No derivative kick at the first error, and in the end Kp e: nothing is lost of it.
+    let [first, _, _, last] = run(f64::INFINITY);
+    assert!((first - 2.0).abs() < 1e-12);
+    assert!((last - 3.0).abs() < 1e-12);
+    // The integral part of a PID makes up for it: no bump at the start.
+    let [first, ..] = run(0.1);
+    assert!((first - 1e5 * (0.02 / 0.1) * 2e-5).abs() < 1e-12);
+    // A bumpless start keeps its voltage.
+    let pd = Pid::new(1e5, f64::INFINITY, 0.0, None).unwrap().at(0.02).unwrap();
+    let mut state = pd.start(5.0);
+    assert!((pd.step(&mut state, &FeedbackSample::new(1e-5)) - 5.0).abs() < 1e-12);
+}
+
+#[test]
 fn bad_parameters_are_named() {
     let inf = f64::INFINITY;
     let pid = |kp, ti, td, tt| Pid::new(kp, ti, td, tt).unwrap_err().name;

@@ -36,6 +36,10 @@ ADVICE = [
     (r"\bmodel='([\w-]+)'", r"--model \1", "--model"),
     (r"\bcount is (?=\d+: expected 1 to)", "--plays is ", "--plays"),
     (r"\bdead_zones is ", "--asymmetry is ", "--asymmetry"),
+    (r"\bmargins\.gain is ", "--gain-margin is ", "--gain-margin"),
+    (r"\bmethod '(frequency|lifted)'", r"--method \1", "--mode-scales"),
+    (r"\bmode_scales is ", "--mode-scales is ", "--mode-scales"),
+    (r"\bmargins\.sensitivity is ", "--sensitivity is ", "--sensitivity"),
     (r"\blog\[([^\]]*)\]", r"--window \1", "--window"),
     *(
         (rf"(?<!--unit )\b{name}=(?!\.\.\.) ?", f"--{name} ", f"--{name}")

@@ -17,6 +17,7 @@ from .contour import contour_command
 from .demo import demo_command
 from .error_messages import of_the_system
 from .identify import identify_command
+from .learn import learn_command
 from .noise import noise_command
 from .reproduce import reproduce_command
 from .simulate import simulate_command
@@ -88,6 +89,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "feedforward": feedforward_command,
     "track": track_command,
     "tune": tune_command,
+    "learn": learn_command,
     "compare-controllers": compare_controllers_command,
     "contour": contour_command,
     "noise": noise_command,

@@ -4,34 +4,36 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from ..errors import ParameterError
 from .error_messages import in_words
-from .loop_options import PAPER, AmplifierBandwidth, Interval, Limits, Loop, LoopDelay, Noise
+from .loop_options import (
+    PAPER,
+    AmplifierBandwidth,
+    Interval,
+    Limits,
+    Loop,
+    LoopDelay,
+    Noise,
+    StageFile,
+    driven_by_voltage,
+    refuse_of_other_stage,
+    simulated,
+)
 from .options import Json, ModelFile, Out, Overwrite, Quiet  # noqa: TC001 - read by typer
 from .output import Output
-
-if TYPE_CHECKING:
-    from ..identification.identified import IdentifiedModel
-    from ..stages.virtual import VirtualStage
 
 __all__ = ["compare_controllers_command"]
 
 
 @in_words
 def compare_controllers_command(
+    context: typer.Context,
     model: ModelFile,
-    stage: Annotated[
-        str | None,
-        typer.Option(
-            metavar=f"FILE|{PAPER}",
-            help=f"Stage to simulate: another model file, or {PAPER}. Default the model itself.",
-            show_default=False,
-        ),
-    ] = None,
+    stage: StageFile = None,
     out: Out = Path("results"),
     overwrite: Overwrite = False,
     dt: Interval = None,
@@ -52,6 +54,9 @@ def compare_controllers_command(
     delay: LoopDelay = 0.0,
     noise_nm: Noise = 0.0,
     bandwidth: AmplifierBandwidth = math.inf,
+    seeds: Annotated[
+        int, typer.Option(help="Draws of the sensor noise that each controller is judged by.")
+    ] = 3,
     seed: Annotated[int, typer.Option(help="Random seed of the searches and sensor noise.")] = 1,
     json: Json = False,
     quiet: Quiet = False,
@@ -68,11 +73,13 @@ def compare_controllers_command(
     from ..control.tuning.margins import Margins
     from ..identification.identified import load
 
-    known = load(model)
-    settings = Loop(stage != PAPER, dt, limits, None, None, None, None)
+    own = stage != PAPER
+    refuse_of_other_stage(context, own)
+    known = load(model) if own else driven_by_voltage(load(model), model)
+    settings = Loop(own, dt, limits, None, None, None, None)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write(["controllers.json", *picture_files("controllers")])
-    plant = _plant(stage, known, 1e-9 * noise_nm, bandwidth, seed)
+    plant = simulated(stage, known, 1e-9 * noise_nm, bandwidth, seed)
     found = compare_controllers(
         plant,
         known,
@@ -84,6 +91,7 @@ def compare_controllers_command(
         else [one.strip() for one in controllers.split(",")],
         margins=Margins(sensitivity=sensitivity),
         delay=delay,
+        seeds=seeds,
         seed=seed,
     )
     document = found.document()
@@ -93,18 +101,6 @@ def compare_controllers_command(
             *save_figures({"controllers": found.plot()}, folder),
         ]
     result.show(str(found), document, written)
-
-
-def _plant(
-    stage: str | None, known: IdentifiedModel, noise: float, bandwidth: float, seed: int
-) -> VirtualStage:
-    from ..identification.identified import load
-    from ..stages.virtual import VirtualStage
-
-    if stage == PAPER:
-        return VirtualStage.xu_li_2010(seed=seed)
-    other = known if stage is None else load(Path(stage))
-    return VirtualStage.of(other, noise=noise, bandwidth=bandwidth, seed=seed)
 
 
 def _rates(text: str) -> tuple[float, float, float]:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ..control.tracking import Tracking
     from ..identification.identified import IdentifiedModel
     from ..references.reference import Reference
+    from ..stages.virtual import VirtualStage
 
 __all__ = [
     "MODEL",
@@ -33,6 +34,7 @@ __all__ = [
     "Loop",
     "LoopDelay",
     "Noise",
+    "StageFile",
     "StageName",
     "Td",
     "Ti",
@@ -40,6 +42,7 @@ __all__ = [
     "drive_notes",
     "driven_by_voltage",
     "refuse_of_other_stage",
+    "simulated",
     "small_margins",
     "unit_of",
 ]
@@ -54,6 +57,14 @@ PAPER_DT, PAPER_LIMITS = 0.02, (0.0, 75.0)
 PAPER_KQ, PAPER_TQ = 1.0, 0.2
 PAPER_GAINS = {"kp": 0.120, "ti": 0.009, "td": 0.044}
 
+StageFile = Annotated[
+    str | None,
+    typer.Option(
+        metavar=f"FILE|{PAPER}",
+        help=f"Stage to simulate: another model file, or {PAPER}. Default the model itself.",
+        show_default=False,
+    ),
+]
 StageName = Annotated[
     str | None,
     typer.Option(
@@ -264,6 +275,26 @@ def drive_notes(model: IdentifiedModel, run: Tracking) -> list[str]:
         rate = model.beyond_fit(run.feedforward, run.controller.dt)
         notes += [note for note in rate if note not in notes and " moves at " in note]
     return notes
+
+
+def simulated(
+    stage: str | None, known: IdentifiedModel, noise: float, bandwidth: float, seed: int
+) -> VirtualStage:
+    """Make the stage of `StageFile`, with the noise [m] of a sensor and a bandwidth [Hz]."""
+    from pathlib import Path
+
+    from ..identification.identified import load
+    from ..stages.virtual import VirtualStage
+
+    if stage == PAPER:
+        return VirtualStage.xu_li_2010(seed=seed)
+    other = known if stage is None else load(Path(stage))
+    if other.drive_unit != known.drive_unit:
+        one, two = (shown_unit(model.drive_unit)[0] for model in (other, known))
+        raise ParameterError(
+            f"--stage is {stage}, whose drive is in {one}: expected one in {two}, as of the model"
+        )
+    return VirtualStage.of(other, noise=noise, bandwidth=bandwidth, seed=seed)
 
 
 def check_stage(stage: str | None) -> None:

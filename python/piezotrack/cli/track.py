@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from ..identification.identified import IdentifiedModel
     from ..references.reference import Reference
 
-__all__ = ["feedforward_command", "parsed_reference", "track_command"]
+__all__ = ["BeyondReach", "feedforward_command", "parsed_reference", "track_command"]
 
 Online = Annotated[
     bool,

@@ -16,6 +16,8 @@ from .hysteresis_observer import HysteresisObserver
 from .scheduled_pid import ScheduledPid
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from .tracking import Tracking
 
 __all__ = [
@@ -26,6 +28,7 @@ __all__ = [
     "PerturbationEstimator",
     "SlidingMode",
     "chatter",
+    "chatter_of",
 ]
 
 
@@ -306,6 +309,11 @@ class Chatter:
     rms_change: float
     fast_share: float
 
+    @property
+    def fast_change(self) -> float:
+        """Rms of the changes above a quarter of the sampling rate [V]."""
+        return self.rms_change * math.sqrt(self.fast_share)
+
 
 def chatter(run: Tracking, *, after: float = 0.0) -> Chatter:
     """Measure how much the voltage of a run chatters.
@@ -342,6 +350,22 @@ def chatter(run: Tracking, *, after: float = 0.0) -> Chatter:
         raise ParameterError(
             f"after is {after:g} s, which leaves {volts.size} samples: expected 16 or more"
         )
+    return chatter_of(volts)
+
+
+def chatter_of(volts: NDArray[np.float64]) -> Chatter:
+    """Measure how much a voltage chatters.
+
+    Parameters
+    ----------
+    volts : ndarray, shape (n,)
+        The voltage at the samples [V], two or more.
+
+    Returns
+    -------
+    Chatter
+        Rms of the change of the voltage in a sample, and its share at high frequencies.
+    """
     changes = np.diff(volts)
     power = np.abs(np.fft.rfft(changes)) ** 2
     total = float(power.sum())

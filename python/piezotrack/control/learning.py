@@ -21,7 +21,7 @@ from .tracking import collected
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Learning", "learn"]
+__all__ = ["Learning", "heading", "learn", "trial_line"]
 
 # Instants kept in each sampling interval of a trial.
 SUBSTEPS = 4
@@ -47,6 +47,22 @@ WHY = {
     "grows": "the error grows",
     "trials": "all trials were made",
 }
+
+
+def heading(learner: IterativeLearning) -> str:
+    """Write what is known before the first trial, and the titles of the table of trials."""
+    kind = {"frequency": "settled period", "lifted": "whole motion from rest"}
+    return (
+        f"{learner.reference!r}, {kind[learner.method]}, cutoff {learner.cutoff:.4g} Hz\n"
+        f"{learner.convergence}\n{'trial':>5}  {'rms nm':>9}  {'max nm':>9}  {'noise nm':>9}"
+    )
+
+
+def trial_line(place: int, trial: LearningTrial) -> str:
+    """Write a line of the table of trials."""
+    noise = "" if trial.noise is None else f"{1e9 * trial.noise:.4g}"
+    rms, most = 1e9 * trial.rms_error, 1e9 * trial.max_error
+    return f"{place:>5}  {rms:>9.4g}  {most:>9.4g}  {noise:>9}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -108,21 +124,22 @@ class Learning:
         str
             Several lines.
         """
-        kind = {"frequency": "settled period", "lifted": "whole motion from rest"}
-        lines = [
-            f"{self.learner.reference!r}, {kind[self.learner.method]}, cutoff "
-            f"{self.learner.cutoff:.4g} Hz",
-            str(self.convergence),
-            f"{'trial':>5}  {'rms nm':>9}  {'max nm':>9}  {'noise nm':>9}",
-        ]
+        lines = [heading(self.learner)]
         for i, one in enumerate(self.trials):
-            noise = "" if one.noise is None else f"{1e9 * one.noise:.4g}"
-            rms, most = 1e9 * one.rms_error, 1e9 * one.max_error
-            mark = " *" if i == self.best else ""
-            lines.append(f"{i:>5}  {rms:>9.4g}  {most:>9.4g}  {noise:>9}{mark}")
-        if (clipped := self.trials[self.best].clipped) > 0.0:
-            lines.append(f"the table is at a limit in {100.0 * clipped:.1f} % of its samples")
-        return "\n".join([*lines, f"ended: {WHY[self.stopped]}"])
+            lines.append(trial_line(i, one) + (" *" if i == self.best else ""))
+        return "\n".join([*lines, *self.outcome()])
+
+    def outcome(self) -> list[str]:
+        """Say why it ended, and whether the table is at a limit.
+
+        Returns
+        -------
+        list of str
+            Lines.
+        """
+        clipped = self.trials[self.best].clipped
+        limited = f"the table is at a limit in {100.0 * clipped:.1f} % of its samples"
+        return [*([limited] if clipped > 0.0 else []), f"ended: {WHY[self.stopped]}"]
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the best table as a CSV file: time, desired displacement, voltage.
@@ -259,6 +276,7 @@ def learn(
     noise: float | None = None,
     visited: float | Sequence[float] = (),
     beyond_reach: bool = False,
+    progress: Callable[[IterativeLearning], None] | None = None,
 ) -> Learning:
     r"""Learn the voltage with which a stage follows a reference, from trial to trial.
 
@@ -290,6 +308,8 @@ def learn(
         As there.
     visited, beyond_reach : optional
         As of `track`.
+    progress : callable, optional
+        Called with the learner before the first trial and after each.
 
     Returns
     -------
@@ -345,18 +365,24 @@ def learn(
         repeats=_counted("repeats", repeats, 1000),
         before=voltages_before(plant, visited, controller.limits),
     )
-    return _learnt(runs, most)
+    return _learnt(runs, most, progress or _unseen)
 
 
-def _learnt(runs: _Trials, most: int) -> Learning:
+def _unseen(_: IterativeLearning) -> None:
+    """Show nothing."""
+
+
+def _learnt(runs: _Trials, most: int, progress: Callable[[IterativeLearning], None]) -> Learning:
     """Play and learn until it ends."""
     learner, first, final = runs.learner, None, None
+    progress(learner)
     while True:
         trial = len(learner.trials)
         made = [runs.run(learner.table, trial)]
         if learner.method == "lifted":
             made += [runs.run(learner.table, trial, i) for i in range(1, runs.repeats)]
         learner.update(np.concatenate([runs.record(one) for one in made]))
+        progress(learner)
         first = first or made[0]
         if learner.best == trial:
             final = made[0]

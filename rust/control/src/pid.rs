@@ -145,7 +145,8 @@ pub struct PidState {
     /// The output, V.
     volts: f64,
     /// The last two errors, m. `None` before the first error, which then stands for the earlier
-    /// ones too, so that the controller starts without a derivative kick.
+    /// ones too, so that the controller starts without a derivative kick. Without an integral part
+    /// nothing would ever make up for what it asks for: from 0 V, that is the first output then.
     errors: Option<[f64; 2]>,
 }
 
@@ -193,6 +194,9 @@ impl Feedback for SampledPid {
     fn step(&self, state: &mut PidState, sample: &FeedbackSample) -> f64 {
         let FeedbackSample { error, excess, .. } = *sample;
         let [e1, e2] = state.errors.unwrap_or([error; 2]);
+        if state.errors.is_none() && self.integral == 0.0 && state.volts == 0.0 {
+            state.volts = self.proportional * error;
+        }
         let rise = error - e1;
         let bend = rise - (e1 - e2);
         let change = self.proportional * rise

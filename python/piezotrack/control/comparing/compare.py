@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 from ... import _core
@@ -14,7 +16,8 @@ from ...identification.identified import IdentifiedModel
 from ...references.reference import Reference
 from ...stages.base import Stage
 from ..controller import number_pair
-from ..plant import plant_of, stepped, voltages_before
+from ..laws import chatter_of
+from ..plant import plant_of, run_closed_loop, stepped, voltages_before
 from ..tracking import can_be_learnt, feedforward_of, first_counted
 from ..tuning.margins import Margins, Spread, plants_of
 from .comparison import Cell, ControllerComparison, Row
@@ -24,14 +27,23 @@ from .variants import Variant, usual_references, variants
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ...data.dataset import Dataset
+    from ...stages.virtual import VirtualStage
     from ..controller import Controller
     from ..plant import Plant
+
+    Array = NDArray[np.float64]
 
 __all__ = ["compare_controllers"]
 
 # Samples over which the time of a step is measured.
 TIMED = 20_000
+# Seeds of the draws that controllers are judged by, after that of the sensor: beyond those of the
+# tuning and of the trials of learning.
+OTHER_DRAWS = 1000
 
 
 def compare_controllers(
@@ -48,13 +60,15 @@ def compare_controllers(
     margins: Margins | None = None,
     spread: Spread | None = None,
     delay: float = 0.0,
+    seeds: int = 3,
     **options: Any,
 ) -> ControllerComparison:
     """Compare controllers on one stage.
 
     Every controller is tuned by `tune` under the same margins for the same references, and then
     judged by its true error on the stage, on stages with 1.3 and 0.7 times the gain and with 10 %
-    slower dynamics, and with 1 ms more delay.
+    slower dynamics, and with 1 ms more delay, by draws of the sensor's noise other than those that
+    it was tuned with.
 
     Parameters
     ----------
@@ -80,6 +94,8 @@ def compare_controllers(
         To train the network with.
     margins, spread, delay : optional
         As of `tune`.
+    seeds : int, optional
+        Draws of the sensor's noise that each controller is judged by; it is tuned with one.
     **options
         Further arguments of `tune`, as `particles`.
 
@@ -126,10 +142,11 @@ def compare_controllers(
         delay=not_negative("delay", delay, "s"),
         options=options,
     )
+    draws = _counted(seeds)
     rows, refused = [], {}
     for name in _names(controllers, task):
         try:
-            rows.append(_row(name, CONTENDERS[name](task), task))
+            rows.append(_row(name, CONTENDERS[name](task), task, draws))
         except PiezotrackError as error:
             refused[name] = str(error)
     if not rows:
@@ -142,7 +159,14 @@ def compare_controllers(
         refused=refused,
         dt=task.dt,
         margins=task.margins,
+        seeds=draws,
     )
+
+
+def _counted(seeds: int) -> int:
+    if not 1 <= _core.as_count("seeds", seeds) <= 100:
+        raise ParameterError(f"seeds is {seeds}: expected 1 to 100")
+    return seeds
 
 
 def _references(given: Sequence[Reference] | None) -> list[Reference]:
@@ -177,11 +201,12 @@ def _names(controllers: Sequence[str] | None, task: Task) -> list[str]:
     return [name for name in CONTENDERS if name not in missing]
 
 
-def _row(name: str, entries: list[Entry | None], task: Task) -> Row:
+def _row(name: str, entries: list[Entry | None], task: Task, draws: int) -> Row:
     """Judge a controller by all references, on all variants of the stage."""
-    cells = []
-    for variant in variants(task.stage):
-        cells.append(tuple(_cell(entry, variant, task) for entry in entries))
+    cells = [
+        tuple(_cell(entry, variant, task, draws, chatters=i == 0) for entry in entries)
+        for i, variant in enumerate(variants(task.stage))
+    ]
     first = next(entry for entry in entries if entry is not None)
     sensitivity, margin = _robustness(first.controller, task)
     return Row(
@@ -194,31 +219,57 @@ def _row(name: str, entries: list[Entry | None], task: Task) -> Row:
     )
 
 
-def _cell(entry: Entry | None, variant: Variant, task: Task) -> Cell | None:
+def _cell(
+    entry: Entry | None, variant: Variant, task: Task, draws: int, *, chatters: bool
+) -> Cell | None:
     """Simulate a controller along a reference: its true errors once it has settled."""
     if entry is None:
         return None
-    controller, reference = entry.controller, entry.reference
-    samples = reference.sample(controller.dt)
+    samples = entry.reference.sample(entry.controller.dt)
     voltage = entry.voltage
     if voltage is None:
-        voltage = feedforward_of(controller, reference, samples).voltage
-    stage = stepped(variant.stage, controller)
+        voltage = feedforward_of(entry.controller, entry.reference, samples).voltage
     # The same samples for all of them, whether they learn or not.
-    learns = can_be_learnt(reference)
-    motion = _core.Task(
-        stage=stage._core,
-        visited=voltages_before(stage, (), controller.limits),
-        dt=controller.dt,
-        delay=task.delay + variant.delay,
+    first = first_counted(entry.reference, samples, learns=can_be_learnt(entry.reference))
+    stages = [_drawn(variant.stage, k) for k in range(draws)]
+    found = [
+        _figures(entry, one, task.delay + variant.delay, (samples.x, voltage), first)
+        for one in stages
+    ]
+    rms, largest, effort, _, clipped = zip(*found, strict=True)
+    chatter = None
+    if chatters and all(map(math.isfinite, rms)):
+        sampling = (task.delay + variant.delay, 0.0, 1)
+        visited = voltages_before(stages[0], (), entry.controller.limits)
+        run = run_closed_loop(stages[0], entry.controller, samples.x, voltage, sampling, visited)
+        chatter = chatter_of(run.part("volts")[first:]).fast_change
+    return Cell(rms, max(largest), fmean(effort), fmean(clipped), chatter)
+
+
+def _drawn(stage: VirtualStage, k: int) -> VirtualStage:
+    """Give the sensor a draw of its noise that no controller was tuned with."""
+    sensor = stage.sensor
+    return replace(stage, sensor=replace(sensor, seed=(sensor.seed + OTHER_DRAWS + k) % 2**63))
+
+
+def _figures(
+    entry: Entry, stage: VirtualStage, delay: float, motion: tuple[Array, Array], first: int
+) -> tuple[float, ...]:
+    """Rms and largest error [m], effort [V], slew [V/s] and clipped share of a loop."""
+    reference, feedforward = motion
+    plant = stepped(stage, entry.controller)
+    task = _core.Task(
+        stage=plant._core,
+        visited=voltages_before(plant, (), entry.controller.limits),
+        dt=entry.controller.dt,
+        delay=delay,
         jitter=0.0,
-        reference=samples.x,
-        feedforward=voltage,
-        first=first_counted(reference, samples, learns=learns),
+        reference=reference,
+        feedforward=feedforward,
+        first=first,
         measured=False,
     )
-    rms, largest, effort, _, clipped = motion.figures([controller._core], 1)[0]
-    return Cell(rms, largest, effort, clipped)
+    return task.figures([entry.controller._core], 1)[0]
 
 
 def _robustness(controller: Controller, task: Task) -> tuple[float | None, float | None]:

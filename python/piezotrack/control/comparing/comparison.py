@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from statistics import fmean, median, stdev
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from .comparison_table import comparison_html, comparison_text
+
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from matplotlib.figure import Figure, SubFigure
 
@@ -16,24 +19,43 @@ if TYPE_CHECKING:
 
 __all__ = ["Cell", "ControllerComparison", "Row"]
 
+# Numbers of a cell in a file.
+NUMBERS = ("rms", "spread", "largest", "effort", "clipped", "chatter")
+
 
 class Cell(NamedTuple):
     """A controller along one reference, once it has settled.
 
     Attributes
     ----------
-    rms, largest : float
-        True error [m]; infinite where the loop diverged.
+    draws : tuple of float
+        True rms error with each draw of the sensor's noise [m]; infinite where the loop diverged.
+    largest : float
+        Largest true error with any of them [m].
     effort : float
         Change of the command from sample to sample, rms [V].
     clipped : float
         Share of the samples at which the command was clipped.
+    chatter : float or None
+        The part of these changes above a quarter of the sampling rate, rms [V], with the first
+        draw; on the stage that the controllers were tuned for only.
     """
 
-    rms: float
+    draws: tuple[float, ...]
     largest: float
     effort: float
     clipped: float
+    chatter: float | None
+
+    @property
+    def rms(self) -> float:
+        """True rms error, mean over the draws [m]."""
+        return fmean(self.draws)
+
+    @property
+    def spread(self) -> float:
+        """Sample standard deviation of the draws [m]; NaN of one, or where the loop diverged."""
+        return _deviation(self.draws)
 
 
 class Row(NamedTuple):
@@ -62,7 +84,7 @@ class Row(NamedTuple):
     step_time: float
 
     def rms(self, variant: int = 0) -> float:
-        """Rms error over the references that it follows.
+        """Rms error over the references that it follows, mean over the draws of the noise.
 
         Parameters
         ----------
@@ -74,8 +96,48 @@ class Row(NamedTuple):
         float
             Root of the mean square over the references [m]; NaN where it follows none.
         """
-        found = [one.rms for one in self.cells[variant] if one is not None]
-        return math.sqrt(sum(one**2 for one in found) / len(found)) if found else math.nan
+        found = self._draws(variant)
+        return fmean(found) if found else math.nan
+
+    def spread(self, variant: int = 0) -> float:
+        """Sample standard deviation of that error over the draws of the noise.
+
+        Parameters
+        ----------
+        variant : int, optional
+            Which stage, a place in `ControllerComparison.variants`.
+
+        Returns
+        -------
+        float
+            Standard deviation [m]; NaN of one draw, or where the loop diverged.
+        """
+        return _deviation(self._draws(variant))
+
+    @property
+    def effort(self) -> float:
+        """Largest effort along any reference, on the stage that it was tuned for [V]."""
+        return max(one.effort for one in self._followed())
+
+    @property
+    def chatter(self) -> float | None:
+        """Median of the chatter over the references, so that jumps of one do not decide [V]."""
+        found = [one.chatter for one in self._followed() if one.chatter is not None]
+        return median(found) if found else None
+
+    def _followed(self) -> list[Cell]:
+        return [one for one in self.cells[0] if one is not None]
+
+    def _draws(self, variant: int) -> list[float]:
+        """Root of the mean square over the references, for each draw."""
+        found = [one.draws for one in self.cells[variant] if one is not None]
+        return [math.sqrt(fmean(one**2 for one in draws)) for draws in zip(*found, strict=True)]
+
+
+def _deviation(draws: Sequence[float]) -> float:
+    if len(draws) < 2 or not all(map(math.isfinite, draws)):
+        return math.nan
+    return stdev(draws)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -94,6 +156,8 @@ class ControllerComparison:
         Sampling interval [s].
     margins : Margins
         What every feedback keeps.
+    seeds : int
+        Draws of the sensor's noise that each controller was judged by.
     """
 
     rows: tuple[Row, ...]
@@ -102,32 +166,16 @@ class ControllerComparison:
     refused: Mapping[str, str]
     dt: float
     margins: Margins
+    seeds: int
 
     def __repr__(self) -> str:
         return f"<ControllerComparison of {len(self.rows)} controllers>"
 
     def __str__(self) -> str:
-        width = max(len(row.name) for row in self.rows)
-        head = "".join(f"{_short(name):>13}" for name in self.references)
-        lines = [
-            f"true rms error in nm at {1.0 / self.dt:.6g} Hz",
-            f"{'':{width}}{head}{'effort mV':>11}{'Ms':>6}{'gain m.':>8}{'step ns':>9}",
-        ]
-        for row in self.rows:
-            cells = "".join(f"{_nanometres(one):>13}" for one in row.cells[0])
-            efforts = [one.effort for one in row.cells[0] if one is not None]
-            effort = 1e3 * max(efforts)
-            lines.append(
-                f"{row.name:{width}}{cells}{effort:>11.3g}{_number(row.sensitivity):>6}"
-                f"{_number(row.gain_margin):>8}{1e9 * row.step_time:>9.0f}"
-            )
-        lines += ["", "over all references, nm rms", f"{'':{width}}"]
-        lines[-1] += "".join(f"{name:>22}" for name in self.variants)
-        for row in self.rows:
-            found = "".join(f"{_finite(row.rms(i)):>22}" for i in range(len(self.variants)))
-            lines.append(f"{row.name:{width}}{found}")
-        lines += [f"not made: {name}: {why}" for name, why in self.refused.items()]
-        return "\n".join(lines)
+        return comparison_text(self)
+
+    def _repr_html_(self) -> str:
+        return comparison_html(self)
 
     def document(self) -> dict[str, Any]:
         """Content of a JSON file, SI.
@@ -143,7 +191,8 @@ class ControllerComparison:
             "dt": {"value": self.dt, "unit": "s"},
             "references": list(self.references),
             "variants": list(self.variants),
-            "unit": "errors in m, effort in V, times in s; null where a loop diverged",
+            "seeds": self.seeds,
+            "unit": "errors in m, effort and chatter in V, times in s; null where a loop diverged",
             "controllers": [
                 {
                     "name": row.name,
@@ -151,12 +200,7 @@ class ControllerComparison:
                     "gain_margin": _finite_or_none(row.gain_margin),
                     "step_time": row.step_time,
                     "figures": [
-                        [
-                            None
-                            if one is None
-                            else {name: _finite_or_none(v) for name, v in one._asdict().items()}
-                            for one in variant
-                        ]
+                        [None if one is None else _figures_of(one) for one in variant]
                         for variant in row.cells
                     ],
                 }
@@ -183,20 +227,10 @@ class ControllerComparison:
         return plot_controllers(self, fig)
 
 
-def _short(name: str) -> str:
-    return name if len(name) <= 12 else name[:11] + "."
-
-
-def _nanometres(one: Cell | None) -> str:
-    return "-" if one is None else _finite(one.rms)
-
-
-def _finite(value: float) -> str:
-    return f"{1e9 * value:.4g}" if math.isfinite(value) else "unstable"
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2f}" if math.isfinite(value) else "inf"
+def _figures_of(cell: Cell) -> dict[str, Any]:
+    values = {"rms": cell.rms, "spread": cell.spread, **cell._asdict()}
+    found: dict[str, Any] = {name: _finite_or_none(values[name]) for name in NUMBERS}
+    return {**found, "draws": [_finite_or_none(one) for one in cell.draws]}
 
 
 def _finite_or_none(value: float | None) -> float | None:

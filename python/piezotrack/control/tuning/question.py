@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, NamedTuple
 
 from ... import _core
@@ -31,6 +31,7 @@ class Question(NamedTuple):
 
     stages: list[Plant | IdentifiedModel]
     references: list[Reference]
+    intervals: list[float]
     limits: tuple[float, float]
     drive_unit: str
     feedforward: Inverse | None
@@ -55,6 +56,7 @@ class Question(NamedTuple):
 
 
 def asked(
+    *,
     stage: Any,
     reference: Any,
     dt: Any,
@@ -79,49 +81,30 @@ def asked(
     seed: int,
     threads: int,
 ) -> tuple[Question, list[float]]:
-    """Check all arguments."""
-    stages = list(stage) if isinstance(stage, Sequence) else [stage]
-    if not stages:
-        raise ParameterError("stage is empty: expected a stage or more")
-    first = plant_of(stages[0])
-    for one in stages:
-        plant_of(one)
-    references = [] if reference is None else reference
-    references = list(references) if isinstance(references, Sequence) else [references]
-    for one in references:
-        if not isinstance(one, Reference):
-            raise ParameterError(f"reference is {type(one).__name__}: expected pt.Reference")
-    if law not in LAWS:
-        raise ParameterError(f"law is {quoted(law)}: expected {', '.join(map(repr, LAWS))}")
-    if not references and law in ("pd", "lead-lag"):
-        raise ParameterError(
-            f"law is {law!r} without a reference: expected one with an integral part, whose gain "
-            "is made large then"
-        )
+    """Check all arguments of `tune`: the question, and the sampling intervals [s]."""
+    stages = _stages(stage)
+    references = _references(reference)
+    _check_word("law", law, LAWS)
+    _check_has_integral_part(law, references)
     _check_kind("margins", margins, Margins)
     _check_kind("spread", spread, Spread)
-    if figure not in FIGURES:
-        raise ParameterError(f"figure is {quoted(figure)}: expected 'rms' or 'largest'")
-    if error not in ("measured", "true"):
-        raise ParameterError(f"error is {quoted(error)}: expected 'measured' or 'true'")
+    _check_word("figure", figure, tuple(FIGURES))
+    _check_word("error", error, ("measured", "true"))
     model = stages[0] if isinstance(stages[0], IdentifiedModel) else None
     intervals = _intervals(dt, model)
-    if limits is None:
-        limits = model.drive_range if model is not None else None
-        if limits is None:
-            raise ParameterError("limits are missing: expected (low, high) in V")
     unit = model.drive_unit if model is not None else "V"
-    limits = number_pair("limits", limits, unit)
-    if not 1 <= _core.as_count("seeds", seeds) <= 100:
-        raise ParameterError(f"seeds is {seeds}: expected 1 to 100")
-    if not _core.as_number("slew", slew) > 0.0:
-        raise ParameterError(f"slew is {slew} V/s: expected above 0")
+    limits = _limits(limits, model, unit)
+    inverse = _inverse_of(stages[0], feedforward)
+    _check_feedforward(law, inverse)
     question = Question(
         stages=stages,
         references=references,
+        intervals=intervals,
         limits=limits,
         drive_unit=unit,
-        feedforward=_inverse_of(stages[0], feedforward),
+        seeds=_seeds(seeds),
+        slew=_slew(slew),
+        feedforward=inverse,
         parts=parts_named(parts),
         filters=_filters(filters),
         law=law,
@@ -129,19 +112,80 @@ def asked(
         spread=spread or Spread(),
         figure=figure,
         effort=not_negative("effort", effort, "m/V"),
-        slew=slew,
         clipped=_core.as_number("clipped", clipped),
         delay=not_negative("delay", delay, "s"),
         jitter=not_negative("jitter", jitter, "s"),
-        visited=voltages_before(first, visited, limits),
+        visited=voltages_before(plant_of(stages[0]), visited, limits),
         measured=error == "measured",
-        seeds=seeds,
         particles=_core.as_count("particles", particles),
         iterations=_core.as_count("iterations", iterations),
         seed=_core.as_count("seed", seed),
         threads=_core.as_count("threads", threads),
     )
     return question, intervals
+
+
+def _stages(stage: Any) -> list[Plant | IdentifiedModel]:
+    stages = list(stage) if isinstance(stage, Sequence) else [stage]
+    if not stages:
+        raise ParameterError("stage is empty: expected a stage or more")
+    for one in stages:
+        plant_of(one)
+    return stages
+
+
+def _references(reference: Any) -> list[Reference]:
+    given = [] if reference is None else reference
+    references = list(given) if isinstance(given, Sequence) else [given]
+    for one in references:
+        if not isinstance(one, Reference):
+            raise ParameterError(f"reference is {type(one).__name__}: expected pt.Reference")
+    return references
+
+
+def _check_word(name: str, value: Any, known: Collection[str]) -> None:
+    if value not in known:
+        between = ", " if len(known) > 2 else " or "
+        raise ParameterError(
+            f"{name} is {quoted(value)}: expected {between.join(map(repr, known))}"
+        )
+
+
+def _check_has_integral_part(law: str, references: list[Reference]) -> None:
+    if not references and law in ("pd", "lead-lag"):
+        raise ParameterError(
+            f"law is {law!r} without a reference: expected one with an integral part, whose gain "
+            "is made large then"
+        )
+
+
+def _check_feedforward(law: str, feedforward: Inverse | None) -> None:
+    if law == "pd" and feedforward is None:
+        raise ParameterError(
+            "law is 'pd' without feedforward: expected feedforward=, for nothing else brings the "
+            "stage to where it is to be, or a law with an integral part"
+        )
+
+
+def _limits(limits: Any, model: IdentifiedModel | None, unit: str) -> tuple[float, float]:
+    known = limits
+    if known is None and model is not None:
+        known = model.drive_range
+    if known is None:
+        raise ParameterError("limits are missing: expected (low, high) in V")
+    return number_pair("limits", known, unit)
+
+
+def _seeds(seeds: int) -> int:
+    if not 1 <= _core.as_count("seeds", seeds) <= 100:
+        raise ParameterError(f"seeds is {seeds}: expected 1 to 100")
+    return seeds
+
+
+def _slew(slew: float) -> float:
+    if not _core.as_number("slew", slew) > 0.0:
+        raise ParameterError(f"slew is {slew} V/s: expected above 0")
+    return slew
 
 
 def _filters(filters: Any) -> tuple[LowPass | Notch, ...]:

@@ -155,10 +155,30 @@ def tune(
     ('sensitivity', True)
     """
     question, intervals = asked(
-        stage, reference, dt, limits, feedforward, parts, filters, law, margins, spread, figure,
-        effort, slew, clipped, delay, jitter, visited, error, seeds, particles, iterations,
-        seed, threads,
-    )  # fmt: skip
+        stage=stage,
+        reference=reference,
+        dt=dt,
+        limits=limits,
+        feedforward=feedforward,
+        parts=parts,
+        filters=filters,
+        law=law,
+        margins=margins,
+        spread=spread,
+        figure=figure,
+        effort=effort,
+        slew=slew,
+        clipped=clipped,
+        delay=delay,
+        jitter=jitter,
+        visited=visited,
+        error=error,
+        seeds=seeds,
+        particles=particles,
+        iterations=iterations,
+        seed=seed,
+        threads=threads,
+    )
     answers = [_searched(question, one) for one in intervals]
     best = min(answers, key=lambda one: (max(1.0, one.found["excess"]), one.found["cost"]))
     if best.found["excess"] > 1.0 + 1e-9:

@@ -1,0 +1,211 @@
+"""``piezotrack learn``: a voltage table, learnt between trials on a simulated stage."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from ..errors import ParameterError
+from .error_messages import in_words
+from .loop_options import (
+    PAPER,
+    AmplifierBandwidth,
+    Feedback,
+    Feedforward,
+    Interval,
+    Kp,
+    Limits,
+    Loop,
+    LoopDelay,
+    Noise,
+    StageFile,
+    Td,
+    Ti,
+    driven_by_voltage,
+    refuse_of_other_stage,
+    simulated,
+    unit_of,
+)
+from .options import (
+    Duration,
+    Json,
+    ModelFile,
+    Overwrite,
+    Period,
+    Quiet,
+    number,
+    refuse_without_effect,
+)
+from .output import Output
+from .track import BeyondReach, parsed_reference
+
+if TYPE_CHECKING:
+    from ..control.iterative_learning import IterativeLearning
+    from ..control.learning import Learning
+
+__all__ = ["learn_command"]
+
+
+@in_words
+def learn_command(
+    context: typer.Context,
+    model: ModelFile,
+    reference: Annotated[
+        str,
+        typer.Option(
+            metavar="TEXT|FILE",
+            help="Reference, as of `track`; one that repeats, or any with --method lifted.",
+        ),
+    ],
+    stage: StageFile = None,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="TABLE.csv", help="File for the table.")
+    ] = Path("learnt.csv"),
+    picture: Annotated[
+        bool, typer.Option("--picture", help="Write a picture beside the table, PNG and SVG.")
+    ] = False,
+    overwrite: Overwrite = False,
+    dt: Interval = None,
+    limits: Limits = None,
+    feedforward: Feedforward = True,
+    feedback: Feedback = None,
+    kp: Kp = None,
+    ti: Ti = None,
+    td: Td = None,
+    trials: Annotated[int, typer.Option(help="Trials at most, the first included.")] = 30,
+    method: Annotated[
+        Literal["frequency", "lifted"],
+        typer.Option(help="Learn a settled period, or the whole reference from rest."),
+    ] = "frequency",
+    gain: Annotated[float, typer.Option(help="Learning gain, above 0 and below 2.")] = 0.7,
+    cutoff: Annotated[
+        float | None,
+        typer.Option(
+            help="Frequency in Hz up to which is learnt; default the highest that converges.",
+            show_default=False,
+        ),
+    ] = None,
+    mode_scales: Annotated[
+        str,
+        typer.Option(
+            metavar="A,B,...",
+            help="Factors on the frequencies of the model's modes with which learning converges.",
+        ),
+    ] = "0.9,1,1.1",
+    delay: LoopDelay = 0.0,
+    noise_nm: Noise = 0.0,
+    bandwidth: AmplifierBandwidth = math.inf,
+    duration: Duration = None,
+    period: Period = None,
+    seed: Annotated[int, typer.Option(help="Random seed of the sensor noise.")] = 1,
+    beyond_reach: BeyondReach = False,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Learn the voltage of a repeated motion."""
+    from .._support.files import make_folder, picture_files, save_figures, together
+    from ..control.controller import Controller
+    from ..control.learning import learn
+    from ..identification.identified import load
+
+    own = stage != PAPER
+    settings = Loop(own, dt, limits, feedback, kp, ti, td)
+    settings.check(context)
+    refuse_of_other_stage(context, own)
+    if own and not noise_nm:
+        refuse_without_effect(context, ["seed"], "without --noise-nm")
+    _check_file(out)
+    known = load(model) if own else driven_by_voltage(load(model), model)
+    desired = parsed_reference(reference, duration, period)
+    loop = Controller(
+        dt=settings.dt(known, desired),
+        limits=settings.volts(known),
+        feedforward=known.inverse() if feedforward else None,
+        feedback=settings.pid(known),
+        drive_unit=unit_of(own, known),
+    )
+    result = Output(out.parent, overwrite=overwrite, json=json, quiet=quiet)
+    result.will_write([out.name, *(picture_files(out.stem) if picture else [])])
+    found = learn(
+        simulated(stage, known, 1e-9 * noise_nm, bandwidth, seed),
+        desired,
+        loop,
+        model=known,
+        trials=trials,
+        method=method,
+        delay=delay,
+        gain=gain,
+        cutoff=cutoff,
+        mode_scales=[number("--mode-scales", one) for one in mode_scales.split(",")],
+        beyond_reach=beyond_reach,
+        progress=None if json or quiet else _show,
+    )
+    with together(make_folder(out.parent)) as folder:
+        written = [found.save(folder / out.name)]
+        if picture:
+            written += save_figures({out.stem: found.plot()}, folder)
+    result.show(_outcome(found), _document(found), written)
+
+
+def _check_file(out: Path) -> None:
+    if out.suffix.lower() != ".csv":
+        raise ParameterError(f"--out is {out}: expected the name of a file, as table.csv")
+    if out.is_dir():
+        raise ParameterError(f"--out is {out}, a folder: expected the name of a file in it")
+
+
+def _show(learner: IterativeLearning) -> None:
+    """Print the convergence before the first trial, and the errors of each."""
+    from ..control.learning import heading, trial_line
+
+    made = len(learner.trials)
+    line = trial_line(made - 1, learner.trials[-1]) if made else heading(learner)
+    print(line, flush=True)
+
+
+def _outcome(found: Learning) -> str:
+    before, after = found.errors[0], found.errors[found.best]
+    best = f"best: trial {found.best}, {1e9 * after:.4g} nm rms after {1e9 * before:.4g} nm"
+    return "\n".join([*found.outcome(), best])
+
+
+def _document(found: Learning) -> dict[str, Any]:
+    """Content of the JSON document: how it converges, the errors, why it ended."""
+    from .. import __version__
+
+    learner, convergence = found.learner, found.convergence
+    return {
+        "format": "piezotrack-learning",
+        "schema_version": 1,
+        "reference": repr(learner.reference),
+        "dt": {"value": learner.controller.dt, "unit": "s"},
+        "limits": {
+            "value": list(learner.controller.limits),
+            "unit": learner.controller.drive_unit,
+        },
+        "method": learner.method,
+        "cutoff": {"value": learner.cutoff, "unit": "Hz"},
+        "convergence": {
+            "factor": convergence.factor,
+            "models": [
+                {"model": name, "factor": factor, "frequency": frequency}
+                for name, factor, frequency in convergence.cases
+            ],
+        },
+        "unit": "errors in m, frequencies in Hz",
+        "trials": [
+            {
+                "rms_error": one.rms_error,
+                "max_error": one.max_error,
+                "noise": one.noise,
+                "clipped": one.clipped,
+            }
+            for one in found.trials
+        ],
+        "best": found.best,
+        "stopped": found.stopped,
+        "provenance": {"package": "piezotrack", "version": __version__},
+    }
