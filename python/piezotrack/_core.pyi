@@ -13,9 +13,11 @@ __all__ = [
     "LeastSquaresFit",
     "LoopPlant",
     "Objective",
+    "PathTask",
     "Response",
     "Search",
     "Session",
+    "SoughtController",
     "Stage",
     "StepResponse",
     "Swarm",
@@ -350,21 +352,45 @@ class Task:
         jitter: float,
         reference: ArrayLike,
         feedforward: ArrayLike,
+        beside: ArrayLike,
         first: int,
         measured: bool,
     ) -> Task: ...
     def figures(self, controllers: Sequence[Controller], threads: int) -> list[_Figures]: ...
 
+@final
+class PathTask:
+    def __new__(
+        cls,
+        x: Task,
+        y: Task,
+        *,
+        lag: float,
+        circle: tuple[float, float, float] | None,
+        path: tuple[ArrayLike, ArrayLike],
+    ) -> PathTask: ...
+    def figures(
+        self, controllers: Sequence[tuple[Controller, Controller]], threads: int
+    ) -> list[_Figures]: ...
+
+@final
+class SoughtController:
+    def __new__(
+        cls,
+        *,
+        controller: Controller,
+        period: float | None,
+        sign: float,
+        law: tuple[str, float, float],
+        sought: list[tuple[str, float, float, bool]],
+        plants: Sequence[LoopPlant],
+    ) -> SoughtController: ...
+
 def tune(
     *,
-    controller: Controller,
-    period: float | None,
-    sign: float,
-    law: tuple[str, float, float],
-    sought: list[tuple[str, float, float, bool]],
-    tasks: Sequence[Task],
-    plants: Sequence[LoopPlant],
-    required: tuple[float, float, float, float, float, float],
+    axes: Sequence[SoughtController],
+    tasks: Sequence[Task | PathTask],
+    required: tuple[float, float, float, float, float, float, float],
     aim: str,
     effort: float,
     particles: int,

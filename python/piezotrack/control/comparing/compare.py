@@ -266,6 +266,7 @@ def _figures(
         jitter=0.0,
         reference=reference,
         feedforward=feedforward,
+        beside=(),
         first=first,
         measured=False,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from typing import Any, NamedTuple
 
@@ -12,8 +13,10 @@ from ..._support.messages import quoted
 from ...errors import ParameterError
 from ...identification.identified import IdentifiedModel
 from ...references.reference import Reference
+from ...references.xy_reference import XYReference
 from ...stages.base import Stage
 from ...stages.inverse import Inverse
+from ...stages.xy import XYStage
 from ..components import LowPass, Notch
 from ..controller import number_pair
 from ..plant import Plant, plant_of, voltages_before
@@ -21,20 +24,50 @@ from .box import parts_named
 from .margins import Margins, Spread
 from .structures import LAWS
 
-__all__ = ["FIGURES", "Question", "asked"]
+__all__ = ["FIGURES", "Axis", "Question", "asked"]
 
-FIGURES = {"rms": "rms error", "largest": "largest error"}
+FIGURES = {
+    "rms": "rms error",
+    "largest": "largest error",
+    "effort": "rms change of the command from sample to sample",
+}
+
+
+class Axis(NamedTuple):
+    """An axis, and what is known of it.
+
+    Attributes
+    ----------
+    name : str
+        ``"x"`` or ``"y"``; empty where there is one.
+    stages : list
+        The stage that is simulated, and others for which the margins hold too.
+    feedforward : Inverse or None
+        Feedforward of its controller.
+    visited : tuple of float
+        Voltages before a run [V].
+    """
+
+    name: str
+    stages: list[Plant | IdentifiedModel]
+    feedforward: Inverse | None
+    visited: tuple[float, ...]
+
+    @property
+    def of(self) -> str:
+        """The axis before a text, or nothing."""
+        return f"{self.name}: " if self.name else ""
 
 
 class Question(NamedTuple):
     """What is common to the searches at all sampling intervals."""
 
-    stages: list[Plant | IdentifiedModel]
-    references: list[Reference]
+    axes: tuple[Axis, ...]
+    stage: XYStage | None
+    references: list[Reference] | list[XYReference]
     intervals: list[float]
     limits: tuple[float, float]
     drive_unit: str
-    feedforward: Inverse | None
     parts: tuple[str, ...] | None
     filters: tuple[LowPass | Notch, ...]
     law: str
@@ -46,8 +79,8 @@ class Question(NamedTuple):
     clipped: float
     delay: float
     jitter: float
-    visited: tuple[float, ...]
     measured: bool
+    allowed: float
     seeds: int
     particles: int
     iterations: int
@@ -75,15 +108,17 @@ def asked(
     jitter: float,
     visited: Any,
     error: Any,
+    allowed: float,
     seeds: int,
     particles: int,
     iterations: int,
     seed: int,
     threads: int,
-) -> tuple[Question, list[float]]:
-    """Check all arguments of `tune`: the question, and the sampling intervals [s]."""
-    stages = _stages(stage)
-    references = _references(reference)
+) -> Question:
+    """Check all arguments of `tune`."""
+    both = stage if isinstance(stage, XYStage) else None
+    stages = [stage.x] if both else _stages(stage)
+    references = _references(reference, XYReference if both else Reference)
     _check_word("law", law, LAWS)
     _check_has_integral_part(law, references)
     _check_kind("margins", margins, Margins)
@@ -94,17 +129,24 @@ def asked(
     intervals = _intervals(dt, model)
     unit = model.drive_unit if model is not None else "V"
     limits = _limits(limits, model, unit)
-    inverse = _inverse_of(stages[0], feedforward)
-    _check_feedforward(law, inverse)
-    question = Question(
-        stages=stages,
+    _check_allowed(figure, _core.as_number("allowed", allowed), references)
+    if both is None:
+        inverse = _inverse_of(stages[0], feedforward)
+        before = voltages_before(plant_of(stages[0]), visited, limits)
+        axes: tuple[Axis, ...] = (Axis("", stages, inverse, before),)
+    else:
+        axes = _axes(both, feedforward, visited, limits)
+    for axis in axes:
+        _check_feedforward(law, axis)
+    return Question(
+        axes=axes,
+        stage=both,
         references=references,
         intervals=intervals,
         limits=limits,
         drive_unit=unit,
         seeds=_seeds(seeds),
         slew=_slew(slew),
-        feedforward=inverse,
         parts=parts_named(parts),
         filters=_filters(filters),
         law=law,
@@ -115,14 +157,39 @@ def asked(
         clipped=_core.as_number("clipped", clipped),
         delay=not_negative("delay", delay, "s"),
         jitter=not_negative("jitter", jitter, "s"),
-        visited=voltages_before(plant_of(stages[0]), visited, limits),
         measured=error == "measured",
+        allowed=allowed,
         particles=_core.as_count("particles", particles),
         iterations=_core.as_count("iterations", iterations),
         seed=_core.as_count("seed", seed),
         threads=_core.as_count("threads", threads),
     )
-    return question, intervals
+
+
+def _axes(
+    stage: XYStage, feedforward: Any, visited: Any, limits: tuple[float, float]
+) -> tuple[Axis, ...]:
+    """Return both axes, each with its own inverse."""
+    pair = isinstance(feedforward, Sequence) and not isinstance(feedforward, str)
+    inverses = list(feedforward) if pair else [feedforward] * 2
+    if len(inverses) != 2:
+        raise ParameterError(
+            f"feedforward has {len(inverses)} entries: expected that of x and of y"
+        )
+    return tuple(
+        Axis(name, [one], _inverse_of(one, inverse), voltages_before(one, visited, limits))
+        for name, one, inverse in zip("xy", (stage.x, stage.y), inverses, strict=True)
+    )
+
+
+def _check_allowed(figure: str, allowed: float, references: Sequence[Any]) -> None:
+    if not allowed > 0.0:
+        raise ParameterError(f"allowed is {allowed:g} m: expected an error above 0")
+    if figure == "effort" and references and allowed == math.inf:
+        raise ParameterError(
+            "figure is 'effort' without allowed: expected allowed=, the largest rms error in m, "
+            "for the least effort is none"
+        )
 
 
 def _stages(stage: Any) -> list[Plant | IdentifiedModel]:
@@ -134,12 +201,17 @@ def _stages(stage: Any) -> list[Plant | IdentifiedModel]:
     return stages
 
 
-def _references(reference: Any) -> list[Reference]:
+def _references(reference: Any, kind: type) -> list[Any]:
     given = [] if reference is None else reference
     references = list(given) if isinstance(given, Sequence) else [given]
     for one in references:
-        if not isinstance(one, Reference):
-            raise ParameterError(f"reference is {type(one).__name__}: expected pt.Reference")
+        if not isinstance(one, kind):
+            raise ParameterError(f"reference is {type(one).__name__}: expected pt.{kind.__name__}")
+    if kind is XYReference and not references:
+        raise ParameterError(
+            "reference is missing: expected a path; gains from margins alone are tuned for one "
+            "axis after the other"
+        )
     return references
 
 
@@ -159,11 +231,11 @@ def _check_has_integral_part(law: str, references: list[Reference]) -> None:
         )
 
 
-def _check_feedforward(law: str, feedforward: Inverse | None) -> None:
-    if law == "pd" and feedforward is None:
+def _check_feedforward(law: str, axis: Axis) -> None:
+    if law == "pd" and axis.feedforward is None:
         raise ParameterError(
-            "law is 'pd' without feedforward: expected feedforward=, for nothing else brings the "
-            "stage to where it is to be, or a law with an integral part"
+            f"{axis.of}law is 'pd' without feedforward: expected feedforward=, for nothing else "
+            "brings the stage to where it is to be, or a law with an integral part"
         )
 
 

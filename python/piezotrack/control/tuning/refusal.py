@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
+
+from .search import searched
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from .question import Question
+    from .search import Answer
 
 __all__ = ["refusal"]
 
@@ -47,9 +51,16 @@ class _Short(NamedTuple):
         )
 
 
-def refusal(question: Question, found: Mapping[str, Any], names: Sequence[str]) -> str:
+def refusal(question: Question, nearest_answer: Answer) -> str:
     """Say which constraint forbids any controller, and how far the nearest one is off."""
+    found, names = nearest_answer.found, nearest_answer.names
     robustness, figures = found["robustness"], found["figures"]
+    if found["excess"] <= 1.0:
+        worst = max(nearest_answer.kept, key=lambda one: one.share)
+        return (
+            f"margins: the search found no gains whose exact margins are as asked for; the nearest "
+            f"have {worst}: expected a milder margin, more particles or more iterations"
+        )
     if _unstable(robustness):
         nearest = _stable(question)
         if nearest is None:
@@ -67,6 +78,12 @@ def refusal(question: Question, found: Mapping[str, Any], names: Sequence[str]) 
         return (
             f"slew is {question.slew:.4g} V/s: expected {fastest:.4g} V/s, which the slowest "
             "controller needs along these references"
+        )
+    error = math.sqrt(sum(one[0] ** 2 for one in figures) / len(figures))
+    if error > question.allowed:
+        return (
+            f"allowed is {1e6 * question.allowed:.4g} um: expected {1e6 * error:.4g} um or more, "
+            "the least rms error that was found along these references"
         )
     return (
         f"clipped is {question.clipped:.3g}: expected {share:.3g} at least, the share of the "
@@ -91,13 +108,10 @@ def _shorts(question: Question, robustness: Sequence[tuple[float, int]]) -> list
 
 def _stable(question: Question) -> Sequence[tuple[float, int]] | None:
     """Search once more, with gain margins that the search can rank: the nearest stable gains."""
-    # Not at the top: `tune` says its refusals by this file.
-    from .tune import _searched
-
     nearest, bound = None, RANKED
     while bound < question.margins.gain:
         milder = question._replace(margins=replace(question.margins, gain=bound))
-        answers = [_searched(milder, one).found for one in question.intervals]
+        answers = [searched(milder, one).found for one in question.intervals]
         found = min(answers, key=lambda one: float(one["excess"]))
         if _unstable(found["robustness"]):
             break

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..._support.units import shown_unit
 from ..components import Pid
+from ..contouring import Contour
 
 if TYPE_CHECKING:
     from ..components import LowPass, Notch, Repetitive
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from ..tracking import Tracking
     from .margins import Margins
 
-__all__ = ["Kept", "Tuned", "TuningReport", "parts_text"]
+__all__ = ["Kept", "Tuned", "TunedPair", "TuningReport", "parts_text"]
 
 UNITS = {"gain margin": "", "phase margin": " rad", "sensitivity": "", "learning": ""}
 
@@ -60,10 +61,12 @@ class TuningReport:
     ----------
     figure : str
         What was made small.
+    unit : str
+        Its unit: ``"m"``, of the effort ``"V"``.
     value : float
-        Its value [m]; without a reference the integral of the error after a step disturbance of
+        Its value; without a reference the integral of the error after a step disturbance of
         1 V at the input of the stage [m s/V].
-    runs : tuple of Tracking
+    runs : tuple of Tracking or of Contour
         Full simulations of the tuned loop, one for each reference.
     kept : tuple of Kept
         The margins over the set of plants.
@@ -84,7 +87,7 @@ class TuningReport:
 
     figure: str
     value: float
-    runs: tuple[Tracking, ...]
+    runs: tuple[Any, ...]
     kept: tuple[Kept, ...]
     margins: Margins
     plants: tuple[str, ...]
@@ -93,6 +96,7 @@ class TuningReport:
     candidates: int
     loops: int
     history: tuple[float, ...]
+    unit: str = "m"
 
     def __str__(self) -> str:
         lines = [
@@ -100,7 +104,7 @@ class TuningReport:
             f"{self.loops} loops simulated"
         ]
         for run in self.runs:
-            lines.append(f"{run.reference!r}: {run.metrics}")
+            lines += _run_lines(run)
         lines.append(f"over {len(self.plants)} plants:")
         lines += [f"  {one}" for one in self.kept]
         binding = (
@@ -129,6 +133,31 @@ class Tuned(NamedTuple):
 
     def __str__(self) -> str:
         return f"{parts_text(self.controller)}\n{self.report}"
+
+
+class TunedPair(NamedTuple):
+    """The tuned controllers of an XY stage and the report of their search.
+
+    Attributes
+    ----------
+    controllers : (Controller, Controller)
+        Of x and y, for `contour`.
+    report : TuningReport
+        What they keep, what binds.
+    """
+
+    controllers: tuple[Controller, Controller]
+    report: TuningReport
+
+    def __str__(self) -> str:
+        x, y = (parts_text(one).replace("\n", "; ") for one in self.controllers)
+        return f"x: {x}\ny: {y}\n{self.report}"
+
+
+def _run_lines(run: Tracking | Contour) -> list[str]:
+    if isinstance(run, Contour):
+        return [f"{run.path!r}: contour error {run.metrics}"]
+    return [f"{run.reference!r}: {run.metrics}"]
 
 
 def parts_text(controller: Controller) -> str:

@@ -1,0 +1,123 @@
+"""The motions that a search for gains judges controllers by."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ... import _core
+from ...errors import ParameterError
+from ...references.xy_reference import XYReference
+from ..checks import check_drive_unit, check_within_reach
+from ..plant import plant_of, stepped
+from ..tracking import feedforward_of, first_counted
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from ...references.reference import Reference, SampledReference
+    from ...stages.virtual import VirtualStage
+    from ..controller import Controller
+    from .question import Axis, Question
+
+    Array = NDArray[np.float64]
+
+__all__ = ["tasks_of"]
+
+NOTHING = np.empty(0)
+
+
+def tasks_of(
+    question: Question, bases: Sequence[Controller], repeats: bool
+) -> list[_core.Task | _core.PathTask]:
+    """Make a task of each reference and draw of the noise; `bases` have the feedforward."""
+    tasks: list[_core.Task | _core.PathTask] = []
+    for axis, base in zip(question.axes, bases, strict=True):
+        check_drive_unit(axis.stages[0], base)
+    for reference in question.references:
+        for draw in range(question.seeds):
+            if isinstance(reference, XYReference):
+                tasks.append(_path_task(question, bases, reference, draw, repeats))
+            else:
+                (axis,), (base,) = question.axes, bases
+                samples = _samples(question, axis, reference, base.dt)
+                tasks.append(
+                    _task(question, axis, base, (reference, samples, NOTHING), draw, repeats)
+                )
+    return tasks
+
+
+def _path_task(
+    question: Question, bases: Sequence[Controller], path: XYReference, draw: int, repeats: bool
+) -> _core.PathTask:
+    stage: Any = question.stage
+    pairs = zip(question.axes, path.axes, bases, strict=True)
+    x, y = (_samples(question, axis, one, base.dt) for axis, one, base in pairs)
+    # Cross-talk as if the other axis were where it is to be at that time.
+    xy, yx = stage.cross_talk
+    beside = (xy * _moved(y, -stage.lag), yx * _moved(x, stage.lag))
+    motions = zip(path.axes, (x, y), beside, strict=True)
+    both = [
+        _task(question, axis, base, motion, draw, repeats)
+        for axis, base, motion in zip(question.axes, bases, motions, strict=True)
+    ]
+    circle = None
+    if path.radius is not None and path.centre is not None:
+        circle = (*path.centre, path.radius)
+    outline = (NOTHING, NOTHING) if circle else path.outline
+    return _core.PathTask(*both, lag=stage.lag, circle=circle, path=outline)
+
+
+def _moved(samples: SampledReference, later: float) -> Array:
+    """Displacement from the start at times that are later by so many seconds [m]."""
+    moved = samples.x - samples.x[0]
+    return np.asarray(np.interp(samples.t + later, samples.t, moved), dtype=np.float64)
+
+
+def _task(
+    question: Question,
+    axis: Axis,
+    base: Controller,
+    motion: tuple[Reference, SampledReference, Array],
+    draw: int,
+    repeats: bool,
+) -> _core.Task:
+    reference, samples, beside = motion
+    plant = plant_of(axis.stages[0])
+    sensor = replace(plant.sensor, seed=plant.sensor.seed + draw)
+    seeded: VirtualStage = stepped(replace(plant, sensor=sensor), base)
+    first = first_counted(reference, samples, learns=repeats)
+    if question.stage is not None:
+        # The smooth start has no path to compare with.
+        first = max(first, int(np.searchsorted(samples.t, reference.ramp - 1e-9)))
+    return _core.Task(
+        stage=seeded._core,
+        visited=axis.visited,
+        dt=base.dt,
+        delay=question.delay,
+        jitter=question.jitter,
+        reference=samples.x,
+        feedforward=feedforward_of(base, reference, samples).voltage,
+        beside=beside,
+        first=first,
+        measured=question.measured,
+    )
+
+
+def _samples(question: Question, axis: Axis, reference: Reference, dt: float) -> SampledReference:
+    """Sample a reference; refuse one beyond the reach of a model, with the argument for that."""
+    samples = reference.sample(dt)
+    if question.clipped >= 0.5:
+        return samples
+    for i, stage in enumerate(axis.stages, 1):
+        try:
+            check_within_reach(plant_of(stage), question.limits, samples, question.drive_unit)
+        except ParameterError as error:
+            words = str(error).replace("or beyond_reach=True", "or clipped=0.5 or more")
+            which = f"model {i}: " if len(axis.stages) > 1 else axis.of
+            raise ParameterError(f"{which}{words}") from None
+    return samples

@@ -1,0 +1,216 @@
+"""The search for gains at one sampling interval, with an exact check of what it found."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from ... import _core
+from ...errors import ParameterError
+from ...references.xy_reference import XYReference
+from ..controller import Controller
+from ..tracking import can_be_learnt
+from .box import Box, box_of, resonance
+from .margins import NamedPlant, plants_of
+from .motions import tasks_of
+from .tuned import Kept
+
+if TYPE_CHECKING:
+    from .question import Axis, Question
+
+__all__ = ["Answer", "searched"]
+
+# The grid of the search is accurate to this; what the exact check finds beyond is asked again.
+SLACK = 0.003
+# Searches with more and more in reserve.
+ROUNDS = 4
+
+
+class SoughtAxis(NamedTuple):
+    """A controller of which settings are sought."""
+
+    name: str
+    box: Box
+    base: Controller
+    plants: list[NamedPlant]
+
+    def controller(self, settings: dict[str, float]) -> Controller:
+        """Return the controller with these settings."""
+        parts = self.box.parts(settings)
+        return replace(
+            self.base,
+            feedback=parts.feedback,
+            filters=(*self.base.filters, *parts.filters),
+            repetitive=parts.repetitive,
+        )
+
+    @property
+    def _core(self) -> _core.SoughtController:
+        return _core.SoughtController(
+            controller=self.base._core,
+            period=self.box.period,
+            sign=self.box.sign,
+            law=(self.box.law, *self.box.nominal),
+            sought=self.box.ranges,
+            plants=[one.plant for one in self.plants],
+        )
+
+
+class Answer(NamedTuple):
+    """Settings found at one sampling interval.
+
+    Attributes
+    ----------
+    found : dict
+        Of the core.
+    axes : list of SoughtAxis
+        What was sought.
+    kept : list of Kept
+        The margins of the settings, exact.
+    """
+
+    found: dict[str, Any]
+    axes: list[SoughtAxis]
+    kept: list[Kept]
+
+    @property
+    def excess(self) -> float:
+        """How far it is from what was asked for: above 1 where it does not keep it."""
+        beyond = max((one.share for one in self.kept), default=0.0)
+        excess = float(self.found["excess"])
+        return max(excess, 1.0) if beyond <= 1.0 + SLACK else max(excess, beyond)
+
+    @property
+    def keeps(self) -> bool:
+        """Whether it keeps all that was asked for."""
+        return self.excess <= 1.0 + 1e-9
+
+    @property
+    def names(self) -> list[str]:
+        """The plants, as the core numbers them."""
+        return [one.name for axis in self.axes for one in axis.plants]
+
+    @property
+    def controllers(self) -> tuple[Controller, ...]:
+        """The controller of each axis."""
+        pairs = zip(self.axes, self.found["settings"], strict=True)
+        return tuple(axis.controller(dict(settings)) for axis, settings in pairs)
+
+    def edges(self) -> list[str]:
+        """Name the settings that are at an end of their range."""
+        found = []
+        for axis, settings in zip(self.axes, self.found["settings"], strict=True):
+            of = f"{axis.name}: " if axis.name else ""
+            found += [f"{of}{text}" for text in axis.box.edges(dict(settings))]
+        return found
+
+
+def searched(question: Question, dt: float) -> Answer:
+    """Search at one sampling interval; where the exact margins are beyond, with some in reserve."""
+    axes = [_sought(question, axis, dt) for axis in question.axes]
+    repeats = any(axis.box.period is not None for axis in axes)
+    tasks = tasks_of(question, [axis.base for axis in axes], repeats)
+    reserve = 1.0
+    for _ in range(ROUNDS):
+        found = _core.tune(
+            axes=[axis._core for axis in axes],
+            tasks=tasks,
+            required=_required(question, reserve),
+            aim=question.figure if tasks else "disturbance",
+            effort=question.effort,
+            particles=question.particles,
+            iterations=question.iterations,
+            seed=question.seed,
+            threads=question.threads,
+        )
+        answer = Answer(found, axes, [])
+        if found["excess"] > 1.0:
+            return answer
+        answer = answer._replace(kept=_kept(question, answer))
+        if answer.keeps:
+            return answer
+        reserve *= 1.0 + 1.2 * (answer.excess - 1.0)
+    return answer
+
+
+def _sought(question: Question, axis: Axis, dt: float) -> SoughtAxis:
+    plants = [
+        NamedPlant(f"{axis.name}, {one.name}" if axis.name else one.name, one.plant)
+        for one in plants_of(axis.stages, question.limits, question.delay, question.spread)
+    ]
+    cores = [one.plant for one in plants]
+    parts = question.parts or _usual_parts(question, cores, dt)
+    of_parts = sum(one in parts for one in ("low-pass", "notch"))
+    if len(question.filters) + of_parts > 2:
+        raise ParameterError(
+            f"filters has {len(question.filters)} beside {of_parts} of the parts: expected 2 in all"
+        )
+    periods = {one.period for one in question.references}
+    if "repetitive" in parts and len(periods) > 1:
+        listed = ", ".join(f"{one:g} s" if one else "none" for one in sorted(periods, key=str))
+        raise ParameterError(
+            f"references have periods of {listed}: expected one period for the repetitive part"
+        )
+    period = next(iter(periods), None)
+    base = Controller(
+        dt=dt,
+        limits=question.limits,
+        feedforward=axis.feedforward,
+        filters=question.filters,
+        drive_unit=question.drive_unit,
+    )
+    box = box_of(parts, cores, dt, period, question.limits, question.law)
+    return SoughtAxis(axis.name, box, base, plants)
+
+
+def _usual_parts(question: Question, plants: list[_core.LoopPlant], dt: float) -> tuple[str, ...]:
+    parts = ["pid", "low-pass"]
+    if resonance(plants, dt) is not None:
+        parts.append("notch")
+    periods = {one.period for one in question.references}
+    rising = all(plant.static_gain > 0.0 for plant in plants)
+    axes = (one.x if isinstance(one, XYReference) else one for one in question.references)
+    if len(periods) == 1 and rising and all(map(can_be_learnt, axes)):
+        parts.append("repetitive")
+    return tuple(parts)
+
+
+def _required(
+    question: Question, reserve: float
+) -> tuple[float, float, float, float, float, float, float]:
+    """Return what is asked for, with a factor in reserve for what the grid does not show."""
+    margins = question.margins
+    gain = 1.0 + (margins.gain - 1.0) * reserve
+    sensitivity = 1.0 + (margins.sensitivity - 1.0) / reserve
+    learning = margins.learning * (1.0 + 1e-9)
+    phase = min(margins.phase * reserve, 0.999 * math.pi)
+    return gain, phase, sensitivity, learning, question.slew, question.clipped, question.allowed
+
+
+def _kept(question: Question, answer: Answer) -> list[Kept]:
+    """Check the margins of what was found, exactly, over all plants."""
+    margins = question.margins
+    bounds = {
+        "gain margin": margins.gain,
+        "phase margin": margins.phase,
+        "learning": margins.learning,
+        "sensitivity": margins.sensitivity,
+    }
+    worst: dict[str, Kept] = {}
+    for axis, controller in zip(answer.axes, answer.controllers, strict=True):
+        for name, plant in axis.plants:
+            check = _core.check_loop(controller._core, plant)
+            values = {
+                "gain margin": check["gain_margin"] or math.inf,
+                "phase margin": math.pi if check["phase_margin"] is None else check["phase_margin"],
+                "learning": check["small_gain"] or 0.0,
+                "sensitivity": check["sensitivity"] if check["stable"] else math.inf,
+            }
+            for key, value in values.items():
+                one = Kept(key, value, bounds[key], name)
+                if key not in worst or one.share > worst[key].share:
+                    worst[key] = one
+    if all(one.repetitive is None for one in answer.controllers):
+        del worst["learning"]
+    return list(worst.values())
