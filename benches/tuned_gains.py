@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import sys
 import time
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -98,25 +97,30 @@ def figures(apparatus: Apparatus, inverse: Any, rates: tuple[float, ...]) -> Non
 
 
 def circles(apparatus: Apparatus, inverse: Any, rates: tuple[float, ...]) -> None:
-    print(
-        "\nContour error, peak to peak and SD, um; ahead: the reference of y is ahead by its lag.\n"
-    )
-    print("| radius um | Hz | rate Hz | published | tuned | published, ahead | tuned, ahead | s |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    print("\nContour error, peak to peak and SD, um.\n")
+    print("| radius um | Hz | rate Hz | published | tuned | s |")
+    print("| --- | --- | --- | --- | --- | --- |")
     one = controller(inverse, 0.02, LIMITS, feedback=PID)
     for case in PUBLISHED:
         path = circle(frequency=case.frequency, radius=case.radius)
-        turn = 2.0 * np.pi * case.frequency * apparatus.stage.lag
-        y = circle(frequency=case.frequency, radius=case.radius, phase=turn).y
-        ahead = replace(path, y=y)
-        before = [contour_error(apparatus, (one, one), motion) for motion in (path, ahead)]
+        before = contour_error(apparatus, (one, one), path)
         for rate in rates:
             started = time.perf_counter()
-            pair = tuned_pair(apparatus, inverse, path, rate)
+            parts = ("pid", "low-pass", "notch") if rate > 400.0 else ("pid", "low-pass")
+            pair, _ = tuned(
+                apparatus.stage,
+                inverse,
+                path,
+                1.0 / rate,
+                apparatus.delay,
+                parts=parts,
+                **budget(rate),
+            )
             took = time.perf_counter() - started
-            after = [contour_error(apparatus, pair, motion) for motion in (path, ahead)]
-            four = (before[0], after[0], before[1], after[1])
-            cells = " | ".join(", ".join(f"{1e6 * value:.3f}" for value in two) for two in four)
+            after = contour_error(apparatus, pair, path)
+            cells = " | ".join(
+                ", ".join(f"{1e6 * value:.3f}" for value in two) for two in (before, after)
+            )
             print(
                 f"| {1e6 * case.radius:g} | {case.frequency:g} | {rate:g} | {cells} | {took:.1f} |",
                 flush=True,
@@ -126,17 +130,6 @@ def circles(apparatus: Apparatus, inverse: Any, rates: tuple[float, ...]) -> Non
 def budget(rate: float) -> dict[str, int]:
     """A loop at 5 kHz has 150 000 samples."""
     return {"particles": 24, "iterations": 25} if rate > 2000.0 else {}
-
-
-def tuned_pair(apparatus: Apparatus, inverse: Any, path: Any, rate: float) -> Any:
-    parts = ("pid", "low-pass", "notch") if rate > 400.0 else ("pid", "low-pass")
-    axes = ((apparatus.x, path.x), (apparatus.y, path.y))
-    return tuple(
-        tuned(
-            stage, inverse, axis, 1.0 / rate, apparatus.delay, parts=parts, **budget(rate)
-        ).controller
-        for stage, axis in axes
-    )
 
 
 def contour_error(apparatus: Apparatus, pair: Any, path: Any) -> tuple[float, float]:

@@ -58,8 +58,16 @@ fn loops(c: &mut Criterion) {
                 substeps: 1,
             };
             let judged = Judged::Measured;
-            let task =
-                Task { stage, visited: &[], timing, samples, beside: &[], from: 250, judged };
+            let task = Task {
+                stage,
+                visited: &[],
+                timing,
+                samples,
+                beside: &[],
+                shown_at: 0.0,
+                from: 250,
+                judged,
+            };
             let task = task.ready().unwrap();
             let all = controllers(dt, repeats);
             let law = if repeats { "PID + repetitive" } else { "PID" };

@@ -11,6 +11,8 @@ import pytest
 
 import piezotrack as pt
 from piezotrack.control import Kept
+from piezotrack.control.tracking import Tracking
+from piezotrack.control.tuning import search
 
 LIMITS = (0.0, 75.0)
 QUICK: dict[str, Any] = {"particles": 24, "iterations": 25}
@@ -227,3 +229,47 @@ def test_plants_of_both_signs_are_refused() -> None:
 def test_impossible_margins_are_named(name: str, value: float) -> None:
     with pytest.raises(pt.ParameterError, match=f"{name} is {value}"):
         pt.Margins(**{name: value})
+
+
+def test_the_least_effort_within_an_allowed_error() -> None:
+    # Slow: most of the effort answers the noise.
+    stage = published_stage()
+    reference = pt.sine(frequency=0.1, low=0.0, high=10e-6, duration=20.0)
+    best = pt.tune(stage, reference, dt=0.02, limits=LIMITS, parts="pid", **QUICK)
+    allowed = 1.5 * best.report.value
+    calm = pt.tune(
+        stage,
+        reference,
+        dt=0.02,
+        limits=LIMITS,
+        parts="pid",
+        figure="effort",
+        allowed=allowed,
+        **QUICK,
+    )
+    (run,), (before,) = calm.report.runs, best.report.runs
+
+    def effort(of: Tracking) -> float:
+        return float(np.sqrt(np.mean(np.diff(of.voltage) ** 2)))
+
+    assert run.metrics.rms_error <= 1.02 * allowed
+    assert effort(run) < 0.95 * effort(before)
+    assert calm.report.unit == "V"
+    assert calm.report.value == pytest.approx(effort(run), rel=0.1)
+    assert "allowed" in calm.report.binding
+
+
+def test_an_error_that_is_not_reached_is_refused_with_the_least() -> None:
+    stage, reference = published_stage(), motion()
+    options: dict[str, Any] = {"dt": 0.02, "limits": LIMITS, "parts": "pid", **QUICK}
+    with pytest.raises(pt.ParameterError, match="figure is 'effort' without allowed: expected"):
+        pt.tune(stage, reference, figure="effort", **options)
+    with pytest.raises(pt.ParameterError, match=r"allowed is 0.001 um: expected 0\.\d+ um or more"):
+        pt.tune(stage, reference, allowed=1e-9, **options)
+
+
+def test_what_the_exact_check_refuses_is_never_returned(monkeypatch: pytest.MonkeyPatch) -> None:
+    # As if the exact margins were always beyond what the search saw.
+    monkeypatch.setattr(search, "SLACK", -0.9)
+    with pytest.raises(pt.ParameterError, match=r"no gains whose exact margins .* (low|high) gain"):
+        pt.tune(published_stage(), motion(), dt=0.02, limits=LIMITS, parts="pid", **QUICK)

@@ -40,7 +40,16 @@ fn controllers(count: u32) -> Vec<Controller<Law>> {
 fn task<'a>(stage: &'a VirtualStage, samples: ReferenceSamples<'a>, delay: f64) -> Task<'a> {
     let timing =
         Timing { interval: DT, samples: samples.reference.len(), delay, jitter: 0.0, substeps: 1 };
-    Task { stage, visited: &[], timing, samples, beside: &[], from: 250, judged: Judged::Measured }
+    Task {
+        stage,
+        visited: &[],
+        timing,
+        samples,
+        beside: &[],
+        shown_at: 0.0,
+        from: 250,
+        judged: Judged::Measured,
+    }
 }
 
 /// Largest and rms error of a loop that is simulated by itself, in fine steps.

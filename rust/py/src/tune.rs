@@ -98,6 +98,7 @@ impl PyTask {
             timing: self.timing,
             samples,
             beside: &self.beside,
+            shown_at: 0.0,
             from: self.from,
             judged: self.judged,
         }
@@ -145,16 +146,16 @@ impl PyPathTask {
         let (x, y): (Vec<_>, Vec<_>) =
             controllers.iter().map(|(x, y)| (x.controller, y.controller)).unzip();
         let found = enter_pool(py, threads, &QUIET, |_, stop| {
-            self.task().ready()?.figures([&x, &y], stop)
+            self.task()?.ready()?.figures([&x, &y], stop)
         })?;
         Ok(found.iter().map(numbers).collect())
     }
 }
 
 impl PyPathTask {
-    fn task(&self) -> PathTask<'_> {
+    fn task(&self) -> Result<PathTask<'_>> {
         let [x, y] = &self.axes;
-        PathTask { x: x.task(), y: y.task(), lag: self.lag, outline: self.outline.clone() }
+        PathTask::new(x.task(), y.task(), self.lag, self.outline.clone())
     }
 }
 
@@ -166,11 +167,11 @@ enum AnyTask<'py> {
 }
 
 impl AnyTask<'_> {
-    fn judge(&self) -> Judge<'_> {
-        match self {
+    fn judge(&self) -> Result<Judge<'_>> {
+        Ok(match self {
             Self::Axis(task) => Judge::Axis(task.task()),
-            Self::Path(task) => Judge::Path(Box::new(task.task())),
-        }
+            Self::Path(task) => Judge::Path(Box::new(task.task()?)),
+        })
     }
 }
 
@@ -302,9 +303,10 @@ fn tune(
     threads: usize,
 ) -> PyResult<FoundSettings> {
     let (gain_margin, phase_margin, sensitivity, learning, slew, clipped, error) = required;
+    let judges: Result<Vec<Judge<'_>>> = tasks.iter().map(AnyTask::judge).collect();
     let tuning = Tuning {
         axes: axes.iter().map(|axis| axis.0.clone()).collect(),
-        tasks: tasks.iter().map(AnyTask::judge).collect(),
+        tasks: judges.map_err(|error| raise(&error))?,
         required: Requirements {
             gain_margin,
             phase_margin,

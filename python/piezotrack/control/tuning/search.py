@@ -78,8 +78,7 @@ class Answer(NamedTuple):
     def excess(self) -> float:
         """How far it is from what was asked for: above 1 where it does not keep it."""
         beyond = max((one.share for one in self.kept), default=0.0)
-        excess = float(self.found["excess"])
-        return max(excess, 1.0) if beyond <= 1.0 + SLACK else max(excess, beyond)
+        return max(float(self.found["excess"]), beyond / (1.0 + SLACK))
 
     @property
     def keeps(self) -> bool:

@@ -188,10 +188,16 @@ def tune(
         threads=threads,
     )
     answers = [searched(question, one) for one in question.intervals]
-    best = min(answers, key=lambda one: (not one.keeps, one.excess, one.found["cost"]))
+    best = min(answers, key=_rank)
     if not best.keeps:
         raise ParameterError(refusal(question, best))
     return _answered(question, best, answers)
+
+
+def _rank(answer: Answer) -> tuple[bool, float, float]:
+    """Any that keeps what was asked for first, then the one nearest to it."""
+    nearest = 1.0 if answer.keeps else answer.excess
+    return not answer.keeps, nearest, answer.found["cost"]
 
 
 def _answered(question: Question, best: Answer, answers: list[Answer]) -> Tuned | TunedPair:

@@ -11,7 +11,7 @@ use crate::error::{Error, Result, not_negative};
 use crate::math::room;
 use crate::signal::contour_error::{Polyline, radial_errors};
 use crate::signal::{Stop, index};
-use crate::simulate::Law;
+use crate::simulate::{Delay, Law};
 
 /// The shape of a path.
 #[derive(Clone, Debug)]
@@ -26,23 +26,32 @@ pub enum Outline {
 #[derive(Clone, Debug)]
 pub struct PathTask<'a> {
     /// The axis that is served first.
-    pub x: Task<'a>,
+    x: Task<'a>,
     /// The axis that is served second.
-    pub y: Task<'a>,
+    y: Task<'a>,
     /// By how much later, s.
-    pub lag: f64,
+    lag: f64,
     /// The path.
-    pub outline: Outline,
+    outline: Outline,
 }
 
 impl<'a> PathTask<'a> {
+    /// A path of two axes, of which y is served `lag` seconds after x.
+    ///
+    /// # Errors
+    /// Names `lag` where it is below 0.
+    pub fn new(x: Task<'a>, y: Task<'a>, lag: f64, outline: Outline) -> Result<Self> {
+        not_negative("lag", lag, "s")?;
+        let Delay { fraction, .. } = Delay::new(lag, y.timing.interval);
+        let shown_at = if fraction > 0.0 { 1.0 - fraction } else { 0.0 };
+        Ok(Self { x, y: Task { shown_at, ..y }, lag, outline })
+    }
+
     /// Brings both axes to where the loops begin.
     ///
     /// # Errors
-    /// Those of [`Task::ready`]; where the axes differ in their samples or a number is out of its
-    /// range.
+    /// Those of [`Task::ready`]; where the axes differ in their samples.
     pub fn ready(&'a self) -> Result<ReadyPath<'a>> {
-        not_negative("lag", self.lag, "s")?;
         let [x, y] = [&self.x, &self.y].map(|task| task.samples.reference.len());
         if x != y {
             return Err(Error::Shape {
@@ -56,12 +65,22 @@ impl<'a> PathTask<'a> {
 
     /// Contour error at each sample that counts, m.
     fn errors(&self, x: &[f64], y: &[f64]) -> Result<Vec<f64>> {
-        let y = later(y, self.lag / self.y.timing.interval)?;
+        let y = self.at_those_of_x(y)?;
         let [x, y] = [x, &y].map(|axis| axis.get(self.x.from..).unwrap_or_default());
         match &self.outline {
             Outline::Circle(centre, radius) => radial_errors(x, y, *centre, *radius),
             Outline::Points(path) => path.signed_distances(x, y),
         }
+    }
+
+    /// Motion of y at the instants of x: before y's first sample it stands where it is.
+    fn at_those_of_x(&self, y: &[f64]) -> Result<Vec<f64>> {
+        let Delay { whole, fraction } = Delay::new(self.lag, self.y.timing.interval);
+        let late = whole + usize::from(fraction > 0.0);
+        let mut out = room("the motion of y", y.len())?;
+        out.extend(core::iter::repeat_n(y.first().copied().unwrap_or(0.0), late.min(y.len())));
+        out.extend_from_slice(&y[..y.len().saturating_sub(late)]);
+        Ok(out)
     }
 
     fn figures(&self, x: &Motion, y: &Motion) -> Result<Figures> {
@@ -105,21 +124,4 @@ impl ReadyPath<'_> {
         let y = y.motions(controllers[1], true, stop)?;
         x.par_iter().zip(&y).map(|(x, y)| self.task.figures(x, y)).collect()
     }
-}
-
-/// Samples that come `late` intervals later, at the instants of those that do not; before the first
-/// of them the axis stands where it is.
-fn later(samples: &[f64], late: f64) -> Result<Vec<f64>> {
-    let whole = libm::floor(late);
-    let part = late - whole;
-    let mut out = room("the motion of y", samples.len())?;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-    let whole = whole as usize;
-    let at = |k: Option<usize>| k.and_then(|k| samples.get(k)).or(samples.first());
-    for k in 0..samples.len() {
-        let (new, old) = (at(k.checked_sub(whole)), at(k.checked_sub(whole.saturating_add(1))));
-        let [new, old] = [new, old].map(|value| value.copied().unwrap_or(f64::NAN));
-        out.push(new + part * (old - new));
-    }
-    Ok(out)
 }

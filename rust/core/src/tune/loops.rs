@@ -11,10 +11,10 @@ use rayon::prelude::*;
 use crate::error::{Error, Result};
 use crate::math::{Lanes, dispatch_vectors, room, width, zeros};
 use crate::models::{LanedPlant, LanedVisitor, StageState};
-use crate::signal::Stop;
+use crate::signal::{Stop, index};
 use crate::simulate::{
-    AmplifierFlow, ApparatusState, DELAY_LINE, Delay, Law, LawState, ReferenceSamples, SAME,
-    Timing, VirtualStage, closed_loop,
+    ApparatusState, DELAY_LINE, Delay, Law, LawState, ReferenceSamples, SAME, Timing, VirtualStage,
+    closed_loop,
 };
 
 /// Which error counts.
@@ -39,6 +39,9 @@ pub struct Task<'a> {
     pub samples: ReferenceSamples<'a>,
     /// What other axes add to the displacement at each sample, m; empty for nothing.
     pub beside: &'a [f64],
+    /// Part of the control interval at which its motion is shown to what judges it beside other axes,
+    /// 0 to below 1; the figures of this axis are always of its samples.
+    pub shown_at: f64,
     /// Samples before the first that counts.
     pub from: usize,
     /// Which error counts.
@@ -76,6 +79,9 @@ const DIVERGED: f64 = 1.0;
 
 /// Ends of the parts in which an amplifier settles after a change of its command, in lags.
 const SETTLING: [f64; 3] = [0.5, 1.5, 4.0];
+
+/// Instants of a control interval at which a loop by itself is shown.
+const INSTANTS: usize = 20;
 
 /// Most steps of equal length in a control interval.
 const MOST_STEPS: f64 = 4.0;
@@ -121,7 +127,8 @@ impl<'a> Task<'a> {
         stop: Stop<'_>,
     ) -> Result<Motion> {
         let ReferenceSamples { reference, feedforward } = self.samples;
-        let timing = Timing { samples: reference.len(), substeps: 1, ..self.timing };
+        let substeps = if self.shown_at > 0.0 { INSTANTS } else { 1 };
+        let timing = Timing { samples: reference.len(), substeps, ..self.timing };
         let length = controller.repetitive.map_or(0, |part| part.length());
         let mut state = controller.rest(zeros(DELAY_LINE, length)?)?;
         let mut commands = room("the commands", reference.len())?;
@@ -132,21 +139,32 @@ impl<'a> Task<'a> {
             command.volts
         };
         let apparatus = self.stage.apparatus();
-        let mut run = match closed_loop(&apparatus, start.clone(), &timing, command, stop) {
+        let run = match closed_loop(&apparatus, start.clone(), &timing, command, stop) {
             Ok(Some(run)) => run,
             // Also where the loop diverged.
             Ok(None) | Err(Error::Numerical(_)) => return Ok(Motion::failed()),
             Err(other) => return Err(other),
         };
-        let mut shown = match self.judged {
-            Judged::Measured => core::mem::take(&mut run.measured),
-            Judged::True => core::mem::take(&mut run.displacement),
-        };
         let mut score = Score::new(self.timing.interval);
-        for (k, (command, shown)) in commands.iter().zip(&mut shown).enumerate() {
-            *shown += self.beside(k);
-            let error = reference[k] - *shown;
-            score.take(k >= self.from, error, command.volts, command.saturated);
+        let mut shown = room("the motion", commands.len())?;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+        let later = libm::round(self.shown_at * index(substeps)) as usize;
+        for (k, command) in commands.iter().enumerate() {
+            let at = k * substeps;
+            let own = run.displacement[at] + self.beside(k);
+            // Of the last sample there is nothing later.
+            let then = run.displacement.get(at + later).map_or(own, |then| then + self.beside(k));
+            let noise = match self.judged {
+                Judged::Measured => run.measured[at] - run.displacement[at],
+                Judged::True => 0.0,
+            };
+            score.take(
+                k >= self.from,
+                reference[k] - own - noise,
+                command.volts,
+                command.saturated,
+            );
+            shown.push(then + noise);
         }
         Ok(Motion { figures: score.figures(), shown })
     }
@@ -156,8 +174,8 @@ impl<'a> Task<'a> {
 #[derive(Clone, Debug)]
 pub(super) struct Motion {
     pub(super) figures: Figures,
-    /// What is judged at each sample, reading or true displacement, m; empty where it failed, or
-    /// was not asked for.
+    /// Reading or true displacement, as is judged, in each control interval, m; empty where it
+    /// failed, or was not asked for.
     pub(super) shown: Vec<f64>,
 }
 
@@ -339,6 +357,8 @@ struct Part {
     step: f64,
     /// Whether the newest command that acts in this interval acts here, or the one before.
     newest: bool,
+    /// Whether the motion is shown at its end.
+    shown: bool,
 }
 
 /// Whole intervals of delay, and the parts of each interval.
@@ -346,7 +366,7 @@ fn parts(task: &Task<'_>, longest: f64) -> (usize, Vec<Part>) {
     let (dt, stage) = (task.timing.interval, task.stage);
     let Delay { whole, fraction } = Delay::new(task.timing.delay + stage.sensor.delay, dt);
     let lag = stage.amplifier.lag();
-    let mut edges = vec![fraction, 1.0];
+    let mut edges = vec![fraction, 1.0, task.shown_at];
     let edge = |after: f64| [fraction + after, fraction + after - 1.0];
     for settled in SETTLING {
         edges.extend(edge(settled * lag / dt));
@@ -369,7 +389,8 @@ fn parts(task: &Task<'_>, longest: f64) -> (usize, Vec<Part>) {
     let mut from = 0.0;
     let mut parts = Vec::with_capacity(edges.len());
     for edge in edges {
-        parts.push(Part { step: (edge - from) * dt, newest: from > fraction - SAME });
+        let shown = (edge - task.shown_at).abs() < SAME;
+        parts.push(Part { step: (edge - from) * dt, newest: from > fraction - SAME, shown });
         from = edge;
     }
     (whole, parts)
@@ -405,10 +426,14 @@ impl<P: LanedPlant, const V: usize> WithSimd for Bundle<'_, P, V> {
         let stage = task.stage;
         let (whole, parts) = parts;
         let zero = Lanes::<S, V>::splat(simd, 0.0);
-        let flows: Vec<(P::Flow<Lanes<S, V>>, AmplifierFlow, bool)> = parts
+        let flows: Vec<_> = parts
             .iter()
-            .map(|part| (plant.flow(zero, part.step), stage.amplifier.flow(part.step), part.newest))
+            .map(|part| (plant.flow(zero, part.step), stage.amplifier.flow(part.step), part))
             .collect();
+        let judged = |reading: f64, x: f64| match task.judged {
+            Judged::Measured => reading,
+            Judged::True => x - start.sensor.zero,
+        };
         let mut state = plant.start(zero);
         let mut applied = zero.like(start.applied);
         let held = zero.like(start.command);
@@ -428,23 +453,31 @@ impl<P: LanedPlant, const V: usize> WithSimd for Bundle<'_, P, V> {
                 let reading = stage.sensor.quantised(x + drawn) - start.sensor.zero;
                 let command = controller.step(state, reference, reading, feedforward);
                 volts[lane] = command.volts;
-                let actual = match task.judged {
-                    Judged::Measured => reading,
-                    Judged::True => x - start.sensor.zero,
-                };
+                let actual = judged(reading, x);
                 let (error, clipped) = (reference - actual, command.saturated);
-                if traces[lane].capacity() > k {
+                if task.shown_at == 0.0 && traces[lane].capacity() > k {
                     traces[lane].push(actual);
                 }
                 scores[lane].take(k >= task.from, error, command.volts, clipped);
             }
             issued.rotate_left(1);
             issued[whole + 1] = Lanes::gather(simd, |lane| volts[lane]);
-            for (flow, amplifier, newest) in &flows {
-                let command = issued[usize::from(*newest)];
+            for (flow, amplifier, part) in &flows {
+                let command = issued[usize::from(part.newest)];
                 let (low, high) = stage.amplifier.advance(amplifier, applied, command, command);
                 plant.advance(flow, &mut state, low, high);
                 applied = high;
+                if part.shown {
+                    // Noise that no command has answered yet.
+                    let drawn = noise.get(k + 1).copied().unwrap_or(drawn);
+                    let shown = plant.displacement(&state);
+                    let with_room = traces.iter_mut().zip(shown.as_slice());
+                    for (trace, x) in with_room.filter(|(trace, _)| trace.capacity() > k) {
+                        let reading =
+                            stage.sensor.quantised(x + beside + drawn) - start.sensor.zero;
+                        trace.push(judged(reading, x + beside));
+                    }
+                }
             }
         }
         let motion = |(score, shown): (&Score, _)| Motion { figures: score.figures(), shown };
