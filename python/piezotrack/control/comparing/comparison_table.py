@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from .comparison import ControllerComparison, Row
 
-__all__ = ["Grid", "comparison_html", "comparison_text", "grids", "with_spread"]
+__all__ = ["Grid", "comparison_html", "comparison_text", "grids", "short", "with_spread"]
 
 # Columns of a terminal; where headings are broken, and where they are else it is too narrow.
 WIDTH = 100
@@ -39,7 +39,7 @@ def grids(comparison: ControllerComparison, *, spreads: bool = True) -> list[Gri
     """
     rows, several = comparison.rows, comparison.seeds > 1
     many = f"mean of {comparison.seeds} draws of the noise" if several else "one draw of the noise"
-    names = [one.partition(" of ")[0] for one in comparison.references]
+    names = [short(one) for one in comparison.references]
 
     def mean(value: float, spread: float) -> str:
         return with_spread(value, spread if spreads else math.nan)
@@ -75,6 +75,11 @@ def grids(comparison: ControllerComparison, *, spreads: bool = True) -> list[Gri
             ],
         ),
     ]
+
+
+def short(reference: str) -> str:
+    """Name a reference without its numbers of steps and lines."""
+    return reference.partition(" of ")[0]
 
 
 def with_spread(value: float, spread: float) -> str:
