@@ -130,15 +130,13 @@ def compare_controllers(
             f"model is {type(model).__name__}: expected a stage or identified model"
         )
     interval = check_dt(dt)
-    usual = () if references is not None else usual_references(plant, (low, high), rates, interval)
     task = Task(
         stage=plant,
         inverse=model.inverse(),
         models=models or {},
         record=record,
-        references=_references(references)
-        or usual_references(plant, (low, high), rates, check_dt(dt)),
-        dt=check_dt(dt),
+        references=_references(references) or usual_references(plant, (low, high), rates, interval),
+        dt=interval,
         limits=(low, high),
         margins=margins or Margins(),
         spread=spread or Spread(),

@@ -117,8 +117,9 @@ def _checked(rates: tuple[float, float, float], dt: float) -> tuple[float, float
             f"{0.5 / dt:.6g} Hz"
         )
     if PERIODS / slow / dt > MOST_SAMPLES:
+        least = PERIODS / MOST_SAMPLES / dt
         raise ParameterError(
-            f"rates begins with {slow:g} Hz: expected {PERIODS / MOST_SAMPLES / dt:.3g} Hz or more, "
+            f"rates begins with {slow:g} Hz: expected {least:.3g} Hz or more, "
             f"of which {PERIODS} periods are {MOST_SAMPLES:g} samples of {dt:g} s"
         )
     return slow, medium, fast
