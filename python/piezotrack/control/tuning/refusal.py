@@ -40,11 +40,18 @@ class _Short(NamedTuple):
         """Say what was asked for, and what the nearest gains have."""
         side = "more" if self.least else "less"
         off = f", {self.factor:.4g} times too {'low' if self.least else 'high'}"
+        bound = f"{_number(self.bound)}{self.unit}"
         return (
-            f"margins.{self.name} is {self.bound:.9g}{self.unit}: expected one that some gains can "
-            f"keep; where {self.bound:.9g}{self.unit} or {side} was asked for, the nearest have "
-            f"{self.value:.6g}{self.unit} ({names[self.plant]}){off if self.factor > 1.1 else ''}"
+            f"margins.{self.name} is {bound}: expected one that some gains can keep; where {bound} "
+            f"or {side} was asked for, the nearest have {self.value:.6g}{self.unit} "
+            f"({names[self.plant]}){off if self.factor > 1.1 else ''}"
         )
+
+
+def _number(value: float) -> str:
+    """Write a number in six digits where it has no more."""
+    short = f"{value:.6g}"
+    return short if float(short) == value else f"{value:.9g}"
 
 
 def refusal(question: Question, found: Mapping[str, Any], names: Sequence[str]) -> str:
