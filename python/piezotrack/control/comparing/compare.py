@@ -15,6 +15,7 @@ from ...errors import ParameterError, PiezotrackError
 from ...identification.identified import IdentifiedModel
 from ...references.reference import Reference
 from ...stages.base import Stage
+from ..checks import check_delay
 from ..controller import number_pair
 from ..laws import chatter_of
 from ..plant import plant_of, run_closed_loop, stepped, voltages_before
@@ -129,7 +130,8 @@ def compare_controllers(
         raise ParameterError(
             f"model is {type(model).__name__}: expected a stage or identified model"
         )
-    interval = check_dt(dt)
+    interval, late = check_dt(dt), not_negative("delay", delay, "s")
+    check_delay(plant, late, interval)
     task = Task(
         stage=plant,
         inverse=model.inverse(),
@@ -140,7 +142,7 @@ def compare_controllers(
         limits=(low, high),
         margins=margins or Margins(),
         spread=spread or Spread(),
-        delay=not_negative("delay", delay, "s"),
+        delay=late,
         options=options,
     )
     draws = _counted(seeds)

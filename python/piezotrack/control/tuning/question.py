@@ -14,6 +14,7 @@ from ...identification.identified import IdentifiedModel
 from ...references.reference import Reference
 from ...stages.base import Stage
 from ...stages.inverse import Inverse
+from ..checks import check_delay
 from ..components import LowPass, Notch
 from ..controller import number_pair
 from ..plant import Plant, plant_of, voltages_before
@@ -94,6 +95,8 @@ def asked(
     intervals = _intervals(dt, model)
     unit = model.drive_unit if model is not None else "V"
     limits = _limits(limits, model, unit)
+    delay = not_negative("delay", delay, "s")
+    check_delay(plant_of(stages[0]), delay, min(intervals))
     inverse = _inverse_of(stages[0], feedforward)
     _check_feedforward(law, inverse)
     question = Question(
@@ -113,7 +116,7 @@ def asked(
         figure=figure,
         effort=not_negative("effort", effort, "m/V"),
         clipped=_core.as_number("clipped", clipped),
-        delay=not_negative("delay", delay, "s"),
+        delay=delay,
         jitter=not_negative("jitter", jitter, "s"),
         visited=voltages_before(plant_of(stages[0]), visited, limits),
         measured=error == "measured",
