@@ -87,6 +87,13 @@ def test_what_could_not_be_made_says_why() -> None:
     assert "not made: network" in str(found)
     with pytest.raises(pt.ParameterError, match=r"not one could be made; network: record"):
         compared(controllers=["network"])
+    once = pt.chirp(start_frequency=1.0, stop_frequency=5.0, low=20e-6, high=60e-6, duration=2.0)
+    names = ["inverse", "inverse + PID + repetitive", "inverse + PID + learning"]
+    found = compared(controllers=names, references=[once])
+    assert [row.name for row in found.rows] == ["inverse"]
+    for name in names[1:]:
+        assert found.refused[name].startswith("references: expected one at least")
+    assert max(map(len, str(found).splitlines())) <= 100
 
 
 def noisy(seed: int) -> pt.VirtualStage:
@@ -198,6 +205,7 @@ def test_the_picture_has_a_mark_for_each_reference() -> None:
     [
         ({"controllers": ["pid"]}, "controllers has 'pid'"),
         ({"references": []}, "references is empty"),
+        ({"controllers": []}, "controllers is empty"),
         ({"references": ["sine"]}, "references has str"),
         ({"limits": (1.0, 0.0)}, "expected the lower one first"),
         ({"dt": 0.0}, "dt is 0"),

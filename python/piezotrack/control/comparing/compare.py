@@ -190,6 +190,8 @@ def _names(controllers: Sequence[str] | None, task: Task) -> list[str]:
                     f"controllers has {quoted(one)}: expected some of "
                     f"{', '.join(map(repr, CONTENDERS))}"
                 )
+        if not controllers:
+            raise ParameterError("controllers is empty: expected one or more")
         return list(controllers)
     missing = set()
     if task.record is None:
@@ -206,11 +208,13 @@ def _names(controllers: Sequence[str] | None, task: Task) -> list[str]:
 
 def _row(name: str, entries: list[Entry | None], task: Task, draws: int) -> Row:
     """Judge a controller by all references, on all variants of the stage."""
+    first = next((entry for entry in entries if entry is not None), None)
+    if first is None:
+        raise ParameterError("references: expected one at least that it can learn, which repeats")
     cells = [
         tuple(_cell(entry, variant, task, draws, chatters=i == 0) for entry in entries)
         for i, variant in enumerate(variants(task.stage))
     ]
-    first = next(entry for entry in entries if entry is not None)
     sensitivity, margin = _robustness(first.controller, task)
     return Row(
         name=name,

@@ -146,7 +146,8 @@ def comparison_text(comparison: ControllerComparison) -> str:
     for wide, narrow in zip(grids(comparison), grids(comparison, spreads=False), strict=True):
         tried = [_lines(grid, width) for grid in (wide, narrow) for width in HEADINGS]
         lines += [*next((one for one in tried if max(map(len, one)) <= WIDTH), tried[-1]), ""]
-    lines += [f"not made: {name}: {why}" for name, why in comparison.refused.items()]
+    for name, why in comparison.refused.items():
+        lines += wrap(f"not made: {name}: {why}", WIDTH, subsequent_indent="  ")
     return "\n".join(lines).rstrip("\n")
 
 
