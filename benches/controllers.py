@@ -2,7 +2,8 @@
 
     python benches/controllers.py [FOLDER]
 
-writes controllers_*.png into the folder.
+writes controllers_*.png and, as controllers_*.md, the tables of docs/compare-controllers.md into
+the folder.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import Any
 import matplotlib as mpl
 
 import piezotrack as pt
+from piezotrack.control.comparing.comparison_table import grids
 
 mpl.use("Agg")
 
@@ -43,6 +45,17 @@ def measured() -> tuple[Any, Any, dict[str, Any]]:
     return stage, model, {**found, "rates": (0.5, 2.0, 8.0), "particles": 24, "iterations": 30}
 
 
+def markdown(found: pt.control.ControllerComparison) -> str:
+    """The tables of a comparison as a page has them."""
+    pages = []
+    for grid in grids(found):
+        head = ["", *grid.heads]
+        lines = [head, ["---"] * len(head), *([name, *cells] for name, cells in grid.rows)]
+        table = "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
+        pages.append(f"{grid.title}\n\n{table}\n")
+    return "\n".join(pages)
+
+
 def main() -> None:
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
     for name, make in (("published", published), ("measured", measured)):
@@ -50,6 +63,7 @@ def main() -> None:
         started = time.perf_counter()
         found = pt.compare_controllers(stage, model, **options)
         print(f"{name}: {time.perf_counter() - started:.0f} s\n{found}\n", flush=True)
+        (folder / f"controllers_{name}.md").write_text(markdown(found), encoding="utf-8")
         found.plot().savefig(folder / f"controllers_{name}.png", dpi=110)
 
 

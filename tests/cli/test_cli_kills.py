@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import re
 import subprocess
 import sys
 import threading
@@ -42,6 +43,18 @@ WORK = {
         "--train",
         ":3",
     ],
+    "tune": [
+        *("tune", "dahl.json", "--reference", "sine:0.5Hz,10..60um,4s", "--noise-nm", "60"),
+        *("--dt", "0.02", "--limits", "0:75", "--parts", "pid"),
+    ],
+    "learn": [
+        *("learn", "dahl.json", "--reference", "sine:0.5Hz,10..60um,4s", "--noise-nm", "60"),
+        *("--dt", "0.02", "--limits", "0:75", "--trials", "3", "--picture"),
+    ],
+    "compare-controllers": [
+        *("compare-controllers", "dahl.json", "--controllers", "PID", "--rates", "0.5,1,2"),
+        *("--dt", "0.02", "--limits", "0:75", "--noise-nm", "60"),
+    ],
 }
 # Results are renamed slowly in every other run, so that this is met too.
 SLOWLY = (
@@ -59,14 +72,18 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 def start(work: list[str], out: str, seed: int, *, slowly: bool = False) -> subprocess.Popen[bytes]:
     words = f"{HEADING}; {SLOWLY if slowly else 'pass'}; main()"
+    # A table is given a name, the others write into a folder.
+    written = f"{out}/table.csv" if work[0] == "learn" else out
     return subprocess.Popen(
-        [sys.executable, "-c", words, *work, "--overwrite", "--out", out, "--seed", str(seed)],
+        [sys.executable, "-c", words, *work, "--overwrite", "--out", written, "--seed", str(seed)],
         stdout=subprocess.DEVNULL,
     )
 
 
 def content(folder: str) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in Path(folder).iterdir()}
+    read = {path.name: path.read_bytes() for path in Path(folder).iterdir()}
+    # How long a step takes is measured, and so not the same twice.
+    return {name: re.sub(rb'"step_time": [^\n]*', b"", data) for name, data in read.items()}
 
 
 def whole(work: list[str], seed: int) -> tuple[dict[str, bytes], float]:

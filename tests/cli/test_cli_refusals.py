@@ -84,6 +84,9 @@ def test_refuses_a_bad_drive(name: str) -> None:
     assert not Path("run").exists()
 
 
+TUNE = "tune dahl.json --dt 0.02 --limits 0:75"
+COMPARE = "compare-controllers dahl.json --dt 0.02 --limits 0:75 --rates 0.5,1,2"
+LEARN = "learn dahl.json --dt 0.02 --limits 0:75 --reference sine:0.5Hz,10..60um,4s"
 BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "identify gone.csv": ("gone.csv: there is no such file",),
     "identify .": ("is a directory",),
@@ -166,6 +169,44 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "simulate dahl.json log.csv --dt 0": ("log.csv", "dt is 0", "above 0"),
     "simulate dahl.json log.csv --out file": ("file cannot be made a folder",),
     "simulate dahl.json huge.csv": ("huge.csv", "finite"),
+    f"{TUNE} --out file": ("file cannot be made a folder",),
+    f"{TUNE} --out file/sub": ("cannot be made a folder",),
+    f"{TUNE} --json --quiet": ("--json and --quiet", "at most"),
+    f"{TUNE} --seed -1": ("seed is -1", "0 or above"),
+    f"{TUNE} --limits 75:0": ("limits", "the lower one first"),
+    f"{TUNE} --reference gone.csv": ("gone.csv: there is no such file",),
+    f"{TUNE} --reference bad.csv": ("bad.csv:3: ", "'high'"),
+    f"{TUNE} --parts repetitive": ("parts has 'repetitive'", "references that repeat"),
+    f"{TUNE} --noise-nm -1": ("noise is -1e-9 m", "0 or above"),
+    f"{TUNE} --bandwidth 0": ("bandwidth is 0", "above 0"),
+    f"{TUNE} --gain-margin nan": ("--gain-margin is nan", "above 1"),
+    f"{TUNE} --delay 1e9": ("delay is 1e+09 s in all", "expected 2000 s at most"),
+    "tune gone.json": ("gone.json: no such file",),
+    "tune log.csv": ("log.csv:1: not JSON",),
+    "tune dahl.json": ("--dt is missing",),
+    "tune dahl.json --dt 0.02": ("--limits is missing",),
+    f"{COMPARE} --out file": ("file cannot be made a folder",),
+    f"{COMPARE} --json --quiet": ("--json and --quiet", "at most"),
+    f"{COMPARE} --seed -1": ("seed is -1", "0 or above"),
+    f"{COMPARE} --seeds 0": ("seeds is 0", "1 to 100"),
+    f"{COMPARE} --limits 75:0": ("limits", "the lower one first"),
+    f"{COMPARE} --rates nan,1,2": ("--rates is 'nan,1,2'", "in rising order"),
+    f"{COMPARE} --rates 1e-9,1,2": ("--rates begins with 1e-09 Hz", "expected 0.00015 Hz or more"),
+    f"{COMPARE} --rates 1,2,25": ("--rates ends with 25 Hz", "half the sampling rate, 25 Hz"),
+    f"{COMPARE} --controllers ,": ("controllers has ''", "'inverse'"),
+    f"{COMPARE} --controllers network": ("not one could be made", "network: record is missing"),
+    f"{COMPARE} --delay 1e9": ("delay is 1e+09 s in all", "expected 2000 s at most"),
+    f"{COMPARE} --delay nan": ("delay is nan", "0 or above"),
+    f"{COMPARE} --noise-nm -1": ("noise is -1e-9 m", "0 or above"),
+    f"{COMPARE} --stage gone.json": ("gone.json: no such file",),
+    f"{COMPARE} --stage other.json": ("other.json is not a piezotrack model",),
+    f"{COMPARE} --stage xu-li-2010 --noise-nm 5": ("--noise-nm has no effect",),
+    "compare-controllers gone.json": ("gone.json: no such file",),
+    "compare-controllers dahl.json": ("--dt is missing",),
+    f"{LEARN} --out file/t.csv": ("file cannot be made a folder",),
+    f"{LEARN} --seed -1 --noise-nm 5": ("seed is -1", "0 or above"),
+    f"{LEARN} --limits 75:0": ("limits", "the lower one first"),
+    f"{LEARN} --noise-nm -1": ("noise is -1e-9 m", "0 or above"),
     "demo --out file": ("file cannot be made a folder",),
     "demo --seed -1": ("seed is -1", "0 or above"),
 }
@@ -176,6 +217,7 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
 def test_refuses_a_bad_argument(command: str) -> None:
     write("file", "not a folder")
     write("other.json", "{}")
+    write("bad.csv", "time_s,target_um\n0,1\n0.1,high\n")
     write("huge.csv", "time_s,voltage_V\n0,0\n1,-1e9\n2,0\n3,1e9\n")
     write_model()
     before = {path for path in Path().rglob("*") if path.is_file()}
@@ -189,6 +231,13 @@ def test_refuses_a_bad_argument(command: str) -> None:
     ("command", "piece"),
     [
         ("identify log.csv --dt often", "--dt"),
+        ("tune dahl.json --gain-margin much", "--gain-margin"),
+        ("tune dahl.json --iterations 3", "--iterations"),
+        ("tune", "MODEL"),
+        ("compare-controllers dahl.json --seeds few", "--seeds"),
+        ("compare-controllers", "MODEL"),
+        ("learn dahl.json --reference sine:1Hz,0..9um,2s --method both", "--method"),
+        ("learn dahl.json", "--reference"),
         ("identify log.csv --seed lucky", "--seed"),
         ("identify log.csv --threads two", "--threads"),
         ("identify log.csv --hold spline", "--hold"),

@@ -87,6 +87,13 @@ def test_what_could_not_be_made_says_why() -> None:
     assert "not made: network" in str(found)
     with pytest.raises(pt.ParameterError, match=r"not one could be made; network: record"):
         compared(controllers=["network"])
+    once = pt.chirp(start_frequency=1.0, stop_frequency=5.0, low=20e-6, high=60e-6, duration=2.0)
+    names = ["inverse", "inverse + PID + repetitive", "inverse + PID + learning"]
+    found = compared(controllers=names, references=[once])
+    assert [row.name for row in found.rows] == ["inverse"]
+    for name in names[1:]:
+        assert found.refused[name].startswith("references: expected one at least")
+    assert max(map(len, str(found).splitlines())) <= 100
 
 
 def noisy(seed: int) -> pt.VirtualStage:
@@ -198,10 +205,14 @@ def test_the_picture_has_a_mark_for_each_reference() -> None:
     [
         ({"controllers": ["pid"]}, "controllers has 'pid'"),
         ({"references": []}, "references is empty"),
+        ({"controllers": []}, "controllers is empty"),
         ({"references": ["sine"]}, "references has str"),
         ({"limits": (1.0, 0.0)}, "expected the lower one first"),
         ({"dt": 0.0}, "dt is 0"),
         ({"delay": -1.0}, "delay is -1"),
+        ({"references": None, "rates": (1.0, 2.0)}, "rates is .* in rising order"),
+        ({"references": None, "rates": (1.0, 2.0, 500.0)}, "rates ends with 500 Hz"),
+        ({"references": None, "rates": (1e-9, 2.0, 5.0)}, "rates begins with 1e-09 Hz"),
         ({"seeds": 0}, "seeds is 0: expected 1 to 100"),
         ({"seeds": 101}, "seeds is 101: expected 1 to 100"),
     ],

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import math
+import os
+import signal
+import threading
+import time
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 import piezotrack as pt
 from piezotrack.control import Kept
-from piezotrack.control.tracking import Tracking
 from piezotrack.control.tuning import search
+
+if TYPE_CHECKING:
+    from piezotrack.control.tracking import Tracking
 
 LIMITS = (0.0, 75.0)
 QUICK: dict[str, Any] = {"particles": 24, "iterations": 25}
@@ -214,6 +220,24 @@ def test_a_model_of_the_set_that_cannot_follow_is_named() -> None:
     words = "model 2: reference is 100 um .* expected 0 to 44 um .* clipped=0.5 or more"
     with pytest.raises(pt.ParameterError, match=words):
         pt.tune([published_stage(), weak], motion(10.0), dt=0.02, limits=LIMITS, **QUICK)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends no signal to its own process")
+def test_ctrl_c_ends_a_search_without_half_tuned_gains() -> None:
+    """A search with so many particles takes minutes."""
+    timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
+    begun = time.monotonic()
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        pt.tune(
+            published_stage(), motion(), dt=1e-3, limits=LIMITS, particles=2000, iterations=1000
+        )
+    assert time.monotonic() - begun < 20.0
+
+
+def test_a_delay_beyond_the_memory_of_a_search_is_refused() -> None:
+    with pytest.raises(pt.ParameterError, match=r"delay is 1e\+09 s in all: expected 2000 s"):
+        pt.tune(published_stage(), motion(), dt=0.02, limits=LIMITS, delay=1e9, **QUICK)
 
 
 def test_plants_of_both_signs_are_refused() -> None:

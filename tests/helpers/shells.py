@@ -57,6 +57,23 @@ OPTIONS: dict[str, list[str]] = {
     "--hold": ["foh", "zoh", "x"],
     "--model": ["dahl", "bouc-wen", "prandtl-ishlinskii", "none", "model.json", ""],
     "--second-level": ["40:50", "x", "0:0", "1:nan"],
+    "--parts": ["pid", "pid,low-pass", "notch", "repetitive", "pid,,", "x", ""],
+    "--figure": ["rms", "largest", "x", ""],
+    **{key: ["2", "1", "1.2", *NUMBERS] for key in ("--gain-margin", "--sensitivity")},
+    "--phase-margin": ["30", "0", "180", *NUMBERS],
+    **{key: ["10", "95", *NUMBERS] for key in ("--mode-spread", "--gain-spread")},
+    "--delay-spread": ["0.002", *NUMBERS],
+    "--noise-nm": ["30", *NUMBERS],
+    "--bandwidth": ["100", *NUMBERS],
+    "--controllers": ["inverse", "inverse, PID", "network", "inverse + PD", "x", "", ","],
+    "--rates": ["0.5,1,2", "2,1", "1,1,1", "0,1,2", "x,1,2", "1e-9,1,1e9", ""],
+    "--stage": ["model.json", "xu-li-2010", "none.json", ""],
+    "--seeds": ["1", "2", "0", "101", *WHOLE],
+    "--trials": ["1", "3", "10001", *WHOLE],
+    "--method": ["frequency", "lifted", "x"],
+    "--gain": ["0.7", "2", *NUMBERS],
+    "--cutoff": ["5", "24", *NUMBERS],
+    "--mode-scales": ["1", "0.9,1,1.1", "1,", "x", "0", "1e300,1"],
     "--swarm": ["default", "spso-2011", "none"],
 }
 COLUMNS = ("--dt", "--unit", "--time", "--drive")
@@ -66,6 +83,25 @@ COMMANDS: dict[str, tuple[list[str], tuple[str, ...]]] = {
     "simulate": (["model.json", "log.csv"], (*COLUMNS, "--hold")),
     "feedforward": (["model.json", "REFERENCE"], ("--dt", "--duration", "--period")),
     "track": (["model.json"], (*LOOP, "--reference", "--period", "--tq", "--kq", "--tt")),
+    "tune": (
+        ["model.json", "--dt", "0.02", "--limits", "0:75", "--parts", "pid"],
+        ("--reference", "--dt", "--limits", "--delay", "--seed", "--duration", "--period",
+         "--parts", "--figure", "--gain-margin", "--phase-margin", "--sensitivity",
+         "--mode-spread", "--gain-spread", "--delay-spread", "--noise-nm", "--bandwidth"),
+    ),
+    "compare-controllers": (
+        ["model.json", "--dt", "0.02", "--limits", "0:75", "--rates", "0.5,1,2",
+         "--controllers", "inverse"],
+        ("--dt", "--limits", "--delay", "--seed", "--seeds", "--rates", "--stage",
+         "--controllers", "--sensitivity", "--noise-nm", "--bandwidth"),
+    ),
+    "learn": (
+        ["model.json", "--dt", "0.02", "--limits", "0:75", "--reference", REFERENCES[0],
+         "--trials", "3"],
+        ("--reference", "--dt", "--limits", "--kp", "--ti", "--td", "--delay", "--seed",
+         "--duration", "--period", "--stage", "--trials", "--method", "--gain", "--cutoff",
+         "--mode-scales", "--noise-nm", "--bandwidth"),
+    ),
     "contour": (["model.json"], (*LOOP, "--path", "--lag", "--cross-talk", "--path-dt")),
     "identify": (
         ["log.csv", "--runs", "1"],
@@ -80,7 +116,7 @@ COMMANDS: dict[str, tuple[list[str], tuple[str, ...]]] = {
 MIX = (
     ["simulate", "feedforward", "track"] * 4
     + ["step", "noise"] * 2
-    + ["contour", "identify", "compare"]
+    + ["contour", "identify", "compare", "tune", "compare-controllers", "learn"]
 )
 
 
@@ -107,7 +143,9 @@ def invocations(draw: Any, right: list[str]) -> tuple[list[str], dict[str, str]]
         arguments += ["--path", PATHS[0]]
     for option in chosen:
         arguments += [option, draw(st.sampled_from(OPTIONS[option]))]
-    return [*arguments, "--out", "out"], files
+    # Or nothing would be asked of a command any more after it has succeeded once.
+    out = "out/t.csv" if command == "learn" else "out"
+    return [*arguments, "--overwrite", "--out", out], files
 
 
 def faults_of_command(arguments: list[str]) -> tuple[list[str], int | None]:

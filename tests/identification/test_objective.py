@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import os
+import signal
+import threading
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -87,3 +90,15 @@ def test_places_outside_of_the_box_are_refused(place: Any, expected: str) -> Non
 def test_a_model_that_is_not_searched_has_no_box() -> None:
     with pytest.raises(pt.ParameterError, match="expected one that is searched"):
         pt.identification.Objective(log(), "prandtl-ishlinskii")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends no signal to its own process")
+def test_ctrl_c_is_raised_and_no_costs_are_made_up() -> None:
+    """So many costs take ten seconds."""
+    once = log()
+    u, y = np.tile(once.u, 20), np.tile(once.y, 20)
+    cost = pt.identification.Objective(pt.Dataset(u=u, y=y, dt=once.dt), "dahl", fixed=HELD)
+    many = places(200_000, cost)
+    threading.Timer(1.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        cost(many)

@@ -38,6 +38,7 @@ ADVICE = [
     (r"\bdead_zones is ", "--asymmetry is ", "--asymmetry"),
     (r"\bmargins\.gain is ", "--gain-margin is ", "--gain-margin"),
     (r"\bmethod '(frequency|lifted)'", r"--method \1", "--mode-scales"),
+    (r"\brates (?=begins|ends)", "--rates ", "--rates"),
     (r"\bmode_scales is ", "--mode-scales is ", "--mode-scales"),
     (r"\bmargins\.sensitivity is ", "--sensitivity is ", "--sensitivity"),
     (r"\blog\[([^\]]*)\]", r"--window \1", "--window"),

@@ -22,7 +22,21 @@ if TYPE_CHECKING:
     from ..stages.virtual import VirtualStage
     from .controller import Controller
 
-__all__ = ["check_drive_unit", "check_period", "check_stable", "check_within_reach"]
+__all__ = ["check_delay", "check_drive_unit", "check_period", "check_stable", "check_within_reach"]
+
+
+# Control intervals that a loop of a search keeps on their way to the stage.
+MOST_INTERVALS = 100_000
+
+
+def check_delay(stage: VirtualStage, delay: float, dt: float) -> None:
+    """Refuse a delay [s], that of the sensor included, beyond the memory of a search."""
+    whole, most = delay + stage.sensor.delay, MOST_INTERVALS * dt
+    if whole > most:
+        raise ParameterError(
+            f"delay is {whole:.6g} s in all: expected {most:.6g} s at most, "
+            f"{MOST_INTERVALS} control intervals"
+        )
 
 
 def check_drive_unit(stage: object, controller: Controller) -> None:

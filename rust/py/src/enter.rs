@@ -149,6 +149,24 @@ pub fn enter_pool<T: Send>(
     }
 }
 
+/// Runs a job on threads of its own that reports nothing, and whose partial result is of no use: an
+/// interruption is raised.
+pub fn enter_quiet_pool<T: Send>(
+    py: Python<'_>,
+    threads: usize,
+    job: impl FnOnce(Stop<'_>) -> piezotrack_core::Result<T> + Send,
+) -> PyResult<T> {
+    let quiet = Watchers { callback: None, progress: None, journal: None };
+    let (result, stopped) = enter_pool(py, threads, &quiet, |_, stop| {
+        let result = job(stop);
+        Ok((result, stop()))
+    })?;
+    if stopped {
+        return Err(PyKeyboardInterrupt::new_err("interrupted"));
+    }
+    result.map_err(|error| raise(&error))
+}
+
 /// Passes reports to Python, and signals to the worker, until the worker ends.
 fn watch(
     watchers: &Watchers,

@@ -8,7 +8,7 @@ use piezotrack_core::signal::Stop;
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
-use crate::enter::{Watchers, enter_pool};
+use crate::enter::enter_quiet_pool;
 use crate::errors::raise;
 use crate::question::{Asked, Question};
 
@@ -34,8 +34,7 @@ impl PyObjective {
     #[new]
     fn new(py: Python<'_>, question: Question<'_>, threads: usize) -> PyResult<Self> {
         let asked = question.asked()?;
-        let watchers = Watchers { callback: None, progress: None, journal: None };
-        let (problem, stepping) = enter_pool(py, threads, &watchers, |_, stop| {
+        let (problem, stepping) = enter_quiet_pool(py, threads, |stop| {
             let record = asked.record()?;
             let problem = Problem::new(&record, &asked.spec(&record)?, stop)?;
             let stepping = Evaluator::new(&record, &problem, stop).stepping;
@@ -114,8 +113,7 @@ impl PyObjective {
         py: Python<'_>,
         job: impl FnOnce(&LocalRefinement<'_>, Stop<'_>) -> Result<T> + Send,
     ) -> PyResult<T> {
-        let watchers = Watchers { callback: None, progress: None, journal: None };
-        enter_pool(py, self.threads, &watchers, |_, stop| {
+        enter_quiet_pool(py, self.threads, |stop| {
             let record = self.asked.record()?;
             let evaluator = Evaluator::stepped(&record, &self.problem, self.stepping);
             let records = Records::one(evaluator);

@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use crate::arrays::samples;
 use crate::control::PyController;
 use crate::design::PyLoopPlant;
-use crate::enter::{Watchers, enter_pool};
+use crate::enter::enter_quiet_pool;
 use crate::errors::raise;
 use crate::virtual_stage::PyVirtualStage;
 
@@ -79,14 +79,11 @@ impl PyTask {
         threads: usize,
     ) -> PyResult<Vec<FigureNumbers>> {
         let controllers: Vec<_> = controllers.iter().map(|one| one.controller).collect();
-        let found = enter_pool(py, threads, &QUIET, |_, stop| {
-            self.task().ready()?.figures(&controllers, stop)
-        })?;
+        let found =
+            enter_quiet_pool(py, threads, |stop| self.task().ready()?.figures(&controllers, stop))?;
         Ok(found.iter().map(numbers).collect())
     }
 }
-
-const QUIET: Watchers = Watchers { callback: None, progress: None, journal: None };
 
 impl PyTask {
     fn task(&self) -> Task<'_> {
@@ -145,9 +142,8 @@ impl PyPathTask {
     ) -> PyResult<Vec<FigureNumbers>> {
         let (x, y): (Vec<_>, Vec<_>) =
             controllers.iter().map(|(x, y)| (x.controller, y.controller)).unzip();
-        let found = enter_pool(py, threads, &QUIET, |_, stop| {
-            self.task()?.ready()?.figures([&x, &y], stop)
-        })?;
+        let found =
+            enter_quiet_pool(py, threads, |stop| self.task()?.ready()?.figures([&x, &y], stop))?;
         Ok(found.iter().map(numbers).collect())
     }
 }
@@ -327,6 +323,6 @@ fn tune(
         iterations,
         seed,
     };
-    let found = enter_pool(py, threads, &QUIET, |_, stop| tuning.search(stop))?;
+    let found = enter_quiet_pool(py, threads, |stop| tuning.search(stop))?;
     Ok(FoundSettings::of(&found))
 }

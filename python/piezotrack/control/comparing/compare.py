@@ -15,6 +15,7 @@ from ...errors import ParameterError, PiezotrackError
 from ...identification.identified import IdentifiedModel
 from ...references.reference import Reference
 from ...stages.base import Stage
+from ..checks import check_delay
 from ..controller import number_pair
 from ..laws import chatter_of
 from ..plant import plant_of, run_closed_loop, stepped, voltages_before
@@ -129,17 +130,19 @@ def compare_controllers(
         raise ParameterError(
             f"model is {type(model).__name__}: expected a stage or identified model"
         )
+    interval, late = check_dt(dt), not_negative("delay", delay, "s")
+    check_delay(plant, late, interval)
     task = Task(
         stage=plant,
         inverse=model.inverse(),
         models=models or {},
         record=record,
-        references=_references(references) or usual_references(plant, (low, high), rates),
-        dt=check_dt(dt),
+        references=_references(references) or usual_references(plant, (low, high), rates, interval),
+        dt=interval,
         limits=(low, high),
         margins=margins or Margins(),
         spread=spread or Spread(),
-        delay=not_negative("delay", delay, "s"),
+        delay=late,
         options=options,
     )
     draws = _counted(seeds)
@@ -187,6 +190,8 @@ def _names(controllers: Sequence[str] | None, task: Task) -> list[str]:
                     f"controllers has {quoted(one)}: expected some of "
                     f"{', '.join(map(repr, CONTENDERS))}"
                 )
+        if not controllers:
+            raise ParameterError("controllers is empty: expected one or more")
         return list(controllers)
     missing = set()
     if task.record is None:
@@ -203,11 +208,13 @@ def _names(controllers: Sequence[str] | None, task: Task) -> list[str]:
 
 def _row(name: str, entries: list[Entry | None], task: Task, draws: int) -> Row:
     """Judge a controller by all references, on all variants of the stage."""
+    first = next((entry for entry in entries if entry is not None), None)
+    if first is None:
+        raise ParameterError("references: expected one at least that it can learn, which repeats")
     cells = [
         tuple(_cell(entry, variant, task, draws, chatters=i == 0) for entry in entries)
         for i, variant in enumerate(variants(task.stage))
     ]
-    first = next(entry for entry in entries if entry is not None)
     sensitivity, margin = _robustness(first.controller, task)
     return Row(
         name=name,

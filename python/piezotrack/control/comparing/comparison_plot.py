@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..._support.plot_style import panels, whole
+from .comparison_table import short
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
@@ -30,7 +31,7 @@ def plot_controllers(
     for k, name in enumerate(comparison.references):
         cells = [row.cells[0][k] for row in rows]
         errors = [math.nan if one is None else 1e9 * one.rms for one in cells]
-        left.plot(errors, places, MARKERS[k % len(MARKERS)], label=name, alpha=0.8)
+        left.plot(errors, places, MARKERS[k % len(MARKERS)], label=short(name), alpha=0.8)
     for k, name in enumerate(comparison.variants):
         errors = [1e9 * row.rms(k) for row in rows]
         right.plot(errors, places, MARKERS[k % len(MARKERS)], label=name, alpha=0.8)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from .comparison import ControllerComparison, Row
 
-__all__ = ["Grid", "comparison_html", "comparison_text", "grids", "with_spread"]
+__all__ = ["Grid", "comparison_html", "comparison_text", "grids", "short", "with_spread"]
 
 # Columns of a terminal; where headings are broken, and where they are else it is too narrow.
 WIDTH = 100
@@ -39,7 +39,7 @@ def grids(comparison: ControllerComparison, *, spreads: bool = True) -> list[Gri
     """
     rows, several = comparison.rows, comparison.seeds > 1
     many = f"mean of {comparison.seeds} draws of the noise" if several else "one draw of the noise"
-    names = [one.partition(" of ")[0] for one in comparison.references]
+    names = [short(one) for one in comparison.references]
 
     def mean(value: float, spread: float) -> str:
         return with_spread(value, spread if spreads else math.nan)
@@ -75,6 +75,11 @@ def grids(comparison: ControllerComparison, *, spreads: bool = True) -> list[Gri
             ],
         ),
     ]
+
+
+def short(reference: str) -> str:
+    """Name a reference without its numbers of steps and lines."""
+    return reference.partition(" of ")[0]
 
 
 def with_spread(value: float, spread: float) -> str:
@@ -141,7 +146,8 @@ def comparison_text(comparison: ControllerComparison) -> str:
     for wide, narrow in zip(grids(comparison), grids(comparison, spreads=False), strict=True):
         tried = [_lines(grid, width) for grid in (wide, narrow) for width in HEADINGS]
         lines += [*next((one for one in tried if max(map(len, one)) <= WIDTH), tried[-1]), ""]
-    lines += [f"not made: {name}: {why}" for name, why in comparison.refused.items()]
+    for name, why in comparison.refused.items():
+        lines += wrap(f"not made: {name}: {why}", WIDTH, subsequent_indent="  ")
     return "\n".join(lines).rstrip("\n")
 
 

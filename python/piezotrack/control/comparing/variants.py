@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..._support.arguments import as_numbers
+from ...errors import ParameterError
 from ...references.waveforms import multisine, sine, staircase, triangle
 from ..plant import reach, settled_bottom
 
@@ -23,6 +25,8 @@ PERIODS = 6
 STROKE = 0.6
 # Reach of the stage, sampled like this [s].
 REACH_STEP = 1e-3
+# Samples of the longest usual reference.
+MOST_SAMPLES = 2e6
 
 
 class Variant(NamedTuple):
@@ -75,9 +79,13 @@ def _scaled(stage: Stage, factors: dict[str, float]) -> Stage:
 
 
 def usual_references(
-    stage: VirtualStage, limits: tuple[float, float], rates: tuple[float, float, float]
+    stage: VirtualStage,
+    limits: tuple[float, float],
+    rates: tuple[float, float, float],
+    dt: float,
 ) -> list[Reference]:
     """Make a sine at three rates, a triangle, a staircase and a random motion within reach."""
+    rates = _checked(rates, dt)
     _, top = reach(stage, limits, REACH_STEP)
     # Once up, the stage no longer comes all the way down.
     bottom = settled_bottom(stage, limits, top, REACH_STEP)
@@ -95,3 +103,23 @@ def usual_references(
         staircase(dwell=1.0 / medium, steps=6, low=low, high=high),
         multisine(frequencies=tones, low=low, high=high, duration=3.0 / basis, seed=1),
     ]
+
+
+def _checked(rates: tuple[float, float, float], dt: float) -> tuple[float, float, float]:
+    """Check that rates rise, and what they ask of samples every `dt` seconds."""
+    listed = as_numbers("rates", rates)
+    if len(listed) != 3 or not 0.0 < listed[0] < listed[1] < listed[2]:
+        raise ParameterError(f"rates is {listed}: expected three rates in Hz in rising order")
+    slow, medium, fast = listed
+    if not fast < 0.5 / dt:
+        raise ParameterError(
+            f"rates ends with {fast:g} Hz: expected one below half the sampling rate, "
+            f"{0.5 / dt:.6g} Hz"
+        )
+    if PERIODS / slow / dt > MOST_SAMPLES:
+        least = PERIODS / MOST_SAMPLES / dt
+        raise ParameterError(
+            f"rates begins with {slow:g} Hz: expected {least:.3g} Hz or more, "
+            f"of which {PERIODS} periods are {MOST_SAMPLES:g} samples of {dt:g} s"
+        )
+    return slow, medium, fast

@@ -17,6 +17,7 @@ from ...references.xy_reference import XYReference
 from ...stages.base import Stage
 from ...stages.inverse import Inverse
 from ...stages.xy import XYStage
+from ..checks import check_delay
 from ..components import LowPass, Notch
 from ..controller import number_pair
 from ..plant import Plant, plant_of, voltages_before
@@ -129,6 +130,9 @@ def asked(
     intervals = _intervals(dt, model)
     unit = model.drive_unit if model is not None else "V"
     limits = _limits(limits, model, unit)
+    delay = not_negative("delay", delay, "s")
+    for one in (stage.x, stage.y) if both else stages[:1]:
+        check_delay(plant_of(one), delay, min(intervals))
     _check_allowed(figure, _core.as_number("allowed", allowed), references)
     if both is None:
         inverse = _inverse_of(stages[0], feedforward)
@@ -155,7 +159,7 @@ def asked(
         figure=figure,
         effort=not_negative("effort", effort, "m/V"),
         clipped=_core.as_number("clipped", clipped),
-        delay=not_negative("delay", delay, "s"),
+        delay=delay,
         jitter=not_negative("jitter", jitter, "s"),
         measured=error == "measured",
         allowed=allowed,

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
-
-from .search import searched
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,12 +12,6 @@ if TYPE_CHECKING:
     from .search import Answer
 
 __all__ = ["refusal"]
-
-# The search ranks an unstable loop before a stable one whose gain margin is short by a larger
-# factor than about this.
-RANKED = 1e3
-# So much more gain margin is asked for where that is kept.
-STEP = 10.0
 
 
 class _Short(NamedTuple):
@@ -44,11 +35,18 @@ class _Short(NamedTuple):
         """Say what was asked for, and what the nearest gains have."""
         side = "more" if self.least else "less"
         off = f", {self.factor:.4g} times too {'low' if self.least else 'high'}"
+        bound = f"{_number(self.bound)}{self.unit}"
         return (
-            f"margins.{self.name} is {self.bound:.9g}{self.unit}: expected one that some gains can "
-            f"keep; where {self.bound:.9g}{self.unit} or {side} was asked for, the nearest have "
-            f"{self.value:.6g}{self.unit} ({names[self.plant]}){off if self.factor > 1.1 else ''}"
+            f"margins.{self.name} is {bound}: expected one that some gains can keep; where {bound} "
+            f"or {side} was asked for, the nearest have {self.value:.6g}{self.unit} "
+            f"({names[self.plant]}){off if self.factor > 1.1 else ''}"
         )
+
+
+def _number(value: float) -> str:
+    """Write a number in six digits where it has no more."""
+    short = f"{value:.6g}"
+    return short if float(short) == value else f"{value:.9g}"
 
 
 def refusal(question: Question, nearest_answer: Answer) -> str:
@@ -61,15 +59,12 @@ def refusal(question: Question, nearest_answer: Answer) -> str:
             f"margins: the search found no gains whose exact margins are as asked for; the nearest "
             f"have {worst}: expected a milder margin, more particles or more iterations"
         )
-    if _unstable(robustness):
-        nearest = _stable(question)
-        if nearest is None:
-            return (
-                f"models: no gains in the search make all {len(names)} plants stable, the nearest "
-                f"leave {names[robustness[0][1]]} unstable: expected a smaller spread, or plants "
-                "nearer to each other"
-            )
-        robustness, figures = nearest, []
+    if robustness[0][0] > 0.0:
+        return (
+            f"models: no gains in the search make all {len(names)} plants stable, the nearest "
+            f"leave {names[robustness[0][1]]} unstable: expected a smaller spread, or plants "
+            "nearer to each other"
+        )
     if not figures:
         shorts = _shorts(question, robustness)
         return max(shorts, key=lambda one: one.factor).sentence(names)
@@ -91,10 +86,6 @@ def refusal(question: Question, nearest_answer: Answer) -> str:
     )
 
 
-def _unstable(robustness: Sequence[tuple[float, int]]) -> bool:
-    return robustness[0][0] > 0.0
-
-
 def _shorts(question: Question, robustness: Sequence[tuple[float, int]]) -> list[_Short]:
     margins = question.margins
     _, gain, phase, sensitivity, learning = robustness
@@ -104,19 +95,3 @@ def _shorts(question: Question, robustness: Sequence[tuple[float, int]]) -> list
         _Short("sensitivity", *sensitivity, margins.sensitivity, least=False),
         _Short("learning", *learning, margins.learning, least=False),
     ]
-
-
-def _stable(question: Question) -> Sequence[tuple[float, int]] | None:
-    """Search once more, with gain margins that the search can rank: the nearest stable gains."""
-    nearest, bound = None, RANKED
-    while bound < question.margins.gain:
-        milder = question._replace(margins=replace(question.margins, gain=bound))
-        answers = [searched(milder, one).found for one in question.intervals]
-        found = min(answers, key=lambda one: float(one["excess"]))
-        if _unstable(found["robustness"]):
-            break
-        nearest = found["robustness"]
-        if found["excess"] > 1.0:
-            break
-        bound *= STEP
-    return nearest

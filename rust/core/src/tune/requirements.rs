@@ -89,12 +89,16 @@ pub struct Robustness {
     pub learning: Worst,
 }
 
+/// How far an unstable loop counts as being off: further than one that is stable, however large the
+/// margins that are asked for.
+const UNSTABLE: f64 = 1e15;
+
 impl Robustness {
     /// How far the set is from what is required: 1 or less where it is kept by all.
     #[must_use]
     pub fn excess(&self, required: &Requirements) -> f64 {
         if self.unstable.value > 0.0 {
-            return 1e3 * (1.0 + self.unstable.value);
+            return UNSTABLE * (1.0 + self.unstable.value);
         }
         let ratios = [
             self.sensitivity.value / required.sensitivity,
