@@ -20,6 +20,7 @@ from .history import Start as Start
 from .identified import IdentifiedModel as IdentifiedModel
 from .identified import load as load
 from .least_squares import LeastSquares as LeastSquares
+from .likely import likely_models as likely_models
 from .objective import Objective as Objective
 from .plot import plot_convergence as plot_convergence
 from .plot import plot_loop as plot_loop
