@@ -119,6 +119,15 @@ impl<'a> Task<'a> {
         self.beside.get(k).copied().unwrap_or(0.0)
     }
 
+    /// Step of a loop by itself, s: as accurate as the parts of an interval in lanes.
+    fn coarse_step(&self) -> f64 {
+        let amplifier = &self.stage.amplifier;
+        let slewing = (amplifier.high - amplifier.low) / amplifier.slew;
+        let settling = [amplifier.lag(), slewing].into_iter().filter(|time| *time > 0.0);
+        let longest = settling.fold(self.timing.interval, f64::min) / MOST_STEPS;
+        self.stage.step.max(longest)
+    }
+
     /// The loop of one controller.
     fn alone(
         &self,
@@ -138,7 +147,8 @@ impl<'a> Task<'a> {
             commands.push(command);
             command.volts
         };
-        let apparatus = self.stage.apparatus();
+        let stage = VirtualStage { step: self.coarse_step(), ..*self.stage };
+        let apparatus = stage.apparatus();
         let run = match closed_loop(&apparatus, start.clone(), &timing, command, stop) {
             Ok(Some(run)) => run,
             // Also where the loop diverged.
