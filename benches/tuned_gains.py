@@ -129,7 +129,7 @@ def circles(apparatus: Apparatus, inverse: Any, rates: tuple[float, ...]) -> Non
 
 def budget(rate: float) -> dict[str, int]:
     """A loop at 5 kHz has 150 000 samples."""
-    return {"particles": 24, "iterations": 25} if rate > 2000.0 else {}
+    return {"particles": 32, "iterations": 40} if rate > 2000.0 else {}
 
 
 def contour_error(apparatus: Apparatus, pair: Any, path: Any) -> tuple[float, float]:

@@ -11,7 +11,7 @@ use crate::error::{Error, Result, check, usable};
 use crate::feedback_law::{Feedback, FeedbackSample};
 use crate::filters::{Filter, FilterState};
 use crate::limits::Limits;
-use crate::measurement::{LONGEST, Readings, Refused, Span};
+use crate::measurement::{Readings, Refused, Span};
 use crate::repetitive::{Outcome, RepetitiveState, SampledRepetitive};
 use crate::snapshot::Snapshot;
 
@@ -107,7 +107,7 @@ pub struct Command {
     pub saturated: bool,
     /// False where the measurement was not finite, outside the span, or a jump too far.
     pub measurement_ok: bool,
-    /// False where the reference was not finite or beyond a metre, or the feedforward was not
+    /// False where the reference was not finite or far outside the span, or the feedforward was not
     /// finite.
     pub reference_ok: bool,
 }
@@ -239,7 +239,7 @@ impl<F: Feedback> Controller<F> {
     ///
     /// Inputs that are not finite affect neither the actuator nor any state, and are reported by
     /// the flags of the command; so do measurements outside the span (or jumps that it excludes)
-    /// and references beyond a metre. Without a valid measurement or reference the feedback part
+    /// and references that are outside it by more than its width. Without a valid measurement or reference the feedback part
     /// holds its output, and the repetitive part continues its output without learning. Without a
     /// valid feedforward the last one is held; of one far outside the limits, as much is used as
     /// reaches from one limit beyond the other by the range between them.
@@ -252,7 +252,7 @@ impl<F: Feedback> Controller<F> {
         feedforward: f64,
     ) -> Command {
         let measurement_ok = self.span.accepts(&mut state.readings, measured);
-        let reference_fits = reference.abs() <= LONGEST;
+        let reference_fits = self.span.may_ask_for(reference);
         let (low, high) = (self.limits.low(), self.limits.high());
         let (mut feedforward_ok, mut used) = (true, feedforward);
         if !(feedforward >= low - (high - low) && feedforward <= high + (high - low)) {

@@ -75,6 +75,19 @@ impl Span {
     }
 }
 
+impl Span {
+    /// Whether a reference (m) may be meant: within the span, or outside it by its width at most;
+    /// false for NaN.
+    ///
+    /// What is further away only saturates, and teaches a repetitive part what it forgets for ever
+    /// after.
+    #[inline]
+    pub(crate) fn may_ask_for(&self, reference: f64) -> bool {
+        let width = self.high - self.low;
+        reference >= self.low - width && reference <= self.high + width
+    }
+}
+
 /// Number of readings that were refused since the start, by the reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Refused {

@@ -116,8 +116,9 @@ def box_of(
     period: float | None,
     limits: tuple[float, float],
     law: str = "pid",
+    lag: float = 0.0,
 ) -> Box:
-    """Set the ranges for plants that are sampled every `dt` seconds."""
+    """Set the ranges for plants sampled every `dt` seconds, of axes with a `lag` [s]."""
     gains = [plant.static_gain for plant in plants]
     largest = max((abs(gain) for gain in gains if math.isfinite(gain)), default=0.0)
     if largest == 0.0 or min(gains) * max(gains) <= 0.0:
@@ -132,7 +133,9 @@ def box_of(
         )
     ranges = law_ranges(law, largest, dt, limits)
     if "low-pass" in parts:
-        ranges.append(("cutoff", 0.02 / dt, 2.0 / dt, True))
+        # An axis whose reading is late moves ahead: so it can make up for its lag.
+        slow = min(0.02 / dt, 0.06 / lag) if lag > 0.0 else 0.02 / dt
+        ranges.append(("cutoff", slow, 2.0 / dt, True))
     if "notch" in parts:
         ranges += _notch(plants, dt)
     if "repetitive" in parts:

@@ -159,7 +159,8 @@ def _sought(question: Question, axis: Axis, dt: float) -> SoughtAxis:
         filters=question.filters,
         drive_unit=question.drive_unit,
     )
-    box = box_of(parts, cores, dt, period, question.limits, question.law)
+    lag = question.stage.lag if question.stage is not None else 0.0
+    box = box_of(parts, cores, dt, period, question.limits, question.law, lag)
     return SoughtAxis(axis.name, box, base, plants)
 
 
