@@ -16,7 +16,9 @@ from ..errors import DataError, ParameterError
 from .dataset_arguments import MIN_SAMPLES, decimation_factor, further_columns, window_samples
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    import os
+    from collections.abc import Iterator, Mapping, Sequence
+    from pathlib import Path
 
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import ArrayLike, NDArray
@@ -58,6 +60,8 @@ class Dataset:
         Units of `columns`, for labels.
     source : str, optional
         Where the record comes from, e.g. the name of a file.
+    notes : sequence of str, optional
+        What a person should know of its source, as that a unit is not the one of the file.
 
     Raises
     ------
@@ -105,6 +109,7 @@ class Dataset:
         columns: Mapping[str, ArrayLike] | None = None,
         column_units: Mapping[str, str] | None = None,
         source: str | None = None,
+        notes: Sequence[str] = (),
     ) -> None:
         if hold not in ("foh", "zoh"):
             raise ParameterError(f"hold is {quoted(hold)}: expected 'foh' or 'zoh'")
@@ -119,6 +124,7 @@ class Dataset:
         self._t, self._dt = time_axis(t, dt, self._u)
         self._columns, self._column_units = further_columns(columns, column_units, self._u)
         self._hold, self._drive_unit, self._source = hold, drive_unit, source
+        self._notes = tuple(map(str, notes))
         self._start = 0
         self._sha256: str | None = None
 
@@ -196,6 +202,48 @@ class Dataset:
         drive = {f"drive_{self.drive_unit}": self.u}
         return frame_of({"time_s": self.t, **drive, "displacement_um": 1e6 * self.y})
 
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the window as a log that `piezotrack.read` reads: the same numbers, in SI.
+
+        Parameters
+        ----------
+        path : path-like
+            The file. Its ending says the format: ``.csv``, ``.npz``, ``.mat`` (MAT v5) or
+            ``.parquet`` (needs pyarrow: ``pip install piezotrack[parquet]``). One that exists is
+            replaced.
+
+        Returns
+        -------
+        pathlib.Path
+            The file.
+
+        Raises
+        ------
+        ParameterError
+            The ending is another one.
+        DataError
+            The file cannot be written, or the library for its format is not installed.
+
+        Notes
+        -----
+        The warm-up is left out; ``log.full.save(path)`` writes it as samples. Times, drive,
+        displacement and further columns are read back to the last bit. In a MAT file a name that
+        MATLAB does not take, as ``temperature (K)``, becomes one that it does, and the units are
+        in the structure ``units``.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import piezotrack as pt
+        >>> u = 5.0 * np.sin(np.arange(5000) / 500.0)
+        >>> log = pt.Dataset(u=u, y=4e-6 * u, dt=0.005)
+        >>> bool(np.array_equal(pt.read(log.save("log.npz")).y, log.y))
+        True
+        """
+        from .log_file import save_log
+
+        return save_log(self, path)
+
     @property
     def t(self) -> Array:
         """Times of the samples in the window [s], shape (n,)."""
@@ -240,6 +288,11 @@ class Dataset:
     def source(self) -> str | None:
         """Where the record comes from, e.g. the name of a file."""
         return self._source
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on its source; an identification repeats them as warnings."""
+        return self._notes
 
     @property
     def warmup(self) -> int:
@@ -355,6 +408,7 @@ class Dataset:
             columns={k: low_passed(v, factor)[first::factor] for k, v in self._columns.items()},
             column_units=self._column_units,
             source=self._source,
+            notes=self._notes,
         )
         less._start = self._start // factor
         return less
@@ -416,6 +470,7 @@ class Dataset:
             columns={k: interpolated(v, factor) for k, v in self._columns.items()},
             column_units=self._column_units,
             source=self._source,
+            notes=self._notes,
         )
         fine._start = self._start * factor
         return fine

@@ -98,8 +98,8 @@ def record_warnings(data: Dataset) -> list[str]:
 would be 40 um if it is 1e6 too large, as um taken as m
     """
     if np.ptp(data.u) == 0.0 or np.ptp(data.y) == 0.0:
-        return []
-    return [*_units(data), *_seldom(data), *_periods(data), *_clipping(data)]
+        return [*data.notes]
+    return [*data.notes, *_units(data), *_seldom(data), *_periods(data), *_clipping(data)]
 
 
 def fit_warnings(
