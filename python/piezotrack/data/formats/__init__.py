@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from . import hdf5, mat, npz, text
+from . import gcs, hdf5, lvm, mat, npz, parquet, tdms, text, waveforms
 from .source import Source
 
 if TYPE_CHECKING:
@@ -25,6 +25,11 @@ FORMATS: tuple[Format, ...] = (
     npz.NPY,
     mat.FORMAT,
     hdf5.FORMAT,
+    parquet.FORMAT,
+    tdms.FORMAT,
+    gcs.FORMAT,
+    lvm.FORMAT,
+    waveforms.FORMAT,
     text.FORMAT,
 )
 

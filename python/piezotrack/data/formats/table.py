@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._support.arrays import MOST_SAMPLES, unmasked
-from ..._support.units import split_unit, symbol_of
+from ..._support.units import lookup, split_unit, symbol_of
 from ..columns import Column, Columns
 
 if TYPE_CHECKING:
@@ -268,36 +268,52 @@ class ChannelTable(Table):
         for column in self.columns:
             channel = self.channels[column.index]
             if column.index not in table and channel.count == count and column.group in groups:
-                table[column.index] = self.column(column)
+                further = _numbers(channel.read())
+                if further is not None and further.shape == (count,):
+                    table[column.index] = further
         return table
 
     def column(self, column: Column) -> Array:
         """Read one column; what is not a number is NaN."""
         channel = self.channels[column.index]
-        values = np.asarray(unmasked(channel.read()))
-        if values.dtype.kind == "M":
-            # The first sample is at 0 s: float64 does not hold nanoseconds since 1970.
-            values = (values - values[0]) / np.timedelta64(1, "ns")
-            values = values.astype(np.float64) / 1e9
-        elif values.dtype.kind == "m":
-            values = (values / np.timedelta64(1, "ns")).astype(np.float64) / 1e9
-        if values.dtype.kind not in "biuf":
+        raw = channel.read()
+        values = _numbers(raw)
+        if values is None:
             raise self.source.error(
-                f"{column} holds values of type {values.dtype}: expected real numbers"
+                f"{column} holds values of type {np.asarray(raw).dtype}: expected real numbers"
             )
         if values.shape != (channel.count,):
             raise self.source.error(
                 f"{column} has the shape {values.shape}, said to be ({channel.count},)"
             )
-        with np.errstate(over="ignore"):
-            return values.astype(np.float64, copy=False)
+        return values
+
+
+def _numbers(raw: Any) -> Array | None:
+    """Convert numbers and times to float64, dates to seconds from the first one."""
+    values = np.asarray(unmasked(raw))
+    if values.dtype.kind == "M":
+        # The first sample is at 0 s: float64 does not hold nanoseconds since 1970.
+        values = values - values[:1]
+    if values.dtype.kind == "m":
+        lost = np.isnat(values)
+        values = values.astype("timedelta64[ns]").astype(np.int64) / 1e9
+        values[lost] = np.nan
+    if values.dtype.kind not in "biuf":
+        return None
+    with np.errstate(over="ignore"):
+        return values.astype(np.float64, copy=False)
 
 
 def column_of(index: int, channel: Channel) -> Column:
     """Make the column of a channel; a stated unit counts as one in a title."""
-    name, unit = (channel.name.strip(), "") if channel.unit is not None else _split(channel.name)
-    if channel.unit is not None:
-        unit = symbol_of(channel.unit)
+    name, unit = _split(channel.name)
+    if channel.unit is not None and (stated := symbol_of(channel.unit)):
+        if not unit or (lookup(unit) is None and unit != stated):
+            name = channel.name.strip()
+        # No unit has this name: where two are stated, the caller has to say which one it is.
+        agree = not lookup(unit) or lookup(unit) == lookup(stated)
+        unit = stated if agree else f"{unit} in its title, {stated} beside it"
     return Column(
         index, channel.path, name, unit, group=channel.group, count=channel.count, last=channel.name
     )
