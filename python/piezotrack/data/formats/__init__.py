@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from . import gcs, hdf5, lvm, mat, npz, parquet, tdms, text, waveforms
+from . import afm, gcs, hdf5, lvm, mat, mdf, npz, parquet, tdms, text, waveforms
 from .source import Source
 
 if TYPE_CHECKING:
@@ -27,6 +27,8 @@ FORMATS: tuple[Format, ...] = (
     hdf5.FORMAT,
     parquet.FORMAT,
     tdms.FORMAT,
+    mdf.FORMAT,
+    afm.FORMAT,
     gcs.FORMAT,
     lvm.FORMAT,
     waveforms.FORMAT,

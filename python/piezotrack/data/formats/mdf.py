@@ -1,0 +1,61 @@
+"""MDF4 and MDF3 of measuring and calibration systems, with asammdf."""
+
+from __future__ import annotations
+
+from collections import Counter
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from .table import Channel, ChannelTable, Format
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from .source import Source
+
+__all__ = ["FORMAT"]
+
+
+def _opens(source: Source) -> ChannelTable:
+    if b"UnFinMF" in source.head[:8]:
+        raise source.error(
+            "was not finished by the program that wrote it: expected a finished MDF file"
+        )
+    asammdf = source.library("asammdf", "mdf")
+    with source.decoding("MDF"), asammdf.MDF(source.path) as file:
+        channels = list(_channels(source, asammdf, file))
+    return ChannelTable(source, channels)
+
+
+def _channels(source: Source, asammdf: Any, file: Any) -> Iterator[Channel]:
+    """Find the channels of all groups; each group has its own times."""
+    parts = [(k, part) for k, part in enumerate(file.groups) if part.channel_group.cycles_nr]
+    names = [str(getattr(part.channel_group, "acq_name", "") or "").strip() for _, part in parts]
+    shared = Counter(names)
+    for (number, part), name in zip(parts, names, strict=True):
+        group = name if name and shared[name] == 1 else f"group {number}"
+        group = group if len(parts) > 1 else ""
+        count = int(part.channel_group.cycles_nr)
+        size = int(part.channel_group.samples_byte_nr)
+        source.check_size(f"channel group {number}", count * max(size, 1))
+        source.check_size(f"channel group {number}", 8 * count)
+        master = file.masters_db.get(number)
+        for index, channel in enumerate(part.channels):
+            unit = file.get_channel_unit(group=number, index=index)
+            read = partial(_read, source, asammdf, number, index, index == master)
+            yield Channel(channel.name, count, read, group, unit or None)
+
+
+def _read(source: Source, asammdf: Any, group: int, index: int, is_master: bool) -> Any:
+    with source.decoding("MDF"), asammdf.MDF(source.path) as file:
+        signal = file.get(group=group, index=index)
+        # Copied, as the file is closed.
+        return (signal.timestamps if is_master else signal.samples).copy()
+
+
+FORMAT = Format(
+    name="MDF",
+    endings=(".mf4", ".mdf"),
+    opens=_opens,
+    begins=lambda head: head.startswith((b"MDF     ", b"UnFinMF ")),
+)
