@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from numbers import Integral
 from typing import TYPE_CHECKING
 
@@ -157,6 +158,8 @@ class Columns(list[Column]):
             # The time last: of several it is that of the group of the others.
             missing.sort(key="time".__eq__)
         for role in missing:
+            if role == "time":
+                _check_lengths(list(roles.values()))
             found = self._candidates(role, taken={column.index for column in roles.values()})
             groups = {column.group for column in roles.values()}
             if len(found) > 1 and len(groups) == 1:
@@ -258,6 +261,16 @@ def _titles(columns: Sequence[Column]) -> str:
     shown = [column.described for column in columns[:MOST_LISTED]]
     more = len(columns) - len(shown)
     return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
+
+
+def _check_lengths(columns: Sequence[Column]) -> None:
+    """Refuse columns of several lengths."""
+    for first, other in pairwise(columns):
+        if first.count != other.count:
+            raise DataError(
+                f"{first} has {first.count} samples and {other} has {other.count}: expected "
+                "equally many"
+            )
 
 
 def _check_unit(column: Column, role: str) -> None:

@@ -67,10 +67,10 @@ def _expanded(source: Source, body: memoryview, order: str) -> bytes:
     return content
 
 
-def _array(source: Source, body: memoryview, order: str, depth: int) -> int:
+def _array(source: Source, body: memoryview, order: str, depth: int) -> None:
     """Check an array whose elements begin at the start of `body`."""
     if len(body) == 0:
-        return 0
+        return
     if not depth:
         raise source.error(f"has more than {DEEPEST} arrays within each other")
     flags, place = _element(source, body, 0, order)
@@ -79,7 +79,7 @@ def _array(source: Source, body: memoryview, order: str, depth: int) -> int:
     kind = struct.unpack_from(f"{order}I", flags)[0] & 0xFF
     if kind > SPARSE + 10:
         # Function handles and objects of MATLAB's own have no dimensions; SciPy skips them.
-        return len(body)
+        return
     dimensions, place = _element(source, body, place, order)
     values = 1
     for (length,) in struct.iter_unpack(f"{order}i", dimensions[: len(dimensions) // 4 * 4]):
@@ -93,11 +93,10 @@ def _array(source: Source, body: memoryview, order: str, depth: int) -> int:
             _, place = _element(source, body, place, order)
         _, place = _element(source, body, place, order)
         _, place = _element(source, body, place, order)
-    if kind in (CELL, STRUCT, OBJECT):
-        while place + 8 <= len(body):
-            inner, place = _element(source, body, place, order)
+    while place + 8 <= len(body):
+        inner, place = _element(source, body, place, order)
+        if kind in (CELL, STRUCT, OBJECT):
             _array(source, inner, order, depth - 1)
-    return place
 
 
 def _element(source: Source, body: memoryview, place: int, order: str) -> tuple[memoryview, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +23,7 @@ def _opens(source: Source) -> ChannelTable:
             "was not finished by the program that wrote it: expected a finished MDF file"
         )
     asammdf = source.library("asammdf", "mdf")
-    with source.decoding("MDF"), asammdf.MDF(source.path) as file:
+    with _opened(source, asammdf) as file:
         channels = list(_channels(source, asammdf, file))
     return ChannelTable(source, channels)
 
@@ -46,8 +47,35 @@ def _channels(source: Source, asammdf: Any, file: Any) -> Iterator[Channel]:
             yield Channel(channel.name, count, read, group, unit or None)
 
 
+@contextmanager
+def _opened(source: Source, asammdf: Any) -> Iterator[Any]:
+    with source.decoding("MDF", "asammdf"), source.path.open("rb") as content:
+        try:
+            file = asammdf.MDF(content)
+        except Exception as error:
+            _close_halves(error)
+            raise
+        with file:
+            yield file
+
+
+def _close_halves(error: BaseException) -> None:
+    """Close what failed to open: asammdf's own `close` would fail on it, in `__del__`."""
+    trace = error.__traceback__
+    while trace is not None:
+        half: Any = trace.tb_frame.f_locals.get("self")
+        if hasattr(half, "_closed"):
+            half._closed = True
+            for name in ("_tempfile", "_mapped_file"):
+                if (opened := getattr(half, name, None)) is not None:
+                    opened.close()
+        trace = trace.tb_next
+    if error.__context__ is not None:
+        _close_halves(error.__context__)
+
+
 def _read(source: Source, asammdf: Any, group: int, index: int, is_master: bool) -> Any:
-    with source.decoding("MDF"), asammdf.MDF(source.path) as file:
+    with _opened(source, asammdf) as file:
         signal = file.get(group=group, index=index)
         # Copied, as the file is closed.
         return (signal.timestamps if is_master else signal.samples).copy()

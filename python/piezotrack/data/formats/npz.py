@@ -73,6 +73,8 @@ def _check(
     source: Source, what: str, shape: Sequence[int], dtype: np.dtype[Any], stored: int
 ) -> None:
     """Refuse an array whose bytes are not all there."""
+    if min(shape, default=0) < 0:
+        raise source.error(f"{what} has the shape {shape}: expected lengths of 0 or more")
     declared = math.prod(shape) * dtype.itemsize
     if not dtype.hasobject:
         source.check_size(what, declared, stored=stored)

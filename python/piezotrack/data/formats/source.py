@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import logging
 import warnings
 from contextlib import contextmanager
 from pathlib import Path
@@ -89,23 +90,29 @@ class Source:
             raise type(error)(f"{self.name}: {error}") from None
 
     @contextmanager
-    def decoding(self, kind: str) -> Iterator[None]:
+    def decoding(self, kind: str, logger: str | None = None) -> Iterator[None]:
         """Turn whatever a library raises on a damaged file of a kind into a sentence.
 
-        What it warns of is not shown: a file is read, or it is not.
+        What it warns of, or writes to its `logger`, is not shown: a file is read, or it is not.
         """
+        silent = logging.getLogger(logger or f"{__name__}.none")
+        before, silent.disabled = silent.disabled, True
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 yield
-        except (PiezotrackError, MemoryError):
+        except (PiezotrackError, MemoryError, KeyboardInterrupt, SystemExit, GeneratorExit):
             raise
-        # Libraries raise whatever their parsers stumble over: IndexError, zlib.error, struct.error.
-        except Exception as error:
+        # Parsers raise whatever they stumble over: IndexError, zlib.error, struct.error, and
+        # afmformats a BaseException of its own.
+        except BaseException as error:
             reason = " ".join(str(error).split()) or type(error).__name__
+            reason = reason.replace(str(self.path), self.name)
             raise self.error(
                 f"is not a sound {kind} file, or is cut off ({quoted(reason)})"
             ) from None
+        finally:
+            silent.disabled = before
 
     def library(self, module: str, extra: str) -> Any:
         """Import the library that reads a format.
