@@ -19,7 +19,7 @@ from ..errors import DataError, ParameterError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["Column", "Columns"]
+__all__ = ["Column", "Columns", "is_usual"]
 
 # The roles of columns: their quantities and usual titles.
 QUANTITIES = {
@@ -251,6 +251,11 @@ class Columns(list[Column]):
         instead = ", or give the sampling interval with dt=" if role == "time" else ""
         nothing = f"no column is known to be the {role}: name it with {role}={instead}"
         raise DataError(f"{nothing}; the columns are {_titles(self)}")
+
+
+def is_usual(name: str) -> bool:
+    """Whether a column of this name may be taken for time, drive or displacement."""
+    return any(_plain(name) in names for names in (*NAMES.values(), POSITIONS))
 
 
 def _plain(name: str) -> str:

@@ -227,9 +227,9 @@ class Dataset:
         Notes
         -----
         The warm-up is left out; ``log.full.save(path)`` writes it as samples. Times, drive,
-        displacement and further columns are read back to the last bit. In a MAT file a name that
-        MATLAB does not take, as ``temperature (K)``, becomes one that it does, and the units are
-        in the structure ``units``.
+        displacement and further columns are read back to the last bit. A further column with a
+        usual name, as ``y``, is written as ``column y``. In a MAT file a name that MATLAB does not
+        take becomes one that it does, and the units are in the structure ``units``.
 
         Examples
         --------

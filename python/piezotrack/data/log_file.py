@@ -10,11 +10,15 @@ from .._support.files import replacing, write_columns
 from .._support.messages import quoted
 from .._support.units import drive_word, split_unit
 from ..errors import ParameterError
+from .columns import is_usual
 from .formats import FORMATS
 from .formats.table import WrittenColumn
 
 if TYPE_CHECKING:
     import os
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from .dataset import Dataset
     from .formats.table import Format
@@ -55,8 +59,7 @@ def save_log(log: Dataset, path: str | os.PathLike[str]) -> Path:
         WrittenColumn("displacement", "m", log.y, "displacement_m"),
     ]
     columns += [
-        WrittenColumn(name, log.column_units[name], values, _title(name, log.column_units[name]))
-        for name, values in log.columns.items()
+        _further(name, log.column_units[name], values) for name, values in log.columns.items()
     ]
     with replacing(file) as temporary:
         known.write(temporary, columns)
@@ -79,9 +82,12 @@ def _drive(log: Dataset) -> WrittenColumn:
     return WrittenColumn(name, log.drive_unit, log.u, f"{name}_{log.drive_unit}")
 
 
-def _title(name: str, unit: str) -> str:
-    """Return a title from which a reader gets the same name and unit."""
+def _further(name: str, unit: str, values: NDArray[np.float64]) -> WrittenColumn:
+    """Give a further column a title from which a reader gets its name and unit."""
     plain = re.sub(r"\s+", " ", name)
-    if unit or split_unit(plain) != (plain, ""):
-        return f"{plain} [{unit}]"
-    return plain
+    bare = split_unit(plain)[0]
+    if is_usual(plain) or is_usual(bare):
+        # It would be taken for one of the three that are written before it.
+        plain = f"column {plain}"
+    is_plain = not unit and split_unit(plain) == (plain, "")
+    return WrittenColumn(plain, unit, values, plain if is_plain else f"{plain} [{unit}]")

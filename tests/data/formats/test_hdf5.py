@@ -97,7 +97,7 @@ def test_the_columns_of_another_length_are_named_with_it(tmp_path: Path) -> None
     assert "'scan 1/run/voltage' [V] (400 samples)" in found
     assert "'slow/temperature' [K] (40 samples)" in found
     found = refusal(path, displacement="temperature", units={"displacement": "um"})
-    assert "time' has 400 samples and column 'slow/temperature' has 40" in found
+    assert "'slow/temperature' has 40 samples and column 'scan 1/run/voltage' has 400" in found
 
 
 def test_the_extra_is_named_where_h5py_is_not_installed(

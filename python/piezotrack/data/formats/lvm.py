@@ -112,7 +112,7 @@ def _channels(
     number, time = 0, None
     for column in table.columns:
         is_x = column.title == X
-        delta = number_of(_entry(segment, "Delta_X", number))
+        delta = number_of(_entry(segment, "Delta_X", number).replace(",", "."))
         interval = delta if delta > 0.0 else None
         seconds = _entry(segment, "X_Dimension", number) in ("Time", "")
         if is_x:

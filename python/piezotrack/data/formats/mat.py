@@ -1,4 +1,4 @@
-"""MATLAB's files: MAT v5 to v7 through SciPy, v7.3 as HDF5."""
+"""MATLAB's files: MAT v5 and v7, and v7.3, which is HDF5."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..._support.units import split_unit
 from . import hdf5
-from .mat_elements import check_elements
+from .mat_elements import Variable, read_variables
 from .table import Channel, ChannelTable, Format, split_matrix
 
 if TYPE_CHECKING:
@@ -23,8 +24,6 @@ __all__ = ["FORMAT"]
 
 # Longest name of a variable in MATLAB.
 LONGEST = 63
-# Structures within structures that are followed.
-DEEPEST = 16
 UNITS = ("units", "unit")
 
 
@@ -37,52 +36,38 @@ def _opens(source: Source) -> ChannelTable:
             "save('log.mat', '-v7.3') writes"
         )
     with source.decoding("MAT"):
-        from scipy.io import loadmat
-
-        check_elements(source)
-        found = loadmat(source.path, struct_as_record=True, chars_as_strings=True)
-        variables = {name: value for name, value in found.items() if not name.startswith("__")}
-        channels = list(_channels(variables, "", {}, DEEPEST))
+        variables = {one.name: one for one in read_variables(source)}
+        channels = list(_channels(variables, "", {}))
     return ChannelTable(source, channels)
 
 
 def _channels(
-    variables: Mapping[str, Any], group: str, stated: Mapping[str, str], depth: int
+    variables: Mapping[str, Variable], group: str, inherited: Mapping[str, str]
 ) -> Iterator[Channel]:
     """Find the numbers in variables or fields, with the units in a structure beside them."""
-    stated = {**stated, **_units(variables)}
-    for name, value in variables.items():
-        if not isinstance(value, np.ndarray):
-            continue
-        if value.dtype.names is not None:
-            if value.size == 1 and depth and name not in UNITS:
-                record = value.reshape(-1)[0]
-                fields = {part: record[part] for part in value.dtype.names}
-                path = f"{group}/{name}" if group else name
-                yield from _channels(fields, path, _of_field(stated, name), depth - 1)
-        elif value.dtype.kind in "biuf":
-            for column, place, count in split_matrix(name, value.shape):
+    stated = {**inherited, **_units(variables)}
+    for name, variable in variables.items():
+        values = variable.values
+        if isinstance(values, dict) and name not in UNITS:
+            # Simulink's signals.values has the unit of signals.
+            inner = {"values": stated[name]} if name in stated else {}
+            yield from _channels(values, f"{group}/{name}" if group else name, inner)
+        elif isinstance(values, np.ndarray):
+            for column, place, count in split_matrix(name, variable.shape):
                 unit = stated.get(column, stated.get(name))
-                yield Channel(column, count, partial(_part, value, place), group, unit)
+                yield Channel(column, count, partial(_part, values, place), group, unit)
 
 
-def _units(variables: Mapping[str, Any]) -> dict[str, str]:
+def _units(variables: Mapping[str, Variable]) -> dict[str, str]:
     """Read the texts of a structure ``units`` whose fields are named like the variables."""
     units: dict[str, str] = {}
     for name in UNITS:
-        value = variables.get(name)
-        if isinstance(value, np.ndarray) and value.dtype.names is not None and value.size == 1:
-            record = value.reshape(-1)[0]
-            for field in value.dtype.names:
-                text = np.asarray(record[field])
-                if text.dtype.kind == "U" and text.size <= 1:
-                    units[field] = str(text.reshape(-1)[0]) if text.size else ""
+        fields = variables[name].values if name in variables else None
+        if isinstance(fields, dict):
+            texts = ((field, one.values) for field, one in fields.items())
+            units |= {field: text for field, text in texts if isinstance(text, str)}
+            units |= {field: "" for field, one in fields.items() if 0 in one.shape}
     return units
-
-
-def _of_field(stated: Mapping[str, str], name: str) -> dict[str, str]:
-    """Return the units of what is in a field, as Simulink's signals.values have none."""
-    return {"values": stated[name]} if name in stated else {}
 
 
 def _part(values: np.ndarray, place: Any) -> Any:
@@ -95,6 +80,8 @@ def _names(columns: Sequence[WrittenColumn]) -> list[str]:
     for column in columns:
         plain = re.sub(r"[^A-Za-z0-9]+", "_", column.name).strip("_") or "column"
         plain = (plain if plain[0].isalpha() else f"x_{plain}")[: LONGEST - 4]
+        # The unit is in the structure, and would be read twice.
+        plain = f"{plain}_" if split_unit(plain)[1] else plain
         name, number = plain, 2
         while name in (*names, *UNITS):
             name, number = f"{plain}_{number}", number + 1

@@ -308,11 +308,13 @@ def _numbers(raw: Any) -> Array | None:
 def column_of(index: int, channel: Channel) -> Column:
     """Make the column of a channel; a stated unit counts as one in a title."""
     name, unit = _split(channel.name)
-    if channel.unit is not None and (stated := symbol_of(channel.unit)):
-        if not unit or (lookup(unit) is None and unit != stated):
-            name = channel.name.strip()
+    if channel.unit is not None:
+        stated = symbol_of(channel.unit)
+        if not stated or (lookup(unit) is None and unit != stated):
+            # What looks like a unit is part of the name.
+            name, unit = (channel.name.strip() if unit else name), ""
         # No unit has this name: where two are stated, the caller has to say which one it is.
-        agree = not lookup(unit) or lookup(unit) == lookup(stated)
+        agree = not unit or lookup(unit) == lookup(stated)
         unit = stated if agree else f"{unit} in its title, {stated} beside it"
     return Column(
         index, channel.path, name, unit, group=channel.group, count=channel.count, last=channel.name
