@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["DriveRecord", "drive_dataset", "read", "read_displacement", "read_drive"]
+__all__ = ["DriveRecord", "Log", "drive_dataset", "read", "read_displacement", "read_drive"]
 
 USE_RESAMPLE = "resample= puts it on even times at that interval [s]"
 
@@ -98,7 +98,7 @@ def read(
     Dataset(3 samples, 0.015 s at 200 Hz, stroke 3.5 um)
     >>> folder.cleanup()
     """
-    log = _Log(path)
+    log = Log(path)
     roles = log.roles({"time": time, "drive": drive, "displacement": displacement}, units, dt)
     if resample is not None:
         if dt is not None:
@@ -172,7 +172,7 @@ def drive_dataset(
     dt: float | None = None,
 ) -> Dataset:
     """Read a drive as `read_drive`, with its unit; the displacement of the record is 0."""
-    log = _Log(path)
+    log = Log(path)
     return log.dataset(log.roles({"time": time, "drive": drive}, units, dt), dt, "foh")
 
 
@@ -213,12 +213,12 @@ def read_displacement(
     array([2.e-06, 3.e-06, 4.e-06])
     >>> folder.cleanup()
     """
-    log = _Log(path)
+    log = Log(path)
     column = log.columns.to_follow() if displacement is None else displacement
     return log.dataset(log.roles({"time": time, "displacement": column}, units, dt), dt, "foh")
 
 
-class _Log:
+class Log:
     """A file of any format, and how its columns become a record."""
 
     def __init__(self, path: str | os.PathLike[str]) -> None:

@@ -95,8 +95,9 @@ class Source:
 
         What it warns of, or writes to its `logger`, is not shown: a file is read, or it is not.
         """
-        silent = logging.getLogger(logger or f"{__name__}.none")
-        before, silent.disabled = silent.disabled, True
+        talking = _loggers(logger)
+        for one in talking:
+            one.disabled = True
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
@@ -112,7 +113,8 @@ class Source:
                 f"is not a sound {kind} file, or is cut off ({quoted(reason)})"
             ) from None
         finally:
-            silent.disabled = before
+            for one in talking:
+                one.disabled = False
 
     def library(self, module: str, extra: str) -> Any:
         """Import the library that reads a format.
@@ -182,3 +184,17 @@ class Source:
             if isinstance(error, PiezotrackError):
                 raise
             raise self.error(f"cannot be read: {error}") from None
+
+
+def _loggers(name: str | None) -> list[logging.Logger]:
+    """Return the loggers of a library that are not disabled already."""
+    if name is None:
+        return []
+    known = logging.Logger.manager.loggerDict.items()
+    return [
+        logger
+        for key, logger in known
+        if isinstance(logger, logging.Logger)
+        and (key == name or key.startswith(f"{name}."))
+        and not logger.disabled
+    ]

@@ -15,7 +15,7 @@ __all__ = ["FORMAT"]
 
 def _opens(source: Source) -> ChannelTable:
     nptdms = source.library("nptdms", "tdms")
-    with source.decoding("TDMS"):
+    with source.decoding("TDMS", "nptdms"):
         file = nptdms.TdmsFile.read_metadata(source.path)
         status = file.file_status
         channels = [
@@ -49,7 +49,7 @@ def _channel(source: Source, nptdms: Any, channel: Any) -> Channel:
 
 
 def _read(source: Source, nptdms: Any, group: str, name: str) -> Any:
-    with source.decoding("TDMS"), nptdms.TdmsFile.open(source.path) as file:
+    with source.decoding("TDMS", "nptdms"), nptdms.TdmsFile.open(source.path) as file:
         return file[group][name][:]
 
 
