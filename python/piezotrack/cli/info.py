@@ -29,9 +29,9 @@ def info_command(
     dt: Interval = None,
     json: Json = False,
 ) -> None:
-    """Show the columns, sampling and drive of a log, and what it can determine.
+    """Show what is in a log, and which models it can determine.
 
-    Units, range, gaps, rests and reversals, and the models that such a record is enough for.
+    Columns, units, ranges, rate, gaps, and where the drive rests and reverses.
     """
     from .._support.files import json_ready
     from ..data.log_info import info

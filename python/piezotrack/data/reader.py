@@ -47,7 +47,7 @@ def read(
     resample: float | None = None,
     hold: Hold = "foh",
 ) -> Dataset:
-    r"""Read the log of one axis from a text file.
+    r"""Read the log of one axis from a file.
 
     Parameters
     ----------
@@ -55,16 +55,22 @@ def read(
         A text file with a header line and one line for each sample, divided by commas,
         semicolons, tabs or blanks; outside of comma files the decimal mark may be a comma. Lines
         before the header that begin with ``#`` or ``%`` are skipped, and so are blank lines. Up to
-        ten thousand columns, and a million characters in a line.
+        ten thousand columns, and a million characters in a line. Or a file in MAT, HDF5, TDMS,
+        NPZ, NPY, Parquet, MDF, a GCS array, LabVIEW's .lvm, Digilent WaveForms' CSV or an AFM
+        curve, known by its first bytes or its ending.
     time, drive, displacement : str or int, optional
         The columns to use: the title in the header, with or without its unit, or the number of
-        the column counted from 0. Needed only where the header does not use a usual name (such
-        as ``time_s``, ``Voltage [V]``, ``x (um)``) or where several columns would do.
+        the column counted from 0. In a file with groups a title is a path, as
+        ``"run 1/voltage"``; its last part is enough where only one column has it. Needed only
+        where the title is not a usual name (such as ``time_s``, ``Voltage [V]``, ``x (um)``) or
+        where several columns would do.
     units : mapping of str or int to str, optional
-        Units for columns whose titles have none, or have the wrong one. A key is ``"time"``,
-        ``"drive"`` or ``"displacement"`` for the column in that role, or else a column as above.
+        Units for columns that have none in the file, or have the wrong one, which `Dataset.notes`
+        then says. A key is ``"time"``, ``"drive"`` or ``"displacement"`` for the column in that
+        role, or else a column as above.
     dt : float, optional
-        Sampling interval [s]. The time column is then ignored and the first sample is at 0 s.
+        Sampling interval [s]. The time column, or the interval that the file states, is then
+        ignored and the first sample is at 0 s.
     resample : float, optional
         Sampling interval [s] of even times on which the record is put, for a log with gaps,
         several rates or jitter: on straight lines between its samples, the drive with ``"zoh"``
@@ -77,13 +83,15 @@ def read(
     -------
     Dataset
         The record in seconds, volts and metres, its ``drive_unit`` ``"m"`` where the drive is a
-        position, as the height (piezo) of an AFM. Further columns are in its ``columns``, in SI
-        where their unit is known, and NaN where an entry is not a number.
+        position, as the height (piezo) of an AFM. Further columns of the same length, and of the
+        same group, are in its ``columns``, in SI where their unit is known, and NaN where an
+        entry is not a number.
 
     Raises
     ------
     DataError
-        The file cannot be read or used. The message begins with the file's name and the line.
+        The file cannot be read or used, or the library that reads it is not installed. The
+        message begins with the file's name, and the line of a text.
     ParameterError
         An argument names a column that is not there or has a value that cannot be used.
 
@@ -130,7 +138,7 @@ def read_drive(
     units: Mapping[str | int, str] | None = None,
     dt: float | None = None,
 ) -> DriveRecord:
-    r"""Read a drive from a text file that need not have a displacement.
+    r"""Read a drive from a file that need not have a displacement.
 
     Parameters
     ----------
@@ -184,7 +192,7 @@ def read_displacement(
     units: Mapping[str | int, str] | None = None,
     dt: float | None = None,
 ) -> Dataset:
-    r"""Read a displacement from a text file that need not have a drive.
+    r"""Read a displacement from a file that need not have a drive.
 
     Parameters
     ----------

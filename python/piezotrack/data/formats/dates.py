@@ -26,7 +26,9 @@ class Instant(NamedTuple):
     def since(self, first: Instant) -> float:
         """Return the time since another instant [s]; TypeError where one lacks the time zone."""
         whole = self.second - first.second
-        return whole.days * 86_400.0 + whole.seconds + (self.nanoseconds - first.nanoseconds) / 1e9
+        seconds = 86_400 * whole.days + whole.seconds
+        # One rounding, of a whole number of nanoseconds.
+        return (10**9 * seconds + self.nanoseconds - first.nanoseconds) / 1e9
 
 
 def instant_of(text: str) -> Instant | None:
