@@ -75,11 +75,12 @@ COMMANDS: dict[str, tuple[list[str], tuple[str, ...]]] = {
     "compare": (["log.csv", "--runs", "1"], (*COLUMNS, "--train", "--test", "--model", "--seed")),
     "step": (["log.csv"], (*COLUMNS, "--stiffness", "--mass", "--second-level", "--window")),
     "noise": (["log.csv"], ("--dt", "--unit", "--time", "--displacement", "--window")),
+    "info": (["log.csv"], (*COLUMNS, "--displacement")),
 }  # fmt: skip
 # Their shares: those that identify take long.
 MIX = (
     ["simulate", "feedforward", "track"] * 4
-    + ["step", "noise"] * 2
+    + ["step", "noise", "info"] * 2
     + ["contour", "identify", "compare"]
 )
 
@@ -107,7 +108,8 @@ def invocations(draw: Any, right: list[str]) -> tuple[list[str], dict[str, str]]
         arguments += ["--path", PATHS[0]]
     for option in chosen:
         arguments += [option, draw(st.sampled_from(OPTIONS[option]))]
-    return [*arguments, "--out", "out"], files
+    # `info` writes nothing.
+    return [*arguments, *([] if command == "info" else ["--out", "out"])], files
 
 
 def faults_of_command(arguments: list[str]) -> tuple[list[str], int | None]:

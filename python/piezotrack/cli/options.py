@@ -105,7 +105,9 @@ Json = Annotated[bool, typer.Option("--json", help="Print the figures as one JSO
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")]
 LogFile = Annotated[
     Path,
-    typer.Argument(metavar="FILE", help="Log: CSV, MAT, HDF5, TDMS, NPZ and others, with units."),
+    typer.Argument(
+        metavar="FILE", help="Log: CSV, MAT, HDF5, TDMS, NPZ and others, with its units."
+    ),
 ]
 OutFile = Annotated[
     Path, typer.Argument(metavar="OUT", help="File to write: .csv, .npz, .mat or .parquet.")

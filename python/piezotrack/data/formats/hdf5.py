@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from .table import Channel, ChannelTable, Format, split_matrix, stated_interval
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from .source import Source
 
@@ -93,19 +93,18 @@ def _of_dataset(
     if dataset.shape is None or dataset.is_virtual or dataset.external:
         return
     _check(source, dataset)
+    read = _reader(source, h5py, dataset.name)
     names = dataset.dtype.names
     if names is not None:
         group = f"{group}/{name}" if group else name
         for part in names:
             inner = dataset.dtype[part]
             if inner.kind in "biuf" and not inner.shape and len(dataset.shape) == 1:
-                read = partial(_read, source, h5py, dataset.name, part)
-                yield Channel(part, dataset.shape[0], read, group)
+                yield Channel(part, dataset.shape[0], partial(_part, read, part), group)
     elif dataset.dtype.kind in "biuf":
         dt = _interval(dataset.attrs, group)
         for column, place, count in split_matrix(name, dataset.shape):
-            read = partial(_read, source, h5py, dataset.name, place)
-            yield Channel(column, count, read, group, unit, dt)
+            yield Channel(column, count, partial(_part, read, place), group, unit, dt)
 
 
 def _check(source: Source, dataset: Any) -> None:
@@ -124,9 +123,18 @@ def _check(source: Source, dataset: Any) -> None:
         source.check_size(what, math.prod(dataset.chunks) * dataset.dtype.itemsize)
 
 
-def _read(source: Source, h5py: Any, path: str, place: Any) -> Any:
-    with source.decoding("HDF5"), h5py.File(source.path, "r") as file:
-        return np.asarray(file[path][place])
+def _reader(source: Source, h5py: Any, path: str) -> Callable[[], Any]:
+    # Once for all columns of a dataset.
+    @cache
+    def read() -> Any:
+        with source.decoding("HDF5"), h5py.File(source.path, "r") as file:
+            return np.asarray(file[path][()])
+
+    return read
+
+
+def _part(read: Callable[[], Any], place: Any) -> Any:
+    return read()[place]
 
 
 def _unit(attributes: Mapping[str, Any]) -> str | None:

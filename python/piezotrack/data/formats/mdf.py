@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from contextlib import contextmanager
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 from .table import Channel, ChannelTable, Format
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from .source import Source
 
@@ -40,11 +40,25 @@ def _channels(source: Source, asammdf: Any, file: Any) -> Iterator[Channel]:
         size = int(part.channel_group.samples_byte_nr)
         source.check_size(f"channel group {number}", count * max(size, 1))
         source.check_size(f"channel group {number}", 8 * count)
-        master = file.masters_db.get(number)
+        read = _reader(source, asammdf, number, len(part.channels), file.masters_db.get(number))
         for index, channel in enumerate(part.channels):
+            _check_place(source, number, part.channel_group, channel)
             unit = file.get_channel_unit(group=number, index=index)
-            read = partial(_read, source, asammdf, number, index, index == master)
-            yield Channel(channel.name, count, read, group, unit or None)
+            yield Channel(channel.name, count, partial(_part, read, index), group, unit or None)
+
+
+def _check_place(source: Source, number: int, group: Any, channel: Any) -> None:
+    """Refuse a channel that is beyond its record: asammdf would read beyond its memory there."""
+    if hasattr(channel, "byte_offset"):
+        first = 8 * int(channel.byte_offset) + int(channel.bit_offset)
+    else:
+        first = int(channel.start_offset) + 8 * int(getattr(channel, "additional_byte_offset", 0))
+    bits = 8 * int(group.samples_byte_nr)
+    if first + int(channel.bit_count) > bits:
+        raise source.error(
+            f"a channel of group {number} is said to end at bit {first + int(channel.bit_count)}: "
+            f"expected {bits} at most, as its records have"
+        )
 
 
 @contextmanager
@@ -74,11 +88,25 @@ def _close_halves(error: BaseException) -> None:
         _close_halves(error.__context__)
 
 
-def _read(source: Source, asammdf: Any, group: int, index: int, is_master: bool) -> Any:
-    with _opened(source, asammdf) as file:
-        signal = file.get(group=group, index=index)
-        # Copied, as the file is closed.
-        return (signal.timestamps if is_master else signal.samples).copy()
+def _reader(
+    source: Source, asammdf: Any, group: int, count: int, master: int | None
+) -> Callable[[], list[Any]]:
+    # Once for all channels of a group: opening a file is what takes long.
+    @cache
+    def read() -> list[Any]:
+        with _opened(source, asammdf) as file:
+            signals = [file.get(group=group, index=index) for index in range(count)]
+            # Copied, as the file is closed.
+            return [
+                (one.timestamps if index == master else one.samples).copy()
+                for index, one in enumerate(signals)
+            ]
+
+    return read
+
+
+def _part(read: Callable[[], list[Any]], index: int) -> Any:
+    return read()[index]
 
 
 FORMAT = Format(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import zipfile
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,6 +48,7 @@ def _opens_npy(source: Source) -> ChannelTable:
             begins = file.tell()
         _check(source, "the array", shape, dtype, source.size - begins)
 
+        @cache
         def read() -> Any:
             with source.decoding("NPY"):
                 return np.load(source.path, allow_pickle=False)
@@ -101,6 +102,8 @@ def _part(read: Callable[[], Any], place: Any) -> Any:
 
 
 def _reader(source: Source, member: str) -> Callable[[], Any]:
+    # Once for all columns of a matrix.
+    @cache
     def read() -> Any:
         with (
             source.decoding("NPZ"),
