@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .._support.arrays import backward, check_dt, time_fault
+from .._support.arrays import UNEVEN, backward, check_dt, time_fault
 from .._support.units import lookup, require
 from ..errors import ParameterError
 from .dataset import Dataset
@@ -306,7 +306,18 @@ class Log:
         check = partial(time_fault, resampling=USE_RESAMPLE) if resample is None else backward
         if (fault := check(t)) is not None:
             raise self.source.error(f"{column}: {fault[1]}", self.table.line(fault[0]))
+        self._note_interval(column, t)
         return t
+
+    def _note_interval(self, column: Column, t: Array) -> None:
+        """Say that a file states another interval than its times have."""
+        stated, usual = self.table.interval([column]), float(np.median(np.diff(t)))
+        stated = self.table.dt if stated is None else stated
+        if stated is not None and abs(stated - usual) > UNEVEN * usual:
+            self.columns.notes.append(
+                f"the file states an interval of {stated:.6g} s, and the times of {column} are "
+                f"{usual:.6g} s apart: the times are used"
+            )
 
     def _further(
         self, table: Mapping[int, Array], taken: set[int]

@@ -11,6 +11,8 @@ import pytest
 
 import piezotrack as pt
 from format_logs import DT, T, U, Y, is_the_log, refusal, survives
+from piezotrack.data.formats.mat_elements import read_variables
+from piezotrack.data.formats.source import Source
 
 scipy_io = pytest.importorskip("scipy.io")
 
@@ -153,6 +155,41 @@ def test_what_the_lies_are_made_of_is_true(tmp_path: Path) -> None:
     path.write_bytes(HEADER + element(14, array((1, 400), U.tobytes())))
     assert np.array_equal(scipy_io.loadmat(path)["voltage_V"].ravel(), U)
     assert "known to be the displacement" in refusal(path, dt=DT)
+
+
+def test_the_other_order_of_bytes(tmp_path: Path) -> None:
+    def part(kind: int, content: bytes) -> bytes:
+        return struct.pack(">II", kind, len(content)) + content + bytes(-len(content) % 8)
+
+    def variable(name: bytes, values: np.ndarray) -> bytes:
+        flags = part(6, struct.pack(">II", 6, 0))
+        shape = part(5, struct.pack(">2i", 1, values.size))
+        return part(14, flags + shape + part(1, name) + part(9, values.astype(">f8").tobytes()))
+
+    named = ((b"time_s", T), (b"voltage_V", U), (b"displacement_um", Y))
+    body = b"".join(variable(name, values) for name, values in named)
+    path = tmp_path / "log.mat"
+    path.write_bytes(HEADER[:124] + b"\x01\x00MI" + body)
+    assert is_the_log(pt.read(path))
+    assert np.array_equal(scipy_io.loadmat(path)["voltage_V"].ravel(), U)
+
+
+def test_reads_what_scipy_reads(tmp_path: Path) -> None:
+    """Numbers of every type, short ones in the tags, logical values and empty arrays."""
+    types = ["i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f4", "f8", "?"]
+    variables = {f"v{code.replace('?', 'b')}": np.arange(5).astype(code) for code in types}
+    variables |= {"empty": np.zeros((0, 3)), "z": np.arange(3) * 1j, "m": np.eye(4)[:, :3]}
+    for compressed in (False, True):
+        path = tmp_path / "log.mat"
+        scipy_io.savemat(path, variables, do_compression=compressed)
+        theirs = scipy_io.loadmat(path)
+        ours = {one.name: one for one in read_variables(Source(path))}
+        for name in variables:
+            values = ours[name].values
+            assert ours[name].shape == theirs[name].shape
+            if name != "z":
+                assert isinstance(values, np.ndarray)
+                assert np.array_equal(values, theirs[name])
 
 
 @versions

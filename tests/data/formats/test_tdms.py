@@ -10,6 +10,7 @@ import pytest
 
 import piezotrack as pt
 from format_logs import DT, TEMPERATURE, T, U, Y, is_the_log, refusal, survives
+from piezotrack.data.diagnostics import record_warnings
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -72,6 +73,21 @@ def test_times_of_a_channel_are_used(tmp_path: Path) -> None:
             ("run", "Position", Y, {"unit_string": "um"}),
         )
         assert is_the_log(pt.read(path))
+
+
+def test_times_that_contradict_the_increment_are_used_and_said(tmp_path: Path) -> None:
+    """LabVIEW writes an increment of 1 s where none was set."""
+    path = write(
+        tmp_path / "log.tdms",
+        ("run", "Time", T, waveform("s", 1.0)),
+        ("run", "Voltage", U, waveform("V", 1.0)),
+        ("run", "Position", Y, waveform("um", 1.0)),
+    )
+    log = pt.read(path)
+    assert is_the_log(log)
+    (note,) = log.notes
+    assert note.startswith("the file states an interval of 1 s, and the times of column 'run/Time'")
+    assert note in record_warnings(log)
 
 
 def test_of_several_groups_one_is_named(tmp_path: Path) -> None:

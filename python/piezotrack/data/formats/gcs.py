@@ -104,5 +104,5 @@ FORMAT = Format(
     name="GCS array",
     endings=(".gcs",),
     opens=_opens,
-    begins=lambda head: _BEGINS.match(head) is not None and b"=" in head,
+    begins=lambda head: _BEGINS.match(head) is not None and b"END_HEADER" in head,
 )

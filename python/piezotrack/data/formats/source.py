@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["Source"]
 
 # First bytes that are looked at.
-HEAD = 4096
+HEAD = 1 << 16
 # Bytes from which samples have to be backed by the file, and how often they may be more than it:
 # noise compresses by a factor of two to ten.
 BACKED, DENSEST = 100_000_000, 200
