@@ -127,6 +127,21 @@ def test_a_dataset_in_which_one_chunk_of_many_is_there_is_refused(tmp_path: Path
     assert "is said to have 800000000000 bytes" in refusal(path)
 
 
+def test_a_heap_of_texts_that_is_no_chain_is_refused(tmp_path: Path) -> None:
+    """libhdf5 goes round in such a one without end."""
+    path = with_units(tmp_path / "log.h5")
+    content = path.read_bytes()
+    heap = content.index(b"GCOL")
+    # The size of the heap, that of its first object, and the number of that object.
+    for place, value in ((8, 2**40), (24, 0), (24, 2**63), (24, 128), (16, 0)):
+        changed = bytearray(content)
+        changed[heap + place : heap + place + 8] = value.to_bytes(8, "little")
+        path.write_bytes(changed)
+        assert "heap" in refusal(path)
+    path.write_bytes(content)
+    assert is_the_log(pt.read(path))
+
+
 def test_samples_in_other_files_are_not_followed(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["voltage_V"] = U

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .hdf5_heaps import check_heaps
 from .table import Channel, ChannelTable, Format, split_matrix, stated_interval
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ EXTRA = "hdf5"
 
 def _opens(source: Source) -> ChannelTable:
     h5py = source.library("h5py", EXTRA)
+    check_heaps(source)
     with source.decoding("HDF5"), h5py.File(source.path, "r") as file:
         channels: list[Channel] = []
         for path, dataset in _datasets(h5py, file):
@@ -52,6 +54,7 @@ def open_matlab(source: Source) -> ChannelTable:
         the variables.
     """
     h5py = source.library("h5py", "mat")
+    check_heaps(source)
     with source.decoding("MAT v7.3"), h5py.File(source.path, "r") as file:
         channels: list[Channel] = []
         numbers = {}

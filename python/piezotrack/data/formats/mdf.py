@@ -18,7 +18,8 @@ __all__ = ["FORMAT"]
 
 
 def _opens(source: Source) -> ChannelTable:
-    if b"UnFinMF" in source.head[:8]:
+    # Byte 60: what is left to be done, which asammdf would try and print its failure.
+    if b"UnFinMF" in source.head[:8] or source.head[60:62].strip(b"\0"):
         raise source.error(
             "was not finished by the program that wrote it: expected a finished MDF file"
         )
