@@ -136,7 +136,8 @@ def _write_hdf5(path: Path) -> None:
     with h5py.File(path, "w") as file:
         for name, values, unit in (("time", TIMES, "s"), ("u", VOLTS, "V"), ("x", VOLTS, "um")):
             file.create_dataset(f"run/{name}", data=values, chunks=(16,), compression="gzip")
-            file[f"run/{name}"].attrs["units"] = unit
+            # Of fixed length: a damaged reference to one of variable length can hang libhdf5.
+            file[f"run/{name}"].attrs["units"] = np.bytes_(unit)
 
 
 def _write_tdms(path: Path) -> None:
