@@ -29,9 +29,10 @@ def info_command(
     dt: Interval = None,
     json: Json = False,
 ) -> None:
-    """Show what is in a log, and which models it can determine.
+    """Show what is in a log and what it can tell.
 
-    Columns, units, ranges, rate, gaps, and where the drive rests and reverses.
+    Columns, units, ranges, rate, gaps, where the drive rests and reverses, and which models such a
+    record can determine.
     """
     from .._support.files import json_ready
     from ..data.log_info import info
