@@ -44,8 +44,8 @@ POSITIONS = (
 )
 # Usual titles of a reference.
 TO_FOLLOW = ("reference", "desired", "target", "setpoint")
-# Most columns that a message lists.
-MOST_LISTED = 20
+# Most columns that a message lists, by their titles, or with units and lengths.
+MOST_LISTED, MOST_DESCRIBED = 20, 6
 BY_NUMBER = (
     "there is no header line: name the columns by number and give their units, as in "
     "time=0, drive=1, displacement=2, units={0: 's', 1: 'V', 2: 'um'}"
@@ -214,7 +214,7 @@ class Columns(list[Column]):
 
     def _nearest(self, key: str, columns: Sequence[Column]) -> Sequence[Column]:
         """Put the columns with names like `key` first, where a message cannot take all."""
-        if len(columns) <= MOST_LISTED:
+        if len(columns) <= _most(columns):
             return columns
         from difflib import get_close_matches
 
@@ -263,9 +263,14 @@ def _plain(name: str) -> str:
 
 
 def _titles(columns: Sequence[Column]) -> str:
-    shown = [column.described for column in columns[:MOST_LISTED]]
+    shown = [column.described for column in columns[: _most(columns)]]
     more = len(columns) - len(shown)
     return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
+
+
+def _most(columns: Sequence[Column]) -> int:
+    """Return how many columns a message takes: fewer with their units and lengths."""
+    return MOST_LISTED if not columns or columns[0].count is None else MOST_DESCRIBED
 
 
 def _check_lengths(columns: Sequence[Column]) -> None:

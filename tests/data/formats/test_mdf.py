@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from typing import TYPE_CHECKING, Any
 
@@ -62,10 +63,28 @@ def test_more_cycles_than_the_file_has_are_refused(tmp_path: Path) -> None:
         refusal(path)
 
 
+def test_a_channel_beyond_its_record_is_refused(tmp_path: Path) -> None:
+    """asammdf would read beyond its memory there, and end the process."""
+    path = write(tmp_path / "log.mf4")
+    content = path.read_bytes()
+    # A channel: its kind, data type and bit offset, then the place of its first byte and its bits.
+    for found in re.finditer(b"##CN", content):
+        place = found.start() + 24 + 8 * 8 + 4
+        assert struct.unpack_from("<I", content, place + 4) == (64,)
+        for offset, value in ((0, 1000), (0, 2**32 - 1), (4, 2**31)):
+            changed = bytearray(content)
+            struct.pack_into("<I", changed, place + offset, value)
+            path.write_bytes(changed)
+            refusal(path)
+
+
 def test_an_unfinished_file_is_refused(tmp_path: Path) -> None:
     path = write(tmp_path / "log.mf4")
-    path.write_bytes(b"UnFinMF " + path.read_bytes()[8:])
-    assert "was not finished by the program that wrote it" in refusal(path)
+    content = path.read_bytes()
+    # By its name, or by its flags for what is left to do.
+    for unfinished in (b"UnFinMF " + content[8:], content[:60] + b"\x01" + content[61:]):
+        path.write_bytes(unfinished)
+        assert "was not finished by the program that wrote it" in refusal(path)
 
 
 def test_damaged_files_are_refused_in_a_sentence(tmp_path: Path) -> None:

@@ -106,6 +106,14 @@ def test_of_several_groups_one_is_named(tmp_path: Path) -> None:
     assert "name of several columns" in refusal(path, drive="Voltage")
 
 
+def test_of_many_channels_those_with_a_like_name_come_first(tmp_path: Path) -> None:
+    channels = [("run", f"channel {k}", U, waveform("V")) for k in range(50)]
+    path = write(tmp_path / "log.tdms", *channels, ("run", "Amplifier", U, waveform("V")))
+    found = refusal(path, drive="Amplifer")
+    assert "the columns are 'run/Amplifier' [V] (400 samples), 'run/channel 0'" in found
+    assert found.endswith("and 45 more")
+
+
 def test_rates_that_differ_are_named(tmp_path: Path) -> None:
     path = write(
         tmp_path / "log.tdms",
