@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import zipfile
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -20,12 +21,12 @@ ENDINGS = (".jpk-force", ".jpk-force-map", ".jpk-qi-data", ".jpk-qi-series", ".i
 
 def _opens(source: Source) -> ChannelTable:
     library = source.library("afmformats", "afm")
-    with source.decoding("AFM"):
+    with source.decoding("AFM", "afmformats"):
         if zipfile.is_zipfile(source.path):
             with zipfile.ZipFile(source.path) as archive:
                 for info in archive.infolist():
                     source.check_size(f"member {info.filename!r}", info.file_size)
-        curves = library.load_data(source.path)
+        curves, uncalibrated = _curves(source, library)
         units = library.afm_data.column_units
         channels = [
             Channel(
@@ -38,13 +39,34 @@ def _opens(source: Source) -> ChannelTable:
             )
             for number, curve in enumerate(curves)
             for name in curve.columns
+            if name not in uncalibrated
         ]
+        _close(source)
     return ChannelTable(source, channels)
 
 
+def _curves(source: Source, library: Any) -> tuple[Any, tuple[str, ...]]:
+    """Load the curves, and say which columns are not calibrated: heights need no spring."""
+    try:
+        return library.load_data(source.path), ()
+    except library.errors.MissingMetaDataError as error:
+        anything = dict.fromkeys(error.meta_keys, 1.0)
+        return library.load_data(source.path, meta_override=anything), ("force", "tip position")
+
+
 def _read(source: Source, curve: Any, name: str) -> Any:
-    with source.decoding("AFM"):
-        return np.asarray(curve[name])
+    with source.decoding("AFM", "afmformats"):
+        values = np.asarray(curve[name])
+        _close(source)
+        return values
+
+
+def _close(source: Source) -> None:
+    """Close the archive, which afmformats keeps open."""
+    reader = importlib.import_module("afmformats.formats.fmt_jpk.jpk_reader")
+    archive = reader.ArchiveCache.open_archives.pop(source.path, None)
+    if archive is not None:
+        archive.close()
 
 
 FORMAT = Format(

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..._support.arrays import MOST_SAMPLES, unmasked
 from ..._support.units import lookup, split_unit, symbol_of
+from ...errors import DataError
 from ..columns import Column, Columns
 
 if TYPE_CHECKING:
@@ -268,10 +269,19 @@ class ChannelTable(Table):
         for column in self.columns:
             channel = self.channels[column.index]
             if column.index not in table and channel.count == count and column.group in groups:
-                further = _numbers(channel.read())
+                further = self._further(column, channel)
                 if further is not None and further.shape == (count,):
                     table[column.index] = further
         return table
+
+    def _further(self, column: Column, channel: Channel) -> Array | None:
+        """Read a column that is not needed; one that cannot be read is left out, with a note."""
+        try:
+            return _numbers(channel.read())
+        except DataError as error:
+            reason = str(error).removeprefix(f"{self.source.name}: ")
+            self.columns.notes.append(f"{column} is left out: it {reason}")
+            return None
 
     def column(self, column: Column) -> Array:
         """Read one column; what is not a number is NaN."""
