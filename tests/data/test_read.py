@@ -348,7 +348,7 @@ def test_a_name_that_fits_two_columns_is_refused(tmp_path: Path) -> None:
 def test_refuses_what_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(pt.DataError, match=r"^gone\.csv: there is no such file in '.*'"):
         pt.read(tmp_path / "gone.csv")
-    with pytest.raises(pt.DataError, match="is a directory: expected a text log"):
+    with pytest.raises(pt.DataError, match="is a directory: expected a log"):
         pt.read(tmp_path)
     with pytest.raises(pt.DataError, match="cannot be read"):
         pt.read(tmp_path / "a\0b.csv")
@@ -356,10 +356,9 @@ def test_refuses_what_is_not_there(tmp_path: Path) -> None:
         pt.read(None)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("ending", [".mat", ".h5", ".TDMS", ".npz", ".xlsx"])
-def test_refuses_formats_that_are_not_text(tmp_path: Path, ending: str) -> None:
-    path = write(tmp_path, b"\x89HDF\r\n\x1a\n", "stage" + ending)
-    with pytest.raises(pt.DataError, match=rf"^stage\{ending}: .* only text logs .* CSV"):
+def test_refuses_a_spreadsheet(tmp_path: Path) -> None:
+    path = write(tmp_path, b"PK\x03\x04 sheet", "stage.xlsx")
+    with pytest.raises(pt.DataError, match=r"^stage\.xlsx: is a spreadsheet .* CSV"):
         pt.read(path)
 
 
@@ -391,7 +390,7 @@ def test_a_clean_log_is_not_read_line_by_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: str
 ) -> None:
     # Ten times slower, and a million samples are nothing unusual.
-    monkeypatch.delattr("piezotrack.data.reader._TextLog._table_by_line")
+    monkeypatch.delattr("piezotrack.data.formats.text.TextTable._table_by_line")
     assert is_the_log(pt.read(write(tmp_path, content)))
 
 

@@ -65,6 +65,9 @@ READERS: dict[str, tuple[Callable[[str], Any], str]] = {
     "reference": (use_reference, ".csv"),
     "path": (use_path, ".csv"),
     "model": (use_model, ".json"),
+    **{
+        ending: (use_log, ending) for ending in (".npz", ".mat", ".parquet", ".h5", ".tdms", ".mf4")
+    },
 }
 
 

@@ -6,6 +6,7 @@ import gzip
 import json
 import math
 import re
+import tempfile
 from copy import deepcopy
 from functools import cache
 from pathlib import Path
@@ -50,9 +51,28 @@ LOGS = [
     ),
     log(titles="time [ms],U [mV],x [\u00b5m]"),
 ]
+DATES = "\n".join(
+    ["Time;voltage_V;displacement_um"]
+    + [
+        f"12.03.2024 10:00:{t:09.6f};{u:.6f};{1.2 * u:.6f}"
+        for t, u in zip(TIMES, VOLTS, strict=True)
+    ]
+)
+LVM = (
+    "LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\nX_Columns\tOne\n"
+    "***End_of_Header***\n\n"
+    "Channels\t2\nSamples\t40\t40\nY_Unit_Label\tV\tum\nX_Dimension\tTime\tTime\nDelta_X\t0.02\t0.02\n"
+    "***End_of_Header***\n" + log("\t", "X_Value,voltage,displacement")
+)
+GCS = (
+    "# TYPE = 1\n# SEPARATOR = 44\n# DIM = 3\n# NDATA = 40\n# SAMPLE_TIME = 0.02\n"
+    "# NAME0 = time_s\n# NAME1 = voltage_V\n# NAME2 = x_um\n# END_HEADER\n"
+    + log().partition("\n")[2]
+)
+WAVEFORMS = "#Digilent WaveForms Oscilloscope Acquisition\n#Sample rate: 50Hz\n\n" + log()
 POINTS = (f"{t},{10 * math.cos(t)},{10 * math.sin(t)}" for t in TIMES)
 TABLES = {
-    "log": LOGS,
+    "log": [*LOGS, DATES, LVM, GCS, WAVEFORMS],
     "drive": LOGS,
     "reference": [
         log(titles="time_s,voltage_V,target_um"),
@@ -93,6 +113,69 @@ def models() -> list[str]:
         *(json.dumps(fit.document(), indent=2) for fit in fits),
         *(path.read_text(encoding="utf-8") for path in older),
     ]
+
+
+@cache
+def binary_logs() -> dict[str, bytes]:
+    """The same log in the formats that are not text, by their endings."""
+    data = pt.Dataset(u=VOLTS, y=1.2e-6 * VOLTS, t=TIMES)
+    found = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for ending in (".npz", ".mat", ".parquet"):
+            found[ending] = data.save(Path(folder, f"log{ending}")).read_bytes()
+        for ending, write in ((".h5", _write_hdf5), (".tdms", _write_tdms), (".mf4", _write_mdf)):
+            path = Path(folder, f"log{ending}")
+            write(path)
+            found[ending] = path.read_bytes()
+    return found
+
+
+def _write_hdf5(path: Path) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        for name, values, unit in (("time", TIMES, "s"), ("u", VOLTS, "V"), ("x", VOLTS, "um")):
+            file.create_dataset(f"run/{name}", data=values, chunks=(16,), compression="gzip")
+            # Of fixed length: a damaged reference to one of variable length can hang libhdf5.
+            file[f"run/{name}"].attrs["units"] = np.bytes_(unit)
+
+
+def _write_tdms(path: Path) -> None:
+    import nptdms
+
+    with nptdms.TdmsWriter(str(path)) as writer:
+        about = {"wf_increment": 0.02}
+        channels = (("u", "V"), ("x", "um"))
+        writer.write_segment(
+            [
+                nptdms.ChannelObject("run", n, VOLTS, {**about, "unit_string": u})
+                for n, u in channels
+            ]
+        )
+
+
+def _write_mdf(path: Path) -> None:
+    from asammdf import MDF, Signal
+
+    with MDF() as file:
+        file.append([Signal(VOLTS, TIMES, name=n, unit=u) for n, u in (("u", "V"), ("x", "um"))])
+        file.save(path)
+
+
+@st.composite
+def binaries(draw: Draw, right: bytes) -> bytes:
+    """A file that is not text with something changed: cut off, bytes, or a number of its sizes."""
+    content = bytearray(right)
+    if draw(st.integers(0, 7)) == 0:
+        del content[draw(st.integers(0, len(content))) :]
+    for _ in range(draw(st.integers(1, 3))):
+        if len(content) < 16:
+            break
+        place = draw(st.integers(0, len(content) - 9))
+        size = draw(st.sampled_from([1, 1, 2, 4, 8]))
+        number = draw(st.sampled_from([0, 1, 2**7, 2 ** (8 * size) - 1, 2 ** (8 * size - 1), 41]))
+        content[place : place + size] = number.to_bytes(size, "little")
+    return bytes(content)
 
 
 @st.composite

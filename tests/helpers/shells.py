@@ -111,11 +111,12 @@ COMMANDS: dict[str, tuple[list[str], tuple[str, ...]]] = {
     "compare": (["log.csv", "--runs", "1"], (*COLUMNS, "--train", "--test", "--model", "--seed")),
     "step": (["log.csv"], (*COLUMNS, "--stiffness", "--mass", "--second-level", "--window")),
     "noise": (["log.csv"], ("--dt", "--unit", "--time", "--displacement", "--window")),
+    "info": (["log.csv"], (*COLUMNS, "--displacement")),
 }  # fmt: skip
 # Their shares: those that identify take long.
 MIX = (
     ["simulate", "feedforward", "track"] * 4
-    + ["step", "noise"] * 2
+    + ["step", "noise", "info"] * 2
     + ["contour", "identify", "compare", "tune", "compare-controllers", "learn"]
 )
 
@@ -143,9 +144,9 @@ def invocations(draw: Any, right: list[str]) -> tuple[list[str], dict[str, str]]
         arguments += ["--path", PATHS[0]]
     for option in chosen:
         arguments += [option, draw(st.sampled_from(OPTIONS[option]))]
-    # Or nothing would be asked of a command any more after it has succeeded once.
+    # `info` writes nothing. Others would not be asked any more after they have succeeded once.
     out = "out/t.csv" if command == "learn" else "out"
-    return [*arguments, "--overwrite", "--out", out], files
+    return [*arguments, *([] if command == "info" else ["--overwrite", "--out", out])], files
 
 
 def faults_of_command(arguments: list[str]) -> tuple[list[str], int | None]:

@@ -8,7 +8,7 @@ import pytest
 
 from doors import READERS, faults_of_file
 from hunt import hunt
-from mutants import TABLES, documents, models, tables
+from mutants import TABLES, binaries, binary_logs, documents, models, tables
 from soak import Script, Tally
 
 if TYPE_CHECKING:
@@ -22,6 +22,9 @@ pytestmark = [
 
 # Each kind's share of the files.
 SHARES = {"log": 5, "drive": 1, "reference": 1, "path": 1, "model": 5}
+SHARES |= {ending: 1 for ending in READERS if ending.startswith(".")}
+# What reads a format that is not text.
+LIBRARIES = {".parquet": "pyarrow", ".h5": "h5py", ".tdms": "nptdms", ".mf4": "asammdf"}
 
 
 @pytest.mark.parametrize("kind", READERS)
@@ -31,7 +34,12 @@ def test_a_mutated_file_is_read_or_refused(
 ) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
     tally = Tally(f"files: {kind}")
-    mutants = documents(models()) if kind == "model" else tables(TABLES[kind])
+    if kind in LIBRARIES:
+        pytest.importorskip(LIBRARIES[kind])
+    if kind.startswith("."):
+        mutants = binaries(binary_logs()[kind])
+    else:
+        mutants = documents(models()) if kind == "model" else tables(TABLES[kind])
 
     def body(_: Script, draw: Any) -> None:
         content = draw(mutants)

@@ -29,6 +29,7 @@ __all__ = [
     "require",
     "shown_unit",
     "split_unit",
+    "symbol_of",
 ]
 
 
@@ -92,6 +93,26 @@ _BY_NAME = {unit.name: unit for unit in _TABLE} | {
 }
 _BY_LOWER = {name.lower(): unit for name, unit in _BY_NAME.items()}
 
+# Units that acquisition software states in words, as a property of a channel. In the title of a
+# column they are words like any other.
+_IN_WORDS = {
+    "second": "s",
+    "sec": "s",
+    "millisecond": "ms",
+    "microsecond": "us",
+    "nanosecond": "ns",
+    "minute": "min",
+    "volt": "V",
+    "millivolt": "mV",
+    "microvolt": "uV",
+    "kilovolt": "kV",
+    **{
+        f"{part}{word}": f"{symbol}m"
+        for word in ("meter", "metre")
+        for part, symbol in (("", ""), ("milli", "m"), ("micro", "u"), ("nano", "n"), ("pico", "p"))
+    },
+}
+
 # What AFM software writes in brackets behind the name of a height.
 _SENSORS = ("piezo", "measured", "smoothed")
 # Units that tables show in place of SI units, and the factor.
@@ -122,6 +143,20 @@ def lookup(text: str) -> Unit | None:
         return None
     is_mega = plain in ("MM", "MS", "MV")
     return None if is_mega else unit
+
+
+def symbol_of(text: str) -> str:
+    """Return the symbol of a unit that a file states, in words or as a symbol.
+
+    Examples
+    --------
+    >>> from piezotrack._support.units import symbol_of
+    >>> symbol_of("Volts"), symbol_of("micrometers"), symbol_of(" um "), symbol_of("K")
+    ('V', 'um', 'um', 'K')
+    """
+    plain = text.strip()
+    word = plain.lower()
+    return _IN_WORDS.get(word) or _IN_WORDS.get(word.removesuffix("s")) or plain
 
 
 def require(text: str, *quantities: str) -> Unit:

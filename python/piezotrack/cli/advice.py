@@ -25,6 +25,7 @@ ADVICE = [
         "--displacement",
     ),
     (r"units=\{'?(\w+)'?: \.\.\.\}", r"--unit \1=...", "--unit"),
+    (r"\bunits= says\b", "--unit says", "--unit"),
     (r"\bfixed=", "--fix", "--fix"),
     (r"\bbounds=", "--bound", "--bound"),
     (r"\bscales=", "--scale", "--scale"),

@@ -64,7 +64,7 @@ PARQUET = "campaign.parquet"
 def campaign_command(
     context: typer.Context,
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILE", help="Logs in CSV, with units in the header.")
+        list[Path], typer.Argument(metavar="FILE", help="Logs of any format, with their units.")
     ],
     window: Seconds = None,
     model: KindsNamed = None,

@@ -14,9 +14,11 @@ from .campaign import campaign_command
 from .compare import compare_command
 from .compare_controllers import compare_controllers_command
 from .contour import contour_command
+from .convert import convert_command
 from .demo import demo_command
 from .error_messages import of_the_system
 from .identify import identify_command
+from .info import info_command
 from .learn import learn_command
 from .noise import noise_command
 from .reproduce import reproduce_command
@@ -81,6 +83,8 @@ class Command(TyperCommand):
 
 
 COMMANDS: dict[str, Callable[..., None]] = {
+    "info": info_command,
+    "convert": convert_command,
     "identify": identify_command,
     "compare": compare_command,
     "campaign": campaign_command,

@@ -158,7 +158,7 @@ LogFiles = Annotated[
     list[Path],
     typer.Argument(
         metavar="FILE...",
-        help="Log in CSV, with units in its header; or several, of which one model is made.",
+        help="Log of any format, with its units; or several, of which one model is made.",
     ),
 ]
 Creep = Annotated[

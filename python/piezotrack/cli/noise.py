@@ -32,7 +32,7 @@ __all__ = ["noise_command"]
 
 @in_words
 def noise_command(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Log in CSV, of a sensor at rest.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Log of a sensor at rest.")],
     window: Annotated[
         str | None,
         typer.Option(

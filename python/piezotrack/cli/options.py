@@ -30,6 +30,7 @@ __all__ = [
     "LogFile",
     "ModelFile",
     "Out",
+    "OutFile",
     "Overwrite",
     "Period",
     "Quiet",
@@ -103,7 +104,13 @@ Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace results th
 Json = Annotated[bool, typer.Option("--json", help="Print the figures as one JSON document.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")]
 LogFile = Annotated[
-    Path, typer.Argument(metavar="FILE", help="Log in CSV, with units in its header.")
+    Path,
+    typer.Argument(
+        metavar="FILE", help="Log: CSV, MAT, HDF5, TDMS, NPZ and others, with its units."
+    ),
+]
+OutFile = Annotated[
+    Path, typer.Argument(metavar="OUT", help="File to write: .csv, .npz, .mat or .parquet.")
 ]
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file in JSON.")]
 

@@ -31,7 +31,7 @@ __all__ = ["simulate_command"]
 @in_words
 def simulate_command(
     model: ModelFile,
-    drive_file: Annotated[Path, typer.Argument(metavar="DRIVE", help="CSV with time and drive.")],
+    drive_file: Annotated[Path, typer.Argument(metavar="DRIVE", help="Log with time and drive.")],
     out: Out = Path("results"),
     overwrite: Overwrite = False,
     time: TimeColumn = None,

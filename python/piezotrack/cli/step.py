@@ -37,7 +37,7 @@ __all__ = ["step_command"]
 
 @in_words
 def step_command(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Log in CSV of a step response.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Log of a step response.")],
     window: Annotated[
         str | None,
         typer.Option(metavar="A:B", help="Seconds with the step; default the whole log."),

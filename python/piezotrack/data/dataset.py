@@ -9,14 +9,15 @@ import numpy as np
 
 from .._support.arrays import signal_of, time_axis
 from .._support.frames import frame_of
-from .._support.html_table import html_table
 from .._support.messages import quoted
-from .._support.units import best_length_unit
 from ..errors import DataError, ParameterError
 from .dataset_arguments import MIN_SAMPLES, decimation_factor, further_columns, window_samples
+from .dataset_text import as_line, as_table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    import os
+    from collections.abc import Iterator, Mapping, Sequence
+    from pathlib import Path
 
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import ArrayLike, NDArray
@@ -58,6 +59,8 @@ class Dataset:
         Units of `columns`, for labels.
     source : str, optional
         Where the record comes from, e.g. the name of a file.
+    notes : sequence of str, optional
+        What a person should know of its source, as that a unit is not the one of the file.
 
     Raises
     ------
@@ -105,6 +108,7 @@ class Dataset:
         columns: Mapping[str, ArrayLike] | None = None,
         column_units: Mapping[str, str] | None = None,
         source: str | None = None,
+        notes: Sequence[str] = (),
     ) -> None:
         if hold not in ("foh", "zoh"):
             raise ParameterError(f"hold is {quoted(hold)}: expected 'foh' or 'zoh'")
@@ -119,6 +123,7 @@ class Dataset:
         self._t, self._dt = time_axis(t, dt, self._u)
         self._columns, self._column_units = further_columns(columns, column_units, self._u)
         self._hold, self._drive_unit, self._source = hold, drive_unit, source
+        self._notes = tuple(map(str, notes))
         self._start = 0
         self._sha256: str | None = None
 
@@ -196,6 +201,48 @@ class Dataset:
         drive = {f"drive_{self.drive_unit}": self.u}
         return frame_of({"time_s": self.t, **drive, "displacement_um": 1e6 * self.y})
 
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the window as a log that `piezotrack.read` reads: the same numbers, in SI.
+
+        Parameters
+        ----------
+        path : path-like
+            The file. Its ending says the format: ``.csv``, ``.npz``, ``.mat`` (MAT v5) or
+            ``.parquet`` (needs pyarrow: ``pip install piezotrack[parquet]``). One that exists is
+            replaced.
+
+        Returns
+        -------
+        pathlib.Path
+            The file.
+
+        Raises
+        ------
+        ParameterError
+            The ending is another one.
+        DataError
+            The file cannot be written, or the library for its format is not installed.
+
+        Notes
+        -----
+        The warm-up is left out; ``log.full.save(path)`` writes it as samples. Times, drive,
+        displacement and further columns are read back to the last bit. A further column with a
+        usual name, as ``y``, is written as ``column y``. In a MAT file a name that MATLAB does not
+        take becomes one that it does, and the units are in the structure ``units``.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import piezotrack as pt
+        >>> u = 5.0 * np.sin(np.arange(5000) / 500.0)
+        >>> log = pt.Dataset(u=u, y=4e-6 * u, dt=0.005)
+        >>> bool(np.array_equal(pt.read(log.save("log.npz")).y, log.y))
+        True
+        """
+        from .log_file import save_log
+
+        return save_log(self, path)
+
     @property
     def t(self) -> Array:
         """Times of the samples in the window [s], shape (n,)."""
@@ -240,6 +287,11 @@ class Dataset:
     def source(self) -> str | None:
         """Where the record comes from, e.g. the name of a file."""
         return self._source
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on its source; an identification repeats them as warnings."""
+        return self._notes
 
     @property
     def warmup(self) -> int:
@@ -337,7 +389,7 @@ class Dataset:
         >>> pt.Dataset(u=u, y=1e-6 * u, dt=0.001).decimate(10).dt
         0.01
         """
-        from .resampling import low_passed
+        from .rates import at_lower_rate
 
         factor = decimation_factor(factor)
         if len(self) < MIN_SAMPLES * factor:
@@ -345,19 +397,8 @@ class Dataset:
                 f"factor is {quoted(factor)}: that leaves fewer than {MIN_SAMPLES} of {len(self)} "
                 "samples"
             )
-        first = self._start % factor
-        less = Dataset(
-            u=low_passed(self._u, factor)[first::factor],
-            y=low_passed(self._y, factor)[first::factor],
-            t=self._t[first::factor],
-            hold="foh",
-            drive_unit=self._drive_unit,
-            columns={k: low_passed(v, factor)[first::factor] for k, v in self._columns.items()},
-            column_units=self._column_units,
-            source=self._source,
-        )
-        less._start = self._start // factor
-        return less
+        less = at_lower_rate(self.full, factor, self._start % factor)
+        return less._part(0, len(less), start=self._start // factor)
 
     def interpolate(self, factor: int) -> Dataset:
         """Return the record at a higher sampling rate, interpolated between the samples.
@@ -396,29 +437,19 @@ class Dataset:
         >>> bool(np.abs(error[500:-500]).max() < 2e-4)
         True
         """
-        from .resampling import interpolated
+        from .rates import at_higher_rate
 
         factor = decimation_factor(factor)
         if self._hold == "zoh":
             raise ParameterError("hold is 'zoh': expected 'foh', as nothing is between the samples")
-        if (count := (self._t.size - 1) * factor + 1) > MOST_SAMPLES:
+        if (self._t.size - 1) * factor + 1 > MOST_SAMPLES:
             raise ParameterError(
                 f"factor is {quoted(factor)}: expected at most "
                 f"{(MOST_SAMPLES - 1) // (self._t.size - 1)}, with which {self._t.size} samples "
                 f"become {MOST_SAMPLES}"
             )
-        fine = Dataset(
-            u=interpolated(self._u, factor),
-            y=interpolated(self._y, factor),
-            t=self._t[0] + np.arange(count) * (self._dt / factor),
-            hold="foh",
-            drive_unit=self._drive_unit,
-            columns={k: interpolated(v, factor) for k, v in self._columns.items()},
-            column_units=self._column_units,
-            source=self._source,
-        )
-        fine._start = self._start * factor
-        return fine
+        fine = at_higher_rate(self.full, factor)
+        return fine._part(0, len(fine), start=self._start * factor)
 
     def _samples(self, start: float | None, stop: float | None) -> tuple[int, int]:
         """Turn the bounds of a window [s] into indices of the arrays."""
@@ -460,28 +491,10 @@ class Dataset:
         return plot_dataset(self, fig)
 
     def __repr__(self) -> str:
-        unit, scale = best_length_unit(self.stroke)
-        parts = [
-            f"{len(self)} samples",
-            f"{self.duration:.6g} s at {1.0 / self._dt:.6g} Hz",
-            f"stroke {self.stroke * scale:.3g} {unit}",
-        ]
-        if self._start:
-            parts.append(f"warm-up {self._start} samples")
-        return f"Dataset({', '.join(parts)})"
+        return as_line(self)
 
     def _repr_html_(self) -> str:
-        unit, scale = best_length_unit(self.stroke)
-        rows = [
-            ("samples", f"{len(self)}, {self.duration:.6g} s at {1.0 / self._dt:.6g} Hz"),
-            ("time", f"{self.t[0]:.6g} to {self.t[-1]:.6g} s"),
-            ("drive", f"{self.u.min():.4g} to {self.u.max():.4g} {self.drive_unit}, {self.hold}"),
-            ("displacement", f"{scale * self.y.min():.4g} to {scale * self.y.max():.4g} {unit}"),
-            ("stroke", f"{scale * self.stroke:.4g} {unit}"),
-            ("warm-up", f"{self._start} samples"),
-        ]
-        rows += [(name, self._column_units.get(name, "")) for name in self._columns]
-        return html_table(f"Dataset {self._source or ''}".rstrip(), rows)
+        return as_table(self)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)

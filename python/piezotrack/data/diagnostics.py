@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["check_record", "fit_warnings", "record_warnings"]
+__all__ = ["JUMP", "TURN", "check_record", "fit_warnings", "record_warnings", "runs"]
 
 # A signal reverses where it goes back by this share of its range.
 TURN = 0.05
@@ -98,8 +98,8 @@ def record_warnings(data: Dataset) -> list[str]:
 would be 40 um if it is 1e6 too large, as um taken as m
     """
     if np.ptp(data.u) == 0.0 or np.ptp(data.y) == 0.0:
-        return []
-    return [*_units(data), *_seldom(data), *_periods(data), *_clipping(data)]
+        return [*data.notes]
+    return [*data.notes, *_units(data), *_seldom(data), *_periods(data), *_clipping(data)]
 
 
 def fit_warnings(
@@ -272,12 +272,12 @@ def _clipping(data: Dataset) -> list[str]:
         )
     )
     for end, level in (("highest", float(u.max())), ("lowest", float(u.min()))):
-        runs = [
+        held = [
             (first, last)
-            for first, last in _runs(np.abs(u - level) <= 0.005 * swing)
+            for first, last in runs(np.abs(u - level) <= 0.005 * swing)
             if last - first >= 5 and _cut_off(moves, first, last, quick, swing)
         ]
-        share = sum(last - first for first, last in runs) / u.size
+        share = sum(last - first for first, last in held) / u.size
         if share >= CLIPPED and rests < 0.1 * share:
             warnings.append(
                 f"the drive is cut off at {_drive(data, level)}, its {end}, for "
@@ -285,7 +285,7 @@ def _clipping(data: Dataset) -> list[str]:
                 "does not determine the hysteresis"
             )
     for level in (float(y.max()), float(y.min())):
-        for first, last in _runs(np.abs(y - level) <= 1e-3 * data.stroke):
+        for first, last in runs(np.abs(y - level) <= 1e-3 * data.stroke):
             part = u[first:last]
             ends = part[[0, -1]]
             further = max(float(part.max() - ends.max()), float(ends.min() - part.min()))
@@ -307,7 +307,7 @@ def _cut_off(moves: Array, first: int, last: int, quick: float, swing: float) ->
     return bool(into[:3].mean() >= 0.25 * quick and into.max() <= 0.1 * swing and last > first)
 
 
-def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return the first sample, and that after the last, of each run of true entries."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

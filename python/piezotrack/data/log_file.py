@@ -1,17 +1,29 @@
-"""Writing a record as a text log."""
+"""Writing a record as a log."""
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .._support.files import write_columns
+from .._support.files import replacing, write_columns
+from .._support.messages import quoted
+from .._support.units import drive_word, split_unit
+from ..errors import ParameterError
+from .columns import is_usual
+from .formats import FORMATS
+from .formats.table import WrittenColumn
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    import os
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from .dataset import Dataset
+    from .formats.table import Format
 
-__all__ = ["write_log"]
+__all__ = ["format_to_write", "save_log", "write_log"]
 
 
 def write_log(log: Dataset, path: Path) -> Path:
@@ -32,3 +44,50 @@ def write_log(log: Dataset, path: Path) -> Path:
     return write_columns(
         path, {"time_s": log.t, "voltage_V": log.u, "displacement_um": 1e6 * log.y}
     )
+
+
+def save_log(log: Dataset, path: str | os.PathLike[str]) -> Path:
+    """Write a log in the format of the file's ending: see `Dataset.save`."""
+    try:
+        file = Path(path)
+    except TypeError:
+        raise ParameterError(f"path is {quoted(path)}: expected the name of a file") from None
+    known = format_to_write(file)
+    columns = [
+        WrittenColumn("time", "s", log.t, "time_s"),
+        _drive(log),
+        WrittenColumn("displacement", "m", log.y, "displacement_m"),
+    ]
+    columns += [
+        _further(name, log.column_units[name], values) for name, values in log.columns.items()
+    ]
+    with replacing(file) as temporary:
+        known.write(temporary, columns)
+    return file
+
+
+def format_to_write(file: Path) -> Format:
+    """Return the format that the ending of a file stands for, or refuse one that is not written."""
+    ending = file.suffix.lower()
+    written = [known for known in FORMATS if known.writes is not None]
+    for known in written:
+        if ending in known.endings:
+            return known
+    endings = ", ".join(known.endings[0] for known in written)
+    raise ParameterError(f"{file.name}: expected an ending of a format that is written: {endings}")
+
+
+def _drive(log: Dataset) -> WrittenColumn:
+    name = drive_word(log.drive_unit)
+    return WrittenColumn(name, log.drive_unit, log.u, f"{name}_{log.drive_unit}")
+
+
+def _further(name: str, unit: str, values: NDArray[np.float64]) -> WrittenColumn:
+    """Give a further column a title from which a reader gets its name and unit."""
+    plain = re.sub(r"\s+", " ", name)
+    bare = split_unit(plain)[0]
+    if is_usual(plain) or is_usual(bare):
+        # It would be taken for one of the three that are written before it.
+        plain = f"column {plain}"
+    is_plain = not unit and split_unit(plain) == (plain, "")
+    return WrittenColumn(plain, unit, values, plain if is_plain else f"{plain} [{unit}]")

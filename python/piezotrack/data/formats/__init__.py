@@ -1,0 +1,71 @@
+"""The formats of logs, one file each.
+
+A format is a file here with a `Format`, and a line in the list. Its `opens` says which columns a
+file has, with the units and the sampling interval that the file states; which column is what, and
+what units mean, is decided in `data/columns.py` for all of them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from . import afm, gcs, hdf5, lvm, mat, mdf, npz, parquet, tdms, text, waveforms
+from .source import Source
+
+if TYPE_CHECKING:
+    import os
+
+    from .table import Format, Table
+
+__all__ = ["FORMATS", "format_of", "open_log"]
+
+# The first whose first bytes are those of a file, or else that of its ending, or else text.
+FORMATS: tuple[Format, ...] = (
+    npz.FORMAT,
+    npz.NPY,
+    mat.FORMAT,
+    hdf5.FORMAT,
+    parquet.FORMAT,
+    tdms.FORMAT,
+    mdf.FORMAT,
+    afm.FORMAT,
+    gcs.FORMAT,
+    lvm.FORMAT,
+    waveforms.FORMAT,
+    text.FORMAT,
+)
+
+
+def format_of(source: Source) -> Format:
+    """Return the format of a file, by its first bytes or by the ending of its name."""
+    for known in FORMATS:
+        if known.begins(source.head):
+            return known
+    for known in FORMATS:
+        if source.ending in known.endings:
+            return known
+    return text.FORMAT
+
+
+def open_log(path: str | os.PathLike[str]) -> Table:
+    """Open a log of any format.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+
+    Returns
+    -------
+    Table
+        Its columns.
+
+    Raises
+    ------
+    DataError
+        It is not there, damaged, or the library for its format is not installed.
+    ParameterError
+        `path` is no name of a file.
+    """
+    source = Source(path)
+    return format_of(source).opens(source)

@@ -1,0 +1,77 @@
+"""Curves of atomic force microscopes, with afmformats: JPK, Asylum and others."""
+
+from __future__ import annotations
+
+import importlib
+import zipfile
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .table import Channel, ChannelTable, Format
+
+if TYPE_CHECKING:
+    from .source import Source
+
+__all__ = ["FORMAT"]
+
+ENDINGS = (".jpk-force", ".jpk-force-map", ".jpk-qi-data", ".jpk-qi-series", ".ibw")
+
+
+def _opens(source: Source) -> ChannelTable:
+    library = source.library("afmformats", "afm")
+    with source.decoding("AFM", "afmformats"):
+        if zipfile.is_zipfile(source.path):
+            with zipfile.ZipFile(source.path) as archive:
+                for info in archive.infolist():
+                    source.check_size(f"member {info.filename!r}", info.file_size)
+        curves, uncalibrated = _curves(source, library)
+        units = library.afm_data.column_units
+        channels = [
+            Channel(
+                name=name,
+                count=len(curve),
+                read=partial(_read, source, curve, name),
+                group=f"curve {number}" if len(curves) > 1 else "",
+                # The library gives every column in SI.
+                unit=units.get(name),
+            )
+            for number, curve in enumerate(curves)
+            for name in curve.columns
+            if name not in uncalibrated
+        ]
+        _close(source)
+    return ChannelTable(source, channels)
+
+
+def _curves(source: Source, library: Any) -> tuple[Any, tuple[str, ...]]:
+    """Load the curves, and say which columns are not calibrated: heights need no spring."""
+    try:
+        return library.load_data(source.path), ()
+    except library.errors.MissingMetaDataError as error:
+        anything = dict.fromkeys(error.meta_keys, 1.0)
+        return library.load_data(source.path, meta_override=anything), ("force", "tip position")
+
+
+def _read(source: Source, curve: Any, name: str) -> Any:
+    with source.decoding("AFM", "afmformats"):
+        values = np.asarray(curve[name])
+        _close(source)
+        return values
+
+
+def _close(source: Source) -> None:
+    """Close the archive, which afmformats keeps open."""
+    reader = importlib.import_module("afmformats.formats.fmt_jpk.jpk_reader")
+    archive = reader.ArchiveCache.open_archives.pop(source.path, None)
+    if archive is not None:
+        archive.close()
+
+
+FORMAT = Format(
+    name="AFM",
+    endings=ENDINGS,
+    opens=_opens,
+    begins=lambda head: head.startswith(b"# afmformats"),
+)

@@ -1,0 +1,200 @@
+"""A file to read: its name, size and first bytes, and errors that name it."""
+
+from __future__ import annotations
+
+import importlib
+import logging
+import warnings
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..._support.messages import quoted
+from ...errors import DataError, ParameterError, PiezotrackError, ShapeError
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterator
+
+__all__ = ["Source"]
+
+# First bytes that are looked at.
+HEAD = 1 << 16
+# Bytes from which samples have to be backed by the file, and how often they may be more than it:
+# noise compresses by a factor of two to ten.
+BACKED, DENSEST = 100_000_000, 200
+
+
+class Source:
+    """A file that is there and may be read.
+
+    Parameters
+    ----------
+    path : path-like
+        Its name.
+
+    Attributes
+    ----------
+    path : pathlib.Path
+        The file.
+    name : str
+        Its name without the folder.
+    size : int
+        Its length [bytes].
+    head : bytes
+        Its first bytes.
+
+    Raises
+    ------
+    ParameterError
+        `path` is no name of a file.
+    DataError
+        There is no such file, it is a directory, or it cannot be read.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        try:
+            self.path = Path(path)
+        except TypeError:
+            raise ParameterError(f"path is {quoted(path)}: expected the name of a file") from None
+        self.name = self.path.name or str(self.path)
+        with self._opening():
+            if self.path.is_dir():
+                raise self.error("is a directory: expected a log")
+            with self.path.open("rb") as opened:
+                self.head = opened.read(HEAD)
+            self.size = self.path.stat().st_size
+
+    @property
+    def ending(self) -> str:
+        """What the name ends with, in small letters and with its dot."""
+        return self.path.suffix.lower()
+
+    def content(self) -> bytes:
+        """Return all bytes."""
+        with self._opening(), self.path.open("rb") as opened:
+            return opened.read()
+
+    def error(self, sentence: str, line: int | None = None) -> DataError:
+        """Make an error about the content of the file."""
+        return DataError(f"{self.name}:{line}: {sentence}" if line else f"{self.name}: {sentence}")
+
+    @contextmanager
+    def named(self, line: int | None = None) -> Iterator[None]:
+        """Put the name of the file, and the line of a fault, before a message."""
+        try:
+            yield
+        except DataError as error:
+            raise self.error(str(error), line) from None
+        except (ParameterError, ShapeError) as error:
+            raise type(error)(f"{self.name}: {error}") from None
+
+    @contextmanager
+    def decoding(self, kind: str, logger: str | None = None) -> Iterator[None]:
+        """Turn whatever a library raises on a damaged file of a kind into a sentence.
+
+        What it warns of, or writes to its `logger`, is not shown: a file is read, or it is not.
+        """
+        talking = _loggers(logger)
+        for one in talking:
+            one.disabled = True
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                yield
+        except (PiezotrackError, MemoryError, KeyboardInterrupt, SystemExit, GeneratorExit):
+            raise
+        # Parsers raise whatever they stumble over: IndexError, zlib.error, struct.error, and
+        # afmformats a BaseException of its own.
+        except BaseException as error:
+            reason = " ".join(str(error).split()) or type(error).__name__
+            reason = reason.replace(str(self.path), self.name)
+            raise self.error(
+                f"is not a sound {kind} file, or is cut off ({quoted(reason)})"
+            ) from None
+        finally:
+            for one in talking:
+                one.disabled = False
+
+    def library(self, module: str, extra: str) -> Any:
+        """Import the library that reads a format.
+
+        Parameters
+        ----------
+        module : str
+            Its name in Python.
+        extra : str
+            The extra of piezotrack that installs it.
+
+        Returns
+        -------
+        module
+            The library.
+
+        Raises
+        ------
+        DataError
+            It is not installed.
+        """
+        try:
+            return importlib.import_module(module)
+        except ImportError:
+            raise self.error(
+                f"is read with {module.partition('.')[0]}, which is not installed: expected "
+                f"pip install 'piezotrack[{extra}]'"
+            ) from None
+
+    def check_size(self, what: str, declared: int, *, stored: int | None = None) -> None:
+        """Refuse samples that the file cannot hold, before memory is asked for.
+
+        Parameters
+        ----------
+        what : str
+            What holds them, for the message.
+        declared : int
+            Their size as the file says [bytes].
+        stored : int, optional
+            Bytes of the file that they take, where they are not compressed.
+
+        Raises
+        ------
+        DataError
+            The file is too small for them.
+        """
+        if stored is not None and declared > stored:
+            raise self.error(
+                f"{what} is said to have {declared} bytes: expected {stored} at most, in a file "
+                f"of {self.size} bytes"
+            )
+        if declared > BACKED and declared > DENSEST * self.size:
+            raise self.error(
+                f"{what} is said to have {declared} bytes: expected {DENSEST * self.size} at most, "
+                f"as measured samples in a file of {self.size} bytes"
+            )
+
+    @contextmanager
+    def _opening(self) -> Iterator[None]:
+        try:
+            yield
+        except FileNotFoundError:
+            raise self.error(f"there is no such file in {quoted(str(self.path.parent))}") from None
+        except PermissionError:
+            raise self.error("no permission to read this file") from None
+        except (OSError, ValueError) as error:
+            if isinstance(error, PiezotrackError):
+                raise
+            raise self.error(f"cannot be read: {error}") from None
+
+
+def _loggers(name: str | None) -> list[logging.Logger]:
+    """Return the loggers of a library that are not disabled already."""
+    if name is None:
+        return []
+    known = logging.Logger.manager.loggerDict.items()
+    return [
+        logger
+        for key, logger in known
+        if isinstance(logger, logging.Logger)
+        and (key == name or key.startswith(f"{name}."))
+        and not logger.disabled
+    ]

@@ -1,0 +1,61 @@
+"""TDMS of LabVIEW and DAQmx, with npTDMS: unit from ``unit_string``, rate from ``wf_increment``."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from .table import Channel, ChannelTable, Format
+
+if TYPE_CHECKING:
+    from .source import Source
+
+__all__ = ["FORMAT"]
+
+
+def _opens(source: Source) -> ChannelTable:
+    nptdms = source.library("nptdms", "tdms")
+    with source.decoding("TDMS", "nptdms"):
+        file = nptdms.TdmsFile.read_metadata(source.path)
+        status = file.file_status
+        channels = [
+            _channel(source, nptdms, channel)
+            for group in file.groups()
+            for channel in group.channels()
+            if channel.dtype is not None and channel.dtype.kind in "biufM"
+        ]
+    if status.incomplete_final_segment:
+        raise source.error(
+            "is cut off in its last segment, as when the program that wrote it was ended: expected "
+            "a whole file, as LabVIEW's TDMS Defragment makes it"
+        )
+    return ChannelTable(source, channels)
+
+
+def _channel(source: Source, nptdms: Any, channel: Any) -> Channel:
+    path = f"{channel.group_name}/{channel.name}"
+    # Raw values have a byte at least, and are not compressed.
+    size = getattr(channel.data_type, "size", None) or 1
+    source.check_size(f"channel {path!r}", len(channel) * size, stored=source.size)
+    unit, increment = channel.properties.get("unit_string"), channel.properties.get("wf_increment")
+    return Channel(
+        name=channel.name,
+        count=len(channel),
+        read=partial(_read, source, nptdms, channel.group_name, channel.name),
+        group=channel.group_name,
+        unit=unit if isinstance(unit, str) and unit.strip() else None,
+        dt=float(increment) if isinstance(increment, (int, float)) and increment > 0.0 else None,
+    )
+
+
+def _read(source: Source, nptdms: Any, group: str, name: str) -> Any:
+    with source.decoding("TDMS", "nptdms"), nptdms.TdmsFile.open(source.path) as file:
+        return file[group][name][:]
+
+
+FORMAT = Format(
+    name="TDMS",
+    endings=(".tdms",),
+    opens=_opens,
+    begins=lambda head: head.startswith(b"TDSm"),
+)

@@ -1,0 +1,41 @@
+"""CSV of Digilent WaveForms: comments, among them the sampling rate, and a usual header."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from .table import Format
+from .text import Layout, TextTable, lines_of
+
+if TYPE_CHECKING:
+    from .source import Source
+
+__all__ = ["FORMAT"]
+
+_RATE = re.compile(r"#\s*Sample rate:\s*([0-9.eE+-]+)\s*([kM]?)Hz\s*", re.IGNORECASE)
+FACTORS = {"": 1.0, "k": 1e3, "m": 1e6}
+
+
+def _opens(source: Source) -> TextTable:
+    lines = lines_of(source)
+    dt = None
+    for number, line in enumerate(lines):
+        if line.strip() and not line.startswith("#"):
+            break
+        if found := _RATE.fullmatch(line):
+            try:
+                dt = 1.0 / (float(found[1]) * FACTORS[found[2].lower()])
+            except (ValueError, ZeroDivisionError):
+                raise source.error(
+                    f"the sample rate is {found[1][:40]!r}: expected hertz above 0", number + 1
+                ) from None
+    return TextTable(source, Layout.found(source, lines), dt=dt)
+
+
+FORMAT = Format(
+    name="WaveForms",
+    endings=(),
+    opens=_opens,
+    begins=lambda head: head.removeprefix(b"\xef\xbb\xbf").startswith(b"#Digilent WaveForms"),
+)

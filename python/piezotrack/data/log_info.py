@@ -1,0 +1,345 @@
+"""What a log has in it, and which models it can determine."""
+
+from __future__ import annotations
+
+import math
+import re
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._support.arrays import time_fault
+from .._support.messages import quoted
+from .._support.units import drive_text, drive_word, lookup
+from ..errors import DataError, PiezotrackError
+from .drive_features import (
+    DriveFeatures,
+    TimeFeatures,
+    drive_features,
+    length_text,
+    remarks,
+    reversals_text,
+    time_features,
+)
+from .formats import format_of
+from .reader import USE_RESAMPLE, Log
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from .columns import Column
+
+    Array = NDArray[np.float64]
+
+__all__ = ["ColumnInfo", "LogInfo", "info"]
+
+# How an error begins where nothing in a log may be a drive.
+NO_DRIVE = "no column is known to be the drive"
+# Gaps and rests that a summary lists.
+LISTED = 5
+# Jitter below which times are even but for rounding [% of an interval].
+EVEN = 0.01
+
+
+@dataclass(frozen=True)
+class ColumnInfo:
+    """One column of a log.
+
+    Attributes
+    ----------
+    title : str
+        As in the file; of a column in a group its path.
+    unit : str
+        As in the file, or as given; empty where there is none.
+    samples : int
+        Number of samples.
+    low, high : float
+        Range of the numbers in it [unit]; NaN where there are none.
+    missing : int
+        Number of entries that are no finite numbers.
+    """
+
+    title: str
+    unit: str
+    samples: int
+    low: float
+    high: float
+    missing: int
+
+
+@dataclass(frozen=True)
+class LogInfo:
+    """What a log has in it.
+
+    Attributes
+    ----------
+    source : str
+        Name of the file.
+    format : str
+        Name of its format.
+    columns : tuple of ColumnInfo
+        Its columns.
+    roles : dict of str to str
+        Titles of the columns of time, drive and displacement, as far as they are known.
+    problem : str
+        Why `piezotrack.read` refuses it as it is; empty where it does not.
+    time : TimeFeatures or None
+        Its sampling; None where neither times nor an interval are known.
+    drive : DriveFeatures or None
+        What its drive does; None where the drive is not known.
+    stroke : float or None
+        Range of the displacement [m]; None where it is not known.
+    determines : tuple of str
+        Sentences on the models that it can determine.
+    notes : tuple of str
+        What a person should know of the file.
+    """
+
+    source: str
+    format: str
+    columns: tuple[ColumnInfo, ...]
+    roles: dict[str, str]
+    problem: str
+    time: TimeFeatures | None
+    drive: DriveFeatures | None
+    stroke: float | None
+    determines: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    def summary(self) -> str:
+        """Write all of it for a person.
+
+        Returns
+        -------
+        str
+            Several lines.
+        """
+        width = min(60, max(len(_shown(column.title)) for column in self.columns))
+        lines = [
+            f"{self.source}  {self.format}, {len(self.columns)} columns",
+            "",
+            f"{'column':<{width}}  {'unit':<5}  {'samples':>8}  {'lowest':>11}  {'highest':>11}",
+        ]
+        for column in self.columns:
+            lost = f"  {column.missing} not finite" if column.missing else ""
+            lines.append(
+                f"{_shown(column.title):<{width}}  {_shown(column.unit) or '-':<5}  "
+                f"{column.samples:>8}  {column.low:>11.6g}  {column.high:>11.6g}{lost}"
+            )
+        lines += ["", *self._of_time(), *self._of_drive()]
+        if self.determines:
+            lines += ["", "can determine", *(f"  {text}" for text in self.determines)]
+        lines += [f"note  {note}" for note in self.notes]
+        if self.problem:
+            lines += ["", f"is not read as it is: {self.problem}"]
+        return "\n".join(lines)
+
+    def document(self) -> dict[str, Any]:
+        """Return the same as numbers, texts, lists and dicts, in SI but for the columns.
+
+        Returns
+        -------
+        dict
+            For a JSON file.
+        """
+        return {
+            "format": "piezotrack-info",
+            "schema_version": 1,
+            "source": self.source,
+            "file_format": self.format,
+            "columns": [asdict(column) for column in self.columns],
+            "roles": self.roles,
+            "problem": self.problem or None,
+            "time": None if self.time is None else asdict(self.time),
+            "drive": None if self.drive is None else asdict(self.drive),
+            "stroke": {"value": self.stroke, "unit": "m"},
+            "determines": list(self.determines),
+            "notes": list(self.notes),
+        }
+
+    def _of_time(self) -> list[str]:
+        if self.time is None:
+            return ["rate      not known"]
+        time = self.time
+        rate = 1.0 / time.interval if time.interval > 0.0 else math.nan
+        share = 100.0 * time.jitter / time.interval if time.interval > 0.0 else math.nan
+        jitter = f"jitter {1e6 * time.jitter:.3g} us rms, {share:.2g} % of an interval"
+        lines = [
+            f"time      {time.begin:.6g} to {time.end:.6g} s",
+            f"rate      {rate:.6g} Hz, {'even' if share < EVEN else jitter}",
+        ]
+        lost = sum(count for _, _, count in time.gaps)
+        found = [f"{first:.6g} to {last:.6g} s" for first, last, _ in time.gaps]
+        lines.append(
+            f"gaps      {len(time.gaps)}, {lost} samples missing: {_listed(found)}"
+            if found
+            else "gaps      none"
+        )
+        return lines
+
+    def _of_drive(self) -> list[str]:
+        lines = []
+        if self.drive is not None:
+            unit = self.drive.unit
+            low, high = drive_text(self.drive.low, unit), drive_text(self.drive.high, unit)
+            rests = [
+                f"{first:.4g} to {last:.4g} s at {drive_text(level, unit)}"
+                for first, last, level in self.drive.rests
+            ]
+            lines = [
+                f"{drive_word(unit):<8}  {low} to {high}",
+                f"reverses  {reversals_text(self.drive)}",
+                f"rests     {_listed(rests) if rests else 'none'}",
+            ]
+        if self.stroke is not None:
+            lines.append(f"stroke    {length_text(self.stroke)}")
+        return lines
+
+
+def info(
+    path: str | os.PathLike[str],
+    *,
+    time: str | int | None = None,
+    drive: str | int | None = None,
+    displacement: str | int | None = None,
+    units: Mapping[str | int, str] | None = None,
+    dt: float | None = None,
+) -> LogInfo:
+    """Look into a log: columns, sampling, what the drive does, and what it can determine.
+
+    A log that `piezotrack.read` refuses is described as far as it goes; `LogInfo.problem` says
+    what is missing.
+
+    Parameters
+    ----------
+    path, time, drive, displacement, units, dt
+        As in `piezotrack.read`.
+
+    Returns
+    -------
+    LogInfo
+        Print its `summary()`.
+
+    Raises
+    ------
+    DataError
+        The file is not there, damaged, or the library for its format is not installed.
+    ParameterError
+        An argument names a column that is not there or has a value that cannot be used.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import piezotrack as pt
+    >>> t = np.arange(1000) / 100.0
+    >>> u = 30.0 - 30.0 * np.cos(2.0 * np.pi * t)
+    >>> path = pt.Dataset(u=u, y=1e-6 * u, t=t).save("stage.csv")
+    >>> found = pt.data.info(path)
+    >>> found.drive.turns, round(1.0 / found.time.interval)
+    (19, 100)
+    >>> print(found.determines[1])
+    one amplitude, 60 V: no smaller loops; weights of small plays are those of this loop
+    """
+    log = Log(path)
+    given = {"time": time, "drive": drive, "displacement": displacement}
+    roles: dict[str, Column] = {}
+    problems: list[str] = []
+    for wanted in _attempts(given):
+        try:
+            roles = log.roles(wanted, units, dt)
+            break
+        except DataError as error:
+            problems.append(_without_name(error, log.source.name))
+    signals, fault = _signals(log, roles, dt)
+    problems += fault
+    t, u, y = (signals.get(role) for role in ("time", "drive", "displacement"))
+    if t is not None and not problems and (uneven := time_fault(t, USE_RESAMPLE)) is not None:
+        problems.append(f"{roles['time']}: {uneven[1]}")
+    if t is None and (u is not None or y is not None):
+        count = (u if u is not None else y if y is not None else np.zeros(0)).size
+        if (interval := dt or log.table.interval(list(roles.values()))) is not None:
+            t = interval * np.arange(count, dtype=np.float64)
+    times = time_features(t) if t is not None and t.size > 1 else None
+    found, stroke = None, None if y is None else float(np.ptp(y))
+    if t is not None and u is not None:
+        found = drive_features(t, u, y, _si(roles["drive"]))
+    sentences: list[str] = []
+    if times is not None and found is not None:
+        sentences = remarks(times, found, stroke)
+    elif stroke is not None and problems and problems[0].startswith(NO_DRIVE):
+        sentences = ["no drive: the noise of a sensor at rest (piezotrack noise), or a reference"]
+    return LogInfo(
+        source=log.source.name,
+        format=format_of(log.source).name,
+        columns=tuple(_column(log, column) for column in log.columns),
+        roles={role: column.title for role, column in roles.items()},
+        problem=problems[0] if problems else "",
+        time=times,
+        drive=found,
+        stroke=stroke,
+        determines=tuple(sentences),
+        notes=tuple(log.columns.notes),
+    )
+
+
+def _attempts(given: Mapping[str, str | int | None]) -> list[dict[str, str | int | None]]:
+    """Return the roles to look for: all, without the displacement, without the drive, the time."""
+    both = ("time", "drive"), ("time", "displacement"), ("time",)
+    named = {role for role, key in given.items() if key is not None}
+    return [dict(given)] + [
+        {role: given[role] for role in roles} for roles in both if named <= set(roles)
+    ]
+
+
+def _signals(
+    log: Log, roles: Mapping[str, Column], dt: float | None
+) -> tuple[dict[str, Array], list[str]]:
+    """Read the columns of the roles in SI, and say why that fails."""
+    main = {role: c for role, c in roles.items() if role != "time" or dt is None}
+    if not main:
+        return {}, []
+    try:
+        table = log.table.values(list(main.values()))
+    except PiezotrackError as error:
+        return {}, [_without_name(error, log.source.name)]
+    found = {}
+    for role, column in main.items():
+        if (unit := lookup(column.unit)) is not None:
+            found[role] = unit.to_si(table[column.index])
+    return found, []
+
+
+def _column(log: Log, column: Column) -> ColumnInfo:
+    values: Array = np.zeros(0)
+    with suppress(PiezotrackError):
+        values = log.table.column(column)
+    known = values[np.isfinite(values)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (math.nan, math.nan)
+    count = log.table.count(column)
+    title = column.title or f"column {column.index}"
+    return ColumnInfo(title, column.unit, count, low, high, count - known.size)
+
+
+def _si(column: Column) -> str:
+    unit = lookup(column.unit)
+    return "V" if unit is None else unit.si
+
+
+def _shown(text: str) -> str:
+    """Shorten a text of the file for a table."""
+    return text if len(text) <= 60 else quoted(text[:50])
+
+
+def _listed(found: list[str]) -> str:
+    more = len(found) - LISTED
+    return "; ".join(found[:LISTED]) + (f"; and {more} more" if more > 0 else "")
+
+
+def _without_name(error: Exception, name: str) -> str:
+    """Return a message without the name of the file before it."""
+    return re.sub(rf"^{re.escape(name)}(:\d+)?: ", "", str(error))

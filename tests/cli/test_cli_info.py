@@ -1,0 +1,94 @@
+"""``piezotrack info`` and ``piezotrack convert``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import piezotrack as pt
+from commands import log_text, ran, refusal, run, write
+
+ENDINGS = ["csv", "npz", "mat", "parquet"]
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("log.csv").write_text(log_text(), encoding="utf-8")
+
+
+def test_info_in_words() -> None:
+    said = ran("info", "log.csv")
+    for piece in ("log.csv  CSV, 3 columns", "voltage_V", "rate", "gaps      none", "reverses"):
+        assert piece in said
+    assert "can determine" in said
+    assert "is not read" not in said
+
+
+def test_info_as_a_document() -> None:
+    document = json.loads(ran("info", "log.csv", "--json"))
+    assert document["format"] == "piezotrack-info"
+    assert document["time"]["samples"] == 1001
+    assert document["roles"]["drive"] == "voltage_V"
+
+
+def test_info_says_in_options_what_is_missing() -> None:
+    write("bare.csv", log_text().replace("voltage_V", "voltage", 1))
+    said = ran("info", "bare.csv")
+    assert "is not read as it is: column 'voltage' has no unit" in said
+    assert "--unit drive=..." in said
+    assert "is not read" not in ran("info", "bare.csv", "--unit", "drive=V")
+
+
+def test_info_refuses_what_is_no_log() -> None:
+    assert refusal("info", "gone.csv").startswith("gone.csv: there is no such file")
+    write("log.npz", b"PK\x03\x04")
+    assert "is not a sound NPZ file" in refusal("info", "log.npz")
+    assert "'volts' is not a column" in refusal("info", "log.csv", "--drive", "volts")
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_convert_keeps_every_number(ending: str) -> None:
+    if ending == "parquet":
+        pytest.importorskip("pyarrow")
+    said = ran("convert", "log.csv", f"out.{ending}")
+    assert f"out.{ending}" in said
+    before, after = pt.read("log.csv"), pt.read(f"out.{ending}")
+    assert np.array_equal(before.u, after.u)
+    assert np.array_equal(before.y, after.y)
+    assert np.array_equal(before.t, after.t)
+    ran("convert", f"out.{ending}", "back.csv")
+    assert np.array_equal(pt.read("back.csv").y, before.y)
+
+
+def test_convert_takes_columns_and_units() -> None:
+    np.savez("raw.npz", a=np.arange(50.0) % 7, b=np.arange(50.0) % 5)
+    columns = ["--drive", "a", "--displacement", "b", "--unit", "a=mV", "--unit", "b=nm"]
+    ran("convert", "raw.npz", "out.csv", *columns, "--dt", "0.5", "--quiet")
+    log = pt.read("out.csv")
+    assert log.u.max() == 6e-3
+    assert log.y.max() == 4e-9
+    assert log.dt == 0.5
+
+
+def test_convert_says_what_contradicts_the_file() -> None:
+    said = ran("convert", "log.csv", "out.npz", "--unit", "displacement=nm")
+    assert "note  column 'displacement_um' is taken in nm, as --unit says, where" in said
+
+
+def test_convert_refuses_before_it_reads() -> None:
+    assert "expected an ending" in refusal("convert", "log.csv", "out.xlsx")
+    write("out.npz", b"")
+    assert "out.npz exists: expected --overwrite" in refusal("convert", "log.csv", "out.npz")
+    ran("convert", "log.csv", "out.npz", "--overwrite")
+    assert len(pt.read("out.npz")) == 1001
+    assert run("convert", "log.csv").exit_code == 2
+
+
+def test_other_commands_take_every_format() -> None:
+    ran("convert", "log.csv", "log.mat")
+    words = ran("identify", "log.mat", "--model", "prandtl-ishlinskii", "--plays", "3")
+    assert "log.mat" in words

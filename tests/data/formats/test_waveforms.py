@@ -1,0 +1,63 @@
+"""CSV of Digilent WaveForms."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+import piezotrack as pt
+from format_logs import T, U, Y, is_the_log, refusal
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+COMMENTS = """#Digilent WaveForms Oscilloscope Acquisition
+#Device Name: Discovery2
+#Serial Number: SN:000000000000
+#Date Time: 2024-03-12 10:00:00.000
+#Sample rate: {rate}
+#Samples: 400
+#Trigger: Source: None at 0 s, Condition: Rising
+
+"""
+GIVEN: dict[str, Any] = {
+    "drive": "Channel 1",
+    "displacement": "Channel 2 (V)",
+    "units": {"Channel 2": "um"},
+}
+
+
+def write(path: Path, rate: str = "200Hz", time: bool = True) -> Path:
+    title = "Time (s)," if time else ""
+    lines = [
+        (f"{t - 1.0:.9f}," if time else "") + f"{u:.9f},{y:.9f}"
+        for t, u, y in zip(T, U, Y, strict=True)
+    ]
+    text = COMMENTS.format(rate=rate) + f"{title}Channel 1 (V),Channel 2 (V)\n" + "\n".join(lines)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_the_time_may_begin_before_the_trigger(tmp_path: Path) -> None:
+    log = pt.read(write(tmp_path / "log.csv"), **GIVEN)
+    assert is_the_log(log, tolerance=1e-8)
+    assert log.t[0] == -1.0
+
+
+@pytest.mark.parametrize("rate", ["200Hz", "0.2 kHz", "2e-4MHz"])
+def test_without_times_the_rate_is_that_of_the_comment(tmp_path: Path, rate: str) -> None:
+    log = pt.read(write(tmp_path / "log.csv", rate, time=False), **GIVEN)
+    assert is_the_log(log, tolerance=1e-8)
+
+
+def test_a_rate_that_is_none_is_refused(tmp_path: Path) -> None:
+    found = refusal(write(tmp_path / "log.csv", "0Hz", time=False))
+    assert found == "log.csv:5: the sample rate is '0': expected hertz above 0"
+
+
+def test_a_fault_is_named_by_its_line(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv")
+    text = path.read_text(encoding="utf-8").replace("-0.995000000,", "-0.995000000,x")
+    path.write_text(text, encoding="utf-8")
+    assert refusal(path, **GIVEN).startswith("log.csv:11: 'x0.")
