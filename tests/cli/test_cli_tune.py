@@ -121,6 +121,14 @@ def test_several_references_and_no_feedforward() -> None:
 
 
 @pytest.mark.usefixtures("_no_pictures")
+def test_the_calmest_command_within_an_allowed_error() -> None:
+    ran("tune", "dahl.json", *COURSE, *QUICK, "--figure", "effort", "--allowed-um", "0.5")
+    (one,) = report()["references"]
+    # The search leaves the samples out in which the motion settles.
+    assert one["metrics"]["rms_error"] <= 1.02 * 0.5e-6
+
+
+@pytest.mark.usefixtures("_no_pictures")
 def test_the_same_command_writes_the_same_bytes() -> None:
     for folder in ("one", "two"):
         ran("tune", "dahl.json", *COURSE, *QUICK, "--out", folder)
@@ -131,7 +139,10 @@ def test_the_same_command_writes_the_same_bytes() -> None:
     ("options", "words"),
     [
         ("--parts pid,magic", "parts is ['pid', 'magic']: expected some of 'pid', 'low-pass'"),
-        ("--figure best", "--figure is best: expected rms or largest"),
+        ("--figure best", "--figure is best: expected rms, largest or effort"),
+        ("--figure effort", "--figure is effort without --allowed-um: expected the largest"),
+        ("--figure effort --allowed-um 0", "--allowed-um is 0: expected an error above 0 um"),
+        ("--allowed-um 1e-6", "--allowed-um is 1e-06 um without a reference: expected one"),
         ("--gain-margin 1", "--gain-margin is 1: expected a factor above 1"),
         ("--phase-margin 180", "--phase-margin is 180: expected degrees, 0 to below 180"),
         ("--sensitivity nan", "--sensitivity is nan: expected a factor above 1"),

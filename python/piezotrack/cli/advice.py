@@ -38,6 +38,7 @@ ADVICE = [
     (r"\bcount is (?=\d+: expected 1 to)", "--plays is ", "--plays"),
     (r"\bdead_zones is ", "--asymmetry is ", "--asymmetry"),
     (r"\bmargins\.gain is ", "--gain-margin is ", "--gain-margin"),
+    (r"\ballowed is ", "--allowed-um is ", "--allowed-um"),
     (r"\bmethod '(frequency|lifted)'", r"--method \1", "--mode-scales"),
     (r"\brates (?=begins|ends)", "--rates ", "--rates"),
     (r"\bmode_scales is ", "--mode-scales is ", "--mode-scales"),

@@ -48,8 +48,16 @@ def tune_command(
         ),
     ] = None,
     figure: Annotated[
-        str, typer.Option(metavar="rms|largest", help="Error that is made small.")
+        str,
+        typer.Option(
+            metavar="rms|largest|effort",
+            help="Error that is made small, or the effort within --allowed-um.",
+        ),
     ] = "rms",
+    allowed_um: Annotated[
+        float | None,
+        typer.Option(help="Largest rms error in um.", show_default=False),
+    ] = None,
     gain_margin: Annotated[float, typer.Option(help="Least gain margin, a factor.")] = 2.0,
     phase_margin: Annotated[float, typer.Option(help="Least phase margin in degrees.")] = 30.0,
     sensitivity: Annotated[float, typer.Option(help="Largest sensitivity Ms.")] = 2.0,
@@ -107,7 +115,8 @@ def tune_command(
         parts=None if parts is None else [one.strip() for one in parts.split(",")],
         margins=margins,
         spread=spread,
-        figure=_figure(figure),
+        figure=_figure(figure, allowed_um),
+        allowed=math.inf if allowed_um is None else 1e-6 * allowed_um,
         delay=delay,
         seed=seed,
     )
@@ -124,9 +133,15 @@ def _within(option: str, value: float, low: float, high: float, expected: str) -
         raise ParameterError(f"{option} is {value:g}: expected {expected}")
 
 
-def _figure(figure: str) -> Any:
-    if figure not in ("rms", "largest"):
-        raise ParameterError(f"--figure is {figure}: expected rms or largest")
+def _figure(figure: str, allowed: float | None) -> Any:
+    if figure not in ("rms", "largest", "effort"):
+        raise ParameterError(f"--figure is {figure}: expected rms, largest or effort")
+    if figure == "effort" and allowed is None:
+        raise ParameterError(
+            "--figure is effort without --allowed-um: expected the largest rms error in um"
+        )
+    if allowed is not None and not allowed > 0.0:
+        raise ParameterError(f"--allowed-um is {allowed:g}: expected an error above 0 um")
     return figure
 
 

@@ -189,6 +189,10 @@ def _axes(
 def _check_allowed(figure: str, allowed: float, references: Sequence[Any]) -> None:
     if not allowed > 0.0:
         raise ParameterError(f"allowed is {allowed:g} m: expected an error above 0")
+    if allowed < math.inf and not references:
+        raise ParameterError(
+            f"allowed is {1e6 * allowed:g} um without a reference: expected one to follow"
+        )
     if figure == "effort" and references and allowed == math.inf:
         raise ParameterError(
             "figure is 'effort' without allowed: expected allowed=, the largest rms error in m, "

@@ -338,11 +338,16 @@ impl LanedVisitor for Loops<'_> {
                     traces: traces?,
                     stop,
                 };
-                if const { P::VECTORS > 1 } && chunk.len() > width {
-                    let bundle = Bundle::<P, VECTORS>(loops);
-                    return Ok(dispatch_vectors(arch, bundle).unwrap_or_default());
+                // Each is compiled for as many vectors as it gains by, and for no other number.
+                if width == 1 {
+                    return Ok(Simd::vectorize(pulp::Scalar, Bundle::<P, 1>(loops)));
                 }
-                Ok(arch.dispatch(Bundle::<P, 1>(loops)))
+                let found = if const { P::VECTORS > 1 } {
+                    dispatch_vectors(arch, Bundle::<P, VECTORS>(loops))
+                } else {
+                    dispatch_vectors(arch, Bundle::<P, 1>(loops))
+                };
+                Ok(found.unwrap_or_default())
             })
             .collect();
         Ok(found?.concat())
