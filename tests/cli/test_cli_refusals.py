@@ -276,7 +276,7 @@ LIMITS = ("--limits", "0:75")
         "track dahl.json --reference sine:1Hz,10..60um,2s --kp 0.03 --ti 0.02",
         "tune dahl.json --reference sine:1Hz,10..60um,2s",
         "learn dahl.json --reference sine:1Hz,10..60um,2s",
-        "compare-controllers dahl.json sine:1Hz,10..60um,2s",
+        "compare-controllers dahl.json",
         "contour dahl.json dahl.json --path circle:20um",
     ],
 )
