@@ -265,3 +265,35 @@ def test_advice_is_for_the_command_line() -> None:
     assert "--unit" in refusal("identify", "bad.csv")
     write("bad.csv", log_text().partition("\n")[2])
     assert "--drive" in refusal("identify", "bad.csv")
+
+
+LIMITS = ("--limits", "0:75")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "track dahl.json --reference sine:1Hz,10..60um,2s --kp 0.03 --ti 0.02",
+        "tune dahl.json --reference sine:1Hz,10..60um,2s",
+        "learn dahl.json --reference sine:1Hz,10..60um,2s",
+        "compare-controllers dahl.json",
+        "contour dahl.json dahl.json --path circle:20um",
+    ],
+)
+@pytest.mark.parametrize("noise", ["-1", "nan", "inf"])
+def test_a_noise_that_is_none_is_refused_in_the_unit_that_was_typed(
+    command: str, noise: str
+) -> None:
+    write_model()
+    said = refusal(*command.split(), "--dt", "0.02", *LIMITS, "--noise-nm", noise)
+    assert said == f"--noise-nm is {noise}: expected nm rms, finite, 0 or above"
+
+
+def test_a_reference_beyond_reach_is_refused_without_an_option_that_tune_lacks() -> None:
+    write_model()
+    said = refusal(
+        "tune", "dahl.json", "--reference", "sine:1Hz,10..900um,2s", "--dt", "0.02", *LIMITS
+    )
+    assert "900 um" in said
+    assert "reaches from" in said
+    assert "clipped" not in said

@@ -106,6 +106,8 @@ def as_options(text: str) -> str:
             text = re.sub(python, words, text)
     if "--resample" not in options:
         text = re.sub(r"; resample= puts it [^;]*", "", text)
+    if "--clipped" not in options:
+        text = text.replace(", or clipped=0.5 or more", "")
     for python, option, needed in ADVICE:
         if needed in options:
             text = re.sub(python, option, text)

@@ -20,6 +20,7 @@ from .loop_options import (
     Noise,
     StageFile,
     driven_by_voltage,
+    noise_metres,
     refuse_of_other_stage,
     simulated,
 )
@@ -79,7 +80,7 @@ def compare_controllers_command(
     settings = Loop(own, dt, limits, None, None, None, None)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write(["controllers.json", *picture_files("controllers")])
-    plant = simulated(stage, known, 1e-9 * noise_nm, bandwidth, seed)
+    plant = simulated(stage, known, noise_metres(noise_nm), bandwidth, seed)
     found = compare_controllers(
         plant,
         known,

@@ -27,6 +27,7 @@ from .loop_options import (
     Td,
     Ti,
     check_stage,
+    noise_metres,
     refuse_of_other_stage,
 )
 from .options import (
@@ -147,7 +148,7 @@ def contour_command(
     _check(context, models, path, table_2, feedforward, own)
     both = loop, replace(loop, kp=gains[1])
     xy = OwnStage(models, both) if own else PaperStage(models, loop, seed)
-    plant = _changed(xy.stage(1e-9 * noise_nm, bandwidth, seed), lag, cross_talk)
+    plant = _changed(xy.stage(noise_metres(noise_nm), bandwidth, seed), lag, cross_talk)
     desired = None if path is None else _path(path, duration, period, path_dt, xy.place(plant))
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write(_names(table_2))

@@ -25,6 +25,7 @@ from .loop_options import (
     Td,
     Ti,
     driven_by_voltage,
+    noise_metres,
     refuse_of_other_stage,
     simulated,
     unit_of,
@@ -130,7 +131,7 @@ def learn_command(
     result = Output(out.parent, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write([out.name, *(picture_files(out.stem) if picture else [])])
     found = learn(
-        simulated(stage, known, 1e-9 * noise_nm, bandwidth, seed),
+        simulated(stage, known, noise_metres(noise_nm), bandwidth, seed),
         desired,
         loop,
         model=known,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -41,6 +42,7 @@ __all__ = [
     "check_stage",
     "drive_notes",
     "driven_by_voltage",
+    "noise_metres",
     "refuse_of_other_stage",
     "simulated",
     "small_margins",
@@ -121,6 +123,29 @@ Noise = Annotated[
 AmplifierBandwidth = Annotated[
     float, typer.Option("--bandwidth", help="Bandwidth of the simulated amplifier in Hz.")
 ]
+
+
+def noise_metres(noise_nm: float) -> float:
+    """Noise of the sensor in metres, from the option in nm.
+
+    Parameters
+    ----------
+    noise_nm : float
+        Option ``--noise-nm``, nm rms.
+
+    Returns
+    -------
+    float
+        The same in m rms.
+
+    Raises
+    ------
+    ParameterError
+        If it is negative or not finite: in nm, as it was typed.
+    """
+    if not (isfinite(noise_nm) and noise_nm >= 0.0):
+        raise ParameterError(f"--noise-nm is {noise_nm:g}: expected nm rms, finite, 0 or above")
+    return 1e-9 * noise_nm
 
 
 @dataclass(frozen=True)

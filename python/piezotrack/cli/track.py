@@ -30,6 +30,7 @@ from .loop_options import (
     check_stage,
     drive_notes,
     driven_by_voltage,
+    noise_metres,
     refuse_of_other_stage,
     small_margins,
     unit_of,
@@ -167,7 +168,7 @@ def track_command(
         drive_unit=unit_of(own, known),
     )
     plant = (
-        VirtualStage.of(known, noise=1e-9 * noise_nm, bandwidth=bandwidth, seed=seed)
+        VirtualStage.of(known, noise=noise_metres(noise_nm), bandwidth=bandwidth, seed=seed)
         if own
         else VirtualStage.xu_li_2010(seed=seed)
     )

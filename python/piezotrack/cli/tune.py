@@ -11,7 +11,7 @@ import typer
 
 from ..errors import ParameterError
 from .error_messages import in_words
-from .loop_options import AmplifierBandwidth, Interval, Limits, Loop, LoopDelay, Noise
+from .loop_options import AmplifierBandwidth, Interval, Limits, Loop, LoopDelay, Noise, noise_metres
 from .options import Duration, Json, ModelFile, Out, Overwrite, Period, Quiet  # noqa: TC001 - read by typer
 from .output import Output
 from .track import parsed_reference
@@ -107,7 +107,7 @@ def tune_command(
     pictures = [name for i in range(len(desired)) for name in picture_files(_name(i))]
     result.will_write(["tuning.json", *pictures])
     tuned = tune(
-        [VirtualStage.of(known, noise=1e-9 * noise_nm, bandwidth=bandwidth, seed=seed)],
+        [VirtualStage.of(known, noise=noise_metres(noise_nm), bandwidth=bandwidth, seed=seed)],
         desired or None,
         dt=settings.dt(known, desired[0] if desired else None),
         limits=settings.volts(known),
