@@ -160,4 +160,4 @@ def test_gains_that_lose_their_margin_between_two_places_are_refused() -> None:
     unstable = ScheduledPid(amplitudes=[1e-5, 2e-5], rates=[0.2], gains=[high, high])
     loop = pt.Controller(dt=0.02, limits=LIMITS, feedback=unstable)
     with pytest.raises(pt.ParameterError, match="half-way between two places of the grid"):
-        _check_between(loop, unstable, plants, Margins())
+        _check_between(loop, plants, Margins())

@@ -118,3 +118,30 @@ def test_the_same_bits_for_any_number_of_threads() -> None:
     )
     assert one.controllers == three.controllers
     assert np.array_equal(one.report.history, three.report.history)
+
+
+def test_scheduled_gains_of_both_axes_follow_the_contour() -> None:
+    stage, grid = pt.XYStage.xu_li_2010(seed=1), ([10e-6, 40e-6], [0.5])
+    found = pt.schedule(stage, *grid, **{**QUICK, "particles": 16, "iterations": 12})
+    assert isinstance(found, pt.control.SchedulePair)
+    assert found.errors.shape == (2, 1, 2)
+    assert (found.errors[..., 1] <= found.errors[..., 0]).all()
+    for radius, (fixed, after) in zip(grid[0], found.errors[:, 0], strict=True):
+        path = pt.circle(frequency=0.5, radius=radius)
+        pair = tuple(
+            replace(one, feedback=replace(one.feedback, first=(radius, 0.5)))  # type: ignore[type-var]
+            for one in found.controllers
+        )
+        run = pt.contour(stage, pair, path)
+        assert run.metrics.rms_error == pytest.approx(after, rel=0.02)
+        assert run.metrics.rms_error < 1.02 * fixed
+    assert str(found).count("rms um: fixed, scheduled") == 2
+
+
+def test_filters_of_each_axis() -> None:
+    path = pt.circle(frequency=0.5, radius=10e-6)
+    filters: Any = ([pt.LowPass(10.0)], [pt.LowPass(4.0)])
+    options = {**QUICK, "particles": 10, "iterations": 4}
+    (x, y), _ = pt.tune(pt.XYStage.xu_li_2010(), path, parts="pid", filters=filters, **options)
+    assert x.filters == (pt.LowPass(10.0),)
+    assert y.filters == (pt.LowPass(4.0),)

@@ -58,6 +58,7 @@ from .tracking_plot import plot_motion as plot_motion
 from .tuning.margins import Margins as Margins
 from .tuning.margins import Spread as Spread
 from .tuning.schedule import Schedule as Schedule
+from .tuning.schedule import SchedulePair as SchedulePair
 from .tuning.schedule import schedule as schedule
 from .tuning.tune import tune as tune
 from .tuning.tuned import Kept as Kept

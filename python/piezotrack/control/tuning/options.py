@@ -22,7 +22,7 @@ class TuneOptions(TypedDict, total=False):
     limits: tuple[float, float] | None
     feedforward: Inverse | Sequence[Inverse | None] | Literal["inverse"] | None
     parts: Sequence[str] | str | None
-    filters: Sequence[LowPass | Notch]
+    filters: Sequence[LowPass | Notch] | Sequence[Sequence[LowPass | Notch]]
     law: LawName
     margins: Margins | None
     spread: Spread | None

@@ -47,12 +47,15 @@ class Axis(NamedTuple):
         Feedforward of its controller.
     visited : tuple of float
         Voltages before a run [V].
+    filters : tuple of LowPass or Notch
+        Those that are there in any case.
     """
 
     name: str
     stages: list[Plant | IdentifiedModel]
     feedforward: Inverse | None
     visited: tuple[float, ...]
+    filters: tuple[LowPass | Notch, ...]
 
     @property
     def of(self) -> str:
@@ -70,7 +73,6 @@ class Question(NamedTuple):
     limits: tuple[float, float]
     drive_unit: str
     parts: tuple[str, ...] | None
-    filters: tuple[LowPass | Notch, ...]
     law: str
     margins: Margins
     spread: Spread
@@ -137,9 +139,9 @@ def asked(
     if both is None:
         inverse = _inverse_of(stages[0], feedforward)
         before = voltages_before(plant_of(stages[0]), visited, limits)
-        axes: tuple[Axis, ...] = (Axis("", stages, inverse, before),)
+        axes: tuple[Axis, ...] = (Axis("", stages, inverse, before, _filters(filters)),)
     else:
-        axes = _axes(both, feedforward, visited, limits)
+        axes = _axes(both, (feedforward, filters), visited, limits)
     for axis in axes:
         _check_feedforward(law, axis)
     return Question(
@@ -152,7 +154,6 @@ def asked(
         seeds=_seeds(seeds),
         slew=_slew(slew),
         parts=parts_named(parts),
-        filters=_filters(filters),
         law=law,
         margins=margins or Margins(),
         spread=spread or Spread(),
@@ -171,19 +172,32 @@ def asked(
 
 
 def _axes(
-    stage: XYStage, feedforward: Any, visited: Any, limits: tuple[float, float]
+    stage: XYStage, given: tuple[Any, Any], visited: Any, limits: tuple[float, float]
 ) -> tuple[Axis, ...]:
-    """Return both axes, each with its own inverse."""
-    pair = isinstance(feedforward, Sequence) and not isinstance(feedforward, str)
-    inverses = list(feedforward) if pair else [feedforward] * 2
-    if len(inverses) != 2:
-        raise ParameterError(
-            f"feedforward has {len(inverses)} entries: expected that of x and of y"
-        )
+    """Return both axes, each with its own inverse and filters."""
+    feedforward, filters = given
+    inverses = _of_both("feedforward", feedforward, not isinstance(feedforward, (str, Inverse)))
+    apart = isinstance(filters, Sequence) and any(isinstance(one, Sequence) for one in filters)
+    known = _of_both("filters", filters, apart)
+    both = zip("xy", (stage.x, stage.y), inverses, known, strict=True)
     return tuple(
-        Axis(name, [one], _inverse_of(one, inverse), voltages_before(one, visited, limits))
-        for name, one, inverse in zip("xy", (stage.x, stage.y), inverses, strict=True)
+        Axis(
+            name=name,
+            stages=[one],
+            feedforward=_inverse_of(one, inverse),
+            visited=voltages_before(one, visited, limits),
+            filters=_filters(own),
+        )
+        for name, one, inverse, own in both
     )
+
+
+def _of_both(name: str, given: Any, apart: bool) -> list[Any]:
+    """Return what is given for x and for y: the same where it is not given apart."""
+    found = list(given) if apart and isinstance(given, Sequence) else [given] * 2
+    if len(found) != 2:
+        raise ParameterError(f"{name} has {len(found)} entries: expected that of x and of y")
+    return found
 
 
 def _check_allowed(figure: str, allowed: float, references: Sequence[Any]) -> None:

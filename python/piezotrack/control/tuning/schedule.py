@@ -4,33 +4,72 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence, Sized
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 
 from ... import _core
 from ..._support.units import shown_unit
 from ...errors import ParameterError
+from ...references.paths import circle
 from ...references.reference import Reference
 from ...references.waveforms import sine
+from ...references.xy_reference import XYReference
+from ...stages.xy import XYStage
 from ..components import Pid
+from ..contouring import contour
 from ..scheduled_pid import ScheduledPid
+from ..tracking import track
 from .margins import Margins, Spread, plants_of
 from .tune import tune
+from .tuned import Tuned, TunedPair
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from ...identification.identified import IdentifiedModel
     from ..controller import Controller
     from ..plant import Plant
-    from .tuned import Tuned
 
-__all__ = ["Schedule", "schedule"]
+    Array = NDArray[np.float64]
+
+__all__ = ["Schedule", "SchedulePair", "schedule"]
 
 # Periods along which a reference of the grid is followed: the first is its smooth start.
 PERIODS = 4
 # Excess of a margin that an interpolated set of gains may have.
 SLACK = 0.05
+# Share by which gains of a place are better than the fixed ones, or the fixed ones are taken.
+LEAST_GAIN = 0.03
 Waveform = Callable[[float, float], Reference]
+PathForm = Callable[[float, float], XYReference]
+
+
+class SchedulePair(NamedTuple):
+    """Scheduled gains of both axes of an XY stage beside one fixed set for all paths.
+
+    Attributes
+    ----------
+    controllers : (Controller, Controller)
+        Of x and y, with scheduled gains.
+    fixed : TunedPair
+        One set of gains for each axis, for all paths of the grid.
+    tuned : tuple of TunedPair
+        For each radius the gains at each rate.
+    errors : ndarray, shape (amplitudes, rates, 2)
+        Rms contour error with the fixed and with the scheduled gains [m].
+    """
+
+    controllers: tuple[Controller, Controller]
+    fixed: TunedPair
+    tuned: tuple[TunedPair, ...]
+    errors: Array
+
+    def __str__(self) -> str:
+        return "\n".join(
+            f"{name}\n{_text(controller, self.errors)}"
+            for name, controller in zip("xy", self.controllers, strict=True)
+        )
 
 
 class Schedule(NamedTuple):
@@ -51,56 +90,83 @@ class Schedule(NamedTuple):
     controller: Controller
     fixed: Tuned
     tuned: tuple[Tuned, ...]
-    errors: np.ndarray[Any, np.dtype[np.float64]]
+    errors: Array
 
     def __str__(self) -> str:
-        law = self.controller.feedback
-        assert isinstance(law, ScheduledPid)
-        unit, scale = shown_unit(self.controller.drive_unit)
-        lines = [
-            f"amplitude um  rate Hz  kp {unit}/um    ti ms    td ms   rms um: fixed, scheduled"
-        ]
-        pairs = [(amplitude, rate) for amplitude in law.amplitudes for rate in law.rates]
-        errors = self.errors.reshape(-1, 2)
-        for (amplitude, rate), one, (before, after) in zip(pairs, law.gains, errors, strict=True):
-            lines.append(
-                f"{1e6 * amplitude:>12g} {rate:>8g} {1e-6 * scale * one.kp:>8.4g} "
-                f"{1e3 * one.ti:>8.3g} {1e3 * one.td:>8.3g}   {1e6 * before:.4f}, {1e6 * after:.4f}"
-            )
-        return "\n".join(lines)
+        return _text(self.controller, self.errors)
 
 
+def _text(controller: Controller, table: Array) -> str:
+    law = controller.feedback
+    assert isinstance(law, ScheduledPid)
+    unit, scale = shown_unit(controller.drive_unit)
+    lines = [f"amplitude um  rate Hz  kp {unit}/um    ti ms    td ms   rms um: fixed, scheduled"]
+    pairs = [(amplitude, rate) for amplitude in law.amplitudes for rate in law.rates]
+    errors = table.reshape(-1, 2)
+    for (amplitude, rate), one, (before, after) in zip(pairs, law.gains, errors, strict=True):
+        lines.append(
+            f"{1e6 * amplitude:>12g} {rate:>8g} {1e-6 * scale * one.kp:>8.4g} "
+            f"{1e3 * one.ti:>8.3g} {1e3 * one.td:>8.3g}   {1e6 * before:.4f}, {1e6 * after:.4f}"
+        )
+    return "\n".join(lines)
+
+
+@overload
+def schedule(
+    stage: XYStage,
+    amplitudes: Sequence[float],
+    rates: Sequence[float],
+    *,
+    centre: tuple[float, float] | None = None,
+    waveform: PathForm | None = None,
+    margins: Margins | None = None,
+    spread: Spread | None = None,
+    **options: Any,
+) -> SchedulePair: ...
+@overload
 def schedule(
     stage: Plant | IdentifiedModel | Sequence[Plant | IdentifiedModel],
     amplitudes: Sequence[float],
     rates: Sequence[float],
     *,
-    centre: float,
+    centre: float | None = None,
     waveform: Waveform | None = None,
     margins: Margins | None = None,
     spread: Spread | None = None,
     **options: Any,
-) -> Schedule:
+) -> Schedule: ...
+def schedule(
+    stage: Plant | IdentifiedModel | Sequence[Plant | IdentifiedModel] | XYStage,
+    amplitudes: Sequence[float],
+    rates: Sequence[float],
+    *,
+    centre: float | tuple[float, float] | None = None,
+    waveform: Waveform | PathForm | None = None,
+    margins: Margins | None = None,
+    spread: Spread | None = None,
+    **options: Any,
+) -> Schedule | SchedulePair:
     """Tune PID gains at each amplitude and rate of a grid, for one controller without bumps.
 
     First one set of gains and filters is tuned for all references of the grid. Then, with those
-    filters, the gains for each reference. Where none is better for it than the fixed set, that is
-    taken. The margins hold at every place of the grid and half-way between neighbours, for every
-    plant of the set.
+    filters, the gains for each reference. Where the scheduled gains are not better for it than the
+    fixed set by 3 %, that is taken. The margins hold at every place of the grid and half-way
+    between neighbours, for every plant of the set.
 
     Parameters
     ----------
-    stage : Stage, VirtualStage, IdentifiedModel, or a sequence of them
-        As of `tune`.
+    stage : Stage, VirtualStage, IdentifiedModel, or a sequence of them; or XYStage
+        As of `tune`: of an XY stage the contour error counts, and each axis has gains of its own.
     amplitudes : sequence of float
-        Half of peak to peak [m], rising, 1 to 4.
+        Half of peak to peak, or radii [m], rising, 1 to 4.
     rates : sequence of float
         Frequencies [Hz], rising, 1 to 4.
-    centre : float
-        Middle of the references [m].
+    centre : float or (float, float), optional
+        Middle of the references [m]; of an XY stage the centre of the circles, by default as of
+        `circle`.
     waveform : callable, optional
         Makes the reference of an amplitude [m] and a rate [Hz]; default a sine of four periods
-        about `centre`.
+        about `centre`, of an XY stage a circle of three turns.
     margins, spread : optional
         As of `tune`.
     **options
@@ -109,8 +175,8 @@ def schedule(
 
     Returns
     -------
-    Schedule
-        The controller, the fixed set, and the errors with both.
+    Schedule or SchedulePair
+        The controller, or both, the fixed set, and the errors with both.
 
     Raises
     ------
@@ -128,7 +194,8 @@ def schedule(
     >>> len(found.tuned), found.errors.shape
     (2, (2, 1, 2))
     """
-    make = waveform or _sines(centre)
+    both = isinstance(stage, XYStage)
+    make: Any = waveform or _waveform(both, centre)
     nothing = Pid(kp=1.0, ti=1.0)
     # The grid is checked before anything is searched.
     grid = ScheduledPid(
@@ -140,24 +207,92 @@ def schedule(
     pairs = [(amplitude, rate) for amplitude in grid.amplitudes for rate in grid.rates]
     references = [make(amplitude, rate) for amplitude, rate in pairs]
     common = {"margins": margins, "spread": spread, **options}
-    fixed = tune(stage, references, parts=parts, **common)
-    common |= {"dt": fixed.controller.dt, "limits": fixed.controller.limits}
-    common["filters"] = fixed.controller.filters
-    tuned, errors = [], []
-    for reference, whole in zip(references, fixed.report.runs, strict=True):
-        one = tune(stage, reference, parts="pid", **common)
-        before, after = (run.metrics.rms_error for run in (whole, one.report.runs[0]))
-        # A search for one reference alone may miss what the search for all has found.
-        tuned.append(one if after < before else fixed)
-        errors.append((before, min(before, after)))
-    gains = [one.controller.feedback for one in tuned]
+    search: Any = tune
+    fixed = search(stage, references, parts=parts, **common)
+    loops = _loops(fixed)
+    common |= {"dt": loops[0].dt, "limits": loops[0].limits}
+    common["filters"] = tuple(one.filters for one in loops) if both else loops[0].filters
+    tuned = [search(stage, reference, parts="pid", **common) for reference in references]
+    motions = list(zip(pairs, references, strict=True))
+    chosen, scheduled, errors = _chosen(stage, motions, tuned, fixed, grid, options)
+    sets: list[Sequence[Any]]
+    if isinstance(stage, XYStage):
+        sets = [[stage.x], [stage.y]]
+    else:
+        sets = [stage if isinstance(stage, Sequence) else [stage]]
+    for controller, stages in zip(scheduled, sets, strict=True):
+        limits, delay = controller.limits, options.get("delay", 0.0)
+        plants = plants_of(stages, limits, delay, spread or Spread())
+        _check_between(controller, [one.plant for one in plants], margins or Margins())
+    table = errors.reshape(len(grid.amplitudes), len(grid.rates), 2)
+    if both:
+        return SchedulePair((scheduled[0], scheduled[1]), fixed, tuple(chosen), table)
+    return Schedule(scheduled[0], fixed, tuple(chosen), table)
+
+
+def _chosen(
+    stage: Any,
+    motions: Sequence[tuple[tuple[float, float], Any]],
+    tuned: Sequence[Any],
+    fixed: Tuned | TunedPair,
+    grid: ScheduledPid,
+    options: dict[str, Any],
+) -> tuple[list[Any], list[Controller], Array]:
+    """Take the gains of a place where they are better in the schedule, else the fixed ones."""
+    before = [one.metrics.rms_error for one in fixed.report.runs]
+    chosen = list(tuned)
+    while True:
+        loops = enumerate(_loops(fixed))
+        scheduled = [_scheduled(grid, loop, chosen, axis) for axis, loop in loops]
+        after = [_error(stage, scheduled, place, one, options) for place, one in motions]
+        # A search for one reference alone may miss what that for all has found; and in the schedule
+        # its gains begin with those of the places around it.
+        better = [new < (1.0 - LEAST_GAIN) * old for new, old in zip(after, before, strict=True)]
+        if all(gains or one is fixed for gains, one in zip(better, chosen, strict=True)):
+            return chosen, scheduled, np.column_stack([before, after])
+        chosen = [one if gains else fixed for gains, one in zip(better, chosen, strict=True)]
+
+
+def _scheduled(grid: ScheduledPid, loop: Controller, tuned: Sequence[Any], axis: int) -> Controller:
+    gains = [_loops(one)[axis].feedback for one in tuned]
     law = replace(grid, gains=[one for one in gains if isinstance(one, Pid)])
-    controller = replace(fixed.controller, feedback=law)
-    stages = list(stage) if isinstance(stage, Sequence) else [stage]
-    plants = plants_of(stages, controller.limits, options.get("delay", 0.0), spread or Spread())
-    _check_between(controller, law, [one.plant for one in plants], margins or Margins())
-    table = np.array(errors).reshape(len(grid.amplitudes), len(grid.rates), 2)
-    return Schedule(controller, fixed, tuple(tuned), table)
+    return replace(loop, feedback=law)
+
+
+def _error(
+    stage: Any,
+    controllers: Sequence[Controller],
+    place: tuple[float, float],
+    reference: Any,
+    options: dict[str, Any],
+) -> float:
+    """Rms error [m] along a reference, beginning with the gains of its place."""
+    laws = [one.feedback for one in controllers]
+    loops = [
+        replace(one, feedback=replace(law, first=place))
+        for one, law in zip(controllers, laws, strict=True)
+        if isinstance(law, ScheduledPid)
+    ]
+    how: dict[str, Any] = {"beyond_reach": True, "unstable": True}
+    how |= {name: options[name] for name in ("delay", "jitter") if name in options}
+    if isinstance(stage, XYStage):
+        return contour(stage, loops, reference, **how).metrics.rms_error
+    first = stage[0] if isinstance(stage, Sequence) else stage
+    visited = options.get("visited", ())
+    return track(first, loops[0], reference, visited=visited, **how).metrics.rms_error
+
+
+def _loops(tuned: Tuned | TunedPair) -> tuple[Controller, ...]:
+    return tuned.controllers if isinstance(tuned, TunedPair) else (tuned.controller,)
+
+
+def _waveform(both: bool, centre: Any) -> Any:
+    if both:
+        middle = {} if centre is None else {"centre": centre}
+        return lambda radius, rate: circle(frequency=rate, radius=radius, **middle)
+    if centre is None:
+        raise ParameterError("centre is missing: expected the middle of the references in m")
+    return _sines(centre)
 
 
 def _count(values: object) -> int:
@@ -173,10 +308,10 @@ def _sines(centre: float) -> Waveform:
     return make
 
 
-def _check_between(
-    controller: Controller, law: ScheduledPid, plants: list[_core.LoopPlant], margins: Margins
-) -> None:
+def _check_between(controller: Controller, plants: list[_core.LoopPlant], margins: Margins) -> None:
     """Refuse gains that lose their margins half-way between two places of the grid."""
+    law = controller.feedback
+    assert isinstance(law, ScheduledPid)
     columns = len(law.rates)
     weights = np.array([_weights(one) for one in law.gains]).reshape(-1, columns, 3)
     middles = [

@@ -141,9 +141,9 @@ def _sought(question: Question, axis: Axis, dt: float) -> SoughtAxis:
     cores = [one.plant for one in plants]
     parts = question.parts or _usual_parts(question, cores, dt)
     of_parts = sum(one in parts for one in ("low-pass", "notch"))
-    if len(question.filters) + of_parts > 2:
+    if len(axis.filters) + of_parts > 2:
         raise ParameterError(
-            f"filters has {len(question.filters)} beside {of_parts} of the parts: expected 2 in all"
+            f"filters has {len(axis.filters)} beside {of_parts} of the parts: expected 2 in all"
         )
     periods = {one.period for one in question.references}
     if "repetitive" in parts and len(periods) > 1:
@@ -156,7 +156,7 @@ def _sought(question: Question, axis: Axis, dt: float) -> SoughtAxis:
         dt=dt,
         limits=question.limits,
         feedforward=axis.feedforward,
-        filters=question.filters,
+        filters=axis.filters,
         drive_unit=question.drive_unit,
     )
     lag = question.stage.lag if question.stage is not None else 0.0

@@ -51,7 +51,7 @@ def tune(
     limits: tuple[float, float] | None = None,
     feedforward: Inverse | Sequence[Inverse | None] | Literal["inverse"] | None = "inverse",
     parts: Sequence[str] | str | None = None,
-    filters: Sequence[LowPass | Notch] = (),
+    filters: Sequence[LowPass | Notch] | Sequence[Sequence[LowPass | Notch]] = (),
     law: LawName = "pid",
     margins: Margins | None = None,
     spread: Spread | None = None,
@@ -104,7 +104,8 @@ def tune(
         low-pass, a notch where a mode rings below half the sampling rate, and a repetitive part
         where all references repeat more than four times with one period.
     filters : sequence of LowPass or Notch, optional
-        Filters of the measurement that are there in any case; two with those of `parts`.
+        Filters of the measurement that are there in any case; two with those of `parts`. Of an XY
+        stage the same for both axes, or those of x and those of y.
     law : str, optional
         The feedback law: ``"pid"``; ``"pd"``, which needs a feedforward; ``"lead-lag"``;
         ``"sliding mode"``, ``"disturbance observer"`` around a PID, or
