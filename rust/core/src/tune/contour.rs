@@ -6,7 +6,8 @@
 use piezotrack_control::Controller;
 use rayon::prelude::*;
 
-use super::loops::{Figures, Motion, ReadyTask, Task};
+use super::figures::Figures;
+use super::loops::{Motion, ReadyTask, Task};
 use crate::error::{Error, Result, not_negative};
 use crate::math::room;
 use crate::signal::contour_error::{Polyline, radial_errors};

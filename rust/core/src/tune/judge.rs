@@ -3,7 +3,8 @@
 use piezotrack_control::Controller;
 
 use super::contour::{PathTask, ReadyPath};
-use super::loops::{Figures, ReadyTask, Task};
+use super::figures::Figures;
+use super::loops::{ReadyTask, Task};
 use crate::error::{Error, Result};
 use crate::signal::Stop;
 use crate::simulate::Law;

@@ -8,13 +8,14 @@ use piezotrack_control::{Controller, ControllerState, Number};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
+use super::figures::{Figures, Score};
+use super::parts::{Part, coarse_step, parts};
 use crate::error::{Error, Result};
 use crate::math::{Lanes, dispatch_vectors, room, width, zeros};
 use crate::models::{LanedPlant, LanedVisitor, StageState};
 use crate::signal::{Stop, index};
 use crate::simulate::{
-    ApparatusState, DELAY_LINE, Delay, Law, LawState, ReferenceSamples, SAME, Timing, VirtualStage,
-    closed_loop,
+    ApparatusState, DELAY_LINE, Law, LawState, ReferenceSamples, Timing, VirtualStage, closed_loop,
 };
 
 /// Which error counts.
@@ -48,43 +49,8 @@ pub struct Task<'a> {
     pub judged: Judged,
 }
 
-/// What is read of a closed loop.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Figures {
-    /// Tracking error, m rms.
-    pub rms: f64,
-    /// Largest tracking error, m.
-    pub largest: f64,
-    /// Change of the command from sample to sample, V rms.
-    pub effort: f64,
-    /// Fastest change of the command, V/s.
-    pub slew: f64,
-    /// Share of the samples at which the command was clipped.
-    pub clipped: f64,
-}
-
-impl Figures {
-    /// Of a loop that did not stay finite.
-    pub const FAILED: Self = Self {
-        rms: f64::INFINITY,
-        largest: f64::INFINITY,
-        effort: f64::INFINITY,
-        slew: f64::INFINITY,
-        clipped: 1.0,
-    };
-}
-
-/// Beyond this a loop counts as diverged, m.
-const DIVERGED: f64 = 1.0;
-
-/// Ends of the parts in which an amplifier settles after a change of its command, in lags.
-const SETTLING: [f64; 3] = [0.5, 1.5, 4.0];
-
 /// Instants of a control interval at which a loop by itself is shown.
 const INSTANTS: usize = 20;
-
-/// Most steps of equal length in a control interval.
-const MOST_STEPS: f64 = 4.0;
 
 impl<'a> Task<'a> {
     /// Brings the stage to where the loops begin, and draws the noise of its sensor.
@@ -119,15 +85,6 @@ impl<'a> Task<'a> {
         self.beside.get(k).copied().unwrap_or(0.0)
     }
 
-    /// Step of a loop by itself, s: as accurate as the parts of an interval in lanes.
-    fn coarse_step(&self) -> f64 {
-        let amplifier = &self.stage.amplifier;
-        let slewing = (amplifier.high - amplifier.low) / amplifier.slew;
-        let settling = [amplifier.lag(), slewing].into_iter().filter(|time| *time > 0.0);
-        let longest = settling.fold(self.timing.interval, f64::min) / MOST_STEPS;
-        self.stage.step.max(longest)
-    }
-
     /// The loop of one controller.
     fn alone(
         &self,
@@ -147,7 +104,8 @@ impl<'a> Task<'a> {
             commands.push(command);
             command.volts
         };
-        let stage = VirtualStage { step: self.coarse_step(), ..*self.stage };
+        let stage =
+            VirtualStage { step: coarse_step(self.stage, self.timing.interval), ..*self.stage };
         let apparatus = stage.apparatus();
         let run = match closed_loop(&apparatus, start.clone(), &timing, command, stop) {
             Ok(Some(run)) => run,
@@ -237,62 +195,6 @@ impl ReadyTask<'_> {
     }
 }
 
-/// The running sums of a loop.
-#[derive(Clone, Copy)]
-struct Score {
-    interval: f64,
-    count: f64,
-    squares: f64,
-    largest: f64,
-    changes: f64,
-    fastest: f64,
-    clipped: f64,
-    before: Option<f64>,
-}
-
-impl Score {
-    fn new(interval: f64) -> Self {
-        Self {
-            interval,
-            count: 0.0,
-            squares: 0.0,
-            largest: 0.0,
-            changes: 0.0,
-            fastest: 0.0,
-            clipped: 0.0,
-            before: None,
-        }
-    }
-
-    #[inline(always)]
-    fn take(&mut self, counts: bool, error: f64, volts: f64, clipped: bool) {
-        let change = self.before.map_or(0.0, |before| volts - before);
-        self.before = Some(volts);
-        if counts {
-            self.count += 1.0;
-            self.squares += error * error;
-            // Not so where the error is not a number
-            self.largest = if error.abs() <= self.largest { self.largest } else { error.abs() };
-            self.changes += change * change;
-            self.fastest = self.fastest.max(change.abs());
-            self.clipped += f64::from(u8::from(clipped));
-        }
-    }
-
-    fn figures(&self) -> Figures {
-        if !(self.largest <= DIVERGED && self.squares.is_finite() && self.count > 0.0) {
-            return Figures::FAILED;
-        }
-        Figures {
-            rms: libm::sqrt(self.squares / self.count),
-            largest: self.largest,
-            effort: libm::sqrt(self.changes / self.count),
-            slew: self.fastest / self.interval,
-            clipped: self.clipped / self.count,
-        }
-    }
-}
-
 /// Loops of one task, to be spread over threads and lanes.
 struct Loops<'a> {
     task: &'a Task<'a>,
@@ -310,7 +212,7 @@ impl LanedVisitor for Loops<'_> {
         let Self { task, start, noise, controllers, shown, stop } = self;
         let arch = Arch::new();
         let width = width(arch);
-        let parts = parts(task, plant.longest());
+        let parts = parts(task.stage, &task.timing, task.shown_at, plant.longest());
         // Every thread gets a vector to fill before any gets a second one.
         let vectors = controllers.len().div_ceil(width);
         let most = if width > 1 { P::VECTORS } else { 1 };
@@ -363,52 +265,6 @@ fn noises(task: &Task<'_>, start: &ApparatusState<StageState>) -> Result<Vec<f64
         noise.push(task.stage.sensor.next_noise(&mut sensor, interval));
     }
     Ok(noise)
-}
-
-/// A part of a control interval in which the command does not change.
-#[derive(Clone, Copy, Debug)]
-struct Part {
-    /// Its length, s.
-    step: f64,
-    /// Whether the newest command that acts in this interval acts here, or the one before.
-    newest: bool,
-    /// Whether the motion is shown at its end.
-    shown: bool,
-}
-
-/// Whole intervals of delay, and the parts of each interval.
-fn parts(task: &Task<'_>, longest: f64) -> (usize, Vec<Part>) {
-    let (dt, stage) = (task.timing.interval, task.stage);
-    let Delay { whole, fraction } = Delay::new(task.timing.delay + stage.sensor.delay, dt);
-    let lag = stage.amplifier.lag();
-    let mut edges = vec![fraction, 1.0, task.shown_at];
-    let edge = |after: f64| [fraction + after, fraction + after - 1.0];
-    for settled in SETTLING {
-        edges.extend(edge(settled * lag / dt));
-    }
-    // While it slews, and a command that its lag rounds off.
-    let slewing = (stage.amplifier.high - stage.amplifier.low) / stage.amplifier.slew / dt;
-    let slews = if slewing > 1.0 / MOST_STEPS { MOST_STEPS } else { 1.0 };
-    edges.extend(edge(slewing.min(1.0)));
-    let count = libm::ceil(dt / longest).clamp(slews, MOST_STEPS);
-    if count > 1.0 {
-        let mut edge = 1.0;
-        while edge < count {
-            edges.push(edge / count);
-            edge += 1.0;
-        }
-    }
-    edges.retain(|edge| *edge > SAME && *edge < 1.0 + SAME);
-    edges.sort_by(f64::total_cmp);
-    edges.dedup_by(|a, b| (*a - *b).abs() < SAME);
-    let mut from = 0.0;
-    let mut parts = Vec::with_capacity(edges.len());
-    for edge in edges {
-        let shown = (edge - task.shown_at).abs() < SAME;
-        parts.push(Part { step: (edge - from) * dt, newest: from > fraction - SAME, shown });
-        from = edge;
-    }
-    (whole, parts)
 }
 
 /// Loops that are simulated together.

@@ -8,8 +8,8 @@
 use piezotrack_control::Controller;
 use rayon::prelude::*;
 
+use super::figures::Figures;
 use super::judge::{Judge, Ready};
-use super::loops::Figures;
 use super::requirements::{PlantSet, Requirements, Robustness};
 use super::settings::{Setting, Sought, Template};
 use crate::error::{Error, Result};
