@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -93,7 +94,7 @@ class Format:
             self.writes(path, columns)
 
 
-class Table:
+class Table(ABC):
     """The columns of a file.
 
     Attributes
@@ -113,6 +114,7 @@ class Table:
     header: int | None = None
     dt: float | None = None
 
+    @abstractmethod
     def values(self, main: Sequence[Column]) -> Mapping[int, Array]:
         """Read the samples of columns, and of those that go with them.
 
@@ -126,15 +128,14 @@ class Table:
         mapping of int to ndarray, each of shape (n,)
             By the number of the column, in the units of the columns.
         """
-        raise NotImplementedError
 
+    @abstractmethod
     def column(self, column: Column) -> Array:
         """Read one column as it is, also where entries are no numbers: those are NaN."""
-        raise NotImplementedError
 
+    @abstractmethod
     def count(self, column: Column) -> int:
         """Return the number of samples of a column."""
-        raise NotImplementedError
 
     def interval(self, main: Sequence[Column]) -> float | None:
         """Return the sampling interval that the file states for columns [s], or None."""
