@@ -32,6 +32,7 @@ from .loop_options import (
     driven_by_voltage,
     noise_metres,
     refuse_of_other_stage,
+    simulated,
     small_margins,
     unit_of,
 )
@@ -141,7 +142,6 @@ def track_command(
     from ..control.stability import check_loop
     from ..control.tracking import track
     from ..identification.identified import load
-    from ..stages.virtual import VirtualStage
 
     check_stage(stage)
     own = stage != PAPER
@@ -167,11 +167,7 @@ def track_command(
         repetitive=settings.repetitive(known, desired, kq, tq) if repetitive else None,
         drive_unit=unit_of(own, known),
     )
-    plant = (
-        VirtualStage.of(known, noise=noise_metres(noise_nm), bandwidth=bandwidth, seed=seed)
-        if own
-        else VirtualStage.xu_li_2010(seed=seed)
-    )
+    plant = simulated(None if own else PAPER, known, noise_metres(noise_nm), bandwidth, seed)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write(["tracking.csv", "tracking.json", *picture_files("tracking")])
     free = {"beyond_reach": beyond_reach, "unstable": unstable}
