@@ -103,6 +103,12 @@ class TuningReport:
             f"{self.figure}, at {1.0 / self.dt:.6g} Hz: {self.candidates} controllers looked at, "
             f"{self.loops} loops simulated"
         ]
+        if self.runs:
+            scale, unit = (1e6, "um") if self.unit == "m" else (1.0, self.unit)
+            lines.append(
+                f"{scale * self.value:.4g} {unit} where it counts: settled, and learnt where "
+                "something learns"
+            )
         for run in self.runs:
             lines += _run_lines(run)
         lines.append(f"over {len(self.plants)} plants:")
