@@ -24,6 +24,9 @@ def plot_controllers(
     comparison: ControllerComparison, fig: Figure | SubFigure | None = None
 ) -> Figure:
     """Draw errors along each reference, and over all of them on each stage."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+    from matplotlib.transforms import ScaledTranslation
+
     rows = comparison.rows
     drawn = panels(fig, (12.0, 2.2 + 0.36 * len(rows)))
     left, right = drawn.subplots(1, 2)
@@ -35,14 +38,24 @@ def plot_controllers(
     for k, name in enumerate(comparison.variants):
         errors = [1e9 * row.rms(k) for row in rows]
         right.plot(errors, places, MARKERS[k % len(MARKERS)], label=name, alpha=0.8)
-    # Below the panels: above any row there may be a mark.
-    below = -0.55 / whole(drawn).get_figheight()
+    # Below the labels, in inches: above any row there may be a mark.
+    below = ScaledTranslation(0.0, -0.5, whole(drawn).dpi_scale_trans)
     titles = ("each reference, as tuned for", "all references, each stage")
     for axis, title in zip((left, right), titles, strict=True):
         axis.set_xscale("log")
+        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=6))
+        axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.xaxis.set_minor_formatter(NullFormatter())
+        axis.set_ylim(-0.5, len(rows) - 0.5)
         axis.set_xlabel("true error, nm rms")
         axis.set_title(title)
         axis.grid(axis="y", alpha=0.3)
         axis.set_yticks(places, [row.name for row in rows] if axis is left else [""] * len(rows))
-        axis.legend(fontsize="small", ncol=3, loc="upper center", bbox_to_anchor=(0.5, below))
+        axis.legend(
+            fontsize="small",
+            ncol=3,
+            loc="upper center",
+            bbox_to_anchor=(0.5, 0.0),
+            bbox_transform=axis.transAxes + below,
+        )
     return whole(drawn)
