@@ -16,10 +16,10 @@ mod plant;
 mod prandtl_ishlinskii;
 mod registry;
 mod search_ranges;
+mod superposition;
 mod tanh_envelope;
 mod traits;
 mod values;
-mod weighted_plays;
 
 pub use bouc_wen::{BoucWenKernel, BoucWenStage};
 pub use bouc_wen_oscillator::{BoucWenOscillator, BoucWenOscillatorKernel};
@@ -44,9 +44,11 @@ pub use prandtl_ishlinskii::{
 };
 pub use registry::{FoundBy, Model, Stage, StageFlow, StageInverse, StageInverseState, StageState};
 pub use search_ranges::{Measures, ModeShown, NOMINAL_STIFFNESS, Range, Ranges};
+pub use superposition::{
+    AnySuperposition, FittedWeights, Places, Signals, SignalsOf, Superposition,
+};
 pub use tanh_envelope::TanhEnvelope;
 pub use traits::{
     Experiment, Invertible, KernelVisitor, Method, ModelInfo, Response, Searchable, StageModel,
 };
 pub use values::{Held, ParameterInfo, Values, position};
-pub use weighted_plays::{FittedPlays, WeightedPlays, WeightedVisitor, state_at_rest};
