@@ -62,5 +62,8 @@ from .stages.generalised_prandtl_ishlinskii import (
 from .stages.inverse import Inverse as Inverse
 from .stages.parallel_dahl import ParallelDahlStage as ParallelDahlStage
 from .stages.prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage
+from .stages.rate_dependent_prandtl_ishlinskii import (
+    RateDependentPrandtlIshlinskiiStage as RateDependentPrandtlIshlinskiiStage,
+)
 from .stages.virtual import VirtualStage as VirtualStage
 from .stages.xy import XYStage as XYStage

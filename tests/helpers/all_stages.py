@@ -48,4 +48,13 @@ STAGES: dict[str, pt.stages.Stage] = {
         level=-10.0,
         time_constant=0.002,
     ),
+    "rate-dependent-prandtl-ishlinskii": pt.RateDependentPrandtlIshlinskiiStage(
+        linear=1e-6,
+        thresholds=(10.0, 20.0),
+        weights=(0.2e-6, 0.1e-6),
+        dilation=0.5e-3,
+        dead_zone_thresholds=(30e-6,),
+        dead_zone_weights=(-0.1,),
+        time_constant=0.002,
+    ),
 }

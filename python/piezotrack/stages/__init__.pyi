@@ -23,6 +23,9 @@ from .parallel_dahl import ParallelDahlStage as ParallelDahlStage
 from .parallel_dahl import ParallelDahlState as ParallelDahlState
 from .prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage
 from .prandtl_ishlinskii import PrandtlIshlinskiiState as PrandtlIshlinskiiState
+from .rate_dependent_prandtl_ishlinskii import (
+    RateDependentPrandtlIshlinskiiStage as RateDependentPrandtlIshlinskiiStage,
+)
 from .virtual import VirtualResponse as VirtualResponse
 from .virtual import VirtualStage as VirtualStage
 from .xy import XYLog as XYLog

@@ -14,6 +14,7 @@ mod mechanics_parameters;
 mod parallel_dahl;
 mod plant;
 mod prandtl_ishlinskii;
+mod rate_dependent_prandtl_ishlinskii;
 mod registry;
 mod search_ranges;
 mod superposition;
@@ -42,10 +43,14 @@ pub use plant::{KernelFlow, KernelModel, Plant, Settling};
 pub use prandtl_ishlinskii::{
     MOST_PLAYS, MOST_ZONES, PlayHysteresis, Plays, PrandtlIshlinskiiStage,
 };
+pub use rate_dependent_prandtl_ishlinskii::{
+    DilatedPlays, DilatedPlaysInverse, DilatedPlaysInverseState, DilatedPlaysState,
+    RateDependentPrandtlIshlinskiiStage,
+};
 pub use registry::{FoundBy, Model, Stage, StageFlow, StageInverse, StageInverseState, StageState};
 pub use search_ranges::{Measures, ModeShown, NOMINAL_STIFFNESS, Range, Ranges};
 pub use superposition::{
-    AnySuperposition, FittedWeights, Places, Signals, SignalsOf, Superposition,
+    AnySuperposition, FittedWeights, Places, Shape, Signals, SignalsOf, Superposition,
 };
 pub use tanh_envelope::TanhEnvelope;
 pub use traits::{

@@ -320,6 +320,7 @@ models! {
     BoucWenOscillator: Creeping<super::BoucWenOscillator>, swarm;
     PrandtlIshlinskii: super::PrandtlIshlinskiiStage, least_squares;
     GeneralisedPrandtlIshlinskii: super::GeneralisedPrandtlIshlinskiiStage, least_squares;
+    RateDependentPrandtlIshlinskii: super::RateDependentPrandtlIshlinskiiStage, least_squares;
 }
 
 impl Model {
