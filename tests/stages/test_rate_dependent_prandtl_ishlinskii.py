@@ -54,9 +54,8 @@ def test_the_motion_is_that_of_the_equations(frequency: float) -> None:
 
 
 def test_without_a_dilation_it_is_a_prandtl_ishlinskii_stage() -> None:
-    still = replace(
-        STAGE, dilation=0.0, time_constant=3e-3, creep_weights=[0.02], creep_times=[1.0]
-    )
+    slow: Any = {"time_constant": 3e-3, "creep_weights": (0.02,), "creep_times": (1.0,)}
+    still = replace(STAGE, dilation=0.0, **slow)
     plain = pt.PrandtlIshlinskiiStage(
         linear=still.linear,
         thresholds=still.thresholds,
@@ -105,7 +104,7 @@ def test_intervals_that_are_too_short_have_no_inverse() -> None:
     share = sum(STAGE.weights) / (STAGE.linear + sum(STAGE.weights))
     shortest = STAGE.dilation * share
     STAGE.inverse().start(1.01 * shortest)
-    with pytest.raises(pt.ParameterError, match="dt is .* plays would go back"):
+    with pytest.raises(pt.ParameterError, match=r"dt is .* plays would go back"):
         STAGE.inverse().start(0.99 * shortest)
 
 
