@@ -9,6 +9,17 @@ import piezotrack as pt
 STAGES: dict[str, pt.stages.Stage] = {
     "dahl": replace(pt.DahlStage.xu_li_2010(), b0=40.0),
     "bouc-wen": pt.BoucWenStage.xu_li_2010_corrected(),
+    "asymmetric-bouc-wen": pt.AsymmetricBoucWenStage(
+        mass=0.1283,
+        damping=1580.0,
+        stiffness=19567.0,
+        piezo_coefficient=1.7339e-6,
+        alpha=0.3575,
+        beta=0.0364,
+        gamma=0.0272,
+        asymmetry=-0.005,
+        sign_asymmetry=-0.01,
+    ),
     "first-order-dahl": pt.FirstOrderDahlStage(
         mass=0.1828,
         damping=100.0,

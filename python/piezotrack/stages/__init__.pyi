@@ -3,6 +3,7 @@
 from .apparatus import Amplifier as Amplifier
 from .apparatus import Preconditioning as Preconditioning
 from .apparatus import Sensor as Sensor
+from .asymmetric_bouc_wen import AsymmetricBoucWenStage as AsymmetricBoucWenStage
 from .base import ForceState as ForceState
 from .base import Response as Response
 from .base import Stage as Stage

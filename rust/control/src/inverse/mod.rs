@@ -14,7 +14,7 @@ mod modes;
 mod neural_network;
 mod play;
 
-pub use bouc_wen::{BoucWenInverse, BoucWenInverseState};
+pub use bouc_wen::{AsymmetricBoucWenInverse, BoucWenInverse, BoucWenInverseState};
 pub use creeping::{CreepingInverse, CreepingInverseState};
 pub use dahl::{DahlInverse, InverseState, SampledDahlInverse};
 pub use drive::after_drive;

@@ -73,6 +73,9 @@ impl Stage {
                 visitor.visit(kernelled(one.stage.lumped(kernel), one, voltages))
             }
             (Self::BoucWen(one), _) => visitor.visit(kernelled(one.stage.lumped(), one, voltages)),
+            (Self::AsymmetricBoucWen(one), _) => {
+                visitor.visit(kernelled(one.stage.lumped(), one, voltages))
+            }
             (Self::FirstOrderDahl(one), _) => {
                 visitor.visit(kernelled(one.stage.lumped(), one, voltages))
             }

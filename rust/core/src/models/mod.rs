@@ -1,5 +1,6 @@
 //! Models of a stage: one file each, the traits that it implements, and the list of models.
 
+mod asymmetric_bouc_wen;
 mod bouc_wen;
 mod bouc_wen_oscillator;
 mod creep;
@@ -8,6 +9,7 @@ pub mod dahl;
 mod dynamics_parameters;
 mod first_order_dahl;
 mod generalised_prandtl_ishlinskii;
+mod input_kernel;
 mod input_stage;
 mod lanes;
 mod mechanics_parameters;
@@ -21,7 +23,8 @@ mod traits;
 mod values;
 mod weighted_plays;
 
-pub use bouc_wen::{BoucWenKernel, BoucWenStage};
+pub use asymmetric_bouc_wen::{AsymmetricBoucWenHysteresis, AsymmetricBoucWenStage};
+pub use bouc_wen::{BoucWenHysteresis, BoucWenStage};
 pub use bouc_wen_oscillator::{BoucWenOscillator, BoucWenOscillatorKernel};
 pub use creep::{
     Creep, Dynamics, MOST_MODES, MOST_RELAXATIONS, Mode, Modes, Relaxation, RelaxationFlow,
@@ -35,6 +38,7 @@ pub use generalised_prandtl_ishlinskii::{
     GeneralisedPlays, GeneralisedPlaysInverse, GeneralisedPlaysInverseState, GeneralisedPlaysState,
     GeneralisedPrandtlIshlinskiiStage,
 };
+pub use input_kernel::{InputHysteresis, InputKernel};
 pub use input_stage::{InputOperator, InputStage, InputStageFlow, InputStageState, Segmented};
 pub use lanes::{LanedPlant, LanedVisitor};
 pub use parallel_dahl::{ParallelDahlKernel, ParallelDahlStage};

@@ -312,6 +312,7 @@ macro_rules! models {
 models! {
     Dahl: Creeping<super::DahlStage>, swarm;
     BoucWen: Creeping<super::BoucWenStage>, swarm;
+    AsymmetricBoucWen: Creeping<super::AsymmetricBoucWenStage>, swarm;
     FirstOrderDahl: Creeping<super::FirstOrderDahlStage>, swarm;
     ParallelDahl: Creeping<super::ParallelDahlStage>, swarm;
     BoucWenOscillator: Creeping<super::BoucWenOscillator>, swarm;
