@@ -61,6 +61,7 @@ from .stages.generalised_prandtl_ishlinskii import (
     GeneralisedPrandtlIshlinskiiStage as GeneralisedPrandtlIshlinskiiStage,
 )
 from .stages.inverse import Inverse as Inverse
+from .stages.lugre import LuGreStage as LuGreStage
 from .stages.parallel_dahl import ParallelDahlStage as ParallelDahlStage
 from .stages.prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage
 from .stages.virtual import VirtualStage as VirtualStage

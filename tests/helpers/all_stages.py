@@ -39,6 +39,18 @@ STAGES: dict[str, pt.stages.Stage] = {
         yield_path=2e-6,
         path_ratio=4.0,
     ),
+    "lugre": pt.LuGreStage(
+        mass=0.1828,
+        damping=100.0,
+        stiffness=26065.0,
+        piezo_coefficient=0.0468,
+        rest_stiffness=9e3,
+        micro_damping=20.0,
+        coulomb_force=0.1,
+        static_force=0.15,
+        stribeck_velocity=1e-3,
+        viscous_friction=5.0,
+    ),
     "bouc-wen-oscillator": pt.BoucWenOscillator.benchmark(),
     "prandtl-ishlinskii": pt.PrandtlIshlinskiiStage(
         linear=1e-6,

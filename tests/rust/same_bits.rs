@@ -120,6 +120,7 @@ fn one_lane_and_many_of_models_with_an_exponent() {
         Model::AsymmetricBoucWen,
         Model::FirstOrderDahl,
         Model::ParallelDahl,
+        Model::LuGre,
         Model::BoucWenOscillator,
     ];
     for (model, (hold, exponent)) in models.into_iter().flat_map(|m| cases.map(|case| (m, case))) {

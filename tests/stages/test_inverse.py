@@ -355,6 +355,7 @@ def test_the_wording_of_a_refusal() -> None:
         "asymmetric-bouc-wen",
         "first-order-dahl",
         "parallel-dahl",
+        "lugre",
         "bouc-wen-oscillator",
     ],
 )

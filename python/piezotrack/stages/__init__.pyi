@@ -20,6 +20,8 @@ from .generalised_prandtl_ishlinskii import (
 from .inverse import Inverse as Inverse
 from .inverse import InverseSession as InverseSession
 from .inverse import PlayedVoltage as PlayedVoltage
+from .lugre import LuGreStage as LuGreStage
+from .lugre import LuGreState as LuGreState
 from .parallel_dahl import ParallelDahlStage as ParallelDahlStage
 from .parallel_dahl import ParallelDahlState as ParallelDahlState
 from .prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage

@@ -76,9 +76,9 @@ pub use hysteresis_observer::{
 pub use inverse::{
     AsymmetricBoucWenInverse, BoucWenInverse, BoucWenInverseState, CreepingInverse,
     CreepingInverseState, DahlInverse, FeedbackInverse, FeedbackInverseState,
-    FirstOrderDahlInverse, InputInverse, InputInverseState, Inverse, InverseState, ModesInverse,
-    ModesInverseState, OperatorInverse, OscillatorInverse, ParallelDahlInverse, PlayInverse,
-    PrandtlIshlinskiiInverse, SampledDahlInverse,
+    FirstOrderDahlInverse, InputInverse, InputInverseState, Inverse, InverseState, LuGreInverse,
+    LuGreInverseState, ModesInverse, ModesInverseState, OperatorInverse, OscillatorInverse,
+    ParallelDahlInverse, PlayInverse, PrandtlIshlinskiiInverse, SampledDahlInverse,
 };
 pub use iterative_learning::IterativeLearning;
 pub use lead_lag::LeadLag;

@@ -10,6 +10,7 @@ mod dahl;
 mod drive;
 mod feedback;
 mod input;
+mod lugre;
 mod modes;
 mod neural_network;
 mod play;
@@ -23,6 +24,7 @@ pub use feedback::{
     ParallelDahlInverse,
 };
 pub use input::{InputInverse, InputInverseState, OperatorInverse, PrandtlIshlinskiiInverse};
+pub use lugre::{LuGreInverse, LuGreInverseState};
 pub use modes::{ModesInverse, ModesInverseState};
 pub use neural_network::{
     MOST_NETWORK_PLAYS, MOST_UNITS, NetworkNumbers, NeuralNetworkInverse, NeuralNetworkState,

@@ -1,7 +1,7 @@
 //! LuGre friction in feedback on the displacement: a force that depends on the speed too.
 //!
 //! ```text
-//! m x'' + b x' + k x = T u - F,   F = sigma0 z + sigma1 z' + sigma2 x'
+//! M x'' + D x' + K x = T u - F,   F = sigma0 z + sigma1 z' + sigma2 x'
 //! ```
 //!
 //! With z' put in, F is `(sigma1 + sigma2) x'`, which the linear part has, and the rest
@@ -24,7 +24,7 @@ const CORRECTIONS: usize = 2;
 /// LuGre friction over one step.
 #[derive(Clone, Copy, Debug)]
 pub struct LuGreCoupling<N> {
-    /// The linear part over one step, with the damping b + sigma1 + sigma2.
+    /// The linear part over one step, with the damping D + sigma1 + sigma2.
     pub linear: Propagator<N>,
     /// The friction.
     pub friction: LuGre<N>,

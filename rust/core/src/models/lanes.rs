@@ -82,6 +82,7 @@ impl Stage {
             (Self::ParallelDahl(one), _) => {
                 visitor.visit(kernelled(one.stage.lumped(), one, voltages))
             }
+            (Self::LuGre(one), _) => visitor.visit(kernelled(one.stage.lumped(), one, voltages)),
             (Self::BoucWenOscillator(one), _) => {
                 visitor.visit(kernelled(one.stage.lumped(), one, voltages))
             }

@@ -12,6 +12,7 @@ mod generalised_prandtl_ishlinskii;
 mod input_kernel;
 mod input_stage;
 mod lanes;
+mod lugre;
 mod mechanics_parameters;
 mod parallel_dahl;
 mod plant;
@@ -41,6 +42,7 @@ pub use generalised_prandtl_ishlinskii::{
 pub use input_kernel::{InputHysteresis, InputKernel};
 pub use input_stage::{InputOperator, InputStage, InputStageFlow, InputStageState, Segmented};
 pub use lanes::{LanedPlant, LanedVisitor};
+pub use lugre::{LuGreKernel, LuGreStage};
 pub use parallel_dahl::{ParallelDahlKernel, ParallelDahlStage};
 pub use plant::{KernelFlow, KernelModel, Plant, Settling};
 pub use prandtl_ishlinskii::{

@@ -315,6 +315,7 @@ models! {
     AsymmetricBoucWen: Creeping<super::AsymmetricBoucWenStage>, swarm;
     FirstOrderDahl: Creeping<super::FirstOrderDahlStage>, swarm;
     ParallelDahl: Creeping<super::ParallelDahlStage>, swarm;
+    LuGre: Creeping<super::LuGreStage>, swarm;
     BoucWenOscillator: Creeping<super::BoucWenOscillator>, swarm;
     PrandtlIshlinskii: super::PrandtlIshlinskiiStage, least_squares;
     GeneralisedPrandtlIshlinskii: super::GeneralisedPrandtlIshlinskiiStage, least_squares;
