@@ -19,10 +19,10 @@ mod plant;
 mod prandtl_ishlinskii;
 mod registry;
 mod search_ranges;
+mod superposition;
 mod tanh_envelope;
 mod traits;
 mod values;
-mod weighted_plays;
 
 pub use asymmetric_bouc_wen::{AsymmetricBoucWenHysteresis, AsymmetricBoucWenStage};
 pub use bouc_wen::{BoucWenHysteresis, BoucWenStage};
@@ -50,9 +50,11 @@ pub use prandtl_ishlinskii::{
 };
 pub use registry::{FoundBy, Model, Stage, StageFlow, StageInverse, StageInverseState, StageState};
 pub use search_ranges::{Measures, ModeShown, NOMINAL_STIFFNESS, Range, Ranges};
+pub use superposition::{
+    AnySuperposition, FittedWeights, Places, Signals, SignalsOf, Superposition,
+};
 pub use tanh_envelope::TanhEnvelope;
 pub use traits::{
     Experiment, Invertible, KernelVisitor, Method, ModelInfo, Response, Searchable, StageModel,
 };
 pub use values::{Held, ParameterInfo, Values, position};
-pub use weighted_plays::{FittedPlays, WeightedPlays, WeightedVisitor, state_at_rest};
