@@ -62,6 +62,7 @@ from .stages.generalised_prandtl_ishlinskii import (
 )
 from .stages.inverse import Inverse as Inverse
 from .stages.lugre import LuGreStage as LuGreStage
+from .stages.maxwell_slip import MaxwellSlipStage as MaxwellSlipStage
 from .stages.parallel_dahl import ParallelDahlStage as ParallelDahlStage
 from .stages.prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage
 from .stages.virtual import VirtualStage as VirtualStage

@@ -61,6 +61,15 @@ STAGES: dict[str, pt.stages.Stage] = {
         frequency=160.0,
         damping_ratio=0.5,
     ),
+    "maxwell-slip": pt.MaxwellSlipStage(
+        piezo_coefficient=1.3e-6,
+        stiffness_ratios=(0.2, 0.1),
+        slip_displacements=(10e-6, 22e-6),
+        creep_weights=(0.01,),
+        creep_times=(0.1,),
+        frequency=160.0,
+        damping_ratio=0.5,
+    ),
     "generalised-prandtl-ishlinskii": pt.GeneralisedPrandtlIshlinskiiStage(
         linear=1e-6,
         thresholds=(10.0, 20.0),

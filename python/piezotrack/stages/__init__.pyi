@@ -22,6 +22,7 @@ from .inverse import InverseSession as InverseSession
 from .inverse import PlayedVoltage as PlayedVoltage
 from .lugre import LuGreStage as LuGreStage
 from .lugre import LuGreState as LuGreState
+from .maxwell_slip import MaxwellSlipStage as MaxwellSlipStage
 from .parallel_dahl import ParallelDahlStage as ParallelDahlStage
 from .parallel_dahl import ParallelDahlState as ParallelDahlState
 from .prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage

@@ -89,6 +89,10 @@ impl Stage {
             (Self::PrandtlIshlinskii(stage), StageState::PrandtlIshlinskii(state)) => {
                 visitor.visit(Plays { stage, start: state, zero: stage.zero() })
             }
+            (Self::MaxwellSlip(stage), StageState::MaxwellSlip(state)) => {
+                let stage = &stage.as_plays();
+                visitor.visit(Plays { stage, start: state, zero: stage.zero() })
+            }
             _ => return None,
         })
     }

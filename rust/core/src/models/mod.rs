@@ -13,6 +13,7 @@ mod input_kernel;
 mod input_stage;
 mod lanes;
 mod lugre;
+mod maxwell_slip;
 mod mechanics_parameters;
 mod parallel_dahl;
 mod plant;
@@ -43,6 +44,7 @@ pub use input_kernel::{InputHysteresis, InputKernel};
 pub use input_stage::{InputOperator, InputStage, InputStageFlow, InputStageState, Segmented};
 pub use lanes::{LanedPlant, LanedVisitor};
 pub use lugre::{LuGreKernel, LuGreStage};
+pub use maxwell_slip::{MaxwellSlip, MaxwellSlipStage};
 pub use parallel_dahl::{ParallelDahlKernel, ParallelDahlStage};
 pub use plant::{KernelFlow, KernelModel, Plant, Settling};
 pub use prandtl_ishlinskii::{

@@ -321,6 +321,7 @@ models! {
     LuGre: Creeping<super::LuGreStage>, swarm;
     BoucWenOscillator: Creeping<super::BoucWenOscillator>, swarm;
     PrandtlIshlinskii: super::PrandtlIshlinskiiStage, least_squares;
+    MaxwellSlip: super::MaxwellSlipStage, least_squares;
     GeneralisedPrandtlIshlinskii: super::GeneralisedPrandtlIshlinskiiStage, least_squares;
 }
 
