@@ -82,7 +82,9 @@ def test_without_asymmetries_it_is_the_symmetric_stage() -> None:
     plain = pt.BoucWenStage(**{name: getattr(STAGE, name) for name in names})
     u = multisine(2000, 1e-3, 0.5)
     assert even.simulate(u, 1e-3).x.tobytes() == plain.simulate(u, 1e-3).x.tobytes()
-    assert even.inverse().voltage(pt.sine(frequency=1.0, low=0.0, high=5e-5, duration=2.0), 1e-3) == (
+    assert even.inverse().voltage(
+        pt.sine(frequency=1.0, low=0.0, high=5e-5, duration=2.0), 1e-3
+    ) == (
         pytest.approx(
             plain.inverse().voltage(pt.sine(frequency=1.0, low=0.0, high=5e-5, duration=2.0), 1e-3),
             abs=1e-12,

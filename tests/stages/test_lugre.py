@@ -167,8 +167,15 @@ def test_identification_finds_the_motion(tmp_path: Path) -> None:
         log,
         "lugre",
         fixed={"mass": STAGE.mass, "stiffness": STAGE.stiffness, "viscous_friction": 5.0},
-        free=["damping", "piezo_coefficient", "rest_stiffness", "micro_damping", "coulomb_force",
-              "static_force", "stribeck_velocity"],
+        free=[
+            "damping",
+            "piezo_coefficient",
+            "rest_stiffness",
+            "micro_damping",
+            "coulomb_force",
+            "static_force",
+            "stribeck_velocity",
+        ],
         seed=2,
     )
     assert fit.cost == pytest.approx(10e-9, rel=0.1)
