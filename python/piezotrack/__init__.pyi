@@ -52,6 +52,7 @@ from .references.waveforms import sine as sine
 from .references.waveforms import staircase as staircase
 from .references.waveforms import triangle as triangle
 from .references.xy_reference import XYReference as XYReference
+from .stages.asymmetric_bouc_wen import AsymmetricBoucWenStage as AsymmetricBoucWenStage
 from .stages.bouc_wen import BoucWenStage as BoucWenStage
 from .stages.bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
 from .stages.dahl import DahlStage as DahlStage
@@ -60,6 +61,8 @@ from .stages.generalised_prandtl_ishlinskii import (
     GeneralisedPrandtlIshlinskiiStage as GeneralisedPrandtlIshlinskiiStage,
 )
 from .stages.inverse import Inverse as Inverse
+from .stages.lugre import LuGreStage as LuGreStage
+from .stages.maxwell_slip import MaxwellSlipStage as MaxwellSlipStage
 from .stages.parallel_dahl import ParallelDahlStage as ParallelDahlStage
 from .stages.prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage
 from .stages.rate_dependent_prandtl_ishlinskii import (

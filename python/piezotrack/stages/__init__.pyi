@@ -3,6 +3,7 @@
 from .apparatus import Amplifier as Amplifier
 from .apparatus import Preconditioning as Preconditioning
 from .apparatus import Sensor as Sensor
+from .asymmetric_bouc_wen import AsymmetricBoucWenStage as AsymmetricBoucWenStage
 from .base import ForceState as ForceState
 from .base import Response as Response
 from .base import Stage as Stage
@@ -19,6 +20,9 @@ from .generalised_prandtl_ishlinskii import (
 from .inverse import Inverse as Inverse
 from .inverse import InverseSession as InverseSession
 from .inverse import PlayedVoltage as PlayedVoltage
+from .lugre import LuGreStage as LuGreStage
+from .lugre import LuGreState as LuGreState
+from .maxwell_slip import MaxwellSlipStage as MaxwellSlipStage
 from .parallel_dahl import ParallelDahlStage as ParallelDahlStage
 from .parallel_dahl import ParallelDahlState as ParallelDahlState
 from .prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage

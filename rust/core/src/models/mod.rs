@@ -1,5 +1,6 @@
 //! Models of a stage: one file each, the traits that it implements, and the list of models.
 
+mod asymmetric_bouc_wen;
 mod bouc_wen;
 mod bouc_wen_oscillator;
 mod creep;
@@ -8,8 +9,11 @@ pub mod dahl;
 mod dynamics_parameters;
 mod first_order_dahl;
 mod generalised_prandtl_ishlinskii;
+mod input_kernel;
 mod input_stage;
 mod lanes;
+mod lugre;
+mod maxwell_slip;
 mod mechanics_parameters;
 mod parallel_dahl;
 mod plant;
@@ -22,7 +26,8 @@ mod tanh_envelope;
 mod traits;
 mod values;
 
-pub use bouc_wen::{BoucWenKernel, BoucWenStage};
+pub use asymmetric_bouc_wen::{AsymmetricBoucWenHysteresis, AsymmetricBoucWenStage};
+pub use bouc_wen::{BoucWenHysteresis, BoucWenStage};
 pub use bouc_wen_oscillator::{BoucWenOscillator, BoucWenOscillatorKernel};
 pub use creep::{
     Creep, Dynamics, MOST_MODES, MOST_RELAXATIONS, Mode, Modes, Relaxation, RelaxationFlow,
@@ -36,8 +41,11 @@ pub use generalised_prandtl_ishlinskii::{
     GeneralisedPlays, GeneralisedPlaysInverse, GeneralisedPlaysInverseState, GeneralisedPlaysState,
     GeneralisedPrandtlIshlinskiiStage,
 };
+pub use input_kernel::{InputHysteresis, InputKernel};
 pub use input_stage::{InputOperator, InputStage, InputStageFlow, InputStageState, Segmented};
 pub use lanes::{LanedPlant, LanedVisitor};
+pub use lugre::{LuGreKernel, LuGreStage};
+pub use maxwell_slip::{MaxwellSlip, MaxwellSlipStage};
 pub use parallel_dahl::{ParallelDahlKernel, ParallelDahlStage};
 pub use plant::{KernelFlow, KernelModel, Plant, Settling};
 pub use prandtl_ishlinskii::{
