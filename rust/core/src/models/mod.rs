@@ -6,6 +6,7 @@ mod creep;
 mod creeping;
 pub mod dahl;
 mod dynamics_parameters;
+mod everett;
 mod first_order_dahl;
 mod generalised_prandtl_ishlinskii;
 mod input_stage;
@@ -14,7 +15,9 @@ mod mechanics_parameters;
 mod parallel_dahl;
 mod plant;
 mod prandtl_ishlinskii;
+mod preisach;
 mod registry;
+mod reversals;
 mod search_ranges;
 mod tanh_envelope;
 mod traits;
@@ -30,6 +33,7 @@ pub use creep::{
 pub(crate) use creeping::relaxed;
 pub use creeping::{Creeping, CreepingFlow, CreepingState};
 pub use dahl::{DahlStage, DahlStageState};
+pub use everett::{Everett, MOST_LEVELS};
 pub use first_order_dahl::{FirstOrderDahlKernel, FirstOrderDahlStage};
 pub use generalised_prandtl_ishlinskii::{
     GeneralisedPlays, GeneralisedPlaysInverse, GeneralisedPlaysInverseState, GeneralisedPlaysState,
@@ -42,7 +46,9 @@ pub use plant::{KernelFlow, KernelModel, Plant, Settling};
 pub use prandtl_ishlinskii::{
     MOST_PLAYS, MOST_ZONES, PlayHysteresis, Plays, PrandtlIshlinskiiStage,
 };
+pub use preisach::{PreisachInverse, PreisachInverseState, PreisachOperator, PreisachState};
 pub use registry::{FoundBy, Model, Stage, StageFlow, StageInverse, StageInverseState, StageState};
+pub use reversals::{MOST_REVERSALS, Reversals};
 pub use search_ranges::{Measures, ModeShown, NOMINAL_STIFFNESS, Range, Ranges};
 pub use tanh_envelope::TanhEnvelope;
 pub use traits::{

@@ -117,7 +117,7 @@ impl PlayHysteresis {
         };
         plays.thresholds[..count].copy_from_slice(&checked_thresholds(thresholds, "V")?);
         for (i, weight) in weights.iter().enumerate() {
-            plays.weights[i] = along(&format!("weights[{i}]"), *weight, sign)?;
+            plays.weights[i] = along(&format!("weights[{i}]"), *weight, "m/V", sign)?;
         }
         let (mut before, mut slope) = (f64::NEG_INFINITY, 1.0);
         for j in 0..dead_zone_thresholds.len() {
@@ -138,7 +138,7 @@ impl PlayHysteresis {
 }
 
 /// The sign of a gain (m/V) that is not 0.
-fn direction(linear: f64) -> Result<f64> {
+pub(super) fn direction(linear: f64) -> Result<f64> {
     if linear.is_finite() && linear != 0.0 {
         return Ok(linear.signum());
     }
@@ -146,14 +146,14 @@ fn direction(linear: f64) -> Result<f64> {
     Err(Error::parameter("linear", found, "a finite number other than 0"))
 }
 
-/// A weight, m/V, that does not work against `linear`, whose sign is given.
-fn along(name: &str, weight: f64, sign: f64) -> Result<f64> {
-    if sign * finite(name, weight, "m/V")? >= 0.0 {
+/// A weight that does not work against `linear`, whose sign is given.
+pub(super) fn along(name: &str, weight: f64, unit: &str, sign: f64) -> Result<f64> {
+    if sign * finite(name, weight, unit)? >= 0.0 {
         return Ok(weight);
     }
     let side = if sign > 0.0 { "0 or above" } else { "0 or below" };
     let expected = format!("a finite number, {side}, as linear is");
-    Err(Error::parameter(name, format!("{} m/V", shown(weight)), expected))
+    Err(Error::parameter(name, format!("{} {unit}", shown(weight)), expected))
 }
 
 /// Thresholds of plays, which are not below 0 and ascend.
