@@ -4,7 +4,9 @@ mod bouc_wen;
 mod bouc_wen_oscillator;
 mod creep;
 mod creeping;
+mod cubic_curve;
 pub mod dahl;
+mod duhem;
 mod dynamics_parameters;
 mod everett;
 mod first_order_dahl;
@@ -14,6 +16,7 @@ mod lanes;
 mod mechanics_parameters;
 mod parallel_dahl;
 mod plant;
+mod polynomial_prandtl_ishlinskii;
 mod prandtl_ishlinskii;
 mod preisach;
 mod registry;
@@ -33,6 +36,7 @@ pub use creep::{
 pub(crate) use creeping::relaxed;
 pub use creeping::{Creeping, CreepingFlow, CreepingState};
 pub use dahl::{DahlStage, DahlStageState};
+pub use duhem::{DuhemInverse, DuhemInverseState, DuhemOperator, DuhemParameters, DuhemState};
 pub use everett::{Everett, MOST_LEVELS};
 pub use first_order_dahl::{FirstOrderDahlKernel, FirstOrderDahlStage};
 pub use generalised_prandtl_ishlinskii::{
@@ -43,6 +47,9 @@ pub use input_stage::{InputOperator, InputStage, InputStageFlow, InputStageState
 pub use lanes::{LanedPlant, LanedVisitor};
 pub use parallel_dahl::{ParallelDahlKernel, ParallelDahlStage};
 pub use plant::{KernelFlow, KernelModel, Plant, Settling};
+pub use polynomial_prandtl_ishlinskii::{
+    PolynomialPlays, PolynomialPlaysInverse, PolynomialPlaysInverseState, PolynomialPlaysState,
+};
 pub use prandtl_ishlinskii::{
     MOST_PLAYS, MOST_ZONES, PlayHysteresis, Plays, PrandtlIshlinskiiStage,
 };

@@ -1,0 +1,282 @@
+//! The polynomial Prandtl-Ishlinskii stage: plays beside a polynomial at the input, creep, linear
+//! dynamics.
+//!
+//! ```text
+//! H = c(u) + sum_i w_i z_i,  z_i = max(u - r_i, min(u + r_i, z_i))
+//! c = a1 u + a2 u^2 + a3 u^3,  low <= u <= high
+//! ```
+//!
+//! Gu, Yang and Zhu 2014, IEEE Transactions on Industrial Electronics 61(3), 1583-1595, doi
+//! 10.1109/TIE.2013.2257153: a polynomial without memory in place of the weighted drive makes the
+//! loops asymmetric. Beyond the range c goes on straight. It has to rise all along the range, or
+//! to fall where the weights are negative, so that there is an inverse.
+//!
+//! Between two corners of the plays, and within one part of c, the output is a cubic in u: the
+//! inverse goes from corner to corner to the one before its output, and finds u there by Newton's
+//! method.
+
+use piezotrack_control::OperatorInverse;
+use piezotrack_control::hysteresis::{Operator, PlayState};
+
+use super::cubic_curve::{Cubic, CubicCurve, checked_range};
+use super::prandtl_ishlinskii::{MOST_PLAYS, PlayHysteresis};
+use crate::error::{Error, Result, finite, shown};
+use crate::math::rising_root;
+
+/// Outputs beyond this are none.
+const MOST_OUTPUT: f64 = 1e100;
+
+/// Distances below this are roundings, relative to the voltages that they are between.
+const ROUNDING: f64 = 1e-12;
+
+/// The operator: plays beside a polynomial, V to m.
+///
+/// ```
+/// use piezotrack_core::models::PolynomialPlays;
+///
+/// # fn main() -> piezotrack_core::Result<()> {
+/// let plays =
+///     PolynomialPlays::new([1e-6, 2e-9, 0.0], (0.0, 100.0), &[10.0, 20.0], &[0.2e-6, 0.1e-6])?;
+/// let mut state = plays.rest();
+/// assert!((plays.follow(&mut state, 50.0) - 66e-6).abs() < 1e-18);
+/// assert!((plays.follow(&mut state, 0.0) - 4e-6).abs() < 1e-18); // the plays stay behind
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PolynomialPlays {
+    /// c, m.
+    curve: CubicCurve,
+    /// The plays, which have no part in proportion to the drive.
+    plays: PlayHysteresis,
+    /// 1 where the output rises with the input, -1 where it falls.
+    turn: f64,
+}
+
+/// Its state: input, plays and their slope.
+pub type PolynomialPlaysState = PlayState<f64, MOST_PLAYS>;
+
+impl PolynomialPlays {
+    /// The operator from a1, a2 and a3 (m/V, m/V^2, m/V^3), the range (V) that they are for,
+    /// thresholds (V) and weights (m/V, of the sign of the slope of the polynomial).
+    ///
+    /// # Errors
+    /// [`Error::Shape`] where entries are missing or too many, [`Error::Parameter`] where one is
+    /// out of its range, and naming `a1` where the polynomial does not rise or fall all along.
+    pub fn new(
+        polynomial: [f64; 3],
+        (low, high): (f64, f64),
+        thresholds: &[f64],
+        weights: &[f64],
+    ) -> Result<Self> {
+        let units = ["m/V", "m/V^2", "m/V^3"];
+        for ((name, value), unit) in ["a1", "a2", "a3"].iter().zip(polynomial).zip(units) {
+            finite(name, value, unit)?;
+        }
+        let range = checked_range(low, high)?;
+        let [a1, a2, a3] = polynomial;
+        let inside = Cubic([0.0, a1, a2, a3]);
+        let (least, most) = inside.slopes(low, high);
+        // Not so where it is not a number.
+        if !(least * most > 0.0) {
+            let found = format!(
+                "with a2 and a3 such that the slope is from {} m/V to {} m/V between {low} V and {high} V",
+                shown(least),
+                shown(most)
+            );
+            let expected = "a polynomial that rises all along, or falls all along";
+            return Err(Error::parameter("a1", found, expected));
+        }
+        let turn = least.signum();
+        let mut plays = PlayHysteresis::new(turn, thresholds, weights, &[], &[])?;
+        plays.plays.linear = 0.0;
+        Ok(Self { curve: CubicCurve::new(inside, range), plays, turn })
+    }
+
+    /// Thresholds (V) and weights (m/V) of the plays, and where those of a state stand, V.
+    fn plays<'a>(
+        &'a self,
+        state: &'a PolynomialPlaysState,
+    ) -> impl Iterator<Item = (f64, f64, f64)> + 'a {
+        let PlayHysteresis { plays, count, .. } = &self.plays;
+        let settings = plays.thresholds.iter().zip(&plays.weights).zip(&state.plays);
+        settings.take(*count).map(|((threshold, weight), play)| (*threshold, *weight, *play))
+    }
+
+    /// The state before any voltage.
+    #[must_use]
+    pub fn rest(&self) -> PolynomialPlaysState {
+        self.plays.plays.rest()
+    }
+
+    /// Takes the input to `volts` and returns the output, m.
+    #[inline]
+    pub fn follow(&self, state: &mut PolynomialPlaysState, volts: f64) -> f64 {
+        let PlayHysteresis { plays, count, .. } = &self.plays;
+        let weighted = plays.follow_used(state, volts, (*count, 0));
+        self.polynomial(volts, true).at(volts) + weighted
+    }
+
+    /// Output of a state, m.
+    #[inline]
+    fn value(&self, state: &PolynomialPlaysState) -> f64 {
+        let weighted: f64 = self.plays(state).map(|(_, weight, play)| weight * play).sum();
+        self.polynomial(state.input, true).at(state.input) + weighted
+    }
+
+    /// The polynomial of c that holds just beyond `volts`.
+    #[inline]
+    fn polynomial(&self, volts: f64, rises: bool) -> &Cubic {
+        &self.curve.parts[self.curve.part(volts, rises).0]
+    }
+
+    /// The nearest place on a rise or a fall where the output is another cubic, V, or infinity.
+    #[inline]
+    fn corner(&self, state: &PolynomialPlaysState, rises: bool, least: f64) -> f64 {
+        let side = if rises { 1.0 } else { -1.0 };
+        let mut end = self.curve.part(state.input, rises).1;
+        for (threshold, weight, play) in self.plays(state) {
+            let corner = play + side * threshold;
+            // What is nearer is a corner that the input stands at, but for a rounding.
+            let ahead = side * (corner - state.input) > least;
+            if ahead && side * (end - corner) > 0.0 && weight != 0.0 {
+                end = corner;
+            }
+        }
+        end
+    }
+
+    /// The end of the first part of the way to `volts` along which a chord is within `deviation`,
+    /// m, of the output.
+    #[must_use]
+    pub fn straight(&self, state: &PolynomialPlaysState, volts: f64, deviation: f64) -> f64 {
+        let (from, rises) = (state.input, volts >= state.input);
+        let end = self.corner(state, rises, ROUNDING * (from.abs() + volts.abs()));
+        let to = if rises { volts.min(end) } else { volts.max(end) };
+        let curve = self.polynomial(from, rises);
+        let bend = curve.bend(from).abs().max(curve.bend(to).abs());
+        let chords = libm::ceil((to - from).abs() * libm::sqrt(0.125 * bend / deviation));
+        if chords > 1.0 { from + (to - from) / chords } else { to }
+    }
+
+    /// Largest second derivative of the output between corners, m/V^2.
+    #[must_use]
+    pub fn bend(&self) -> f64 {
+        let inside = &self.curve.parts[1];
+        inside.bend(self.curve.low).abs().max(inside.bend(self.curve.high).abs())
+    }
+
+    /// Bound of the difference of any two slopes, m/V.
+    #[must_use]
+    pub fn kink(&self) -> f64 {
+        let (least, most) = self.curve.parts[1].slopes(self.curve.low, self.curve.high);
+        let moving: f64 = self.plays.plays.weights.iter().map(|weight| weight.abs()).sum();
+        moving + (most - least)
+    }
+}
+
+impl Operator<f64> for PolynomialPlays {
+    type State = PolynomialPlaysState;
+    type Branch = (PolynomialPlaysState, f64);
+
+    fn rest(&self) -> PolynomialPlaysState {
+        Self::rest(self)
+    }
+
+    fn output(&self, state: &PolynomialPlaysState) -> (f64, f64) {
+        let slope = self.polynomial(state.input, true).slope(state.input);
+        (self.value(state), slope + state.slope)
+    }
+
+    fn branch(&self, state: &PolynomialPlaysState, direction: f64) -> Self::Branch {
+        (*state, direction)
+    }
+
+    fn along(&self, (from, _): &Self::Branch, distance: f64) -> PolynomialPlaysState {
+        let mut state = *from;
+        self.follow(&mut state, from.input + distance);
+        state
+    }
+}
+
+/// The inverse: output in, m, input out, V, by Newton's method between corners.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PolynomialPlaysInverse(pub PolynomialPlays);
+
+/// Its state: that of the operator, and the output requested last, m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PolynomialPlaysInverseState {
+    operator: PolynomialPlaysState,
+    output: f64,
+}
+
+piezotrack_control::snapshot!(PolynomialPlaysInverseState { operator, output });
+
+impl PolynomialPlaysInverse {
+    /// The state for an operator in a given state.
+    #[must_use]
+    pub fn memory(&self, operator: &PolynomialPlaysState) -> PolynomialPlaysInverseState {
+        PolynomialPlaysInverseState { operator: *operator, output: self.0.value(operator) }
+    }
+
+    /// The input for an output (m) on a rise or a fall of the input.
+    #[inline]
+    fn input(&self, from: &PolynomialPlaysState, output: f64, rises: bool) -> f64 {
+        let operator = &self.0;
+        let side = if rises { 1.0 } else { -1.0 };
+        let mut state = *from;
+        loop {
+            let (start, end) = (state.input, operator.corner(&state, rises, 0.0));
+            // The plays that move on this part, and their share of the slope.
+            let moving: f64 = operator
+                .plays(&state)
+                .filter(|(threshold, _, play)| side * (play + side * threshold - start) <= 0.0)
+                .map(|(_, weight, _)| weight)
+                .sum();
+            let (curve, value) = (operator.polynomial(start, rises), operator.value(&state));
+            let rest = value - curve.at(start) - output;
+            let above = |way: f64| {
+                let volts = start + side * way;
+                let value = curve.at(volts) + side * moving * way + rest;
+                (side * operator.turn * value, (curve.slope(volts) + moving).abs())
+            };
+            if end.is_infinite() {
+                // Straight from here on.
+                let (value, slope) = above(0.0);
+                return start + side * (-value / slope).max(0.0);
+            }
+            let reach = (end - start).abs();
+            if above(reach).0 >= 0.0 {
+                return start + side * rising_root(reach, above);
+            }
+            operator.follow(&mut state, end);
+        }
+    }
+}
+
+impl OperatorInverse for PolynomialPlaysInverse {
+    type State = PolynomialPlaysInverseState;
+
+    fn rest(&self) -> PolynomialPlaysInverseState {
+        self.memory(&self.0.rest())
+    }
+
+    /// Exact to rounding for a step of any length, provided that the output is monotone within it.
+    #[inline]
+    fn follow(&self, state: &mut PolynomialPlaysInverseState, output: f64) -> f64 {
+        let way = output - state.output;
+        if way == 0.0 {
+            return state.operator.input;
+        }
+        // The input falls where the output rises with a falling polynomial.
+        let rises = (way > 0.0) == (self.0.turn > 0.0);
+        let reachable = output.abs() < MOST_OUTPUT;
+        let volts = if reachable { self.input(&state.operator, output, rises) } else { f64::NAN };
+        if !volts.is_finite() {
+            return f64::NAN;
+        }
+        self.0.follow(&mut state.operator, volts);
+        state.output = output;
+        volts
+    }
+}
