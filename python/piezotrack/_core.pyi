@@ -491,35 +491,25 @@ class LeastSquaresFit:
     @property
     def parameters(self) -> _Named: ...
     @property
-    def offset(self) -> float: ...
-    @property
     def rms(self) -> float: ...
     @property
     def evaluations(self) -> int: ...
     @property
     def at_bound(self) -> list[str]: ...
     @property
-    def history(self) -> Literal["virgin", "settled", "fit"]: ...
-    @property
-    def start(self) -> _Named: ...
+    def records(self) -> list[dict[str, Any]]: ...
     @property
     def lag_range(self) -> tuple[float, float] | None: ...
 
 def identify_weights(
+    records: Sequence[dict[str, Any]],
     *,
     model: str,
-    u: ArrayLike,
-    y: ArrayLike,
-    dt: float,
-    hold_name: str,
-    start: int,
     count: int | None,
     thresholds: Sequence[float] | None,
     zones: int,
     creep_times: Sequence[float] | None,
     dynamics: str,
-    history: str | None,
-    offset: bool,
 ) -> LeastSquaresFit: ...
 def resonances(
     *, u: ArrayLike, y: ArrayLike, dt: float, hold_name: str, start: int, most: int

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from piezotrack.identification.search import search as one_search
+from piezotrack.identification.search import search_records
 
 DT = 1e-3
 NOISE = 10e-9
@@ -86,11 +86,11 @@ def test_a_record_is_searched_again_only_for_a_history_that_it_shows(
 ) -> None:
     asked = []
 
-    def search(*arguments: Any, history: str = "virgin", **settings: Any) -> Any:
-        asked.append(history)
-        return one_search(*arguments, history=history, **settings)  # type: ignore[arg-type]
+    def search(records: Any, *arguments: Any, **settings: Any) -> Any:
+        asked.append(records[0].history)
+        return search_records(records, *arguments, **settings)
 
-    monkeypatch.setattr("piezotrack.identification.kinds.search", search)
+    monkeypatch.setattr("piezotrack.identification.kinds.search_records", search)
     pt.identify(record(visited), "first-order-dahl")
     assert set(asked) <= set(searched)
     assert asked[-1] == searched[-1]

@@ -20,21 +20,31 @@ DT = 1e-3
 
 
 def fitted(u: NDArray[np.float64], y: NDArray[np.float64], **given: Any) -> Any:
-    """A fit through the core; what is not given is chosen."""
-    settings: dict[str, Any] = {
-        "model": "prandtl-ishlinskii",
+    """A fit of one record through the core; what is not given is chosen."""
+    asked: dict[str, Any] = {
+        "u": u,
+        "y": y,
         "dt": DT,
         "hold_name": "foh",
         "start": 0,
+        "history": None,
+        "offset": True,
+        "drift": 0.0,
+        "delay": (0.0, 0.0),
+        "label": "",
+        "weight": 1.0,
+    }
+    settings: dict[str, Any] = {
+        "model": "prandtl-ishlinskii",
         "count": None,
         "thresholds": list(PLAIN.thresholds),
         "zones": 0,
         "creep_times": [],
         "dynamics": "none",
-        "history": None,
-        "offset": True,
     }
-    return _core.identify_weights(u=u, y=y, **(settings | given))
+    for name, value in given.items():
+        (asked if name in asked else settings)[name] = value
+    return _core.identify_weights([asked], **settings)
 
 
 def number(fit: Any, name: str) -> float:

@@ -3,12 +3,12 @@
 
 use piezotrack_control::{OperatorInverse, PlayInverse};
 use piezotrack_core::identify::{
-    CreepKind, DynamicsKind, History, PlaysKind, WeightsRecord, WeightsSettings, identify_weights,
+    CreepKind, DynamicsKind, History, PlacesKind, WeightsRecord, WeightsSettings, identify_weights,
 };
 use piezotrack_core::models::{
     Dynamics, Experiment, GeneralisedPlays, GeneralisedPlaysInverse,
     GeneralisedPrandtlIshlinskiiStage, InputOperator, Invertible, Model, Plant, PlayHysteresis,
-    PrandtlIshlinskiiStage, Relaxation, StageModel, TanhEnvelope, Values, WeightedPlays,
+    PrandtlIshlinskiiStage, Relaxation, StageModel, TanhEnvelope, Values,
 };
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 
@@ -70,7 +70,7 @@ fn the_plays_follow_their_equations() {
             }
             let found = operator.follow(&mut state, volts);
             assert!((found - expected).abs() < 1e-19, "{found} {expected}");
-            assert_eq!(operator.plays(&mut state), z);
+            assert_eq!(operator.memory(&state), z);
         }
     }
 }
@@ -239,8 +239,7 @@ fn a_stage_shows_nothing_at_rest_and_moves_in_a_loop_as_in_a_simulation() {
 
 #[test]
 fn an_envelope_that_hardly_bends_is_none() {
-    let straight =
-        <GeneralisedPrandtlIshlinskiiStage as WeightedPlays>::envelope(&[1.0, 1e-6], (-40.0, 40.0));
+    let straight = GeneralisedPrandtlIshlinskiiStage::envelope(&[1.0, 1e-6], (-40.0, 40.0));
     let operator =
         GeneralisedPlays::new(LINEAR, &THRESHOLDS, &WEIGHTS, straight, straight).unwrap();
     let plain = PlayHysteresis::new(LINEAR, &THRESHOLDS, &WEIGHTS, &[], &[]).unwrap();
@@ -260,10 +259,7 @@ fn an_envelope_that_hardly_bends_is_none() {
 #[test]
 fn an_envelope_has_the_ratio_of_slopes_that_was_asked_for() {
     for (ratio, bend) in [(0.25, 0.005), (0.8, 0.3), (1.0, 1.6), (4.0, 0.1)] {
-        let of = <GeneralisedPrandtlIshlinskiiStage as WeightedPlays>::envelope(
-            &[ratio, bend],
-            (-10.0, 90.0),
-        );
+        let of = GeneralisedPrandtlIshlinskiiStage::envelope(&[ratio, bend], (-10.0, 90.0));
         assert!((of.with_slope(90.0).1 / of.with_slope(-10.0).1 / ratio - 1.0).abs() < 1e-11);
         assert!((of.at(90.0) - of.at(-10.0) - 100.0).abs() < 1e-10);
         assert!(of.at(0.0).abs() < 1e-10);
@@ -273,12 +269,10 @@ fn an_envelope_has_the_ratio_of_slopes_that_was_asked_for() {
 
 fn settings() -> WeightsSettings {
     WeightsSettings {
-        plays: PlaysKind::Thresholds(THRESHOLDS.to_vec()),
+        places: PlacesKind::Given(THRESHOLDS.to_vec()),
         zones: 0,
         creep: CreepKind::Times(vec![]),
         dynamics: DynamicsKind::None,
-        history: Some(History::Virgin),
-        offset: true,
     }
 }
 
@@ -296,9 +290,10 @@ fn a_fit_finds_what_the_record_was_made_with() {
         };
         let drive = Drive::new(&u, 0.01, Hold::First).unwrap();
         let y = stage.simulate(&Experiment::of(&drive, NEVER)).unwrap().unwrap().x;
-        let record = WeightsRecord { drive, y: &y, start: 0 };
+        let record =
+            WeightsRecord { history: Some(History::Virgin), ..WeightsRecord::of(drive, &y, 0) };
         let model = Model::GeneralisedPrandtlIshlinskii;
-        let fit = identify_weights(model, &record, &settings(), NEVER).unwrap().unwrap();
+        let fit = identify_weights(model, &[record], &settings(), NEVER).unwrap().unwrap();
         for (found, made) in fit.values.list("weights").iter().zip(WEIGHTS) {
             assert!((found - made).abs() < 2e-9, "{found} {made}");
         }
@@ -311,9 +306,11 @@ fn a_fit_finds_what_the_record_was_made_with() {
 fn a_fit_has_no_dead_zones() {
     let u = path(1500);
     let drive = Drive::new(&u, 0.01, Hold::First).unwrap();
-    let record = WeightsRecord { drive, y: &u, start: 0 };
+    let record =
+        WeightsRecord { history: Some(History::Virgin), ..WeightsRecord::of(drive, &u, 0) };
     let settings = WeightsSettings { zones: 2, ..settings() };
-    let refused = identify_weights(Model::GeneralisedPrandtlIshlinskii, &record, &settings, NEVER);
+    let refused =
+        identify_weights(Model::GeneralisedPrandtlIshlinskii, &[record], &settings, NEVER);
     assert!(refused.unwrap_err().to_string().contains("no dead zones"));
 }
 

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use piezotrack_control::PlayInverse;
 use piezotrack_control::hysteresis::{Operator, Play};
 use piezotrack_core::identify::{
-    CreepKind, DynamicsKind, History, PlaysKind, WeightsRecord, WeightsSettings, identify_weights,
+    CreepKind, DynamicsKind, History, PlacesKind, WeightsRecord, WeightsSettings, identify_weights,
 };
 use piezotrack_core::math::{NOT_NEGATIVE, Rows, bounded};
 use piezotrack_core::models::{
@@ -182,16 +182,16 @@ fn a_fit_finds_what_the_record_was_made_with() {
         let drive = Drive::new(&u, 0.01, hold).unwrap();
         let y = stage.simulate(&Experiment::of(&drive, NEVER)).unwrap().unwrap().x;
         let settings = WeightsSettings {
-            plays: PlaysKind::Thresholds(vec![4.0, 10.0, 20.0]),
+            places: PlacesKind::Given(vec![4.0, 10.0, 20.0]),
             zones: 0,
             creep: CreepKind::Times(vec![]),
             dynamics: DynamicsKind::First,
-            history: Some(History::Virgin),
-            offset: true,
         };
-        let record = WeightsRecord { drive, y: &y, start: 500 };
-        let fit =
-            identify_weights(Model::PrandtlIshlinskii, &record, &settings, NEVER).unwrap().unwrap();
+        let record =
+            WeightsRecord { history: Some(History::Virgin), ..WeightsRecord::of(drive, &y, 500) };
+        let fit = identify_weights(Model::PrandtlIshlinskii, &[record], &settings, NEVER)
+            .unwrap()
+            .unwrap();
         let time = fit.values.number("time_constant");
         assert!((time - 0.015).abs() < 1e-6, "{time}");
         let made = [0.2e-6, 0.0, 0.15e-6];
@@ -200,7 +200,7 @@ fn a_fit_finds_what_the_record_was_made_with() {
         }
         assert!(fit.rms < 1e-9);
         assert_eq!(
-            identify_weights(Model::PrandtlIshlinskii, &record, &settings, &|| true).unwrap(),
+            identify_weights(Model::PrandtlIshlinskii, &[record], &settings, &|| true).unwrap(),
             None
         );
     }

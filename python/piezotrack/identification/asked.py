@@ -38,12 +38,15 @@ class Asked:
         How much each of its samples counts beside those of the others.
     label : str
         How messages call it; empty where it is the only one.
+    drift : object
+        As for `identify`, not yet checked.
     """
 
     data: Dataset
     offset: bool = True
     history: History | None = None
     delay: object = None
+    drift: object = None
     weight: float = 1.0
     label: str = ""
 
@@ -55,6 +58,7 @@ class Own(NamedTuple):
     history: object
     delay: object
     weights: object
+    drift: object = None
 
 
 def asked_of(data: object, own: Own) -> tuple[Asked, ...]:
@@ -85,11 +89,13 @@ def asked_of(data: object, own: Own) -> tuple[Asked, ...]:
                 "others that a weight counts"
             )
         history, offset = checked_history(own.history), _core.as_truth("offset", own.offset)
-        return (Asked(data=data, offset=offset, history=history, delay=own.delay),)
+        one = Asked(data=data, offset=offset, history=history, delay=own.delay, drift=own.drift)
+        return (one,)
     records = _records(data)
     count = len(records)
     offsets, histories = _each("offset", own.offset, count), _each("history", own.history, count)
     delays, weights = _each("delay", own.delay, count), _each("weights", own.weights, count)
+    drifts = _each("drift", own.drift, count)
     asked = []
     for i, record in enumerate(records):
         label = _label(record, i) if count > 1 else ""
@@ -103,6 +109,7 @@ def asked_of(data: object, own: Own) -> tuple[Asked, ...]:
                 offset=offset,
                 history=history,
                 delay=delays[i],
+                drift=drifts[i],
                 weight=weight,
                 label=label,
             )

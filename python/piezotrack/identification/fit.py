@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from ..stages.registry import model_named
 from .asked import Own, asked_of
 from .checkpoint import checkpoint_of
+from .drift import asked_drift
 from .kinds import identify_kind, refuse_given
 from .selection import AUTO, identify_best
 from .together import best_together, identify_together, refuse_several
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from .swarm import ParticleSwarm
 
     Delay = bool | float | tuple[float, float] | None
+    Drift = bool | float | None
 
 __all__ = ["identify"]
 
@@ -46,6 +48,7 @@ def identify(
     stiffness: float | None = None,
     offset: bool | list[bool] = True,
     delay: Delay | list[Delay] = None,
+    drift: Drift | list[Drift] = None,
     history: History | list[History | None] | None = None,
     weights: Sequence[float] | None = None,
     creep: bool | Iterable[float] | None = None,
@@ -147,6 +150,12 @@ def identify(
         between two bounds. Under one slow sine the effect of a delay is that of damping; a drive
         of several frequencies separates the two. A list has an entry for each of several records;
         each has a delay of its own in any case.
+    drift : bool or float, or a list of these, optional
+        Slow drift of the sensor along the record, ``d exp(-t/tau)``, its amplitude fitted: none
+        (False), with a time constant that the record shows (True), or with this one [s]. Where it
+        is not given: for models found by least squares what the record shows, for models that are
+        searched none. A list has an entry for each of several records; each has a drift of its own
+        in any case.
     history : {"virgin", "settled", "fit"}, or a list of these or None, optional
         What the stage went through before the record, whose first sample finds it in equilibrium:
         nothing (``"virgin"``), the drive of the record once or more until the hysteresis repeats
@@ -230,7 +239,7 @@ def identify(
     >>> print(f"K = {1e-3 * fit.model.stiffness:.1f} kN/m, {fit.nit > 0}")
     K = 26.1 kN/m, True
     """
-    records = asked_of(data, Own(offset, history, delay, weights))
+    records = asked_of(data, Own(offset, history, delay, weights, drift))
     of_swarm: dict[str, Any] = {
         "free": free,
         "fixed": fixed,
@@ -256,16 +265,17 @@ def identify(
     several = len(records) > 1
     if several:
         refuse_several("creep", creep, len(records))
-        refuse_several("least_squares", least_squares, len(records))
-    elif info is not None:
-        refuse_given(info, of_swarm | {"delay": records[0].delay}, least_squares)
+    if info is not None:
+        refuse_given(info, of_swarm, least_squares)
+    for one in records:
+        asked_drift(one.drift)
     said = {**of_swarm, "model": model, "least_squares": least_squares}
     with checkpoint_of(checkpoint, records, said) as kept:
         of_swarm["checkpoint"] = kept
         if several and info is None:
-            return best_together(records, of_swarm)
+            return best_together(records, of_swarm, least_squares)
         if several and info is not None:
-            return identify_together(records, info, of_swarm)
+            return identify_together(records, info, of_swarm, least_squares)
         return _alone(records[0], info, of_swarm, least_squares)
 
 
@@ -273,12 +283,6 @@ def _alone(
     one: Asked, info: ModelInfo | None, of_swarm: dict[str, Any], least_squares: object
 ) -> Identification:
     """Identify a stage of a kind, or of the best one, from one record."""
-    asked: dict[str, Any] = {
-        "offset": one.offset,
-        "history": one.history,
-        "of_swarm": of_swarm | {"delay": one.delay},
-        "least_squares": least_squares,
-    }
     if info is None:
-        return identify_best(one.data, **asked)
-    return identify_kind(one.data, info, **asked)
+        return identify_best(one, of_swarm=of_swarm, least_squares=least_squares)
+    return identify_kind(one, info, of_swarm=of_swarm, least_squares=least_squares)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from .. import _core
 from .._support.json_text import object_of
 from ..errors import ParameterError
+from .drift import Drift, drift_entry, drift_of
 from .history import Start, same_beginning, start_entry, start_of
 
 if TYPE_CHECKING:
@@ -36,6 +37,8 @@ class FittedRecord:
         Reading of the sensor at rest without drive [m].
     offset_fitted : bool
         Whether the offset was fitted.
+    drift : Drift or None
+        Drift of the sensor along the record.
     start : Start or None
         Where the record begins.
     cost : float
@@ -54,6 +57,7 @@ class FittedRecord:
     delay: float = 0.0
     offset: float = 0.0
     offset_fitted: bool = True
+    drift: Drift | None = None
     start: Start | None = field(default=None, repr=False)
     cost: float
     stroke: float
@@ -119,6 +123,7 @@ def record_entries(records: Sequence[FittedRecord], unit: str) -> dict[str, Any]
             "cost": {"value": one.cost, "unit": "m"},
             "stroke": {"value": one.stroke, "unit": "m"},
             "start": start_entry(one.start, unit),
+            **drift_entry(one.drift),
             "data": dict(one.origin),
         }
         for one in records
@@ -170,6 +175,7 @@ def _record(name: str, entry: Any, state: type[StageState]) -> FittedRecord:
         offset=number("offset", "m"),
         offset_fitted=_core.as_truth(f"{name}: offset fitted", found["offset"]["fitted"]),
         start=start_of(found["start"], state),
+        drift=drift_of(found.get("drift")),
         cost=number("cost", "m"),
         stroke=number("stroke", "m"),
         origin=object_of(f"{name}: data", found["data"]),

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from ..data.dataset import Hold
     from ..stages.base import Response, StageState
     from ..stages.inverse import Inverse
+    from .drift import Drift
     from .fitted_record import FittedRecord
     from .history import History, Start
 
@@ -59,6 +60,9 @@ class IdentifiedModel:
     start : Start or None
         Where the record identified begins: what the stage went through before, and its state at
         the first sample. None in files of older versions.
+    drift : Drift or None
+        Drift of the sensor along the record identified, which is in the displacement on that record
+        alone.
     records : tuple of FittedRecord
         What each of several records identified has of its own; `offset`, `delay` and `start` are
         those of the first, and `stroke` is the largest. Of one record: a result has it alone, a
@@ -75,6 +79,7 @@ class IdentifiedModel:
     scale_assumed: bool = False
     delay: float = 0.0
     start: Start | None = None
+    drift: Drift | None = None
     records: tuple[FittedRecord, ...] = ()
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
@@ -247,13 +252,24 @@ class IdentifiedModel:
 
     def _shown(self, run: Response, delay: float) -> Array:
         """Displacement with the delay of the sensor [m]."""
-        dt = float(run.t[1]) if run.t.size > 1 else 1.0
-        return _core.delayed(run.x, run.v, dt, delay) if delay else run.x
+        if not delay:
+            return run.x
+        if not self.model.info.searched:
+            # As in the fit: straight between samples, as a stage without modes has no velocity.
+            late: Array = np.interp(run.t - delay, run.t, run.x)
+            return late
+        return _core.delayed(run.x, run.v, float(run.t[1]) if run.t.size > 1 else 1.0, delay)
 
     def _delay_on(self, data: Dataset) -> float:
         """Delay of the sensor on a record [s]: its own where it is one of those identified."""
         own = self._own(data)
         return self.delay if own is None else own.delay
+
+    def _drift_on(self, data: Dataset) -> Array | float:
+        """Drift of the sensor on a record [m]: that of the one identified, else none."""
+        own = self._own(data)
+        start, drift = (self.start, self.drift) if own is None else (own.start, own.drift)
+        return drift.at(data.t) if drift and same_beginning(start, data) else 0.0
 
     def simulate(
         self,
@@ -295,7 +311,7 @@ class IdentifiedModel:
         state = self._begins(data, history, initial)
         start = data.warmup
         run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
-        x = self._shown(run, self._delay_on(data))[start:]
+        x = self._shown(run, self._delay_on(data))[start:] + self._drift_on(data)
         signals = {
             one.name: value[start:]
             for one in fields(run)
@@ -370,7 +386,8 @@ class IdentifiedModel:
     def _residual(self, data: Dataset, state: StageState) -> Array:
         """Measured less simulated displacement in the window, without offset [m]."""
         run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
-        rest: Array = data.y - self._shown(run, self._delay_on(data))[data.warmup :]
+        x = self._shown(run, self._delay_on(data))[data.warmup :]
+        rest: Array = data.y - x - self._drift_on(data)
         return rest
 
     def _fits_offset(self, data: Dataset) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from .. import _core
@@ -11,17 +12,16 @@ from ..errors import Interrupted, ParameterError
 from .history import GAIN
 from .least_squares import LeastSquares, solve_least_squares
 from .other_histories import other_histories
-from .search import search
+from .search import search_records
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
-    from ..data.dataset import Dataset
     from ..stages.model_info import ModelInfo
-    from .history import History
+    from .asked import Asked
     from .result import Identification
 
-__all__ = ["check_counts", "identify_kind", "refuse_given"]
+__all__ = ["check_counts", "identify_kind", "identify_weights", "refuse_drift", "refuse_given"]
 
 # How a search is run, not what it finds.
 RUNNING = ("seed", "runs", "threads", "progress")
@@ -30,26 +30,16 @@ OF_SEARCH = ("method", "swarm", "descents", "seed", "runs", "progress", "callbac
 
 
 def identify_kind(
-    data: Dataset,
-    info: ModelInfo,
-    *,
-    offset: bool,
-    history: History | None,
-    of_swarm: Mapping[str, Any],
-    least_squares: object,
+    one: Asked, info: ModelInfo, *, of_swarm: Mapping[str, Any], least_squares: object
 ) -> Identification:
-    """Identify a stage of one kind.
+    """Identify a stage of one kind from one record.
 
     Parameters
     ----------
-    data : Dataset
-        The record.
+    one : Asked
+        The record, and what is asked of it.
     info : ModelInfo
         The kind.
-    offset : bool
-        Whether an offset of the sensor is fitted.
-    history : {"virgin", "settled", "fit"} or None
-        What the stage went through before; None for what the record shows.
     of_swarm, least_squares : mapping, object
         Arguments for one of the two ways, not yet checked; those for the other are not used.
 
@@ -63,10 +53,42 @@ def identify_kind(
     ParameterError, DataError, NumericalError, Interrupted
         As for `identify`.
     """
-    if info.searched and history is not None:
-        return search(data, info, offset=offset, history=history, **of_swarm)
-    if info.searched:
-        return _as_shown(data, info, offset, of_swarm)
+    if not info.searched:
+        return identify_weights((one,), info, of_swarm=of_swarm, least_squares=least_squares)
+    refuse_drift(info, one.drift)
+    if one.history is not None:
+        return search_records((one,), info, **of_swarm)
+    return _as_shown(one, info, of_swarm)
+
+
+def identify_weights(
+    records: Sequence[Asked],
+    info: ModelInfo,
+    *,
+    of_swarm: Mapping[str, Any],
+    least_squares: object,
+) -> Identification:
+    """Identify a stage whose weights least squares find, from one or several records.
+
+    Parameters
+    ----------
+    records : sequence of Asked
+        The records, each with what is asked of it alone.
+    info : ModelInfo
+        The kind.
+    of_swarm, least_squares : mapping, object
+        As for `identify_kind`.
+
+    Returns
+    -------
+    Identification
+        The result.
+
+    Raises
+    ------
+    ParameterError, DataError, Interrupted
+        As for `identify`.
+    """
     settings = LeastSquares() if least_squares is None else least_squares
     if not isinstance(settings, LeastSquares):
         raise ParameterError(
@@ -74,21 +96,42 @@ def identify_kind(
         )
     try:
         with ProgressBar(of_swarm["progress"], f"identify: {info.name}, least squares"):
-            return solve_least_squares(data, info, settings, offset, history)
+            return solve_least_squares(records, info, settings)
     except KeyboardInterrupt:
         raise Interrupted("interrupted before the weights were found") from None
 
 
-def _as_shown(
-    data: Dataset, info: ModelInfo, offset: bool, of_swarm: Mapping[str, Any]
-) -> Identification:
+def refuse_drift(info: ModelInfo, drift: object) -> None:
+    """Refuse a drift beside parameters that are searched.
+
+    Parameters
+    ----------
+    info : ModelInfo
+        The kind.
+    drift : object
+        What was asked for; None where nothing was.
+
+    Raises
+    ------
+    ParameterError
+        A drift was asked for.
+    """
+    if drift not in (None, False):
+        raise ParameterError(
+            f"drift is {quoted(drift)}: expected none with the model {info.name!r}, whose "
+            "parameters are searched; least squares find it"
+        )
+
+
+def _as_shown(one: Asked, info: ModelInfo, of_swarm: Mapping[str, Any]) -> Identification:
     """Search with the history that the record shows: more freedom has to lower the cost."""
-    fit = virgin = search(data, info, offset=offset, **of_swarm)
+    fit = virgin = search_records((replace(one, history="virgin"),), info, **of_swarm)
     asked = {name: value for name, value in of_swarm.items() if name not in OF_SEARCH}
-    for one in other_histories(data, info, fit, offset=offset, asked=asked):
-        if one.share * virgin.cost < (1.0 - GAIN) * fit.cost:
-            other = search(data, info, offset=offset, history=one.history, **of_swarm)
-            fit = other if other.cost < (1.0 - GAIN) * fit.cost else fit
+    asked["delay"] = one.delay
+    for other in other_histories(one.data, info, fit, offset=one.offset, asked=asked):
+        if other.share * virgin.cost < (1.0 - GAIN) * fit.cost:
+            found = search_records((replace(one, history=other.history),), info, **of_swarm)
+            fit = found if found.cost < (1.0 - GAIN) * fit.cost else fit
     return fit
 
 

@@ -10,20 +10,24 @@ from .._support.arguments import as_numbers
 from .._support.messages import quoted
 from ..errors import DataError, ParameterError
 from ..stages.registry import stage_class
+from .asked import of_record
+from .drift import Drift, asked_drift
 from .estimates import LagRange
+from .fitted_record import FittedRecord
 from .history import start_of_fit
-from .model_file import fit_entry, provenance
+from .model_file import fit_entry, origin_of, provenance
+from .question import delay_bounds
+from .remarks import spread_of
 from .result import Identification
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from ..data.dataset import Dataset
     from ..stages.model_info import ModelInfo
+    from .asked import Asked
 
 __all__ = ["LeastSquares", "solve_least_squares"]
-
-History = Literal["virgin", "settled", "fit"]
 
 MOST_PLAYS, MOST_ZONES, MOST_RELAXATIONS = 32, 8, 8
 DYNAMICS = ("time_constant", "frequency", "damping_ratio")
@@ -139,27 +143,19 @@ class LeastSquares:
 
 
 def solve_least_squares(
-    data: Dataset,
-    info: ModelInfo,
-    settings: LeastSquares,
-    offset: bool,
-    history: History | None = None,
+    records: Sequence[Asked], info: ModelInfo, settings: LeastSquares
 ) -> Identification:
     """Identify a stage by least squares.
 
     Parameters
     ----------
-    data : Dataset
-        The record. The drive before its window is warm-up: simulated, not scored.
+    records : sequence of Asked
+        The records, each with what is asked of it alone. The drive before a window is warm-up:
+        simulated, not scored.
     info : ModelInfo
         The model.
     settings : LeastSquares
         Settings.
-    offset : bool
-        Whether an offset of the sensor is fitted.
-    history : {"virgin", "settled", "fit"} or None, optional
-        What went before the record: nothing, its own drive, or a voltage that is found with the
-        weights. None: the first of these that explains the record as well as the next.
 
     Returns
     -------
@@ -169,44 +165,49 @@ def solve_least_squares(
     Raises
     ------
     DataError
-        The record does not determine the weights: its drive or its displacement is constant, the
-        drive never reverses, the displacement falls as the drive rises, or the window is too
-        short.
+        A record does not determine the weights: its drive or its displacement is constant, the
+        drive never reverses, or the window is too short.
+    ParameterError
+        What is asked of a record cannot be used.
     """
+    data = records[0].data
+    longest = max((one.data for one in records), key=lambda one: one.duration)
     found = _core.identify_weights(
+        [_asked(one) for one in records],
         model=info.name,
-        u=data.full.u,
-        y=data.full.y,
-        dt=data.dt,
-        hold_name=data.hold,
-        start=data.warmup,
         count=settings.count,
         thresholds=None if settings.thresholds is None else list(settings.thresholds),
         zones=settings._zones(info),
-        creep_times=settings._times(data),
+        creep_times=settings._times(longest),
         dynamics=settings.dynamics or "none",
-        history=history,
-        offset=offset,
     )
+    model = stage_class(info)
+    both = zip(records, found.records, strict=True)
+    fitted = tuple(_fitted(model, info, one, own) for one, own in both)
+    spread = spread_of([(one.data, one.weight) for one in records])
+    first = fitted[0]
     details: dict[str, Any] = {
         "parameters": {
             one.name: {"free": one.name not in CHOSEN and one.held is None}
             for one in info.parameters
         },
+        "delay": {"free": True} if _is_searched(records[0]) else {},
         "fit": {
-            **fit_entry(found.rms, data),
+            **fit_entry(found.rms, data, None, spread),
             "simulations": found.evaluations,
             "at_bound": found.at_bound,
             "lag_range": {"value": found.lag_range, "unit": "s"},
         },
         "provenance": provenance(data, least_squares=asdict(settings)),
     }
-    model = stage_class(info)
     return Identification(
         model=model._from(found.parameters),
-        offset=found.offset,
-        offset_fitted=offset,
-        stroke=data.stroke,
+        offset=first.offset,
+        offset_fitted=first.offset_fitted,
+        drift=first.drift,
+        delay=first.delay,
+        stroke=max(one.stroke for one in fitted),
+        records=fitted,
         details=details,
         data=data,
         cost=found.rms,
@@ -215,7 +216,50 @@ def solve_least_squares(
         least_squares=settings,
         at_bound=any(name in DYNAMICS for name in found.at_bound),
         lags=_lags(found.lag_range),
-        start=start_of_fit(data, found.history, model._state._from(found.start, info.state)),
+        start=first.start,
+    )
+
+
+def _asked(one: Asked) -> dict[str, Any]:
+    """Return a record and what is asked of it, as the core takes it."""
+    data = one.data
+    with of_record(one.label):
+        delay, drift = delay_bounds(one.delay), asked_drift(one.drift)
+    return {
+        "u": data.full.u,
+        "y": data.full.y,
+        "dt": data.dt,
+        "hold_name": data.hold,
+        "start": data.warmup,
+        "history": one.history,
+        "offset": one.offset,
+        "drift": drift,
+        "delay": delay,
+        "label": one.label,
+        "weight": one.weight,
+    }
+
+
+def _is_searched(one: Asked) -> bool:
+    bounds = delay_bounds(one.delay)
+    return bounds is None or bounds[0] < bounds[1]
+
+
+def _fitted(model: Any, info: ModelInfo, one: Asked, own: Mapping[str, Any]) -> FittedRecord:
+    """Return what was found of a record alone."""
+    data = one.data
+    drift = own["drift"]
+    return FittedRecord(
+        data=data,
+        weight=one.weight,
+        delay=own["delay"],
+        offset=own["offset"],
+        offset_fitted=one.offset,
+        drift=drift and Drift(amplitude=drift[0], time=drift[1], begin=float(data.t[0])),
+        start=start_of_fit(data, own["history"], model._state._from(own["start"], info.state)),
+        cost=own["rms"],
+        stroke=data.stroke,
+        origin=origin_of(data),
     )
 
 

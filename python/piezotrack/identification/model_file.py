@@ -12,6 +12,7 @@ from .._support.json_text import number_pair, object_of, parse_json, text_of
 from .._support.units import of_drive
 from ..errors import DataError, ParameterError, PiezotrackError
 from ..stages.registry import model_named, stage_class
+from .drift import drift_entry, drift_of
 from .fitted_record import record_entries, records_of_file
 from .history import start_entry, start_of
 from .remarks import drive_rate, fit_percent
@@ -57,6 +58,7 @@ OWN = {
     "stroke",
     "delay",
     "start",
+    "drift",
     "records",
 }
 # Unit and limits of the numbers that go with a stage. What is beyond them is in another unit.
@@ -104,6 +106,7 @@ def document_of(model: IdentifiedModel) -> dict[str, Any]:
         "stroke": {"value": model.stroke, "unit": "m"},
         "delay": {"value": model.delay, "unit": "s"} | delay,
         "start": start_entry(model.start, model.drive_unit),
+        **drift_entry(model.drift),
         **record_entries(model.records, model.drive_unit),
         **details,
     }
@@ -161,6 +164,7 @@ def read_model(path: str | os.PathLike[str]) -> dict[str, Any]:
             "stroke": file_number("stroke", document["stroke"]),
             "delay": file_number("delay", delay),
             "start": start_of(document.get("start"), stage_class(info)._state),
+            "drift": drift_of(document.get("drift")),
             "records": _records(document, stage_class(info)._state),
             "details": {
                 "parameters": {key: _fit_details(entry) for key, entry in parameters.items()},

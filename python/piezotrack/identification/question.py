@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..stages.model_info import ModelInfo
     from .asked import Asked
 
-__all__ = ["question_of"]
+__all__ = ["delay_bounds", "question_of"]
 
 
 def question_of(
@@ -60,7 +60,7 @@ def question_of(
     """
     data = asked.data
     with of_record(asked.label):
-        searched_delay = _delay(False if asked.delay is None else asked.delay)
+        searched_delay = delay_bounds(asked.delay)
     creep_times = _creep_times(False if creep is None else creep)
     said = ParameterArguments.checked(scales, ties, constraints, priors)
     held = _held(initial, fixed, free, bounds, said.named)
@@ -135,9 +135,25 @@ def _pair(name: str, pair: object) -> tuple[float, float]:
     )
 
 
-def _delay(delay: object) -> tuple[float, float] | None:
-    """Bounds of the delay: None if the core chooses them, equal ones if it is known."""
-    if isinstance(delay, bool):
+def delay_bounds(delay: object) -> tuple[float, float] | None:
+    """Bounds between which a delay is searched.
+
+    Parameters
+    ----------
+    delay : object
+        As for `identify`, not yet checked.
+
+    Returns
+    -------
+    (float, float) or None
+        The bounds [s], equal ones where it is known; None where the core chooses them.
+
+    Raises
+    ------
+    ParameterError
+        It is none of what `identify` takes.
+    """
+    if delay is None or isinstance(delay, bool):
         return None if delay else (0.0, 0.0)
     if isinstance(delay, Iterable) and not isinstance(delay, str):
         low, high = _pair("delay", delay)

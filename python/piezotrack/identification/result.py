@@ -137,6 +137,7 @@ class Identification(IdentifiedModel):
                 delay=self.delay,
                 offset=self.offset,
                 offset_fitted=self.offset_fitted,
+                drift=self.drift,
                 start=self.start,
                 cost=self.cost,
                 stroke=self.stroke,

@@ -12,7 +12,6 @@ from .._support.progress_bar import ProgressBar
 from .._support.units import of_drive
 from ..errors import Interrupted, ParameterError
 from ..stages.registry import stage_class
-from .asked import Asked
 from .descents import Descents
 from .estimates import Constraint, Estimate, LagRange, Progress, SwarmRun
 from .fitted_record import FittedRecord
@@ -26,11 +25,10 @@ from .swarm import ParticleSwarm
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from ..data.dataset import Dataset
     from ..stages.model_info import ModelInfo
-    from .history import History
+    from .asked import Asked
 
-__all__ = ["search", "search_records"]
+__all__ = ["search_records"]
 
 # Searches by default, and their names: a swarm has to be restarted to tell whether it converged.
 RUNS: dict[type, int] = {ParticleSwarm: 4, Descents: 1}
@@ -38,46 +36,6 @@ METHODS: dict[type, str] = {ParticleSwarm: "swarm", Descents: "descents"}
 DEFAULT = "descents"
 # Unit and symbol of what is searched beside the parameters of a model.
 SENSOR = {"delay": ("s", "Td"), "voltage_before": ("V", "u0")}
-
-
-def search(
-    data: Dataset,
-    info: ModelInfo,
-    *,
-    offset: bool,
-    history: History = "virgin",
-    delay: object = None,
-    **asked: Any,
-) -> Identification:
-    """Search the parameters of a model on one record.
-
-    Parameters
-    ----------
-    data : Dataset
-        The record.
-    info : ModelInfo
-        The model.
-    offset : bool
-        Whether an offset of the sensor is fitted.
-    history : {"virgin", "settled", "fit"}
-        What the stage went through before the record.
-    delay : object
-        As for `identify`, not yet checked.
-    **asked
-        As for `search_records`.
-
-    Returns
-    -------
-    Identification
-        Result with the best candidate.
-
-    Raises
-    ------
-    ParameterError, DataError, NumericalError, Interrupted
-        As for `identify`.
-    """
-    record = Asked(data=data, offset=offset, history=history, delay=delay)
-    return search_records((record,), info, **asked)
 
 
 def search_records(

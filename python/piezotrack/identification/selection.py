@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from ..data.dataset import Dataset
     from ..stages.model_info import ModelInfo
-    from .history import History
+    from .asked import Asked
     from .result import Identification
 
     Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ OF_FORCE = ("bouc-wen-oscillator", "prandtl-ishlinskii")
 # Arguments that name parameters of one model.
 OF_ONE_MODEL = ("free", "fixed", "initial", "bounds", *ON_PARAMETERS)
 # Arguments that least squares cannot follow.
-OF_SWARM_ONLY = ("delay", "stiffness")
+OF_SWARM_ONLY = ("stiffness",)
 # Share of the window that is fitted, and turns of the drive that each part needs.
 FITTED, TURNS = 0.6, 2
 # A residual of so many times the noise, on what was not fitted, is good enough to try no more.
@@ -80,23 +80,14 @@ class Trial(NamedTuple):
 
 
 def identify_best(
-    data: Dataset,
-    *,
-    offset: bool,
-    history: History | None,
-    of_swarm: Mapping[str, Any],
-    least_squares: object,
+    one: Asked, *, of_swarm: Mapping[str, Any], least_squares: object
 ) -> Identification:
     """Identify the kind of stage that describes a record best.
 
     Parameters
     ----------
-    data : Dataset
-        The record.
-    offset : bool
-        Whether an offset of the sensor is fitted.
-    history : {"virgin", "settled", "fit"} or None
-        What the stage went through before.
+    one : Asked
+        The record, and what is asked of it.
     of_swarm, least_squares : mapping, object
         As for `identify`, not yet checked.
 
@@ -111,17 +102,17 @@ def identify_best(
         As for `identify`.
     """
     refuse_of_one_model(of_swarm)
-    common: dict[str, Any] = {"offset": offset, "history": history, "least_squares": least_squares}
     several, swarm = short_trials(of_swarm)
-    infos = kinds_tried(data, of_swarm)
-    part, rest = two_parts(data)
+    infos = kinds_tried(one.data, {**of_swarm, "drift": one.drift or None})
+    part, rest = two_parts(one.data)
     noise = sample_noise(rest.y)
     trial = several if rest is not part else swarm
     found: list[tuple[Trial, ModelInfo]] = []
     refused: Exception | None = None
     for info in infos:
         try:
-            fit = identify_kind(part, info, of_swarm=trial, **common)
+            asked = replace(one, data=part)
+            fit = identify_kind(asked, info, of_swarm=trial, least_squares=least_squares)
             score = fit.score(rest, offset=fit.offset) if rest is not part else fit.fitted
         except (DataError, NumericalError) as error:
             refused = refused or error
@@ -137,7 +128,7 @@ def identify_best(
     best, info = best_of(found)
     whole = fit if rest is part and best is found[-1][0] else None
     if whole is None:
-        whole = identify_kind(data, info, of_swarm=swarm, **common)
+        whole = identify_kind(one, info, of_swarm=swarm, least_squares=least_squares)
     return with_trials(whole, found, None if rest is part else float(part.t[-1]))
 
 
@@ -248,7 +239,8 @@ def kinds_tried(data: Dataset, of_swarm: Mapping[str, Any]) -> list[ModelInfo]:
     names = OF_FORCE if data.drive_unit == "N" else OF_VOLTS
     infos = [model_named(name) for name in names]
     needs_swarm = any(of_swarm.get(name) is not None for name in OF_SWARM_ONLY)
-    return [info for info in infos if info.searched or not needs_swarm]
+    drifts = of_swarm.get("drift") is not None
+    return [info for info in infos if not (drifts if info.searched else needs_swarm)]
 
 
 def two_parts(data: Dataset) -> tuple[Dataset, Dataset]:

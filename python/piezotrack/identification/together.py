@@ -11,8 +11,8 @@ import numpy as np
 from .._support.messages import quoted
 from .._support.statistics import sample_noise
 from ..errors import DataError, NumericalError, ParameterError
-from ..stages.model_info import LISTED
 from .history import GAIN
+from .kinds import identify_weights, refuse_drift
 from .search import search_records
 from .selection import (
     AS_NOISE,
@@ -40,7 +40,10 @@ SHOWN = (("settled", None), ("fit", None))
 
 
 def identify_together(
-    records: Sequence[Asked], info: ModelInfo, of_search: Mapping[str, Any]
+    records: Sequence[Asked],
+    info: ModelInfo,
+    of_search: Mapping[str, Any],
+    least_squares: object = None,
 ) -> Identification:
     """Identify a stage of one kind from several records.
 
@@ -50,8 +53,8 @@ def identify_together(
         The records, each with what is asked of it alone.
     info : ModelInfo
         The kind.
-    of_search : mapping
-        Arguments of the search, not yet checked.
+    of_search, least_squares : mapping, object
+        Arguments for one of the two ways, not yet checked; those for the other are not used.
 
     Returns
     -------
@@ -64,10 +67,9 @@ def identify_together(
         As for `identify`.
     """
     if not info.searched:
-        raise ParameterError(
-            f"model is {info.name!r} with {len(records)} records: expected one whose parameters "
-            f"are searched, {_searched()}"
-        )
+        return identify_weights(records, info, of_swarm=of_search, least_squares=least_squares)
+    for one in records:
+        refuse_drift(info, one.drift)
     fit = search_records(records, info, **of_search)
     shown = [one if one.history else _with_shown(fit, one) for one in records]
     moved = [i for i, one in enumerate(shown) if (one.history, records[i].history) in SHOWN]
@@ -93,25 +95,22 @@ def _with_shown(fit: Identification, asked: Asked) -> Asked:
     return replace(asked, history=model.start_on(asked.data).history)
 
 
-def _searched() -> str:
-    names = [repr(name) for name, info in LISTED.items() if info.searched]
-    return ", ".join(names[:-1]) + f" or {names[-1]}"
-
-
-def best_together(records: Sequence[Asked], of_search: Mapping[str, Any]) -> Identification:
+def best_together(
+    records: Sequence[Asked], of_search: Mapping[str, Any], least_squares: object = None
+) -> Identification:
     """Identify the kind of stage that describes several records best.
 
     Parameters
     ----------
     records : sequence of Asked
         The records, each with what is asked of it alone.
-    of_search : mapping
-        Arguments of the search, not yet checked.
+    of_search, least_squares : mapping, object
+        As for `identify_together`.
 
     Returns
     -------
     Identification
-        The best of the kinds that are searched, fitted to the whole windows. The trials were fitted
+        The best of the kinds, fitted to the whole windows. The trials were fitted
         to the first part of each window and judged on the rest of each.
 
     Raises
@@ -130,11 +129,10 @@ def best_together(records: Sequence[Asked], of_search: Mapping[str, Any]) -> Ide
     found: list[tuple[Trial, ModelInfo]] = []
     refused: Exception | None = None
     fit: Identification | None = None
-    for info in kinds_tried(records[0].data, of_search):
-        if not info.searched:
-            continue
+    drifts = any(one.drift for one in records)
+    for info in kinds_tried(records[0].data, {**of_search, "drift": drifts or None}):
         try:
-            fit = identify_together(first, info, trial if apart else full)
+            fit = identify_together(first, info, trial if apart else full, least_squares)
         except (DataError, NumericalError) as error:
             refused = refused or error
             continue
@@ -152,7 +150,7 @@ def best_together(records: Sequence[Asked], of_search: Mapping[str, Any]) -> Ide
         raise refused or DataError("no kind of stage could be fitted")
     best, info = best_of(found)
     if apart or best is not found[-1][0]:
-        fit = identify_together(records, info, full)
+        fit = identify_together(records, info, full, least_squares)
     return with_trials(fit, found, float(first[0].data.t[-1]) if apart else None)
 
 

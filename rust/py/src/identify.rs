@@ -233,6 +233,15 @@ impl PySearch {
 }
 
 /// What a stage went through before a record, by its name.
+/// The name of a history.
+pub fn history_name(history: History) -> &'static str {
+    match history {
+        History::Virgin => "virgin",
+        History::Settled => "settled",
+        History::Fitted => "fit",
+    }
+}
+
 pub fn history_named(name: &str) -> Result<History> {
     match name {
         "virgin" => Ok(History::Virgin),

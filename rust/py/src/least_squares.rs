@@ -1,8 +1,8 @@
 //! Identification of a stage's weights by least squares.
 
 use piezotrack_core::identify::{
-    CreepKind, DynamicsKind, History, LeastSquaresFit, PlaysKind, WeightsRecord, WeightsSettings,
-    identify_weights, resonances,
+    CreepKind, DriftKind, DynamicsKind, LeastSquaresFit, PlacesKind, Record, RecordFit,
+    WeightsRecord, WeightsSettings, identify_weights, resonances,
 };
 use piezotrack_core::math::{FREE, NOT_NEGATIVE, Rows};
 use piezotrack_core::models::Model;
@@ -13,8 +13,9 @@ use pyo3::prelude::*;
 use crate::arrays::samples;
 use crate::enter::enter;
 use crate::errors::raise;
-use crate::identify::history_named;
+use crate::identify::{history_name, history_named};
 use crate::models::{Named, named};
+use crate::question::delay_between;
 use crate::stage::hold;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -37,11 +38,6 @@ impl PyLeastSquaresFit {
     }
 
     #[getter]
-    fn offset(&self) -> f64 {
-        self.0.offset
-    }
-
-    #[getter]
     fn rms(&self) -> f64 {
         self.0.rms
     }
@@ -57,25 +53,86 @@ impl PyLeastSquaresFit {
         self.0.at_bound.clone()
     }
 
+    /// What each record has of its own, in their order.
     #[getter]
-    fn history(&self) -> &'static str {
-        match self.0.history {
-            History::Virgin => "virgin",
-            History::Settled => "settled",
-            History::Fitted => "fit",
-        }
-    }
-
-    /// State of the stage before the first sample, by its names.
-    #[getter]
-    fn start(&self) -> Named {
-        named(&self.0.start)
+    fn records(&self) -> Vec<Own> {
+        self.0.records.iter().map(Own::of).collect()
     }
 
     /// Lags that explain the record as well, s.
     #[getter]
     fn lag_range(&self) -> Option<(f64, f64)> {
         self.0.lag_range
+    }
+}
+
+/// What one of the records has of its own, as a dict in Python.
+#[derive(IntoPyObject)]
+struct Own {
+    /// RMS deviation, m.
+    rms: f64,
+    /// Reading at rest, m.
+    offset: f64,
+    /// Drift where the window begins, m, and its time constant, s.
+    drift: Option<(f64, f64)>,
+    /// Delay of the reading, s.
+    delay: f64,
+    history: &'static str,
+    /// State of the stage before the first sample, by its names.
+    start: Named,
+}
+
+impl Own {
+    fn of(found: &RecordFit) -> Self {
+        let RecordFit { offset, drift, delay, rms, history, ref start } = *found;
+        Self { rms, offset, drift, delay, history: history_name(history), start: named(start) }
+    }
+}
+
+/// A record and what is asked of it alone, from a dict of Python.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct Asked<'py> {
+    u: Bound<'py, PyAny>,
+    y: Bound<'py, PyAny>,
+    dt: f64,
+    hold_name: String,
+    start: usize,
+    history: Option<String>,
+    offset: bool,
+    /// Time constant of the drift, s; 0 for none, None for what the record shows.
+    drift: Option<f64>,
+    delay: Option<(f64, f64)>,
+    label: String,
+    weight: f64,
+}
+
+/// The same with its numbers out of Python.
+struct Samples {
+    u: Vec<f64>,
+    y: Vec<f64>,
+}
+
+impl Asked<'_> {
+    fn samples(&self) -> PyResult<Samples> {
+        Ok(Samples { u: samples("u", &self.u)?, y: samples("y", &self.y)? })
+    }
+
+    /// The record as the core takes it.
+    fn record<'a>(&self, of: &'a Samples) -> Result<WeightsRecord<'a>> {
+        let record = Record::new(&of.u, &of.y, self.dt, hold(&self.hold_name)?, self.start);
+        let Record { drive, y, weight, .. } =
+            record.map_err(|error| error.of(&self.label))?.among(&self.label, self.weight)?;
+        let history = self.history.as_deref().map(history_named).transpose()?;
+        let Self { start, offset, .. } = *self;
+        let drift = match self.drift {
+            None => DriftKind::Auto,
+            Some(0.0) => DriftKind::None,
+            Some(time) => DriftKind::Time(time),
+        };
+        let one =
+            WeightsRecord { history, offset, drift, weight, ..WeightsRecord::of(drive, y, start) };
+        one.delayed(delay_between(self.delay)).map_err(|error| error.of(&self.label))
     }
 }
 
@@ -92,42 +149,37 @@ fn dynamics_named(name: &str) -> Result<DynamicsKind> {
     }
 }
 
-/// Identifies a stage of a model from a record; what is None is chosen.
+/// Identifies a stage of a model from records; what is None is chosen.
 #[pyfunction]
-#[pyo3(name = "identify_weights", signature = (*, model, u, y, dt, hold_name, start, count,
-    thresholds, zones, creep_times, dynamics, history, offset))]
+#[pyo3(name = "identify_weights", signature = (records, *, model, count, thresholds, zones,
+    creep_times, dynamics))]
 #[expect(clippy::too_many_arguments, reason = "keyword-only, called from one place")]
+#[expect(clippy::needless_pass_by_value, reason = "from Python")]
 fn fit_weights(
     py: Python<'_>,
+    records: Vec<Asked<'_>>,
     model: &str,
-    u: &Bound<'_, PyAny>,
-    y: &Bound<'_, PyAny>,
-    dt: f64,
-    hold_name: &str,
-    start: usize,
     count: Option<usize>,
     thresholds: Option<Vec<f64>>,
     zones: usize,
     creep_times: Option<Vec<f64>>,
     dynamics: &str,
-    history: Option<&str>,
-    offset: bool,
 ) -> PyResult<PyLeastSquaresFit> {
-    let (u, y) = (samples("u", u)?, samples("y", y)?);
-    let fit = enter(py, |stop| {
-        let drive = Drive::new(&u, dt, hold(hold_name)?)?;
-        let dynamics = dynamics_named(dynamics)?;
-        let plays = match (thresholds, count) {
-            (Some(thresholds), _) => PlaysKind::Thresholds(thresholds),
-            (None, Some(count)) => PlaysKind::Spread(count),
-            (None, None) => PlaysKind::Auto,
+    let numbers: Vec<Samples> = records.iter().map(Asked::samples).collect::<PyResult<_>>()?;
+    let checked = || -> Result<_> {
+        let both = records.iter().zip(&numbers);
+        let records: Result<Vec<_>> = both.map(|(one, numbers)| one.record(numbers)).collect();
+        let places = match (thresholds, count) {
+            (Some(thresholds), _) => PlacesKind::Given(thresholds),
+            (None, Some(count)) => PlacesKind::Spread(count),
+            (None, None) => PlacesKind::Auto,
         };
         let creep = creep_times.map_or(CreepKind::Auto, CreepKind::Times);
-        let history = history.map(history_named).transpose()?;
-        let settings = WeightsSettings { plays, zones, creep, dynamics, history, offset };
-        let record = WeightsRecord { drive, y: &y, start };
-        identify_weights(Model::named(model)?, &record, &settings, stop)
-    })?;
+        let dynamics = dynamics_named(dynamics)?;
+        Ok((Model::named(model)?, records?, WeightsSettings { places, zones, creep, dynamics }))
+    };
+    let (model, asked, settings) = checked().map_err(|error| raise(&error))?;
+    let fit = enter(py, |stop| identify_weights(model, &asked, &settings, stop))?;
     // None means stopped, for which `enter` has raised.
     fit.map(PyLeastSquaresFit)
         .ok_or_else(|| raise(&Error::Numerical("the search was stopped".into())))

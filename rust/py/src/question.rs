@@ -51,16 +51,21 @@ pub struct Asked {
     weight: f64,
 }
 
+/// The delay between two bounds, s: known where they are equal, chosen where there are none.
+pub fn delay_between(bounds: Option<(f64, f64)>) -> Delay {
+    match bounds {
+        None => Delay::Fitted,
+        #[expect(clippy::float_cmp, reason = "the caller writes one number twice")]
+        Some((low, high)) if low == high => Delay::Fixed(low),
+        Some((low, high)) => Delay::Between(low, high),
+    }
+}
+
 impl Question<'_> {
     /// Takes the numbers out of Python.
     pub fn asked(self) -> PyResult<Asked> {
         let (u, y) = (samples("u", &self.u)?, samples("y", &self.y)?);
-        let delay = match self.delay {
-            None => Delay::Fitted,
-            #[expect(clippy::float_cmp, reason = "the caller writes one number twice")]
-            Some((low, high)) if low == high => Delay::Fixed(low),
-            Some((low, high)) => Delay::Between(low, high),
-        };
+        let delay = delay_between(self.delay);
         let named = || Ok((Model::named(&self.model)?, history_named(&self.history)?));
         let (model, history) = named().map_err(|error| raise(&error))?;
         let spec = Spec {

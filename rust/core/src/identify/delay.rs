@@ -27,25 +27,30 @@ impl Delay {
     /// The coordinate of the search.
     pub(super) fn coordinate(self, record: &Record<'_>) -> Result<Coordinate> {
         let length = record.drive.dt * index(record.drive.u.len());
-        let (low, high) = match self {
-            Self::Fixed(value) => (value, value),
-            Self::Fitted => {
-                return Coordinate::between("delay", 0.0, bounds::measures(record).longest_delay());
-            }
-            Self::Between(low, high) => (low, high),
-        };
-        if !(low >= 0.0 && high < length) {
-            let found = if low < high || high < low {
-                format!("({}, {}) s", shown(low), shown(high))
-            } else {
-                format!("{} s", shown(low))
-            };
-            let expected = format!("0 s or above, below the record's {length:.6} s");
-            return Err(Error::parameter("delay", found, expected));
-        }
+        let (low, high) = self.ends(length, || bounds::measures(record).longest_delay())?;
         match self {
             Self::Fixed(value) => Ok(Coordinate::Fixed(value)),
             _ => Coordinate::between("delay", low, high),
         }
+    }
+
+    /// Between which delays a record of `length` seconds is searched, s; `longest` is the longest
+    /// one where the caller gives no bounds.
+    pub(super) fn ends(self, length: f64, longest: impl FnOnce() -> f64) -> Result<(f64, f64)> {
+        let (low, high) = match self {
+            Self::Fixed(value) => (value, value),
+            Self::Fitted => return Ok((0.0, longest())),
+            Self::Between(low, high) => (low, high),
+        };
+        if low >= 0.0 && high < length {
+            return Ok((low, high));
+        }
+        let found = if low < high || high < low {
+            format!("({}, {}) s", shown(low), shown(high))
+        } else {
+            format!("{} s", shown(low))
+        };
+        let expected = format!("0 s or above, below the record's {length:.6} s");
+        Err(Error::parameter("delay", found, expected))
     }
 }

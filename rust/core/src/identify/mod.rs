@@ -49,8 +49,8 @@ pub use identification::{Identification, OwnResult, identify, identify_together}
 pub use journal::Journal;
 pub use lag::LagRange;
 pub use least_squares::{
-    CreepKind, DynamicsKind, LeastSquaresFit, PlaysKind, Settings as WeightsSettings,
-    WeightsRecord, identify_weights,
+    CreepKind, DriftKind, DynamicsKind, LeastSquaresFit, PlacesKind, RecordFit,
+    Settings as WeightsSettings, WeightsDelay, WeightsRecord, identify_weights,
 };
 pub use levenberg_marquardt::{LocalRefinement, Polished, Sensitivity};
 pub use plan::{Method, Plan};

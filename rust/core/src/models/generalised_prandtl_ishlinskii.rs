@@ -33,12 +33,16 @@ use piezotrack_control::{InputInverse, InputInverseState, OperatorInverse};
 
 use super::creep::{MOST_RELAXATIONS, Relaxation};
 use super::dynamics_parameters::DYNAMICS;
-use super::input_stage::{InputOperator, InputStage, PLAYS_STATE, Segmented, inverse_state};
+use super::input_stage::{
+    InputOperator, InputStage, PLAYS_STATE, Segmented, inverse_state, recall_plays, state_at_rest,
+};
 use super::prandtl_ishlinskii::{MOST_PLAYS, PlayHysteresis};
+use super::superposition::{
+    Edges, FittedWeights, Places, PlaySignals, Signals, SignalsOf, Superposition,
+};
 use super::tanh_envelope::{MOST_BEND, TanhEnvelope};
 use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
 use super::values::{ParameterInfo, Values};
-use super::weighted_plays::{FittedPlays, WeightedPlays};
 use crate::design::{Gains, LoopPlant};
 use crate::error::Result;
 
@@ -270,8 +274,16 @@ impl InputOperator for GeneralisedPlays {
         state.input
     }
 
-    fn plays<'a>(&self, state: &'a mut GeneralisedPlaysState) -> &'a mut [f64] {
-        &mut state.plays[..self.count]
+    fn memory(&self, state: &GeneralisedPlaysState) -> Vec<f64> {
+        state.plays[..self.count].to_vec()
+    }
+
+    fn recall(
+        &self,
+        state: &mut GeneralisedPlaysState,
+        memory: &[f64],
+    ) -> core::result::Result<(), String> {
+        recall_plays(&mut state.plays[..self.count], memory)
     }
 }
 
@@ -429,23 +441,14 @@ impl Invertible for GeneralisedPrandtlIshlinskiiStage {
     }
 }
 
-impl WeightedPlays for GeneralisedPrandtlIshlinskiiStage {
-    const DEAD_ZONES: bool = false;
-    const PLAY_OF_DRIVE: bool = true;
-
-    type Envelope = TanhEnvelope;
-
-    /// Its slope at the top of the drive over that at the bottom, and how much it bends both ways:
-    /// s in `B^2 = artanh(k)^2 + s^2`, where tanh's argument runs over 2 B and
-    /// k = (1 - sqrt(ratio))/(1 + sqrt(ratio)). With s near 0 it bends in one direction only.
-    fn shapes() -> Vec<(f64, f64)> {
-        vec![(0.25, 4.0), (0.005, 1.6)]
-    }
-
+impl GeneralisedPrandtlIshlinskiiStage {
+    /// The envelope of a fit, from the numbers of its shape and the range of the drive, V.
+    ///
     /// It passes through 0 at 0 V, where the plays rest, and rises over the drive's range by as
     /// much as the drive does: thresholds and weights mean what they do without it. Its scale
     /// could be traded for the weights otherwise.
-    fn envelope(shape: &[f64], (low, high): (f64, f64)) -> TanhEnvelope {
+    #[must_use]
+    pub fn envelope(shape: &[f64], (low, high): (f64, f64)) -> TanhEnvelope {
         let [ratio, bend] = [0, 1].map(|i| shape.get(i).copied().unwrap_or(1.0));
         // The ratio is cosh^2(A - B)/cosh^2(A + B), A the argument in the middle.
         let root = libm::sqrt(ratio);
@@ -462,20 +465,42 @@ impl WeightedPlays for GeneralisedPrandtlIshlinskiiStage {
         let scale = (high - low) / (bare.at(high) - bare.at(low));
         TanhEnvelope { scale, level: -scale * bare.at(0.0), ..bare }
     }
+}
 
+impl Edges for TanhEnvelope {
     #[inline(always)]
-    fn edges(envelope: &TanhEnvelope, volts: f64) -> (f64, f64) {
-        let edge = envelope.at(volts);
+    fn at(&self, volts: f64) -> (f64, f64) {
+        let edge = Self::at(self, volts);
         (edge, edge)
     }
+}
 
-    fn values(fitted: &FittedPlays) -> Values {
+impl Superposition for GeneralisedPrandtlIshlinskiiStage {
+    const PLACES: Places = Places::Thresholds;
+
+    /// Its slope at the top of the drive over that at the bottom, and how much it bends both ways:
+    /// s in `B^2 = artanh(k)^2 + s^2`, where tanh's argument runs over 2 B and
+    /// k = (1 - sqrt(ratio))/(1 + sqrt(ratio)). With s near 0 it bends in one direction only.
+    fn shapes() -> Vec<(f64, f64)> {
+        vec![(0.25, 4.0), (0.005, 1.6)]
+    }
+
+    fn check_places(places: &[f64]) -> Result<()> {
+        PlayHysteresis::new(1.0, places, &vec![0.0; places.len()], &[], &[]).map(drop)
+    }
+
+    fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {
+        let edges = Self::envelope(of.shape, of.drive);
+        Box::new(PlaySignals { edges, thresholds: of.places.to_vec() })
+    }
+
+    fn values(fitted: &FittedWeights) -> Values {
         let of = fitted.clone();
         let TanhEnvelope { scale, slope, shift, level } = Self::envelope(&of.shape, of.drive);
         let relaxation = of.relaxation.values();
         let operator = [
             vec![of.linear],
-            of.thresholds,
+            of.places,
             of.weights,
             vec![scale],
             vec![slope],
@@ -487,5 +512,10 @@ impl WeightedPlays for GeneralisedPrandtlIshlinskiiStage {
             vec![],
         ];
         Values::of(PARAMETERS, operator.into_iter().chain(relaxation))
+    }
+
+    /// With the play of the drive.
+    fn state_at_rest(x: f64, volts: f64, memory: &[f64], creep: &[f64], modes: usize) -> Values {
+        state_at_rest(PLAYS_STATE, (x, volts), memory, creep, modes)
     }
 }

@@ -41,20 +41,56 @@ const ACCURACY: f64 = 1e-10;
 const POLL: usize = 4096;
 
 /// State of a stage whose operator has plays.
-pub(super) const PLAYS_STATE: &[ParameterInfo] = &[
-    X,
-    V,
-    ParameterInfo::new("u", "u", "V"),
-    ParameterInfo::list("plays", "z", "V"),
-    ParameterInfo::list("creep", "q", "m"),
-    ParameterInfo::list("mode_x", "x_k", "m").or_none(),
-    ParameterInfo::list("mode_v", "x_k'", "m/s").or_none(),
-];
+pub(super) const PLAYS_STATE: &[ParameterInfo] =
+    &state_with(ParameterInfo::list("plays", "z", "V"));
+
+/// Where the memory of the operator is in a state.
+const MEMORY: usize = 3;
+
+/// State of a stage whose operator has this memory.
+pub(super) const fn state_with(memory: ParameterInfo) -> [ParameterInfo; 7] {
+    [
+        X,
+        V,
+        ParameterInfo::new("u", "u", "V"),
+        memory,
+        ParameterInfo::list("creep", "q", "m"),
+        ParameterInfo::list("mode_x", "x_k", "m").or_none(),
+        ParameterInfo::list("mode_v", "x_k'", "m/s").or_none(),
+    ]
+}
+
+/// A state at rest at `x`, m, and `volts`, in the order of [`state_with`].
+pub(super) fn state_at_rest(
+    infos: &'static [ParameterInfo],
+    (x, volts): (f64, f64),
+    memory: &[f64],
+    creep: &[f64],
+    modes: usize,
+) -> Values {
+    let (mode_x, mode_v) = (vec![x; modes], vec![0.0; modes]);
+    let entries =
+        [vec![x], vec![0.0], vec![volts], memory.to_vec(), creep.to_vec(), mode_x, mode_v];
+    Values::of(infos, entries)
+}
+
+/// Puts plays into their slots, where there are as many.
+pub(super) fn recall_plays(slots: &mut [f64], memory: &[f64]) -> core::result::Result<(), String> {
+    if slots.len() != memory.len() {
+        return Err(format!("{} plays, as the stage", slots.len()));
+    }
+    slots.copy_from_slice(memory);
+    Ok(())
+}
 
 /// A hysteresis operator that is followed from sample to sample, V to m.
 pub trait InputOperator: Copy + Debug {
     /// Its state.
     type State: Copy + Debug;
+
+    /// Description of a stage's state: that of plays, or the same with another name, symbol and
+    /// unit of the operator's memory in their place.
+    const STATE: &'static [ParameterInfo] = PLAYS_STATE;
 
     /// The state before any voltage.
     fn rest(&self) -> Self::State;
@@ -65,8 +101,14 @@ pub trait InputOperator: Copy + Debug {
     /// Input of a state, V.
     fn input(&self, state: &Self::State) -> f64;
 
-    /// The plays of a state: those that are used.
-    fn plays<'a>(&self, state: &'a mut Self::State) -> &'a mut [f64];
+    /// Memory of a state as numbers.
+    fn memory(&self, state: &Self::State) -> Vec<f64>;
+
+    /// Gives a state the memory of these numbers; where they are none, says what was expected.
+    ///
+    /// # Errors
+    /// What was expected.
+    fn recall(&self, state: &mut Self::State, memory: &[f64]) -> core::result::Result<(), String>;
 }
 
 /// A hysteresis operator whose output is a straight line between corners, or nearly so.
@@ -147,33 +189,28 @@ impl<O: InputOperator> InputStage<O> {
     pub fn state(&self, values: Option<&Values>) -> Result<InputStageState<O::State>> {
         let mut state = self.at_rest();
         let Some(values) = values else { return Ok(state) };
-        let (plays, creep) = (values.list("plays"), values.list("creep"));
+        let name = O::STATE[MEMORY].name;
+        let (memory, creep) = (values.list(name), values.list("creep"));
         let modes = (values.list("mode_x"), values.list("mode_v"));
-        let slots = self.operator.plays(&mut state.operator);
-        let (count, relaxations) = (slots.len(), self.relaxation.count);
-        if plays.len() != count || creep.len() != relaxations {
-            return Err(Error::Shape {
-                name: "initial".into(),
-                found: format!("{} plays and {} relaxations", plays.len(), creep.len()),
-                expected: format!("{count} plays and {relaxations} relaxations, as the stage"),
-            });
+        let relaxations = self.relaxation.count;
+        let shape = |found, expected| Err(Error::Shape { name: "initial".into(), found, expected });
+        if creep.len() != relaxations {
+            let found = format!("{} relaxations", creep.len());
+            return shape(found, format!("{relaxations}, as the stage"));
         }
         let further = self.relaxation.dynamics.further().len();
         if modes.0.len() != further || modes.1.len() != further {
-            return Err(Error::Shape {
-                name: "initial".into(),
-                found: format!(
-                    "{} and {} entries of mode_x and mode_v",
-                    modes.0.len(),
-                    modes.1.len()
-                ),
-                expected: format!("{further} each, as the stage has modes beside its main one"),
-            });
+            let (places, speeds) = (modes.0.len(), modes.1.len());
+            let found = format!("{places} and {speeds} entries of mode_x and mode_v");
+            let expected = format!("{further} each, as the stage has modes beside its main one");
+            return shape(found, expected);
         }
         if !values.iter().flat_map(|(_, numbers)| numbers).all(|value| value.is_finite()) {
             return Err(Error::parameter("initial", "not finite", "finite numbers"));
         }
-        slots.copy_from_slice(plays);
+        if let Err(expected) = self.operator.recall(&mut state.operator, memory) {
+            return shape(format!("{} {name}", memory.len()), expected);
+        }
         let relaxation = &mut state.relaxation;
         relaxation.creep[..relaxations].copy_from_slice(creep);
         relaxation.input =
@@ -186,15 +223,15 @@ impl<O: InputOperator> InputStage<O> {
 
     /// The values of a state.
     fn values_of(&self, state: &InputStageState<O::State>) -> Values {
-        let InputStageState { mut operator, relaxation } = *state;
+        let InputStageState { operator, relaxation } = *state;
         let creep = relaxation.creep[..self.relaxation.count].to_vec();
-        let plays = self.operator.plays(&mut operator).to_vec();
+        let memory = self.operator.memory(&operator);
         let (x, v, input) = (relaxation.x, relaxation.v, self.operator.input(&operator));
         let further = self.relaxation.dynamics.further().len();
         let (places, speeds) = (&relaxation.mode_x[..further], &relaxation.mode_v[..further]);
         let entries =
-            [vec![x], vec![v], vec![input], plays, creep, places.to_vec(), speeds.to_vec()];
-        Values::of(PLAYS_STATE, entries)
+            [vec![x], vec![v], vec![input], memory, creep, places.to_vec(), speeds.to_vec()];
+        Values::of(O::STATE, entries)
     }
 
     /// Equilibrium after a slow visit to each voltage in turn, from rest, its creep complete.

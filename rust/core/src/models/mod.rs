@@ -22,10 +22,10 @@ mod preisach;
 mod registry;
 mod reversals;
 mod search_ranges;
+mod superposition;
 mod tanh_envelope;
 mod traits;
 mod values;
-mod weighted_plays;
 
 pub use bouc_wen::{BoucWenKernel, BoucWenStage};
 pub use bouc_wen_oscillator::{BoucWenOscillator, BoucWenOscillatorKernel};
@@ -57,9 +57,11 @@ pub use preisach::{PreisachInverse, PreisachInverseState, PreisachOperator, Prei
 pub use registry::{FoundBy, Model, Stage, StageFlow, StageInverse, StageInverseState, StageState};
 pub use reversals::{MOST_REVERSALS, Reversals};
 pub use search_ranges::{Measures, ModeShown, NOMINAL_STIFFNESS, Range, Ranges};
+pub use superposition::{
+    AnySuperposition, FittedWeights, Places, Signals, SignalsOf, Superposition,
+};
 pub use tanh_envelope::TanhEnvelope;
 pub use traits::{
     Experiment, Invertible, KernelVisitor, Method, ModelInfo, Response, Searchable, StageModel,
 };
 pub use values::{Held, ParameterInfo, Values, position};
-pub use weighted_plays::{FittedPlays, WeightedPlays, WeightedVisitor, state_at_rest};

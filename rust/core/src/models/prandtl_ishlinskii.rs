@@ -17,10 +17,14 @@ use piezotrack_control::{InputInverseState, PlayInverse, PrandtlIshlinskiiInvers
 
 use super::creep::{MOST_RELAXATIONS, Relaxation};
 use super::dynamics_parameters::{DYNAMICS, same_length};
-use super::input_stage::{InputOperator, InputStage, PLAYS_STATE, Segmented, inverse_state};
+use super::input_stage::{
+    InputOperator, InputStage, PLAYS_STATE, Segmented, inverse_state, recall_plays, state_at_rest,
+};
+use super::superposition::{
+    FittedWeights, Places, Plain, PlaySignals, Signals, SignalsOf, Superposition,
+};
 use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
 use super::values::{ParameterInfo, Values};
-use super::weighted_plays::{FittedPlays, WeightedPlays};
 use crate::design::{Gains, LoopPlant};
 use crate::error::{Error, Result, finite, not_negative, shown};
 
@@ -192,8 +196,12 @@ impl InputOperator for PlayHysteresis {
         state.input
     }
 
-    fn plays<'a>(&self, state: &'a mut Self::State) -> &'a mut [f64] {
-        &mut state.plays[..self.count]
+    fn memory(&self, state: &Self::State) -> Vec<f64> {
+        state.plays[..self.count].to_vec()
+    }
+
+    fn recall(&self, state: &mut Self::State, memory: &[f64]) -> core::result::Result<(), String> {
+        recall_plays(&mut state.plays[..self.count], memory)
     }
 }
 
@@ -285,28 +293,28 @@ impl Invertible for PrandtlIshlinskiiStage {
     }
 }
 
-impl WeightedPlays for PrandtlIshlinskiiStage {
+impl Superposition for PrandtlIshlinskiiStage {
     const DEAD_ZONES: bool = true;
+    const PLACES: Places = Places::Thresholds;
 
-    type Envelope = ();
-
-    fn envelope(_shape: &[f64], _drive: (f64, f64)) {}
-
-    #[inline(always)]
-    fn edges((): &(), volts: f64) -> (f64, f64) {
-        (volts, volts)
+    fn check_places(places: &[f64]) -> Result<()> {
+        PlayHysteresis::new(1.0, places, &vec![0.0; places.len()], &[], &[]).map(drop)
     }
 
-    fn values(fitted: &FittedPlays) -> Values {
+    fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {
+        Box::new(PlaySignals { edges: Plain, thresholds: of.places.to_vec() })
+    }
+
+    fn values(fitted: &FittedWeights) -> Values {
         let of = fitted.clone();
         let relaxation = of.relaxation.values();
-        let operator = [
-            vec![of.linear],
-            of.thresholds,
-            of.weights,
-            of.dead_zone_thresholds,
-            of.dead_zone_weights,
-        ];
+        let operator =
+            [vec![of.linear], of.places, of.weights, of.dead_zone_thresholds, of.dead_zone_weights];
         Values::of(PARAMETERS, operator.into_iter().chain(relaxation))
+    }
+
+    /// Without the play of the drive.
+    fn state_at_rest(x: f64, volts: f64, memory: &[f64], creep: &[f64], modes: usize) -> Values {
+        state_at_rest(PLAYS_STATE, (x, volts), memory.get(1..).unwrap_or(&[]), creep, modes)
     }
 }

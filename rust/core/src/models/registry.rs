@@ -1,16 +1,18 @@
 //! The list of models, and the types that hold any model, stage, state or inverse of it.
 
+use core::marker::PhantomData;
+
 use piezotrack_control::Snapshot;
 use piezotrack_control::inverse::Inverse;
 
 use super::creeping::Creeping;
 use super::plant::{Plant, Settling};
 use super::search_ranges::{Measures, Ranges};
+use super::superposition::{AnySuperposition, Of};
 use super::traits::{
     Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
 };
 use super::values::{Held, ParameterInfo, Values};
-use super::weighted_plays::WeightedVisitor;
 use crate::design::LoopPlant;
 use crate::error::{Error, Result};
 use crate::integrator::{Order, Parameters};
@@ -128,11 +130,12 @@ macro_rules! models {
         }
 
         impl Model {
-            /// Hands the model to a visitor; `None` where least squares do not find its weights.
-            pub fn weighted<V: WeightedVisitor>(self, visitor: V) -> Option<V::Output> {
+            /// What least squares find of it; `None` where a swarm searches its parameters.
+            #[must_use]
+            pub fn superposition(self) -> Option<&'static dyn AnySuperposition> {
                 match self {
                     $(Self::$variant => {
-                        by_swarm!($found, None, Some(visitor.visit::<$stage>()))
+                        by_swarm!($found, None, Some(&Of::<$stage>(PhantomData)))
                     })*
                 }
             }

@@ -2,16 +2,16 @@
 //!
 //! Each is decided in turn on the least squares so far, and has to earn its place.
 
-use super::fit::{Common, Fit};
+use super::common::{Common, Thinned};
+use super::fit::{Beginning, Fit};
 use super::form::Form;
 use super::gauss_newton::STEPS;
 use super::modes::{drop_modes, first_mode};
-use super::plays::{add_once, choose_plays, plays_for, spread};
-use super::{CreepKind, DynamicsKind, PlaysKind, Settings, WeightsRecord};
+use super::places::{add_once, choose_places, few_or_many, spread};
+use super::{CreepKind, DriftKind, DynamicsKind, PlacesKind, Settings, WeightsRecord};
 use crate::identify::history::History;
 use crate::math::least;
-use crate::models::WeightedPlays;
-use crate::signal::{Drive, index, range};
+use crate::signal::{index, range};
 
 /// Rounds over the numbers of an envelope, at most.
 const SHAPE_ROUNDS: usize = 20;
@@ -23,7 +23,11 @@ const SHAPE_GAIN: f64 = 0.1;
 /// Shares of the deviation that histories, creep and modes have to take away.
 const HISTORY_GAIN: f64 = 0.02;
 const CREEP_GAIN: f64 = 0.015;
+const DRIFT_GAIN: f64 = 0.015;
 pub(super) const MODE_GAIN: f64 = 0.02;
+
+/// Time constants of a drift, as shares of the record.
+const DRIFTS: [f64; 5] = [0.1, 0.3, 1.0, 3.0, 10.0];
 
 /// Deviations that differ by less than this share tell nothing.
 const SAME: f64 = 1.01;
@@ -54,20 +58,16 @@ const LAG_SAME: f64 = 1.003;
 const FIRST_SHARE: f64 = 0.005;
 
 /// A fit, and the range of lags that explain the record as well.
-type Found<'a, M> = (Fit<'a, M>, Option<(f64, f64)>);
+type Found<'a> = (Fit<'a>, Option<(f64, f64)>);
 
 /// The best stage, and the lags that explain the record as well; `None` where stopped.
-pub(super) fn search<'a, M: WeightedPlays>(
-    common: &'a Common<'a>,
-    settings: &Settings,
-) -> Option<Found<'a, M>> {
-    let every = thinning(common.record);
-    let (mut fit, lags) = if every > 1 {
-        choose_thinned(common, settings, every)?
-    } else {
-        let (chosen, lags) = choose::<M>(common, settings)?;
-        (chosen.on(common), lags)
-    };
+pub(super) fn search<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Found<'a>> {
+    let kept: Vec<Thinned> =
+        common.records.iter().map(|one| Thinned::of(one, thinning(one))).collect();
+    let few = common.thinned(&kept);
+    let (chosen, lags) = choose(&few, settings)?;
+    common.evaluations.set(common.evaluations.get() + few.evaluations.get());
+    let mut fit = chosen.on(common);
     fit.settle(1e-4)?;
     fit.exact = true;
     fit.settle(1e-8)?;
@@ -75,45 +75,26 @@ pub(super) fn search<'a, M: WeightedPlays>(
     Some((fit, lags))
 }
 
-/// The structure that every so many of the samples ask for, on all of them.
-fn choose_thinned<'a, M: WeightedPlays>(
-    common: &'a Common<'a>,
-    settings: &Settings,
-    every: usize,
-) -> Option<Found<'a, M>> {
-    let WeightsRecord { drive, y, start } = *common.record;
-    let thin = |values: &[f64]| values.iter().copied().step_by(every).collect::<Vec<f64>>();
-    let (u, y) = (thin(drive.u), thin(y));
-    let drive = Drive { u: &u, dt: drive.dt * index(every), ..drive };
-    let record = WeightsRecord { drive, y: &y, start: start.div_ceil(every) };
-    let few = Common::new(&record, common.offset, common.falls, common.stop);
-    let (chosen, lags) = choose::<M>(&few, settings)?;
-    common.evaluations.set(common.evaluations.get() + few.evaluations.get());
-    Some((chosen.on(common), lags))
-}
-
 /// Every how many samples the choices are made on: where the drive is slow all the time, as many as
 /// leave [`ROWS`].
 fn thinning(record: &WeightsRecord<'_>) -> usize {
     let of = record.measures();
     let most = LONGEST_PHASE / (of.frequency * record.drive.dt);
-    let every = (record.y.len() - record.start) / ROWS;
-    let few = of.excited().is_none() && index(every) < most;
+    let every = record.samples() / ROWS;
+    let few = of.excited().is_none() && index(every) < most && !record.is_delayed();
     if few { every.max(1) } else { 1 }
 }
 
-/// The structure, on a record that may be thinned.
-fn choose<'a, M: WeightedPlays>(
-    common: &'a Common<'a>,
-    settings: &Settings,
-) -> Option<Found<'a, M>> {
-    let thresholds = match &settings.plays {
-        PlaysKind::Thresholds(thresholds) => thresholds.clone(),
-        PlaysKind::Spread(count) => spread(common, (*count, 1.0), false),
-        PlaysKind::Auto => spread(common, (plays_for(common), 1.0), false),
+/// The structure, on records that may be thinned.
+fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Found<'a>> {
+    let places = match &settings.places {
+        PlacesKind::Given(places) => places.clone(),
+        PlacesKind::Spread(count) => spread(common, (*count, 1.0), false),
+        PlacesKind::Auto => spread(common, (few_or_many(common), 1.0), false),
     };
-    let mut fit = Fit::<M>::new(common, &thresholds, settings.history.unwrap_or(History::Virgin));
-    fit.every = (common.record.y.len() - common.record.start).div_ceil(ROWS);
+    let mut fit = Fit::new(common, &places);
+    let every = |one: &WeightsRecord<'_>| one.samples().div_ceil(ROWS);
+    fit.every = common.records.iter().map(every).collect();
     fit.settle(ROUGH)?;
     search_shape(&mut fit)?;
     place_corners(&mut fit, settings.zones);
@@ -128,27 +109,28 @@ fn choose<'a, M: WeightedPlays>(
     if lags {
         fit = best_lag(&fit)?;
     }
-    choose_history(&mut fit, settings)?;
+    choose_histories(&mut fit, settings)?;
     if lags {
         fit.set_poles(Form::None, &[]);
         fit.settle(ROUGH)?;
     }
-    choose_creep(&mut fit, settings)?;
+    choose_slow(&mut fit, settings)?;
     let lags = choose_dynamics(&mut fit, settings, mode)?;
-    choose_plays(&mut fit, settings)?;
+    choose_places(&mut fit, settings)?;
     Some((fit, lags))
 }
 
-/// Spreads the dead zones over what comes out of the plays in the window.
-fn place_corners<M: WeightedPlays>(fit: &mut Fit<'_, M>, count: usize) {
-    let record = fit.common.record;
-    let mut plays = fit.plays_before();
+/// Spreads the dead zones over what comes out of the plays in the windows.
+fn place_corners(fit: &mut Fit<'_>, count: usize) {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for (k, &volts) in record.drive.u.iter().enumerate() {
-        fit.push(&mut plays, volts);
-        if k >= record.start {
-            let value = fit.sum(&plays);
-            (low, high) = (low.min(value), high.max(value));
+    for (r, record) in fit.common.records.iter().enumerate() {
+        let mut path = fit.before(r);
+        for (k, &volts) in record.drive.u.iter().enumerate() {
+            fit.push(&mut path, volts, record.drive.dt);
+            if k >= record.start {
+                let value = fit.sum(&path.signals);
+                (low, high) = (low.min(value), high.max(value));
+            }
         }
     }
     let corner = |j: usize| low + (high - low) * index(j) / index(count + 1);
@@ -158,9 +140,9 @@ fn place_corners<M: WeightedPlays>(fit: &mut Fit<'_, M>, count: usize) {
     }
 }
 
-/// The numbers of the envelope in turn, each from its range.
-fn search_shape<M: WeightedPlays>(fit: &mut Fit<'_, M>) -> Option<()> {
-    let ranges = M::shapes();
+/// The numbers of the shape in turn, each from its range.
+fn search_shape(fit: &mut Fit<'_>) -> Option<()> {
+    let ranges = fit.common.of.shapes();
     let mut released = vec![false; ranges.len()];
     for _ in 0..SHAPE_ROUNDS {
         let round = fit.rms;
@@ -190,14 +172,15 @@ fn search_shape<M: WeightedPlays>(fit: &mut Fit<'_, M>) -> Option<()> {
     Some(())
 }
 
-/// The fit with another history, as good as it gets.
-fn with_history<'a, M: WeightedPlays>(
-    fit: &Fit<'a, M>,
+/// The fit with another history of record `r`, as good as it gets.
+fn with_history<'a>(
+    fit: &Fit<'a>,
+    r: usize,
     (history, from): (History, f64),
     steps: usize,
-) -> Option<Fit<'a, M>> {
+) -> Option<Fit<'a>> {
     let mut trial = fit.clone();
-    trial.restructure(|trial| (trial.history, trial.from) = (history, from));
+    trial.restructure(|trial| trial.begins[r] = Beginning { history, from });
     if history == History::Fitted {
         for share in trial.layout().shares() {
             trial.x[share] = trial.x[share].max(FIRST_SHARE);
@@ -208,24 +191,25 @@ fn with_history<'a, M: WeightedPlays>(
 }
 
 /// The voltage that the stage came from.
-fn fitted_history<'a, M: WeightedPlays>(fit: &Fit<'a, M>) -> Option<Fit<'a, M>> {
-    let drive = fit.common.record.drive;
+fn fitted_history<'a>(fit: &Fit<'a>, r: usize) -> Option<Fit<'a>> {
+    let drive = fit.common.records[r].drive;
     let (low, high) = range(drive.u);
     let (first, reach) = (drive.u[0], high - low);
     let parts = 16;
-    let mut best = with_history(fit, (History::Fitted, first), STEPS)?;
+    let mut best = with_history(fit, r, (History::Fitted, first), STEPS)?;
     let mut width = 2.0 * reach / index(parts);
     for i in 0..=parts {
         let from = first - reach + width * index(i);
-        let trial = with_history(&best, (History::Fitted, from), FEW_STEPS)?;
+        let trial = with_history(&best, r, (History::Fitted, from), FEW_STEPS)?;
         if trial.rms < best.rms {
             best = trial;
         }
     }
     for _ in 0..7 {
         width *= 0.5;
-        for from in [best.from - width, best.from + width] {
-            let trial = with_history(&best, (History::Fitted, from), FEW_STEPS)?;
+        let from = best.begins[r].from;
+        for from in [from - width, from + width] {
+            let trial = with_history(&best, r, (History::Fitted, from), FEW_STEPS)?;
             if trial.rms < best.rms {
                 best = trial;
             }
@@ -235,32 +219,42 @@ fn fitted_history<'a, M: WeightedPlays>(fit: &Fit<'a, M>) -> Option<Fit<'a, M>> 
     Some(best)
 }
 
-/// The history that was set, or the simplest one that explains the record.
-fn choose_history<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -> Option<()> {
-    let with_once = |fit: &mut Fit<'_, M>| {
-        if settings.plays == PlaysKind::Auto { add_once(fit, HISTORY_GAIN) } else { Some(()) }
+/// The histories that were set, or the simplest ones that explain the records.
+fn choose_histories(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
+    let open = fit.common.records.iter().any(|one| one.history.is_none());
+    if open && settings.creep == CreepKind::Auto {
+        // With creep, or what it does would be taken for a history.
+        let times = creeps(fit).pop().unwrap_or_default();
+        fit.restructure(|fit| fit.times = times);
+        fit.settle(ROUGH)?;
+    }
+    for r in 0..fit.common.records.len() {
+        choose_history(fit, settings, r)?;
+    }
+    Some(())
+}
+
+/// The history of one record.
+fn choose_history(fit: &mut Fit<'_>, settings: &Settings, r: usize) -> Option<()> {
+    let with_once = |fit: &mut Fit<'_>| {
+        if settings.places == PlacesKind::Auto { add_once(fit, HISTORY_GAIN) } else { Some(()) }
     };
-    match settings.history {
+    match fit.common.records[r].history {
         Some(History::Settled) => {}
         Some(History::Virgin) => with_once(fit)?,
         Some(History::Fitted) => {
-            *fit = fitted_history(fit)?;
+            *fit = fitted_history(fit, r)?;
             with_once(fit)?;
         }
         None => {
-            // With creep, or what it does would be taken for a history.
-            if settings.creep == CreepKind::Auto {
-                let times = creeps(fit).pop().unwrap_or_default();
-                fit.restructure(|fit| fit.times = times);
-                fit.settle(ROUGH)?;
-            }
             let mut virgin = fit.clone();
             with_once(&mut virgin)?;
-            let mut fitted = fitted_history(fit)?;
+            let mut fitted = fitted_history(fit, r)?;
             with_once(&mut fitted)?;
             let other = if virgin.rms < fitted.rms { virgin } else { fitted };
-            for trial in [with_history(fit, (History::Settled, 0.0), STEPS)?, other] {
-                if trial.rms < (1.0 - HISTORY_GAIN) * fit.rms {
+            for trial in [with_history(fit, r, (History::Settled, 0.0), STEPS)?, other] {
+                let enough = (1.0 - HISTORY_GAIN) * fit.deviation_of(r);
+                if trial.rms < fit.rms && trial.deviation_of(r) < enough {
                     *fit = trial;
                 }
             }
@@ -271,10 +265,10 @@ fn choose_history<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -
 
 /// Time constants of the creep that a record may ask for, s: slower than the drive, whose phase a
 /// faster one would turn as a lag does.
-fn creeps<M: WeightedPlays>(fit: &Fit<'_, M>) -> Vec<Vec<f64>> {
-    let WeightsRecord { drive, y, start } = *fit.common.record;
-    let length = drive.dt * index(y.len() - start);
-    let u = &drive.u[start..];
+fn creeps(fit: &Fit<'_>) -> Vec<Vec<f64>> {
+    let record = fit.common.longest();
+    let (drive, length) = (record.drive, record.length());
+    let u = &drive.u[record.start..];
     let mean = u.iter().sum::<f64>() / index(u.len());
     let moved: f64 = u.iter().map(|u| (u - mean).powi(2)).sum();
     let changed: f64 = u.windows(2).map(|u| (u[1] - u[0]).powi(2)).sum();
@@ -284,15 +278,62 @@ fn creeps<M: WeightedPlays>(fit: &Fit<'_, M>) -> Vec<Vec<f64>> {
     all.filter(|times| times[0] >= shortest).collect()
 }
 
+/// Creep and drift where they are not set: none, one of the two, or both where each explains
+/// enough.
+fn choose_slow(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
+    let mut crept = fit.clone();
+    choose_creep(&mut crept, settings)?;
+    let mut drifted = fit.clone();
+    if settings.creep == CreepKind::Auto {
+        drifted.restructure(|fit| fit.times = Vec::new());
+        drifted.settle(ROUGH)?;
+    }
+    choose_drifts(&mut drifted)?;
+    let mut both = drifted.clone();
+    choose_creep(&mut both, settings)?;
+    choose_drifts(&mut crept)?;
+    *fit = [drifted, both].into_iter().fold(
+        crept,
+        |best, one| {
+            if one.rms < best.rms { one } else { best }
+        },
+    );
+    Some(())
+}
+
+/// The drift of each record of which nothing is said, where it explains enough.
+fn choose_drifts(fit: &mut Fit<'_>) -> Option<()> {
+    for r in 0..fit.common.records.len() {
+        if fit.common.records[r].drift != DriftKind::Auto || fit.drifts[r].is_some() {
+            continue;
+        }
+        let length = fit.common.records[r].length();
+        let mut best: Option<Fit<'_>> = None;
+        for part in DRIFTS {
+            let mut trial = fit.clone();
+            trial.restructure(|trial| trial.drifts[r] = Some(part * length));
+            trial.settle(ROUGH)?;
+            if best.as_ref().is_none_or(|best| trial.rms < best.rms) {
+                best = Some(trial);
+            }
+        }
+        let enough = (1.0 - DRIFT_GAIN) * fit.deviation_of(r);
+        if let Some(best) = best.filter(|best| best.deviation_of(r) < enough) {
+            *fit = best;
+        }
+    }
+    Some(())
+}
+
 /// Creep where it was not set: none, or the two relaxations that explain most.
-fn choose_creep<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -> Option<()> {
+fn choose_creep(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
     if settings.creep != CreepKind::Auto {
         return Some(());
     }
     let mut none = fit.clone();
     none.restructure(|none| none.times = Vec::new());
     none.settle(ROUGH)?;
-    let mut best: Option<Fit<'_, M>> = None;
+    let mut best: Option<Fit<'_>> = None;
     for times in creeps(fit) {
         let mut trial = none.clone();
         trial.restructure(|trial| trial.times = times);
@@ -311,7 +352,7 @@ fn choose_creep<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -> 
     if settings.dynamics == DynamicsKind::Auto && none.form == Form::None {
         let late = best_lag(&none)?;
         let time = libm::exp(late.x[late.layout().poles().start]);
-        if time < LATE * fit.common.record.drive.dt && late.rms < SAME * best.rms {
+        if time < LATE * fit.common.shortest_interval() && late.rms < SAME * best.rms {
             *fit = none;
             return Some(());
         }
@@ -322,8 +363,8 @@ fn choose_creep<M: WeightedPlays>(fit: &mut Fit<'_, M>, settings: &Settings) -> 
 
 /// Mode or lag where they are not set, and the lags that explain the record as well.
 #[expect(clippy::option_option, reason = "stopped, or no lag to tell of")]
-fn choose_dynamics<M: WeightedPlays>(
-    fit: &mut Fit<'_, M>,
+fn choose_dynamics(
+    fit: &mut Fit<'_>,
     settings: &Settings,
     mode: bool,
 ) -> Option<Option<(f64, f64)>> {
@@ -357,10 +398,10 @@ fn choose_dynamics<M: WeightedPlays>(
 }
 
 /// The fit with the lag that explains most.
-fn best_lag<'a, M: WeightedPlays>(fit: &Fit<'a, M>) -> Option<Fit<'a, M>> {
-    let ranges = Form::First.ranges(&fit.common.record.drive, fit.common.record.start);
+fn best_lag<'a>(fit: &Fit<'a>) -> Option<Fit<'a>> {
+    let ranges = Form::First.ranges(fit.common.longest().length(), fit.common.shortest_interval());
     let bounds = (libm::exp(ranges[0].0), libm::exp(ranges[0].1));
-    let mut best: Option<Fit<'a, M>> = None;
+    let mut best: Option<Fit<'a>> = None;
     least(bounds, 0.1, |time| {
         let trial = at_lag(fit, time)?;
         let rms = trial.rms;
@@ -375,7 +416,7 @@ fn best_lag<'a, M: WeightedPlays>(fit: &Fit<'a, M>) -> Option<Fit<'a, M>> {
 }
 
 /// The fit with a lag of so many seconds, which is held.
-fn at_lag<'a, M: WeightedPlays>(fit: &Fit<'a, M>, time: f64) -> Option<Fit<'a, M>> {
+fn at_lag<'a>(fit: &Fit<'a>, time: f64) -> Option<Fit<'a>> {
     let mut trial = fit.clone();
     trial.set_poles(Form::First, &[libm::log(time)]);
     trial.held = true;
@@ -385,10 +426,7 @@ fn at_lag<'a, M: WeightedPlays>(fit: &Fit<'a, M>, time: f64) -> Option<Fit<'a, M
 }
 
 /// The smallest lag that explains the record as well as the best one, and the range of such lags.
-fn smallest_lag<'a, M: WeightedPlays>(
-    still: Fit<'a, M>,
-    best: &Fit<'a, M>,
-) -> Option<(Fit<'a, M>, (f64, f64))> {
+fn smallest_lag<'a>(still: Fit<'a>, best: &Fit<'a>) -> Option<(Fit<'a>, (f64, f64))> {
     let time = libm::exp(best.x[best.layout().poles().start]);
     let enough = SAME * f64::min(best.rms, still.rms);
     let as_good = |time: f64| Some(at_lag(best, time)?.rms <= enough);
@@ -421,9 +459,9 @@ fn smallest_lag<'a, M: WeightedPlays>(
 }
 
 /// A mode that the record does not show: as high and as little damped as the record allows.
-fn unseen_mode<'a, M: WeightedPlays>(fit: &Fit<'a, M>) -> Option<Fit<'a, M>> {
-    let dt = fit.common.record.drive.dt;
-    let mut best: Option<Fit<'a, M>> = None;
+fn unseen_mode<'a>(fit: &Fit<'a>) -> Option<Fit<'a>> {
+    let dt = fit.common.shortest_interval();
+    let mut best: Option<Fit<'a>> = None;
     for (frequency, damping_ratio) in [(0.4, 0.1), (0.4, 1.0), (0.1, 0.1), (0.1, 1.0), (0.02, 1.0)]
     {
         let mut trial = fit.clone();

@@ -1,52 +1,31 @@
-//! A stage of plays on its way to the record, and how far it is from it.
+//! A stage of weighted signals on its way to the records, and how far it is from them.
 
-use core::cell::Cell;
 use core::ops::Range;
+use std::sync::Arc;
 
-use super::follower::Follower;
+use super::common::Common;
 use super::form::Form;
-use super::layout::Layout;
-use super::{LeastSquaresFit, WeightsRecord};
+use super::layout::{Layout, Own};
+use super::{DriftKind, LeastSquaresFit, RecordFit, WeightsDelay, WeightsRecord};
 use crate::error::{Error, Result};
-use crate::identify::history::{History, visited};
-use crate::models::{
-    Dynamics, Experiment, FittedPlays, Relaxation, Values, WeightedPlays, state_at_rest,
-};
-use crate::signal::{Stop, index, range};
+use crate::identify::history::History;
+use crate::models::{Dynamics, FittedWeights, Relaxation, Signals, SignalsOf, Values};
+use crate::signal::index;
 
-/// Least share of the mean slope that passes without memory: with less the inverse is no use.
-const LEAST_LINEAR: f64 = 1e-3;
-
-/// What all fits of a record share.
-pub(super) struct Common<'a> {
-    pub record: &'a WeightsRecord<'a>,
-    pub offset: bool,
-    /// Whether the record is the mirror image of one that falls.
-    pub falls: bool,
-    pub stop: Stop<'a>,
-    /// Range of the drive in the window, V.
-    pub drive: (f64, f64),
-    /// Range of the displacement in the window, m.
-    pub stroke: f64,
-    pub evaluations: Cell<usize>,
-}
-
-impl<'a> Common<'a> {
-    pub fn new(record: &'a WeightsRecord<'a>, offset: bool, falls: bool, stop: Stop<'a>) -> Self {
-        let (least, most) = range(&record.y[record.start..]);
-        let drive = range(&record.drive.u[record.start..]);
-        Self { record, offset, falls, stop, drive, stroke: most - least, evaluations: Cell::new(0) }
-    }
-
-    fn least_linear(&self) -> f64 {
-        LEAST_LINEAR * self.stroke / (self.drive.1 - self.drive.0)
-    }
+/// Where a record begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Beginning {
+    pub history: History,
+    /// Voltage that a history which is fitted comes from, V.
+    pub from: f64,
 }
 
 /// A stage on its way to the best one of its structure.
-pub(super) struct Fit<'a, M: WeightedPlays> {
+#[derive(Clone)]
+pub(super) struct Fit<'a> {
     pub common: &'a Common<'a>,
-    pub thresholds: Vec<f64>,
+    /// Thresholds of plays, or levels, V.
+    pub places: Vec<f64>,
     /// Number of dead zones, and what comes to them, m.
     pub zones: usize,
     pub bent: (f64, f64),
@@ -55,123 +34,149 @@ pub(super) struct Fit<'a, M: WeightedPlays> {
     pub form: Form,
     /// Whether the numbers of the dynamics stay as they are.
     pub held: bool,
-    pub history: History,
-    /// Voltage that a history which is fitted comes from, V.
-    pub from: f64,
-    /// Numbers of the envelope, and what they make.
+    /// Where each record begins.
+    pub begins: Vec<Beginning>,
+    /// Time constant of the drift of each record, s; `None` where there is none.
+    pub drifts: Vec<Option<f64>>,
+    /// Numbers of the shape, and what shape and places make.
     pub shape: Vec<f64>,
-    envelope: M::Envelope,
+    pub signals: Arc<dyn Signals>,
     /// Whether the motion is that of the stage's simulation, exact between samples too.
     pub exact: bool,
-    /// Window to be judged, and every how many samples.
-    pub window: Range<usize>,
-    pub every: usize,
-    /// The unknowns, see [`Layout`].
+    /// Window of each record that is judged, and every how many of its samples.
+    pub windows: Vec<Range<usize>>,
+    pub every: Vec<usize>,
+    /// The unknowns: those of the stage, see [`Layout`], then those of each record, see [`Own`].
     pub x: Vec<f64>,
     pub rms: f64,
 }
 
-impl<M: WeightedPlays> Clone for Fit<'_, M> {
-    fn clone(&self) -> Self {
-        Self {
-            thresholds: self.thresholds.clone(),
-            times: self.times.clone(),
-            shape: self.shape.clone(),
-            envelope: self.envelope.clone(),
-            window: self.window.clone(),
-            x: self.x.clone(),
-            ..*self
-        }
-    }
-}
-
-impl<'a, M: WeightedPlays> Fit<'a, M> {
-    pub fn new(common: &'a Common<'a>, thresholds: &[f64], history: History) -> Self {
+impl<'a> Fit<'a> {
+    pub fn new(common: &'a Common<'a>, places: &[f64]) -> Self {
         let middle = |(from, to): &(f64, f64)| libm::sqrt(from * to);
-        let shape: Vec<f64> = M::shapes().iter().map(middle).collect();
+        let shape: Vec<f64> = common.of.shapes().iter().map(middle).collect();
+        let begin = |history: Option<History>| Beginning {
+            history: history.unwrap_or(History::Virgin),
+            from: 0.0,
+        };
         let mut fit = Self {
-            envelope: M::envelope(&shape, common.drive),
+            signals: signals(common, &shape, places),
             shape,
             common,
-            thresholds: thresholds.to_vec(),
+            places: places.to_vec(),
             zones: 0,
             bent: (0.0, 0.0),
             times: Vec::new(),
             form: Form::None,
             held: false,
-            history,
-            from: 0.0,
+            begins: common.records.iter().map(|one| begin(one.history)).collect(),
+            drifts: common.records.iter().map(known_drift).collect(),
             exact: false,
-            window: common.record.start..common.record.y.len(),
-            every: 1,
+            windows: windows(common),
+            every: vec![1; common.records.len()],
             x: Vec::new(),
             rms: f64::INFINITY,
         };
-        fit.x = vec![0.0; fit.layout().count()];
+        fit.x = vec![0.0; fit.unknowns()];
+        for r in 0..common.records.len() {
+            fit.set_delay(r);
+        }
         fit
     }
 
-    /// The same on all samples of another record.
-    pub fn on<'b>(self, common: &'b Common<'b>) -> Fit<'b, M> {
+    /// The same on all samples of the records from which those of `self` were thinned.
+    pub fn on<'b>(self, common: &'b Common<'b>) -> Fit<'b> {
         Fit {
             common,
-            envelope: M::envelope(&self.shape, common.drive),
-            thresholds: self.thresholds,
+            signals: signals(common, &self.shape, &self.places),
+            places: self.places,
             times: self.times,
             shape: self.shape,
-            window: common.record.start..common.record.y.len(),
-            every: 1,
+            windows: windows(common),
+            every: vec![1; common.records.len()],
             x: self.x,
             zones: self.zones,
             bent: self.bent,
             form: self.form,
             held: self.held,
-            history: self.history,
-            from: self.from,
+            begins: self.begins,
+            drifts: self.drifts,
             exact: false,
             rms: f64::INFINITY,
         }
     }
 
     pub fn layout(&self) -> Layout {
-        let departing = self.history == History::Fitted;
         Layout {
-            weights: 1 + self.thresholds.len(),
+            weights: self.signals.count(),
             bends: self.zones,
             corners: self.zones,
             shares: self.times.len(),
-            departures: if departing { self.times.len() } else { 0 },
-            offset: usize::from(self.common.offset),
             poles: self.form.numbers(),
+        }
+    }
+
+    /// Where the unknowns of record `r` are.
+    pub fn own(&self, r: usize) -> Own {
+        let mut start = self.layout().count();
+        for before in 0..r {
+            start += self.own_from(0, before).end();
+        }
+        self.own_from(start, r)
+    }
+
+    fn own_from(&self, start: usize, r: usize) -> Own {
+        let departing = self.begins[r].history == History::Fitted;
+        let record = &self.common.records[r];
+        let delayed = matches!(record.delay, WeightsDelay::Fitted(..));
+        let departures = if departing { self.times.len() } else { 0 };
+        Own::new(start, departures, [record.offset, self.drifts[r].is_some(), delayed])
+    }
+
+    /// Number of unknowns.
+    pub fn unknowns(&self) -> usize {
+        match self.common.records.len() {
+            0 => self.layout().count(),
+            count => self.own(count - 1).end(),
         }
     }
 
     /// Changes the structure; what both structures have stays.
     pub fn restructure(&mut self, change: impl FnOnce(&mut Self)) {
-        let (before, kept) = (self.layout(), self.x.clone());
-        let (times, plays) = (self.times.clone(), self.thresholds.clone());
-        let form = self.form;
+        let before = self.clone();
         change(self);
-        let now = self.layout();
-        self.x = vec![0.0; now.count()];
+        if self.places != before.places {
+            self.signals = signals(self.common, &self.shape, &self.places);
+        }
+        let (was, now) = (before.layout(), self.layout());
+        self.x = vec![0.0; self.unknowns()];
         let mut keep = |to: Range<usize>, from: Range<usize>, same: bool| {
             if same && to.len() == from.len() {
-                self.x[to].copy_from_slice(&kept[from]);
+                self.x[to].copy_from_slice(&before.x[from]);
             }
         };
-        keep(now.weights(), before.weights(), plays == self.thresholds);
-        keep(now.bends(), before.bends(), true);
-        keep(now.corners(), before.corners(), true);
-        keep(now.shares(), before.shares(), times == self.times);
-        keep(now.departures(), before.departures(), times == self.times);
-        keep(now.offset(), before.offset(), true);
-        keep(now.poles(), before.poles(), form == self.form);
+        let timed = before.times == self.times;
+        keep(now.weights(), was.weights(), before.places == self.places);
+        keep(now.bends(), was.bends(), true);
+        keep(now.corners(), was.corners(), true);
+        keep(now.shares(), was.shares(), timed);
+        keep(now.poles(), was.poles(), before.form == self.form);
+        for r in 0..self.common.records.len() {
+            let (to, from) = (self.own(r).parts(), before.own(r).parts());
+            for (i, (to, from)) in to.into_iter().zip(from).enumerate() {
+                let same =
+                    if i == 0 { timed } else { i != 2 || before.drifts[r] == self.drifts[r] };
+                if same && to.len() == from.len() {
+                    self.x[to].copy_from_slice(&before.x[from]);
+                }
+            }
+        }
         self.rms = f64::INFINITY;
     }
 
     pub fn reshape(&mut self, i: usize, place: f64) {
         self.shape[i] = place;
-        self.envelope = M::envelope(&self.shape, self.common.drive);
+        self.signals = signals(self.common, &self.shape, &self.places);
     }
 
     /// Sets the numbers of the dynamics, logarithms.
@@ -193,36 +198,51 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
     }
 
     pub fn pole_ranges(&self) -> Vec<(f64, f64)> {
-        self.form.ranges(&self.common.record.drive, self.common.record.start)
+        self.form.ranges(self.common.longest().length(), self.common.shortest_interval())
     }
 
-    /// Plays that were taken through the voltages before the record.
-    pub fn plays_before(&self) -> Vec<f64> {
-        let mut plays = vec![0.0; 1 + self.thresholds.len()];
-        for volts in visited(&self.common.record.drive, self.history, self.from) {
-            self.push(&mut plays, volts);
-        }
-        plays
-    }
-
-    /// Moves the plays to `volts`: that of the drive, then those with thresholds.
-    #[inline(always)]
-    pub fn push(&self, plays: &mut [f64], volts: f64) {
-        let (up, down) = M::edges(&self.envelope, volts);
-        plays[0] = up.max(down.min(plays[0]));
-        for (play, threshold) in plays[1..].iter_mut().zip(&self.thresholds) {
-            *play = (up - threshold).max((down + threshold).min(*play));
+    /// Begins the delay of a record that is to be found with one sample.
+    fn set_delay(&mut self, r: usize) {
+        let record = &self.common.records[r];
+        if let (Some(slot), WeightsDelay::Fitted(low, high)) =
+            (self.own(r).delay.next(), record.delay)
+        {
+            self.x[slot] = record.drive.dt.max(low).min(high);
         }
     }
 
-    /// What comes out of the plays, m.
-    #[inline(always)]
-    pub fn sum(&self, plays: &[f64]) -> f64 {
-        let weighted: f64 = plays.iter().zip(&self.x).map(|(play, weight)| weight * play).sum();
-        self.common.least_linear().mul_add(plays[0], weighted)
+    /// Delay of the reading of a record, s.
+    pub fn delay(&self, r: usize) -> f64 {
+        match self.common.records[r].delay {
+            WeightsDelay::Known(delay) => delay,
+            WeightsDelay::Fitted(..) => self.x[self.own(r).delay].iter().sum(),
+        }
     }
 
-    fn corners(&self) -> &[f64] {
+    /// What the sensor adds to the displacement at each sample of a record, m.
+    pub fn added(&self, r: usize) -> impl Fn(usize) -> f64 + use<> {
+        let (own, record) = (self.own(r), &self.common.records[r]);
+        let offset: f64 = self.x[own.offset].iter().sum();
+        let drift: f64 = self.x[own.drift].iter().sum();
+        let (start, fades) = (record.start, self.fading(r));
+        move |k| drift.mul_add(fades(k, start), offset)
+    }
+
+    /// What is left of a drift of 1 at sample `k` of a record that counts from `start` on.
+    pub fn fading(&self, r: usize) -> impl Fn(usize, usize) -> f64 + use<> {
+        let rate = self.drifts[r].map_or(0.0, |time| self.common.records[r].drive.dt / time);
+        move |k, start| libm::exp(rate * (index(start) - index(k)))
+    }
+
+    /// What comes out of the signals, m.
+    #[inline(always)]
+    pub fn sum(&self, signals: &[f64]) -> f64 {
+        let weighted: f64 =
+            signals.iter().zip(&self.x).map(|(signal, weight)| weight * signal).sum();
+        self.common.least_linear().mul_add(signals[0], weighted)
+    }
+
+    pub fn corners(&self) -> &[f64] {
         &self.x[self.layout().corners()]
     }
 
@@ -242,139 +262,82 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
 
     /// Inputs of the columns of weights and dead zones, then that of the stage.
     #[inline(always)]
-    pub fn inputs(&self, plays: &[f64], signals: &mut [f64]) {
-        let value = self.sum(plays);
+    pub fn inputs(&self, signals: &[f64], inputs: &mut [f64]) {
+        let value = self.sum(signals);
         let bends = &self.x[self.layout().bends()];
         let passed = |(corner, bend): (&f64, &f64)| if value > *corner { *bend } else { 0.0 };
         let corners = self.corners();
         let slope = 1.0 + corners.iter().zip(bends).map(passed).sum::<f64>();
-        for (signal, play) in signals.iter_mut().zip(plays) {
-            *signal = slope * play;
+        for (input, signal) in inputs.iter_mut().zip(signals) {
+            *input = slope * signal;
         }
-        let (bent, moved) = signals[plays.len()..].split_at_mut(corners.len());
-        for (signal, corner) in bent.iter_mut().zip(corners) {
-            *signal = beyond(value, *corner);
+        let (bent, moved) = inputs[signals.len()..].split_at_mut(corners.len());
+        for (input, corner) in bent.iter_mut().zip(corners) {
+            *input = beyond(value, *corner);
         }
-        for ((signal, corner), bend) in moved.iter_mut().zip(corners).zip(bends) {
+        for ((input, corner), bend) in moved.iter_mut().zip(corners).zip(bends) {
             let through = |on: bool| if on { *bend } else { 0.0 };
-            *signal = through(*corner < 0.0) - through(value > *corner);
+            *input = through(*corner < 0.0) - through(value > *corner);
         }
-        if let Some(last) = signals.last_mut() {
+        if let Some(last) = inputs.last_mut() {
             *last = self.bent(value);
         }
     }
 
-    /// Where the creep stands before the record behind each of the inputs.
-    pub fn creep_before(&self, width: usize) -> Vec<Vec<f64>> {
-        let drive = self.common.record.drive;
-        let mut plays = self.plays_before();
-        let mut signals = vec![0.0; width];
-        let whole_only = width == 1;
-        let take = |fit: &Self, plays: &mut Vec<f64>, volts: f64, signals: &mut Vec<f64>| {
-            fit.push(plays, volts);
-            if whole_only {
-                signals[0] = fit.bent(fit.sum(plays));
-            } else {
-                fit.inputs(plays, signals);
-            }
-        };
-        take(self, &mut plays, drive.u[0], &mut signals);
-        let relaxed = |signal: &f64| vec![*signal; self.times.len()];
-        if self.history != History::Settled || self.times.is_empty() {
-            let mut reached: Vec<Vec<f64>> = signals.iter().map(relaxed).collect();
-            let departures = &self.x[self.layout().departures()];
-            if let Some(whole) = reached.last_mut() {
-                whole.iter_mut().zip(departures).for_each(|(q, departure)| *q += departure);
-            }
-            return reached;
-        }
-        // From 0 through the record; q repeats that begins at its end / (1 - exp(-T / tau)).
-        let Ok(creep) = Relaxation::new(&vec![0.0; self.times.len()], &self.times, Dynamics::None)
-        else {
-            return signals.iter().map(relaxed).collect();
-        };
-        let flow = creep.flow(drive.dt);
-        let mut followers: Vec<Follower> =
-            signals.iter().map(|signal| Follower::at_rest(&creep, *signal, &[])).collect();
-        for &volts in &drive.u[1..] {
-            take(self, &mut plays, volts, &mut signals);
-            for (follower, signal) in followers.iter_mut().zip(&signals) {
-                follower.next(&creep, &flow, drive.hold, *signal);
-            }
-        }
-        let length = drive.dt * index(drive.u.len() - 1);
-        let repeats = |time: &f64| -libm::expm1(-length / time);
-        let factors: Vec<f64> = self.times.iter().map(repeats).collect();
-        let of = |follower: &Follower| {
-            follower.state.creep.iter().zip(&factors).map(|(end, factor)| end / factor).collect()
-        };
-        followers.iter().map(of).collect()
+    /// Samples of a record that are judged.
+    pub fn judged(&self, r: usize) -> impl Iterator<Item = usize> {
+        self.windows[r].clone().step_by(self.every[r])
     }
 
-    pub fn counts(&self, k: usize) -> bool {
-        self.window.contains(&k) && (k - self.window.start).is_multiple_of(self.every)
+    /// How much a judged sample of a record counts.
+    pub fn weight(&self, r: usize) -> f64 {
+        self.common.weights[r] * index(self.every[r])
     }
 
-    /// RMS deviation in the window, m.
+    /// RMS deviation in the windows, m.
     pub fn deviation(&self) -> f64 {
         self.common.evaluations.set(self.common.evaluations.get() + 1);
-        let Ok(motion) = self.motion() else { return f64::INFINITY };
-        let offset: f64 = self.x[self.layout().offset()].iter().sum();
+        let (mut sum, mut count) = (0.0, 0.0);
+        for r in 0..self.common.records.len() {
+            let Ok((squares, samples)) = self.squares(r) else { return f64::INFINITY };
+            sum += self.weight(r) * squares;
+            count += self.weight(r) * index(samples);
+        }
+        libm::sqrt(sum / count)
+    }
+
+    /// RMS deviation in the window of one record, m.
+    pub fn deviation_of(&self, r: usize) -> f64 {
+        self.squares(r).map_or(f64::INFINITY, |(sum, count)| libm::sqrt(sum / index(count)))
+    }
+
+    /// Sum of the squares of the deviations of a record, and how many.
+    fn squares(&self, r: usize) -> Result<(f64, usize)> {
+        let (motion, added) = (self.motion(r)?, self.added(r));
+        let y = self.common.records[r].y;
         let (mut sum, mut count) = (0.0, 0);
-        for (k, (y, x)) in self.common.record.y.iter().zip(&motion).enumerate() {
-            if self.counts(k) {
-                let error = y - x - offset;
-                sum += error * error;
-                count += 1;
-            }
+        for k in self.judged(r) {
+            let error = y[k] - motion[k] - added(k);
+            sum += error * error;
+            count += 1;
         }
-        libm::sqrt(sum / index(count))
+        Ok((sum, count))
     }
 
-    /// What is left of the displacement, m.
-    pub fn rest(&self) -> Result<Vec<f64>> {
-        let offset: f64 = self.x[self.layout().offset()].iter().sum();
-        let left = self.common.record.y.iter().zip(self.motion()?);
-        Ok(left.map(|(y, x)| y - x - offset).collect())
+    /// What is left of the displacement of a record, m.
+    pub fn rest(&self, r: usize) -> Result<Vec<f64>> {
+        let added = self.added(r);
+        let left = self.common.records[r].y.iter().zip(self.motion(r)?).enumerate();
+        Ok(left.map(|(k, (y, x))| y - x - added(k)).collect())
     }
 
-    /// Displacement up to the end of the window, m.
-    pub fn motion(&self) -> Result<Vec<f64>> {
-        let relaxation = self.relaxation()?;
-        let drive = self.common.record.drive;
-        if self.exact {
-            let (values, start) = self.stage(false)?;
-            let experiment =
-                Experiment { initial: Some(&start), ..Experiment::of(&drive, self.common.stop) };
-            let stopped = || Error::Numerical("the simulation was stopped".into());
-            return Ok(M::build(&values)?.simulate(&experiment)?.ok_or_else(stopped)?.x);
-        }
-        let flow = relaxation.flow(drive.dt);
-        let mut plays = self.plays_before();
-        let creep = self.creep_before(1);
-        let mut follower: Option<Follower> = None;
-        let through = |volts: &f64| {
-            self.push(&mut plays, *volts);
-            let output = self.bent(self.sum(&plays));
-            match &mut follower {
-                Some(follower) => follower.next(&relaxation, &flow, drive.hold, output),
-                none => none.insert(Follower::at_rest(&relaxation, output, &creep[0])).state.x,
-            }
-        };
-        Ok(drive.u.iter().take(self.window.end).map(through).collect())
-    }
-
-    /// Parameters of the stage, and its state before the first sample; those of its mirror image
-    /// where it is to fall.
-    fn stage(&self, falls: bool) -> Result<(Values, Values)> {
+    /// Parameters of the stage; those of its mirror image where it is to fall.
+    pub fn values(&self, falls: bool) -> Result<Values> {
         let layout = self.layout();
         let sign = if falls { -1.0 } else { 1.0 };
-        // Either the drive was turned or the displacement.
-        let (of_drive, of_motion) = if M::DEAD_ZONES { (sign, 1.0) } else { (1.0, sign) };
-        let relaxation = self.relaxation()?;
-        let fitted = FittedPlays {
+        let fitted = FittedWeights {
             linear: sign * (self.common.least_linear() + self.x[0]),
-            thresholds: self.thresholds.clone(),
+            places: self.places.clone(),
             weights: self.x[1..layout.weights]
                 .iter()
                 .map(|weight| sign * weight.max(0.0))
@@ -383,40 +346,59 @@ impl<'a, M: WeightedPlays> Fit<'a, M> {
             dead_zone_weights: self.x[layout.bends()].to_vec(),
             shape: self.shape.clone(),
             drive: self.common.drive,
-            relaxation,
+            relaxation: self.relaxation()?,
         };
-        let first = self.common.record.drive.u[0];
-        let mut plays = self.plays_before();
-        self.push(&mut plays, first);
-        let creep = &self.creep_before(1)[0];
-        let rest = Follower::at_rest(&relaxation, self.bent(self.sum(&plays)), creep).state.x;
-        let modes = self.dynamics().further().len();
-        for play in &mut plays {
-            *play *= of_drive;
-        }
-        let creep: Vec<f64> = creep.iter().map(|q| of_motion * q).collect();
-        let (x, volts) = (of_motion * rest, of_drive * first);
-        let start = state_at_rest::<M>(x, volts, &plays, &creep, modes);
-        Ok((M::values(&fitted), start))
+        Ok(self.common.of.values(&fitted))
     }
 
     /// What was found.
     pub fn result(&self) -> Result<LeastSquaresFit> {
-        let layout = self.layout();
-        let (values, start) = self.stage(self.common.falls)?;
-        let of_motion = if self.common.falls && !M::DEAD_ZONES { -1.0 } else { 1.0 };
-        M::build(&values)?;
+        let values = self.values(self.common.falls)?;
+        self.common.model.build(&values)?;
+        let mirrored = self.common.falls && !self.common.of.has_dead_zones();
+        let of_motion = if mirrored { -1.0 } else { 1.0 };
+        let record = |r: usize| {
+            let own = self.own(r);
+            let sum = |part: Range<usize>| self.x[part].iter().sum::<f64>();
+            Ok(RecordFit {
+                offset: of_motion * sum(own.offset),
+                drift: self.drifts[r].map(|time| (of_motion * sum(own.drift), time)),
+                delay: self.delay(r),
+                rms: self.deviation_of(r),
+                history: self.begins[r].history,
+                start: self.start(r, self.common.falls)?,
+            })
+        };
+        let records: Result<Vec<RecordFit>> = (0..self.common.records.len()).map(record).collect();
         Ok(LeastSquaresFit {
             values,
-            offset: of_motion * self.x[layout.offset()].iter().sum::<f64>(),
             rms: self.rms,
             evaluations: self.common.evaluations.get(),
-            at_bound: layout.at_bound(&self.x, self.form, &self.pole_ranges()),
-            history: self.history,
-            start,
+            at_bound: self.layout().at_bound(&self.x, self.form, &self.pole_ranges()),
+            records: records?,
             lag_range: None,
         })
     }
+
+    /// That a simulation was stopped.
+    pub(super) fn stopped() -> Error {
+        Error::Numerical("the simulation was stopped".into())
+    }
+}
+
+fn signals(common: &Common<'_>, shape: &[f64], places: &[f64]) -> Arc<dyn Signals> {
+    Arc::from(common.of.signals(&SignalsOf { shape, places, drive: common.drive }))
+}
+
+fn known_drift(record: &WeightsRecord<'_>) -> Option<f64> {
+    match record.drift {
+        DriftKind::Time(time) => Some(time),
+        DriftKind::None | DriftKind::Auto => None,
+    }
+}
+
+fn windows(common: &Common<'_>) -> Vec<Range<usize>> {
+    common.records.iter().map(|one| one.start..one.y.len()).collect()
 }
 
 /// What a dead zone passes, less what it passes of 0.

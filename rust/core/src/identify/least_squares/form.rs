@@ -1,7 +1,6 @@
 //! Linear dynamics as logarithms of their numbers, and weights of modes, which are found.
 
 use crate::models::{Dynamics, Mode};
-use crate::signal::{Drive, index};
 
 /// Longest lag that is searched, as a share of the record.
 const LONGEST_LAG: f64 = 0.1;
@@ -52,10 +51,8 @@ impl Form {
         }
     }
 
-    /// Ranges of the logarithms, for a window of so many seconds.
-    pub fn ranges(self, drive: &Drive<'_>, start: usize) -> Vec<(f64, f64)> {
-        let dt = drive.dt;
-        let length = dt * index(drive.u.len() - start);
+    /// Ranges of the logarithms, for a window of so many seconds and samples every `dt`.
+    pub fn ranges(self, length: f64, dt: f64) -> Vec<(f64, f64)> {
         let log = |(low, high): (f64, f64)| (libm::log(low), libm::log(high));
         match self {
             Self::None => Vec::new(),

@@ -1,13 +1,15 @@
 //! Gauss and Newton's method, whose steps are least squares within bounds.
 
 use core::ops::Range;
+use std::collections::VecDeque;
 
-use super::WeightsRecord;
 use super::fit::Fit;
 use super::follower::Follower;
+use super::record_path::Late;
+use super::{WeightsDelay, WeightsRecord};
 use crate::error::Result;
 use crate::math::Rows;
-use crate::models::{Relaxation, RelaxationFlow, RelaxationState, WeightedPlays};
+use crate::models::{Relaxation, RelaxationFlow, RelaxationState};
 use crate::signal::Hold;
 
 /// Change of a logarithm for a derivative by differences.
@@ -19,7 +21,7 @@ const STIFF: f64 = 1e4;
 /// Most steps.
 pub(super) const STEPS: usize = 60;
 
-impl<M: WeightedPlays> Fit<'_, M> {
+impl Fit<'_> {
     /// Gauss and Newton's method until a step gains less than `gain`; `None` where stopped.
     pub fn settle(&mut self, gain: f64) -> Option<()> {
         self.settle_within(STEPS, gain)
@@ -59,8 +61,7 @@ impl<M: WeightedPlays> Fit<'_, M> {
     fn goal(&self) -> Vec<f64> {
         let Ok(rows) = self.linearised() else { return self.x.clone() };
         let layout = self.layout();
-        let ranges = self.pole_ranges();
-        let bounds = layout.bounds(&self.x, self.held, self.bent, &ranges, self.common.stroke);
+        let bounds = self.bounds();
         let mut held = rows.clone();
         let mut x = held.solve(&bounds);
         // Sums beyond their bounds are held there, one more each time.
@@ -73,7 +74,7 @@ impl<M: WeightedPlays> Fit<'_, M> {
                 (sum < low - 1e-9 || sum > high + 1e-9).then(|| (part.clone(), *bound))
             });
             let Some((part, bound)) = beyond else { break };
-            let mut row = vec![0.0; layout.count()];
+            let mut row = vec![0.0; self.unknowns()];
             let stiff = STIFF * held.size();
             row[part].fill(stiff);
             held.push(&row, stiff * bound);
@@ -82,51 +83,84 @@ impl<M: WeightedPlays> Fit<'_, M> {
         x
     }
 
+    /// Bounds of all unknowns for a step.
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        let ranges = self.pole_ranges();
+        let mut bounds = self.layout().bounds(&self.x, self.held, self.bent, &ranges);
+        for (r, record) in self.common.records.iter().enumerate() {
+            let delay = match record.delay {
+                WeightsDelay::Known(delay) => (delay, delay),
+                WeightsDelay::Fitted(low, high) => (low, high),
+            };
+            bounds.extend(self.own(r).bounds(self.common.stroke, delay));
+        }
+        bounds
+    }
+
     /// The rows of the linearised problem.
     fn linearised(&self) -> Result<Rows> {
         self.common.evaluations.set(self.common.evaluations.get() + 1);
-        let WeightsRecord { drive, y, .. } = *self.common.record;
-        let (layout, motion) = (self.layout(), self.motion()?);
-        let parts = Parts::of(self)?;
-        let inner = layout.weights + layout.bends + layout.corners;
-        let mut signals = vec![0.0; inner + 1];
-        let mut plays = self.plays_before();
-        let mut columns = None;
-        let mut rows = Rows::new(layout.count());
-        let mut row = vec![1.0; layout.count()];
-        for (k, &volts) in drive.u.iter().enumerate().take(self.window.end) {
-            self.push(&mut plays, volts);
-            self.inputs(&plays, &mut signals);
-            let columns = match &mut columns {
-                None => {
-                    let departed = &self.x[layout.shares()][..layout.departures];
-                    let creep = self.creep_before(inner + 1);
-                    columns.insert(Columns::at_rest(&parts, &signals, &creep, departed))
-                }
-                Some(columns) => {
-                    columns.next(&parts, drive.hold, &signals);
-                    columns
-                }
-            };
-            if !self.counts(k) {
-                continue;
-            }
-            for (slot, value) in row.iter_mut().zip(columns.linear()) {
-                *slot = value;
-            }
-            for (slot, slope) in row[layout.poles()].iter_mut().zip(columns.slopes()) {
-                *slot = slope;
-            }
-            let known: f64 = row.iter().zip(&self.x).map(|(a, b)| a * b).sum();
-            let offset: f64 = self.x[layout.offset()].iter().sum();
-            rows.push(&row, y[k] - motion[k] - offset + known);
+        let mut rows = Rows::new(self.unknowns());
+        for r in 0..self.common.records.len() {
+            self.push_rows(r, &mut rows)?;
         }
         Ok(rows)
     }
 
+    /// The rows of one record.
+    fn push_rows(&self, r: usize, rows: &mut Rows) -> Result<()> {
+        let WeightsRecord { drive, y, start, .. } = self.common.records[r];
+        let (layout, own) = (self.layout(), self.own(r));
+        let (motion, added, fades) = (self.undelayed(r)?, self.added(r), self.fading(r));
+        let parts = Parts::of(self, drive.dt)?;
+        let inner = layout.weights + layout.bends + layout.corners;
+        let mut inputs = vec![0.0; inner + 1];
+        let mut path = self.before(r);
+        let mut columns: Option<Columns> = None;
+        let late = Late::new(self.delay(r), drive.dt);
+        let factor = libm::sqrt(self.weight(r));
+        let mut recent = Recent::new(layout.count() + own.departures.len(), late);
+        let mut row = vec![0.0; self.unknowns()];
+        let mut judged = self.judged(r).peekable();
+        for (k, &volts) in drive.u.iter().enumerate().take(self.windows[r].end) {
+            self.push(&mut path, volts, if k == 0 { f64::INFINITY } else { drive.dt });
+            self.inputs(&path.signals, &mut inputs);
+            let columns = match &mut columns {
+                None => {
+                    let departed = &self.x[layout.shares()][..own.departures.len()];
+                    let creep = self.creep_before(r, inner + 1);
+                    columns.insert(Columns::at_rest(&parts, &inputs, &creep, departed))
+                }
+                Some(columns) => {
+                    columns.next(&parts, drive.hold, &inputs);
+                    columns
+                }
+            };
+            let counts = judged.next_if_eq(&k).is_some();
+            if !counts && late.is_none() {
+                continue;
+            }
+            let now = recent.next();
+            columns.write(now);
+            if !counts {
+                continue;
+            }
+            recent.read(&mut row[..layout.count()], 0);
+            recent.read(&mut row[own.departures.clone()], layout.count());
+            row[own.offset.clone()].fill(1.0);
+            row[own.drift.clone()].fill(fades(k, start));
+            let (before, after) = late.between(k);
+            row[own.delay.clone()].fill((motion[before] - motion[after]) / drive.dt);
+            let known: f64 = row.iter().zip(&self.x).map(|(a, b)| a * b).sum();
+            let left = y[k] - late.of(k, |k| motion[k]) - added(k);
+            row.iter_mut().for_each(|entry| *entry *= factor);
+            rows.push(&row, factor * (left + known));
+        }
+        Ok(())
+    }
+
     /// Creep and dynamics with each number of the dynamics changed a little.
-    fn nudged(&self) -> Result<Vec<(Relaxation, RelaxationFlow)>> {
-        let dt = self.common.record.drive.dt;
+    fn nudged(&self, dt: f64) -> Result<Vec<(Relaxation, RelaxationFlow)>> {
         let of = |i: usize| {
             let mut other = self.clone();
             let slot = other.layout().poles().start + i;
@@ -150,11 +184,10 @@ struct Parts {
 }
 
 impl Parts {
-    fn of<M: WeightedPlays>(fit: &Fit<'_, M>) -> Result<Self> {
-        let dt = fit.common.record.drive.dt;
+    fn of(fit: &Fit<'_>, dt: f64) -> Result<Self> {
         let (whole, bare) = (fit.relaxation()?, Relaxation::new(&[], &[], fit.dynamics())?);
         let decay = fit.times.iter().map(|time| libm::exp(-dt / time)).collect();
-        let nudged = fit.nudged()?;
+        let nudged = fit.nudged(dt)?;
         Ok(Self { whole: (whole, whole.flow(dt)), bare: (bare, bare.flow(dt)), nudged, decay })
     }
 }
@@ -192,16 +225,18 @@ impl Columns {
         self.inputs[self.inputs.len() - 1].state
     }
 
-    /// How each weight, dead zone, corner, creep share and departure moves the stage.
-    fn linear(&self) -> impl Iterator<Item = f64> {
-        let inputs = &self.inputs[..self.inputs.len() - 1];
-        inputs.iter().chain(&self.reached).chain(&self.faded).map(|one| one.state.x)
-    }
-
-    /// How each number of the dynamics moves it.
-    fn slopes(&self) -> impl Iterator<Item = f64> {
+    /// How each weight, dead zone, corner, creep share, number of the dynamics and departure
+    /// moves the stage.
+    fn write(&self, row: &mut [f64]) {
         let x = self.stage().x;
-        self.nudged.iter().map(move |one| (one.state.x - x) / NUDGE)
+        let moved = |one: &Follower| one.state.x;
+        let inputs = self.inputs[..self.inputs.len() - 1].iter().chain(&self.reached).map(moved);
+        let slopes = self.nudged.iter().map(|one| (one.state.x - x) / NUDGE);
+        for (slot, value) in
+            row.iter_mut().zip(inputs.chain(slopes).chain(self.faded.iter().map(moved)))
+        {
+            *slot = value;
+        }
     }
 
     fn next(&mut self, parts: &Parts, hold: Hold, signals: &[f64]) {
@@ -221,6 +256,37 @@ impl Columns {
         }
         for (column, (part, flow)) in self.nudged.iter_mut().zip(&parts.nudged) {
             column.next(part, flow, hold, signals[signals.len() - 1]);
+        }
+    }
+}
+
+/// The rows of the latest samples, as many as a late reading needs.
+struct Recent {
+    rows: VecDeque<Vec<f64>>,
+    length: usize,
+    late: Late,
+}
+
+impl Recent {
+    fn new(length: usize, late: Late) -> Self {
+        Self { rows: VecDeque::new(), length, late }
+    }
+
+    /// Room for the row of the next sample.
+    fn next(&mut self) -> &mut Vec<f64> {
+        let oldest =
+            if self.rows.len() < self.late.whole() + 2 { None } else { self.rows.pop_front() };
+        self.rows.push_back(oldest.unwrap_or_else(|| vec![0.0; self.length]));
+        let last = self.rows.len() - 1;
+        &mut self.rows[last]
+    }
+
+    /// The entries from `from` on as they are read at the latest sample.
+    fn read(&self, entries: &mut [f64], from: usize) {
+        let last = self.rows.len() - 1;
+        for (i, entry) in entries.iter_mut().enumerate() {
+            let at = |k: usize| self.rows[k][from + i];
+            *entry = if self.late.is_none() { at(last) } else { self.late.of(last, at) };
         }
     }
 }

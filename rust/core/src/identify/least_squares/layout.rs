@@ -24,10 +24,10 @@ const MARGIN: f64 = 0.05;
 /// Most that a number of the dynamics changes by in one step, as a logarithm.
 const STRIDE: f64 = LN_2;
 
-/// How many unknowns there are of each sort, in this order.
+/// How many unknowns of the stage there are of each sort, in this order.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Layout {
-    /// w0 above its least value, then the weights of the plays, m/V.
+    /// That of the first signal above its least value, then those of the others, m/V.
     pub weights: usize,
     /// Weights of the dead zones.
     pub bends: usize,
@@ -35,12 +35,54 @@ pub(super) struct Layout {
     pub corners: usize,
     /// Shares of the creep.
     pub shares: usize,
-    /// What each relaxation stands at before the record, beyond its equilibrium, m.
-    pub departures: usize,
-    /// Displacement that the sensor shows at rest, m: none or one.
-    pub offset: usize,
     /// Logarithms of the numbers of the dynamics.
     pub poles: usize,
+}
+
+/// Where the unknowns are that a record has of its own, which follow those of the stage.
+#[derive(Clone, Debug)]
+pub(super) struct Own {
+    /// What each relaxation stands at before the record, beyond its equilibrium, m.
+    pub departures: Range<usize>,
+    /// Displacement that the sensor shows at rest, m: none or one.
+    pub offset: Range<usize>,
+    /// Drift of the sensor, m/s: none or one.
+    pub drift: Range<usize>,
+    /// Delay of the reading, s: none or one.
+    pub delay: Range<usize>,
+}
+
+impl Own {
+    /// The unknowns from `start` on.
+    pub fn new(start: usize, departures: usize, [offset, drift, delay]: [bool; 3]) -> Self {
+        let mut end = start;
+        let mut next = |count: usize| {
+            let from = end;
+            end += count;
+            from..end
+        };
+        let departures = next(departures);
+        let [offset, drift, delay] = [offset, drift, delay].map(|one| next(usize::from(one)));
+        Self { departures, offset, drift, delay }
+    }
+
+    pub fn end(&self) -> usize {
+        self.delay.end
+    }
+
+    /// The parts that two structures may have in common.
+    pub fn parts(&self) -> [Range<usize>; 4] {
+        [&self.departures, &self.offset, &self.drift, &self.delay].map(Range::clone)
+    }
+
+    /// Bounds for a step; `stroke` in m, `delay` in s.
+    pub fn bounds(&self, stroke: f64, delay: (f64, f64)) -> Vec<(f64, f64)> {
+        let most = MOST_DEPARTURE * stroke;
+        let mut bounds = vec![(-most, most); self.departures.len()];
+        bounds.extend(vec![FREE; self.offset.len() + self.drift.len()]);
+        bounds.extend(vec![delay; self.delay.len()]);
+        bounds
+    }
 }
 
 impl Layout {
@@ -60,37 +102,27 @@ impl Layout {
         self.corners().end..self.corners().end + self.shares
     }
 
-    pub fn departures(&self) -> Range<usize> {
-        self.shares().end..self.shares().end + self.departures
-    }
-
-    pub fn offset(&self) -> Range<usize> {
-        self.departures().end..self.departures().end + self.offset
-    }
-
     pub fn poles(&self) -> Range<usize> {
-        self.offset().end..self.offset().end + self.poles
+        self.shares().end..self.shares().end + self.poles
     }
 
+    /// Unknowns of the stage.
     pub fn count(&self) -> usize {
         self.poles().end
     }
 
-    /// Bounds for a step from `x`; `stroke` in m.
+    /// Bounds for a step of the unknowns of the stage from `x`.
     pub fn bounds(
         &self,
         x: &[f64],
         held: bool,
         corners: (f64, f64),
         ranges: &[(f64, f64)],
-        stroke: f64,
     ) -> Vec<(f64, f64)> {
         let mut bounds = vec![NOT_NEGATIVE; self.weights];
         bounds.extend(vec![BEND; self.bends]);
         bounds.extend(Self::near(&x[self.corners()], corners));
         bounds.extend(vec![(0.0, MOST_CREEP); self.shares]);
-        bounds.extend(vec![(-MOST_DEPARTURE * stroke, MOST_DEPARTURE * stroke); self.departures]);
-        bounds.extend(vec![FREE; self.offset]);
         let stride = if held { 0.0 } else { STRIDE };
         bounds.extend(x[self.poles()].iter().zip(ranges).map(|(at, (low, high))| {
             let at = at.min(*high).max(*low);

@@ -8,46 +8,46 @@
 //! spectrum has a mode; the numbers of an envelope are searched along one line at a time.
 
 mod choices;
+mod common;
 mod fit;
 mod follower;
 mod form;
 mod gauss_newton;
 mod layout;
 mod modes;
-mod plays;
+mod places;
+mod record_path;
 
+use super::delay::Delay;
 use super::history::History;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, positive};
 use crate::models::{
-    Dynamics, Measures, Model, PlayHysteresis, Relaxation, Values, WeightedPlays, WeightedVisitor,
+    AnySuperposition, Dynamics, Measures, Model, PlayHysteresis, Relaxation, SignalsOf, Values,
 };
 use crate::signal::{Drive, Stop, index, range, turns};
 
-use fit::{Common, Fit};
+use common::Common;
 
-/// What is to be found.
+/// What is to be found of the stage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Which plays.
-    pub plays: PlaysKind,
+    /// Thresholds of plays, or levels.
+    pub places: PlacesKind,
     /// Number of dead zones.
     pub zones: usize,
     /// Which creep.
     pub creep: CreepKind,
     /// Which dynamics.
     pub dynamics: DynamicsKind,
-    /// What went before the record; `None` chooses.
-    pub history: Option<History>,
-    /// Whether the sensor shows something where the stage is at rest.
-    pub offset: bool,
 }
 
-/// Plays of a fit.
+/// Thresholds of plays, or levels of a grid.
 #[derive(Clone, Debug, PartialEq)]
-pub enum PlaysKind {
-    /// Those of these thresholds, V, ascending.
-    Thresholds(Vec<f64>),
-    /// So many, spread evenly up to half of the drive's range.
+pub enum PlacesKind {
+    /// These, V, ascending.
+    Given(Vec<f64>),
+    /// So many plays, spread evenly up to half of the drive's range; so many intervals between
+    /// levels.
     Spread(usize),
     /// As many as foretell best what they were not fitted to.
     Auto,
@@ -62,17 +62,6 @@ pub enum CreepKind {
     Auto,
 }
 
-impl PlaysKind {
-    /// Those given, or as many zeros as there may be.
-    fn thresholds(&self) -> Vec<f64> {
-        match self {
-            Self::Thresholds(thresholds) => thresholds.clone(),
-            Self::Spread(count) => vec![0.0; *count],
-            Self::Auto => vec![0.0; 10],
-        }
-    }
-}
-
 impl CreepKind {
     /// Those given.
     fn times(&self) -> &[f64] {
@@ -82,6 +71,9 @@ impl CreepKind {
         }
     }
 }
+
+/// Places that a record of few samples has to determine where nobody says how many.
+const AUTO_PLACES: usize = 10;
 
 /// Linear dynamics that can be searched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,7 +88,8 @@ pub enum DynamicsKind {
     Auto,
 }
 
-/// A record: the displacement under a drive, judged from sample `start` on.
+/// A record: the displacement under a drive, judged from sample `start` on, and what is asked of
+/// it alone.
 #[derive(Clone, Copy, Debug)]
 pub struct WeightsRecord<'a> {
     /// Drive, V.
@@ -105,12 +98,89 @@ pub struct WeightsRecord<'a> {
     pub y: &'a [f64],
     /// First sample that counts; those before are warm-up.
     pub start: usize,
+    /// What went before the record; `None` chooses.
+    pub history: Option<History>,
+    /// Whether the sensor shows something where the stage is at rest.
+    pub offset: bool,
+    /// Whether what it shows drifts.
+    pub drift: DriftKind,
+    /// Delay of the reading.
+    pub delay: WeightsDelay,
+    /// How much a sample counts beside those of other records.
+    pub weight: f64,
 }
 
-impl WeightsRecord<'_> {
+/// Slow drift of what a sensor shows: a part `d exp(-t / tau)` of the reading that has nothing to
+/// do with the drive, t from the first sample that counts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DriftKind {
+    /// None.
+    None,
+    /// With this time constant, s.
+    Time(f64),
+    /// What the record shows.
+    Auto,
+}
+
+/// Delay of a reading in a fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum WeightsDelay {
+    /// Known, s; 0 for none.
+    Known(f64),
+    /// To be found between two bounds, s.
+    Fitted(f64, f64),
+}
+
+impl<'a> WeightsRecord<'a> {
+    /// A record that begins as it shows, with an offset, without drift or delay.
+    #[must_use]
+    pub fn of(drive: Drive<'a>, y: &'a [f64], start: usize) -> Self {
+        let delay = WeightsDelay::Known(0.0);
+        Self {
+            drive,
+            y,
+            start,
+            history: None,
+            offset: true,
+            drift: DriftKind::None,
+            delay,
+            weight: 1.0,
+        }
+    }
+
+    /// The same with a delay of its reading.
+    ///
+    /// # Errors
+    /// Names `delay` where it is out of its range.
+    pub fn delayed(self, delay: Delay) -> Result<Self> {
+        let length = self.drive.dt * index(self.drive.u.len());
+        let ends = delay.ends(length, || self.measures().longest_delay())?;
+        let delay = match delay {
+            Delay::Fixed(value) => WeightsDelay::Known(value),
+            _ if ends.0 < ends.1 => WeightsDelay::Fitted(ends.0, ends.1),
+            _ => WeightsDelay::Known(ends.0),
+        };
+        Ok(Self { delay, ..self })
+    }
+
     /// Measures of the samples that count.
     fn measures(&self) -> Measures {
         Measures::of(&self.drive, self.y, self.start..self.y.len())
+    }
+
+    /// Samples that count.
+    fn samples(&self) -> usize {
+        self.y.len().saturating_sub(self.start)
+    }
+
+    /// Seconds that count.
+    fn length(&self) -> f64 {
+        self.drive.dt * index(self.samples())
+    }
+
+    /// Whether readings are late.
+    fn is_delayed(&self) -> bool {
+        self.delay != WeightsDelay::Known(0.0)
     }
 }
 
@@ -119,86 +189,121 @@ impl WeightsRecord<'_> {
 pub struct LeastSquaresFit {
     /// Parameters of the stage, as the model builds it.
     pub values: Values,
-    /// Displacement that the sensor shows at rest, m.
-    pub offset: f64,
-    /// Root mean square of the deviations, m.
+    /// Root mean square of the deviations from all records, m.
     pub rms: f64,
-    /// Simulations of the record.
+    /// Simulations of the records.
     pub evaluations: usize,
     /// Names of the parameters that lie on a bound of what was searched.
     pub at_bound: Vec<String>,
-    /// What went before the record.
-    pub history: History,
-    /// State of the stage before the first sample.
-    pub start: Values,
-    /// Lags that explain the record within 1 % of the deviation, s; `None` where the record shows a
+    /// Of each record, what it has of its own.
+    pub records: Vec<RecordFit>,
+    /// Lags that explain the records within 1 % of the deviation, s; `None` where they show a
     /// mode, or where the dynamics were set.
     pub lag_range: Option<(f64, f64)>,
 }
 
-/// Identifies a stage of a model; `None` where `stop` said so meanwhile.
+/// What was found of one record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordFit {
+    /// Displacement that the sensor shows at rest, m.
+    pub offset: f64,
+    /// Drift at the first sample that counts, m, and its time constant, s.
+    pub drift: Option<(f64, f64)>,
+    /// Delay of the reading, s.
+    pub delay: f64,
+    /// Root mean square of the deviations, m.
+    pub rms: f64,
+    /// What went before the record.
+    pub history: History,
+    /// State of the stage before the first sample.
+    pub start: Values,
+}
+
+/// Identifies a stage of a model from one or several records; `None` where `stop` said so
+/// meanwhile.
 ///
 /// # Errors
-/// [`Error`] where the model, the settings or the record cannot be used.
+/// [`Error`] where the model, the settings or a record cannot be used.
 pub fn identify_weights(
     model: Model,
-    record: &WeightsRecord<'_>,
+    records: &[WeightsRecord<'_>],
     settings: &Settings,
     stop: Stop<'_>,
 ) -> Result<Option<LeastSquaresFit>> {
+    let Some(of) = model.superposition() else {
+        let found = format!("'{}'", model.info().name);
+        return Err(Error::parameter("model", found, "one whose weights least squares find"));
+    };
+    if records.is_empty() {
+        return Err(Error::parameter("records", "none", "at least one"));
+    }
     // What the settings are refused for, before anything else.
     let zeros = |count: usize| vec![0.0; count];
     let zones = zeros(settings.zones);
-    let thresholds = settings.plays.thresholds();
-    PlayHysteresis::new(1.0, &thresholds, &zeros(thresholds.len()), &zones, &zones)?;
+    PlayHysteresis::new(1.0, &[], &[], &zones, &zones)?;
+    if let PlacesKind::Given(places) = &settings.places {
+        of.check_places(places)?;
+    }
     let times = settings.creep.times();
     Relaxation::new(&zeros(times.len()), times, Dynamics::None)?;
-    let falls = check(record, settings)?;
-    model.weighted(Search { record, settings, falls, stop }).unwrap_or_else(|| {
-        let found = format!("'{}'", model.info().name);
-        Err(Error::parameter("model", found, "one whose weights least squares find"))
-    })
-}
-
-/// The search, for a model.
-struct Search<'a> {
-    record: &'a WeightsRecord<'a>,
-    settings: &'a Settings,
-    /// Whether the displacement falls as the drive rises.
-    falls: bool,
-    stop: Stop<'a>,
-}
-
-impl WeightedVisitor for Search<'_> {
-    type Output = Result<Option<LeastSquaresFit>>;
-
-    fn visit<M: WeightedPlays>(self) -> Self::Output {
-        if self.settings.zones > 0 && !M::DEAD_ZONES {
-            let expected = format!("0: {} has no dead zones", M::INFO.title);
-            return Err(Error::parameter("dead_zones", self.settings.zones, expected));
+    let mut falls = None;
+    for record in records {
+        if let DriftKind::Time(time) = record.drift {
+            positive("drift", time, "s")?;
         }
-        // A falling displacement is fitted as a rising one: under the negative drive, or negative
-        // itself where an envelope bends the drive.
-        let negative = |values: &[f64]| values.iter().map(|value| -value).collect::<Vec<f64>>();
-        let WeightsRecord { drive, y, start } = *self.record;
-        let (u, y) = match (self.falls, M::DEAD_ZONES) {
-            (true, true) => (negative(drive.u), y.to_vec()),
-            (true, false) => (drive.u.to_vec(), negative(y)),
-            (false, _) => (drive.u.to_vec(), y.to_vec()),
-        };
-        let record = WeightsRecord { drive: Drive { u: &u, ..drive }, y: &y, start };
-        let common = Common::new(&record, self.settings.offset, self.falls, self.stop);
-        let found = choices::search::<M>(&common, self.settings);
-        let result =
-            |(fit, lag_range): (Fit<'_, M>, _)| Ok(LeastSquaresFit { lag_range, ..fit.result()? });
-        found.map(result).transpose()
+        check(record, unknowns(of, settings))?;
+        let here = is_falling(record);
+        if *falls.get_or_insert(here) != here {
+            return Err(Error::Data(
+                "the displacement rises with the drive in one record and falls in another".into(),
+            ));
+        }
+    }
+    if settings.zones > 0 && !of.has_dead_zones() {
+        let expected = format!("0: {} has no dead zones", of.info().title);
+        return Err(Error::parameter("dead_zones", settings.zones, expected));
+    }
+    let falls = falls.unwrap_or(false);
+    let mirrored: Vec<_> = records.iter().map(|one| mirror(one, falls, of)).collect();
+    let seen = records.iter().zip(&mirrored);
+    let records =
+        seen.map(|(one, (u, y))| WeightsRecord { drive: Drive { u, ..one.drive }, y, ..*one });
+    let common = Common::new((model, of), records.collect(), falls, stop);
+    let found = choices::search(&common, settings);
+    found.map(|(fit, lag_range)| Ok(LeastSquaresFit { lag_range, ..fit.result()? })).transpose()
+}
+
+/// A falling displacement is fitted as a rising one: under the negative drive, or negative itself
+/// where the signals bend the drive.
+fn mirror(
+    record: &WeightsRecord<'_>,
+    falls: bool,
+    of: &dyn AnySuperposition,
+) -> (Vec<f64>, Vec<f64>) {
+    let negative = |values: &[f64]| values.iter().map(|value| -value).collect::<Vec<f64>>();
+    let (u, y) = (record.drive.u, record.y);
+    match (falls, of.has_dead_zones()) {
+        (true, true) => (negative(u), y.to_vec()),
+        (true, false) => (u.to_vec(), negative(y)),
+        (false, _) => (u.to_vec(), y.to_vec()),
     }
 }
 
-/// Refuses records that tell nothing of a hysteresis; true where the displacement falls as the
-/// drive rises.
-fn check(record: &WeightsRecord<'_>, settings: &Settings) -> Result<bool> {
-    let WeightsRecord { drive, y, start } = *record;
+/// Number of unknowns that the settings ask for at most.
+fn unknowns(of: &dyn AnySuperposition, settings: &Settings) -> usize {
+    let places = match &settings.places {
+        PlacesKind::Given(places) => places.clone(),
+        PlacesKind::Spread(count) => (0..*count).map(index).collect(),
+        PlacesKind::Auto => (0..AUTO_PLACES).map(index).collect(),
+    };
+    let shape: Vec<f64> = of.shapes().iter().map(|(low, high)| libm::sqrt(low * high)).collect();
+    let made = SignalsOf { shape: &shape, places: &places, drive: (0.0, index(AUTO_PLACES)) };
+    1 + of.signals(&made).count() + settings.zones + settings.creep.times().len()
+}
+
+/// Refuses records that tell nothing of a hysteresis.
+fn check(record: &WeightsRecord<'_>, unknowns: usize) -> Result<()> {
+    let WeightsRecord { drive, y, start, .. } = *record;
     if y.len() != drive.u.len() {
         return Err(Error::Shape {
             name: "y".into(),
@@ -206,8 +311,6 @@ fn check(record: &WeightsRecord<'_>, settings: &Settings) -> Result<bool> {
             expected: format!("{}, as many as u", drive.u.len()),
         });
     }
-    let unknowns =
-        2 + settings.plays.thresholds().len() + settings.zones + settings.creep.times().len();
     let count = y.len().saturating_sub(start);
     if count < 2 * unknowns {
         return Err(Error::Data(format!(
@@ -236,8 +339,14 @@ fn check(record: &WeightsRecord<'_>, settings: &Settings) -> Result<bool> {
                 .into(),
         ));
     }
+    Ok(())
+}
+
+/// Whether the displacement falls as the drive rises.
+fn is_falling(record: &WeightsRecord<'_>) -> bool {
+    let (u, y) = (&record.drive.u[record.start..], &record.y[record.start..]);
     let mean = |values: &[f64]| values.iter().sum::<f64>() / index(values.len());
     let (middle, centre) = (mean(u), mean(y));
     let together: f64 = u.iter().zip(y).map(|(u, y)| (u - middle) * (y - centre)).sum();
-    Ok(together < 0.0)
+    together < 0.0
 }

@@ -5,7 +5,6 @@ use super::fit::Fit;
 use super::form::Form;
 use super::{DynamicsKind, Settings, WeightsRecord};
 use crate::identify::resonances::{Resonance, resonances};
-use crate::models::WeightedPlays;
 
 /// Modes that are looked for.
 const MOST_SHOWN: usize = 2;
@@ -14,21 +13,21 @@ const MOST_SHOWN: usize = 2;
 const FURTHER_WEIGHT: f64 = 0.1;
 
 /// Whether a mode was found, which is then part of the fit.
-pub(super) fn first_mode<M: WeightedPlays>(
-    fit: &mut Fit<'_, M>,
-    settings: &Settings,
-) -> Option<bool> {
+pub(super) fn first_mode(fit: &mut Fit<'_>, settings: &Settings) -> Option<bool> {
     if !matches!(settings.dynamics, DynamicsKind::Auto | DynamicsKind::Second) {
         return Some(false);
     }
     let common = fit.common;
-    let record = common.record;
-    let most = if settings.dynamics == DynamicsKind::Auto { MOST_SHOWN } else { 1 };
-    if record.measures().excited().is_none() && settings.dynamics == DynamicsKind::Auto {
+    let chosen = settings.dynamics == DynamicsKind::Auto;
+    let most = if chosen { MOST_SHOWN } else { 1 };
+    let mut found = Vec::new();
+    for record in &common.records {
         // What a mode would explain of one slow sine is creep, or what the plays do not.
-        return Some(false);
+        if !(found.is_empty() && (!chosen || record.measures().excited().is_some())) {
+            continue;
+        }
+        found = resonances(&record.drive, record.y, record.start, most, common.stop)?;
     }
-    let found = resonances(&record.drive, record.y, record.start, most, common.stop)?;
     let mut better = false;
     for count in 1..=found.len() {
         let mut trial = fit.clone();
@@ -55,15 +54,16 @@ pub(super) fn first_mode<M: WeightedPlays>(
 /// The fit with one mode more, where what the others leave shows it: beside hysteresis, it is seen
 /// only once the plays and the first mode are fitted together.
 #[expect(clippy::option_option, reason = "stopped, or none")]
-fn another_mode<'a, M: WeightedPlays>(
-    fit: &Fit<'a, M>,
-    count: usize,
-) -> Option<Option<Fit<'a, M>>> {
-    let WeightsRecord { drive, start, .. } = *fit.common.record;
-    let Ok(rest) = fit.rest() else { return Some(None) };
-    let found = resonances(&drive, &rest, start, 1, fit.common.stop)?;
+fn another_mode<'a>(fit: &Fit<'a>, count: usize) -> Option<Option<Fit<'a>>> {
+    let mut found = Vec::new();
+    for (r, WeightsRecord { drive, start, .. }) in fit.common.records.iter().enumerate() {
+        let Ok(rest) = fit.rest(r) else { return Some(None) };
+        if found.is_empty() {
+            found = resonances(drive, &rest, *start, 1, fit.common.stop)?;
+        }
+    }
     let Some(mode) = found.first() else { return Some(None) };
-    let mut best: Option<Fit<'a, M>> = None;
+    let mut best: Option<Fit<'a>> = None;
     for weight in [FURTHER_WEIGHT, -FURTHER_WEIGHT] {
         let mut trial = fit.clone();
         let mut poles = fit.x[fit.layout().poles()].to_vec();
@@ -74,13 +74,12 @@ fn another_mode<'a, M: WeightedPlays>(
             best = Some(trial);
         }
     }
-    let better =
-        |trial: &Fit<'_, M>| trial.poles_within() && trial.rms < (1.0 - MODE_GAIN) * fit.rms;
+    let better = |trial: &Fit<'_>| trial.poles_within() && trial.rms < (1.0 - MODE_GAIN) * fit.rms;
     Some(best.filter(better))
 }
 
 /// Leaves out further modes that the stepping between the samples has made needless.
-pub(super) fn drop_modes<M: WeightedPlays>(fit: &mut Fit<'_, M>) -> Option<()> {
+pub(super) fn drop_modes(fit: &mut Fit<'_>) -> Option<()> {
     while let Form::Modes(count @ 2..) = fit.form {
         let mut trial = fit.clone();
         let poles = fit.x[fit.layout().poles()].to_vec();

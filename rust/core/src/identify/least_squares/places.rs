@@ -1,10 +1,13 @@
-//! Which plays a fit has: their number and their thresholds.
+//! The places of a fit: thresholds of plays, or levels; how many, and where.
 
 use super::choices::ROUGH;
-use super::fit::{Common, Fit};
-use super::{PlaysKind, Settings};
-use crate::models::{MOST_PLAYS, WeightedPlays};
-use crate::signal::{index, range};
+use core::ops::Range;
+
+use super::common::Common;
+use super::fit::Fit;
+use super::{PlacesKind, Settings};
+use crate::models::{MOST_PLAYS, Places};
+use crate::signal::index;
 
 /// Share of the deviation on what they were not fitted to that other plays have to take away.
 const PLAYS_GAIN: f64 = 0.03;
@@ -13,6 +16,10 @@ const PLAYS_GAIN: f64 = 0.03;
 const MANY_SAMPLES: usize = 800;
 const PLAYS: usize = 20;
 const FEW_PLAYS: usize = 10;
+
+/// Intervals between levels to begin with, and those that are tried.
+const LEVELS: usize = 6;
+const TRIED_LEVELS: [(usize, f64); 2] = [(10, 1.0), (16, 1.0)];
 
 /// Numbers of plays that are tried, and the power by which their thresholds are spread.
 const TRIED: [(usize, f64); 3] = [(PLAYS, 1.0), (PLAYS, 1.5), (MANY_PLAYS, 1.0)];
@@ -26,31 +33,51 @@ const ROUNDS: usize = 5;
 /// Weight of a play that counts, as a share of all.
 const LEAST_WEIGHT: f64 = 1e-3;
 
-/// Plays to begin with: few take a rounded loop for a lag, many need samples.
-pub(super) fn plays_for(common: &Common<'_>) -> usize {
-    if common.record.y.len() - common.record.start < MANY_SAMPLES { FEW_PLAYS } else { PLAYS }
+/// Places to begin with: few plays take a rounded loop for a lag, many need samples.
+pub(super) fn few_or_many(common: &Common<'_>) -> usize {
+    let few = common.samples() < MANY_SAMPLES;
+    match common.of.places() {
+        Places::None => 0,
+        Places::Thresholds if few => FEW_PLAYS,
+        Places::Thresholds => PLAYS,
+        Places::Levels => LEVELS,
+    }
 }
 
 /// Thresholds up to half of the drive's range; a `power` above 1 has more of them near 0.
 ///
 /// Where the stage goes beyond where it was before, plays of half of the range and more move once
 /// and never back: with `once` one further threshold stands for all of them.
+/// Levels divide all of the range that the drives reach.
 pub(super) fn spread(common: &Common<'_>, (count, power): (usize, f64), once: bool) -> Vec<f64> {
-    let part = |i: usize| libm::pow(index(i) / index(count + 1), power);
-    (1..=count + usize::from(once)).map(|i| reach(common) * part(i)).collect()
+    match common.of.places() {
+        Places::None => Vec::new(),
+        Places::Thresholds => {
+            let part = |i: usize| libm::pow(index(i) / index(count + 1), power);
+            (1..=count + usize::from(once)).map(|i| reach(common) * part(i)).collect()
+        }
+        Places::Levels => {
+            let (low, high) = common.reached();
+            (0..=count).map(|i| low + (high - low) * index(i) / index(count)).collect()
+        }
+    }
 }
 
 /// Whether one of the plays moves once and never back.
-fn has_once<M: WeightedPlays>(fit: &Fit<'_, M>) -> bool {
-    fit.thresholds.last().is_some_and(|last| *last >= reach(fit.common))
+fn has_once(fit: &Fit<'_>) -> bool {
+    let plays = fit.common.of.places() == Places::Thresholds;
+    plays && fit.places.last().is_some_and(|last| *last >= reach(fit.common))
 }
 
 /// Adds the play that moves once where it explains more than a share `gain` of the deviation: less
 /// would give it a weight by chance.
-pub(super) fn add_once<M: WeightedPlays>(fit: &mut Fit<'_, M>, gain: f64) -> Option<()> {
+pub(super) fn add_once(fit: &mut Fit<'_>, gain: f64) -> Option<()> {
+    if fit.common.of.places() != Places::Thresholds {
+        return Some(());
+    }
     let mut trial = fit.clone();
     let kept = fit.x[fit.layout().weights()].to_vec();
-    trial.restructure(|trial| trial.thresholds.push(reach(trial.common)));
+    trial.restructure(|trial| trial.places.push(reach(trial.common)));
     trial.x[..kept.len()].copy_from_slice(&kept);
     trial.settle(ROUGH)?;
     if trial.rms < (1.0 - gain) * fit.rms {
@@ -59,48 +86,54 @@ pub(super) fn add_once<M: WeightedPlays>(fit: &mut Fit<'_, M>, gain: f64) -> Opt
     Some(())
 }
 
+/// Numbers of places that are tried.
+fn tried(places: Places) -> &'static [(usize, f64)] {
+    match places {
+        Places::None => &[],
+        Places::Thresholds => &TRIED,
+        Places::Levels => &TRIED_LEVELS,
+    }
+}
+
 /// Half of the drive's range, V.
 fn reach(common: &Common<'_>) -> f64 {
-    let (low, high) = range(common.record.drive.u);
+    let (low, high) = common.reached();
     0.5 * (high - low)
 }
 
 /// Other plays, where they foretell a part of the window that they were not fitted to.
-pub(super) fn choose_plays<M: WeightedPlays>(
-    fit: &mut Fit<'_, M>,
-    settings: &Settings,
-) -> Option<()> {
-    if settings.plays != PlaysKind::Auto {
+pub(super) fn choose_places(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
+    if settings.places != PlacesKind::Auto {
         return Some(());
     }
-    let window = fit.window.clone();
-    let split = window.start + 2 * window.len() / 3;
+    let split = |window: &Range<usize>| window.start + 2 * window.len() / 3;
     let mut here = fit.clone();
-    here.window = window.start..split;
+    here.windows = fit.windows.iter().map(|one| one.start..split(one)).collect();
     here.settle(ROUGH)?;
-    let foretold = |fit: &Fit<'_, M>| {
+    let later: Vec<Range<usize>> = fit.windows.iter().map(|one| split(one)..one.end).collect();
+    let foretold = |fit: &Fit<'_>| {
         let mut trial = fit.clone();
-        trial.window = split..window.end;
+        trial.windows.clone_from(&later);
         trial.deviation()
     };
     let mut least = (1.0 - PLAYS_GAIN) * foretold(&here);
     let mut best = None;
-    for (count, power) in TRIED {
+    for &(count, power) in tried(fit.common.of.places()) {
         let mut trial = here.clone();
         let thresholds = spread(trial.common, (count, power), has_once(fit));
-        trial.restructure(|trial| trial.thresholds = thresholds);
+        trial.restructure(|trial| trial.places = thresholds);
         trial.settle(ROUGH)?;
         let few = if count == MANY_PLAYS { gathered(&trial)? } else { None };
         for trial in [Some(trial), few].into_iter().flatten() {
             let rms = foretold(&trial);
             if rms < least {
                 least = (1.0 - PLAYS_GAIN) * rms;
-                best = Some(trial.thresholds);
+                best = Some(trial.places);
             }
         }
     }
     if let Some(thresholds) = best {
-        fit.restructure(|fit| fit.thresholds = thresholds);
+        fit.restructure(|fit| fit.places = thresholds);
         fit.settle(ROUGH)?;
     }
     Some(())
@@ -109,9 +142,9 @@ pub(super) fn choose_plays<M: WeightedPlays>(
 /// Few plays in place of many that are spread evenly, where their weights gather about few
 /// thresholds: two neighbours stand for one play between them. `None` where they do not gather.
 #[expect(clippy::option_option, reason = "stopped, or none")]
-fn gathered<'a, M: WeightedPlays>(fit: &Fit<'a, M>) -> Option<Option<Fit<'a, M>>> {
+fn gathered<'a>(fit: &Fit<'a>) -> Option<Option<Fit<'a>>> {
     let mut trial = fit.clone();
-    let mut gap = reach(fit.common) / index(fit.thresholds.len() + 1);
+    let mut gap = reach(fit.common) / index(fit.places.len() + 1);
     for _ in 0..ROUNDS {
         let middle = middles(&trial, 1.1 * gap);
         if middle.is_empty() || 2 * middle.len() > MOST_PLAYS {
@@ -121,20 +154,20 @@ fn gathered<'a, M: WeightedPlays>(fit: &Fit<'a, M>) -> Option<Option<Fit<'a, M>>
         let mut pairs: Vec<f64> =
             middle.iter().flat_map(|at| [f64::max(at - 0.5 * gap, 0.0), at + 0.5 * gap]).collect();
         pairs.sort_by(f64::total_cmp);
-        trial.restructure(|trial| trial.thresholds = pairs);
+        trial.restructure(|trial| trial.places = pairs);
         trial.settle(ROUGH)?;
     }
     let middle = middles(&trial, 1.1 * gap);
-    trial.restructure(|trial| trial.thresholds = middle);
+    trial.restructure(|trial| trial.places = middle);
     trial.settle(ROUGH)?;
     Some(Some(trial))
 }
 
 /// Thresholds of plays whose weights count, those of two neighbours `width` or less apart as one.
-fn middles<M: WeightedPlays>(fit: &Fit<'_, M>, width: f64) -> Vec<f64> {
-    let weights = &fit.x[1..=fit.thresholds.len()];
+fn middles(fit: &Fit<'_>, width: f64) -> Vec<f64> {
+    let weights = &fit.x[1..fit.layout().weights];
     let least = LEAST_WEIGHT * weights.iter().sum::<f64>();
-    let counts = fit.thresholds.iter().zip(weights).filter(|(_, weight)| **weight > least);
+    let counts = fit.places.iter().zip(weights).filter(|(_, weight)| **weight > least);
     let mut found: Vec<f64> = Vec::new();
     let mut alone: Option<(f64, f64)> = None;
     for (&at, &weight) in counts {

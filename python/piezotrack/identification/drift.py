@@ -1,0 +1,136 @@
+"""Slow drift of a sensor's reading along one record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import _core
+from .._support.arguments import positive
+from .._support.json_text import object_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+__all__ = ["Drift", "asked_drift", "drift_entry", "drift_of"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drift:
+    """A part of a reading that decays along a record and has nothing to do with its drive.
+
+    As what is left of the creep under an earlier drive, or of the warmth of an amplifier, it
+    belongs to the record, not to the stage::
+
+        y = x + offset + amplitude exp(-(t - begin) / time)
+
+    Attributes
+    ----------
+    amplitude : float
+        At `begin` [m].
+    time : float
+        Time constant [s]. Where it is much longer than the record, the drift is a straight line.
+    begin : float
+        First instant of the window that was fitted, on the record's own time axis [s].
+    """
+
+    amplitude: float
+    time: float
+    begin: float
+
+    def at(self, t: Array) -> Array:
+        """Value at some instants of the record.
+
+        Parameters
+        ----------
+        t : ndarray, shape (n,)
+            Times of the record [s].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Part of the reading [m].
+        """
+        x: Array = self.amplitude * np.exp((self.begin - np.asarray(t)) / self.time)
+        return x
+
+
+def asked_drift(drift: object) -> float | None:
+    """Check what is asked of the drift of a record.
+
+    Parameters
+    ----------
+    drift : object
+        Argument of the caller: True or ``"auto"`` for what the record shows, False for none, or
+        a time constant [s].
+
+    Returns
+    -------
+    float or None
+        The time constant [s]; 0 for none, None for what the record shows.
+
+    Raises
+    ------
+    ParameterError
+        It is none of these.
+    """
+    if drift is None or drift is True or (isinstance(drift, str) and drift == "auto"):
+        return None
+    return 0.0 if drift is False else positive("drift", drift, "s")
+
+
+def drift_entry(drift: Drift | None) -> dict[str, Any]:
+    """Entry of a drift in a file; none where there is no drift.
+
+    Parameters
+    ----------
+    drift : Drift or None
+        The drift.
+
+    Returns
+    -------
+    dict
+        Of numbers and texts only.
+    """
+    if drift is None:
+        return {}
+    return {
+        "drift": {
+            "amplitude": {"value": drift.amplitude, "unit": "m"},
+            "time": {"value": drift.time, "unit": "s"},
+            "begin": {"value": drift.begin, "unit": "s"},
+        }
+    }
+
+
+def drift_of(entry: Any) -> Drift | None:
+    """Read a drift from a file.
+
+    Parameters
+    ----------
+    entry : Any
+        Its entry; None where there is none.
+
+    Returns
+    -------
+    Drift or None
+        The drift.
+
+    Raises
+    ------
+    ParameterError
+        The entry is not that of a drift.
+    """
+    if entry is None:
+        return None
+    found = object_of("drift", entry)
+    values = {
+        name: _core.as_number(f"drift: {name}", object_of(f"drift: {name}", found[name])["value"])
+        for name in ("amplitude", "begin")
+    }
+    time = object_of("drift: time", found["time"])["value"]
+    return Drift(time=positive("drift: time", time, "s"), **values)

@@ -1,0 +1,112 @@
+//! What all fits of some records share.
+
+use core::cell::Cell;
+
+use super::WeightsRecord;
+use crate::models::{AnySuperposition, Model};
+use crate::signal::{Drive, Stop, index, range};
+
+/// Least share of the mean slope that passes without memory: with less the inverse is no use.
+const LEAST_LINEAR: f64 = 1e-3;
+
+/// What all fits of some records share.
+pub(super) struct Common<'a> {
+    pub model: Model,
+    pub of: &'static dyn AnySuperposition,
+    pub records: Vec<WeightsRecord<'a>>,
+    /// How much a sample of each record counts.
+    pub weights: Vec<f64>,
+    /// Whether the records are mirror images of ones that fall.
+    pub falls: bool,
+    pub stop: Stop<'a>,
+    /// Range of the drive in the windows, V.
+    pub drive: (f64, f64),
+    /// Largest range of the displacement in a window, m.
+    pub stroke: f64,
+    pub evaluations: Cell<usize>,
+}
+
+impl<'a> Common<'a> {
+    pub fn new(
+        (model, of): (Model, &'static dyn AnySuperposition),
+        records: Vec<WeightsRecord<'a>>,
+        falls: bool,
+        stop: Stop<'a>,
+    ) -> Self {
+        let span = |one: &WeightsRecord<'a>| range(&one.y[one.start..]);
+        let stroke = records.iter().map(span).map(|(low, high)| high - low).fold(0.0, f64::max);
+        let drive = ends(records.iter().map(|one| range(&one.drive.u[one.start..])));
+        let weights = records.iter().map(|one| one.weight).collect();
+        Self { model, of, records, weights, falls, stop, drive, stroke, evaluations: Cell::new(0) }
+    }
+
+    /// The same records with every so many of the samples of each.
+    pub fn thinned<'b>(&self, kept: &'b [Thinned]) -> Common<'b>
+    where
+        'a: 'b,
+    {
+        let thin = |(one, kept): (&WeightsRecord<'a>, &'b Thinned)| {
+            let dt = one.drive.dt * index(kept.every);
+            let start = one.start.div_ceil(kept.every);
+            let drive = Drive { u: &kept.u, dt, hold: one.drive.hold };
+            WeightsRecord { drive, y: &kept.y, start, ..*one }
+        };
+        let records: Vec<WeightsRecord<'b>> = self.records.iter().zip(kept).map(thin).collect();
+        let weights =
+            self.weights.iter().zip(kept).map(|(weight, kept)| weight * index(kept.every));
+        let few = Common::new((self.model, self.of), records, self.falls, self.stop);
+        Common { weights: weights.collect(), ..few }
+    }
+
+    /// Least weight of the first signal, m/V.
+    pub fn least_linear(&self) -> f64 {
+        LEAST_LINEAR * self.stroke / (self.drive.1 - self.drive.0)
+    }
+
+    /// Range of all drives, warm-up included, V.
+    pub fn reached(&self) -> (f64, f64) {
+        ends(self.records.iter().map(|one| range(one.drive.u)))
+    }
+
+    /// Samples that count, of all records.
+    pub fn samples(&self) -> usize {
+        self.records.iter().map(WeightsRecord::samples).sum()
+    }
+
+    /// The record that lasts longest.
+    pub fn longest(&self) -> &WeightsRecord<'a> {
+        let mut longest = &self.records[0];
+        for one in &self.records {
+            if one.length() > longest.length() {
+                longest = one;
+            }
+        }
+        longest
+    }
+
+    /// The shortest interval between samples, s.
+    pub fn shortest_interval(&self) -> f64 {
+        self.records.iter().map(|one| one.drive.dt).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Every so many of the samples of a record.
+pub(super) struct Thinned {
+    every: usize,
+    u: Vec<f64>,
+    y: Vec<f64>,
+}
+
+impl Thinned {
+    pub fn of(record: &WeightsRecord<'_>, every: usize) -> Self {
+        let thin = |values: &[f64]| values.iter().copied().step_by(every).collect::<Vec<f64>>();
+        Self { every, u: thin(record.drive.u), y: thin(record.y) }
+    }
+}
+
+/// Ends of several ranges together.
+fn ends(ranges: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
+    ranges.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (least, most)| {
+        (f64::min(low, least), f64::max(high, most))
+    })
+}

@@ -1,0 +1,173 @@
+//! The way of a stage through one of the records: memory and creep before it, and its motion.
+
+use super::fit::Fit;
+use super::follower::Follower;
+use crate::error::Result;
+use crate::identify::history::{History, visited};
+use crate::models::{Dynamics, Experiment, Relaxation, Values};
+use crate::signal::{FractionalDelay, index};
+
+/// Signals of a drive, and the memory that they come from.
+#[derive(Clone, Debug)]
+pub(super) struct Path {
+    pub memory: Vec<f64>,
+    pub signals: Vec<f64>,
+}
+
+impl Fit<'_> {
+    /// The signals after the voltages that the stage visited slowly before record `r`.
+    pub fn before(&self, r: usize) -> Path {
+        let mut path =
+            Path { memory: self.signals.rest(), signals: vec![0.0; self.signals.count()] };
+        let begin = self.begins[r];
+        for volts in visited(&self.common.records[r].drive, begin.history, begin.from) {
+            self.push(&mut path, volts, f64::INFINITY);
+        }
+        path
+    }
+
+    /// Takes the drive to `volts` within `dt` seconds.
+    #[inline(always)]
+    pub fn push(&self, path: &mut Path, volts: f64, dt: f64) {
+        self.signals.follow(&mut path.memory, volts, dt, &mut path.signals);
+    }
+
+    /// Where the creep stands before record `r` behind each of so many inputs.
+    pub fn creep_before(&self, r: usize, width: usize) -> Vec<Vec<f64>> {
+        let drive = self.common.records[r].drive;
+        let mut path = self.before(r);
+        let mut inputs = vec![0.0; width];
+        let whole_only = width == 1;
+        let take = |fit: &Self, path: &mut Path, (volts, dt): (f64, f64), inputs: &mut Vec<f64>| {
+            fit.push(path, volts, dt);
+            if whole_only {
+                inputs[0] = fit.bent(fit.sum(&path.signals));
+            } else {
+                fit.inputs(&path.signals, inputs);
+            }
+        };
+        take(self, &mut path, (drive.u[0], f64::INFINITY), &mut inputs);
+        let relaxed = |input: &f64| vec![*input; self.times.len()];
+        if self.begins[r].history != History::Settled || self.times.is_empty() {
+            let mut reached: Vec<Vec<f64>> = inputs.iter().map(relaxed).collect();
+            let departures = &self.x[self.own(r).departures];
+            if let Some(whole) = reached.last_mut() {
+                whole.iter_mut().zip(departures).for_each(|(q, departure)| *q += departure);
+            }
+            return reached;
+        }
+        // From 0 through the record; q repeats that begins at its end / (1 - exp(-T / tau)).
+        let Ok(creep) = Relaxation::new(&vec![0.0; self.times.len()], &self.times, Dynamics::None)
+        else {
+            return inputs.iter().map(relaxed).collect();
+        };
+        let flow = creep.flow(drive.dt);
+        let mut followers: Vec<Follower> =
+            inputs.iter().map(|input| Follower::at_rest(&creep, *input, &[])).collect();
+        for &volts in &drive.u[1..] {
+            take(self, &mut path, (volts, drive.dt), &mut inputs);
+            for (follower, input) in followers.iter_mut().zip(&inputs) {
+                follower.next(&creep, &flow, drive.hold, *input);
+            }
+        }
+        let length = drive.dt * index(drive.u.len() - 1);
+        let repeats = |time: &f64| -libm::expm1(-length / time);
+        let factors: Vec<f64> = self.times.iter().map(repeats).collect();
+        let of = |follower: &Follower| {
+            follower.state.creep.iter().zip(&factors).map(|(end, factor)| end / factor).collect()
+        };
+        followers.iter().map(of).collect()
+    }
+
+    /// Displacement of record `r` up to the end of its window as it is read, m: without what the
+    /// sensor adds.
+    pub fn motion(&self, r: usize) -> Result<Vec<f64>> {
+        let x = self.undelayed(r)?;
+        let late = Late::new(self.delay(r), self.common.records[r].drive.dt);
+        if late.is_none() {
+            return Ok(x);
+        }
+        Ok((0..x.len()).map(|k| late.of(k, |k| x[k])).collect())
+    }
+
+    /// The same before it is read.
+    pub fn undelayed(&self, r: usize) -> Result<Vec<f64>> {
+        let drive = self.common.records[r].drive;
+        if self.exact {
+            let (values, start) = (self.values(false)?, self.start(r, false)?);
+            let experiment =
+                Experiment { initial: Some(&start), ..Experiment::of(&drive, self.common.stop) };
+            let stage = self.common.model.build(&values)?;
+            return Ok(stage.simulate(&experiment)?.ok_or_else(Self::stopped)?.x);
+        }
+        let relaxation = self.relaxation()?;
+        let flow = relaxation.flow(drive.dt);
+        let mut path = self.before(r);
+        let creep = self.creep_before(r, 1);
+        let mut follower: Option<Follower> = None;
+        let through = |volts: &f64| {
+            let dt = if follower.is_some() { drive.dt } else { f64::INFINITY };
+            self.push(&mut path, *volts, dt);
+            let output = self.bent(self.sum(&path.signals));
+            match &mut follower {
+                Some(follower) => follower.next(&relaxation, &flow, drive.hold, output),
+                none => none.insert(Follower::at_rest(&relaxation, output, &creep[0])).state.x,
+            }
+        };
+        Ok(drive.u.iter().take(self.windows[r].end).map(through).collect())
+    }
+
+    /// State of the stage before the first sample of record `r`; that of its mirror image where it
+    /// is to fall.
+    pub fn start(&self, r: usize, falls: bool) -> Result<Values> {
+        let sign = if falls { -1.0 } else { 1.0 };
+        // Either the drive was turned or the displacement.
+        let turned = self.common.of.has_dead_zones();
+        let (of_drive, of_motion) = if turned { (sign, 1.0) } else { (1.0, sign) };
+        let relaxation = self.relaxation()?;
+        let first = self.common.records[r].drive.u[0];
+        let mut path = self.before(r);
+        self.push(&mut path, first, f64::INFINITY);
+        let creep = &self.creep_before(r, 1)[0];
+        let output = self.bent(self.sum(&path.signals));
+        let rest = Follower::at_rest(&relaxation, output, creep).state.x;
+        let modes = self.dynamics().further().len();
+        let memory: Vec<f64> = path.memory.iter().map(|one| of_drive * one).collect();
+        let creep: Vec<f64> = creep.iter().map(|q| of_motion * q).collect();
+        let (x, volts) = (of_motion * rest, of_drive * first);
+        Ok(self.common.of.state_at_rest(x, volts, &memory, &creep, modes))
+    }
+}
+
+/// A reading that comes late, on straight lines between samples; before the first sample the stage
+/// is where it starts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Late(FractionalDelay);
+
+impl Late {
+    pub fn new(delay: f64, dt: f64) -> Self {
+        Self(FractionalDelay::new(delay, dt))
+    }
+
+    /// Whether readings are in time.
+    pub fn is_none(self) -> bool {
+        self.0.whole == 0 && self.0.part >= 1.0
+    }
+
+    /// What is read at sample `k` of values at samples.
+    pub fn of(self, k: usize, at: impl Fn(usize) -> f64) -> f64 {
+        let (before, after) = self.between(k);
+        let before = at(before);
+        self.0.part.mul_add(at(after) - before, before)
+    }
+
+    /// The samples between which it is read at sample `k`.
+    pub fn between(self, k: usize) -> (usize, usize) {
+        (k.saturating_sub(self.0.whole + 1), k.saturating_sub(self.0.whole))
+    }
+
+    /// Whole samples of the delay.
+    pub fn whole(self) -> usize {
+        self.0.whole
+    }
+}

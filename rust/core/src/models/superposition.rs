@@ -1,0 +1,228 @@
+//! Models identified by least squares: weighted sums of signals that follow from the drive.
+
+use core::fmt::Debug;
+use core::marker::PhantomData;
+
+use super::creep::Relaxation;
+use super::traits::{ModelInfo, StageModel};
+use super::values::Values;
+use crate::error::{Error, Result};
+
+/// Result of the least squares.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FittedWeights {
+    /// Weight of the first signal, that of the drive without hysteresis.
+    pub linear: f64,
+    /// Places of the signals: thresholds of plays, levels of a grid, V.
+    pub places: Vec<f64>,
+    /// Weights of the other signals.
+    pub weights: Vec<f64>,
+    /// Thresholds of the dead zones behind them, m.
+    pub dead_zone_thresholds: Vec<f64>,
+    /// Weights of the dead zones.
+    pub dead_zone_weights: Vec<f64>,
+    /// Numbers of the shape that were searched.
+    pub shape: Vec<f64>,
+    /// Range of the drive that the signals were made for, V.
+    pub drive: (f64, f64),
+    /// Creep and dynamics.
+    pub relaxation: Relaxation,
+}
+
+/// Where the signals of a model have their places.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Places {
+    /// Nowhere: a model has always the same signals.
+    None,
+    /// At thresholds of plays, V, up to half of the drive's range.
+    Thresholds,
+    /// At levels that divide the drive's range, V.
+    Levels,
+}
+
+/// Signals of the drive, whose weighted sum comes out of a hysteresis.
+pub trait Signals: Debug + Send + Sync {
+    /// How many; the first is the drive itself, or an envelope of it, without memory.
+    fn count(&self) -> usize;
+
+    /// Memory before any voltage, as the state of the model has it.
+    fn rest(&self) -> Vec<f64>;
+
+    /// Takes the memory to `volts` within `dt` seconds, infinite for a slow visit, and writes the
+    /// signals there.
+    fn follow(&self, memory: &mut Vec<f64>, volts: f64, dt: f64, signals: &mut [f64]);
+}
+
+/// What the signals of a model are made from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SignalsOf<'a> {
+    /// Numbers of the shape, see [`Superposition::shapes`].
+    pub shape: &'a [f64],
+    /// Places, V, ascending.
+    pub places: &'a [f64],
+    /// Range of the drive in what is fitted, V.
+    pub drive: (f64, f64),
+}
+
+/// A model whose hysteresis is a sum of signals with weights of one sign.
+///
+/// Weights are found as 0 or above for a displacement that rises with the drive. One that falls
+/// is fitted as one that rises: under the negative drive where the model has dead zones, else
+/// negative itself.
+pub trait Superposition: StageModel {
+    /// Whether dead zones may follow the sum.
+    const DEAD_ZONES: bool = false;
+
+    /// Where its signals have their places.
+    const PLACES: Places;
+
+    /// Ranges of numbers above 0 that shape the signals and are searched around the least squares
+    /// on a logarithmic scale. A number that gains little stays at the middle of its range.
+    #[must_use]
+    fn shapes() -> Vec<(f64, f64)> {
+        Vec::new()
+    }
+
+    /// Refuses places with which no stage exists.
+    ///
+    /// # Errors
+    /// Names the place.
+    fn check_places(places: &[f64]) -> Result<()>;
+
+    /// The signals.
+    fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals>;
+
+    /// The parameters of the stage, as [`StageModel::build`] takes them.
+    fn values(fitted: &FittedWeights) -> Values;
+
+    /// A state at rest at `x`, m, and `volts`, with a memory of the signals, creep (m), and so
+    /// many further modes.
+    fn state_at_rest(x: f64, volts: f64, memory: &[f64], creep: &[f64], modes: usize) -> Values;
+}
+
+/// A [`Superposition`] whose type is not known; one search serves them all.
+pub trait AnySuperposition: Sync {
+    /// Name and parts of the model.
+    fn info(&self) -> ModelInfo;
+    /// See [`Superposition::DEAD_ZONES`].
+    fn has_dead_zones(&self) -> bool;
+    /// See [`Superposition::PLACES`].
+    fn places(&self) -> Places;
+    /// See [`Superposition::shapes`].
+    fn shapes(&self) -> Vec<(f64, f64)>;
+    /// See [`Superposition::check_places`].
+    ///
+    /// # Errors
+    /// Names the place with which no stage exists.
+    fn check_places(&self, places: &[f64]) -> Result<()>;
+    /// See [`Superposition::signals`].
+    fn signals(&self, of: &SignalsOf<'_>) -> Box<dyn Signals>;
+    /// See [`Superposition::values`].
+    fn values(&self, fitted: &FittedWeights) -> Values;
+    /// See [`Superposition::state_at_rest`].
+    fn state_at_rest(
+        &self,
+        x: f64,
+        volts: f64,
+        memory: &[f64],
+        creep: &[f64],
+        modes: usize,
+    ) -> Values;
+}
+
+/// The superposition of a model, its type forgotten.
+pub(super) struct Of<M>(pub PhantomData<fn() -> M>);
+
+impl<M: Superposition> AnySuperposition for Of<M> {
+    fn info(&self) -> ModelInfo {
+        M::INFO
+    }
+
+    fn has_dead_zones(&self) -> bool {
+        M::DEAD_ZONES
+    }
+
+    fn places(&self) -> Places {
+        M::PLACES
+    }
+
+    fn shapes(&self) -> Vec<(f64, f64)> {
+        M::shapes()
+    }
+
+    fn check_places(&self, places: &[f64]) -> Result<()> {
+        if M::PLACES == Places::None && !places.is_empty() {
+            let found = format!("{} of them", places.len());
+            let expected = format!("none: {} has no thresholds or levels", M::INFO.title);
+            return Err(Error::parameter("thresholds", found, expected));
+        }
+        M::check_places(places)
+    }
+
+    fn signals(&self, of: &SignalsOf<'_>) -> Box<dyn Signals> {
+        M::signals(of)
+    }
+
+    fn values(&self, fitted: &FittedWeights) -> Values {
+        M::values(fitted)
+    }
+
+    fn state_at_rest(
+        &self,
+        x: f64,
+        volts: f64,
+        memory: &[f64],
+        creep: &[f64],
+        modes: usize,
+    ) -> Values {
+        M::state_at_rest(x, volts, memory, creep, modes)
+    }
+}
+
+/// Plays between the edges of an envelope, whose first is that of the drive with threshold 0.
+#[derive(Clone, Debug)]
+pub(super) struct PlaySignals<E> {
+    /// Edges up and down at a voltage; at 0 V both are 0, where the plays rest.
+    pub edges: E,
+    /// Thresholds of the others, V.
+    pub thresholds: Vec<f64>,
+}
+
+/// Edges of plays at a voltage: a play of threshold r is pushed up to `up - r` and down to
+/// `down + r`.
+pub(super) trait Edges: Debug + Send + Sync {
+    /// Edges up and down.
+    fn at(&self, volts: f64) -> (f64, f64);
+}
+
+/// The voltage itself.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plain;
+
+impl Edges for Plain {
+    #[inline(always)]
+    fn at(&self, volts: f64) -> (f64, f64) {
+        (volts, volts)
+    }
+}
+
+impl<E: Edges> Signals for PlaySignals<E> {
+    fn count(&self) -> usize {
+        1 + self.thresholds.len()
+    }
+
+    fn rest(&self) -> Vec<f64> {
+        vec![0.0; self.count()]
+    }
+
+    fn follow(&self, memory: &mut Vec<f64>, volts: f64, _dt: f64, signals: &mut [f64]) {
+        let (up, down) = self.edges.at(volts);
+        if let Some((first, plays)) = memory.split_first_mut() {
+            *first = up.max(down.min(*first));
+            for (play, threshold) in plays.iter_mut().zip(&self.thresholds) {
+                *play = (up - threshold).max((down + threshold).min(*play));
+            }
+        }
+        signals.copy_from_slice(memory);
+    }
+}
