@@ -3,7 +3,14 @@
 
 use piezotrack_control::hysteresis::Operator;
 use piezotrack_control::{OperatorInverse, Snapshot};
-use piezotrack_core::models::{MOST_REVERSALS, PlayHysteresis, PreisachInverse, PreisachOperator};
+use piezotrack_core::identify::{
+    CreepKind, DynamicsKind, History, PlacesKind, WeightsRecord, WeightsSettings, identify_weights,
+};
+use piezotrack_core::models::{
+    Dynamics, Experiment, InputOperator, Invertible, MOST_REVERSALS, Model, Plant, PlayHysteresis,
+    PreisachInverse, PreisachOperator, PreisachStage, Relaxation, StageModel,
+};
+use piezotrack_core::signal::{Drive, Hold, NEVER};
 
 const LINEAR: f64 = 0.3e-6;
 const LEVELS: [f64; 6] = [-32.0, -12.0, 0.0, 16.0, 40.0, 48.0];
@@ -337,6 +344,133 @@ fn a_snapshot_brings_the_state_back() {
         let mut left = changed.into_iter();
         assert_eq!(inverse.rest().load(&mut || left.next()), None);
     }
+}
+
+fn stage(dynamics: Dynamics) -> PreisachStage {
+    let relaxation = Relaxation::new(&[0.01], &[0.3], dynamics).unwrap();
+    PreisachStage { operator: preisach(), relaxation }
+}
+
+#[test]
+fn the_stage_moves_as_under_a_drive_in_many_more_steps() {
+    let stage = stage(Dynamics::Second { frequency: 30.0, damping_ratio: 0.1 });
+    let u = path(600);
+    let run = stage
+        .simulate(&Experiment::of(&Drive::new(&u, 0.01, Hold::First).unwrap(), NEVER))
+        .unwrap()
+        .unwrap();
+    let fine: Vec<f64> = u
+        .windows(2)
+        .flat_map(|pair| (0..50).map(|k| pair[0] + (pair[1] - pair[0]) * f64::from(k) / 50.0))
+        .collect();
+    let slow = stage
+        .simulate(&Experiment::of(&Drive::new(&fine, 0.0002, Hold::First).unwrap(), NEVER))
+        .unwrap()
+        .unwrap();
+    for (k, x) in run.x.iter().take(u.len() - 1).enumerate() {
+        // The creep before the mode is taken as straight over a part of an interval.
+        assert!((x - slow.x[50 * k]).abs() < 1e-10, "{k}");
+    }
+    assert_eq!(run.error_estimate, 0.0);
+    let flow = stage.flow(0.01);
+    let mut state = Plant::rest(&stage);
+    for k in 1..u.len() {
+        stage.advance(&flow, &mut state, u[k - 1], u[k]);
+        assert!((stage.displacement(&state) - run.x[k]).abs() < 1e-10, "{k}");
+    }
+}
+
+#[test]
+fn a_simulation_and_the_inverse_go_on_from_any_state() {
+    let (stage, dt) = (stage(Dynamics::None), 0.01);
+    let u = path(3000);
+    let whole = Drive::new(&u, dt, Hold::First).unwrap();
+    let whole = stage.simulate(&Experiment::of(&whole, NEVER)).unwrap().unwrap();
+    for at in [1, 17, 1111] {
+        let drive = Drive::new(&u[..=at], dt, Hold::First).unwrap();
+        let middle = stage.simulate(&Experiment::of(&drive, NEVER)).unwrap().unwrap().last;
+        let after = &u[at..];
+        let drive = Drive::new(after, dt, Hold::First).unwrap();
+        let experiment = Experiment { initial: Some(&middle), ..Experiment::of(&drive, NEVER) };
+        let run = stage.simulate(&experiment).unwrap().unwrap();
+        let (inverse, mut state) = stage.inverse(dt, Some(&middle)).unwrap();
+        for (k, (&x, &volts)) in run.x.iter().zip(after).enumerate() {
+            assert!((x - whole.x[at + k]).abs() < 1e-18);
+            let found = inverse.step(&mut state, x, 0.0, 0.0);
+            // The inverse of the creep takes the output as straight from sample to sample.
+            assert!((found - volts).abs() < 1e-4, "{found} for {volts}");
+        }
+    }
+}
+
+#[test]
+fn a_memory_that_is_none_is_refused() {
+    let operator = preisach();
+    let mut state = InputOperator::rest(&operator);
+    for bad in [&[50.0][..], &[-33.0], &[20.0, 25.0], &[20.0, 0.0, 30.0], &[f64::NAN], &[1.0; 64]] {
+        let expected = operator.recall(&mut state, 0.0, bad).unwrap_err();
+        assert!(expected.contains("-32 V to 48 V"), "{expected}");
+    }
+    operator.recall(&mut state, 0.0, &[20.0, -5.0, 10.0]).unwrap();
+    assert_eq!(operator.memory(&state), [20.0, -5.0, 10.0]);
+    let found = InputOperator::follow(&operator, &mut state, 0.0);
+    assert_eq!(found, last(&operator, &[-32.0, 20.0, -5.0, 10.0, 0.0]));
+}
+
+#[test]
+fn a_fit_finds_what_the_record_was_made_with() {
+    let u = path(3000);
+    let relaxation = Relaxation::new(&[], &[], Dynamics::None).unwrap();
+    for sign in [1.0, -1.0] {
+        let masses = MASSES.map(|mass| sign * 1e-6 * mass);
+        let operator = PreisachOperator::new(sign * LINEAR, &LEVELS, &masses).unwrap();
+        let made = PreisachStage { operator, relaxation };
+        let drive = Drive::new(&u, 0.01, Hold::First).unwrap();
+        let y = made.simulate(&Experiment::of(&drive, NEVER)).unwrap().unwrap().x;
+        let record =
+            WeightsRecord { history: Some(History::Virgin), ..WeightsRecord::of(drive, &y, 0) };
+        let settings = WeightsSettings {
+            places: PlacesKind::Given(LEVELS.to_vec()),
+            zones: 0,
+            creep: CreepKind::Times(vec![]),
+            dynamics: DynamicsKind::None,
+        };
+        let fit = identify_weights(Model::Preisach, &[record], &settings, NEVER).unwrap().unwrap();
+        assert!(fit.rms < 1e-14, "{:e}", fit.rms);
+        // The path leaves the levels, and so tells the gain without memory from the diagonal.
+        assert!((sign * fit.values.number("linear") - LINEAR).abs() < 1e-12);
+        for (found, made) in fit.values.list("masses").iter().zip(masses) {
+            assert!((found - made).abs() < 1e-11, "{found} {made}");
+        }
+    }
+}
+
+#[test]
+fn a_fit_moves_outside_its_levels_as_within_them() {
+    // The drive stays within the levels: what the whole diagonal has in common is put there too.
+    let u: Vec<f64> = path(3000).iter().map(|volts| 0.5 * volts).collect();
+    let (lowest, highest) = (-20.0, 25.0);
+    let levels: Vec<f64> = (0..=5).map(|k| lowest + 9.0 * f64::from(k)).collect();
+    let masses = MASSES.map(|mass| 1e-6 * (mass + 1.0));
+    let operator = PreisachOperator::new(LINEAR, &levels, &masses).unwrap();
+    let relaxation = Relaxation::new(&[], &[], Dynamics::None).unwrap();
+    let made = PreisachStage { operator, relaxation };
+    let u: Vec<f64> = u.iter().map(|volts| volts.clamp(lowest, highest)).collect();
+    let drive = Drive::new(&u, 0.01, Hold::First).unwrap();
+    let y = made.simulate(&Experiment::of(&drive, NEVER)).unwrap().unwrap().x;
+    let record =
+        WeightsRecord { history: Some(History::Virgin), ..WeightsRecord::of(drive, &y, 0) };
+    let settings = WeightsSettings {
+        places: PlacesKind::Given(levels),
+        zones: 0,
+        creep: CreepKind::Times(vec![]),
+        dynamics: DynamicsKind::None,
+    };
+    let fit = identify_weights(Model::Preisach, &[record], &settings, NEVER).unwrap().unwrap();
+    assert!(fit.rms < 1e-14, "{:e}", fit.rms);
+    // The least slope of the diagonal cells, 1.7, 3, 3.5, 2.8 and 2.7 um on 9 V, on top.
+    let expected = LINEAR + 2.7e-6 / 9.0;
+    assert!((fit.values.number("linear") - expected).abs() < 1e-11);
 }
 
 #[test]

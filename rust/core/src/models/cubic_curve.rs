@@ -80,6 +80,12 @@ impl CubicCurve {
         Self { low, high, parts: [tangent(low), inside, tangent(high)] }
     }
 
+    /// Its value.
+    #[inline]
+    pub(super) fn at(&self, volts: f64) -> f64 {
+        self.parts[self.part(volts, true).0].at(volts)
+    }
+
     /// Which polynomial holds just beyond `volts` on a rise or a fall, and up to where.
     #[inline]
     pub(super) fn part(&self, volts: f64, rises: bool) -> (usize, f64) {

@@ -21,12 +21,12 @@ pub const MOST_LEVELS: usize = 17;
 const NODES: usize = MOST_LEVELS * (MOST_LEVELS + 1) / 2;
 
 /// Cells between so many levels.
-const fn cells(levels: usize) -> usize {
+pub(super) const fn cells(levels: usize) -> usize {
     levels * levels.saturating_sub(1) / 2
 }
 
 /// Place of an entry in the rows of a triangle: row i has i + 1 entries.
-const fn entry(i: usize, j: usize) -> usize {
+pub(super) const fn entry(i: usize, j: usize) -> usize {
     i * (i + 1) / 2 + j
 }
 
@@ -50,28 +50,13 @@ impl Everett {
     /// not ascend or a mass has the other sign.
     pub(super) fn new(levels: &[f64], masses: &[f64], sign: f64) -> Result<Self> {
         let count = levels.len();
-        if !(2..=MOST_LEVELS).contains(&count) {
-            return Err(Error::Shape {
-                name: "levels".into(),
-                found: format!("{count} entries"),
-                expected: format!("2 to {MOST_LEVELS}"),
-            });
-        }
+        let mut everett = Self::of_levels(levels)?;
         if masses.len() != cells(count) {
             return Err(Error::Shape {
                 name: "masses".into(),
                 found: format!("{} entries", masses.len()),
                 expected: format!("{}, the cells between {count} levels", cells(count)),
             });
-        }
-        let mut everett = Self { levels: [0.0; MOST_LEVELS], count, nodes: [0.0; NODES] };
-        for (i, level) in levels.iter().enumerate() {
-            let name = format!("levels[{i}]");
-            everett.levels[i] = finite(&name, *level, "V")?;
-            if i > 0 && *level <= levels[i - 1] {
-                let expected = format!("above {} V: they ascend", levels[i - 1]);
-                return Err(Error::parameter(name, format!("{level} V"), expected));
-            }
         }
         for (k, mass) in masses.iter().enumerate() {
             along(&format!("masses[{k}]"), *mass, "m", sign)?;
@@ -85,6 +70,39 @@ impl Everett {
             }
         }
         Ok(everett)
+    }
+
+    /// On levels (V), without any mass.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] where there are too few or too many, [`Error::Parameter`] where they do not
+    /// ascend.
+    pub(super) fn of_levels(levels: &[f64]) -> Result<Self> {
+        let count = levels.len();
+        if !(2..=MOST_LEVELS).contains(&count) {
+            return Err(Error::Shape {
+                name: "levels".into(),
+                found: format!("{count} entries"),
+                expected: format!("2 to {MOST_LEVELS}"),
+            });
+        }
+        let mut everett = Self { count, ..Self::empty() };
+        for (i, level) in levels.iter().enumerate() {
+            let name = format!("levels[{i}]");
+            everett.levels[i] = finite(&name, *level, "V")?;
+            if i > 0 && *level <= levels[i - 1] {
+                let expected = format!("above {} V: they ascend", levels[i - 1]);
+                return Err(Error::parameter(name, format!("{level} V"), expected));
+            }
+        }
+        Ok(everett)
+    }
+
+    /// Of one cell from 0 V to 1 V, without mass.
+    pub(super) fn empty() -> Self {
+        let mut levels = [0.0; MOST_LEVELS];
+        levels[1] = 1.0;
+        Self { levels, count: 2, nodes: [0.0; NODES] }
     }
 
     /// Its levels, V.
@@ -145,6 +163,23 @@ impl Everett {
             (self.stroke(from, high) - self.stroke(from, low)) / (high - low)
         } else {
             0.0
+        }
+    }
+
+    /// Adds to the shares of the cells that are switched on those of a rise, or takes off those of
+    /// a fall.
+    pub(super) fn add_shares(&self, from: f64, to: f64, shares: &mut [f64]) {
+        let (high, low, sign) = if to < from { (from, to, -1.0) } else { (to, from, 1.0) };
+        let below = |i: usize, volts: f64| {
+            let (start, end) = (self.levels[i], self.levels[i + 1]);
+            ((volts - start) / (end - start)).clamp(0.0, 1.0)
+        };
+        for i in 0..self.count - 1 {
+            let up = below(i, high);
+            for j in 0..i {
+                shares[entry(i, j)] += sign * up * (1.0 - below(j, low));
+            }
+            shares[entry(i, i)] += sign * (up - below(i, low));
         }
     }
 

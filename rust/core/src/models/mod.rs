@@ -7,6 +7,7 @@ mod creeping;
 mod cubic_curve;
 pub mod dahl;
 mod duhem;
+mod duhem_operator;
 mod dynamics_parameters;
 mod everett;
 mod first_order_dahl;
@@ -19,6 +20,7 @@ mod plant;
 mod polynomial_prandtl_ishlinskii;
 mod prandtl_ishlinskii;
 mod preisach;
+mod preisach_operator;
 mod registry;
 mod reversals;
 mod search_ranges;
@@ -36,7 +38,10 @@ pub use creep::{
 pub(crate) use creeping::relaxed;
 pub use creeping::{Creeping, CreepingFlow, CreepingState};
 pub use dahl::{DahlStage, DahlStageState};
-pub use duhem::{DuhemInverse, DuhemInverseState, DuhemOperator, DuhemParameters, DuhemState};
+pub use duhem::DuhemStage;
+pub use duhem_operator::{
+    DuhemInverse, DuhemInverseState, DuhemOperator, DuhemParameters, DuhemState,
+};
 pub use everett::{Everett, MOST_LEVELS};
 pub use first_order_dahl::{FirstOrderDahlKernel, FirstOrderDahlStage};
 pub use generalised_prandtl_ishlinskii::{
@@ -49,16 +54,20 @@ pub use parallel_dahl::{ParallelDahlKernel, ParallelDahlStage};
 pub use plant::{KernelFlow, KernelModel, Plant, Settling};
 pub use polynomial_prandtl_ishlinskii::{
     PolynomialPlays, PolynomialPlaysInverse, PolynomialPlaysInverseState, PolynomialPlaysState,
+    PolynomialPrandtlIshlinskiiStage,
 };
 pub use prandtl_ishlinskii::{
     MOST_PLAYS, MOST_ZONES, PlayHysteresis, Plays, PrandtlIshlinskiiStage,
 };
-pub use preisach::{PreisachInverse, PreisachInverseState, PreisachOperator, PreisachState};
+pub use preisach::PreisachStage;
+pub use preisach_operator::{
+    PreisachInverse, PreisachInverseState, PreisachOperator, PreisachState,
+};
 pub use registry::{FoundBy, Model, Stage, StageFlow, StageInverse, StageInverseState, StageState};
 pub use reversals::{MOST_REVERSALS, Reversals};
 pub use search_ranges::{Measures, ModeShown, NOMINAL_STIFFNESS, Range, Ranges};
 pub use superposition::{
-    AnySuperposition, FittedWeights, Places, Signals, SignalsOf, Superposition,
+    AnySuperposition, FittedWeights, Places, Rest, Signals, SignalsOf, Superposition,
 };
 pub use tanh_envelope::TanhEnvelope;
 pub use traits::{

@@ -15,11 +15,22 @@
 //! inverse goes from corner to corner to the one before its output, and finds u there by Newton's
 //! method.
 
-use piezotrack_control::OperatorInverse;
 use piezotrack_control::hysteresis::{Operator, PlayState};
+use piezotrack_control::{InputInverse, InputInverseState, OperatorInverse};
 
+use super::creep::{MOST_RELAXATIONS, Relaxation};
 use super::cubic_curve::{Cubic, CubicCurve, checked_range};
+use super::dynamics_parameters::DYNAMICS;
+use super::input_stage::{
+    InputOperator, InputStage, PLAYS_STATE, Segmented, inverse_state, recall_plays, state_at_rest,
+};
 use super::prandtl_ishlinskii::{MOST_PLAYS, PlayHysteresis};
+use super::superposition::{
+    FittedWeights, Places, Plain, PlaySignals, Rest, Signals, SignalsOf, Superposition,
+};
+use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
+use super::values::{ParameterInfo, Values};
+use crate::design::{Gains, LoopPlant};
 use crate::error::{Error, Result, finite, shown};
 use crate::math::rising_root;
 
@@ -28,6 +39,24 @@ const MOST_OUTPUT: f64 = 1e100;
 
 /// Distances below this are roundings, relative to the voltages that they are between.
 const ROUNDING: f64 = 1e-12;
+
+const PARAMETERS: &[ParameterInfo] = &[
+    ParameterInfo::new("a1", "a1", "m/V"),
+    ParameterInfo::new("a2", "a2", "m/V^2"),
+    ParameterInfo::new("a3", "a3", "m/V^3"),
+    ParameterInfo::new("low", "ua", "V"),
+    ParameterInfo::new("high", "ub", "V"),
+    ParameterInfo::list("thresholds", "r", "V"),
+    ParameterInfo::list("weights", "w", "m/V"),
+    DYNAMICS[0],
+    DYNAMICS[1],
+    DYNAMICS[2],
+    DYNAMICS[3],
+    DYNAMICS[4],
+    DYNAMICS[5],
+    DYNAMICS[6],
+    DYNAMICS[7],
+];
 
 /// The operator: plays beside a polynomial, V to m.
 ///
@@ -114,14 +143,14 @@ impl PolynomialPlays {
     pub fn follow(&self, state: &mut PolynomialPlaysState, volts: f64) -> f64 {
         let PlayHysteresis { plays, count, .. } = &self.plays;
         let weighted = plays.follow_used(state, volts, (*count, 0));
-        self.polynomial(volts, true).at(volts) + weighted
+        self.curve.at(volts) + weighted
     }
 
     /// Output of a state, m.
     #[inline]
     fn value(&self, state: &PolynomialPlaysState) -> f64 {
         let weighted: f64 = self.plays(state).map(|(_, weight, play)| weight * play).sum();
-        self.polynomial(state.input, true).at(state.input) + weighted
+        self.curve.at(state.input) + weighted
     }
 
     /// The polynomial of c that holds just beyond `volts`.
@@ -145,11 +174,41 @@ impl PolynomialPlays {
         }
         end
     }
+}
 
-    /// The end of the first part of the way to `volts` along which a chord is within `deviation`,
-    /// m, of the output.
-    #[must_use]
-    pub fn straight(&self, state: &PolynomialPlaysState, volts: f64, deviation: f64) -> f64 {
+impl InputOperator for PolynomialPlays {
+    type State = PolynomialPlaysState;
+
+    fn rest(&self) -> PolynomialPlaysState {
+        Self::rest(self)
+    }
+
+    #[inline]
+    fn follow(&self, state: &mut PolynomialPlaysState, volts: f64) -> f64 {
+        Self::follow(self, state, volts)
+    }
+
+    #[inline]
+    fn input(&self, state: &PolynomialPlaysState) -> f64 {
+        state.input
+    }
+
+    fn memory(&self, state: &PolynomialPlaysState) -> Vec<f64> {
+        state.plays[..self.plays.count].to_vec()
+    }
+
+    fn recall(
+        &self,
+        state: &mut PolynomialPlaysState,
+        _volts: f64,
+        memory: &[f64],
+    ) -> core::result::Result<(), String> {
+        recall_plays(&mut state.plays[..self.plays.count], memory)
+    }
+}
+
+impl Segmented for PolynomialPlays {
+    fn straight(&self, state: &PolynomialPlaysState, volts: f64, deviation: f64) -> f64 {
         let (from, rises) = (state.input, volts >= state.input);
         let end = self.corner(state, rises, ROUNDING * (from.abs() + volts.abs()));
         let to = if rises { volts.min(end) } else { volts.max(end) };
@@ -159,16 +218,12 @@ impl PolynomialPlays {
         if chords > 1.0 { from + (to - from) / chords } else { to }
     }
 
-    /// Largest second derivative of the output between corners, m/V^2.
-    #[must_use]
-    pub fn bend(&self) -> f64 {
+    fn bend(&self) -> f64 {
         let inside = &self.curve.parts[1];
         inside.bend(self.curve.low).abs().max(inside.bend(self.curve.high).abs())
     }
 
-    /// Bound of the difference of any two slopes, m/V.
-    #[must_use]
-    pub fn kink(&self) -> f64 {
+    fn kink(&self) -> f64 {
         let (least, most) = self.curve.parts[1].slopes(self.curve.low, self.curve.high);
         let moving: f64 = self.plays.plays.weights.iter().map(|weight| weight.abs()).sum();
         moving + (most - least)
@@ -278,5 +333,155 @@ impl OperatorInverse for PolynomialPlaysInverse {
         self.0.follow(&mut state.operator, volts);
         state.output = output;
         volts
+    }
+}
+
+/// A stage with plays beside a polynomial at its input.
+///
+/// ```
+/// use piezotrack_core::models::{
+///     Dynamics, Experiment, PolynomialPlays, PolynomialPrandtlIshlinskiiStage, Relaxation,
+///     StageModel,
+/// };
+/// use piezotrack_core::signal::{Drive, Hold, NEVER};
+///
+/// # fn main() -> piezotrack_core::Result<()> {
+/// let polynomial = [1e-6, 2e-9, 0.0];
+/// let stage = PolynomialPrandtlIshlinskiiStage {
+///     operator: PolynomialPlays::new(polynomial, (0.0, 100.0), &[10.0], &[0.2e-6])?,
+///     relaxation: Relaxation::new(&[], &[], Dynamics::None)?,
+/// };
+/// let drive = Drive::new(&[0.0, 50.0, 0.0], 0.01, Hold::First)?;
+/// let run = stage.simulate(&Experiment::of(&drive, NEVER))?.unwrap();
+/// assert!((run.x[1] - 63e-6).abs() < 1e-18);
+/// assert!((run.x[2] - 2e-6).abs() < 1e-18); // the play stays behind
+/// # Ok(())
+/// # }
+/// ```
+pub type PolynomialPrandtlIshlinskiiStage = InputStage<PolynomialPlays>;
+
+impl StageModel for PolynomialPrandtlIshlinskiiStage {
+    const INFO: ModelInfo = ModelInfo {
+        name: "polynomial-prandtl-ishlinskii",
+        title: "polynomial Prandtl-Ishlinskii",
+        drive_unit: "V",
+        parameters: PARAMETERS,
+        state: PLAYS_STATE,
+        published: &[],
+    };
+
+    fn build(values: &Values) -> Result<Self> {
+        let number = |name| values.number(name);
+        let operator = PolynomialPlays::new(
+            ["a1", "a2", "a3"].map(number),
+            (number("low"), number("high")),
+            values.list("thresholds"),
+            values.list("weights"),
+        )?;
+        Ok(Self { operator, relaxation: Relaxation::build(values)? })
+    }
+
+    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
+        self.equilibrium_values(voltages)
+    }
+
+    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
+        self.follow(experiment)
+    }
+
+    /// On its settled loop between the two voltages.
+    fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
+        let gains = Gains::of(&self.operator, low, high, |slope| slope)?;
+        gains.plants(|gain| self.relaxation.loop_plant(gain))
+    }
+}
+
+impl Invertible for PolynomialPrandtlIshlinskiiStage {
+    type Inverse = InputInverse<PolynomialPlaysInverse, MOST_RELAXATIONS>;
+
+    fn inverse(
+        &self,
+        dt: f64,
+        initial: Option<&Values>,
+    ) -> Result<(Self::Inverse, InputInverseState<PolynomialPlaysInverseState, MOST_RELAXATIONS>)>
+    {
+        let inverse = self.feedforward(PolynomialPlaysInverse(self.operator), dt)?;
+        let state = self.state(initial)?;
+        let memory = inverse.operator().memory(&state.operator);
+        let start = inverse_state(&inverse, memory, &state.relaxation);
+        Ok((inverse, start))
+    }
+}
+
+/// Polynomials that rise from 0 at 0 V, with Bernstein polynomials of the range as slopes: their
+/// sums with weights above 0 rise too.
+fn rising_polynomials((low, high): (f64, f64)) -> [[f64; 3]; 3] {
+    let wide = high - low;
+    let (down, up) = ([high / wide, -1.0 / wide], [-low / wide, 1.0 / wide]);
+    let slope = |one: [f64; 2], other: [f64; 2], factor: f64| {
+        let middle = one[0] * other[1] + one[1] * other[0];
+        [factor * one[0] * other[0], factor * middle, factor * one[1] * other[1]]
+    };
+    let slopes = [slope(down, down, 1.0), slope(down, up, 2.0), slope(up, up, 1.0)];
+    slopes.map(|[a, b, c]| [a, 0.5 * b, c / 3.0])
+}
+
+/// The drive, plays, and the rising polynomials.
+#[derive(Clone, Debug)]
+struct PlaysAndPolynomials {
+    plays: PlaySignals<Plain>,
+    polynomials: [CubicCurve; 3],
+}
+
+impl Signals for PlaysAndPolynomials {
+    fn count(&self) -> usize {
+        self.plays.count() + self.polynomials.len()
+    }
+
+    fn rest(&self) -> Vec<f64> {
+        self.plays.rest()
+    }
+
+    fn follow(&self, memory: &mut Vec<f64>, volts: f64, dt: f64, signals: &mut [f64]) {
+        let (plays, bent) = signals.split_at_mut(self.plays.count());
+        self.plays.follow(memory, volts, dt, plays);
+        for (signal, polynomial) in bent.iter_mut().zip(&self.polynomials) {
+            *signal = polynomial.at(volts) - polynomial.at(0.0);
+        }
+    }
+}
+
+impl Superposition for PolynomialPrandtlIshlinskiiStage {
+    const PLACES: Places = Places::Thresholds;
+
+    fn check_places(places: &[f64]) -> Result<()> {
+        PlayHysteresis::new(1.0, places, &vec![0.0; places.len()], &[], &[]).map(drop)
+    }
+
+    fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {
+        let curve = |[a, b, c]: [f64; 3]| CubicCurve::new(Cubic([0.0, a, b, c]), of.drive);
+        let plays = PlaySignals { edges: Plain, thresholds: of.places.to_vec() };
+        let polynomials = rising_polynomials(of.drive).map(curve);
+        Box::new(PlaysAndPolynomials { plays, polynomials })
+    }
+
+    fn values(fitted: &FittedWeights) -> Values {
+        let of = fitted.clone();
+        let (weights, bent) = of.weights.split_at(of.places.len().min(of.weights.len()));
+        let mut sum = [of.linear, 0.0, 0.0];
+        for (polynomial, weight) in rising_polynomials(of.drive).iter().zip(bent) {
+            for (entry, coefficient) in sum.iter_mut().zip(polynomial) {
+                *entry += weight * coefficient;
+            }
+        }
+        let [a1, a2, a3] = sum.map(|coefficient| vec![coefficient]);
+        let (low, high) = (vec![of.drive.0], vec![of.drive.1]);
+        let operator = [a1, a2, a3, low, high, of.places, weights.to_vec()];
+        Values::of(PARAMETERS, operator.into_iter().chain(of.relaxation.values()))
+    }
+
+    /// Without the play of the drive.
+    fn state_at_rest(rest: &Rest<'_>) -> Values {
+        state_at_rest(PLAYS_STATE, rest, rest.memory.get(1..).unwrap_or(&[]))
     }
 }

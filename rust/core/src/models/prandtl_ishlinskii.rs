@@ -21,7 +21,7 @@ use super::input_stage::{
     InputOperator, InputStage, PLAYS_STATE, Segmented, inverse_state, recall_plays, state_at_rest,
 };
 use super::superposition::{
-    FittedWeights, Places, Plain, PlaySignals, Signals, SignalsOf, Superposition,
+    FittedWeights, Places, Plain, PlaySignals, Rest, Signals, SignalsOf, Superposition,
 };
 use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
 use super::values::{ParameterInfo, Values};
@@ -200,7 +200,12 @@ impl InputOperator for PlayHysteresis {
         state.plays[..self.count].to_vec()
     }
 
-    fn recall(&self, state: &mut Self::State, memory: &[f64]) -> core::result::Result<(), String> {
+    fn recall(
+        &self,
+        state: &mut Self::State,
+        _volts: f64,
+        memory: &[f64],
+    ) -> core::result::Result<(), String> {
         recall_plays(&mut state.plays[..self.count], memory)
     }
 }
@@ -314,7 +319,7 @@ impl Superposition for PrandtlIshlinskiiStage {
     }
 
     /// Without the play of the drive.
-    fn state_at_rest(x: f64, volts: f64, memory: &[f64], creep: &[f64], modes: usize) -> Values {
-        state_at_rest(PLAYS_STATE, (x, volts), memory.get(1..).unwrap_or(&[]), creep, modes)
+    fn state_at_rest(rest: &Rest<'_>) -> Values {
+        state_at_rest(PLAYS_STATE, rest, rest.memory.get(1..).unwrap_or(&[]))
     }
 }

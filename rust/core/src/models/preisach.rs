@@ -1,286 +1,218 @@
 //! The Preisach stage: relays at the input, creep, linear dynamics.
 //!
-//! ```text
-//! H(u) = w_0 u + sum over the strokes between reversals of +E (rise) or -E (fall)
-//! E(v_i, v_j) = sum of the masses mu_kl of the cells with v_j <= v_l,  v_(k+1) <= v_i
-//! ```
+//! [`PreisachOperator`] has the equations; Mayergoyz 1986, Physical Review Letters 56, 1518-1521,
+//! doi 10.1103/PhysRevLett.56.1518. [`InputStage`] says what follows the operator.
 //!
-//! Mayergoyz 1986, Physical Review Letters 56, 1518-1521, doi 10.1103/PhysRevLett.56.1518, and
-//! Mayergoyz 2003, Mathematical Models of Hysteresis and Their Applications; on piezoceramic
-//! actuators Ge and Jouaneh 1995, Precision Engineering 17(3), 211-221, doi
-//! 10.1016/0141-6359(95)00002-U. Relays that switch up at a and down at b are spread over cells
-//! between levels of a and b; [`Everett`] has the sums, [`Reversals`] the memory.
-//!
-//! Along a branch the output is straight between levels and wiped-out reversals: the inverse goes
-//! from corner to corner and is exact. Outside the levels only `w_0` acts. With levels that are
-//! equally far apart and all masses of a diagonal k = i - j equal, paths that reverse at levels
-//! have the output of a play of threshold k/2 times that distance.
-//!
-//! A stage that never moved remembers reversals that die out at 0 V: those relays are switched up
-//! whose a + b is below 0, as plays at rest at 0 V have it. The line a + b = 0 is drawn in steps
-//! from level to level, on average through the middle of a cell.
+//! The output is the sum of the masses of the cells times the shares of them that are switched on:
+//! a fit finds the masses by least squares. Its levels divide the range of the drive.
 
-use piezotrack_control::OperatorInverse;
-use piezotrack_control::hysteresis::Operator;
+use piezotrack_control::{InputInverse, InputInverseState};
 
-use super::everett::{Everett, MOST_LEVELS};
-use super::prandtl_ishlinskii::direction;
+use super::creep::{MOST_RELAXATIONS, Relaxation};
+use super::dynamics_parameters::DYNAMICS;
+use super::everett::{Everett, entry};
+use super::input_stage::{InputOperator, InputStage, inverse_state, state_at_rest};
+use super::preisach_operator::{PreisachInverse, PreisachInverseState, PreisachOperator};
 use super::reversals::Reversals;
+use super::superposition::{FittedWeights, Places, Rest, Signals, SignalsOf, Superposition};
+use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
+use super::values::{ParameterInfo, Values};
+use crate::design::{Gains, LoopPlant};
 use crate::error::Result;
 
-/// Outputs beyond this are none.
-const MOST_OUTPUT: f64 = 1e100;
+const PARAMETERS: &[ParameterInfo] = &[
+    ParameterInfo::new("linear", "w0", "m/V"),
+    ParameterInfo::list("levels", "v", "V"),
+    ParameterInfo::list("masses", "mu", "m"),
+    DYNAMICS[0],
+    DYNAMICS[1],
+    DYNAMICS[2],
+    DYNAMICS[3],
+    DYNAMICS[4],
+    DYNAMICS[5],
+    DYNAMICS[6],
+    DYNAMICS[7],
+];
 
-/// The operator: relays on a plane of cells, V to m.
+/// A stage with relays at its input.
 ///
 /// ```
-/// use piezotrack_core::models::PreisachOperator;
+/// use piezotrack_core::models::{
+///     Dynamics, Experiment, PreisachOperator, PreisachStage, Relaxation, StageModel,
+/// };
+/// use piezotrack_core::signal::{Drive, Hold, NEVER};
 ///
 /// # fn main() -> piezotrack_core::Result<()> {
-/// // Relays without memory below, above, and such that switch up above 50 V and down below it.
-/// let preisach =
-///     PreisachOperator::new(1e-6, &[0.0, 50.0, 100.0], &[5e-6, 10e-6, 15e-6])?;
-/// let mut state = preisach.rest();
-/// assert!((preisach.follow(&mut state, 100.0) - 130e-6).abs() < 1e-18);
-/// assert!((preisach.follow(&mut state, 50.0) - 65e-6).abs() < 1e-18);
-/// assert!((preisach.follow(&mut state, 25.0) - 32.5e-6).abs() < 1e-18);
+/// let stage = PreisachStage {
+///     operator: PreisachOperator::new(1e-6, &[0.0, 50.0, 100.0], &[5e-6, 10e-6, 15e-6])?,
+///     relaxation: Relaxation::new(&[], &[], Dynamics::None)?,
+/// };
+/// let drive = Drive::new(&[0.0, 100.0, 50.0, 25.0], 0.01, Hold::First)?;
+/// let run = stage.simulate(&Experiment::of(&drive, NEVER))?.unwrap();
+/// assert!((run.x[1] - 130e-6).abs() < 1e-18);
+/// assert!((run.x[2] - 65e-6).abs() < 1e-18);
+/// assert!((run.x[3] - 32.5e-6).abs() < 1e-18);
 /// # Ok(())
 /// # }
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PreisachOperator {
-    /// Gain without memory, m/V, not 0.
-    linear: f64,
-    everett: Everett,
-}
+pub type PreisachStage = InputStage<PreisachOperator>;
 
-/// Its state.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PreisachState {
-    /// Input, V.
-    input: f64,
-    /// Of the input within the levels.
-    reversals: Reversals,
-}
+impl StageModel for PreisachStage {
+    const INFO: ModelInfo = ModelInfo {
+        name: "preisach",
+        title: "Preisach",
+        drive_unit: "V",
+        parameters: PARAMETERS,
+        state: PreisachOperator::STATE,
+        published: &[],
+    };
 
-piezotrack_control::snapshot!(PreisachState { input, reversals });
-
-impl PreisachState {
-    /// The input, V.
-    #[must_use]
-    pub fn input(&self) -> f64 {
-        self.input
+    fn build(values: &Values) -> Result<Self> {
+        let (levels, masses) = (values.list("levels"), values.list("masses"));
+        let operator = PreisachOperator::new(values.number("linear"), levels, masses)?;
+        Ok(Self { operator, relaxation: Relaxation::build(values)? })
     }
 
-    /// The lowest level and the reversals since, V: maxima and minima in turn.
-    #[must_use]
-    pub fn turns(&self) -> &[f64] {
-        self.reversals.turns()
+    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
+        self.equilibrium_values(voltages)
+    }
+
+    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
+        self.follow(experiment)
+    }
+
+    /// On its settled loop between the two voltages.
+    fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
+        let gains = Gains::of(&self.operator, low, high, |slope| slope)?;
+        gains.plants(|gain| self.relaxation.loop_plant(gain))
     }
 }
 
-impl PreisachOperator {
-    /// From the gain without memory (m/V), the levels (V, ascending) and the masses (m) of the
-    /// cells, all of one sign with it: mu_00, mu_10, mu_11, mu_20, ..., where mu_ij has the relays
-    /// that switch up between levels i and i + 1 and down between j and j + 1.
-    ///
-    /// # Errors
-    /// [`crate::error::Error::Shape`] where entries are missing or too many,
-    /// [`crate::error::Error::Parameter`] where one is out of its range.
-    pub fn new(linear: f64, levels: &[f64], masses: &[f64]) -> Result<Self> {
-        let sign = direction(linear)?;
-        Ok(Self { linear, everett: Everett::new(levels, masses, sign)? })
+impl Invertible for PreisachStage {
+    type Inverse = InputInverse<PreisachInverse, MOST_RELAXATIONS>;
+
+    fn inverse(
+        &self,
+        dt: f64,
+        initial: Option<&Values>,
+    ) -> Result<(Self::Inverse, InputInverseState<PreisachInverseState, MOST_RELAXATIONS>)> {
+        let inverse = self.feedforward(PreisachInverse(self.operator), dt)?;
+        let state = self.state(initial)?;
+        let memory = inverse.operator().memory(&state.operator);
+        let start = inverse_state(&inverse, memory, &state.relaxation);
+        Ok((inverse, start))
+    }
+}
+
+/// The drive, and the share of each cell that is switched on, less that before any voltage.
+#[derive(Clone, Debug)]
+struct Shares {
+    /// Without masses.
+    cells: Everett,
+    /// Reversals before any voltage, and the place there.
+    rest: Vec<f64>,
+    /// Shares there.
+    zero: Vec<f64>,
+}
+
+impl Shares {
+    /// Of the reversals in a memory, whose last entry is the present place.
+    fn reversals(&self, memory: &[f64]) -> Reversals {
+        let ends = self.cells.ends();
+        let (place, turns) = memory.split_last().unwrap_or((&ends.0, &[]));
+        let turned = Reversals::recalled(ends, turns);
+        let mut reversals = turned.unwrap_or_else(|| Reversals::rise(ends.0, ends.0));
+        reversals.follow(*place);
+        reversals
     }
 
-    /// The state before any voltage.
-    #[must_use]
-    pub fn rest(&self) -> PreisachState {
-        let (lowest, highest) = self.everett.ends();
-        // As far as the levels reach to both sides.
-        let reach = highest.min(-lowest);
-        let mut sizes = [0.0; MOST_LEVELS + 1];
-        let mut count = 0;
-        for level in self.everett.levels() {
-            let size = level.abs();
-            if size > 0.0 && size <= reach && !sizes[..count].contains(&size) {
-                sizes[count] = size;
-                count += 1;
-            }
+    /// Writes the shares of the cells.
+    fn write(&self, reversals: &Reversals, shares: &mut [f64]) {
+        shares.fill(0.0);
+        let turns = reversals.turns();
+        let places = turns.iter().copied().skip(1).chain([reversals.place()]);
+        for (from, to) in turns.iter().zip(places) {
+            self.cells.add_shares(*from, to, shares);
         }
-        sizes[..count].sort_unstable_by(|one, other| other.total_cmp(one));
-        let mut reversals = Reversals::rise(lowest, lowest);
-        // The last size is 0.
-        for pair in sizes[..=count].windows(2) {
-            reversals.follow(pair[0]);
-            reversals.follow(-0.5 * (pair[0] + pair[1]));
-        }
-        reversals.follow(0.0_f64.clamp(lowest, highest));
-        PreisachState { input: 0.0, reversals }
-    }
-
-    /// Takes the input to `volts` and returns the output, m.
-    #[inline]
-    pub fn follow(&self, state: &mut PreisachState, volts: f64) -> f64 {
-        self.take(state, volts);
-        self.value(state)
-    }
-
-    /// Output of a state, m.
-    #[inline]
-    fn value(&self, state: &PreisachState) -> f64 {
-        let turns = state.reversals.turns();
-        let places = turns.iter().copied().skip(1).chain([state.reversals.place()]);
-        let strokes = turns.iter().zip(places).map(|(from, to)| self.everett.stroke(*from, to));
-        self.linear * state.input + strokes.sum::<f64>()
-    }
-
-    /// Takes the input to `volts`.
-    #[inline]
-    fn take(&self, state: &mut PreisachState, volts: f64) {
-        let (lowest, highest) = self.everett.ends();
-        state.reversals.follow(volts.clamp(lowest, highest));
-        state.input = volts;
-    }
-
-    /// The next corner of the output on a rise or a fall, V, or infinity.
-    #[inline]
-    fn corner(&self, state: &PreisachState, rises: bool) -> f64 {
-        let (input, levels) = (state.input, self.everett.levels());
-        let wiped = state.reversals.wiped_at(rises);
-        if rises {
-            levels
-                .iter()
-                .copied()
-                .find(|level| *level > input)
-                .map_or(f64::INFINITY, |level| if wiped > input { wiped.min(level) } else { level })
-        } else {
-            let mut below = levels.iter().rev().copied();
-            below.find(|level| *level < input).map_or(f64::NEG_INFINITY, |level| {
-                if wiped < input { wiped.max(level) } else { level }
-            })
-        }
-    }
-
-    /// The change of the output on the way to `volts`, which lies up to the next corner.
-    #[inline]
-    fn rise(&self, state: &PreisachState, volts: f64) -> f64 {
-        let (lowest, highest) = self.everett.ends();
-        let (from, to) = (state.reversals.place(), volts.clamp(lowest, highest));
-        let beginning = state.reversals.beginning(volts > state.input);
-        let stroke = |to: f64| self.everett.stroke(beginning, to);
-        self.linear * (volts - state.input) + (stroke(to) - stroke(from))
-    }
-}
-
-impl Operator<f64> for PreisachOperator {
-    type State = PreisachState;
-    type Branch = PreisachState;
-
-    fn rest(&self) -> PreisachState {
-        Self::rest(self)
-    }
-
-    fn output(&self, state: &PreisachState) -> (f64, f64) {
-        let (lowest, highest) = self.everett.ends();
-        let inside = (lowest..=highest).contains(&state.input);
-        let from = state.turns().last().copied().unwrap_or(lowest);
-        let slope = if inside { self.everett.slope(from, state.input) } else { 0.0 };
-        (self.value(state), self.linear + slope)
-    }
-
-    fn branch(&self, state: &PreisachState, _direction: f64) -> PreisachState {
-        *state
-    }
-
-    fn along(&self, branch: &PreisachState, distance: f64) -> PreisachState {
-        let mut state = *branch;
-        self.take(&mut state, branch.input + distance);
-        state
-    }
-}
-
-/// The inverse: output in, m, input out, V; closed along each branch.
-///
-/// ```
-/// use piezotrack_control::OperatorInverse;
-/// use piezotrack_core::models::{PreisachInverse, PreisachOperator};
-///
-/// # fn main() -> piezotrack_core::Result<()> {
-/// let preisach = PreisachOperator::new(1e-6, &[0.0, 50.0, 100.0], &[5e-6, 10e-6, 15e-6])?;
-/// let inverse = PreisachInverse(preisach);
-/// let (mut there, mut back) = (preisach.rest(), inverse.rest());
-/// for volts in [80.0, 20.0, 60.0, 120.0, 0.0] {
-///     let output = preisach.follow(&mut there, volts);
-///     assert!((inverse.follow(&mut back, output) - volts).abs() < 1e-12);
-/// }
-/// # Ok(())
-/// # }
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PreisachInverse(pub PreisachOperator);
-
-/// Its state: that of the operator, and the output requested last, m.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PreisachInverseState {
-    operator: PreisachState,
-    output: f64,
-}
-
-piezotrack_control::snapshot!(PreisachInverseState { operator, output });
-
-impl PreisachInverse {
-    /// The state for an operator in a given state.
-    #[must_use]
-    pub fn memory(&self, operator: &PreisachState) -> PreisachInverseState {
-        PreisachInverseState { operator: *operator, output: self.0.value(operator) }
-    }
-
-    /// The input for an output (m) on a rise or a fall of the input.
-    #[inline]
-    fn input(&self, from: &PreisachState, output: f64, rises: bool) -> f64 {
-        let operator = &self.0;
-        let (mut state, mut rest) = (*from, output - operator.value(from));
-        let sign = if rises == (operator.linear > 0.0) { 1.0 } else { -1.0 };
-        loop {
-            let corner = operator.corner(&state, rises);
-            let (before, way) = (state.input, corner - state.input);
-            if corner.is_infinite() {
-                return before + rest / operator.linear;
-            }
-            let rise = operator.rise(&state, corner);
-            if sign * (rest - rise) <= 0.0 {
-                // Below 0 by a rounding only.
-                return before + way * (rest / rise).max(0.0);
-            }
-            rest -= rise;
-            operator.take(&mut state, corner);
+        for (share, zero) in shares.iter_mut().zip(&self.zero) {
+            *share -= zero;
         }
     }
 }
 
-impl OperatorInverse for PreisachInverse {
-    type State = PreisachInverseState;
-
-    fn rest(&self) -> PreisachInverseState {
-        self.memory(&self.0.rest())
+impl Signals for Shares {
+    fn count(&self) -> usize {
+        1 + self.zero.len()
     }
 
-    /// Exact for a step of any length, provided that the output is monotone within it.
-    #[inline]
-    fn follow(&self, state: &mut PreisachInverseState, output: f64) -> f64 {
-        let way = output - state.output;
-        if way == 0.0 {
-            return state.operator.input;
-        }
-        // The input falls where the output rises with negative weights.
-        let rises = (way > 0.0) == (self.0.linear > 0.0);
-        let reachable = output.abs() < MOST_OUTPUT;
-        let volts = if reachable { self.input(&state.operator, output, rises) } else { f64::NAN };
-        if !volts.is_finite() {
-            return f64::NAN;
-        }
-        self.0.take(&mut state.operator, volts);
-        state.output = output;
-        volts
+    fn rest(&self) -> Vec<f64> {
+        self.rest.clone()
     }
+
+    fn follow(&self, memory: &mut Vec<f64>, volts: f64, _dt: f64, signals: &mut [f64]) {
+        let (low, high) = self.cells.ends();
+        let mut reversals = self.reversals(memory);
+        reversals.follow(volts.clamp(low, high));
+        memory.clear();
+        memory.extend_from_slice(&reversals.turns()[1..]);
+        memory.push(reversals.place());
+        if let Some((drive, shares)) = signals.split_first_mut() {
+            *drive = volts;
+            self.write(&reversals, shares);
+        }
+    }
+}
+
+impl Superposition for PreisachStage {
+    const PLACES: Places = Places::Levels;
+
+    fn check_places(places: &[f64]) -> Result<()> {
+        Everett::of_levels(places).map(drop)
+    }
+
+    fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {
+        // Levels that are none have been refused.
+        let cells = Everett::of_levels(of.places).unwrap_or_else(|_| Everett::empty());
+        let reversals = PreisachOperator { linear: 1.0, everett: cells }.rest().reversals;
+        let rest = [&reversals.turns()[1..], &[reversals.place()]].concat();
+        let shares = Shares { cells, rest, zero: Vec::new() };
+        let mut zero = vec![0.0; entry(cells.levels().len() - 1, 0)];
+        shares.write(&reversals, &mut zero);
+        Box::new(Shares { zero, ..shares })
+    }
+
+    fn values(fitted: &FittedWeights) -> Values {
+        let of = fitted.clone();
+        let (linear, masses) = with_gain_outside(of.linear, &of.places, of.weights);
+        let operator = [vec![linear], of.places, masses];
+        Values::of(PARAMETERS, operator.into_iter().chain(of.relaxation.values()))
+    }
+
+    fn state_at_rest(rest: &Rest<'_>) -> Values {
+        let turns = rest.memory.split_last().map_or(&[][..], |(_, turns)| turns);
+        state_at_rest(PreisachOperator::STATE, rest, turns)
+    }
+}
+
+/// The same output between the levels, where 0 V is one of them or between them, with as much of
+/// the gain without memory as there is on the whole diagonal outside the levels too: the stage
+/// would hardly move there.
+fn with_gain_outside(linear: f64, levels: &[f64], mut masses: Vec<f64>) -> (f64, Vec<f64>) {
+    let around = levels.first().is_some_and(|low| *low <= 0.0)
+        && levels.last().is_some_and(|high| *high >= 0.0);
+    let widths: Vec<f64> = levels.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let slope = |(i, width): (usize, &f64)| masses.get(entry(i, i)).copied().unwrap_or(0.0) / width;
+    let slopes: Vec<f64> = widths.iter().enumerate().map(slope).collect();
+    let common = slopes.iter().copied().reduce(
+        |one, other| {
+            if other.abs() < one.abs() { other } else { one }
+        },
+    );
+    let common = common.filter(|_| around).unwrap_or(0.0);
+    for (i, (width, slope)) in widths.iter().zip(&slopes).enumerate() {
+        if let Some(mass) = masses.get_mut(entry(i, i)) {
+            *mass = (slope - common) * width;
+        }
+    }
+    (linear + common, masses)
 }

@@ -320,6 +320,9 @@ models! {
     BoucWenOscillator: Creeping<super::BoucWenOscillator>, swarm;
     PrandtlIshlinskii: super::PrandtlIshlinskiiStage, least_squares;
     GeneralisedPrandtlIshlinskii: super::GeneralisedPrandtlIshlinskiiStage, least_squares;
+    PolynomialPrandtlIshlinskii: super::PolynomialPrandtlIshlinskiiStage, least_squares;
+    Preisach: super::PreisachStage, least_squares;
+    Duhem: super::DuhemStage, least_squares;
 }
 
 impl Model {
