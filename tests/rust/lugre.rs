@@ -93,8 +93,7 @@ fn the_stage_at_one_force_is_the_one_with_first_order_dahl_friction() {
     let mut values = VALUES;
     (values[5], values[7]) = (0.0, 0.1);
     let stage = LuGreStage::new(&values).unwrap();
-    let other =
-        FirstOrderDahlStage::new(&[0.1828, 55.0, 26065.0, 0.0468, 2e4, 0.1, 1.0]).unwrap();
+    let other = FirstOrderDahlStage::new(&[0.1828, 55.0, 26065.0, 0.0468, 2e4, 0.1, 1.0]).unwrap();
     let u = drive(400);
     for hold in [Hold::First, Hold::Zero] {
         let drive = Drive::new(&u, 2e-3, hold).unwrap();

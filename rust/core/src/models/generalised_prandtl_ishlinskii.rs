@@ -38,7 +38,7 @@ use super::input_stage::{
 };
 use super::prandtl_ishlinskii::{MOST_PLAYS, PlayHysteresis};
 use super::superposition::{
-    Edges, FittedWeights, Places, PlaySignals, Shape, Signals, SignalsOf, Superposition,
+    Edges, FittedWeights, Places, PlaySignals, Rest, Shape, Signals, SignalsOf, Superposition,
 };
 use super::tanh_envelope::{MOST_BEND, TanhEnvelope};
 use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
@@ -281,6 +281,7 @@ impl InputOperator for GeneralisedPlays {
     fn recall(
         &self,
         state: &mut GeneralisedPlaysState,
+        _volts: f64,
         memory: &[f64],
     ) -> core::result::Result<(), String> {
         recall_plays(&mut state.plays[..self.count], memory)
@@ -515,7 +516,7 @@ impl Superposition for GeneralisedPrandtlIshlinskiiStage {
     }
 
     /// With the play of the drive.
-    fn state_at_rest(x: f64, volts: f64, memory: &[f64], creep: &[f64], modes: usize) -> Values {
-        state_at_rest(PLAYS_STATE, (x, volts), memory, creep, modes)
+    fn state_at_rest(rest: &Rest<'_>) -> Values {
+        state_at_rest(PLAYS_STATE, rest, rest.memory)
     }
 }

@@ -31,7 +31,7 @@ use super::input_stage::{
     InputOperator, InputStage, PLAYS_STATE, Segmented, inverse_state, recall_plays, state_at_rest,
 };
 use super::prandtl_ishlinskii::{MOST_PLAYS, MOST_ZONES, PlayHysteresis};
-use super::superposition::{FittedWeights, Places, Shape, Signals, SignalsOf, Superposition};
+use super::superposition::{FittedWeights, Places, Rest, Shape, Signals, SignalsOf, Superposition};
 use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
 use super::values::{ParameterInfo, Values};
 use crate::design::{Gains, LoopPlant};
@@ -119,6 +119,7 @@ impl InputOperator for DilatedPlays {
     fn recall(
         &self,
         state: &mut DilatedPlaysState,
+        _volts: f64,
         memory: &[f64],
     ) -> core::result::Result<(), String> {
         recall_plays(&mut state.plays.plays[..self.plays.count], memory)
@@ -378,7 +379,7 @@ impl Superposition for RateDependentPrandtlIshlinskiiStage {
     }
 
     /// Without the drive.
-    fn state_at_rest(x: f64, volts: f64, memory: &[f64], creep: &[f64], modes: usize) -> Values {
-        state_at_rest(PLAYS_STATE, (x, volts), memory.get(1..).unwrap_or(&[]), creep, modes)
+    fn state_at_rest(rest: &Rest<'_>) -> Values {
+        state_at_rest(PLAYS_STATE, rest, rest.memory.get(1..).unwrap_or(&[]))
     }
 }

@@ -81,6 +81,23 @@ pub struct SignalsOf<'a> {
     pub drive: (f64, f64),
 }
 
+/// A stage at rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rest<'a> {
+    /// Displacement, m.
+    pub x: f64,
+    /// Drive, V.
+    pub volts: f64,
+    /// Weighted sum of the signals, m.
+    pub sum: f64,
+    /// Memory of the signals.
+    pub memory: &'a [f64],
+    /// Relaxations of the creep, m.
+    pub creep: &'a [f64],
+    /// Number of modes beside the main one.
+    pub modes: usize,
+}
+
 /// A model whose hysteresis is a sum of signals with weights of one sign.
 ///
 /// Weights are found as 0 or above for a displacement that rises with the drive. One that falls
@@ -112,9 +129,8 @@ pub trait Superposition: StageModel {
     /// The parameters of the stage, as [`StageModel::build`] takes them.
     fn values(fitted: &FittedWeights) -> Values;
 
-    /// A state at rest at `x`, m, and `volts`, with a memory of the signals, creep (m), and so
-    /// many further modes.
-    fn state_at_rest(x: f64, volts: f64, memory: &[f64], creep: &[f64], modes: usize) -> Values;
+    /// The state at rest.
+    fn state_at_rest(rest: &Rest<'_>) -> Values;
 }
 
 /// A [`Superposition`] whose type is not known; one search serves them all.
@@ -137,14 +153,7 @@ pub trait AnySuperposition: Sync {
     /// See [`Superposition::values`].
     fn values(&self, fitted: &FittedWeights) -> Values;
     /// See [`Superposition::state_at_rest`].
-    fn state_at_rest(
-        &self,
-        x: f64,
-        volts: f64,
-        memory: &[f64],
-        creep: &[f64],
-        modes: usize,
-    ) -> Values;
+    fn state_at_rest(&self, rest: &Rest<'_>) -> Values;
 }
 
 /// The superposition of a model, its type forgotten.
@@ -184,15 +193,8 @@ impl<M: Superposition> AnySuperposition for Of<M> {
         M::values(fitted)
     }
 
-    fn state_at_rest(
-        &self,
-        x: f64,
-        volts: f64,
-        memory: &[f64],
-        creep: &[f64],
-        modes: usize,
-    ) -> Values {
-        M::state_at_rest(x, volts, memory, creep, modes)
+    fn state_at_rest(&self, rest: &Rest<'_>) -> Values {
+        M::state_at_rest(rest)
     }
 }
 

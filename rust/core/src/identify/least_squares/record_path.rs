@@ -4,7 +4,7 @@ use super::fit::Fit;
 use super::follower::Follower;
 use crate::error::Result;
 use crate::identify::history::{History, visited};
-use crate::models::{Dynamics, Experiment, Relaxation, Values};
+use crate::models::{Dynamics, Experiment, Relaxation, Rest, Values};
 use crate::signal::{FractionalDelay, index};
 
 /// Signals of a drive, and the memory that they come from.
@@ -130,12 +130,14 @@ impl Fit<'_> {
         self.push(&mut path, first, f64::INFINITY);
         let creep = &self.creep_before(r, 1)[0];
         let output = self.bent(self.sum(&path.signals));
-        let rest = Follower::at_rest(&relaxation, output, creep).state.x;
+        let at_rest = Follower::at_rest(&relaxation, output, creep).state.x;
         let modes = self.dynamics().further().len();
         let memory: Vec<f64> = path.memory.iter().map(|one| of_drive * one).collect();
         let creep: Vec<f64> = creep.iter().map(|q| of_motion * q).collect();
-        let (x, volts) = (of_motion * rest, of_drive * first);
-        Ok(self.common.of.state_at_rest(x, volts, &memory, &creep, modes))
+        let (x, volts) = (of_motion * at_rest, of_drive * first);
+        let sum = of_motion * self.sum(&path.signals);
+        let rest = Rest { x, volts, sum, memory: &memory, creep: &creep, modes };
+        Ok(self.common.of.state_at_rest(&rest))
     }
 }
 
