@@ -1,0 +1,138 @@
+"""Made-up stages: plays, and one thing more in each: creep, a mode, asymmetry, or rate.
+
+All have ten plays and a stroke of about 40 um at 0 to 100 V, and noise of 20 nm. What is fitted is
+a sine whose amplitude falls to a fifth; the rest of the record repeats it in other steps, and the
+other record is another motion.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ....data.dataset import Dataset
+from ....stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
+from ..record import BenchmarkRecord
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+    Motion = Callable[[Array, float], Array]
+
+__all__ = ["RECORDS", "rate_dependent_plays"]
+
+NOISE = 20e-9
+LINEAR = 0.3e-6
+THRESHOLDS = np.linspace(4.0, 40.0, 10)
+WEIGHTS = 0.03e-6 * np.exp(-THRESHOLDS / 25.0)
+# Samples in a cycle, and cycles in each part.
+CYCLE, CYCLES = 200, 12
+# Lag of the thresholds behind the rate: V per V/s.
+RATE = 2e-3
+
+
+def rate_dependent_plays(u: Array, dt: float) -> Array:
+    """Simulate plays whose thresholds grow with the rate of the drive.
+
+    Al Janaideh and Krejci 2013, doi 10.1109/TMECH.2012.2205265: the play with the threshold
+    r(t) = r + beta abs(u'), so that z follows max(u - r, min(u + r, z)) at each instant.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n,)
+        Drive [V].
+    dt : float
+        Sampling interval [s].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Displacement [m].
+    """
+    rate = np.abs(np.gradient(u, dt))
+    x, z = np.empty(u.size), np.zeros(THRESHOLDS.size)
+    for k, (volts, fast) in enumerate(zip(u, rate, strict=True)):
+        r = THRESHOLDS + RATE * fast
+        z = np.maximum(volts - r, np.minimum(volts + r, z))
+        x[k] = LINEAR * volts + WEIGHTS @ z
+    return x
+
+
+def _plays(more: dict[str, Any], u: Array, dt: float) -> Array:
+    stage = PrandtlIshlinskiiStage(
+        linear=LINEAR, thresholds=tuple(THRESHOLDS), weights=tuple(WEIGHTS), **more
+    )
+    return stage.simulate(u, dt).x
+
+
+def _falling(seed: int) -> Array:
+    """Cycles from 0 V whose heights fall to a fifth, in another order for each seed."""
+    heights = np.linspace(100.0, 20.0, CYCLES)
+    heights[1:] = np.random.default_rng(seed).permutation(heights[1:])
+    phase = 2.0 * np.pi * np.arange(CYCLE) / CYCLE
+    return np.concatenate([0.5 * height * (1.0 - np.cos(phase)) for height in heights])
+
+
+def _wandering(seed: int) -> Array:
+    """Sums of three sines about the middle."""
+    t = np.arange(CYCLE * CYCLES) / CYCLE
+    shifts = 2.0 * np.pi * np.random.default_rng(seed).random(3)
+    parts = [
+        np.sin(2.0 * np.pi * f * t + s) for f, s in zip((0.31, 0.83, 1.7), shifts, strict=True)
+    ]
+    # From 0 V, so that the first cycle begins at rest.
+    return 50.0 * (1.0 + np.sum(parts, axis=0) / 3.0) * np.minimum(1.0, t / 2.0)
+
+
+def _made(name: str, title: str, motion: Motion, frequency: float) -> BenchmarkRecord:
+    """Make the record of a stage, the rest of it and another one."""
+    dt = 1.0 / (CYCLE * frequency)
+
+    def log(u: Array, seed: int) -> Dataset:
+        noise = NOISE * np.random.default_rng(seed).standard_normal(u.size)
+        return Dataset(u=u, y=motion(u, dt) + noise, dt=dt)
+
+    whole = log(np.concatenate([_falling(1), _falling(2)]), 3)
+    middle = float(whole.t[CYCLE * CYCLES])
+    return BenchmarkRecord(
+        name=name,
+        title=title,
+        fitted=whole[:middle],
+        rest=whole[middle:],
+        others={"other motion": log(_wandering(4), 5)},
+        noise=NOISE,
+    )
+
+
+def _of_plays(name: str, title: str, frequency: float, **more: Any) -> BenchmarkRecord:
+    return _made(name, title, partial(_plays, more), frequency)
+
+
+def _of_rate(frequency: float) -> BenchmarkRecord:
+    return _made(
+        f"rate-{frequency:g}hz", f"rate: {frequency:g} Hz", rate_dependent_plays, frequency
+    )
+
+
+RECORDS: dict[str, Callable[[], BenchmarkRecord]] = {
+    "creep": partial(
+        _of_plays, "creep", "creep", 1.0, creep_weights=(0.02, 0.02), creep_times=(1.0, 10.0)
+    ),
+    "mode": partial(_of_plays, "mode", "mode", 20.0, frequency=300.0, damping_ratio=0.05),
+    "asymmetry": partial(
+        _of_plays,
+        "asymmetry",
+        "asymmetry",
+        1.0,
+        dead_zone_thresholds=(12e-6, 26e-6),
+        dead_zone_weights=(-0.1, -0.12),
+    ),
+    "rate-0.1hz": partial(_of_rate, 0.1),
+    "rate-1hz": partial(_of_rate, 1.0),
+    "rate-10hz": partial(_of_rate, 10.0),
+}
