@@ -207,8 +207,8 @@ def _pieces(along: Array, across: Array) -> Pieces:
 
 def _along(curve: Pieces, x: Array) -> Array:
     """Follow a curve without memory; beyond its ends it is level."""
-    corners = [np.concatenate([[0.0], np.cumsum(part)]) for part in curve]
-    return np.interp(x, *corners)
+    at, height = (np.concatenate([[0.0], np.cumsum(part)]) for part in curve)
+    return np.asarray(np.interp(x, at, height), dtype=np.float64)
 
 
 def _backlash(pieces: Pieces, x: Array) -> Array:

@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 __all__ = ["nonnegative_plays"]
 
 
-def nonnegative_plays(u: Array, y: Array, dt: float) -> Callable[[Array, float], Array]:
-    """Fit 12 plays, three samples late, by ``scipy.optimize.nnls`` (Kuhnen 2003, equation (16)).
+def nonnegative_plays(u: Array, y: Array, first: int = 0) -> Callable[[Array, float], Array]:
+    """Fit 12 plays, three samples late, by ``scipy.optimize.nnls``.
 
     Parameters
     ----------
     u, y : ndarray, shape (n,)
         Drive [V] and displacement [m].
-    dt : float
-        Sampling interval [s].
+    first : int, optional
+        Sample from which on the displacement counts.
 
     Returns
     -------
@@ -42,5 +42,5 @@ def nonnegative_plays(u: Array, y: Array, dt: float) -> Callable[[Array, float],
             plays[k] = (*z, 1.0, -1.0)
         return np.concatenate([np.repeat(plays[:1], 3, axis=0), plays[:-3]])
 
-    weights, _ = nnls(columns(u), y)
-    return lambda u, dt: columns(u) @ weights
+    weights, _ = nnls(columns(u)[first:], y[first:])
+    return lambda u, _: columns(u) @ weights

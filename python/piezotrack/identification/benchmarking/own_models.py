@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...data.dataset import Dataset
+    from ...stages.base import StageState
     from ..result import Identification
     from .record import BenchmarkRecord
 
@@ -50,7 +51,7 @@ class _Identified:
         return self.fit.simulate(data, offset=self.fit.offset).x
 
     def invert(self, data: Dataset, y: Array) -> tuple[Array, Array] | None:
-        state = self.fit.start_on(data).state
+        state: StageState | None = self.fit.start_on(data).state
         inverse = self.fit.inverse()
         try:
             # Models with the hysteresis in feedback take no state: what the warm-up does is enough.
@@ -58,7 +59,7 @@ class _Identified:
         except ParameterError:
             state = None
         volts = inverse.voltage(Reference.from_samples(y, data.dt), data.dt)
-        return volts, self.fit.predict(volts, data.dt, initial=state)
+        return volts, self.fit.displacement(volts, data.dt, initial=state)
 
 
 def _fit(model: str, data: Dataset) -> _Identified:

@@ -1,4 +1,4 @@
-"""Contenders that are plain functions of arrays: those of other people, and the simple ones here."""
+"""Contenders that are plain functions of arrays: of other people, and the simple ones here."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def simple_contenders() -> list[Contender]:
     """
 
     def plays(data: Dataset) -> _Plain:
-        predict = nonnegative_plays(data.u, data.y, data.dt)
+        predict = nonnegative_plays(data.full.u, data.full.y, data.warmup)
         return _Plain("plays-nnls", predict, values=13)
 
     def of_volts(record: BenchmarkRecord) -> bool:

@@ -12,6 +12,7 @@ from ..._support.arguments import positive
 from ..._support.messages import quoted
 from ...data.dataset import Dataset
 from ...errors import ParameterError
+from ..comparison import parts_of
 from ..keys import key_of, record_key
 
 __all__ = ["BenchmarkRecord", "checked_name"]
@@ -114,6 +115,68 @@ class BenchmarkRecord:
             positive("noise", self.noise, "m")
         if not self.title:
             object.__setattr__(self, "title", self.name)
+
+    @classmethod
+    def of_log(
+        cls,
+        log: Dataset,
+        *,
+        name: str | None = None,
+        train: tuple[float | None, float | None] | None = None,
+        test: tuple[float | None, float | None] | None = None,
+        other: Dataset | None = None,
+    ) -> BenchmarkRecord:
+        """Make a record of a log, with the parts that `compare` would take.
+
+        Parameters
+        ----------
+        log : Dataset
+            The log.
+        name : str, optional
+            Name of the record; that of the log's file where not given.
+        train : (float, float), optional
+            Window to fit [s]; by default the first half, or all of it beside another log.
+        test : (float, float), optional
+            Window of the same log to judge on [s]; by default what follows.
+        other : Dataset, optional
+            Another log of the same stage to judge on.
+
+        Returns
+        -------
+        BenchmarkRecord
+            The record.
+
+        Raises
+        ------
+        ParameterError
+            A window is out of the log, or both overlap.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import piezotrack as pt
+        >>> u = 5.0 * np.sin(np.arange(5000) / 500.0)
+        >>> log = pt.Dataset(u=u, y=4e-6 * u, dt=0.005)
+        >>> record = pt.BenchmarkRecord.of_log(log, name="my-stage", train=(3.0, 13.0))
+        >>> record.fitted.duration, record.rest.duration
+        (10.0, 12.0)
+        """
+        title = log.source or "log"
+        plain = re.sub(r"[^a-z0-9._]+", "-", title.rpartition("/")[2].lower()).strip("-._")
+        rest: Dataset | None = None
+        if other is not None and test is None:
+            open_end = train is None or train[1] is None
+            fitted, _, _ = parts_of(log, train, other)
+            rest = None if open_end else parts_of(log, train, None)[1]
+        else:
+            fitted, rest, _ = parts_of(log, train, test)
+        return cls(
+            name=plain or "log" if name is None else name,
+            title=title if name is None else name,
+            fitted=fitted,
+            rest=rest,
+            others={} if other is None else {"other log": other},
+        )
 
     def parts(self) -> list[tuple[str, Dataset]]:
         """Every part, the fitted one first.

@@ -9,13 +9,13 @@ import numpy as np
 
 from ... import _core
 from ...errors import PiezotrackError
-from .record import BenchmarkRecord
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...data.dataset import Dataset
     from .contender import Contender, Fitted
+    from .record import BenchmarkRecord
 
     Array = NDArray[np.float64]
 

@@ -36,6 +36,18 @@ CYCLE, CYCLES = 200, 12
 RATE = 2e-3
 
 
+# What each stage of plays has besides, and the drive's frequency [Hz].
+ONE_MORE: tuple[tuple[str, dict[str, Any], float], ...] = (
+    ("creep", {"creep_weights": (0.02, 0.02), "creep_times": (1.0, 10.0)}, 1.0),
+    ("mode", {"frequency": 300.0, "damping_ratio": 0.05}, 20.0),
+    (
+        "asymmetry",
+        {"dead_zone_thresholds": (12e-6, 26e-6), "dead_zone_weights": (-0.1, -0.12)},
+        1.0,
+    ),
+)
+
+
 def rate_dependent_plays(u: Array, dt: float) -> Array:
     """Simulate plays whose thresholds grow with the rate of the drive.
 
@@ -79,14 +91,15 @@ def _falling(seed: int) -> Array:
 
 
 def _wandering(seed: int) -> Array:
-    """Sums of three sines about the middle."""
+    """Add three sines about the middle."""
     t = np.arange(CYCLE * CYCLES) / CYCLE
     shifts = 2.0 * np.pi * np.random.default_rng(seed).random(3)
     parts = [
         np.sin(2.0 * np.pi * f * t + s) for f, s in zip((0.31, 0.83, 1.7), shifts, strict=True)
     ]
     # From 0 V, so that the first cycle begins at rest.
-    return 50.0 * (1.0 + np.sum(parts, axis=0) / 3.0) * np.minimum(1.0, t / 2.0)
+    u = 50.0 * (1.0 + np.sum(parts, axis=0) / 3.0) * np.minimum(1.0, t / 2.0)
+    return np.asarray(u, dtype=np.float64)
 
 
 def _made(name: str, title: str, motion: Motion, frequency: float) -> BenchmarkRecord:
@@ -109,8 +122,8 @@ def _made(name: str, title: str, motion: Motion, frequency: float) -> BenchmarkR
     )
 
 
-def _of_plays(name: str, title: str, frequency: float, **more: Any) -> BenchmarkRecord:
-    return _made(name, title, partial(_plays, more), frequency)
+def _of_plays(name: str, more: dict[str, Any], frequency: float) -> BenchmarkRecord:
+    return _made(name, name, partial(_plays, more), frequency)
 
 
 def _of_rate(frequency: float) -> BenchmarkRecord:
@@ -120,19 +133,5 @@ def _of_rate(frequency: float) -> BenchmarkRecord:
 
 
 RECORDS: dict[str, Callable[[], BenchmarkRecord]] = {
-    "creep": partial(
-        _of_plays, "creep", "creep", 1.0, creep_weights=(0.02, 0.02), creep_times=(1.0, 10.0)
-    ),
-    "mode": partial(_of_plays, "mode", "mode", 20.0, frequency=300.0, damping_ratio=0.05),
-    "asymmetry": partial(
-        _of_plays,
-        "asymmetry",
-        "asymmetry",
-        1.0,
-        dead_zone_thresholds=(12e-6, 26e-6),
-        dead_zone_weights=(-0.1, -0.12),
-    ),
-    "rate-0.1hz": partial(_of_rate, 0.1),
-    "rate-1hz": partial(_of_rate, 1.0),
-    "rate-10hz": partial(_of_rate, 10.0),
-}
+    name: partial(_of_plays, name, more, frequency) for name, more, frequency in ONE_MORE
+} | {f"rate-{frequency:g}hz": partial(_of_rate, frequency) for frequency in (0.1, 1.0, 10.0)}

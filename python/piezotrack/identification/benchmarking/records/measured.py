@@ -18,7 +18,7 @@ def _measured() -> BenchmarkRecord:
         title="measured log, 1 Hz",
         fitted=log[SETTLED:FITTED],
         rest=log[FITTED:],
-        others={"other log, many amplitudes": dbo_tracking()[SETTLED:]},
+        others={"other log": dbo_tracking()[SETTLED:]},
     )
 
 
