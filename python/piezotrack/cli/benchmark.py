@@ -157,8 +157,8 @@ def _lines(listed: Path) -> list[tuple[Path, dict[str, str]]]:
         said = dict(word.partition("=")[::2] for word in words[1:])
         if len(said) < len(words) - 1 or not said.keys() <= set(SAID) or not all(said.values()):
             raise DataError(
-                f"{where}: '{' '.join(words[1:])}': expected train=A:B, test=A:B and other=FILE, "
-                "each once at most"
+                f"{where}: '{' '.join(words[1:])}': expected NAME=VALUE with the names "
+                f"{', '.join(SAID)}, each once at most"
             )
         found.append((listed.parent / words[0], said))
     if not found:

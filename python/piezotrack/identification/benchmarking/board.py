@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import sys
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +18,7 @@ from ..._support.files import (
     write_document,
 )
 from ..._support.messages import quoted
+from ..._support.progress_bar import ProgressBar
 from ...errors import ParameterError
 from .board_files import BoardFolder
 from .contenders import contenders_named
@@ -237,7 +237,7 @@ class Benchmark:
             "schema_version": SCHEMA_VERSION,
             "version": _core.__version__,
             "unit": "errors, strokes and noise in m; times in s; drives in the unit of the record",
-            "results": [_entry(one) for one in self.results],
+            "results": [asdict(one) for one in self.results],
         }
 
     def save(self, folder: str | os.PathLike[str]) -> list[Path]:
@@ -280,7 +280,7 @@ def benchmark(
     *,
     folder: str | os.PathLike[str] | None = None,
     overwrite: bool = False,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> Benchmark:
     """Fit models to records by their default calls, and judge them on what was not fitted.
 
@@ -306,7 +306,7 @@ def benchmark(
     overwrite : bool, optional
         Whether they are computed again.
     progress : bool, optional
-        Whether each result is announced on stderr.
+        As for `identify`.
 
     Returns
     -------
@@ -333,17 +333,20 @@ def benchmark(
         raise ParameterError("overwrite is True without a folder: expected a folder too")
     contenders, judged = contenders_named(models), records_named(records)
     kept = None if folder is None else BoardFolder(Path(folder))
+    pairs = [
+        (record, contender)
+        for record in judged
+        for contender in contenders
+        if models is not None or contender.suits(record)
+    ]
     found = []
-    for record in judged:
-        for contender in contenders:
-            if models is None and not contender.suits(record):
-                continue
+    with ProgressBar(progress, "benchmark") as bar:
+        for done, (record, contender) in enumerate(pairs):
             document = None
             if kept is not None and not overwrite:
                 document = kept.result(record, contender)
             if document is None:
-                if progress:
-                    print(f"{record.name}: {contender.title}", file=sys.stderr, flush=True)
+                bar.step(done, len(pairs), f"{len(pairs)}: {record.title}, {contender.title}")
                 document = json_ready(result_of(contender, record))
                 if kept is not None:
                     kept.store(record, contender, document)
@@ -390,9 +393,3 @@ def _read(document: Mapping[str, Any]) -> BenchmarkResult:
         parameters=document.get("parameters") or {},
         error=document["error"],
     )
-
-
-def _entry(one: BenchmarkResult) -> dict[str, Any]:
-    from dataclasses import asdict
-
-    return asdict(one)

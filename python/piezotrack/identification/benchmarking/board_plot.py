@@ -90,7 +90,10 @@ def _plain_ticks(ax: Axes) -> None:
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     low, high = ax.get_xlim()
-    subs = (1.0, 2.0, 5.0) if high < 300.0 * low else (1.0,)
+    if high < 15.0 * low:
+        subs: tuple[float, ...] = (1.0, 2.0, 3.0, 4.0, 5.0, 7.0)
+    else:
+        subs = (1.0, 2.0, 5.0) if high < 300.0 * low else (1.0,)
     ax.xaxis.set_major_locator(LogLocator(subs=subs, numticks=12))
     ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.12g}"))
     ax.xaxis.set_minor_formatter(NullFormatter())

@@ -17,7 +17,7 @@ from ....stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
 from ..record import BenchmarkRecord
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
@@ -132,6 +132,6 @@ def _of_rate(frequency: float) -> BenchmarkRecord:
     )
 
 
-RECORDS: dict[str, Callable[[], BenchmarkRecord]] = {
+RECORDS: Mapping[str, Callable[[], BenchmarkRecord]] = {
     name: partial(_of_plays, name, more, frequency) for name, more, frequency in ONE_MORE
 } | {f"rate-{frequency:g}hz": partial(_of_rate, frequency) for frequency in (0.1, 1.0, 10.0)}
