@@ -100,7 +100,6 @@ def test_the_discrete_backlash_and_its_inverse_undo_each_other() -> None:
     # But for what is snapped to a corner, a tenth of the last piece.
     away = model.inverse(model.simulate(u)) - u
     assert np.std(away) < 0.005 * np.ptp(u)
-    assert np.mean(np.abs(away) > 1e-3 * np.ptp(u)) < 0.1
     assert model.shifted(1e-6).level == pytest.approx(model.level + 1e-6)
 
 
@@ -284,6 +283,7 @@ def test_results_are_kept_until_the_record_changes(tmp_path: Path) -> None:
 
 def test_a_board_is_written_whole(tmp_path: Path) -> None:
     board = pt.benchmark([record(noise=1e-9)], ["plays-nnls", "first-order-dahl"])
+    assert max(map(len, board.summary().splitlines())) <= 100
     written = {path.name for path in board.save(tmp_path)}
     names = {"benchmark.md", "benchmark.json", "benchmark.png", "benchmark.svg"}
     assert written == names == {path.name for path in tmp_path.iterdir()}

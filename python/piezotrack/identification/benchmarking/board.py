@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure, SubFigure
 
+    from .contender import Contender
     from .record import BenchmarkRecord
 
 __all__ = ["Benchmark", "BenchmarkResult", "Inverted", "PartScore", "benchmark", "board_files"]
@@ -350,7 +351,7 @@ def benchmark(
                 document = json_ready(result_of(contender, record))
                 if kept is not None:
                     kept.store(record, contender, document)
-            found.append(_read(document))
+            found.append(_read(document, record, contender))
     return Benchmark(results=tuple(found))
 
 
@@ -359,16 +360,18 @@ def _number(value: object) -> float:
     return float(value) if isinstance(value, (int, float)) else math.nan
 
 
-def _read(document: Mapping[str, Any]) -> BenchmarkResult:
-    """Make a result of the content of its file."""
-    record, inverse = document["record"], document.get("inverse")
+def _read(
+    document: Mapping[str, Any], record: BenchmarkRecord, contender: Contender
+) -> BenchmarkResult:
+    """Make a result of the content of its file, under the titles of today."""
+    inverse = document.get("inverse")
     return BenchmarkResult(
-        record=record["name"],
-        model=document["model"]["name"],
-        record_title=record["title"],
-        title=document["model"]["title"],
-        noise=_number(record["noise_m"]),
-        stroke=_number(record["stroke_m"]),
+        record=record.name,
+        model=contender.name,
+        record_title=record.title,
+        title=contender.title,
+        noise=math.nan if record.noise is None else record.noise,
+        stroke=record.fitted.stroke,
         seconds=_number(document.get("seconds")),
         values=document.get("values"),
         chosen=document.get("chosen") or "",

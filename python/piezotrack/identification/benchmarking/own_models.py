@@ -78,9 +78,7 @@ def own_contenders() -> list[Contender]:
     def suits(unit: str, record: BenchmarkRecord) -> bool:
         return unit in ("V", record.drive_unit)
 
-    chosen = Contender(
-        name=AUTO, title="pt.identify(log)", fit=partial(_fit, AUTO), suits=lambda _: True
-    )
+    chosen = Contender(name=AUTO, title="default", fit=partial(_fit, AUTO), suits=lambda _: True)
     return [
         chosen,
         *(

@@ -164,7 +164,7 @@ def simple_contenders() -> list[Contender]:
         ),
         Contender(
             name="discrete-backlash",
-            title="discrete backlash, Aye and Ang 2018",
+            title="discrete backlash (2018)",
             fit=backlash,
             suits=lambda record: record.name == "measured",
         ),
