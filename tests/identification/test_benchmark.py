@@ -109,6 +109,14 @@ def test_a_drive_without_cycles_has_no_last_one() -> None:
         last_cycle(u, u)
 
 
+def test_a_loop_of_noise_has_no_discrete_backlash() -> None:
+    t = np.arange(2000) / 200.0
+    u = 1.0 - np.cos(2.0 * np.pi * t)
+    noise = np.random.default_rng(1).standard_normal(t.size)
+    with pytest.raises(DataError, match="does not have 25 pieces that rise"):
+        identify_backlash(*last_cycle(u, noise))
+
+
 # What a person writes in a quarter of an hour.
 
 
@@ -290,7 +298,7 @@ def test_a_board_is_written_whole(tmp_path: Path) -> None:
     document = json.loads((tmp_path / "benchmark.json").read_text(encoding="utf-8"))
     assert document["format"] == "piezotrack-benchmark"
     assert [one["model"] for one in document["results"]] == ["plays-nnls", "first-order-dahl"]
-    assert "| model | fitted % | rest % | other log % | K |" in board.markdown()
+    assert "| model | fitted | rest | other log | K |" in board.markdown()
 
 
 # Other people's models.
@@ -352,6 +360,8 @@ def test_an_installed_model_does_not_take_the_name_of_another(site: Path) -> Non
         ("def fit(u, y, dt): raise ValueError('no')", "gain failed: ValueError: no"),
         ("def fit(u, dt): return u[:-1]", "array of shape"),
         ("def fit(u, dt): return u * float('nan')", "not finite numbers"),
+        ("def fit(u, y, dt): return {}[1]", "gain failed: KeyError"),
+        ("def fit(u, dt): return u.missing", "gain failed: AttributeError"),
         ("def fit(u, dt): return ['x'] * len(u)", "gain failed: ValueError"),
     ],
 )

@@ -15,7 +15,7 @@ default: pt.identify(log), and what it chose. Errors are rms in per cent of the 
 largest error on the last part. K: values fitted. s: time of the fit, on this computer, beside
 whatever else it did. inverse: its drive for the measured displacement of a part not fitted, less
 the recorded drive, rms in per cent of the drive's range."""
-HEADS = ("K", "s", "um", "inverse %")
+HEADS = ("K", "s", "um", "inverse")
 
 
 def board_text(board: Benchmark) -> str:
@@ -89,7 +89,7 @@ def _about(rows: list[BenchmarkResult]) -> str:
 
 def _heads(rows: list[BenchmarkResult]) -> list[str]:
     parts = next((row.parts for row in rows if row.parts), ())
-    return [*(f"{part.part} %" for part in parts), *HEADS]
+    return [*(part.part for part in parts), *HEADS]
 
 
 def _cells(row: BenchmarkResult) -> list[str]:

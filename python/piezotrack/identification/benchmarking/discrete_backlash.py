@@ -122,6 +122,11 @@ def identify_backlash(u: Array, y: Array) -> DiscreteBacklash:
     -------
     DiscreteBacklash
         The model.
+
+    Raises
+    ------
+    DataError
+        The loop is not one of 25 pieces that rise.
     """
     low, level = float(u.min()), float(y.min())
     reach = float(np.ptp(u))
@@ -137,9 +142,19 @@ def identify_backlash(u: Array, y: Array) -> DiscreteBacklash:
     turned = along[-1] - along[::-1]
     falling = _corners(turned, (across[down], beside[down]), (0.0, 0.0))
     mean = 0.5 * (rising + falling[::-1])
+    backlash, curve = _pieces(along, rising - mean), _pieces(along, mean)
+    # Shorter ones would be passed to and fro within what is snapped.
+    least = min(float(part.min()) for part in backlash)
+    if not least > 2.0 * SNAP * max(backlash.dx[-1], backlash.dy[-1]) or not all(
+        np.all(part > 0.0) for part in curve
+    ):
+        raise DataError(
+            f"the loop does not have {PIECES} pieces that rise: expected a slow drive, and a "
+            "displacement that rises and falls with it"
+        )
     return DiscreteBacklash(
-        backlash=_pieces(along, rising - mean),
-        curve=_pieces(along, mean),
+        backlash=backlash,
+        curve=curve,
         slope=slope,
         level=level,
         low=low,
@@ -188,7 +203,8 @@ def _corners(at: Array, points: tuple[Array, Array], ends: tuple[float, float]) 
     """Heights of a broken line with given ends that is nearest to points, by least squares."""
     x, y = points
     piece = np.clip(np.searchsorted(at, x, side="left"), 1, at.size - 1)
-    share = (x - at[piece - 1]) / (at[piece] - at[piece - 1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.nan_to_num((x - at[piece - 1]) / (at[piece] - at[piece - 1]))
     hats = np.zeros((x.size, at.size))
     rows = np.arange(x.size)
     hats[rows, piece - 1], hats[rows, piece] = 1.0 - share, share

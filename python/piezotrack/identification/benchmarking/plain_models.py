@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._support.messages import quoted
-from ...errors import DataError, ParameterError
+from ...errors import DataError, NumericalError, ParameterError
 from .contender import Contender
 from .discrete_backlash import identify_backlash, last_cycle
 from .nonnegative_plays import nonnegative_plays
@@ -55,7 +55,8 @@ class _Plain:
         """Call a function, and refuse what is not as many finite numbers."""
         try:
             found = np.asarray(function(values.copy(), dt), dtype=np.float64)
-        except (TypeError, ValueError) as error:
+        except Exception as error:
+            # Code of others, which may raise anything.
             raise DataError(f"{self.name} failed: {type(error).__name__}: {error}") from error
         if found.shape != values.shape:
             raise DataError(
@@ -116,7 +117,7 @@ def _arguments(function: object) -> int | None:
 def _fitted(name: str, fit: Callable[[Array, Array, float], Any], data: Dataset) -> _Plain:
     try:
         predict = fit(data.u.copy(), data.y.copy(), data.dt)
-    except (TypeError, ValueError, ArithmeticError, RuntimeError) as error:
+    except Exception as error:
         raise DataError(f"{name} failed: {type(error).__name__}: {error}") from error
     if _arguments(predict) != PREDICTS:
         raise DataError(f"{name} returned {quoted(predict)}: expected a function predict(u, dt)")
@@ -143,7 +144,10 @@ def simple_contenders() -> list[Contender]:
     """
 
     def plays(data: Dataset) -> _Plain:
-        predict = nonnegative_plays(data.full.u, data.full.y, data.warmup)
+        try:
+            predict = nonnegative_plays(data.full.u, data.full.y, data.warmup)
+        except RuntimeError as error:
+            raise NumericalError(f"plays-nnls: {error}") from None
         return _Plain("plays-nnls", predict, values=13)
 
     def of_volts(record: BenchmarkRecord) -> bool:
