@@ -33,6 +33,8 @@ from .errors import NumericalError as NumericalError
 from .errors import ParameterError as ParameterError
 from .errors import PiezotrackError as PiezotrackError
 from .errors import ShapeError as ShapeError
+from .identification.benchmarking.board import benchmark as benchmark
+from .identification.benchmarking.record import BenchmarkRecord as BenchmarkRecord
 from .identification.campaigns import campaign as campaign
 from .identification.comparison import compare as compare
 from .identification.descents import Descents as Descents
