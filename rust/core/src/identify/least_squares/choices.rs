@@ -393,6 +393,13 @@ fn choose_dynamics(
             if mode && fit.rms < (1.0 - MODE_GAIN) * lagging.rms {
                 return Some(None);
             }
+            if !mode && may_hide_a_mode(fit) {
+                let hidden = unseen_mode(&still)?;
+                if hidden.poles_within() && hidden.rms < (1.0 - MODE_GAIN) * lagging.rms {
+                    *fit = hidden;
+                    return Some(None);
+                }
+            }
             let (chosen, lags) = smallest_lag(still, &lagging)?;
             *fit = chosen;
             Some(Some(lags))
@@ -459,6 +466,12 @@ fn smallest_lag<'a>(still: Fit<'a>, best: &Fit<'a>) -> Option<(Fit<'a>, (f64, f6
     let mut chosen = at_lag(best, shortest(least)?)?;
     chosen.held = true;
     Some((chosen, (low, high)))
+}
+
+/// Whether a drive is quick enough for a mode that no resonance shows: of a slow sine it would
+/// explain what is creep, or what the plays do not.
+fn may_hide_a_mode(fit: &Fit<'_>) -> bool {
+    fit.common.records.iter().any(|one| one.measures().excited().is_some())
 }
 
 /// A mode that the record does not show: as high and as little damped as the record allows.
