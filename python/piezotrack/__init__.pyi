@@ -56,11 +56,16 @@ from .stages.bouc_wen import BoucWenStage as BoucWenStage
 from .stages.bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
 from .stages.dahl import DahlStage as DahlStage
 from .stages.first_order_dahl import FirstOrderDahlStage as FirstOrderDahlStage
+from .stages.duhem import DuhemStage as DuhemStage
 from .stages.generalised_prandtl_ishlinskii import (
     GeneralisedPrandtlIshlinskiiStage as GeneralisedPrandtlIshlinskiiStage,
 )
 from .stages.inverse import Inverse as Inverse
 from .stages.parallel_dahl import ParallelDahlStage as ParallelDahlStage
+from .stages.polynomial_prandtl_ishlinskii import (
+    PolynomialPrandtlIshlinskiiStage as PolynomialPrandtlIshlinskiiStage,
+)
 from .stages.prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage
+from .stages.preisach import PreisachStage as PreisachStage
 from .stages.virtual import VirtualStage as VirtualStage
 from .stages.xy import XYStage as XYStage

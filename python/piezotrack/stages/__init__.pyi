@@ -13,6 +13,8 @@ from .bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
 from .dahl import DahlStage as DahlStage
 from .dahl import DahlState as DahlState
 from .first_order_dahl import FirstOrderDahlStage as FirstOrderDahlStage
+from .duhem import DuhemStage as DuhemStage
+from .duhem import DuhemState as DuhemState
 from .generalised_prandtl_ishlinskii import (
     GeneralisedPrandtlIshlinskiiStage as GeneralisedPrandtlIshlinskiiStage,
 )
@@ -21,8 +23,13 @@ from .inverse import InverseSession as InverseSession
 from .inverse import PlayedVoltage as PlayedVoltage
 from .parallel_dahl import ParallelDahlStage as ParallelDahlStage
 from .parallel_dahl import ParallelDahlState as ParallelDahlState
+from .polynomial_prandtl_ishlinskii import (
+    PolynomialPrandtlIshlinskiiStage as PolynomialPrandtlIshlinskiiStage,
+)
 from .prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage
 from .prandtl_ishlinskii import PrandtlIshlinskiiState as PrandtlIshlinskiiState
+from .preisach import PreisachStage as PreisachStage
+from .preisach import PreisachState as PreisachState
 from .virtual import VirtualResponse as VirtualResponse
 from .virtual import VirtualStage as VirtualStage
 from .xy import XYLog as XYLog
