@@ -58,6 +58,7 @@ from .stages.asymmetric_bouc_wen import AsymmetricBoucWenStage as AsymmetricBouc
 from .stages.bouc_wen import BoucWenStage as BoucWenStage
 from .stages.bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
 from .stages.dahl import DahlStage as DahlStage
+from .stages.duhem import DuhemStage as DuhemStage
 from .stages.first_order_dahl import FirstOrderDahlStage as FirstOrderDahlStage
 from .stages.generalised_prandtl_ishlinskii import (
     GeneralisedPrandtlIshlinskiiStage as GeneralisedPrandtlIshlinskiiStage,
@@ -66,7 +67,11 @@ from .stages.inverse import Inverse as Inverse
 from .stages.lugre import LuGreStage as LuGreStage
 from .stages.maxwell_slip import MaxwellSlipStage as MaxwellSlipStage
 from .stages.parallel_dahl import ParallelDahlStage as ParallelDahlStage
+from .stages.polynomial_prandtl_ishlinskii import (
+    PolynomialPrandtlIshlinskiiStage as PolynomialPrandtlIshlinskiiStage,
+)
 from .stages.prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage
+from .stages.preisach import PreisachStage as PreisachStage
 from .stages.rate_dependent_prandtl_ishlinskii import (
     RateDependentPrandtlIshlinskiiStage as RateDependentPrandtlIshlinskiiStage,
 )

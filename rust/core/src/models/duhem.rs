@@ -133,8 +133,8 @@ impl Invertible for DuhemStage {
     }
 }
 
-/// f' and g of a pair as quadratics in t, which is 0 at the lower end of the range of the drive
-/// and 1 at the upper one.
+/// Coefficients of f' and g of a pair, quadratics in t, which is 0 at the lower end of the range of
+/// the drive and 1 at the upper one.
 type Pair = ([f64; 3], [f64; 3]);
 
 /// The pairs for an alpha of `rate` over the range of the drive.
@@ -170,14 +170,14 @@ fn in_volts([a, b, c]: [f64; 3], (low, high): (f64, f64)) -> [f64; 3] {
     [a - b * low + c * low * low, b - 2.0 * c * low, c]
 }
 
-/// f and g of a pair in volts.
-fn polynomials(pair: Pair, range: (f64, f64)) -> ([f64; 3], [f64; 3]) {
+/// The coefficients of f, without its constant, and of g in volts.
+fn polynomials(pair: Pair, range: (f64, f64)) -> Pair {
     let [a, b, c] = in_volts(pair.0, range);
     ([a, 0.5 * b, c / 3.0], in_volts(pair.1, range))
 }
 
-/// Alpha and the pairs in volts of a fit.
-fn in_fit(shape: &[f64], (low, high): (f64, f64)) -> (f64, Vec<([f64; 3], [f64; 3])>) {
+/// Alpha, and the coefficients of f and g of the pairs in volts.
+fn in_fit(shape: &[f64], (low, high): (f64, f64)) -> (f64, Vec<Pair>) {
     let rate = shape.first().copied().unwrap_or(1.0);
     let pairs = pairs(rate).into_iter().map(|pair| polynomials(pair, (low, high)));
     (rate / (high - low), pairs.collect())

@@ -217,7 +217,7 @@ impl DuhemOperator {
             let to = if rises { volts.min(end) } else { volts.max(end) };
             let (output, slope) = self.on(&limit.parts[part], &state, to);
             state = DuhemState { input: to, output, slope };
-            if to == volts {
+            if if rises { to >= volts } else { to <= volts } {
                 break;
             }
         }
@@ -242,8 +242,7 @@ fn check_branches(
     for (name, what, curve) in [("f1", "f'", f), ("g0", "2 g - f'", &after)] {
         let lower =
             least(&curve.plus(1.0 / alpha, &bent)).min(least(&curve.plus(-1.0 / alpha, &bent)));
-        // Not so where it is not a number.
-        if !(lower > 0.0) {
+        if lower.is_nan() || lower <= 0.0 {
             let found = format!(
                 "such that {what}, less |g'|/alpha, is {} m/V somewhere from {low} V to {high} V",
                 shown(turn * lower)
@@ -259,7 +258,7 @@ fn check_branches(
 impl InputOperator for DuhemOperator {
     type State = DuhemState;
 
-    const STATE: &'static [ParameterInfo] = &state_with(ParameterInfo::list("output", "h", "m"));
+    const STATE: &'static [ParameterInfo] = &state_with(ParameterInfo::new("output", "h", "m"));
 
     fn rest(&self) -> DuhemState {
         Self::rest(self)
@@ -286,7 +285,7 @@ impl InputOperator for DuhemOperator {
         volts: f64,
         memory: &[f64],
     ) -> core::result::Result<(), String> {
-        let [output] = *memory else { return Err("one output, in a list".into()) };
+        let [output] = *memory else { return Err("one output".into()) };
         *state = DuhemState { input: volts, output: self.zero + output, slope: 0.0 };
         Ok(())
     }

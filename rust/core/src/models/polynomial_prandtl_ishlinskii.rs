@@ -106,8 +106,8 @@ impl PolynomialPlays {
         let [a1, a2, a3] = polynomial;
         let inside = Cubic([0.0, a1, a2, a3]);
         let (least, most) = inside.slopes(low, high);
-        // Not so where it is not a number.
-        if !(least * most > 0.0) {
+        let along = least > 0.0 || most < 0.0;
+        if !(along && least.is_finite() && most.is_finite()) {
             let found = format!(
                 "with a2 and a3 such that the slope is from {} m/V to {} m/V between {low} V and {high} V",
                 shown(least),

@@ -182,10 +182,9 @@ impl Superposition for PreisachStage {
     }
 
     fn values(fitted: &FittedWeights) -> Values {
-        let of = fitted.clone();
-        let (linear, masses) = with_gain_outside(of.linear, &of.places, of.weights);
-        let operator = [vec![linear], of.places, masses];
-        Values::of(PARAMETERS, operator.into_iter().chain(of.relaxation.values()))
+        let (linear, masses) = with_gain_outside(fitted);
+        let operator = [vec![linear], fitted.places.clone(), masses];
+        Values::of(PARAMETERS, operator.into_iter().chain(fitted.relaxation.values()))
     }
 
     fn state_at_rest(rest: &Rest<'_>) -> Values {
@@ -194,25 +193,27 @@ impl Superposition for PreisachStage {
     }
 }
 
-/// The same output between the levels, where 0 V is one of them or between them, with as much of
-/// the gain without memory as there is on the whole diagonal outside the levels too: the stage
-/// would hardly move there.
-fn with_gain_outside(linear: f64, levels: &[f64], mut masses: Vec<f64>) -> (f64, Vec<f64>) {
-    let around = levels.first().is_some_and(|low| *low <= 0.0)
-        && levels.last().is_some_and(|high| *high >= 0.0);
+/// The gain without memory and the masses of a fit.
+///
+/// What all cells of the diagonal have in common is a gain without memory between the levels. It
+/// becomes one outside them too, where the stage would hardly move otherwise, unless the record
+/// shows how it moves there, or 0 V is there.
+fn with_gain_outside(fitted: &FittedWeights) -> (f64, Vec<f64>) {
+    let (levels, mut masses) = (&fitted.places, fitted.weights.clone());
+    let ends = levels.first().zip(levels.last());
+    let (low, high) = (fitted.drive.0.min(0.0), fitted.drive.1.max(0.0));
+    if !ends.is_some_and(|(lowest, highest)| *lowest <= low && high <= *highest) {
+        return (fitted.linear, masses);
+    }
     let widths: Vec<f64> = levels.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let slope = |(i, width): (usize, &f64)| masses.get(entry(i, i)).copied().unwrap_or(0.0) / width;
     let slopes: Vec<f64> = widths.iter().enumerate().map(slope).collect();
-    let common = slopes.iter().copied().reduce(
-        |one, other| {
-            if other.abs() < one.abs() { other } else { one }
-        },
-    );
-    let common = common.filter(|_| around).unwrap_or(0.0);
+    let smaller = |one: f64, other: f64| if other.abs() < one.abs() { other } else { one };
+    let common = slopes.iter().copied().reduce(smaller).unwrap_or(0.0);
     for (i, (width, slope)) in widths.iter().zip(&slopes).enumerate() {
         if let Some(mass) = masses.get_mut(entry(i, i)) {
             *mass = (slope - common) * width;
         }
     }
-    (linear + common, masses)
+    (fitted.linear + common, masses)
 }

@@ -83,8 +83,8 @@ impl PreisachState {
 
 impl PreisachOperator {
     /// From the gain without memory (m/V), the levels (V, ascending) and the masses (m) of the
-    /// cells, all of one sign with it: mu_00, mu_10, mu_11, mu_20, ..., where mu_ij has the relays
-    /// that switch up between levels i and i + 1 and down between j and j + 1.
+    /// cells, all of one sign with it. They stand in rows of the interval in which their relays
+    /// switch up, from the lowest interval in which they switch down to the same one.
     ///
     /// # Errors
     /// [`crate::error::Error::Shape`] where entries are missing or too many,

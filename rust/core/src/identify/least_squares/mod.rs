@@ -22,7 +22,8 @@ use super::delay::Delay;
 use super::history::History;
 use crate::error::{Error, Result, positive, shown};
 use crate::models::{
-    AnySuperposition, Dynamics, Measures, Model, PlayHysteresis, Relaxation, SignalsOf, Values,
+    AnySuperposition, Dynamics, MOST_LEVELS, Measures, Model, Places, PlayHysteresis, Relaxation,
+    SignalsOf, Values,
 };
 use crate::signal::{Drive, Hold, Stop, index, range, turns};
 
@@ -250,8 +251,10 @@ pub fn identify_weights(
     let zeros = |count: usize| vec![0.0; count];
     let zones = zeros(settings.zones);
     PlayHysteresis::new(1.0, &[], &[], &zones, &zones)?;
-    if let PlacesKind::Given(places) = &settings.places {
-        of.check_places(places)?;
+    match &settings.places {
+        PlacesKind::Given(places) => of.check_places(places)?,
+        PlacesKind::Spread(count) => check_count(of, *count)?,
+        PlacesKind::Auto => {}
     }
     let times = settings.creep.times();
     Relaxation::new(&zeros(times.len()), times, Dynamics::None)?;
@@ -280,6 +283,18 @@ pub fn identify_weights(
     let common = Common::new((model, of), records.collect(), falls, stop);
     let found = choices::search(&common, settings);
     found.map(|(fit, lag_range)| Ok(LeastSquaresFit { lag_range, ..fit.result()? })).transpose()
+}
+
+/// Refuses a number of places with which no stage exists.
+fn check_count(of: &dyn AnySuperposition, count: usize) -> Result<()> {
+    let title = of.info().title;
+    let expected = match of.places() {
+        Places::Thresholds => return Ok(()),
+        Places::Levels if (1..MOST_LEVELS).contains(&count) => return Ok(()),
+        Places::Levels => format!("1 to {} intervals between levels of {title}", MOST_LEVELS - 1),
+        Places::None => format!("None: {title} has no thresholds or levels"),
+    };
+    Err(Error::parameter("count", count, expected))
 }
 
 /// A falling displacement is fitted as a rising one: under the negative drive, or negative itself
