@@ -87,6 +87,8 @@ STAGES: dict[str, pt.stages.Stage] = {
         dilation=0.5e-3,
         dead_zone_thresholds=(30e-6,),
         dead_zone_weights=(-0.1,),
+        time_constant=0.002,
+    ),
     "polynomial-prandtl-ishlinskii": pt.PolynomialPrandtlIshlinskiiStage(
         a1=1e-6,
         a2=2e-9,
