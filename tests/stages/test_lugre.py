@@ -105,9 +105,7 @@ def test_against_a_stiff_solver(stage: pt.LuGreStage, hold: Literal["foh", "zoh"
 def test_at_one_force_it_is_first_order_dahl_friction() -> None:
     names = ("mass", "damping", "stiffness", "piezo_coefficient", "rest_stiffness", "coulomb_force")
     dahl = pt.FirstOrderDahlStage(**{name: getattr(STAGE, name) for name in names})
-    same = dataclasses.replace(
-        STAGE, static_ratio=1.0, micro_damping=0.0, viscous_friction=0.0
-    )
+    same = dataclasses.replace(STAGE, static_ratio=1.0, micro_damping=0.0, viscous_friction=0.0)
     u, dt = drive(1000, 1e-3), 1e-3
     found, expected = same.simulate(u, dt, accuracy=1e-12), dahl.simulate(u, dt, accuracy=1e-12)
     np.testing.assert_allclose(found.x, expected.x, rtol=0, atol=3e-12)
