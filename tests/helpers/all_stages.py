@@ -47,7 +47,7 @@ STAGES: dict[str, pt.stages.Stage] = {
         rest_stiffness=9e3,
         micro_damping=20.0,
         coulomb_force=0.1,
-        static_force=0.15,
+        static_ratio=1.5,
         stribeck_velocity=1e-3,
         viscous_friction=5.0,
     ),

@@ -59,10 +59,10 @@ class LuGreStage(Stage):
         most 60 times the damping, or 60 times ``sqrt(stiffness * mass)`` where that is larger.
     coulomb_force : float
         Fc [N], above 0: force of sliding at high speed.
-    static_force : float
-        Fs [N], above 0: force of sliding at low speed. Of dry friction it is above Fc (the Stribeck
-        effect); below Fc the friction grows with the speed.
-    stribeck_velocity : float
+    static_ratio : float, optional
+        Fs/Fc, above 0: force of sliding at low speed over that at high speed. Of dry friction it is
+        above 1 (the Stribeck effect); below 1 the friction grows with the speed.
+    stribeck_velocity : float, optional
         vs [m/s], above 0: the speed at which 63 % of the change from Fs to Fc is done.
     viscous_friction : float, optional
         sigma2 [N s/m], 0 or above. A record determines only its sum with the damping.
@@ -83,8 +83,9 @@ class LuGreStage(Stage):
     determine how, and the equilibria that an experiment begins with are those of motions so slow
     that the force of sliding is Fs.
 
-    A search between two forces of sliding and a speed needs a record of slow and fast motions.
-    ``constraints=["coulomb_force < static_force"]`` keeps the search to the Stribeck effect.
+    For the same reason a search holds `static_ratio` and `stribeck_velocity` unless they are in
+    ``free=``. Where the force of sliding falls faster with the speed than the damping grows, the
+    stage sticks and slips, and a search among such motions finds nothing of use.
 
     Examples
     --------
@@ -93,7 +94,7 @@ class LuGreStage(Stage):
     >>> stage = pt.LuGreStage(
     ...     mass=0.18, damping=50.0, stiffness=2.6e4, piezo_coefficient=0.0468,
     ...     rest_stiffness=2e4, micro_damping=20.0,
-    ...     coulomb_force=0.1, static_force=0.2, stribeck_velocity=2e-4,
+    ...     coulomb_force=0.1, static_ratio=2.0, stribeck_velocity=2e-4,
     ... )
     >>> for frequency in (0.1, 10.0):
     ...     t = np.linspace(0.0, 3.0 / frequency, 6001)
@@ -111,11 +112,16 @@ class LuGreStage(Stage):
     rest_stiffness: float
     micro_damping: float
     coulomb_force: float
-    static_force: float
-    stribeck_velocity: float
+    static_ratio: float = 1.0
+    stribeck_velocity: float = 1e-3
     viscous_friction: float = 0.0
     creep_weights: tuple[float, ...] = ()
     creep_times: tuple[float, ...] = ()
+
+    @property
+    def static_force(self) -> float:
+        """Force of sliding at low speed, Fs [N]."""
+        return self.static_ratio * self.coulomb_force
 
     def force_ratios(self) -> list[Ratio]:
         """Return forces over the stiffness, and the velocity."""
@@ -126,6 +132,6 @@ class LuGreStage(Stage):
             ("rest_stiffness", "sigma0/K", self.rest_stiffness / self.stiffness, ""),
             ("micro_damping", "sigma1/K", 1e3 * self.micro_damping / self.stiffness, "ms"),
             ("coulomb_force", "Fc/K", 1e6 * self.coulomb_force / self.stiffness, "um"),
-            ("static_force", "Fs/K", 1e6 * self.static_force / self.stiffness, "um"),
+            ("static_ratio", "Fs/Fc", self.static_ratio, ""),
             ("stribeck_velocity", "vs", 1e6 * self.stribeck_velocity, "um/s"),
         ]

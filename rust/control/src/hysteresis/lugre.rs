@@ -178,29 +178,23 @@ impl<N: Number> LuGre<N> {
     /// `sigma0 z (1 - sigma1 |v|/g)`.
     #[inline(always)]
     pub fn force(&self, z: N, velocity: N) -> N {
-        let slip = self.slip(velocity);
-        (self.rest_stiffness * z) * (-slip).mul_add(self.micro_damping, z.like(1.0))
+        self.force_and_rate(z, velocity, z.like(0.0))[0]
     }
 
-    /// Time derivative of that force at an acceleration.
+    /// That force, and its derivative with respect to time at an acceleration.
     #[inline(always)]
-    pub fn force_rate(&self, z: N, velocity: N, acceleration: N) -> N {
+    pub fn force_and_rate(&self, z: N, velocity: N, acceleration: N) -> [N; 2] {
+        let one = z.like(1.0);
         let square = velocity * velocity;
         let limit = self.limit(square);
         let slip = magnitude(velocity) / limit;
-        let deflection = (-(self.rest_stiffness * slip)).mul_add(z, velocity);
+        let held = (-slip).mul_add(self.micro_damping, one);
+        let deflected = (-(self.rest_stiffness * slip)).mul_add(z, velocity);
         let steeper = (limit - self.coulomb_force) * square
             / (limit * (self.stribeck_velocity * self.stribeck_velocity));
-        let one = z.like(1.0);
         let slips = sign(velocity) * acceleration * steeper.mul_add(z.like(2.0), one) / limit;
-        let held = (-slip).mul_add(self.micro_damping, one);
-        self.rest_stiffness * deflection.mul_add(held, -(self.micro_damping * z * slips))
-    }
-
-    /// |v|/g.
-    #[inline(always)]
-    fn slip(&self, velocity: N) -> N {
-        magnitude(velocity) / self.limit(velocity * velocity)
+        let rate = deflected.mul_add(held, -(self.micro_damping * z * slips));
+        [self.rest_stiffness * z * held, self.rest_stiffness * rate]
     }
 }
 

@@ -57,8 +57,8 @@ impl<N: Number> LuGreCoupling<N> {
     fn force(&self, deflection: N, w: N, acceleration: N) -> (N, N) {
         let velocity = w * self.rate;
         let acceleration = acceleration * (self.rate * self.rate);
-        let rate = self.friction.force_rate(deflection, velocity, acceleration);
-        (self.friction.force(deflection, velocity), rate / self.rate)
+        let [force, rate] = self.friction.force_and_rate(deflection, velocity, acceleration);
+        (force, rate / self.rate)
     }
 }
 

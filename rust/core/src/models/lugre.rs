@@ -38,12 +38,15 @@ const PARAMETERS: &[ParameterInfo] = &[
     ParameterInfo::new("rest_stiffness", "sigma0", "N/m").force(),
     ParameterInfo::new("micro_damping", "sigma1", "N s/m").force(),
     ParameterInfo::new("coulomb_force", "Fc", "N").force(),
-    ParameterInfo::new("static_force", "Fs", "N").force(),
-    ParameterInfo::new("stribeck_velocity", "vs", "m/s"),
+    ParameterInfo::new("static_ratio", "Fs/Fc", "").or(1.0),
+    ParameterInfo::new("stribeck_velocity", "vs", "m/s").or(STRIBECK_VELOCITY),
     ParameterInfo::new("viscous_friction", "sigma2", "N s/m").force().or(0.0).never_searched(
         "viscous_friction held, in fixed=: a record determines its sum with the damping only",
     ),
 ];
+
+/// Speed that is held where it is not searched, m/s.
+const STRIBECK_VELOCITY: f64 = 1e-3;
 
 const STATE: &[ParameterInfo] = &[X, V, ParameterInfo::new("deflection", "z", "m")];
 
@@ -76,20 +79,20 @@ pub struct LuGreStage {
 }
 
 impl LuGreStage {
-    /// The stage with its ten parameters: M, D, K, T, sigma0, sigma1, Fc, Fs, vs and sigma2.
+    /// The stage with its ten parameters: M, D, K, T, sigma0, sigma1, Fc, Fs/Fc, vs and sigma2.
     ///
     /// # Errors
     /// [`Error::Parameter`] naming the parameter that is out of its range.
     pub fn new(values: &[f64; 10]) -> Result<Self> {
         let [mass, damping, stiffness, piezo_coefficient, .., viscous] = *values;
-        let [_, _, _, _, rest, micro, coulomb, holding, velocity, _] = *values;
+        let [_, _, _, _, rest, micro, coulomb, ratio, velocity, _] = *values;
         let mechanics = Mechanics::new(mass, damping, stiffness)?;
         not_zero("piezo_coefficient", piezo_coefficient, "N/V")?;
         let friction = LuGre {
             rest_stiffness: positive("rest_stiffness", rest, "N/m")?,
             micro_damping: not_negative("micro_damping", micro, "N s/m")?,
             coulomb_force: positive("coulomb_force", coulomb, "N")?,
-            static_force: positive("static_force", holding, "N")?,
+            static_force: coulomb * positive("static_ratio", ratio, "")?,
             stribeck_velocity: positive("stribeck_velocity", velocity, "m/s")?,
         };
         not_negative("viscous_friction", viscous, "N s/m")?;
@@ -115,7 +118,7 @@ impl LuGreStage {
             rest_stiffness,
             micro_damping,
             coulomb_force,
-            static_force,
+            static_force / coulomb_force,
             stribeck_velocity,
             self.viscous_friction,
         ]
@@ -180,12 +183,10 @@ impl Searchable for LuGreStage {
     const NONSMOOTH: bool = true;
 
     fn ranges(of: &Measures, held: &Held) -> Result<Ranges> {
-        let limit = held.value("coulomb_force").or(held.value("static_force"));
-        let limit = limit.map(|limit| 10.0 * limit / of.stroke);
+        let limit = held.value("coulomb_force").map(|limit| 10.0 * limit / of.stroke);
         let hints = [held.value("rest_stiffness"), limit];
         let (soft, hard) = of.stiffness(held, held.value("piezo_coefficient"), &hints);
         let [mass, damping, stiffness] = of.mechanical((soft, hard));
-        let force = (1e-3 * soft * of.stroke, hard * of.stroke);
         // The fastest motion that a sine of the same size and rate has.
         let fastest = of.stroke * of.displacement_rate;
         Ok(vec![
@@ -195,9 +196,9 @@ impl Searchable for LuGreStage {
             ("piezo_coefficient", of.piezo(soft * of.gain, hard * of.gain)),
             ("rest_stiffness", (1e-2 * soft, 10.0 * hard)),
             ("micro_damping", (1e-2 * damping.0, damping.1)),
-            ("coulomb_force", force),
-            ("static_force", force),
-            ("stribeck_velocity", (1e-3 * fastest, fastest)),
+            ("coulomb_force", (1e-3 * soft * of.stroke, hard * of.stroke)),
+            ("static_ratio", (0.3, 3.0)),
+            ("stribeck_velocity", (0.01 * fastest, 3.0 * fastest)),
         ])
     }
 
@@ -229,19 +230,15 @@ pub struct LuGreKernel;
 impl LuGreKernel {
     #[inline(always)]
     fn friction<N: Number>(parameters: &Parameters<N>) -> LuGre<N> {
-        let [
-            _,
-            _,
-            _,
-            _,
+        let [_, _, _, _, rest_stiffness, micro_damping, coulomb_force, ratio, velocity, ..] =
+            *parameters;
+        LuGre {
             rest_stiffness,
             micro_damping,
             coulomb_force,
-            static_force,
-            stribeck_velocity,
-            ..,
-        ] = *parameters;
-        LuGre { rest_stiffness, micro_damping, coulomb_force, static_force, stribeck_velocity }
+            static_force: coulomb_force * ratio,
+            stribeck_velocity: velocity,
+        }
     }
 }
 
