@@ -76,7 +76,7 @@ def _record(ax: Axes, rows: list[BenchmarkResult]) -> None:
     ax.legend(
         loc="lower left",
         bbox_to_anchor=(-0.02, 0.99),
-        ncols=4,
+        ncols=6,
         fontsize="small",
         frameon=False,
         borderaxespad=0.1,
