@@ -177,7 +177,7 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "benchmark log.csv --model unknown": ("models has 'unknown'", "'auto', 'dahl'"),
     "benchmark --record unknown": ("records has 'unknown'", "'measured'"),
     "benchmark --list gone.txt": ("--list: gone.txt cannot be read",),
-    "benchmark log.csv --train 3:1": ("log.csv: --train", "3 s to 1 s"),
+    "benchmark log.csv --train 3:1": ("log.csv: train", "3 s to 1 s"),
     f"{TUNE} --out file": ("file cannot be made a folder",),
     f"{TUNE} --out file/sub": ("cannot be made a folder",),
     f"{TUNE} --json --quiet": ("--json and --quiet", "at most"),
