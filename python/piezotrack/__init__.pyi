@@ -55,8 +55,8 @@ from .references.xy_reference import XYReference as XYReference
 from .stages.bouc_wen import BoucWenStage as BoucWenStage
 from .stages.bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
 from .stages.dahl import DahlStage as DahlStage
-from .stages.first_order_dahl import FirstOrderDahlStage as FirstOrderDahlStage
 from .stages.duhem import DuhemStage as DuhemStage
+from .stages.first_order_dahl import FirstOrderDahlStage as FirstOrderDahlStage
 from .stages.generalised_prandtl_ishlinskii import (
     GeneralisedPrandtlIshlinskiiStage as GeneralisedPrandtlIshlinskiiStage,
 )

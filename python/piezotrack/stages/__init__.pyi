@@ -12,9 +12,9 @@ from .bouc_wen import BoucWenState as BoucWenState
 from .bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
 from .dahl import DahlStage as DahlStage
 from .dahl import DahlState as DahlState
-from .first_order_dahl import FirstOrderDahlStage as FirstOrderDahlStage
 from .duhem import DuhemStage as DuhemStage
 from .duhem import DuhemState as DuhemState
+from .first_order_dahl import FirstOrderDahlStage as FirstOrderDahlStage
 from .generalised_prandtl_ishlinskii import (
     GeneralisedPrandtlIshlinskiiStage as GeneralisedPrandtlIshlinskiiStage,
 )
