@@ -15,9 +15,11 @@ HEADLINE = {
     # fitted, the rest of that record, another record
     "dahl": (0.49, 0.81, 1.24),
     "bouc-wen": (0.71, 0.82, 1.19),
+    "asymmetric-bouc-wen": (0.43, 0.59, 1.33),
     "prandtl-ishlinskii": (0.27, 0.36, 0.405),
     "first-order-dahl": (0.72, 0.83, 0.745),
     "parallel-dahl": (0.70, 0.74, 0.73),
+    "maxwell-slip": (0.69, 0.70, 0.65),
     "generalised-prandtl-ishlinskii": (0.29, 0.46, 0.53),
 }
 

@@ -115,8 +115,14 @@ fn one_lane_and_many_with_friction_and_delay() {
 fn one_lane_and_many_of_models_with_an_exponent() {
     let (u, y) = log();
     let cases = [(Hold::First, 1.0), (Hold::Zero, 1.0), (Hold::First, 1.5)];
-    let models =
-        [Model::BoucWen, Model::FirstOrderDahl, Model::ParallelDahl, Model::BoucWenOscillator];
+    let models = [
+        Model::BoucWen,
+        Model::AsymmetricBoucWen,
+        Model::FirstOrderDahl,
+        Model::ParallelDahl,
+        Model::LuGre,
+        Model::BoucWenOscillator,
+    ];
     for (model, (hold, exponent)) in models.into_iter().flat_map(|m| cases.map(|case| (m, case))) {
         let has_exponent = model.info().parameters.iter().any(|one| one.name == "exponent");
         let record = Record::new(&u, &y, DT, hold, 100).unwrap();

@@ -348,7 +348,16 @@ def test_the_wording_of_a_refusal() -> None:
 
 
 @pytest.mark.parametrize(
-    "model", ["dahl", "bouc-wen", "first-order-dahl", "parallel-dahl", "bouc-wen-oscillator"]
+    "model",
+    [
+        "dahl",
+        "bouc-wen",
+        "asymmetric-bouc-wen",
+        "first-order-dahl",
+        "parallel-dahl",
+        "lugre",
+        "bouc-wen-oscillator",
+    ],
 )
 def test_a_state_is_refused_where_the_inverse_begins_at_rest(model: str) -> None:
     stage = all_stages.STAGES[model]

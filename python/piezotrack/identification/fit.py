@@ -99,6 +99,7 @@ def identify(
         first three fifths of the window and judged on the rest, and the best is fitted to all of
         it and says so: `Identification.trials`. Searched are ``"dahl"`` (`DahlStage`),
         ``"bouc-wen"`` (`BoucWenStage`), ``"first-order-dahl"`` (`FirstOrderDahlStage`),
+        ``"asymmetric-bouc-wen"`` (`AsymmetricBoucWenStage`), ``"lugre"`` (`LuGreStage`),
         ``"parallel-dahl"`` (`ParallelDahlStage`) and ``"bouc-wen-oscillator"``
         (`BoucWenOscillator`); least squares find
         ``"prandtl-ishlinskii"`` (`PrandtlIshlinskiiStage`) and

@@ -3,6 +3,7 @@
 from .apparatus import Amplifier as Amplifier
 from .apparatus import Preconditioning as Preconditioning
 from .apparatus import Sensor as Sensor
+from .asymmetric_bouc_wen import AsymmetricBoucWenStage as AsymmetricBoucWenStage
 from .base import ForceState as ForceState
 from .base import Response as Response
 from .base import Stage as Stage
@@ -21,6 +22,9 @@ from .generalised_prandtl_ishlinskii import (
 from .inverse import Inverse as Inverse
 from .inverse import InverseSession as InverseSession
 from .inverse import PlayedVoltage as PlayedVoltage
+from .lugre import LuGreStage as LuGreStage
+from .lugre import LuGreState as LuGreState
+from .maxwell_slip import MaxwellSlipStage as MaxwellSlipStage
 from .parallel_dahl import ParallelDahlStage as ParallelDahlStage
 from .parallel_dahl import ParallelDahlState as ParallelDahlState
 from .polynomial_prandtl_ishlinskii import (
@@ -30,6 +34,9 @@ from .prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage
 from .prandtl_ishlinskii import PrandtlIshlinskiiState as PrandtlIshlinskiiState
 from .preisach import PreisachStage as PreisachStage
 from .preisach import PreisachState as PreisachState
+from .rate_dependent_prandtl_ishlinskii import (
+    RateDependentPrandtlIshlinskiiStage as RateDependentPrandtlIshlinskiiStage,
+)
 from .virtual import VirtualResponse as VirtualResponse
 from .virtual import VirtualStage as VirtualStage
 from .xy import XYLog as XYLog

@@ -39,6 +39,7 @@
 mod back_calculation;
 pub mod controller;
 pub mod creep;
+pub mod cubic_motion;
 mod cubic_segment;
 pub mod disturbance_observer;
 pub mod dynamics;
@@ -73,9 +74,10 @@ pub use hysteresis_observer::{
     HysteresisObserved, HysteresisObservedState, HysteresisObserver, Observable, ObservedOperator,
 };
 pub use inverse::{
-    BoucWenInverse, BoucWenInverseState, CreepingInverse, CreepingInverseState, DahlInverse,
-    FeedbackInverse, FeedbackInverseState, FirstOrderDahlInverse, InputInverse, InputInverseState,
-    Inverse, InverseState, ModesInverse, ModesInverseState, OperatorInverse, OscillatorInverse,
+    AsymmetricBoucWenInverse, BoucWenInverse, BoucWenInverseState, CreepingInverse,
+    CreepingInverseState, DahlInverse, FeedbackInverse, FeedbackInverseState,
+    FirstOrderDahlInverse, InputInverse, InputInverseState, Inverse, InverseState, LuGreInverse,
+    LuGreInverseState, ModesInverse, ModesInverseState, OperatorInverse, OscillatorInverse,
     ParallelDahlInverse, PlayInverse, PrandtlIshlinskiiInverse, SampledDahlInverse,
 };
 pub use iterative_learning::IterativeLearning;

@@ -5,16 +5,20 @@
 //! the *branch* that leaves a state in one direction, and the branch gives the state at a
 //! distance along it.
 
+mod asymmetric_bouc_wen;
 mod bouc_wen;
 mod dahl;
 mod decay;
 mod first_order_dahl;
+mod lugre;
 mod parallel_dahl;
 mod play;
 
+pub use asymmetric_bouc_wen::AsymmetricBoucWen;
 pub use bouc_wen::{BoucWen, BoucWenBranch, BoucWenState};
 pub use dahl::{Dahl, DahlBranch, DahlState};
 pub use first_order_dahl::FirstOrderDahl;
+pub use lugre::LuGre;
 pub use parallel_dahl::{FRICTION_ELEMENTS, ParallelDahl, ParallelDahlBranch, ParallelDahlState};
 pub use play::{Play, PlayBranch, PlayState};
 

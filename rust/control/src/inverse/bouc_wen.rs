@@ -1,4 +1,4 @@
-//! Feedforward: the inverse of the Bouc-Wen stage, sample by sample.
+//! Feedforward: the inverse of the Bouc-Wen stage, symmetric or not, sample by sample.
 //!
 //! ```text
 //! d u - h(u) = y,   y = (m xd'' + b xd' + k xd)/k
@@ -11,7 +11,7 @@
 
 use super::Inverse;
 use crate::error::{Result, check, finite, not_negative, positive, usable};
-use crate::hysteresis::{BoucWen, BoucWenState, Operator};
+use crate::hysteresis::{AsymmetricBoucWen, BoucWen, BoucWenState, Operator};
 
 /// Parameters of the inverse of a Bouc-Wen stage.
 ///
@@ -23,13 +23,16 @@ use crate::hysteresis::{BoucWen, BoucWenState, Operator};
 /// | `beta`, `gamma` | beta, gamma | 1/(V m^(n-1)) | beta + gamma >= 0, beta >= gamma |
 /// | `exponent` | n | 1 | >= 1 |
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BoucWenInverse {
+pub struct BoucWenInverse<O = BoucWen<f64>> {
     mass: f64,
     damping: f64,
     stiffness: f64,
     piezo_coefficient: f64,
-    operator: BoucWen<f64>,
+    operator: O,
 }
+
+/// Inverse of an asymmetric Bouc-Wen stage.
+pub type AsymmetricBoucWenInverse = BoucWenInverse<AsymmetricBoucWen<f64>>;
 
 impl BoucWenInverse {
     /// The inverse of the stage with these parameters, in SI units.
@@ -50,26 +53,77 @@ impl BoucWenInverse {
         gamma: f64,
         exponent: f64,
     ) -> Result<Self> {
-        finite("piezo_coefficient", piezo_coefficient, "m/V")?;
-        let right = piezo_coefficient.abs() > 0.0;
-        check("piezo_coefficient", piezo_coefficient, "m/V", right, "a value other than 0")?;
         finite("beta", beta, "1/V")?;
         finite("gamma", gamma, "1/V")?;
         let passive = gamma.abs() <= beta;
         check("gamma", gamma, "1/V", passive, "a value within +-beta, for an inverse")?;
-        let limit = beta + gamma;
-        let steepest = if limit > 0.0 { 2.0 * alpha * beta / limit } else { alpha };
-        let right = finite("alpha", alpha, "")?.max(steepest) < 1.0;
+        let right = finite("alpha", alpha, "")?.max(steepest(alpha, beta, gamma)) < 1.0;
         let expected = "alpha and 2 alpha beta/(beta + gamma) below 1, for an inverse";
         check("alpha", alpha, "", right && alpha >= 0.0, expected)?;
         let right = exponent >= 1.0 && exponent.is_finite();
         check("exponent", exponent, "", right, "a finite number, 1 or above")?;
+        let rise = alpha * piezo_coefficient;
+        let operator = BoucWen { rise, beta, gamma, exponent };
+        Self::with([mass, damping, stiffness, piezo_coefficient], operator)
+    }
+}
+
+impl AsymmetricBoucWenInverse {
+    /// The inverse of the stage with this mass (kg), damping (N s/m), stiffness (N/m) and piezo
+    /// coefficient (m/V), with alpha, and with beta, gamma, delta and epsilon (1/V).
+    ///
+    /// # Errors
+    /// Names the parameter that is out of its range: `sign_asymmetry` where one of the four rates
+    /// is below 0, `alpha` as in [`BoucWenInverse::new`], with the rates above h = 0 and with those
+    /// below it.
+    pub fn asymmetric(
+        [mass, damping, stiffness, piezo_coefficient]: [f64; 4],
+        alpha: f64,
+        [beta, gamma, delta, epsilon]: [f64; 4],
+    ) -> Result<Self> {
+        finite("beta", beta, "1/V")?;
+        finite("gamma", gamma, "1/V")?;
+        finite("asymmetry", delta, "1/V")?;
+        finite("sign_asymmetry", epsilon, "1/V")?;
+        // A loop above h = 0 goes away from it rising and back falling, one below it the other way.
+        let sides = [(beta + epsilon, gamma + delta), (beta - epsilon, gamma - delta)];
+        let right = sides.iter().all(|(beta, gamma)| gamma.abs() <= *beta);
+        let expected = "asymmetries with which no rate beta +- epsilon +- (gamma + delta) or \
+                        beta - epsilon +- (gamma - delta) is negative, for an inverse";
+        check("sign_asymmetry", epsilon, "1/V", right, expected)?;
+        let slopes = sides.map(|(beta, gamma)| steepest(alpha, beta, gamma));
+        let right = finite("alpha", alpha, "")?.max(slopes[0]).max(slopes[1]) < 1.0;
+        let expected = "alpha and 2 alpha beta/(beta + gamma) below 1, above and below h = 0, for \
+                        an inverse";
+        check("alpha", alpha, "", right && alpha >= 0.0, expected)?;
+        let operator = AsymmetricBoucWen {
+            rise: alpha * piezo_coefficient,
+            beta,
+            gamma,
+            asymmetry: delta,
+            sign_asymmetry: epsilon,
+        };
+        Self::with([mass, damping, stiffness, piezo_coefficient], operator)
+    }
+}
+
+/// Slope of the hysteresis relative to d after a reversal in saturation.
+fn steepest(alpha: f64, beta: f64, gamma: f64) -> f64 {
+    let limit = beta + gamma;
+    if limit > 0.0 { 2.0 * alpha * beta / limit } else { alpha }
+}
+
+impl<O: Operator<f64, State = BoucWenState<f64>>> BoucWenInverse<O> {
+    fn with([mass, damping, stiffness, piezo_coefficient]: [f64; 4], operator: O) -> Result<Self> {
+        finite("piezo_coefficient", piezo_coefficient, "m/V")?;
+        let right = piezo_coefficient.abs() > 0.0;
+        check("piezo_coefficient", piezo_coefficient, "m/V", right, "a value other than 0")?;
         Ok(Self {
             mass: not_negative("mass", mass, "kg")?,
             damping: not_negative("damping", damping, "N s/m")?,
             stiffness: positive("stiffness", stiffness, "N/m")?,
             piezo_coefficient,
-            operator: BoucWen { rise: alpha * piezo_coefficient, beta, gamma, exponent },
+            operator,
         })
     }
 
@@ -135,7 +189,7 @@ pub struct BoucWenInverseState {
 
 crate::snapshot!(BoucWenInverseState { u, memory });
 
-impl Inverse for BoucWenInverse {
+impl<O: Operator<f64, State = BoucWenState<f64>>> Inverse for BoucWenInverse<O> {
     type State = BoucWenInverseState;
 
     fn rest(&self) -> Self::State {

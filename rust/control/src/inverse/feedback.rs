@@ -136,7 +136,7 @@ impl OscillatorInverse {
 }
 
 /// A piezo coefficient that drives.
-fn not_zero(piezo_coefficient: f64) -> Result<f64> {
+pub(super) fn not_zero(piezo_coefficient: f64) -> Result<f64> {
     finite("piezo_coefficient", piezo_coefficient, "N/V")?;
     let right = piezo_coefficient.abs() > 0.0;
     check("piezo_coefficient", piezo_coefficient, "N/V", right, "a value other than 0")

@@ -10,11 +10,12 @@ mod dahl;
 mod drive;
 mod feedback;
 mod input;
+mod lugre;
 mod modes;
 mod neural_network;
 mod play;
 
-pub use bouc_wen::{BoucWenInverse, BoucWenInverseState};
+pub use bouc_wen::{AsymmetricBoucWenInverse, BoucWenInverse, BoucWenInverseState};
 pub use creeping::{CreepingInverse, CreepingInverseState};
 pub use dahl::{DahlInverse, InverseState, SampledDahlInverse};
 pub use drive::after_drive;
@@ -23,6 +24,7 @@ pub use feedback::{
     ParallelDahlInverse,
 };
 pub use input::{InputInverse, InputInverseState, OperatorInverse, PrandtlIshlinskiiInverse};
+pub use lugre::{LuGreInverse, LuGreInverseState};
 pub use modes::{ModesInverse, ModesInverseState};
 pub use neural_network::{
     MOST_NETWORK_PLAYS, MOST_UNITS, NetworkNumbers, NeuralNetworkInverse, NeuralNetworkState,

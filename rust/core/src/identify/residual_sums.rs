@@ -2,6 +2,7 @@
 
 use piezotrack_control::Number;
 use piezotrack_control::creep::CubicLag;
+use piezotrack_control::cubic_motion::between;
 use pulp::Simd;
 
 use super::candidate::Candidate;
@@ -9,7 +10,7 @@ use super::creep_shares::{MOST_CREEP, MOST_SHARES, SLACK, ShareSums, Shares};
 use super::record::Record;
 use crate::integrator::{FeedbackState, Observer};
 use crate::math::Lanes;
-use crate::signal::{FractionalDelay, Stop, between, index};
+use crate::signal::{FractionalDelay, Stop, index};
 
 /// Cost and offset of a candidate.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,11 +8,11 @@
 //! order.
 
 use piezotrack_control::Number;
+use piezotrack_control::cubic_motion::{CubicVelocity, between, turning_time};
 use piezotrack_control::hysteresis::Operator;
 
 use super::propagator::Propagator;
 use super::traits::{Coupling, FeedbackState};
-use crate::signal::between;
 
 /// An operator without dry friction in feedback, coupled to second or fourth order.
 #[derive(Clone, Copy, Debug)]
@@ -62,7 +62,18 @@ pub(super) fn predict<N: Number, O: Operator<N>>(
     rise: N,
 ) -> Prediction<N> {
     let (force, slope) = operator.output(&state.memory);
-    let change = slope * state.w;
+    extrapolate(linear, state, (force, slope * state.w), drive, rise)
+}
+
+/// The step with a force that changes at a constant rate, by `change` over the step.
+#[inline(always)]
+pub(super) fn extrapolate<N: Number, M>(
+    linear: &Propagator<N>,
+    state: &FeedbackState<N, M>,
+    (force, change): (N, N),
+    drive: N,
+    rise: N,
+) -> Prediction<N> {
     let f0 = drive - force;
     let f1 = rise - change;
     // The force's change comes last: it is what the chain of operations waits for.
@@ -94,8 +105,18 @@ pub(super) fn conclude<N: Number>(
     ahead: &Prediction<N>,
     (force, slope): (N, N),
 ) -> (N, N) {
+    conclude_with(linear, ahead, (force, slope * ahead.w))
+}
+
+/// The same with the force at the end and its change over a step at the rate that it has there.
+#[inline(always)]
+pub(super) fn conclude_with<N: Number>(
+    linear: &Propagator<N>,
+    ahead: &Prediction<N>,
+    (force, change): (N, N),
+) -> (N, N) {
     let excess = ahead.force + ahead.change - force;
-    let bend = ahead.change - slope * ahead.w;
+    let bend = ahead.change - change;
     let x = linear.excess.x.mul_add(excess, linear.bend.x.mul_add(bend, ahead.x));
     let w = linear.excess.w.mul_add(excess, linear.bend.w.mul_add(bend, ahead.w));
     (x, w)
@@ -150,7 +171,7 @@ pub(super) fn advance_operator<N: Number, O: Operator<N>>(
     w: N,
 ) -> O::State {
     let turned = from.w * w;
-    let velocity = CubicVelocity::between(from, x, w);
+    let velocity = CubicVelocity::along(sign(from.w), [from.x, from.w], [x, w]);
     // A lane that turns does not go back besides; each lane takes its own way, whatever the others.
     let dips = turned.where_negative(x.like(1.0), velocity.dips());
     if dips.any_negative() {
@@ -174,58 +195,6 @@ pub(super) fn advance_operator<N: Number, O: Operator<N>>(
     }
 }
 
-/// Velocity along the direction of motion over a step, `c + b s + a s^2` for s from 0 to 1: that
-/// of the cubic through displacement and velocity at both ends.
-pub(super) struct CubicVelocity<N> {
-    pub direction: N,
-    pub a: N,
-    pub b: N,
-    pub c: N,
-}
-
-impl<N: Number> CubicVelocity<N> {
-    /// Of a step that starts in the direction of its velocity.
-    #[inline(always)]
-    fn between<M>(from: &FeedbackState<N, M>, x: N, w: N) -> Self {
-        Self::along(sign(from.w), from, x, w)
-    }
-
-    /// Of a step that starts in a given direction.
-    #[inline(always)]
-    pub fn along<M>(direction: N, from: &FeedbackState<N, M>, x: N, w: N) -> Self {
-        let rise = x - from.x;
-        let c3 = rise.mul_add(rise.like(-2.0), from.w + w);
-        let c2 = rise - from.w - c3;
-        Self {
-            direction,
-            a: direction * (c3 + c3 + c3),
-            b: direction * (c2 + c2),
-            c: direction * from.w,
-        }
-    }
-
-    /// Below 0 where the velocity starts along the direction, passes zero and comes back to it:
-    /// both ends of such a step look as if it had not turned.
-    #[inline(always)]
-    pub fn dips(&self) -> N {
-        let Self { a, b, c, .. } = *self;
-        let one = a.like(1.0);
-        let roots = (a * c).mul_add(a.like(4.0), -(b * b));
-        let falls = b.where_negative(roots, one);
-        let rises = (-(a + a + b)).where_negative(falls, one);
-        (-c).where_negative(rises, one)
-    }
-
-    /// Both parts of the step after which the velocity of a step that dips passes zero.
-    #[inline(always)]
-    pub fn dip(&self) -> [N; 2] {
-        let Self { a, b, c, .. } = *self;
-        let square = b.mul_add(b, -((a * c) * a.like(4.0)));
-        let root = square.where_negative(a.like(0.0), square).sqrt();
-        [(c + c) / (root - b), (root - b) / (a + a)]
-    }
-}
-
 /// +1 or -1; +1 for 0.
 #[inline(always)]
 pub(super) fn sign<N: Number>(value: N) -> N {
@@ -233,10 +202,7 @@ pub(super) fn sign<N: Number>(value: N) -> N {
 }
 
 /// Displacement where the velocity passes zero, on the cubic through both ends.
-///
-/// The time comes from a straight line through the velocities: the displacement is flat there,
-/// so its error is of fourth order.
 #[inline(always)]
 fn turning_point<N: Number, M>(from: &FeedbackState<N, M>, x: N, w: N) -> N {
-    between(from.x, from.w, x, w, from.w / (from.w - w))
+    between(from.x, from.w, x, w, turning_time(from.w, w))
 }

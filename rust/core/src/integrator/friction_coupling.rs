@@ -14,10 +14,11 @@
 //! Reversals, sticking and breaking away are located inside the step, each lane by itself.
 
 use piezotrack_control::Number;
+use piezotrack_control::cubic_motion::CubicVelocity;
 use piezotrack_control::hysteresis::{Dahl, DahlBranch, DahlState, Operator};
 
 use super::equilibrium;
-use super::feedback_coupling::{CubicVelocity, Prediction, correct, predict, sign};
+use super::feedback_coupling::{Prediction, correct, predict, sign};
 use super::propagator::Propagator;
 use super::stepping_loop::TERMS;
 use super::traits::{Coupling, FeedbackState};
@@ -413,14 +414,14 @@ fn magnitude<N: Number>(value: N) -> N {
 #[inline(always)]
 fn reverses<N: Number, M>(direction: N, from: &FeedbackState<N, M>, x: N, w: N) -> N {
     let end = direction * w;
-    end.where_negative(end, CubicVelocity::along(direction, from, x, w).dips())
+    end.where_negative(end, CubicVelocity::along(direction, [from.x, from.w], [x, w]).dips())
 }
 
 /// Part of a leg along `direction` after which its velocity first passes zero, on the cubic
 /// through displacement and velocity at both ends.
 #[inline(always)]
 fn turning_fraction<N: Number, M>(direction: N, from: &FeedbackState<N, M>, x: N, w: N) -> N {
-    let CubicVelocity { a, b, c, .. } = CubicVelocity::along(direction, from, x, w);
+    let CubicVelocity { a, b, c, .. } = CubicVelocity::along(direction, [from.x, from.w], [x, w]);
     let square = b.mul_add(b, -((a * c) * a.like(4.0)));
     let root = square.where_negative(a.like(0.0), square).sqrt();
     // Each form where it does not cancel.

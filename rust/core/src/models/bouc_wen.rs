@@ -11,6 +11,7 @@ use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{BoucWen, BoucWenState, Operator};
 use piezotrack_control::inverse::{BoucWenInverse, BoucWenInverseState};
 
+use super::input_kernel::{InputHysteresis, InputKernel, plants_with_input};
 use super::mechanics_parameters::{V, X};
 use super::plant::KernelModel;
 use super::search_ranges::{Measures, Ranges};
@@ -19,12 +20,9 @@ use super::traits::{
     from_rest_only, kernel_equilibrium, leading, simulate_kernel,
 };
 use super::values::{Held, ParameterInfo, Values};
-use crate::design::{Gains, LoopPlant};
+use crate::design::LoopPlant;
 use crate::error::{Result, finite, not_zero, positive, within};
-use crate::integrator::{
-    InputCoupling, InputMemory, Kernel, LumpedStage, Mechanics, Order, Parameters, equilibrium,
-    linear,
-};
+use crate::integrator::{InputMemory, LumpedStage, Mechanics, Order, Parameters};
 
 /// The unit of beta and gamma is that for n = 1; in general it is 1/(V m^(n-1)).
 const PARAMETERS: &[ParameterInfo] = &[
@@ -137,10 +135,10 @@ impl BoucWenStage {
 }
 
 impl KernelModel for BoucWenStage {
-    type Kernel = BoucWenKernel;
+    type Kernel = InputKernel<BoucWenHysteresis>;
 
-    fn lumped(&self) -> LumpedStage<BoucWenKernel> {
-        let kernel = BoucWenKernel { exponent: self.exponent };
+    fn lumped(&self) -> LumpedStage<Self::Kernel> {
+        let kernel = InputKernel(BoucWenHysteresis { exponent: self.exponent });
         LumpedStage { kernel, parameters: leading(&self.values()) }
     }
 
@@ -182,14 +180,8 @@ impl StageModel for BoucWenStage {
         simulate_kernel(self, experiment)
     }
 
-    /// On its settled loop between the two voltages: `d - dh/du`.
     fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
-        let piezo = self.piezo_coefficient;
-        let gains = Gains::of(&self.operator(), low, high, |slope| piezo - slope)?;
-        let Mechanics { mass, damping, stiffness } = self.mechanics;
-        let natural = libm::sqrt(stiffness / mass);
-        let ratio = 0.5 * damping / (mass * natural);
-        gains.plants(|gain| LoopPlant::mode(gain, natural / core::f64::consts::TAU, ratio))
+        plants_with_input(&self.operator(), &self.mechanics, self.piezo_coefficient, low, high)
     }
 }
 
@@ -212,7 +204,8 @@ impl Searchable for BoucWenStage {
     }
 
     fn kernel<V: KernelVisitor>(held: &Held, _order: Order, visitor: V) -> V::Output {
-        visitor.visit(BoucWenKernel { exponent: held.value("exponent").unwrap_or(1.0) })
+        let exponent = held.value("exponent").unwrap_or(1.0);
+        visitor.visit(InputKernel(BoucWenHysteresis { exponent }))
     }
 }
 
@@ -235,61 +228,19 @@ impl Invertible for BoucWenStage {
 /// Largest exponent: far beyond it the bend is a corner, and the steps become too short.
 const MOST_EXPONENT: f64 = 20.0;
 
-/// Bouc-Wen stages of one exponent.
+/// The hysteresis of Bouc-Wen stages of one exponent.
 #[derive(Clone, Copy, Debug)]
-pub struct BoucWenKernel {
+pub struct BoucWenHysteresis {
     /// n, the same in all lanes.
     pub exponent: f64,
 }
 
-impl BoucWenKernel {
+impl InputHysteresis for BoucWenHysteresis {
+    type Operator<N: Number> = BoucWen<N>;
+
     #[inline(always)]
-    fn operator<N: Number>(self, parameters: &Parameters<N>) -> BoucWen<N> {
+    fn operator<N: Number>(&self, parameters: &Parameters<N>) -> BoucWen<N> {
         let [_, _, _, gain, alpha, beta, gamma, ..] = *parameters;
         BoucWen { rise: alpha * gain, beta, gamma, exponent: self.exponent }
-    }
-}
-
-impl Kernel for BoucWenKernel {
-    type Coupling<N: Number> = InputCoupling<N, BoucWen<N>>;
-
-    /// The drive enters in volts.
-    #[inline(always)]
-    fn coupling<N: Number>(
-        &self,
-        parameters: &Parameters<N>,
-        step: f64,
-        halvings: u32,
-    ) -> (Self::Coupling<N>, N) {
-        let [_, _, stiffness, gain, ..] = *parameters;
-        let linear = linear(parameters, step, halvings);
-        let operator = self.operator(parameters);
-        (InputCoupling { linear, operator, stiffness, gain }, gain.like(1.0))
-    }
-
-    #[inline(always)]
-    fn rest<N: Number>(&self, parameters: &Parameters<N>) -> InputMemory<N, BoucWenState<N>> {
-        let zero = parameters[0].like(0.0);
-        InputMemory { operator: self.operator(parameters).rest(), input: zero, rise: zero }
-    }
-
-    #[inline(always)]
-    fn approach<N: Number>(
-        &self,
-        parameters: &Parameters<N>,
-        from: (N, InputMemory<N, BoucWenState<N>>),
-        volts: N,
-    ) -> (N, InputMemory<N, BoucWenState<N>>) {
-        equilibrium::input(&self.operator(parameters), parameters[3], &from.1, volts)
-    }
-
-    /// k h, what the hysteresis takes off the drive's force.
-    #[inline(always)]
-    fn force(
-        &self,
-        parameters: &Parameters<f64>,
-        memory: &InputMemory<f64, BoucWenState<f64>>,
-    ) -> f64 {
-        parameters[2] * memory.operator.value
     }
 }

@@ -19,7 +19,7 @@ use super::creep::{MOST_RELAXATIONS, Relaxation};
 use super::duhem_operator::{DuhemInverse, DuhemInverseState, DuhemOperator, DuhemParameters};
 use super::dynamics_parameters::DYNAMICS;
 use super::input_stage::{InputOperator, InputStage, inverse_state, state_at_rest};
-use super::superposition::{FittedWeights, Places, Rest, Signals, SignalsOf, Superposition};
+use super::superposition::{FittedWeights, Places, Rest, Shape, Signals, SignalsOf, Superposition};
 use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
 use super::values::{ParameterInfo, Values};
 use crate::design::{Gains, LoopPlant};
@@ -212,8 +212,8 @@ impl Superposition for DuhemStage {
     const PLACES: Places = Places::None;
 
     /// Alpha, times the range of the drive.
-    fn shapes() -> Vec<(f64, f64)> {
-        vec![RATES]
+    fn shapes() -> Vec<Shape> {
+        vec![Shape::about(RATES.0, RATES.1)]
     }
 
     fn check_places(_places: &[f64]) -> Result<()> {

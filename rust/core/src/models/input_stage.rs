@@ -95,6 +95,12 @@ pub trait InputOperator: Copy + Debug {
     /// The state before any voltage.
     fn rest(&self) -> Self::State;
 
+    /// Whether the output depends on how fast the input moves.
+    const BY_RATE: bool = false;
+
+    /// Sets how fast the input moves from now on, V/s.
+    fn at_rate(&self, _state: &mut Self::State, _rate: f64) {}
+
     /// Takes the input to `volts` and returns the output, m.
     fn follow(&self, state: &mut Self::State, volts: f64) -> f64;
 
@@ -306,6 +312,10 @@ impl<O: Segmented> InputStage<O> {
     ) -> usize {
         let InputStageFlow { relaxation, zero, step, deviation, least } = flow;
         let from = self.operator.input(&state.operator);
+        if O::BY_RATE {
+            self.operator.at_rate(&mut state.operator, (volts - from).abs() / *step);
+            self.jump(state, from, *zero);
+        }
         let (mut done, mut parts, mut idle) = (0.0, 1, 0);
         let splits = self.relaxation.remembers() && (volts - from).abs() > *least;
         while splits && parts < MOST_PARTS && idle < MOST_IDLE {

@@ -73,16 +73,24 @@ impl Stage {
                 visitor.visit(kernelled(one.stage.lumped(kernel), one, voltages))
             }
             (Self::BoucWen(one), _) => visitor.visit(kernelled(one.stage.lumped(), one, voltages)),
+            (Self::AsymmetricBoucWen(one), _) => {
+                visitor.visit(kernelled(one.stage.lumped(), one, voltages))
+            }
             (Self::FirstOrderDahl(one), _) => {
                 visitor.visit(kernelled(one.stage.lumped(), one, voltages))
             }
             (Self::ParallelDahl(one), _) => {
                 visitor.visit(kernelled(one.stage.lumped(), one, voltages))
             }
+            (Self::LuGre(one), _) => visitor.visit(kernelled(one.stage.lumped(), one, voltages)),
             (Self::BoucWenOscillator(one), _) => {
                 visitor.visit(kernelled(one.stage.lumped(), one, voltages))
             }
             (Self::PrandtlIshlinskii(stage), StageState::PrandtlIshlinskii(state)) => {
+                visitor.visit(Plays { stage, start: state, zero: stage.zero() })
+            }
+            (Self::MaxwellSlip(stage), StageState::MaxwellSlip(state)) => {
+                let stage = &stage.as_plays();
                 visitor.visit(Plays { stage, start: state, zero: stage.zero() })
             }
             _ => return None,

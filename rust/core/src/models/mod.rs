@@ -1,5 +1,6 @@
 //! Models of a stage: one file each, the traits that it implements, and the list of models.
 
+mod asymmetric_bouc_wen;
 mod bouc_wen;
 mod bouc_wen_oscillator;
 mod creep;
@@ -12,8 +13,11 @@ mod dynamics_parameters;
 mod everett;
 mod first_order_dahl;
 mod generalised_prandtl_ishlinskii;
+mod input_kernel;
 mod input_stage;
 mod lanes;
+mod lugre;
+mod maxwell_slip;
 mod mechanics_parameters;
 mod parallel_dahl;
 mod plant;
@@ -21,6 +25,7 @@ mod polynomial_prandtl_ishlinskii;
 mod prandtl_ishlinskii;
 mod preisach;
 mod preisach_operator;
+mod rate_dependent_prandtl_ishlinskii;
 mod registry;
 mod reversals;
 mod search_ranges;
@@ -29,7 +34,8 @@ mod tanh_envelope;
 mod traits;
 mod values;
 
-pub use bouc_wen::{BoucWenKernel, BoucWenStage};
+pub use asymmetric_bouc_wen::{AsymmetricBoucWenHysteresis, AsymmetricBoucWenStage};
+pub use bouc_wen::{BoucWenHysteresis, BoucWenStage};
 pub use bouc_wen_oscillator::{BoucWenOscillator, BoucWenOscillatorKernel};
 pub use creep::{
     Creep, Dynamics, MOST_MODES, MOST_RELAXATIONS, Mode, Modes, Relaxation, RelaxationFlow,
@@ -48,8 +54,11 @@ pub use generalised_prandtl_ishlinskii::{
     GeneralisedPlays, GeneralisedPlaysInverse, GeneralisedPlaysInverseState, GeneralisedPlaysState,
     GeneralisedPrandtlIshlinskiiStage,
 };
+pub use input_kernel::{InputHysteresis, InputKernel};
 pub use input_stage::{InputOperator, InputStage, InputStageFlow, InputStageState, Segmented};
 pub use lanes::{LanedPlant, LanedVisitor};
+pub use lugre::{LuGreKernel, LuGreStage};
+pub use maxwell_slip::{MaxwellSlip, MaxwellSlipStage};
 pub use parallel_dahl::{ParallelDahlKernel, ParallelDahlStage};
 pub use plant::{KernelFlow, KernelModel, Plant, Settling};
 pub use polynomial_prandtl_ishlinskii::{
@@ -63,11 +72,15 @@ pub use preisach::PreisachStage;
 pub use preisach_operator::{
     PreisachInverse, PreisachInverseState, PreisachOperator, PreisachState,
 };
+pub use rate_dependent_prandtl_ishlinskii::{
+    DilatedPlays, DilatedPlaysInverse, DilatedPlaysInverseState, DilatedPlaysState,
+    RateDependentPrandtlIshlinskiiStage,
+};
 pub use registry::{FoundBy, Model, Stage, StageFlow, StageInverse, StageInverseState, StageState};
 pub use reversals::{MOST_REVERSALS, Reversals};
 pub use search_ranges::{Measures, ModeShown, NOMINAL_STIFFNESS, Range, Ranges};
 pub use superposition::{
-    AnySuperposition, FittedWeights, Places, Rest, Signals, SignalsOf, Superposition,
+    AnySuperposition, FittedWeights, Places, Rest, Shape, Signals, SignalsOf, Superposition,
 };
 pub use tanh_envelope::TanhEnvelope;
 pub use traits::{

@@ -119,7 +119,11 @@ impl PlayHysteresis {
             dead_zone_thresholds: [dead_zone_thresholds.last().copied().unwrap_or(0.0); MOST_ZONES],
             dead_zone_weights: [0.0; MOST_ZONES],
         };
-        plays.thresholds[..count].copy_from_slice(&checked_thresholds(thresholds, "V")?);
+        plays.thresholds[..count].copy_from_slice(&checked_thresholds(
+            "thresholds",
+            thresholds,
+            "V",
+        )?);
         for (i, weight) in weights.iter().enumerate() {
             plays.weights[i] = along(&format!("weights[{i}]"), *weight, "m/V", sign)?;
         }
@@ -160,11 +164,11 @@ pub(super) fn along(name: &str, weight: f64, unit: &str, sign: f64) -> Result<f6
     Err(Error::parameter(name, format!("{} {unit}", shown(weight)), expected))
 }
 
-/// Thresholds of plays, which are not below 0 and ascend.
-pub(super) fn checked_thresholds(thresholds: &[f64], unit: &str) -> Result<Vec<f64>> {
+/// Thresholds, which are not below 0 and ascend.
+pub(super) fn checked_thresholds(of: &str, thresholds: &[f64], unit: &str) -> Result<Vec<f64>> {
     let mut before = 0.0;
     let check = |(i, threshold): (usize, &f64)| {
-        let name = format!("thresholds[{i}]");
+        let name = format!("{of}[{i}]");
         before = ascending(&name, not_negative(&name, *threshold, unit)?, before, unit)?;
         Ok(before)
     };

@@ -315,11 +315,15 @@ macro_rules! models {
 models! {
     Dahl: Creeping<super::DahlStage>, swarm;
     BoucWen: Creeping<super::BoucWenStage>, swarm;
+    AsymmetricBoucWen: Creeping<super::AsymmetricBoucWenStage>, swarm;
     FirstOrderDahl: Creeping<super::FirstOrderDahlStage>, swarm;
     ParallelDahl: Creeping<super::ParallelDahlStage>, swarm;
+    LuGre: Creeping<super::LuGreStage>, swarm;
     BoucWenOscillator: Creeping<super::BoucWenOscillator>, swarm;
     PrandtlIshlinskii: super::PrandtlIshlinskiiStage, least_squares;
+    MaxwellSlip: super::MaxwellSlipStage, least_squares;
     GeneralisedPrandtlIshlinskii: super::GeneralisedPrandtlIshlinskiiStage, least_squares;
+    RateDependentPrandtlIshlinskii: super::RateDependentPrandtlIshlinskiiStage, least_squares;
     PolynomialPrandtlIshlinskii: super::PolynomialPrandtlIshlinskiiStage, least_squares;
     Preisach: super::PreisachStage, least_squares;
     Duhem: super::DuhemStage, least_squares;

@@ -40,6 +40,23 @@ pub enum Places {
     Levels,
 }
 
+/// A number above 0 that shapes signals.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shape {
+    /// Least and largest, between which it is searched on a logarithmic scale.
+    pub range: (f64, f64),
+    /// What it is where a record does not tell.
+    pub neutral: f64,
+}
+
+impl Shape {
+    /// A number that is neutral in the middle of its range.
+    #[must_use]
+    pub fn about(low: f64, high: f64) -> Self {
+        Self { range: (low, high), neutral: libm::sqrt(low * high) }
+    }
+}
+
 /// Signals of the drive, whose weighted sum comes out of a hysteresis.
 pub trait Signals: Debug + Send + Sync {
     /// How many; the first is the drive itself, or an envelope of it, without memory.
@@ -93,10 +110,10 @@ pub trait Superposition: StageModel {
     /// Where its signals have their places.
     const PLACES: Places;
 
-    /// Ranges of numbers above 0 that shape the signals and are searched around the least squares
-    /// on a logarithmic scale. A number that gains little stays at the middle of its range.
+    /// Numbers that shape the signals and are searched around the least squares. One that gains
+    /// little stays at its neutral value.
     #[must_use]
-    fn shapes() -> Vec<(f64, f64)> {
+    fn shapes() -> Vec<Shape> {
         Vec::new()
     }
 
@@ -125,7 +142,7 @@ pub trait AnySuperposition: Sync {
     /// See [`Superposition::PLACES`].
     fn places(&self) -> Places;
     /// See [`Superposition::shapes`].
-    fn shapes(&self) -> Vec<(f64, f64)>;
+    fn shapes(&self) -> Vec<Shape>;
     /// See [`Superposition::check_places`].
     ///
     /// # Errors
@@ -155,7 +172,7 @@ impl<M: Superposition> AnySuperposition for Of<M> {
         M::PLACES
     }
 
-    fn shapes(&self) -> Vec<(f64, f64)> {
+    fn shapes(&self) -> Vec<Shape> {
         M::shapes()
     }
 

@@ -1,6 +1,6 @@
 //! Fractional delay of a displacement.
 
-use piezotrack_control::Number;
+use piezotrack_control::cubic_motion::between;
 
 use crate::error::Result;
 use crate::math::room;
@@ -46,13 +46,4 @@ impl FractionalDelay {
         let whole = libm::floor(samples);
         Self { whole: whole as usize, part: 1.0 - (samples - whole) }
     }
-}
-
-/// The cubic through values and scaled slopes at 0 and 1, at `s`.
-#[inline(always)]
-pub(crate) fn between<N: Number>(x0: N, w0: N, x1: N, w1: N, s: N) -> N {
-    let rise = x1 - x0;
-    let c3 = rise.mul_add(rise.like(-2.0), w0 + w1);
-    let c2 = rise - w0 - c3;
-    s.mul_add(s.mul_add(s.mul_add(c3, c2), w0), x0)
 }

@@ -12,7 +12,7 @@ pub use delay::delayed;
 pub use drive::{Drive, Hold, NEVER, Stop};
 pub use turning_points::turns;
 
-pub(crate) use delay::{FractionalDelay, between};
+pub(crate) use delay::FractionalDelay;
 pub(crate) use detrend::without_drift;
 pub(crate) use drive::{all_finite, index, largest_difference, range};
 pub(crate) use frequency_response::Spectrum;

@@ -34,7 +34,8 @@ impl Fit<'_> {
 
     /// Where the creep stands before record `r` behind each of so many inputs.
     pub fn creep_before(&self, r: usize, width: usize) -> Vec<Vec<f64>> {
-        let drive = self.common.records[r].drive;
+        let record = &self.common.records[r];
+        let drive = record.drive;
         let mut path = self.before(r);
         let mut inputs = vec![0.0; width];
         let whole_only = width == 1;
@@ -65,7 +66,7 @@ impl Fit<'_> {
         let mut followers: Vec<Follower> =
             inputs.iter().map(|input| Follower::at_rest(&creep, *input, &[])).collect();
         for &volts in &drive.u[1..] {
-            take(self, &mut path, (volts, drive.dt), &mut inputs);
+            take(self, &mut path, (volts, record.step(1)), &mut inputs);
             for (follower, input) in followers.iter_mut().zip(&inputs) {
                 follower.next(&creep, &flow, drive.hold, *input);
             }
@@ -105,16 +106,15 @@ impl Fit<'_> {
         let mut path = self.before(r);
         let creep = self.creep_before(r, 1);
         let mut follower: Option<Follower> = None;
-        let through = |volts: &f64| {
-            let dt = if follower.is_some() { drive.dt } else { f64::INFINITY };
-            self.push(&mut path, *volts, dt);
+        let through = |(k, volts): (usize, &f64)| {
+            self.push(&mut path, *volts, self.common.records[r].step(k));
             let output = self.bent(self.sum(&path.signals));
             match &mut follower {
                 Some(follower) => follower.next(&relaxation, &flow, drive.hold, output),
                 none => none.insert(Follower::at_rest(&relaxation, output, &creep[0])).state.x,
             }
         };
-        Ok(drive.u.iter().take(self.windows[r].end).map(through).collect())
+        Ok(drive.u.iter().take(self.windows[r].end).enumerate().map(through).collect())
     }
 
     /// State of the stage before the first sample of record `r`; that of its mirror image where it
