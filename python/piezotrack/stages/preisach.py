@@ -53,9 +53,8 @@ class PreisachStage(Stage):
     `PrandtlIshlinskiiStage`.
 
     I. D. Mayergoyz, Physical Review Letters 56, 1518-1521, 1986, doi
-    10.1103/PhysRevLett.56.1518, eq. (1) and its wiping-out and congruency properties; on
-    piezoceramic actuators P. Ge, M. Jouaneh, Precision Engineering 17(3), 211-221, 1995, doi
-    10.1016/0141-6359(95)00002-U.
+    10.1103/PhysRevLett.56.1518; on piezoceramic actuators P. Ge, M. Jouaneh, Precision
+    Engineering 17(3), 211-221, 1995, doi 10.1016/0141-6359(95)00002-U.
 
     Parameters
     ----------
