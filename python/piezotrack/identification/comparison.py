@@ -134,10 +134,11 @@ class Comparison:
         Returns
         -------
         ndarray, shape (n,)
-            Displacement with the offset that was scored [m].
+            Displacement with the offset, and the drift, that were scored [m].
         """
         data, score = (self.train, row.train) if part == "train" else (self.test, row.test)
-        x: Array = row.fit.simulate(data, offset=score.offset).x
+        own = part == "test" and not self.carried
+        x: Array = row.fit.simulate(data, offset="own" if own else score.offset).x
         return x
 
     def summary(self) -> str:

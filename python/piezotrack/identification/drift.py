@@ -59,6 +59,30 @@ class Drift:
         return x
 
 
+    def of_another(self, t: Array, rest: Array, *, centred: bool) -> Array:
+        """Drift of another record of the same sensor, by least squares with this time constant.
+
+        Parameters
+        ----------
+        t : ndarray, shape (n,)
+            Times of that record [s].
+        rest : ndarray, shape (n,)
+            What the stage leaves of its readings [m].
+        centred : bool
+            Whether an offset is taken off besides.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Part of its readings [m].
+        """
+        fading = np.exp((t[0] - t) / self.time)
+        shape = fading - fading.mean() if centred else fading
+        size = float(shape @ shape)
+        found: Array = fading * (float(shape @ rest) / size if size > 0.0 else 0.0)
+        return found
+
+
 def asked_drift(drift: object) -> float | None:
     """Check what is asked of the drift of a record.
 

@@ -266,7 +266,7 @@ class IdentifiedModel:
         return self.delay if own is None else own.delay
 
     def _drift_on(self, data: Dataset) -> Array | float:
-        """Drift of the sensor on a record [m]: that of the one identified, else none."""
+        """Drift of the sensor on a record [m]: that of the one identified, else none yet."""
         own = self._own(data)
         start, drift = (self.start, self.drift) if own is None else (own.start, own.drift)
         return drift.at(data.t) if drift and same_beginning(start, data) else 0.0
@@ -287,7 +287,8 @@ class IdentifiedModel:
             The record. Its warm-up is simulated too.
         offset : float or "own", optional
             Added to the displacement [m]. ``"own"``: if an offset was fitted, the one that fits
-            this record's window best, otherwise none.
+            this record's window best, otherwise none; and if a drift was fitted, on another record
+            one of its own with the same time constant.
         history : {"virgin", "settled", "fit"}, optional
             What the stage went through before the record; see `identify`. Where it is not given:
             of a record identified as it was there, of another one what that record shows.
@@ -301,6 +302,12 @@ class IdentifiedModel:
             Motion in the window; offset and delay are in its displacement, the rest is the
             stage's own. The delay is that of the record where it is one of those identified.
         """
+        run = self._run(data, history, initial)
+        drift, shift = self._added(data, run.x, offset)
+        return replace(run, x=run.x + drift + shift)
+
+    def _run(self, data: Dataset, history: History | None, initial: StageState | None) -> Response:
+        """Response in the window of a record, as it is read but for an offset."""
         if not isinstance(data, Dataset):
             raise ParameterError(f"data is {type(data).__name__}: expected a Dataset")
         if data.drive_unit != (unit := self.drive_unit) and "m" in (unit, data.drive_unit):
@@ -317,9 +324,19 @@ class IdentifiedModel:
             for one in fields(run)
             if isinstance(value := getattr(run, one.name), np.ndarray)
         }
-        signals |= {"t": data.t, "u": data.u, "x": x + self._shift(data, x, offset)}
+        signals |= {"t": data.t, "u": data.u, "x": x}
         windowed: Response = replace(run, **signals)
         return windowed
+
+    def _added(
+        self, data: Dataset, x: Array, offset: float | Literal["own"]
+    ) -> tuple[Array | float, float]:
+        """Drift and offset to add to the displacement that is simulated of a record [m]."""
+        drift: Array | float = 0.0
+        known = [self.start, *(one.start for one in self.records)]
+        if self.drift and offset == "own" and not any(same_beginning(one, data) for one in known):
+            drift = self.drift.of_another(data.t, data.y - x, centred=self._fits_offset(data))
+        return drift, self._shift(data, x + drift, offset)
 
     def score(
         self,
@@ -348,9 +365,9 @@ class IdentifiedModel:
             Percentages refer to the stroke of the record identified: of one of several to its
             own, of another record to the largest.
         """
-        x = self.simulate(data, offset=0.0, history=history, initial=initial).x
-        shift = self._shift(data, x, offset)
-        error = data.y - x - shift
+        x = self._run(data, history, initial).x
+        drift, shift = self._added(data, x, offset)
+        error = data.y - x - drift - shift
         own = self._own(data)
         return Score(
             rms=float(np.sqrt(np.mean(error**2))),

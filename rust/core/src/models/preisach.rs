@@ -149,6 +149,19 @@ impl Signals for Shares {
         self.rest.clone()
     }
 
+    /// Neighbouring cells: a drive of one amplitude tells of rows and columns only.
+    fn alike(&self) -> Vec<(usize, usize)> {
+        let count = self.cells.levels().len().saturating_sub(1);
+        let place = |i, j| 1 + entry(i, j);
+        let cells = (0..count).flat_map(|i| (0..=i).map(move |j| (i, j)));
+        let pairs = cells.flat_map(|(i, j)| {
+            let below = (i + 1 < count).then(|| (place(i, j), place(i + 1, j)));
+            let beside = (j < i).then(|| (place(i, j), place(i, j + 1)));
+            below.into_iter().chain(beside)
+        });
+        pairs.collect()
+    }
+
     fn follow(&self, memory: &mut Vec<f64>, volts: f64, _dt: f64, signals: &mut [f64]) {
         let (low, high) = self.cells.ends();
         let mut reversals = self.reversals(memory);

@@ -65,6 +65,12 @@ pub trait Signals: Debug + Send + Sync {
     /// Memory before any voltage, as the state of the model has it.
     fn rest(&self) -> Vec<f64>;
 
+    /// Pairs of signals whose weights are as alike as the records allow: those of neighbours, of
+    /// which a record may not tell one from the other.
+    fn alike(&self) -> Vec<(usize, usize)> {
+        Vec::new()
+    }
+
     /// Takes the memory to `volts` within `dt` seconds, infinite for a slow visit, and writes the
     /// signals there.
     fn follow(&self, memory: &mut Vec<f64>, volts: f64, dt: f64, signals: &mut [f64]);

@@ -293,6 +293,11 @@ impl<'a> Fit<'a> {
         self.common.weights[r] * index(self.every[r])
     }
 
+    /// Samples that are judged, each as often as it counts.
+    pub fn counted(&self) -> f64 {
+        (0..self.windows.len()).map(|r| self.weight(r) * index(self.judged(r).count())).sum()
+    }
+
     /// RMS deviation in the windows, m.
     pub fn deviation(&self) -> f64 {
         self.common.evaluations.set(self.common.evaluations.get() + 1);

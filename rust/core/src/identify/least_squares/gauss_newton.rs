@@ -18,6 +18,9 @@ const NUDGE: f64 = 1e-5;
 /// Weight of a row that holds a sum at its bound, relative to all others together.
 const STIFF: f64 = 1e4;
 
+/// RMS deviation that a difference of two weights that are to be alike counts as, relative to it.
+const ALIKE: f64 = 0.01;
+
 /// Most steps.
 pub(super) const STEPS: usize = 60;
 
@@ -103,6 +106,15 @@ impl Fit<'_> {
         let mut rows = Rows::new(self.unknowns());
         for r in 0..self.common.records.len() {
             self.push_rows(r, &mut rows)?;
+        }
+        let pairs = self.signals.alike();
+        if !pairs.is_empty() {
+            let size = ALIKE * libm::sqrt(self.counted());
+            for (one, other) in pairs {
+                let mut row = vec![0.0; self.unknowns()];
+                (row[one], row[other]) = (size, -size);
+                rows.push(&row, 0.0);
+            }
         }
         Ok(rows)
     }

@@ -19,7 +19,7 @@ const FEW_PLAYS: usize = 10;
 
 /// Intervals between levels to begin with, and those that are tried.
 const LEVELS: usize = 6;
-const TRIED_LEVELS: [(usize, f64); 2] = [(10, 1.0), (16, 1.0)];
+const TRIED_LEVELS: [(usize, f64); 1] = [(12, 1.0)];
 
 /// Numbers of plays that are tried, and the power by which their thresholds are spread.
 const TRIED: [(usize, f64); 3] = [(PLAYS, 1.0), (PLAYS, 1.5), (MANY_PLAYS, 1.0)];
