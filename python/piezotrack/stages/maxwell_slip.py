@@ -65,8 +65,8 @@ class MaxwellSlipStage(Stage):
     zones, and is simulated, inverted and identified as one: least squares find the plays, which are
     converted to elements. What it adds are the parameters of the elements. A state has the plays.
 
-    Mass and damping are behind the hysteresis, not inside the sum of forces: the elements respond to
-    the slow displacement h, so that an oscillation of the stage makes no hysteresis. Where it
+    Mass and damping are behind the hysteresis, not inside the sum of forces: the elements respond
+    to the slow displacement h, so that an oscillation of the stage makes no hysteresis. Where it
     does, use `ParallelDahlStage`, whose elements are in feedback on the displacement.
 
     Examples
