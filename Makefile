@@ -1,6 +1,6 @@
 # What a person types. Needs a Rust toolchain and Python 3.11 or newer; all else is put in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo reproduce test soak fuzz lint rust-test no-std python-test bench docs reference clean
+.PHONY: help demo reproduce benchmark test soak fuzz lint rust-test no-std python-test bench docs reference clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -24,6 +24,10 @@ demo: $(VENV)/installed ## Build, then from a measured log to a model, its test 
 
 reproduce: $(VENV)/installed ## Every figure and table of the paper, published beside obtained
 	$(BIN)/piezotrack reproduce --out report --overwrite
+
+benchmark: $(VENV)/installed ## Every model on every record, and the page of it
+	$(BIN)/piezotrack benchmark --out benchmark --overwrite
+	$(BIN)/python docs/make_benchmark.py benchmark
 
 test: lint rust-test no-std python-test ## Everything that must hold before a change lands
 

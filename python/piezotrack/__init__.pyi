@@ -33,6 +33,8 @@ from .errors import NumericalError as NumericalError
 from .errors import ParameterError as ParameterError
 from .errors import PiezotrackError as PiezotrackError
 from .errors import ShapeError as ShapeError
+from .identification.benchmarking.board import benchmark as benchmark
+from .identification.benchmarking.record import BenchmarkRecord as BenchmarkRecord
 from .identification.campaigns import campaign as campaign
 from .identification.comparison import compare as compare
 from .identification.descents import Descents as Descents
@@ -56,6 +58,7 @@ from .stages.asymmetric_bouc_wen import AsymmetricBoucWenStage as AsymmetricBouc
 from .stages.bouc_wen import BoucWenStage as BoucWenStage
 from .stages.bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
 from .stages.dahl import DahlStage as DahlStage
+from .stages.duhem import DuhemStage as DuhemStage
 from .stages.first_order_dahl import FirstOrderDahlStage as FirstOrderDahlStage
 from .stages.generalised_prandtl_ishlinskii import (
     GeneralisedPrandtlIshlinskiiStage as GeneralisedPrandtlIshlinskiiStage,
@@ -64,6 +67,13 @@ from .stages.inverse import Inverse as Inverse
 from .stages.lugre import LuGreStage as LuGreStage
 from .stages.maxwell_slip import MaxwellSlipStage as MaxwellSlipStage
 from .stages.parallel_dahl import ParallelDahlStage as ParallelDahlStage
+from .stages.polynomial_prandtl_ishlinskii import (
+    PolynomialPrandtlIshlinskiiStage as PolynomialPrandtlIshlinskiiStage,
+)
 from .stages.prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage
+from .stages.preisach import PreisachStage as PreisachStage
+from .stages.rate_dependent_prandtl_ishlinskii import (
+    RateDependentPrandtlIshlinskiiStage as RateDependentPrandtlIshlinskiiStage,
+)
 from .stages.virtual import VirtualStage as VirtualStage
 from .stages.xy import XYStage as XYStage

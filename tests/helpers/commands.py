@@ -50,7 +50,7 @@ def run(*arguments: str) -> Any:
 
 def without_progress(errors: str) -> str:
     """What was said on stderr beside the lines of progress, which a busy machine brings about."""
-    return re.sub(r"(?m)^(identify|compare|campaign|reproduce)[:,] .*\d+ s\n", "", errors)
+    return re.sub(r"(?m)^(identify|compare|campaign|benchmark|reproduce)[:,] .*\d+ s\n", "", errors)
 
 
 def as_printed(text: str) -> str:

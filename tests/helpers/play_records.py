@@ -36,8 +36,9 @@ def record(stage: pt.PrandtlIshlinskiiStage, dt: float = 1e-3, **keywords: Any) 
 
 
 def fit_plays(
-    data: pt.Dataset, *, offset: bool = True, **settings: Any
+    data: pt.Dataset, *, offset: bool = True, drift: bool | None = None, **settings: Any
 ) -> pt.identification.Identification:
     """Identify a Prandtl-Ishlinskii stage with these settings of the least squares."""
     least_squares = pt.identification.LeastSquares(**settings)
-    return pt.identify(data, "prandtl-ishlinskii", offset=offset, least_squares=least_squares)
+    asked: dict[str, Any] = {"offset": offset, "drift": drift, "least_squares": least_squares}
+    return pt.identify(data, "prandtl-ishlinskii", **asked)

@@ -109,6 +109,10 @@ COMMANDS: dict[str, tuple[list[str], tuple[str, ...]]] = {
          "--free", "--model", "--stiffness", "--delay", "--swarm", "--seed"),
     ),
     "compare": (["log.csv", "--runs", "1"], (*COLUMNS, "--train", "--test", "--model", "--seed")),
+    "benchmark": (
+        ["log.csv", "--model", "plays-nnls"],
+        (*COLUMNS, "--displacement", "--hold", "--train", "--test", "--model"),
+    ),
     "step": (["log.csv"], (*COLUMNS, "--stiffness", "--mass", "--second-level", "--window")),
     "noise": (["log.csv"], ("--dt", "--unit", "--time", "--displacement", "--window")),
     "info": (["log.csv"], (*COLUMNS, "--displacement")),
@@ -117,7 +121,7 @@ COMMANDS: dict[str, tuple[list[str], tuple[str, ...]]] = {
 MIX = (
     ["simulate", "feedforward", "track"] * 4
     + ["step", "noise", "info"] * 2
-    + ["contour", "identify", "compare", "tune", "compare-controllers", "learn"]
+    + ["contour", "identify", "compare", "benchmark", "tune", "compare-controllers", "learn"]
 )
 
 

@@ -120,7 +120,7 @@ def test_choices_on_a_thinned_record_are_those_of_the_whole() -> None:
         return fitted(u, y, dt=t[1], **free)
 
     few, many = fit(short), fit(long)
-    assert few.history == many.history == "fit"
+    assert few.records[0]["history"] == many.records[0]["history"] == "fit"
     assert len(dict(few.parameters)["creep_times"]) == len(dict(many.parameters)["creep_times"])
     assert few.rms < 15e-9
     assert many.rms < 15e-9
@@ -156,7 +156,7 @@ def simulated(fit: Any, u: NDArray[np.float64]) -> NDArray[np.float64]:
     values["linear"] = values["linear"][0]
     stage = pt.PrandtlIshlinskiiStage(**values)
     state = stage.simulate([0.0], DT).final
-    start = dict(fit.start)
+    start = dict(fit.records[0]["start"])
     first = {
         name: start[name][0] if isinstance(getattr(state, name), float) else tuple(start[name])
         for name in start
@@ -170,7 +170,7 @@ def test_the_start_reproduces_the_cost(history: str, dynamics: str) -> None:
     u = 20.0 + 0.5 * drive()
     y = noisy(replace(STAGE, creep_weights=(0.02,), creep_times=(0.5,)).simulate(u, DT).x)
     fit = fitted(u, y, zones=2, creep_times=[0.5], history=history, dynamics=dynamics, start=10)
-    left = (y - simulated(fit, u) - fit.offset)[10:]
+    left = (y - simulated(fit, u) - fit.records[0]["offset"])[10:]
     assert np.sqrt(np.mean(left**2)) == pytest.approx(fit.rms, rel=1e-6)
 
 
@@ -181,7 +181,7 @@ def test_a_record_that_begins_at_half_of_the_range() -> None:
     y = noisy(PLAIN.simulate(np.concatenate([before, u]), DT).x[before.size :])
     assert fitted(u, y, history="virgin").rms > 30e-9
     fit = fitted(u, y)
-    assert fit.history == "settled"
+    assert fit.records[0]["history"] == "settled"
     assert fit.rms < 11e-9
     # One that came from another voltage.
     before = np.concatenate([np.linspace(0.0, 60.0, 500), np.linspace(60.0, 37.5, 500)])

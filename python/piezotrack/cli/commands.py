@@ -10,6 +10,7 @@ import typer
 from typer.core import TyperCommand
 
 from .. import __version__
+from .benchmark import benchmark_command
 from .campaign import campaign_command
 from .compare import compare_command
 from .compare_controllers import compare_controllers_command
@@ -87,6 +88,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "convert": convert_command,
     "identify": identify_command,
     "compare": compare_command,
+    "benchmark": benchmark_command,
     "campaign": campaign_command,
     "step": step_command,
     "simulate": simulate_command,

@@ -25,6 +25,7 @@ __all__ = [
     "Creep",
     "Delay",
     "Delays",
+    "Drifts",
     "Dynamics",
     "Fix",
     "Free",
@@ -121,6 +122,16 @@ Delays = Annotated[
         metavar="fit|S|LOW:HIGH",
         help="Sensor delay: fit it, a known value in s, or bounds in s; default none. Once, or "
         "once for each of several logs.",
+    ),
+]
+Drifts = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--drift",
+        metavar="none|fit|S",
+        help="Slow drift of the sensor: none, fit it, or its time constant in s; default none for "
+        "models that are searched, what the log shows for the others. Once, or once for each of "
+        "several logs.",
     ),
 ]
 History = Annotated[
@@ -247,17 +258,20 @@ class Kinds:
             refuse_without_effect(
                 context, OF_PLAYS, f"with the model {named}, whose parameters are searched"
             )
-        for given in ("delay", "stiffness"):
-            if context.params[given] not in (None, [], ()) and self.names == (AUTO,):
-                refuse_without_effect(
-                    context, OF_PLAYS, f"with --{given}, for which a search is needed"
-                )
+            refuse_without_effect(
+                context, ("drift",), f"with the model {named}: least squares find a drift"
+            )
+        if context.params["stiffness"] is not None and self.names == (AUTO,):
+            refuse_without_effect(
+                context, OF_PLAYS, "with --stiffness, for which a search is needed"
+            )
 
     def arguments_of(self, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
         """Arguments of `identify` for one of the kinds, without those of the others only."""
         arguments = {key: value for key, value in given.items() if value is not None}
         if not _of_plays(name):
             arguments.pop("least_squares", None)
+            arguments.pop("drift", None)
         elif not searched(name):
             # Its creep is a setting of the least squares.
             arguments.pop("creep", None)
@@ -352,16 +366,27 @@ def _prior(text: str) -> tuple[float, float]:
 
 
 def of_each_log(
-    delay: list[str] | None, history: list[str] | None, weight: list[float] | None, count: int
+    delay: list[str] | None,
+    drift: list[str] | None,
+    history: list[str] | None,
+    weight: list[float] | None,
+    count: int,
 ) -> dict[str, Any]:
     """Parse what may be said of each of several logs; one value stands for all of them."""
-    for option, given in (("--delay", delay), ("--history", history), ("--weight", weight)):
+    for option, given in (
+        ("--delay", delay),
+        ("--drift", drift),
+        ("--history", history),
+        ("--weight", weight),
+    ):
         check_count(option, given, count)
     if weight and count == 1:
         raise ParameterError("--weight has no effect with 1 log: expected it left out")
     delays = [_delay(text) for text in delay or []]
+    drifts = [_drift(text) for text in drift or []]
     return {
         "delay": delays if len(delays) > 1 else next(iter(delays), None),
+        "drift": drifts if len(drifts) > 1 else next(iter(drifts), None),
         "history": history if history and len(history) > 1 else next(iter(history or []), None),
         "weights": None if not weight else weight * count if len(weight) == 1 else weight,
     }
@@ -388,6 +413,10 @@ def _delay(text: str | None) -> bool | float | tuple[float, float] | None:
     if text is None or text == "fit":
         return None if text is None else True
     return number_range("--delay", text) if ":" in text else number("--delay", text)
+
+
+def _drift(text: str) -> bool | float:
+    return text == "fit" if text in ("fit", "none") else number("--drift", text)
 
 
 def _creep(text: str | None) -> bool | list[float] | None:

@@ -18,6 +18,7 @@ from .fit_options import (
     Constrain,
     Creep,
     Delays,
+    Drifts,
     Dynamics,
     Fix,
     Free,
@@ -68,8 +69,6 @@ if TYPE_CHECKING:
 
 __all__ = ["identify_command"]
 
-# Options that one log can have.
-OF_ONE_LOG = ("creep", "plays", "asymmetry", "dynamics")
 # Pictures of a second log.
 PANELS = ("loop", "time")
 
@@ -102,6 +101,7 @@ def identify_command(
     ] = None,
     offset: Annotated[bool, typer.Option(help="Fit a constant sensor offset.")] = True,
     delay: Delays = None,
+    drift: Drifts = None,
     history: Histories = None,
     creep: Creep = None,
     plays: Plays = None,
@@ -134,8 +134,8 @@ def identify_command(
     """Identify models of a stage from one log or several."""
     kinds = Kinds.checked(model)
     kinds.refuse_without_effect(context)
-    if len(files) > 1:
-        refuse_without_effect(context, OF_ONE_LOG, "with several logs")
+    if len(files) > 1 and any(map(searched, kinds.names)):
+        refuse_without_effect(context, ("creep",), "with several logs and a model that is searched")
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     given = fit_options(
         free=free,
@@ -154,7 +154,7 @@ def identify_command(
         swarm=swarm,
     )
     given |= {"stiffness": stiffness, "offset": offset}
-    given |= of_each_log(delay, history, weight, len(files))
+    given |= of_each_log(delay, drift, history, weight, len(files))
     given |= {"seed": seed, "runs": runs, "threads": threads, "progress": result.progress}
     if checkpoint is not None and len(kinds.names) > 1:
         raise ParameterError("--checkpoint is given with several models: expected one")
@@ -201,8 +201,7 @@ def _files(
 
     names = [name for name in kinds.names if name != AUTO]
     if AUTO in kinds.names:
-        tried = kinds_tried(logs[0], given)
-        names += [kind.name for kind in tried if len(logs) == 1 or kind.searched]
+        names += [kind.name for kind in kinds_tried(logs[0], {**given, "drift": None})]
     for name in dict.fromkeys(names):
         yield from identification_files(name, searched=searched(name), records=len(logs))
         if validated:

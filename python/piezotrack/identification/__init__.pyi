@@ -1,5 +1,11 @@
 # The public names and their homes, each written once: type checkers read them here, and
 # _support/lazy.py does at run time. One name a line, as `ruff format` keeps it.
+from .benchmarking.board import Benchmark as Benchmark
+from .benchmarking.board import BenchmarkResult as BenchmarkResult
+from .benchmarking.board import Inverted as Inverted
+from .benchmarking.board import PartScore as PartScore
+from .benchmarking.board import benchmark as benchmark
+from .benchmarking.record import BenchmarkRecord as BenchmarkRecord
 from .campaign_result import Campaign as Campaign
 from .campaign_result import TaskResult as TaskResult
 from .campaigns import campaign as campaign

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Comparison", "ModelScore", "compare", "comparison_files"]
+__all__ = ["Comparison", "ModelScore", "compare", "comparison_files", "parts_of"]
 
 FORMAT = "piezotrack-comparison"
 SCHEMA_VERSION = 1
@@ -296,7 +296,7 @@ def compare(
     if not isinstance(data, Dataset):
         raise ParameterError(f"data is {type(data).__name__}: expected a Dataset, see pt.read")
     wanted = _wanted(models, data.drive_unit)
-    first, second, carried = _parts(data, train, test)
+    first, second, carried = parts_of(data, train, test)
     of_swarm: dict[str, Any] = {
         "seed": seed,
         "runs": runs,
@@ -396,8 +396,28 @@ def _source(model: object) -> tuple[str | None, ModelInfo | IdentifiedModel]:
     )
 
 
-def _parts(log: Dataset, train: object, test: object) -> tuple[Dataset, Dataset, bool]:
-    """Return the parts to fit and to test, and whether both are of the same record."""
+def parts_of(log: Dataset, train: object, test: object) -> tuple[Dataset, Dataset, bool]:
+    """Return the parts to fit and to test, and whether both are of the same record.
+
+    Parameters
+    ----------
+    log : Dataset
+        The record.
+    train, test : object
+        Arguments of `compare`.
+
+    Returns
+    -------
+    train, test : Dataset
+        The parts.
+    carried : bool
+        Whether both are of the same record.
+
+    Raises
+    ------
+    ParameterError
+        As of `compare`.
+    """
     first = _bounds("train", train)
     if isinstance(test, Dataset):
         one = _windowed("train", log, first)

@@ -32,7 +32,7 @@ __all__ = ["LeastSquares", "solve_least_squares"]
 MOST_PLAYS, MOST_ZONES, MOST_RELAXATIONS = 32, 8, 8
 DYNAMICS = ("time_constant", "frequency", "damping_ratio")
 # Parameters that the settings and the record fix beforehand.
-CHOSEN = ("thresholds", "dead_zone_thresholds", "creep_times")
+CHOSEN = ("thresholds", "levels", "low", "high", "dead_zone_thresholds", "creep_times")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,8 +53,11 @@ class LeastSquares:
         Number of plays, 1 to 32, with thresholds spread evenly up to half of the drive's range.
         None: 20, or 10 with fewer than 800 samples; others where they foretell a third of the
         window better that was left out: up to 32, or fewer about which the weights of these gather.
+        Of a model with levels the number of intervals between them, 1 to 16; None: 6, or 10 or 16.
     thresholds : sequence of float, optional
         Thresholds of the plays [V], in place of `count`.
+    levels : sequence of float, optional
+        Levels [V] of a model that has them, in place of `count`.
     dead_zones : bool or int, optional
         Number of one-sided dead zones, 0 to 8, spread evenly over the displacement; True stands
         for 2, or for none where the model has no dead zones.
@@ -91,6 +94,7 @@ class LeastSquares:
 
     count: int | None = None
     thresholds: Sequence[float] | None = None
+    levels: Sequence[float] | None = None
     dead_zones: bool | int = True
     creep: Literal["auto"] | bool | Sequence[float] = "auto"
     dynamics: Literal["auto", "first", "second"] | None = "auto"
@@ -102,6 +106,8 @@ class LeastSquares:
                 raise ParameterError(f"count is {count}: expected 1 to {MOST_PLAYS} plays")
         if self.thresholds is not None:
             object.__setattr__(self, "thresholds", as_numbers("thresholds", self.thresholds))
+        if self.levels is not None:
+            object.__setattr__(self, "levels", as_numbers("levels", self.levels))
         if not isinstance(self.dead_zones, bool):
             zones = _core.as_count("dead_zones", self.dead_zones)
             if zones > MOST_ZONES:
@@ -119,6 +125,18 @@ class LeastSquares:
     def _chosen(self) -> bool:
         """Whether the creep is what the record shows."""
         return isinstance(self.creep, str) and self.creep == "auto"
+
+    def _places(self, info: ModelInfo) -> list[float] | None:
+        """Thresholds or levels that are given, whichever the model has."""
+        names = [one.name for one in info.parameters]
+        places = None
+        for name, given in (("thresholds", self.thresholds), ("levels", self.levels)):
+            if given is not None and name not in names:
+                raise ParameterError(
+                    f"{name} is {quoted(given)}: expected None, as {info.title} has no {name}"
+                )
+            places = places if given is None else list(given)
+        return places
 
     def _zones(self, info: ModelInfo) -> int:
         if self.dead_zones is True:
@@ -176,7 +194,7 @@ def solve_least_squares(
         [_asked(one) for one in records],
         model=info.name,
         count=settings.count,
-        thresholds=None if settings.thresholds is None else list(settings.thresholds),
+        thresholds=settings._places(info),
         zones=settings._zones(info),
         creep_times=settings._times(longest),
         dynamics=settings.dynamics or "none",

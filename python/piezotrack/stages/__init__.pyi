@@ -13,6 +13,8 @@ from .bouc_wen import BoucWenState as BoucWenState
 from .bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
 from .dahl import DahlStage as DahlStage
 from .dahl import DahlState as DahlState
+from .duhem import DuhemStage as DuhemStage
+from .duhem import DuhemState as DuhemState
 from .first_order_dahl import FirstOrderDahlStage as FirstOrderDahlStage
 from .generalised_prandtl_ishlinskii import (
     GeneralisedPrandtlIshlinskiiStage as GeneralisedPrandtlIshlinskiiStage,
@@ -25,8 +27,16 @@ from .lugre import LuGreState as LuGreState
 from .maxwell_slip import MaxwellSlipStage as MaxwellSlipStage
 from .parallel_dahl import ParallelDahlStage as ParallelDahlStage
 from .parallel_dahl import ParallelDahlState as ParallelDahlState
+from .polynomial_prandtl_ishlinskii import (
+    PolynomialPrandtlIshlinskiiStage as PolynomialPrandtlIshlinskiiStage,
+)
 from .prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage
 from .prandtl_ishlinskii import PrandtlIshlinskiiState as PrandtlIshlinskiiState
+from .preisach import PreisachStage as PreisachStage
+from .preisach import PreisachState as PreisachState
+from .rate_dependent_prandtl_ishlinskii import (
+    RateDependentPrandtlIshlinskiiStage as RateDependentPrandtlIshlinskiiStage,
+)
 from .virtual import VirtualResponse as VirtualResponse
 from .virtual import VirtualStage as VirtualStage
 from .xy import XYLog as XYLog

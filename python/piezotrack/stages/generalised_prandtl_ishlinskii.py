@@ -52,9 +52,6 @@ class GeneralisedPrandtlIshlinskiiStage(Stage):
     mode_weights, mode_frequencies, mode_damping_ratios : sequence of float, optional
         g, undamped frequency [Hz] and damping ratio of further modes in parallel with that mode;
         3 at most, each g between -1 and 1.
-    mode_weights, mode_frequencies, mode_damping_ratios : sequence of float, optional
-        g, undamped frequency [Hz] and damping ratio of further modes in parallel with that mode;
-        3 at most, each g between -1 and 1.
 
     Raises
     ------

@@ -25,20 +25,25 @@ def stage_text(stage: Stage) -> str:
         Such as ``PrandtlIshlinskiiStage(12.6 um/V, 10 plays, lag 1.2 ms)``. All parameters are
         attributes of the stage, and ``dataclasses.asdict(stage)`` has them in a dict.
     """
-    parts = _with_plays(stage) if hasattr(stage, "weights") else _with_mass(stage)
+    parts = _with_mass(stage) if hasattr(stage, "stiffness") else _at_the_input(stage)
     if creep := len(stage.creep_times):  # type: ignore[attr-defined]
         parts.append(_count(creep, "creep time"))
     return f"{type(stage).__name__}({', '.join(parts)})"
 
 
-def _with_plays(stage: Any) -> list[str]:
+def _at_the_input(stage: Any) -> list[str]:
     parts = []
-    if not hasattr(stage, "scale"):
-        # With an envelope the slope depends on the voltage.
-        parts.append(f"{1e6 * _mean_slope(stage):.3g} um/V")
-    parts.append(_count(len(stage.thresholds), "play"))
-    if dead := len(getattr(stage, "dead_zone_weights", ())):
-        parts.append(_count(dead, "dead zone"))
+    thresholds = getattr(stage, "thresholds", None)
+    if thresholds is not None:
+        # With an envelope or a polynomial the slope depends on the voltage.
+        if hasattr(stage, "linear") and not hasattr(stage, "scale"):
+            parts.append(f"{1e6 * _mean_slope(stage):.3g} um/V")
+        parts.append(_count(len(thresholds), "play"))
+    for name, thing in (("dead_zone_weights", "dead zone"), ("levels", "level")):
+        if count := len(getattr(stage, name, ())):
+            parts.append(_count(count, thing))
+    if hasattr(stage, "low"):
+        parts.append(f"{stage.low:.4g} V to {stage.high:.4g} V")
     if stage.time_constant is not None:
         parts.append(f"lag {1e3 * stage.time_constant:.3g} ms")
     if stage.frequency is not None:

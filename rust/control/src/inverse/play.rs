@@ -97,6 +97,14 @@ impl<const PLAYS: usize, const ZONES: usize> PlayInverse<PLAYS, ZONES> {
         if !usable(output) {
             return f64::NAN;
         }
+        self.plays.follow(state, self.before_dead_zones(output))
+    }
+
+    /// What goes into the dead zones where `output` comes out of them: the weighted sum of the
+    /// plays.
+    #[must_use]
+    #[inline]
+    pub fn before_dead_zones(&self, output: f64) -> f64 {
         let mut value = output;
         for (corner, bend) in self.dead_zone_thresholds.iter().zip(&self.dead_zone_weights) {
             let beyond = output - corner;
@@ -104,7 +112,7 @@ impl<const PLAYS: usize, const ZONES: usize> PlayInverse<PLAYS, ZONES> {
                 value += bend * beyond;
             }
         }
-        self.plays.follow(state, value)
+        value
     }
 }
 

@@ -1,4 +1,4 @@
-//! Numerical methods: SIMD lanes, random numbers, least squares, line search, transfer functions,
+//! Numerical methods: SIMD lanes, random numbers, least squares, line search, roots, transfer functions,
 //! memory.
 
 mod bounded_least_squares;
@@ -7,6 +7,7 @@ mod golden_section;
 mod lanes;
 mod memory;
 mod random;
+mod root;
 mod transfer_function;
 
 pub use bounded_least_squares::{FREE, NOT_NEGATIVE, Rows, bounded};
@@ -16,4 +17,5 @@ pub use memory::{available, room, zeros};
 pub(crate) use dispatch::{dispatch_fused, dispatch_vectors, width};
 pub(crate) use golden_section::least;
 pub(crate) use random::Draws;
+pub(crate) use root::rising_root;
 pub(crate) use transfer_function::{C, Jet, Ratio};

@@ -38,7 +38,7 @@ use super::input_stage::{
 };
 use super::prandtl_ishlinskii::{MOST_PLAYS, PlayHysteresis};
 use super::superposition::{
-    Edges, FittedWeights, Places, PlaySignals, Signals, SignalsOf, Superposition,
+    Edges, FittedWeights, Places, PlaySignals, Rest, Shape, Signals, SignalsOf, Superposition,
 };
 use super::tanh_envelope::{MOST_BEND, TanhEnvelope};
 use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
@@ -281,6 +281,7 @@ impl InputOperator for GeneralisedPlays {
     fn recall(
         &self,
         state: &mut GeneralisedPlaysState,
+        _volts: f64,
         memory: &[f64],
     ) -> core::result::Result<(), String> {
         recall_plays(&mut state.plays[..self.count], memory)
@@ -481,8 +482,8 @@ impl Superposition for GeneralisedPrandtlIshlinskiiStage {
     /// Its slope at the top of the drive over that at the bottom, and how much it bends both ways:
     /// s in `B^2 = artanh(k)^2 + s^2`, where tanh's argument runs over 2 B and
     /// k = (1 - sqrt(ratio))/(1 + sqrt(ratio)). With s near 0 it bends in one direction only.
-    fn shapes() -> Vec<(f64, f64)> {
-        vec![(0.25, 4.0), (0.005, 1.6)]
+    fn shapes() -> Vec<Shape> {
+        vec![Shape::about(0.25, 4.0), Shape::about(0.005, 1.6)]
     }
 
     fn check_places(places: &[f64]) -> Result<()> {
@@ -515,7 +516,7 @@ impl Superposition for GeneralisedPrandtlIshlinskiiStage {
     }
 
     /// With the play of the drive.
-    fn state_at_rest(x: f64, volts: f64, memory: &[f64], creep: &[f64], modes: usize) -> Values {
-        state_at_rest(PLAYS_STATE, (x, volts), memory, creep, modes)
+    fn state_at_rest(rest: &Rest<'_>) -> Values {
+        state_at_rest(PLAYS_STATE, rest, rest.memory)
     }
 }

@@ -19,6 +19,7 @@ use piezotrack_control::{CreepState, InputInverse, InputInverseState, OperatorIn
 use super::creep::{MOST_RELAXATIONS, Relaxation, RelaxationFlow, RelaxationState};
 use super::mechanics_parameters::{V, X};
 use super::plant::{Plant, Settling};
+use super::superposition::Rest;
 use super::traits::{Experiment, Response, finite_state};
 use super::values::{ParameterInfo, Values};
 use crate::error::{Error, Result, positive};
@@ -60,14 +61,13 @@ pub(super) const fn state_with(memory: ParameterInfo) -> [ParameterInfo; 7] {
     ]
 }
 
-/// A state at rest at `x`, m, and `volts`, in the order of [`state_with`].
+/// A state at rest with this memory of the operator, in the order of [`state_with`].
 pub(super) fn state_at_rest(
     infos: &'static [ParameterInfo],
-    (x, volts): (f64, f64),
+    rest: &Rest<'_>,
     memory: &[f64],
-    creep: &[f64],
-    modes: usize,
 ) -> Values {
+    let Rest { x, volts, creep, modes, .. } = *rest;
     let (mode_x, mode_v) = (vec![x; modes], vec![0.0; modes]);
     let entries =
         [vec![x], vec![0.0], vec![volts], memory.to_vec(), creep.to_vec(), mode_x, mode_v];
@@ -95,6 +95,12 @@ pub trait InputOperator: Copy + Debug {
     /// The state before any voltage.
     fn rest(&self) -> Self::State;
 
+    /// Whether the output depends on how fast the input moves.
+    const BY_RATE: bool = false;
+
+    /// Sets how fast the input moves from now on, V/s.
+    fn at_rate(&self, _state: &mut Self::State, _rate: f64) {}
+
     /// Takes the input to `volts` and returns the output, m.
     fn follow(&self, state: &mut Self::State, volts: f64) -> f64;
 
@@ -104,11 +110,17 @@ pub trait InputOperator: Copy + Debug {
     /// Memory of a state as numbers.
     fn memory(&self, state: &Self::State) -> Vec<f64>;
 
-    /// Gives a state the memory of these numbers; where they are none, says what was expected.
+    /// Gives a state at `volts` the memory of these numbers, where the input may stand elsewhere
+    /// if it can go to `volts` from there.
     ///
     /// # Errors
-    /// What was expected.
-    fn recall(&self, state: &mut Self::State, memory: &[f64]) -> core::result::Result<(), String>;
+    /// What was expected, where these numbers are no memory.
+    fn recall(
+        &self,
+        state: &mut Self::State,
+        volts: f64,
+        memory: &[f64],
+    ) -> core::result::Result<(), String>;
 }
 
 /// A hysteresis operator whose output is a straight line between corners, or nearly so.
@@ -208,13 +220,13 @@ impl<O: InputOperator> InputStage<O> {
         if !values.iter().flat_map(|(_, numbers)| numbers).all(|value| value.is_finite()) {
             return Err(Error::parameter("initial", "not finite", "finite numbers"));
         }
-        if let Err(expected) = self.operator.recall(&mut state.operator, memory) {
+        let volts = values.number("u");
+        if let Err(expected) = self.operator.recall(&mut state.operator, volts, memory) {
             return shape(format!("{} {name}", memory.len()), expected);
         }
         let relaxation = &mut state.relaxation;
         relaxation.creep[..relaxations].copy_from_slice(creep);
-        relaxation.input =
-            self.operator.follow(&mut state.operator, values.number("u")) - self.zero();
+        relaxation.input = self.operator.follow(&mut state.operator, volts) - self.zero();
         (relaxation.x, relaxation.v) = (values.number("x"), values.number("v"));
         relaxation.mode_x[..further].copy_from_slice(modes.0);
         relaxation.mode_v[..further].copy_from_slice(modes.1);
@@ -300,6 +312,10 @@ impl<O: Segmented> InputStage<O> {
     ) -> usize {
         let InputStageFlow { relaxation, zero, step, deviation, least } = flow;
         let from = self.operator.input(&state.operator);
+        if O::BY_RATE {
+            self.operator.at_rate(&mut state.operator, (volts - from).abs() / *step);
+            self.jump(state, from, *zero);
+        }
         let (mut done, mut parts, mut idle) = (0.0, 1, 0);
         let splits = self.relaxation.remembers() && (volts - from).abs() > *least;
         while splits && parts < MOST_PARTS && idle < MOST_IDLE {

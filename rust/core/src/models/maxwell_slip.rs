@@ -30,7 +30,7 @@ use super::input_stage::{InputOperator, InputStage, PLAYS_STATE, Segmented};
 use super::prandtl_ishlinskii::{
     MOST_PLAYS, PlayHysteresis, PrandtlIshlinskiiStage, checked_thresholds,
 };
-use super::superposition::{FittedWeights, Places, Signals, SignalsOf, Superposition};
+use super::superposition::{FittedWeights, Places, Rest, Signals, SignalsOf, Superposition};
 use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
 use super::values::{ParameterInfo, Values};
 use crate::design::LoopPlant;
@@ -147,8 +147,13 @@ impl InputOperator for MaxwellSlip {
         self.plays.memory(state)
     }
 
-    fn recall(&self, state: &mut Self::State, memory: &[f64]) -> core::result::Result<(), String> {
-        self.plays.recall(state, memory)
+    fn recall(
+        &self,
+        state: &mut Self::State,
+        volts: f64,
+        memory: &[f64],
+    ) -> core::result::Result<(), String> {
+        self.plays.recall(state, volts, memory)
     }
 }
 
@@ -236,7 +241,7 @@ impl Superposition for MaxwellSlipStage {
         Values::of(PARAMETERS, operator.into_iter().chain(fitted.relaxation.values()))
     }
 
-    fn state_at_rest(x: f64, volts: f64, memory: &[f64], creep: &[f64], modes: usize) -> Values {
-        PrandtlIshlinskiiStage::state_at_rest(x, volts, memory, creep, modes)
+    fn state_at_rest(rest: &Rest<'_>) -> Values {
+        PrandtlIshlinskiiStage::state_at_rest(rest)
     }
 }

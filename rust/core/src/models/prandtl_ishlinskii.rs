@@ -21,7 +21,7 @@ use super::input_stage::{
     InputOperator, InputStage, PLAYS_STATE, Segmented, inverse_state, recall_plays, state_at_rest,
 };
 use super::superposition::{
-    FittedWeights, Places, Plain, PlaySignals, Signals, SignalsOf, Superposition,
+    FittedWeights, Places, Plain, PlaySignals, Rest, Signals, SignalsOf, Superposition,
 };
 use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
 use super::values::{ParameterInfo, Values};
@@ -125,7 +125,7 @@ impl PlayHysteresis {
             "V",
         )?);
         for (i, weight) in weights.iter().enumerate() {
-            plays.weights[i] = along(&format!("weights[{i}]"), *weight, sign)?;
+            plays.weights[i] = along(&format!("weights[{i}]"), *weight, "m/V", sign)?;
         }
         let (mut before, mut slope) = (f64::NEG_INFINITY, 1.0);
         for j in 0..dead_zone_thresholds.len() {
@@ -146,7 +146,7 @@ impl PlayHysteresis {
 }
 
 /// The sign of a gain (m/V) that is not 0.
-fn direction(linear: f64) -> Result<f64> {
+pub(super) fn direction(linear: f64) -> Result<f64> {
     if linear.is_finite() && linear != 0.0 {
         return Ok(linear.signum());
     }
@@ -154,14 +154,14 @@ fn direction(linear: f64) -> Result<f64> {
     Err(Error::parameter("linear", found, "a finite number other than 0"))
 }
 
-/// A weight, m/V, that does not work against `linear`, whose sign is given.
-fn along(name: &str, weight: f64, sign: f64) -> Result<f64> {
-    if sign * finite(name, weight, "m/V")? >= 0.0 {
+/// A weight that does not work against `linear`, whose sign is given.
+pub(super) fn along(name: &str, weight: f64, unit: &str, sign: f64) -> Result<f64> {
+    if sign * finite(name, weight, unit)? >= 0.0 {
         return Ok(weight);
     }
     let side = if sign > 0.0 { "0 or above" } else { "0 or below" };
     let expected = format!("a finite number, {side}, as linear is");
-    Err(Error::parameter(name, format!("{} m/V", shown(weight)), expected))
+    Err(Error::parameter(name, format!("{} {unit}", shown(weight)), expected))
 }
 
 /// Thresholds, which are not below 0 and ascend.
@@ -204,7 +204,12 @@ impl InputOperator for PlayHysteresis {
         state.plays[..self.count].to_vec()
     }
 
-    fn recall(&self, state: &mut Self::State, memory: &[f64]) -> core::result::Result<(), String> {
+    fn recall(
+        &self,
+        state: &mut Self::State,
+        _volts: f64,
+        memory: &[f64],
+    ) -> core::result::Result<(), String> {
         recall_plays(&mut state.plays[..self.count], memory)
     }
 }
@@ -318,7 +323,7 @@ impl Superposition for PrandtlIshlinskiiStage {
     }
 
     /// Without the play of the drive.
-    fn state_at_rest(x: f64, volts: f64, memory: &[f64], creep: &[f64], modes: usize) -> Values {
-        state_at_rest(PLAYS_STATE, (x, volts), memory.get(1..).unwrap_or(&[]), creep, modes)
+    fn state_at_rest(rest: &Rest<'_>) -> Values {
+        state_at_rest(PLAYS_STATE, rest, rest.memory.get(1..).unwrap_or(&[]))
     }
 }

@@ -323,6 +323,10 @@ models! {
     PrandtlIshlinskii: super::PrandtlIshlinskiiStage, least_squares;
     MaxwellSlip: super::MaxwellSlipStage, least_squares;
     GeneralisedPrandtlIshlinskii: super::GeneralisedPrandtlIshlinskiiStage, least_squares;
+    RateDependentPrandtlIshlinskii: super::RateDependentPrandtlIshlinskiiStage, least_squares;
+    PolynomialPrandtlIshlinskii: super::PolynomialPrandtlIshlinskiiStage, least_squares;
+    Preisach: super::PreisachStage, least_squares;
+    Duhem: super::DuhemStage, least_squares;
 }
 
 impl Model {

@@ -40,6 +40,23 @@ pub enum Places {
     Levels,
 }
 
+/// A number above 0 that shapes signals.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shape {
+    /// Least and largest, between which it is searched on a logarithmic scale.
+    pub range: (f64, f64),
+    /// What it is where a record does not tell.
+    pub neutral: f64,
+}
+
+impl Shape {
+    /// A number that is neutral in the middle of its range.
+    #[must_use]
+    pub fn about(low: f64, high: f64) -> Self {
+        Self { range: (low, high), neutral: libm::sqrt(low * high) }
+    }
+}
+
 /// Signals of the drive, whose weighted sum comes out of a hysteresis.
 pub trait Signals: Debug + Send + Sync {
     /// How many; the first is the drive itself, or an envelope of it, without memory.
@@ -64,6 +81,23 @@ pub struct SignalsOf<'a> {
     pub drive: (f64, f64),
 }
 
+/// A stage at rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rest<'a> {
+    /// Displacement, m.
+    pub x: f64,
+    /// Drive, V.
+    pub volts: f64,
+    /// Weighted sum of the signals, m.
+    pub sum: f64,
+    /// Memory of the signals.
+    pub memory: &'a [f64],
+    /// Relaxations of the creep, m.
+    pub creep: &'a [f64],
+    /// Number of modes beside the main one.
+    pub modes: usize,
+}
+
 /// A model whose hysteresis is a sum of signals with weights of one sign.
 ///
 /// Weights are found as 0 or above for a displacement that rises with the drive. One that falls
@@ -76,10 +110,10 @@ pub trait Superposition: StageModel {
     /// Where its signals have their places.
     const PLACES: Places;
 
-    /// Ranges of numbers above 0 that shape the signals and are searched around the least squares
-    /// on a logarithmic scale. A number that gains little stays at the middle of its range.
+    /// Numbers that shape the signals and are searched around the least squares. One that gains
+    /// little stays at its neutral value.
     #[must_use]
-    fn shapes() -> Vec<(f64, f64)> {
+    fn shapes() -> Vec<Shape> {
         Vec::new()
     }
 
@@ -95,9 +129,8 @@ pub trait Superposition: StageModel {
     /// The parameters of the stage, as [`StageModel::build`] takes them.
     fn values(fitted: &FittedWeights) -> Values;
 
-    /// A state at rest at `x`, m, and `volts`, with a memory of the signals, creep (m), and so
-    /// many further modes.
-    fn state_at_rest(x: f64, volts: f64, memory: &[f64], creep: &[f64], modes: usize) -> Values;
+    /// The state at rest.
+    fn state_at_rest(rest: &Rest<'_>) -> Values;
 }
 
 /// A [`Superposition`] whose type is not known; one search serves them all.
@@ -109,7 +142,7 @@ pub trait AnySuperposition: Sync {
     /// See [`Superposition::PLACES`].
     fn places(&self) -> Places;
     /// See [`Superposition::shapes`].
-    fn shapes(&self) -> Vec<(f64, f64)>;
+    fn shapes(&self) -> Vec<Shape>;
     /// See [`Superposition::check_places`].
     ///
     /// # Errors
@@ -120,14 +153,7 @@ pub trait AnySuperposition: Sync {
     /// See [`Superposition::values`].
     fn values(&self, fitted: &FittedWeights) -> Values;
     /// See [`Superposition::state_at_rest`].
-    fn state_at_rest(
-        &self,
-        x: f64,
-        volts: f64,
-        memory: &[f64],
-        creep: &[f64],
-        modes: usize,
-    ) -> Values;
+    fn state_at_rest(&self, rest: &Rest<'_>) -> Values;
 }
 
 /// The superposition of a model, its type forgotten.
@@ -146,7 +172,7 @@ impl<M: Superposition> AnySuperposition for Of<M> {
         M::PLACES
     }
 
-    fn shapes(&self) -> Vec<(f64, f64)> {
+    fn shapes(&self) -> Vec<Shape> {
         M::shapes()
     }
 
@@ -167,15 +193,8 @@ impl<M: Superposition> AnySuperposition for Of<M> {
         M::values(fitted)
     }
 
-    fn state_at_rest(
-        &self,
-        x: f64,
-        volts: f64,
-        memory: &[f64],
-        creep: &[f64],
-        modes: usize,
-    ) -> Values {
-        M::state_at_rest(x, volts, memory, creep, modes)
+    fn state_at_rest(&self, rest: &Rest<'_>) -> Values {
+        M::state_at_rest(rest)
     }
 }
 

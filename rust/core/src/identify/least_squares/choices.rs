@@ -26,8 +26,8 @@ const CREEP_GAIN: f64 = 0.015;
 const DRIFT_GAIN: f64 = 0.015;
 pub(super) const MODE_GAIN: f64 = 0.02;
 
-/// Time constants of a drift, as shares of the record.
-const DRIFTS: [f64; 5] = [0.1, 0.3, 1.0, 3.0, 10.0];
+/// Range of the time constant of a drift, as shares of the record.
+const DRIFTS: (f64, f64) = (0.1, 10.0);
 
 /// Deviations that differ by less than this share tell nothing.
 const SAME: f64 = 1.01;
@@ -126,7 +126,7 @@ fn place_corners(fit: &mut Fit<'_>, count: usize) {
     for (r, record) in fit.common.records.iter().enumerate() {
         let mut path = fit.before(r);
         for (k, &volts) in record.drive.u.iter().enumerate() {
-            fit.push(&mut path, volts, record.drive.dt);
+            fit.push(&mut path, volts, record.step(k));
             if k >= record.start {
                 let value = fit.sum(&path.signals);
                 (low, high) = (low.min(value), high.max(value));
@@ -142,7 +142,7 @@ fn place_corners(fit: &mut Fit<'_>, count: usize) {
 
 /// The numbers of the shape in turn, each from its range.
 fn search_shape(fit: &mut Fit<'_>) -> Option<()> {
-    let ranges = fit.common.of.shapes();
+    let ranges: Vec<(f64, f64)> = fit.common.of.shapes().iter().map(|one| one.range).collect();
     let mut released = vec![false; ranges.len()];
     for _ in 0..SHAPE_ROUNDS {
         let round = fit.rms;
@@ -309,14 +309,17 @@ fn choose_drifts(fit: &mut Fit<'_>) -> Option<()> {
         }
         let length = fit.common.records[r].length();
         let mut best: Option<Fit<'_>> = None;
-        for part in DRIFTS {
+        let tried = |time: f64| {
             let mut trial = fit.clone();
-            trial.restructure(|trial| trial.drifts[r] = Some(part * length));
+            trial.restructure(|trial| trial.drifts[r] = Some(time));
             trial.settle(ROUGH)?;
-            if best.as_ref().is_none_or(|best| trial.rms < best.rms) {
+            let rms = trial.rms;
+            if best.as_ref().is_none_or(|best| rms < best.rms) {
                 best = Some(trial);
             }
-        }
+            Some(rms)
+        };
+        least((DRIFTS.0 * length, DRIFTS.1 * length), 0.02, tried)?;
         let enough = (1.0 - DRIFT_GAIN) * fit.deviation_of(r);
         if let Some(best) = best.filter(|best| best.deviation_of(r) < enough) {
             *fit = best;
@@ -390,6 +393,13 @@ fn choose_dynamics(
             if mode && fit.rms < (1.0 - MODE_GAIN) * lagging.rms {
                 return Some(None);
             }
+            if !mode && may_hide_a_mode(fit) {
+                let hidden = unseen_mode(&still)?;
+                if hidden.poles_within() && hidden.rms < (1.0 - MODE_GAIN) * lagging.rms {
+                    *fit = hidden;
+                    return Some(None);
+                }
+            }
             let (chosen, lags) = smallest_lag(still, &lagging)?;
             *fit = chosen;
             Some(Some(lags))
@@ -456,6 +466,12 @@ fn smallest_lag<'a>(still: Fit<'a>, best: &Fit<'a>) -> Option<(Fit<'a>, (f64, f6
     let mut chosen = at_lag(best, shortest(least)?)?;
     chosen.held = true;
     Some((chosen, (low, high)))
+}
+
+/// Whether a drive is quick enough for a mode that no resonance shows: of a slow sine it would
+/// explain what is creep, or what the plays do not.
+fn may_hide_a_mode(fit: &Fit<'_>) -> bool {
+    fit.common.records.iter().any(|one| one.measures().excited().is_some())
 }
 
 /// A mode that the record does not show: as high and as little damped as the record allows.

@@ -53,8 +53,7 @@ pub(super) struct Fit<'a> {
 
 impl<'a> Fit<'a> {
     pub fn new(common: &'a Common<'a>, places: &[f64]) -> Self {
-        let middle = |(from, to): &(f64, f64)| libm::sqrt(from * to);
-        let shape: Vec<f64> = common.of.shapes().iter().map(middle).collect();
+        let shape: Vec<f64> = common.of.shapes().iter().map(|one| one.neutral).collect();
         let begin = |history: Option<History>| Beginning {
             history: history.unwrap_or(History::Virgin),
             from: 0.0,

@@ -123,7 +123,7 @@ impl Fit<'_> {
         let mut row = vec![0.0; self.unknowns()];
         let mut judged = self.judged(r).peekable();
         for (k, &volts) in drive.u.iter().enumerate().take(self.windows[r].end) {
-            self.push(&mut path, volts, if k == 0 { f64::INFINITY } else { drive.dt });
+            self.push(&mut path, volts, self.common.records[r].step(k));
             self.inputs(&path.signals, &mut inputs);
             let columns = match &mut columns {
                 None => {

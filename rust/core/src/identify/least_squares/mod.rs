@@ -20,11 +20,12 @@ mod record_path;
 
 use super::delay::Delay;
 use super::history::History;
-use crate::error::{Error, Result, positive};
+use crate::error::{Error, Result, positive, shown};
 use crate::models::{
-    AnySuperposition, Dynamics, Measures, Model, PlayHysteresis, Relaxation, SignalsOf, Values,
+    AnySuperposition, Dynamics, MOST_LEVELS, Measures, Model, Places, PlayHysteresis, Relaxation,
+    SignalsOf, Values,
 };
-use crate::signal::{Drive, Stop, index, range, turns};
+use crate::signal::{Drive, Hold, Stop, index, range, turns};
 
 use common::Common;
 
@@ -157,6 +158,10 @@ impl<'a> WeightsRecord<'a> {
         let ends = delay.ends(length, || self.measures().longest_delay())?;
         let delay = match delay {
             Delay::Fixed(value) => WeightsDelay::Known(value),
+            Delay::Between(low, high) if low > high => {
+                let found = format!("({}, {}) s", shown(low), shown(high));
+                return Err(Error::parameter("delay", found, "the lower bound first"));
+            }
             _ if ends.0 < ends.1 => WeightsDelay::Fitted(ends.0, ends.1),
             _ => WeightsDelay::Known(ends.0),
         };
@@ -166,6 +171,11 @@ impl<'a> WeightsRecord<'a> {
     /// Measures of the samples that count.
     fn measures(&self) -> Measures {
         Measures::of(&self.drive, self.y, self.start..self.y.len())
+    }
+
+    /// Seconds within which the drive comes to a sample: none where it is held and jumps.
+    fn step(&self, k: usize) -> f64 {
+        if k > 0 && self.drive.hold == Hold::First { self.drive.dt } else { f64::INFINITY }
     }
 
     /// Samples that count.
@@ -241,8 +251,10 @@ pub fn identify_weights(
     let zeros = |count: usize| vec![0.0; count];
     let zones = zeros(settings.zones);
     PlayHysteresis::new(1.0, &[], &[], &zones, &zones)?;
-    if let PlacesKind::Given(places) = &settings.places {
-        of.check_places(places)?;
+    match &settings.places {
+        PlacesKind::Given(places) => of.check_places(places)?,
+        PlacesKind::Spread(count) => check_count(of, *count)?,
+        PlacesKind::Auto => {}
     }
     let times = settings.creep.times();
     Relaxation::new(&zeros(times.len()), times, Dynamics::None)?;
@@ -273,6 +285,18 @@ pub fn identify_weights(
     found.map(|(fit, lag_range)| Ok(LeastSquaresFit { lag_range, ..fit.result()? })).transpose()
 }
 
+/// Refuses a number of places with which no stage exists.
+fn check_count(of: &dyn AnySuperposition, count: usize) -> Result<()> {
+    let title = of.info().title;
+    let expected = match of.places() {
+        Places::Thresholds => return Ok(()),
+        Places::Levels if (1..MOST_LEVELS).contains(&count) => return Ok(()),
+        Places::Levels => format!("1 to {} intervals between levels of {title}", MOST_LEVELS - 1),
+        Places::None => format!("None: {title} has no thresholds or levels"),
+    };
+    Err(Error::parameter("count", count, expected))
+}
+
 /// A falling displacement is fitted as a rising one: under the negative drive, or negative itself
 /// where the signals bend the drive.
 fn mirror(
@@ -296,7 +320,7 @@ fn unknowns(of: &dyn AnySuperposition, settings: &Settings) -> usize {
         PlacesKind::Spread(count) => (0..*count).map(index).collect(),
         PlacesKind::Auto => (0..AUTO_PLACES).map(index).collect(),
     };
-    let shape: Vec<f64> = of.shapes().iter().map(|(low, high)| libm::sqrt(low * high)).collect();
+    let shape: Vec<f64> = of.shapes().iter().map(|one| one.neutral).collect();
     let made = SignalsOf { shape: &shape, places: &places, drive: (0.0, index(AUTO_PLACES)) };
     1 + of.signals(&made).count() + settings.zones + settings.creep.times().len()
 }

@@ -4,7 +4,7 @@ use super::fit::Fit;
 use super::follower::Follower;
 use crate::error::Result;
 use crate::identify::history::{History, visited};
-use crate::models::{Dynamics, Experiment, Relaxation, Values};
+use crate::models::{Dynamics, Experiment, Relaxation, Rest, Values};
 use crate::signal::{FractionalDelay, index};
 
 /// Signals of a drive, and the memory that they come from.
@@ -34,7 +34,8 @@ impl Fit<'_> {
 
     /// Where the creep stands before record `r` behind each of so many inputs.
     pub fn creep_before(&self, r: usize, width: usize) -> Vec<Vec<f64>> {
-        let drive = self.common.records[r].drive;
+        let record = &self.common.records[r];
+        let drive = record.drive;
         let mut path = self.before(r);
         let mut inputs = vec![0.0; width];
         let whole_only = width == 1;
@@ -65,7 +66,7 @@ impl Fit<'_> {
         let mut followers: Vec<Follower> =
             inputs.iter().map(|input| Follower::at_rest(&creep, *input, &[])).collect();
         for &volts in &drive.u[1..] {
-            take(self, &mut path, (volts, drive.dt), &mut inputs);
+            take(self, &mut path, (volts, record.step(1)), &mut inputs);
             for (follower, input) in followers.iter_mut().zip(&inputs) {
                 follower.next(&creep, &flow, drive.hold, *input);
             }
@@ -105,16 +106,15 @@ impl Fit<'_> {
         let mut path = self.before(r);
         let creep = self.creep_before(r, 1);
         let mut follower: Option<Follower> = None;
-        let through = |volts: &f64| {
-            let dt = if follower.is_some() { drive.dt } else { f64::INFINITY };
-            self.push(&mut path, *volts, dt);
+        let through = |(k, volts): (usize, &f64)| {
+            self.push(&mut path, *volts, self.common.records[r].step(k));
             let output = self.bent(self.sum(&path.signals));
             match &mut follower {
                 Some(follower) => follower.next(&relaxation, &flow, drive.hold, output),
                 none => none.insert(Follower::at_rest(&relaxation, output, &creep[0])).state.x,
             }
         };
-        Ok(drive.u.iter().take(self.windows[r].end).map(through).collect())
+        Ok(drive.u.iter().take(self.windows[r].end).enumerate().map(through).collect())
     }
 
     /// State of the stage before the first sample of record `r`; that of its mirror image where it
@@ -130,12 +130,14 @@ impl Fit<'_> {
         self.push(&mut path, first, f64::INFINITY);
         let creep = &self.creep_before(r, 1)[0];
         let output = self.bent(self.sum(&path.signals));
-        let rest = Follower::at_rest(&relaxation, output, creep).state.x;
+        let at_rest = Follower::at_rest(&relaxation, output, creep).state.x;
         let modes = self.dynamics().further().len();
         let memory: Vec<f64> = path.memory.iter().map(|one| of_drive * one).collect();
         let creep: Vec<f64> = creep.iter().map(|q| of_motion * q).collect();
-        let (x, volts) = (of_motion * rest, of_drive * first);
-        Ok(self.common.of.state_at_rest(x, volts, &memory, &creep, modes))
+        let (x, volts) = (of_motion * at_rest, of_drive * first);
+        let sum = of_motion * self.sum(&path.signals);
+        let rest = Rest { x, volts, sum, memory: &memory, creep: &creep, modes };
+        Ok(self.common.of.state_at_rest(&rest))
     }
 }
 
