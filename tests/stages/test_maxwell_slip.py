@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -61,7 +61,7 @@ def test_without_elements_it_is_a_spring() -> None:
 def test_it_is_the_stage_of_these_plays() -> None:
     """One element, on paper: threshold and weight of the play from ratio and slip."""
     gain, ratio, slip = 0.8e-6, 0.25, 3e-6
-    moving = {
+    moving: dict[str, Any] = {
         "creep_weights": (0.02,),
         "creep_times": (0.5,),
         "frequency": 200.0,

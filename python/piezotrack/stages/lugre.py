@@ -84,9 +84,9 @@ class LuGreStage(Stage):
     that the force of sliding is Fs.
 
     For the same reason a search holds `micro_damping`, `static_ratio` and `stribeck_velocity`
-    unless they are in ``free=``. Where the force of sliding falls faster with the speed than the damping
-    grows, the stage sticks and slips, and a search among such motions finds nothing of use. A
-    micro damping far above the damping needs thousands of steps a sample:
+    unless they are in ``free=``. Where the force of sliding falls faster with the speed than the
+    damping grows, the stage sticks and slips, and a search among such motions finds nothing of use.
+    A micro damping far above the damping needs thousands of steps a sample:
     ``constraints=["micro_damping < damping"]`` keeps a search away from it.
 
     Examples
