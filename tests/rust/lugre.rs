@@ -142,7 +142,7 @@ fn what_is_out_of_its_range_is_named() {
     };
     assert!(refused(4, 0.0).starts_with("rest_stiffness is 0 N/m"));
     assert!(refused(5, -1.0).starts_with("micro_damping is -1 N s/m"));
-    assert!(refused(5, 1e5).starts_with("micro_damping is 100000 N s/m: expected"));
+    assert!(refused(5, 1e9).starts_with("micro_damping is 1000000000 N s/m: expected"));
     assert!(refused(7, f64::NAN).starts_with("static_ratio"));
     assert!(refused(8, 0.0).starts_with("stribeck_velocity is 0 m/s"));
     let values = Values::scalars(Model::LuGre.info().parameters, &VALUES);

@@ -189,7 +189,7 @@ def test_identification_finds_the_motion(tmp_path: Path) -> None:
     [
         ("rest_stiffness", 0.0, "rest_stiffness is 0 N/m: expected a finite number above 0"),
         ("micro_damping", -1.0, "micro_damping is -1 N s/m"),
-        ("micro_damping", 1e6, "micro_damping is 1000000 N s/m: expected"),
+        ("micro_damping", 1e9, "micro_damping is 1000000000 N s/m: expected"),
         ("stribeck_velocity", 0.0, "stribeck_velocity is 0 m/s"),
         ("static_ratio", float("nan"), "static_ratio"),
         ("viscous_friction", -1.0, "viscous_friction is -1 N s/m"),
@@ -205,6 +205,9 @@ def test_on_a_measured_log() -> None:
     log, other = datasets.dbo_training(), datasets.dbo_tracking()[3.0:]
     names = ["first-order-dahl", "lugre"]
     dahl, lugre = pt.compare(log, names, train=(3.0, 23.0), test=other).rows
-    assert not lugre.fit.parameters["static_ratio"].free
-    assert lugre.train.rms_percent < 1.01 * dahl.train.rms_percent
-    assert lugre.test.rms_percent == pytest.approx(dahl.test.rms_percent, abs=0.1)
+    # What depends on the speed is held.
+    assert lugre.parameters == dahl.parameters == 5
+    assert isinstance(lugre.fit.model, pt.LuGreStage)
+    assert (lugre.fit.model.micro_damping, lugre.fit.model.static_ratio) == (0.0, 1.0)
+    assert lugre.train.rms_percent == pytest.approx(dahl.train.rms_percent, abs=0.005)
+    assert lugre.test.rms_percent == pytest.approx(dahl.test.rms_percent, abs=0.01)

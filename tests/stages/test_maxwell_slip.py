@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -59,9 +59,9 @@ def test_without_elements_it_is_a_spring() -> None:
 
 
 def test_it_is_the_stage_of_these_plays() -> None:
-    """One element: r (1 + kappa)/(T/k) is the threshold, T/k kappa/(1 + kappa) the weight."""
+    """One element, on paper: threshold and weight of the play from ratio and slip."""
     gain, ratio, slip = 0.8e-6, 0.25, 3e-6
-    moving = {
+    moving: dict[str, Any] = {
         "creep_weights": (0.02,),
         "creep_times": (0.5,),
         "frequency": 200.0,
@@ -91,7 +91,7 @@ def test_samples_do_not_matter() -> None:
 
 
 def test_loops_close_and_the_work_is_lost_in_the_elements() -> None:
-    """Around a large loop each element slips there and back: 4 f_i (x_max - r_i)."""
+    """Around a large loop of an amplitude a, each element loses 4 f_i (a - r_i)."""
     t = np.arange(4001) / 1000
     u = 60.0 * np.sin(2 * np.pi * t)
     x = STAGE.simulate(u, 1e-3).x

@@ -69,7 +69,8 @@ class AsymmetricBoucWenStage(Stage):
 
     .. math::
 
-        \frac{dz}{dp} = \alpha d - z (\beta + s \delta + (\gamma + s \epsilon) \operatorname{sgn} z)
+        \frac{dz}{dp} = \alpha d
+        - z (\beta + s \delta + (\gamma + s \epsilon) \operatorname{sgn} z)
 
     so each of the four combinations of direction and sign of h has its own rate, of which
     :math:`(\beta, \gamma, \delta, \epsilon)` are the coordinates. Without asymmetries the stage is
@@ -80,8 +81,8 @@ class AsymmetricBoucWenStage(Stage):
     The hysteresis is passive only for ``abs(gamma + delta) <= beta + epsilon`` and
     ``abs(gamma - delta) <= beta - epsilon``, and bounded for
     ``beta + gamma > abs(delta + epsilon)``. The inverse exists where it is passive and
-    ``2 alpha beta / (beta + gamma)`` is below 1, both with ``beta + epsilon``, ``gamma + delta``
-    and with ``beta - epsilon``, ``gamma - delta``.
+    ``2 alpha beta / (beta + gamma)`` is below 1, both with ``beta + epsilon`` and ``gamma + delta``
+    and with ``beta - epsilon`` and ``gamma - delta``.
 
     Examples
     --------

@@ -54,9 +54,9 @@ class LuGreStage(Stage):
         T [N/V], not 0.
     rest_stiffness : float
         sigma0 [N/m], above 0: stiffness of the bristles, the slope of the force where it is 0.
-    micro_damping : float
+    micro_damping : float, optional
         sigma1 [N s/m], 0 or above: damping of the bristles. Together with `viscous_friction` at
-        most 60 times the damping, or 60 times ``sqrt(stiffness * mass)`` where that is larger.
+        most 500000 times the damping, or ``sqrt(stiffness * mass)`` where that is larger.
     coulomb_force : float
         Fc [N], above 0: force of sliding at high speed.
     static_ratio : float, optional
@@ -83,9 +83,11 @@ class LuGreStage(Stage):
     determine how, and the equilibria that an experiment begins with are those of motions so slow
     that the force of sliding is Fs.
 
-    For the same reason a search holds `static_ratio` and `stribeck_velocity` unless they are in
-    ``free=``. Where the force of sliding falls faster with the speed than the damping grows, the
-    stage sticks and slips, and a search among such motions finds nothing of use.
+    For the same reason a search holds `micro_damping`, `static_ratio` and `stribeck_velocity`
+    unless they are in ``free=``. Where the force of sliding falls faster with the speed than the
+    damping grows, the stage sticks and slips, and a search among such motions finds nothing of use.
+    A micro damping far above the damping needs thousands of steps a sample:
+    ``constraints=["micro_damping < damping"]`` keeps a search away from it.
 
     Examples
     --------
@@ -110,7 +112,7 @@ class LuGreStage(Stage):
     stiffness: float
     piezo_coefficient: float
     rest_stiffness: float
-    micro_damping: float
+    micro_damping: float = 0.0
     coulomb_force: float
     static_ratio: float = 1.0
     stribeck_velocity: float = 1e-3

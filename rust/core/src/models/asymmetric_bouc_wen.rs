@@ -16,9 +16,8 @@ use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{AsymmetricBoucWen, BoucWenState};
 use piezotrack_control::inverse::{AsymmetricBoucWenInverse, BoucWenInverseState};
 
-use super::bouc_wen::BoucWenStage;
+use super::bouc_wen::{self as symmetric, BoucWenStage};
 use super::input_kernel::{InputHysteresis, InputKernel, plants_with_input};
-use super::mechanics_parameters::{V, X};
 use super::plant::KernelModel;
 use super::search_ranges::{Measures, Ranges};
 use super::traits::{
@@ -31,19 +30,16 @@ use crate::error::{Result, finite, positive};
 use crate::integrator::{InputMemory, LumpedStage, Order, Parameters};
 
 const PARAMETERS: &[ParameterInfo] = &[
-    ParameterInfo::new("mass", "m", "kg").force(),
-    ParameterInfo::new("damping", "b", "N s/m").force(),
-    ParameterInfo::new("stiffness", "k", "N/m").force(),
-    ParameterInfo::new("piezo_coefficient", "d", "m/V"),
-    ParameterInfo::new("alpha", "alpha", ""),
-    ParameterInfo::new("beta", "beta", "1/V"),
-    ParameterInfo::new("gamma", "gamma", "1/V"),
+    symmetric::PARAMETERS[0],
+    symmetric::PARAMETERS[1],
+    symmetric::PARAMETERS[2],
+    symmetric::PARAMETERS[3],
+    symmetric::PARAMETERS[4],
+    symmetric::PARAMETERS[5],
+    symmetric::PARAMETERS[6],
     ParameterInfo::new("asymmetry", "delta", "1/V"),
     ParameterInfo::new("sign_asymmetry", "epsilon", "1/V").or(0.0),
 ];
-
-const STATE: &[ParameterInfo] =
-    &[X, V, ParameterInfo::new("u", "u", "V"), ParameterInfo::new("h", "h", "m")];
 
 /// A stage with asymmetric Bouc-Wen hysteresis at its input.
 ///
@@ -113,7 +109,7 @@ impl StageModel for AsymmetricBoucWenStage {
         title: "asymmetric Bouc-Wen",
         drive_unit: "V",
         parameters: PARAMETERS,
-        state: STATE,
+        state: symmetric::STATE,
         published: &[],
     };
 
@@ -138,7 +134,7 @@ impl StageModel for AsymmetricBoucWenStage {
 impl Searchable for AsymmetricBoucWenStage {
     fn ranges(of: &Measures, held: &Held) -> Result<Ranges> {
         let mut ranges = BoucWenStage::ranges(of, held)?;
-        // A rate of once over the whole drive, in either direction.
+        // Of either sign, as gamma.
         let most = MOST_ASYMMETRY * of.gain / of.stroke;
         ranges.push(("asymmetry", (-most, most)));
         ranges.push(("sign_asymmetry", (-most, most)));

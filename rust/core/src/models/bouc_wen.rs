@@ -25,7 +25,7 @@ use crate::error::{Result, finite, not_zero, positive, within};
 use crate::integrator::{InputMemory, LumpedStage, Mechanics, Order, Parameters};
 
 /// The unit of beta and gamma is that for n = 1; in general it is 1/(V m^(n-1)).
-const PARAMETERS: &[ParameterInfo] = &[
+pub(super) const PARAMETERS: &[ParameterInfo; 8] = &[
     ParameterInfo::new("mass", "m", "kg").force(),
     ParameterInfo::new("damping", "b", "N s/m").force(),
     ParameterInfo::new("stiffness", "k", "N/m").force(),
@@ -38,7 +38,8 @@ const PARAMETERS: &[ParameterInfo] = &[
         .never_searched("exponent held, in fixed=: it decides the unit of beta and gamma"),
 ];
 
-const STATE: &[ParameterInfo] =
+/// Displacement, velocity, drive and hysteresis.
+pub(super) const STATE: &[ParameterInfo] =
     &[X, V, ParameterInfo::new("u", "u", "V"), ParameterInfo::new("h", "h", "m")];
 
 /// A stage with Bouc-Wen hysteresis at its input.

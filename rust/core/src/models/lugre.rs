@@ -36,7 +36,7 @@ const PARAMETERS: &[ParameterInfo] = &[
     STIFFNESS,
     PIEZO_COEFFICIENT,
     ParameterInfo::new("rest_stiffness", "sigma0", "N/m").force(),
-    ParameterInfo::new("micro_damping", "sigma1", "N s/m").force(),
+    ParameterInfo::new("micro_damping", "sigma1", "N s/m").force().or(0.0),
     ParameterInfo::new("coulomb_force", "Fc", "N").force(),
     ParameterInfo::new("static_ratio", "Fs/Fc", "").or(1.0),
     ParameterInfo::new("stribeck_velocity", "vs", "m/s").or(STRIBECK_VELOCITY),
@@ -52,11 +52,11 @@ const STATE: &[ParameterInfo] = &[X, V, ParameterInfo::new("deflection", "z", "m
 
 /// Halvings of the matrix exponential beside those for the damping alone, which the damping of the
 /// friction is not part of: see [`MOST_DAMPING`].
-const MORE_HALVINGS: u32 = 6;
+const MORE_HALVINGS: u32 = 20;
 
 /// Most damping of the friction, over that of the mechanics or its natural frequency times the mass,
 /// whichever is larger.
-const MOST_DAMPING: f64 = 60.0;
+const MOST_DAMPING: f64 = 5e5;
 
 /// A stage with LuGre friction.
 ///
