@@ -122,7 +122,7 @@ def test_it_explains_a_measured_log_and_foretells_another(tmp_path: Path) -> Non
     fit = compared.fits["duhem"]
     found = pt.load(fit.save(tmp_path / "stage.json"))
     assert found.model == fit.model
-    reference = pt.sine(frequency=1.0, low=5e-6, high=35e-6, duration=4.0)
+    reference = pt.sine(frequency=1.0, low=10e-6, high=35e-6, duration=4.0)
     inverse = found.model.inverse(playback="online")
     loop = pt.Controller(dt=1e-3, limits=(0.0, 3.6), feedforward=inverse)
     run = pt.track(found.model, loop, reference)

@@ -104,8 +104,8 @@ def test_it_has_a_row_beside_the_others_on_a_measured_log(tmp_path: Path) -> Non
     compared = pt.compare(log, ["prandtl-ishlinskii", NAME], train=(3.0, 23.0), test=other[3.0:])
     plain, bent = compared.rows
     assert bent.title == "polynomial Prandtl-Ishlinskii"
-    # The polynomial does nearly what two dead zones do.
-    assert bent.train.rms_percent == pytest.approx(plain.train.rms_percent, rel=0.2)
+    # The polynomial bends all of the loop, two dead zones the part where they are placed.
+    assert plain.train.rms_percent < bent.train.rms_percent < 1.5 * plain.train.rms_percent
     assert bent.test.rms_percent < 1.0
     fit = compared.fits[NAME]
     found = pt.load(fit.save(tmp_path / "stage.json"))
