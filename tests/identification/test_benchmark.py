@@ -263,7 +263,7 @@ def test_a_model_that_does_not_suit_is_a_result_with_a_sentence() -> None:
     # The best comes first, and what has no figures last.
     assert [one.model for one in board.of("asymmetry")] == ["plays-nnls", "discrete-backlash"]
     assert fitted.judged is not None
-    assert "no fit: the drive does not repeat" in board.summary()
+    assert "no fit: discrete backlash (2018): the drive does not repeat" in board.summary()
     assert "No fit: discrete backlash" in board.markdown()
 
 
