@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import threading
+import time
 from pathlib import Path
 
 import pytest
 
-from commands import log_text, ran, refusal
+from commands import COMMAND, log_text, ran, refusal
 
 PLAYS = ("--model", "plays-nnls")
 
@@ -36,6 +40,25 @@ def test_own_logs_are_compared_and_written() -> None:
     again = ("benchmark", "log.csv", *PLAYS, "--train", ":2.5", "--out", "board", "--json")
     assert json.loads(ran(*again))["results"][0]["seconds"] == 77.0
     assert json.loads(ran(*again, "--overwrite"))["results"][0]["seconds"] < 77.0
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows cannot tell whether a process runs")
+def test_a_killed_benchmark_goes_on_with_what_it_has() -> None:
+    models = ("plays-nnls", "first-order-dahl", "parallel-dahl", "dahl")
+    command = ["benchmark", "log.csv", *(part for name in models for part in ("--model", name))]
+    first = Path("benchmark/results/log.csv--plays-nnls.json")
+    with subprocess.Popen([*COMMAND, *command, "--quiet"]) as process:
+        until = time.monotonic() + 120.0
+        while not first.exists() and time.monotonic() < until:
+            threading.Event().wait(0.01)
+        process.kill()
+    kept = {path: path.read_bytes() for path in Path("benchmark/results").glob("log*.json")}
+    assert first in kept
+    assert all(json.loads(content)["record"]["name"] == "log.csv" for content in kept.values())
+    ran(*command, "--quiet")
+    assert {path: path.read_bytes() for path in kept} == kept
+    document = json.loads(Path("benchmark/benchmark.json").read_text(encoding="utf-8"))
+    assert [one["model"] for one in document["results"]] == list(models)
 
 
 def test_a_list_says_of_each_log_what_is_fitted() -> None:

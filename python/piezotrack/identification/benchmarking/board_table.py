@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -15,6 +16,8 @@ default: pt.identify(log), and what it chose. Errors are rms in per cent of the 
 largest error on the last part. K: values fitted. s: time of the fit, on this computer, beside
 whatever else it did. inverse: its drive for the measured displacement of a part not fitted, less
 the recorded drive, rms in per cent of the drive's range."""
+# Of a line in a terminal.
+WIDTH = 100
 HEADS = ("K", "s", "um", "inverse")
 
 
@@ -42,8 +45,12 @@ def board_text(board: Benchmark) -> str:
         ]
         lines += [_about(rows), f"  {'model':<{width}}{_line(heads, wide)}"]
         for row, cell in zip(rows, cells, strict=True):
-            said = _line(cell, wide) if cell else f"  no fit: {row.error}"
-            lines.append(f"  {_title(row):<{width}}{said}".rstrip())
+            if cell:
+                lines.append(f"  {_title(row):<{width}}{_line(cell, wide)}")
+        for row in rows:
+            if row.error:
+                said = f"no fit: {_title(row)}: {row.error}"
+                lines += wrap(said, WIDTH, initial_indent="  ", subsequent_indent="    ")
         lines.append("")
     return "\n".join([*lines, NOTES])
 

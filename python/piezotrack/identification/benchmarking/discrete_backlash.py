@@ -14,7 +14,7 @@ other order it is the inverse.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -104,10 +104,6 @@ class DiscreteBacklash:
         """
         bent = _along(self.curve.exchanged(), (y - self.level) / self.slope)
         return self.low + _backlash(self.backlash.exchanged(), bent)
-
-    def shifted(self, offset: float) -> DiscreteBacklash:
-        """Return the same with another zero of the displacement, `offset` higher [m]."""
-        return replace(self, level=self.level + offset)
 
 
 def identify_backlash(u: Array, y: Array) -> DiscreteBacklash:
