@@ -110,6 +110,11 @@ pub trait Superposition: StageModel {
     /// Where its signals have their places.
     const PLACES: Places;
 
+    /// How much each weight but the first is drawn to 0, as a share of signals of size 1: of
+    /// weights that explain a record as well, the most even ones are found. Those that the record
+    /// determines hardly change.
+    const EVEN: f64 = 0.0;
+
     /// Numbers that shape the signals and are searched around the least squares. One that gains
     /// little stays at its neutral value.
     #[must_use]
@@ -141,6 +146,8 @@ pub trait AnySuperposition: Sync {
     fn has_dead_zones(&self) -> bool;
     /// See [`Superposition::PLACES`].
     fn places(&self) -> Places;
+    /// See [`Superposition::EVEN`].
+    fn even(&self) -> f64;
     /// See [`Superposition::shapes`].
     fn shapes(&self) -> Vec<Shape>;
     /// See [`Superposition::check_places`].
@@ -170,6 +177,10 @@ impl<M: Superposition> AnySuperposition for Of<M> {
 
     fn places(&self) -> Places {
         M::PLACES
+    }
+
+    fn even(&self) -> f64 {
+        M::EVEN
     }
 
     fn shapes(&self) -> Vec<Shape> {

@@ -10,7 +10,7 @@ use super::{WeightsDelay, WeightsRecord};
 use crate::error::Result;
 use crate::math::Rows;
 use crate::models::{Relaxation, RelaxationFlow, RelaxationState};
-use crate::signal::Hold;
+use crate::signal::{Hold, index};
 
 /// Change of a logarithm for a derivative by differences.
 const NUDGE: f64 = 1e-5;
@@ -104,7 +104,24 @@ impl Fit<'_> {
         for r in 0..self.common.records.len() {
             self.push_rows(r, &mut rows)?;
         }
+        self.push_even(&mut rows);
         Ok(rows)
+    }
+
+    /// Rows that draw the weights to 0 where the model asks for it.
+    fn push_even(&self, rows: &mut Rows) {
+        let share = self.common.of.even();
+        if share <= 0.0 {
+            return;
+        }
+        let samples = |r: usize| self.weight(r) * index(self.judged(r).count());
+        let squares: f64 = (0..self.common.records.len()).map(samples).sum();
+        let mut row = vec![0.0; self.unknowns()];
+        for slot in 1..self.layout().weights {
+            row[slot] = share * libm::sqrt(squares);
+            rows.push(&row, 0.0);
+            row[slot] = 0.0;
+        }
     }
 
     /// The rows of one record.
