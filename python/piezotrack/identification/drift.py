@@ -58,7 +58,6 @@ class Drift:
         x: Array = self.amplitude * np.exp((self.begin - np.asarray(t)) / self.time)
         return x
 
-
     def of_another(self, t: Array, rest: Array, *, centred: bool) -> Array:
         """Drift of another record of the same sensor, by least squares with this time constant.
 

@@ -86,7 +86,9 @@ class PreisachStage(Stage):
     -----
     A stage that never moved has those relays switched on for which a + b is below 0, as plays at
     rest at 0 V have it; the line a + b = 0 is drawn in steps from level to level. Where all
-    levels are 0 V or above, no relay is on.
+    levels are 0 V or above, no relay is on; the first rise of a stage then goes up the settled
+    loop, unless the lowest level is as far below 0 V as the highest one is above: relays that
+    switch down there stay on for ever.
 
     With equal distances between levels and all masses of a diagonal k = i - j equal, a drive that
     reverses at levels has the output of a play of threshold k/2 times that distance.

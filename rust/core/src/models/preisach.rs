@@ -4,7 +4,8 @@
 //! doi 10.1103/PhysRevLett.56.1518. [`InputStage`] says what follows the operator.
 //!
 //! The output is the sum of the masses of the cells times the shares of them that are switched on:
-//! a fit finds the masses by least squares. Its levels divide the range of the drive.
+//! a fit finds the masses by least squares. Its levels divide the range of the drive. Of masses
+//! that explain a record as well those are found whose neighbours are alike.
 
 use piezotrack_control::{InputInverse, InputInverseState};
 

@@ -107,16 +107,18 @@ impl Fit<'_> {
         for r in 0..self.common.records.len() {
             self.push_rows(r, &mut rows)?;
         }
-        let pairs = self.signals.alike();
-        if !pairs.is_empty() {
-            let size = ALIKE * libm::sqrt(self.counted());
-            for (one, other) in pairs {
-                let mut row = vec![0.0; self.unknowns()];
-                (row[one], row[other]) = (size, -size);
-                rows.push(&row, 0.0);
-            }
-        }
+        self.push_alike(&mut rows);
         Ok(rows)
+    }
+
+    /// Rows that draw weights of neighbours together where the model asks for it.
+    fn push_alike(&self, rows: &mut Rows) {
+        let size = ALIKE * libm::sqrt(self.counted());
+        for (one, other) in self.signals.alike() {
+            let mut row = vec![0.0; self.unknowns()];
+            (row[one], row[other]) = (size, -size);
+            rows.push(&row, 0.0);
+        }
     }
 
     /// The rows of one record.
