@@ -130,12 +130,31 @@ def test_a_drift_is_that_of_its_record_alone(tmp_path: Path) -> None:
     # It goes on where the record does, offset and all, and is none of another record.
     carried = fit.score(rest, offset=fit.offset).rms
     assert carried < 0.3 * still.score(rest, offset=still.offset).rms
+    # Another record has one of its own, as fast, which may be none.
     other = record(0.5, 30.0, 0.005, seed=9)
     assert fit.score(other).rms == pytest.approx(NOISE, rel=0.3)
+    drifting = record(0.5, 30.0, 0.005, seed=9, drift=(-5e-7, fit.drift.time))
+    score = fit.score(drifting)
+    assert score.rms == pytest.approx(NOISE, rel=0.3)
+    assert np.std(drifting.y - fit.simulate(drifting).x) == pytest.approx(score.rms, rel=1e-9)
+    # With an offset that is given the stage alone speaks.
+    assert np.ptp(drifting.y - fit.simulate(drifting, offset=0.0).x) > 2e-7
     # In the file too.
     kept = pt.load(fit.save(tmp_path / "stage.json"))
     assert kept.drift == fit.drift
     assert kept.score(rest, offset=kept.offset).rms == carried
+
+
+def test_a_mode_far_above_the_drive_is_no_lag() -> None:
+    """No resonance shows, but what the mode does to the turns of a quick drive does."""
+    stage = replace(STAGE, creep_weights=(), creep_times=(), frequency=300.0, damping_ratio=0.05)
+    u = drive(20.0, 35.0, 2.5e-4, 0.6)
+    noise = NOISE * np.random.default_rng(4).standard_normal(u.size)
+    log = pt.Dataset(u=u, y=stage.simulate(u, 2.5e-4).x + noise, dt=2.5e-4)
+    settings = replace(PLAYS, creep=False, dynamics="auto")
+    fit = pt.identify(log, KIND, history="virgin", drift=False, least_squares=settings)
+    assert fit.model.frequency == pytest.approx(300.0, rel=0.05)
+    assert fit.cost == pytest.approx(NOISE, rel=0.1)
 
 
 def test_a_record_without_a_drift_gets_none() -> None:

@@ -403,8 +403,8 @@ class IdentifiedModel:
     def _residual(self, data: Dataset, state: StageState) -> Array:
         """Measured less simulated displacement in the window, without offset [m]."""
         run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
-        x = self._shown(run, self._delay_on(data))[data.warmup :]
-        rest: Array = data.y - x - self._drift_on(data)
+        x = self._shown(run, self._delay_on(data))[data.warmup :] + self._drift_on(data)
+        rest: Array = data.y - x - self._added(data, x, "own")[0]
         return rest
 
     def _fits_offset(self, data: Dataset) -> bool:

@@ -128,10 +128,9 @@ class LeastSquares:
 
     def _places(self, info: ModelInfo) -> list[float] | None:
         """Thresholds or levels that are given, whichever the model has."""
-        names = [one.name for one in info.parameters]
         places = None
         for name, given in (("thresholds", self.thresholds), ("levels", self.levels)):
-            if given is not None and name not in names:
+            if given is not None and name != info.places:
                 raise ParameterError(
                     f"{name} is {quoted(given)}: expected None, as {info.title} has no {name}"
                 )

@@ -54,6 +54,9 @@ class ModelInfo:
         Unit of the drive.
     searched : bool
         Whether the parameters are searched; otherwise least squares find them.
+    places : {"thresholds", "levels", ""}
+        What an identification by least squares spreads over the drive's range: thresholds of plays,
+        levels, or nothing.
     parameters, state : tuple of Parameter
         The parameters, and the parts of the state.
     """
@@ -62,6 +65,7 @@ class ModelInfo:
     title: str
     drive_unit: str
     searched: bool
+    places: str
     parameters: tuple[Parameter, ...]
     state: tuple[Parameter, ...]
 
@@ -97,6 +101,7 @@ def _listed(entry: dict[str, Any]) -> ModelInfo:
         title=entry["title"],
         drive_unit=entry["drive_unit"],
         searched=entry["searched"],
+        places=entry["places"],
         parameters=tuple(Parameter(**one) for one in entry["parameters"]),
         state=tuple(Parameter(**one) for one in entry["state"]),
     )

@@ -1,6 +1,6 @@
 //! The list of models: their parameters, their states and their published values.
 
-use piezotrack_core::models::{FoundBy, Model, ParameterInfo, Values};
+use piezotrack_core::models::{AnySuperposition, FoundBy, Model, ParameterInfo, Places, Values};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
@@ -54,6 +54,8 @@ struct Listed {
     title: &'static str,
     drive_unit: &'static str,
     searched: bool,
+    /// What the places of its signals are called; empty where they have none.
+    places: &'static str,
     parameters: Vec<Parameter>,
     state: Vec<Parameter>,
     published: Vec<&'static str>,
@@ -69,6 +71,11 @@ fn models() -> Vec<Listed> {
             title: info.title,
             drive_unit: info.drive_unit,
             searched: model.found_by() == FoundBy::Swarm,
+            places: match model.superposition().map(AnySuperposition::places) {
+                Some(Places::Thresholds) => "thresholds",
+                Some(Places::Levels) => "levels",
+                Some(Places::None) | None => "",
+            },
             parameters: info.parameters.iter().map(Parameter::of).collect(),
             state: info.state.iter().map(Parameter::of).collect(),
             published: info.published.iter().map(|(name, _)| *name).collect(),

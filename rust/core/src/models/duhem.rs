@@ -18,7 +18,7 @@ use piezotrack_control::{InputInverse, InputInverseState};
 use super::creep::{MOST_RELAXATIONS, Relaxation};
 use super::duhem_operator::{DuhemInverse, DuhemInverseState, DuhemOperator, DuhemParameters};
 use super::dynamics_parameters::DYNAMICS;
-use super::input_stage::{InputOperator, InputStage, inverse_state, state_at_rest};
+use super::input_stage::{InputStage, Remembering, inverse_state, state_at_rest};
 use super::superposition::{FittedWeights, Places, Rest, Shape, Signals, SignalsOf, Superposition};
 use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
 use super::values::{ParameterInfo, Values};
@@ -214,10 +214,6 @@ impl Superposition for DuhemStage {
     /// Alpha, times the range of the drive.
     fn shapes() -> Vec<Shape> {
         vec![Shape::about(RATES.0, RATES.1)]
-    }
-
-    fn check_places(_places: &[f64]) -> Result<()> {
-        Ok(())
     }
 
     fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {

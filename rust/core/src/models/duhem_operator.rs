@@ -34,7 +34,7 @@ use piezotrack_control::OperatorInverse;
 use piezotrack_control::hysteresis::Operator;
 
 use super::cubic_curve::{Cubic, CubicCurve, checked_range};
-use super::input_stage::{InputOperator, Segmented, state_with};
+use super::input_stage::{InputOperator, Remembering, Segmented, state_with};
 use super::values::ParameterInfo;
 use crate::error::{Error, Result, finite, positive, shown};
 use crate::math::rising_root;
@@ -258,8 +258,6 @@ fn check_branches(
 impl InputOperator for DuhemOperator {
     type State = DuhemState;
 
-    const STATE: &'static [ParameterInfo] = &state_with(ParameterInfo::new("output", "h", "m"));
-
     fn rest(&self) -> DuhemState {
         Self::rest(self)
     }
@@ -273,6 +271,10 @@ impl InputOperator for DuhemOperator {
     fn input(&self, state: &DuhemState) -> f64 {
         state.input
     }
+}
+
+impl Remembering for DuhemOperator {
+    const STATE: &'static [ParameterInfo] = &state_with(ParameterInfo::new("output", "h", "m"));
 
     /// The output, beyond that at rest.
     fn memory(&self, state: &DuhemState) -> Vec<f64> {

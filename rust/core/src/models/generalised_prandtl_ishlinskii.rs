@@ -34,7 +34,8 @@ use piezotrack_control::{InputInverse, InputInverseState, OperatorInverse};
 use super::creep::{MOST_RELAXATIONS, Relaxation};
 use super::dynamics_parameters::DYNAMICS;
 use super::input_stage::{
-    InputOperator, InputStage, PLAYS_STATE, Segmented, inverse_state, recall_plays, state_at_rest,
+    InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented, inverse_state, recall_plays,
+    state_at_rest,
 };
 use super::prandtl_ishlinskii::{MOST_PLAYS, PlayHysteresis};
 use super::superposition::{
@@ -273,7 +274,9 @@ impl InputOperator for GeneralisedPlays {
     fn input(&self, state: &GeneralisedPlaysState) -> f64 {
         state.input
     }
+}
 
+impl Remembering for GeneralisedPlays {
     fn memory(&self, state: &GeneralisedPlaysState) -> Vec<f64> {
         state.plays[..self.count].to_vec()
     }
@@ -484,10 +487,6 @@ impl Superposition for GeneralisedPrandtlIshlinskiiStage {
     /// k = (1 - sqrt(ratio))/(1 + sqrt(ratio)). With s near 0 it bends in one direction only.
     fn shapes() -> Vec<Shape> {
         vec![Shape::about(0.25, 4.0), Shape::about(0.005, 1.6)]
-    }
-
-    fn check_places(places: &[f64]) -> Result<()> {
-        PlayHysteresis::new(1.0, places, &vec![0.0; places.len()], &[], &[]).map(drop)
     }
 
     fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {

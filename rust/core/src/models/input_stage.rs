@@ -88,15 +88,11 @@ pub trait InputOperator: Copy + Debug {
     /// Its state.
     type State: Copy + Debug;
 
-    /// Description of a stage's state: that of plays, or the same with another name, symbol and
-    /// unit of the operator's memory in their place.
-    const STATE: &'static [ParameterInfo] = PLAYS_STATE;
+    /// Whether the output depends on how fast the input moves.
+    const BY_RATE: bool = false;
 
     /// The state before any voltage.
     fn rest(&self) -> Self::State;
-
-    /// Whether the output depends on how fast the input moves.
-    const BY_RATE: bool = false;
 
     /// Sets how fast the input moves from now on, V/s.
     fn at_rate(&self, _state: &mut Self::State, _rate: f64) {}
@@ -106,6 +102,13 @@ pub trait InputOperator: Copy + Debug {
 
     /// Input of a state, V.
     fn input(&self, state: &Self::State) -> f64;
+}
+
+/// An operator whose memory can be kept as numbers.
+pub trait Remembering: InputOperator {
+    /// Description of a stage's state: that of plays, or the same with another name, symbol and
+    /// unit of the operator's memory in their place.
+    const STATE: &'static [ParameterInfo] = PLAYS_STATE;
 
     /// Memory of a state as numbers.
     fn memory(&self, state: &Self::State) -> Vec<f64>;
@@ -124,7 +127,7 @@ pub trait InputOperator: Copy + Debug {
 }
 
 /// A hysteresis operator whose output is a straight line between corners, or nearly so.
-pub trait Segmented: InputOperator {
+pub trait Segmented: Remembering {
     /// The end of the first part of the way to `volts` along which the output is a straight line
     /// to within `deviation`, m: beyond the present input, and `volts` where all of the way is.
     fn straight(&self, state: &Self::State, volts: f64, deviation: f64) -> f64;
@@ -171,7 +174,7 @@ pub struct InputStageFlow {
     least: f64,
 }
 
-impl<O: InputOperator> InputStage<O> {
+impl<O: Remembering> InputStage<O> {
     /// The state before any voltage.
     #[must_use]
     pub fn at_rest(&self) -> InputStageState<O::State> {

@@ -26,7 +26,7 @@ use piezotrack_control::hysteresis::PlayState;
 
 use super::creep::Relaxation;
 use super::dynamics_parameters::{DYNAMICS, same_length};
-use super::input_stage::{InputOperator, InputStage, PLAYS_STATE, Segmented};
+use super::input_stage::{InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented};
 use super::prandtl_ishlinskii::{
     MOST_PLAYS, PlayHysteresis, PrandtlIshlinskiiStage, checked_thresholds,
 };
@@ -142,7 +142,9 @@ impl InputOperator for MaxwellSlip {
     fn input(&self, state: &Self::State) -> f64 {
         state.input
     }
+}
 
+impl Remembering for MaxwellSlip {
     fn memory(&self, state: &Self::State) -> Vec<f64> {
         self.plays.memory(state)
     }
@@ -227,10 +229,6 @@ impl Invertible for MaxwellSlipStage {
 /// Plays are found, and say which elements they are.
 impl Superposition for MaxwellSlipStage {
     const PLACES: Places = Places::Thresholds;
-
-    fn check_places(places: &[f64]) -> Result<()> {
-        PrandtlIshlinskiiStage::check_places(places)
-    }
 
     fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {
         PrandtlIshlinskiiStage::signals(of)

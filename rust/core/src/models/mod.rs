@@ -55,7 +55,9 @@ pub use generalised_prandtl_ishlinskii::{
     GeneralisedPrandtlIshlinskiiStage,
 };
 pub use input_kernel::{InputHysteresis, InputKernel};
-pub use input_stage::{InputOperator, InputStage, InputStageFlow, InputStageState, Segmented};
+pub use input_stage::{
+    InputOperator, InputStage, InputStageFlow, InputStageState, Remembering, Segmented,
+};
 pub use lanes::{LanedPlant, LanedVisitor};
 pub use lugre::{LuGreKernel, LuGreStage};
 pub use maxwell_slip::{MaxwellSlip, MaxwellSlipStage};

@@ -22,7 +22,8 @@ use super::creep::{MOST_RELAXATIONS, Relaxation};
 use super::cubic_curve::{Cubic, CubicCurve, checked_range};
 use super::dynamics_parameters::DYNAMICS;
 use super::input_stage::{
-    InputOperator, InputStage, PLAYS_STATE, Segmented, inverse_state, recall_plays, state_at_rest,
+    InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented, inverse_state, recall_plays,
+    state_at_rest,
 };
 use super::prandtl_ishlinskii::{MOST_PLAYS, PlayHysteresis};
 use super::superposition::{
@@ -192,7 +193,9 @@ impl InputOperator for PolynomialPlays {
     fn input(&self, state: &PolynomialPlaysState) -> f64 {
         state.input
     }
+}
 
+impl Remembering for PolynomialPlays {
     fn memory(&self, state: &PolynomialPlaysState) -> Vec<f64> {
         state.plays[..self.plays.count].to_vec()
     }
@@ -453,10 +456,6 @@ impl Signals for PlaysAndPolynomials {
 
 impl Superposition for PolynomialPrandtlIshlinskiiStage {
     const PLACES: Places = Places::Thresholds;
-
-    fn check_places(places: &[f64]) -> Result<()> {
-        PlayHysteresis::new(1.0, places, &vec![0.0; places.len()], &[], &[]).map(drop)
-    }
 
     fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {
         let curve = |[a, b, c]: [f64; 3]| CubicCurve::new(Cubic([0.0, a, b, c]), of.drive);

@@ -18,7 +18,8 @@ use piezotrack_control::{InputInverseState, PlayInverse, PrandtlIshlinskiiInvers
 use super::creep::{MOST_RELAXATIONS, Relaxation};
 use super::dynamics_parameters::{DYNAMICS, same_length};
 use super::input_stage::{
-    InputOperator, InputStage, PLAYS_STATE, Segmented, inverse_state, recall_plays, state_at_rest,
+    InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented, inverse_state, recall_plays,
+    state_at_rest,
 };
 use super::superposition::{
     FittedWeights, Places, Plain, PlaySignals, Rest, Signals, SignalsOf, Superposition,
@@ -199,7 +200,9 @@ impl InputOperator for PlayHysteresis {
     fn input(&self, state: &Self::State) -> f64 {
         state.input
     }
+}
 
+impl Remembering for PlayHysteresis {
     fn memory(&self, state: &Self::State) -> Vec<f64> {
         state.plays[..self.count].to_vec()
     }
@@ -305,10 +308,6 @@ impl Invertible for PrandtlIshlinskiiStage {
 impl Superposition for PrandtlIshlinskiiStage {
     const DEAD_ZONES: bool = true;
     const PLACES: Places = Places::Thresholds;
-
-    fn check_places(places: &[f64]) -> Result<()> {
-        PlayHysteresis::new(1.0, places, &vec![0.0; places.len()], &[], &[]).map(drop)
-    }
 
     fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {
         Box::new(PlaySignals { edges: Plain, thresholds: of.places.to_vec() })

@@ -12,7 +12,7 @@ use piezotrack_control::{InputInverse, InputInverseState};
 use super::creep::{MOST_RELAXATIONS, Relaxation};
 use super::dynamics_parameters::DYNAMICS;
 use super::everett::{Everett, entry};
-use super::input_stage::{InputOperator, InputStage, inverse_state, state_at_rest};
+use super::input_stage::{InputStage, Remembering, inverse_state, state_at_rest};
 use super::preisach_operator::{PreisachInverse, PreisachInverseState, PreisachOperator};
 use super::reversals::Reversals;
 use super::superposition::{FittedWeights, Places, Rest, Signals, SignalsOf, Superposition};
@@ -179,10 +179,6 @@ impl Signals for Shares {
 
 impl Superposition for PreisachStage {
     const PLACES: Places = Places::Levels;
-
-    fn check_places(places: &[f64]) -> Result<()> {
-        Everett::of_levels(places).map(drop)
-    }
 
     fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {
         // Levels that are none have been refused.

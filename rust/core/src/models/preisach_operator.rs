@@ -24,7 +24,7 @@ use piezotrack_control::OperatorInverse;
 use piezotrack_control::hysteresis::Operator;
 
 use super::everett::{Everett, MOST_LEVELS};
-use super::input_stage::{InputOperator, Segmented, state_with};
+use super::input_stage::{InputOperator, Remembering, Segmented, state_with};
 use super::prandtl_ishlinskii::direction;
 use super::reversals::{MOST_REVERSALS, Reversals};
 use super::values::ParameterInfo;
@@ -177,8 +177,6 @@ impl PreisachOperator {
 impl InputOperator for PreisachOperator {
     type State = PreisachState;
 
-    const STATE: &'static [ParameterInfo] = &state_with(ParameterInfo::list("reversals", "m", "V"));
-
     fn rest(&self) -> PreisachState {
         Self::rest(self)
     }
@@ -192,6 +190,10 @@ impl InputOperator for PreisachOperator {
     fn input(&self, state: &PreisachState) -> f64 {
         state.input
     }
+}
+
+impl Remembering for PreisachOperator {
+    const STATE: &'static [ParameterInfo] = &state_with(ParameterInfo::list("reversals", "m", "V"));
 
     fn memory(&self, state: &PreisachState) -> Vec<f64> {
         state.reversals.memory()

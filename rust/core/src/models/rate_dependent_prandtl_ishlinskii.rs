@@ -28,7 +28,8 @@ use piezotrack_control::{InputInverse, InputInverseState, OperatorInverse, PlayI
 use super::creep::{MOST_RELAXATIONS, Relaxation};
 use super::dynamics_parameters::DYNAMICS;
 use super::input_stage::{
-    InputOperator, InputStage, PLAYS_STATE, Segmented, inverse_state, recall_plays, state_at_rest,
+    InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented, inverse_state, recall_plays,
+    state_at_rest,
 };
 use super::prandtl_ishlinskii::{MOST_PLAYS, MOST_ZONES, PlayHysteresis};
 use super::superposition::{FittedWeights, Places, Rest, Shape, Signals, SignalsOf, Superposition};
@@ -111,7 +112,9 @@ impl InputOperator for DilatedPlays {
     fn input(&self, state: &DilatedPlaysState) -> f64 {
         state.plays.input
     }
+}
 
+impl Remembering for DilatedPlays {
     fn memory(&self, state: &DilatedPlaysState) -> Vec<f64> {
         self.plays.memory(&state.plays)
     }
@@ -264,7 +267,8 @@ impl DilatedPlaysInverse {
             if next <= low || next >= high {
                 next = 0.5 * (low + high);
             }
-            if next == volts || !next.is_finite() {
+            let step = (next - volts).abs();
+            if step <= f64::EPSILON * volts.abs() || !next.is_finite() {
                 break;
             }
             volts = next;
@@ -353,10 +357,6 @@ impl Superposition for RateDependentPrandtlIshlinskiiStage {
     /// The dilation, s.
     fn shapes() -> Vec<Shape> {
         vec![Shape { range: (1e-6, 1.0), neutral: 1e-9 }]
-    }
-
-    fn check_places(places: &[f64]) -> Result<()> {
-        PlayHysteresis::new(1.0, places, &vec![0.0; places.len()], &[], &[]).map(drop)
     }
 
     fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {

@@ -4,6 +4,8 @@ use core::fmt::Debug;
 use core::marker::PhantomData;
 
 use super::creep::Relaxation;
+use super::everett::Everett;
+use super::prandtl_ishlinskii::PlayHysteresis;
 use super::traits::{ModelInfo, StageModel};
 use super::values::Values;
 use crate::error::{Error, Result};
@@ -38,6 +40,26 @@ pub enum Places {
     Thresholds,
     /// At levels that divide the drive's range, V.
     Levels,
+}
+
+impl Places {
+    /// Refuses places that a model with these has not.
+    ///
+    /// # Errors
+    /// Names the place.
+    pub(crate) fn check(self, places: &[f64]) -> Result<()> {
+        match self {
+            Self::None if places.is_empty() => Ok(()),
+            Self::None => {
+                let found = format!("{} of them", places.len());
+                Err(Error::parameter("thresholds", found, "none, as the model has no plays"))
+            }
+            Self::Thresholds => {
+                PlayHysteresis::new(1.0, places, &vec![0.0; places.len()], &[], &[]).map(drop)
+            }
+            Self::Levels => Everett::of_levels(places).map(drop),
+        }
+    }
 }
 
 /// A number above 0 that shapes signals.
@@ -123,12 +145,6 @@ pub trait Superposition: StageModel {
         Vec::new()
     }
 
-    /// Refuses places with which no stage exists.
-    ///
-    /// # Errors
-    /// Names the place.
-    fn check_places(places: &[f64]) -> Result<()>;
-
     /// The signals.
     fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals>;
 
@@ -149,11 +165,6 @@ pub trait AnySuperposition: Sync {
     fn places(&self) -> Places;
     /// See [`Superposition::shapes`].
     fn shapes(&self) -> Vec<Shape>;
-    /// See [`Superposition::check_places`].
-    ///
-    /// # Errors
-    /// Names the place with which no stage exists.
-    fn check_places(&self, places: &[f64]) -> Result<()>;
     /// See [`Superposition::signals`].
     fn signals(&self, of: &SignalsOf<'_>) -> Box<dyn Signals>;
     /// See [`Superposition::values`].
@@ -180,15 +191,6 @@ impl<M: Superposition> AnySuperposition for Of<M> {
 
     fn shapes(&self) -> Vec<Shape> {
         M::shapes()
-    }
-
-    fn check_places(&self, places: &[f64]) -> Result<()> {
-        if M::PLACES == Places::None && !places.is_empty() {
-            let found = format!("{} of them", places.len());
-            let expected = format!("none: {} has no thresholds or levels", M::INFO.title);
-            return Err(Error::parameter("thresholds", found, expected));
-        }
-        M::check_places(places)
     }
 
     fn signals(&self, of: &SignalsOf<'_>) -> Box<dyn Signals> {

@@ -26,6 +26,10 @@ const CREEP_GAIN: f64 = 0.015;
 const DRIFT_GAIN: f64 = 0.015;
 pub(super) const MODE_GAIN: f64 = 0.02;
 
+/// Share of the deviation that a mode has to take away where the drive is too slow to show its
+/// resonance: it would also explain some of the creep, or of what the plays do not.
+const UNSEEN_GAIN: f64 = 0.3;
+
 /// Range of the time constant of a drift, as shares of the record.
 const DRIFTS: (f64, f64) = (0.1, 10.0);
 
@@ -393,9 +397,11 @@ fn choose_dynamics(
             if mode && fit.rms < (1.0 - MODE_GAIN) * lagging.rms {
                 return Some(None);
             }
-            if !mode && may_hide_a_mode(fit) {
+            if !mode {
                 let hidden = unseen_mode(&still)?;
-                if hidden.poles_within() && hidden.rms < (1.0 - MODE_GAIN) * lagging.rms {
+                let quick = fit.common.records.iter().any(|one| one.measures().excited().is_some());
+                let gain = if quick { MODE_GAIN } else { UNSEEN_GAIN };
+                if hidden.poles_within() && hidden.rms < (1.0 - gain) * lagging.rms {
                     *fit = hidden;
                     return Some(None);
                 }
@@ -466,12 +472,6 @@ fn smallest_lag<'a>(still: Fit<'a>, best: &Fit<'a>) -> Option<(Fit<'a>, (f64, f6
     let mut chosen = at_lag(best, shortest(least)?)?;
     chosen.held = true;
     Some((chosen, (low, high)))
-}
-
-/// Whether a drive is quick enough for a mode that no resonance shows: of a slow sine it would
-/// explain what is creep, or what the plays do not.
-fn may_hide_a_mode(fit: &Fit<'_>) -> bool {
-    fit.common.records.iter().any(|one| one.measures().excited().is_some())
 }
 
 /// A mode that the record does not show: as high and as little damped as the record allows.

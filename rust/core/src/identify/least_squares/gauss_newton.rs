@@ -19,7 +19,7 @@ const NUDGE: f64 = 1e-5;
 const STIFF: f64 = 1e4;
 
 /// RMS deviation that a difference of two weights that are to be alike counts as, relative to it.
-const ALIKE: f64 = 0.01;
+const ALIKE: f64 = 1e-5;
 
 /// Most steps.
 pub(super) const STEPS: usize = 60;
@@ -167,7 +167,9 @@ impl Fit<'_> {
             row[own.delay.clone()].fill((motion[before] - motion[after]) / drive.dt);
             let known: f64 = row.iter().zip(&self.x).map(|(a, b)| a * b).sum();
             let left = y[k] - late.of(k, |k| motion[k]) - added(k);
-            row.iter_mut().for_each(|entry| *entry *= factor);
+            for entry in &mut row {
+                *entry *= factor;
+            }
             rows.push(&row, factor * (left + known));
         }
         Ok(())

@@ -252,7 +252,7 @@ pub fn identify_weights(
     let zones = zeros(settings.zones);
     PlayHysteresis::new(1.0, &[], &[], &zones, &zones)?;
     match &settings.places {
-        PlacesKind::Given(places) => of.check_places(places)?,
+        PlacesKind::Given(places) => of.places().check(places)?,
         PlacesKind::Spread(count) => check_count(of, *count)?,
         PlacesKind::Auto => {}
     }
