@@ -128,7 +128,10 @@ class LeastSquares:
 
     def _places(self, info: ModelInfo) -> list[float] | None:
         """Thresholds or levels that are given, whichever the model has."""
-        names = [one.name for one in info.parameters]
+        names = {one.name for one in info.parameters}
+        # Of elements, those of the plays that they are equivalent to.
+        if "slip_displacements" in names:
+            names.add("thresholds")
         places = None
         for name, given in (("thresholds", self.thresholds), ("levels", self.levels)):
             if given is not None and name not in names:

@@ -104,7 +104,7 @@ class LuGreStage(Stage):
     ...     force = stage.simulate(u, t[1]).hysteresis
     ...     print(f"{force.max():.2f} N at {frequency:g} Hz")
     0.20 N at 0.1 Hz
-    0.18 N at 10 Hz
+    0.10 N at 10 Hz
     """
 
     mass: float
