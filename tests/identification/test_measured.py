@@ -19,6 +19,7 @@ HEADLINE = {
     "prandtl-ishlinskii": (0.27, 0.36, 0.405),
     "first-order-dahl": (0.72, 0.83, 0.745),
     "parallel-dahl": (0.70, 0.74, 0.73),
+    "lugre": (0.72, 0.83, 0.745),
     "maxwell-slip": (0.69, 0.70, 0.65),
     "generalised-prandtl-ishlinskii": (0.29, 0.46, 0.53),
 }

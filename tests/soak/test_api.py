@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
+import all_stages
 import piezotrack as pt
 from hunt import hunt
 from odd_values import (
@@ -93,6 +94,9 @@ STAGES = {
     "pt.BoucWenOscillator": pt.BoucWenOscillator.benchmark(),
     "pt.FirstOrderDahlStage": FIRST_ORDER,
     "pt.ParallelDahlStage": PARALLEL,
+    "pt.AsymmetricBoucWenStage": all_stages.STAGES["asymmetric-bouc-wen"],
+    "pt.LuGreStage": all_stages.STAGES["lugre"],
+    "pt.MaxwellSlipStage": all_stages.STAGES["maxwell-slip"],
     "pt.PrandtlIshlinskiiStage": PLAYS,
     "pt.GeneralisedPrandtlIshlinskiiStage": ENVELOPE,
 }
@@ -414,7 +418,8 @@ def step_readings(script: Script, draw: Draw) -> None:
 
 KINDS = {
     "dahl": DAHL, "bouc-wen": STAGES["pt.BoucWenStage"], "first-order-dahl": FIRST_ORDER,
-    "parallel-dahl": PARALLEL, "bouc-wen-oscillator": STAGES["pt.BoucWenOscillator"],
+    "parallel-dahl": PARALLEL, "asymmetric-bouc-wen": STAGES["pt.AsymmetricBoucWenStage"],
+    "lugre": STAGES["pt.LuGreStage"], "bouc-wen-oscillator": STAGES["pt.BoucWenOscillator"],
 }  # fmt: skip
 
 

@@ -86,8 +86,9 @@ class LuGreStage(Stage):
     For the same reason a search holds `micro_damping`, `static_ratio` and `stribeck_velocity`
     unless they are in ``free=``. Where the force of sliding falls faster with the speed than the
     damping grows, the stage sticks and slips, and a search among such motions finds nothing of use.
-    A micro damping far above the damping needs thousands of steps a sample:
-    ``constraints=["micro_damping < damping"]`` keeps a search away from it.
+    A micro damping far above the damping needs thousands of steps a sample, and one beside a mass
+    that is too small to show needs more steps than a search takes: free it for a record that shows
+    the resonance, with ``constraints=["micro_damping < damping"]``.
 
     Examples
     --------
@@ -104,7 +105,7 @@ class LuGreStage(Stage):
     ...     force = stage.simulate(u, t[1]).hysteresis
     ...     print(f"{force.max():.2f} N at {frequency:g} Hz")
     0.20 N at 0.1 Hz
-    0.18 N at 10 Hz
+    0.10 N at 10 Hz
     """
 
     mass: float

@@ -7,8 +7,8 @@
 //! With z' put in, F is `(sigma1 + sigma2) x'`, which the linear part has, and the rest
 //! `sigma0 z (1 - sigma1 |x'|/g)`. As in [`super::NonsmoothCoupling`] the rest is a cubic in time
 //! over a step, through its values and rates at both ends. Its rate needs the acceleration: at first
-//! none, then that of the motion found, with which the step is corrected twice. Fourth order between
-//! reversals.
+//! none, then that of the cubic through the motion found, with which the step is corrected twice.
+//! Between reversals this is of fourth order without sigma1, and of third with it.
 
 use piezotrack_control::Number;
 use piezotrack_control::cubic_motion::CubicVelocity;
