@@ -26,9 +26,10 @@ const CREEP_GAIN: f64 = 0.015;
 const DRIFT_GAIN: f64 = 0.015;
 pub(super) const MODE_GAIN: f64 = 0.02;
 
-/// Share of the deviation that a mode has to take away where the drive is too slow to show its
-/// resonance: it would also explain some of the creep, or of what the plays do not.
+/// Share of the deviation that a mode has to take away whose resonance no record shows, and how far
+/// it is above the drive: it would also explain some of the creep, or of what the plays do not.
 const UNSEEN_GAIN: f64 = 0.3;
+const ABOVE_DRIVE: f64 = 10.0;
 
 /// Range of the time constant of a drift, as shares of the record.
 const DRIFTS: (f64, f64) = (0.1, 10.0);
@@ -399,9 +400,7 @@ fn choose_dynamics(
             }
             if !mode {
                 let hidden = unseen_mode(&still)?;
-                let quick = fit.common.records.iter().any(|one| one.measures().excited().is_some());
-                let gain = if quick { MODE_GAIN } else { UNSEEN_GAIN };
-                if hidden.poles_within() && hidden.rms < (1.0 - gain) * lagging.rms {
+                if is_mode(&hidden) && hidden.rms < (1.0 - UNSEEN_GAIN) * lagging.rms {
                     *fit = hidden;
                     return Some(None);
                 }
@@ -472,6 +471,15 @@ fn smallest_lag<'a>(still: Fit<'a>, best: &Fit<'a>) -> Option<(Fit<'a>, (f64, f6
     let mut chosen = at_lag(best, shortest(least)?)?;
     chosen.held = true;
     Some((chosen, (low, high)))
+}
+
+/// Whether what was found as a mode is one: far above the drive, where it does not stand for
+/// what else the record shows at the drive's harmonics.
+fn is_mode(fit: &Fit<'_>) -> bool {
+    let rates = fit.common.records.iter().map(|one| one.measures().frequency);
+    let drive = rates.fold(0.0, f64::max) / core::f64::consts::TAU;
+    let Some(slot) = fit.layout().poles().next() else { return false };
+    fit.poles_within() && libm::exp(fit.x[slot]) > ABOVE_DRIVE * drive
 }
 
 /// A mode that the record does not show: as high and as little damped as the record allows.
