@@ -2,7 +2,7 @@
 #![allow(missing_docs, clippy::unwrap_used, clippy::float_cmp)]
 
 use piezotrack_control::hysteresis::{AsymmetricBoucWen, BoucWen, BoucWenState, Operator};
-use piezotrack_control::{AsymmetricBoucWenInverse, Inverse};
+use piezotrack_control::AsymmetricBoucWenInverse;
 
 const HYSTERESIS: AsymmetricBoucWen<f64> = AsymmetricBoucWen {
     rise: 0.6,
