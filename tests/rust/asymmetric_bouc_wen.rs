@@ -1,8 +1,8 @@
 //! The asymmetric Bouc-Wen operator: its equation, its symmetric limit, its bounds and its inverse.
 #![allow(missing_docs, clippy::unwrap_used, clippy::float_cmp)]
 
+use piezotrack_control::AsymmetricBoucWenInverse;
 use piezotrack_control::hysteresis::{AsymmetricBoucWen, BoucWen, BoucWenState, Operator};
-use piezotrack_control::{AsymmetricBoucWenInverse, Inverse};
 
 const HYSTERESIS: AsymmetricBoucWen<f64> = AsymmetricBoucWen {
     rise: 0.6,

@@ -1,7 +1,6 @@
 //! The Maxwell-slip stage: its elements, the plays that they are, and its inverse.
 #![allow(missing_docs, clippy::unwrap_used)]
 
-use piezotrack_control::Inverse;
 use piezotrack_core::models::{
     Dynamics, FittedWeights, InputOperator, InputStage, Invertible, MaxwellSlip, MaxwellSlipStage,
     Relaxation, StageModel, Superposition,
