@@ -436,20 +436,12 @@ fn a_fit_finds_what_the_record_was_made_with() {
             dynamics: DynamicsKind::None,
         };
         let fit = identify_weights(Model::Preisach, &[record], &settings, NEVER).unwrap().unwrap();
-        // Neighbours are drawn together a little, which costs less than 0.1 % of the stroke.
-        assert!(fit.rms < 5e-8, "{:e}", fit.rms);
+        // Neighbours are drawn together by a trace.
+        assert!(fit.rms < 1e-10, "{:e}", fit.rms);
         // The path leaves the levels, and so tells the gain without memory from the diagonal.
-        assert!((sign * fit.values.number("linear") / LINEAR - 1.0).abs() < 0.1);
-        // Other loops are foretold nearly as well.
-        let other: Vec<f64> = path(4000)[2000..].iter().map(|volts| 0.6 * volts + 3.0).collect();
-        let drive = Drive::new(&other, 0.01, Hold::First).unwrap();
-        let found = PreisachStage::build(&fit.values).unwrap();
-        let run = |stage: &PreisachStage| {
-            let x = stage.simulate(&Experiment::of(&drive, NEVER)).unwrap().unwrap().x;
-            x.iter().map(|here| here - x[0]).collect::<Vec<f64>>()
-        };
-        for (found, made) in run(&found).iter().zip(run(&made)) {
-            assert!((found - made).abs() < 0.5e-6, "{found} {made}");
+        assert!((sign * fit.values.number("linear") / LINEAR - 1.0).abs() < 1e-3);
+        for (found, made) in fit.values.list("masses").iter().zip(masses) {
+            assert!((found - made).abs() < 1e-9, "{found} {made}");
         }
     }
 }
@@ -476,7 +468,7 @@ fn a_fit_moves_outside_its_levels_as_within_them() {
         dynamics: DynamicsKind::None,
     };
     let fit = identify_weights(Model::Preisach, &[record], &settings, NEVER).unwrap().unwrap();
-    assert!(fit.rms < 5e-8, "{:e}", fit.rms);
+    assert!(fit.rms < 1e-10, "{:e}", fit.rms);
     // The least slope of the diagonal cells, 1.7, 3, 3.5, 2.8 and 2.7 um on 9 V, on top.
     let expected = LINEAR + 2.7e-6 / 9.0;
     assert!((fit.values.number("linear") / expected - 1.0).abs() < 0.01);

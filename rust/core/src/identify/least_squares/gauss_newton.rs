@@ -19,7 +19,7 @@ const NUDGE: f64 = 1e-5;
 const STIFF: f64 = 1e4;
 
 /// RMS deviation that a difference of two weights that are to be alike counts as, relative to it.
-const ALIKE: f64 = 1e-5;
+const ALIKE: f64 = 1e-4;
 
 /// Most steps.
 pub(super) const STEPS: usize = 60;
