@@ -308,7 +308,7 @@ def test_it_is_saved_with_its_models(tmp_path: Path) -> None:
 REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "one name": ({"models": "dahl"}, "models is"),
     "no model": ({"models": []}, "models is empty"),
-    "unknown": ({"models": ["preisach"]}, "models has 'preisach'"),
+    "unknown": ({"models": ["jiles-atherton"]}, "models has 'jiles-atherton'"),
     "a stage": ({"models": [PLAYS]}, "models has 'PrandtlIshlinskiiStage'"),
     "no file": ({"models": ["gone.json"]}, "gone.json"),
     "train": ({"train": 3.0}, "train is"),
@@ -383,7 +383,7 @@ def test_the_command_judges_on_another_log_and_takes_files() -> None:
 
 REFUSED_COMMANDS: dict[str, tuple[str, ...]] = {
     "compare gone.csv": ("gone.csv: there is no such file",),
-    "compare log.csv --model preisach": ("log.csv: models has 'preisach'", "'dahl'"),
+    "compare log.csv --model jiles-atherton": ("log.csv: models has 'jiles-atherton'", "'dahl'"),
     "compare log.csv --model gone.json": ("gone.json: no such file",),
     "compare log.csv --model log.json": ("log.json",),
     "compare log.csv --train 5": ("--train is '5'", "expected A:B"),

@@ -151,8 +151,8 @@ def test_the_measured_log_and_another_one() -> None:
 @measured
 def test_each_part_of_the_model_earns_its_place() -> None:
     training, tracking = logs()
-    alone = fit_plays(training, count=10, dead_zones=False, dynamics=None)
-    late = fit_plays(training, count=10, dead_zones=False)
+    alone = fit_plays(training, drift=False, count=10, dead_zones=False, dynamics=None)
+    late = fit_plays(training, drift=False, count=10, dead_zones=False)
     bent = fit_plays(training, count=10, drift=False)
     crept = fit_plays(training, count=10, drift=False, creep=True)
     # Thresholds of dead zones are found in a problem with several minima: to a hundredth. Of the

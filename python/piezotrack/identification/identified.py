@@ -123,7 +123,7 @@ class IdentifiedModel:
 
     @property
     def free_count(self) -> int | None:
-        """Number of values fitted, offset included; None if the file does not have it.
+        """Number of values fitted, offset and drift included; None if the file does not have it.
 
         Thresholds and time constants chosen beforehand are not counted; a weight that was found
         to be 0 is.
@@ -131,11 +131,13 @@ class IdentifiedModel:
         found = self.details.get("parameters", {})
         if not any("free" in entry for entry in found.values()):
             return None
-        own = self.model.parameter_names()
-        free = [name for name in own if found.get(name, {}).get("free", False)]
+        names = self.model.parameter_names()
+        free = [name for name in names if found.get(name, {}).get("free", False)]
         delay = bool(self.details.get("delay", {}).get("free", False))
         offsets = int(self.offset_fitted) + sum(one.offset_fitted for one in self.records[1:])
-        return sum(_count(getattr(self.model, name)) for name in free) + delay + offsets
+        drifting = int(self.drift is not None) + sum(bool(one.drift) for one in self.records[1:])
+        own = delay + offsets + 2 * drifting
+        return sum(_count(getattr(self.model, name)) for name in free) + own
 
     def beyond_fit(self, u: ArrayLike, dt: float | None = None) -> list[str]:
         """Remarks on a drive that goes beyond the range or the rate of the record identified.

@@ -11,7 +11,6 @@
 
 use piezotrack_control::Number;
 use pulp::{Arch, Simd, WithSimd};
-use rayon::prelude::*;
 
 use super::candidate::{BEFORE, Candidate, Theta};
 use super::creep_shares::ShareSums;
@@ -24,7 +23,7 @@ use super::step_size;
 use crate::integrator::{
     FeedbackState, Kernel, MOST_PARAMETERS, Mechanics, Stepping, SteppingLoop, halvings,
 };
-use crate::math::{Lanes, dispatch_vectors, width};
+use crate::math::{Lanes, dispatch_vectors, on_all_threads, width};
 use crate::models::{Held, KernelVisitor, relaxed};
 use crate::signal::{Stop, delayed, index};
 
@@ -210,7 +209,8 @@ impl<'a> KernelVisitor for All<'a> {
             }
             of.arch.dispatch(Bundle::<K, 1> { kernel, of, candidates: chunk, stride, stop })
         };
-        candidates.par_chunks(size).flat_map_iter(bundle).collect()
+        let chunks: Vec<&[Candidate]> = candidates.chunks(size).collect();
+        on_all_threads(&chunks, &|chunk| bundle(chunk)).into_iter().flatten().collect()
     }
 }
 

@@ -1,4 +1,4 @@
-//! Numerical methods: SIMD lanes, random numbers, least squares, line search, roots, transfer functions,
+//! Numerical methods: SIMD lanes, threads, random numbers, least squares, line search, roots, transfer functions,
 //! memory.
 
 mod bounded_least_squares;
@@ -8,6 +8,7 @@ mod lanes;
 mod memory;
 mod random;
 mod root;
+mod threads;
 mod transfer_function;
 
 pub use bounded_least_squares::{FREE, NOT_NEGATIVE, Rows, bounded};
@@ -18,4 +19,5 @@ pub(crate) use dispatch::{dispatch_fused, dispatch_vectors, width};
 pub(crate) use golden_section::least;
 pub(crate) use random::Draws;
 pub(crate) use root::rising_root;
+pub(crate) use threads::on_all_threads;
 pub(crate) use transfer_function::{C, Jet, Ratio};

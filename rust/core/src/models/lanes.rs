@@ -73,16 +73,12 @@ impl Stage {
                 visitor.visit(kernelled(one.stage.lumped(kernel), one, voltages))
             }
             (Self::BoucWen(one), _) => visitor.visit(kernelled(one.stage.lumped(), one, voltages)),
-            (Self::AsymmetricBoucWen(one), _) => {
-                visitor.visit(kernelled(one.stage.lumped(), one, voltages))
-            }
             (Self::FirstOrderDahl(one), _) => {
                 visitor.visit(kernelled(one.stage.lumped(), one, voltages))
             }
             (Self::ParallelDahl(one), _) => {
                 visitor.visit(kernelled(one.stage.lumped(), one, voltages))
             }
-            (Self::LuGre(one), _) => visitor.visit(kernelled(one.stage.lumped(), one, voltages)),
             (Self::BoucWenOscillator(one), _) => {
                 visitor.visit(kernelled(one.stage.lumped(), one, voltages))
             }

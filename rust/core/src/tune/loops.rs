@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::figures::{Figures, Score};
 use super::parts::{Part, coarse_step, parts};
 use crate::error::{Error, Result};
-use crate::math::{Lanes, dispatch_vectors, room, width, zeros};
+use crate::math::{Lanes, dispatch_vectors, on_all_threads, room, width, zeros};
 use crate::models::{LanedPlant, LanedVisitor, StageState};
 use crate::signal::{Stop, index};
 use crate::simulate::{
@@ -217,41 +217,42 @@ impl LanedVisitor for Loops<'_> {
         let vectors = controllers.len().div_ceil(width);
         let most = if width > 1 { P::VECTORS } else { 1 };
         let each = vectors.div_ceil(rayon::current_num_threads()).clamp(1, most);
-        let found: Result<Vec<Vec<Motion>>> = controllers
-            .par_chunks(width * each)
-            .map(|chunk| {
-                let states = chunk.iter().map(|one| {
-                    let length = one.repetitive.map_or(0, |part| part.length());
-                    Ok(one.rest(zeros(DELAY_LINE, length)?)?)
-                });
-                let states: Result<Vec<_>> = states.collect();
-                let (plant, parts, states) = (&plant, &parts, states?);
-                let samples = if shown { noise.len() } else { 0 };
-                let traces = (0..chunk.len()).map(|_| room("the motions", samples));
-                let traces: Result<Vec<_>> = traces.collect();
-                let loops = Chunk {
-                    task,
-                    start,
-                    plant,
-                    noise,
-                    parts,
-                    controllers: chunk,
-                    states,
-                    traces: traces?,
-                    stop,
-                };
-                // Each is compiled for as many vectors as it gains by, and for no other number.
-                if width == 1 {
-                    return Ok(Simd::vectorize(pulp::Scalar, Bundle::<P, 1>(loops)));
-                }
-                let found = if const { P::VECTORS > 1 } {
-                    dispatch_vectors(arch, Bundle::<P, VECTORS>(loops))
-                } else {
-                    dispatch_vectors(arch, Bundle::<P, 1>(loops))
-                };
-                Ok(found.unwrap_or_default())
-            })
-            .collect();
+        let chunks: Vec<&[Controller<Law>]> = controllers.chunks(width * each).collect();
+        let found: Result<Vec<Vec<Motion>>> = on_all_threads(&chunks, &|chunk: &&[_]| {
+            let chunk = *chunk;
+            let states = chunk.iter().map(|one| {
+                let length = one.repetitive.map_or(0, |part| part.length());
+                Ok(one.rest(zeros(DELAY_LINE, length)?)?)
+            });
+            let states: Result<Vec<_>> = states.collect();
+            let (plant, parts, states) = (&plant, &parts, states?);
+            let samples = if shown { noise.len() } else { 0 };
+            let traces = (0..chunk.len()).map(|_| room("the motions", samples));
+            let traces: Result<Vec<_>> = traces.collect();
+            let loops = Chunk {
+                task,
+                start,
+                plant,
+                noise,
+                parts,
+                controllers: chunk,
+                states,
+                traces: traces?,
+                stop,
+            };
+            // Each is compiled for as many vectors as it gains by, and for no other number.
+            if width == 1 {
+                return Ok(Simd::vectorize(pulp::Scalar, Bundle::<P, 1>(loops)));
+            }
+            let found = if const { P::VECTORS > 1 } {
+                dispatch_vectors(arch, Bundle::<P, VECTORS>(loops))
+            } else {
+                dispatch_vectors(arch, Bundle::<P, 1>(loops))
+            };
+            Ok(found.unwrap_or_default())
+        })
+        .into_iter()
+        .collect();
         Ok(found?.concat())
     }
 }

@@ -288,21 +288,24 @@ fn creeps(fit: &Fit<'_>) -> Vec<Vec<f64>> {
 fn choose_slow(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
     let mut crept = fit.clone();
     choose_creep(&mut crept, settings)?;
+    if fit.common.records.iter().all(|one| one.drift != DriftKind::Auto) {
+        *fit = crept;
+        return Some(());
+    }
     let mut drifted = fit.clone();
     if settings.creep == CreepKind::Auto {
         drifted.restructure(|fit| fit.times = Vec::new());
         drifted.settle(ROUGH)?;
     }
     choose_drifts(&mut drifted)?;
-    let mut both = drifted.clone();
-    choose_creep(&mut both, settings)?;
+    let mut found = vec![drifted];
+    if found[0].drifts != fit.drifts {
+        let mut both = found[0].clone();
+        choose_creep(&mut both, settings)?;
+        found.push(both);
+    }
     choose_drifts(&mut crept)?;
-    *fit = [drifted, both].into_iter().fold(
-        crept,
-        |best, one| {
-            if one.rms < best.rms { one } else { best }
-        },
-    );
+    *fit = found.into_iter().fold(crept, |best, one| if one.rms < best.rms { one } else { best });
     Some(())
 }
 
