@@ -8,7 +8,7 @@ use piezotrack_core::identify::{
 use piezotrack_core::models::{
     Dynamics, Experiment, GeneralisedPlays, GeneralisedPlaysInverse,
     GeneralisedPrandtlIshlinskiiStage, InputOperator, Invertible, Model, Plant, PlayHysteresis,
-    PrandtlIshlinskiiStage, Relaxation, StageModel, TanhEnvelope, Values,
+    PrandtlIshlinskiiStage, Relaxation, Remembering, StageModel, TanhEnvelope, Values,
 };
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 

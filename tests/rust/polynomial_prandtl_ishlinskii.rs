@@ -6,9 +6,9 @@ use piezotrack_core::identify::{
     CreepKind, DynamicsKind, History, PlacesKind, WeightsRecord, WeightsSettings, identify_weights,
 };
 use piezotrack_core::models::{
-    Dynamics, Experiment, InputOperator, Invertible, Model, Plant, PlayHysteresis, PolynomialPlays,
+    Dynamics, Experiment, Invertible, Model, Plant, PlayHysteresis, PolynomialPlays,
     PolynomialPlaysInverse, PolynomialPrandtlIshlinskiiStage, PrandtlIshlinskiiStage, Relaxation,
-    StageModel,
+    Remembering, StageModel,
 };
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 

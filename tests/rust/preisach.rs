@@ -1,5 +1,11 @@
 //! The Preisach stage: its operator and its inverse.
-#![allow(missing_docs, clippy::unwrap_used, clippy::panic, clippy::float_cmp)]
+#![allow(
+    missing_docs,
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::float_cmp,
+    clippy::cast_precision_loss
+)]
 
 use piezotrack_control::hysteresis::Operator;
 use piezotrack_control::{OperatorInverse, Snapshot};
@@ -8,7 +14,7 @@ use piezotrack_core::identify::{
 };
 use piezotrack_core::models::{
     Dynamics, Experiment, InputOperator, Invertible, MOST_REVERSALS, Model, Plant, PlayHysteresis,
-    PreisachInverse, PreisachOperator, PreisachStage, Relaxation, StageModel,
+    PreisachInverse, PreisachOperator, PreisachStage, Relaxation, Remembering, StageModel,
 };
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 

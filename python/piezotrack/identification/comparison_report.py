@@ -32,7 +32,8 @@ def comparison_text(comparison: Comparison) -> str:
     """
     rows, how = comparison.rows, "state and offset carried over"
     if not comparison.carried:
-        how = "another record, with an offset of its own"
+        drifts = any(row.fit.drift for row in comparison.rows)
+        how = "another record, with an offset" + (" and a drift" if drifts else "") + " of its own"
     width = max(len(row.title) for row in rows)
     aic = min((row.aic for row in rows if row.aic is not None), default=0.0)
     bic = min((row.bic for row in rows if row.bic is not None), default=0.0)

@@ -26,21 +26,24 @@ class Drift:
     As what is left of the creep under an earlier drive, or of the warmth of an amplifier, it
     belongs to the record, not to the stage::
 
-        y = x + offset + amplitude exp(-(t - begin) / time)
+        y = x + offset + amplitude (exp(-(t - begin) / time) - exp(-(end - begin) / time))
+
+    It is 0 at the end of the window, so that the offset is what the sensor showed at rest last.
 
     Attributes
     ----------
     amplitude : float
-        At `begin` [m].
+        Of the part that decays, at `begin` [m].
     time : float
         Time constant [s]. Where it is much longer than the record, the drift is a straight line.
-    begin : float
-        First instant of the window that was fitted, on the record's own time axis [s].
+    begin, end : float
+        First and last instant of the window that was fitted, on the record's own time axis [s].
     """
 
     amplitude: float
     time: float
     begin: float
+    end: float
 
     def at(self, t: Array) -> Array:
         """Value at some instants of the record.
@@ -55,7 +58,8 @@ class Drift:
         ndarray, shape (n,)
             Part of the reading [m].
         """
-        x: Array = self.amplitude * np.exp((self.begin - np.asarray(t)) / self.time)
+        last = np.exp((self.begin - self.end) / self.time)
+        x: Array = self.amplitude * (np.exp((self.begin - np.asarray(t)) / self.time) - last)
         return x
 
     def of_another(self, t: Array, rest: Array, *, centred: bool) -> Array:
@@ -75,7 +79,7 @@ class Drift:
         ndarray, shape (n,)
             Part of its readings [m].
         """
-        fading = np.exp((t[0] - t) / self.time)
+        fading = np.exp((t[0] - t) / self.time) - np.exp((t[0] - t[-1]) / self.time)
         shape = fading - fading.mean() if centred else fading
         size = float(shape @ shape)
         found: Array = fading * (float(shape @ rest) / size if size > 0.0 else 0.0)
@@ -126,6 +130,7 @@ def drift_entry(drift: Drift | None) -> dict[str, Any]:
             "amplitude": {"value": drift.amplitude, "unit": "m"},
             "time": {"value": drift.time, "unit": "s"},
             "begin": {"value": drift.begin, "unit": "s"},
+            "end": {"value": drift.end, "unit": "s"},
         }
     }
 
@@ -153,7 +158,7 @@ def drift_of(entry: Any) -> Drift | None:
     found = object_of("drift", entry)
     values = {
         name: _core.as_number(f"drift: {name}", object_of(f"drift: {name}", found[name])["value"])
-        for name in ("amplitude", "begin")
+        for name in ("amplitude", "begin", "end")
     }
     time = object_of("drift: time", found["time"])["value"]
     return Drift(time=positive("drift: time", time, "s"), **values)

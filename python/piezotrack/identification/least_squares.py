@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -265,14 +266,20 @@ def _is_searched(one: Asked) -> bool:
 def _fitted(model: Any, info: ModelInfo, one: Asked, own: Mapping[str, Any]) -> FittedRecord:
     """Return what was found of a record alone."""
     data = one.data
-    drift = own["drift"]
+    drift, offset = None, own["offset"]
+    if own["drift"] is not None:
+        amplitude, time = own["drift"]
+        begin, end = float(data.t[0]), float(data.t[-1])
+        drift = Drift(amplitude=amplitude, time=time, begin=begin, end=end)
+        # What the sensor shows at rest at the end of the window.
+        offset += amplitude * math.exp((begin - end) / time)
     return FittedRecord(
         data=data,
         weight=one.weight,
         delay=own["delay"],
-        offset=own["offset"],
+        offset=offset,
         offset_fitted=one.offset,
-        drift=drift and Drift(amplitude=drift[0], time=drift[1], begin=float(data.t[0])),
+        drift=drift,
         start=start_of_fit(data, own["history"], model._state._from(own["start"], info.state)),
         cost=own["rms"],
         stroke=data.stroke,

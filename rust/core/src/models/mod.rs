@@ -20,6 +20,7 @@ mod lugre;
 mod maxwell_slip;
 mod mechanics_parameters;
 mod parallel_dahl;
+mod places;
 mod plant;
 mod polynomial_prandtl_ishlinskii;
 mod prandtl_ishlinskii;
@@ -62,6 +63,7 @@ pub use lanes::{LanedPlant, LanedVisitor};
 pub use lugre::{LuGreKernel, LuGreStage};
 pub use maxwell_slip::{MaxwellSlip, MaxwellSlipStage};
 pub use parallel_dahl::{ParallelDahlKernel, ParallelDahlStage};
+pub(crate) use places::check_places;
 pub use plant::{KernelFlow, KernelModel, Plant, Settling};
 pub use polynomial_prandtl_ishlinskii::{
     PolynomialPlays, PolynomialPlaysInverse, PolynomialPlaysInverseState, PolynomialPlaysState,

@@ -257,6 +257,9 @@ impl Operator<f64> for PolynomialPlays {
     }
 }
 
+/// Corners on the way to an output, at most: each play has one, the polynomial two.
+const MOST_CORNERS: usize = 2 * MOST_PLAYS + 4;
+
 /// The inverse: output in, m, input out, V, by Newton's method between corners.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PolynomialPlaysInverse(pub PolynomialPlays);
@@ -283,12 +286,15 @@ impl PolynomialPlaysInverse {
         let operator = &self.0;
         let side = if rises { 1.0 } else { -1.0 };
         let mut state = *from;
-        loop {
-            let (start, end) = (state.input, operator.corner(&state, rises, 0.0));
+        for _ in 0..MOST_CORNERS {
+            let start = state.input;
+            // A corner that a rounding is ahead is here: it would be found again and again.
+            let least = ROUNDING * start.abs();
+            let end = operator.corner(&state, rises, least);
             // The plays that move on this part, and their share of the slope.
             let moving: f64 = operator
                 .plays(&state)
-                .filter(|(threshold, _, play)| side * (play + side * threshold - start) <= 0.0)
+                .filter(|(threshold, _, play)| side * (play + side * threshold - start) <= least)
                 .map(|(_, weight, _)| weight)
                 .sum();
             let (curve, value) = (operator.polynomial(start, rises), operator.value(&state));
@@ -309,6 +315,7 @@ impl PolynomialPlaysInverse {
             }
             operator.follow(&mut state, end);
         }
+        f64::NAN
     }
 }
 

@@ -4,11 +4,8 @@ use core::fmt::Debug;
 use core::marker::PhantomData;
 
 use super::creep::Relaxation;
-use super::everett::Everett;
-use super::prandtl_ishlinskii::PlayHysteresis;
 use super::traits::{ModelInfo, StageModel};
 use super::values::Values;
-use crate::error::{Error, Result};
 
 /// Result of the least squares.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,26 +37,6 @@ pub enum Places {
     Thresholds,
     /// At levels that divide the drive's range, V.
     Levels,
-}
-
-impl Places {
-    /// Refuses places that a model with these has not.
-    ///
-    /// # Errors
-    /// Names the place.
-    pub(crate) fn check(self, places: &[f64]) -> Result<()> {
-        match self {
-            Self::None if places.is_empty() => Ok(()),
-            Self::None => {
-                let found = format!("{} of them", places.len());
-                Err(Error::parameter("thresholds", found, "none, as the model has no plays"))
-            }
-            Self::Thresholds => {
-                PlayHysteresis::new(1.0, places, &vec![0.0; places.len()], &[], &[]).map(drop)
-            }
-            Self::Levels => Everett::of_levels(places).map(drop),
-        }
-    }
 }
 
 /// A number above 0 that shapes signals.

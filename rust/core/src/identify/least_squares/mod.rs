@@ -23,7 +23,7 @@ use super::history::History;
 use crate::error::{Error, Result, positive, shown};
 use crate::models::{
     AnySuperposition, Dynamics, MOST_LEVELS, Measures, Model, Places, PlayHysteresis, Relaxation,
-    SignalsOf, Values,
+    SignalsOf, Values, check_places,
 };
 use crate::signal::{Drive, Hold, Stop, index, range, turns};
 
@@ -252,7 +252,7 @@ pub fn identify_weights(
     let zones = zeros(settings.zones);
     PlayHysteresis::new(1.0, &[], &[], &zones, &zones)?;
     match &settings.places {
-        PlacesKind::Given(places) => of.places().check(places)?,
+        PlacesKind::Given(places) => check_places(of.places(), places)?,
         PlacesKind::Spread(count) => check_count(of, *count)?,
         PlacesKind::Auto => {}
     }
