@@ -99,7 +99,7 @@ def _loops(comparison: Comparison, loop: Axes, off: Axes) -> None:
     few_ticks(off)
     when = f"{data.t[part][0]:.4g} to {data.t[part][-1]:.4g} s"
     where = "" if comparison.carried else f" of {literal(data.source or 'the other record')}"
-    heading(loop, f"Loop with the largest error ({when}{where})")
+    heading(loop, f"Loop with the largest error\n({when}{where})")
     heading(off, "Its error = measured - simulated")
     # Room for the names to the right of the loop's lower end.
     low, high = loop.get_ylim()

@@ -15,6 +15,7 @@ from ..data.dataset import Dataset
 from ..errors import ParameterError, ShapeError
 from .fitted_record import record_of
 from .history import begin, checked_history, same_beginning
+from .late_reading import late_reading
 from .model_file import document_of, drive_unit_of, read_model, sensor_number
 from .remarks import beyond_fit
 from .score import Score
@@ -250,28 +251,16 @@ class IdentifiedModel:
             Displacement with offset and delay [m].
         """
         run = self.model.simulate(u, dt, hold=hold, initial=initial)
-        return self._shown(run, self.delay) + self.offset
-
-    def _shown(self, run: Response, delay: float) -> Array:
-        """Displacement with the delay of the sensor [m]."""
-        if not delay:
-            return run.x
-        if not self.model.info.searched:
-            # As in the fit: straight between samples, as a stage without modes has no velocity.
-            late: Array = np.interp(run.t - delay, run.t, run.x)
-            return late
-        return _core.delayed(run.x, run.v, float(run.t[1]) if run.t.size > 1 else 1.0, delay)
+        return late_reading(self.model.info, run, self.delay) + self.offset
 
     def _delay_on(self, data: Dataset) -> float:
         """Delay of the sensor on a record [s]: its own where it is one of those identified."""
-        own = self._own(data)
-        return self.delay if own is None else own.delay
+        return (self._own(data) or self).delay
 
     def _drift_on(self, data: Dataset) -> Array | float:
         """Drift of the sensor on a record [m]: that of the one identified, else none yet."""
-        own = self._own(data)
-        start, drift = (self.start, self.drift) if own is None else (own.start, own.drift)
-        return drift.at(data.t) if drift and same_beginning(start, data) else 0.0
+        own = self._own(data) or self
+        return own.drift.at(data.t) if own.drift and same_beginning(own.start, data) else 0.0
 
     def simulate(
         self,
@@ -320,7 +309,7 @@ class IdentifiedModel:
         state = self._begins(data, history, initial)
         start = data.warmup
         run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
-        x = self._shown(run, self._delay_on(data))[start:] + self._drift_on(data)
+        x = late_reading(self.model.info, run, self._delay_on(data))[start:] + self._drift_on(data)
         signals = {
             one.name: value[start:]
             for one in fields(run)
@@ -405,14 +394,15 @@ class IdentifiedModel:
     def _residual(self, data: Dataset, state: StageState) -> Array:
         """Measured less simulated displacement in the window, without offset [m]."""
         run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
-        x = self._shown(run, self._delay_on(data))[data.warmup :] + self._drift_on(data)
+        x = late_reading(self.model.info, run, self._delay_on(data))[
+            data.warmup :
+        ] + self._drift_on(data)
         rest: Array = data.y - x - self._added(data, x, "own")[0]
         return rest
 
     def _fits_offset(self, data: Dataset) -> bool:
         """Whether a record gets an offset."""
-        own = self._own(data)
-        return self.offset_fitted if own is None else own.offset_fitted
+        return (self._own(data) or self).offset_fitted
 
     def _begins(
         self, data: Dataset, history: History | None, initial: StageState | None

@@ -12,7 +12,7 @@ from ..._support.arguments import positive
 from ..._support.messages import quoted
 from ...data.dataset import Dataset
 from ...errors import ParameterError
-from ..comparison import parts_of
+from ..comparison_parts import parts_of
 from ..keys import key_of, record_key
 
 __all__ = ["BenchmarkRecord", "checked_name"]
