@@ -124,6 +124,7 @@ def test_a_drift_is_that_of_its_record_alone(tmp_path: Path) -> None:
     fit = pt.identify(part, KIND, history="virgin", least_squares=PLAYS)
     assert fit.drift is not None
     assert fit.drift.amplitude == pytest.approx(6e-7, rel=0.3)
+    assert "a drift of -0.5" in fit.summary()
     still = pt.identify(part, KIND, drift=False, history="virgin", least_squares=PLAYS)
     assert still.drift is None
     assert still.cost > 1.5 * fit.cost

@@ -45,6 +45,13 @@ class Drift:
     begin: float
     end: float
 
+    def __str__(self) -> str:
+        moved = self.amplitude * float(np.exp((self.begin - self.end) / self.time) - 1.0)
+        return (
+            f"a drift of {1e6 * moved:.3g} um along the window fitted, "
+            f"time constant {self.time:.3g} s"
+        )
+
     def at(self, t: Array) -> Array:
         """Value at some instants of the record.
 

@@ -64,6 +64,10 @@ def _of_one(fit: Identification) -> list[str]:
         f"fit {fit.fit_percent:.4g} %"
         + (f", offset {1e6 * fit.offset:.5g} um fitted" if fit.offset_fitted else ""),
     ]
+    if fit.drift:
+        lines.append(f"      {fit.drift}")
+    if fit.delay and "delay" not in fit.parameters:
+        lines.append(f"      delay {1e3 * fit.delay:.4g} ms")
     if begun := of_start(fit.start, data):
         lines.append(f"      the record begins {begun}")
     return lines
@@ -84,10 +88,14 @@ def _of_several(fit: Identification) -> list[str]:
         said += f", offset {1e6 * one.offset:.5g} um fitted" if one.offset_fitted else ""
         if "delay" in one.parameters:
             said += f", delay {1e3 * one.delay:.4g} ms" + _spread(one.parameters["delay"])
+        elif one.delay:
+            said += f", delay {1e3 * one.delay:.4g} ms"
         lines += [
             f"  {i + 1:>2}  {one.data.source or 'unnamed'}, {_size(one.data)}",
             f"      {said}",
         ]
+        if one.drift:
+            lines.append(f"      {one.drift}")
         if begun := of_start(one.start, one.data):
             lines.append(f"      it begins {begun}")
     return lines
