@@ -8,7 +8,8 @@ use super::form::Form;
 use super::gauss_newton::STEPS;
 use super::modes::{drop_modes, first_mode};
 use super::places::{add_once, choose_places, few_or_many, spread};
-use super::{CreepKind, DriftKind, DynamicsKind, PlacesKind, Settings, WeightsRecord};
+use super::slow_parts::{choose_slow, creeps};
+use super::{CreepKind, DynamicsKind, PlacesKind, Settings, WeightsRecord};
 use crate::identify::history::History;
 use crate::math::least;
 use crate::signal::{index, range};
@@ -20,22 +21,17 @@ const SHAPE_ROUNDS: usize = 20;
 /// middle of its range: what a record does not determine is not changed.
 const SHAPE_GAIN: f64 = 0.1;
 
-/// Shares of the deviation that histories, creep and modes have to take away.
+/// Shares of the deviation that histories and modes have to take away.
 const HISTORY_GAIN: f64 = 0.02;
-const CREEP_GAIN: f64 = 0.015;
-const DRIFT_GAIN: f64 = 0.015;
 pub(super) const MODE_GAIN: f64 = 0.02;
 
 /// Share of the deviation that a mode has to take away whose resonance no record shows, and how far
 /// it is above the drive: it would also explain some of the creep, or of what the plays do not.
-const UNSEEN_GAIN: f64 = 0.3;
+const UNSEEN_GAIN: f64 = 0.15;
 const ABOVE_DRIVE: f64 = 10.0;
 
-/// Range of the time constant of a drift, as shares of the record.
-const DRIFTS: (f64, f64) = (0.1, 10.0);
-
 /// Deviations that differ by less than this share tell nothing.
-const SAME: f64 = 1.01;
+pub(super) const SAME: f64 = 1.01;
 
 /// Gain of a step below which a choice is settled.
 pub(super) const ROUGH: f64 = 1e-3;
@@ -50,17 +46,11 @@ const LONGEST_PHASE: f64 = 0.06;
 /// Steps of a trial among many: the best one is settled.
 const FEW_STEPS: usize = 4;
 
-/// Least time constant of the creep, relative to that of the drive.
-const SLOWER: f64 = 0.5;
-
-/// Longest lag that is as likely as creep, in samples: a reading may come late.
-const LATE: f64 = 3.0;
-
 /// Deviation of the lag that is taken, relative to the least.
 const LAG_SAME: f64 = 1.003;
 
 /// Share of a fitted creep to start from.
-const FIRST_SHARE: f64 = 0.005;
+pub(super) const FIRST_SHARE: f64 = 0.005;
 
 /// A fit, and the range of lags that explain the record as well.
 type Found<'a> = (Fit<'a>, Option<(f64, f64)>);
@@ -268,110 +258,6 @@ fn choose_history(fit: &mut Fit<'_>, settings: &Settings, r: usize) -> Option<()
     Some(())
 }
 
-/// Time constants of the creep that a record may ask for, s: slower than the drive, whose phase a
-/// faster one would turn as a lag does.
-fn creeps(fit: &Fit<'_>) -> Vec<Vec<f64>> {
-    let record = fit.common.longest();
-    let (drive, length) = (record.drive, record.length());
-    let u = &drive.u[record.start..];
-    let mean = u.iter().sum::<f64>() / index(u.len());
-    let moved: f64 = u.iter().map(|u| (u - mean).powi(2)).sum();
-    let changed: f64 = u.windows(2).map(|u| (u[1] - u[0]).powi(2)).sum();
-    let shortest = f64::max(SLOWER * drive.dt * libm::sqrt(moved / changed), 10.0 * drive.dt);
-    let pair = |divisor: f64| vec![length / divisor, 10.0 * length / divisor];
-    let all = [3.0, 10.0, 30.0, 100.0, 300.0].into_iter().map(pair);
-    all.filter(|times| times[0] >= shortest).collect()
-}
-
-/// Creep and drift where they are not set: none, one of the two, or both where each explains
-/// enough.
-fn choose_slow(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
-    let mut crept = fit.clone();
-    choose_creep(&mut crept, settings)?;
-    if fit.common.records.iter().all(|one| one.drift != DriftKind::Auto) {
-        *fit = crept;
-        return Some(());
-    }
-    let mut drifted = fit.clone();
-    if settings.creep == CreepKind::Auto {
-        drifted.restructure(|fit| fit.times = Vec::new());
-        drifted.settle(ROUGH)?;
-    }
-    choose_drifts(&mut drifted)?;
-    let mut found = vec![drifted];
-    if found[0].drifts != fit.drifts {
-        let mut both = found[0].clone();
-        choose_creep(&mut both, settings)?;
-        found.push(both);
-    }
-    choose_drifts(&mut crept)?;
-    *fit = found.into_iter().fold(crept, |best, one| if one.rms < best.rms { one } else { best });
-    Some(())
-}
-
-/// The drift of each record of which nothing is said, where it explains enough.
-fn choose_drifts(fit: &mut Fit<'_>) -> Option<()> {
-    for r in 0..fit.common.records.len() {
-        if fit.common.records[r].drift != DriftKind::Auto || fit.drifts[r].is_some() {
-            continue;
-        }
-        let length = fit.common.records[r].length();
-        let mut best: Option<Fit<'_>> = None;
-        let tried = |time: f64| {
-            let mut trial = fit.clone();
-            trial.restructure(|trial| trial.drifts[r] = Some(time));
-            trial.settle(ROUGH)?;
-            let rms = trial.rms;
-            if best.as_ref().is_none_or(|best| rms < best.rms) {
-                best = Some(trial);
-            }
-            Some(rms)
-        };
-        least((DRIFTS.0 * length, DRIFTS.1 * length), 0.02, tried)?;
-        let enough = (1.0 - DRIFT_GAIN) * fit.deviation_of(r);
-        if let Some(best) = best.filter(|best| best.deviation_of(r) < enough) {
-            *fit = best;
-        }
-    }
-    Some(())
-}
-
-/// Creep where it was not set: none, or the two relaxations that explain most.
-fn choose_creep(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
-    if settings.creep != CreepKind::Auto {
-        return Some(());
-    }
-    let mut none = fit.clone();
-    none.restructure(|none| none.times = Vec::new());
-    none.settle(ROUGH)?;
-    let mut best: Option<Fit<'_>> = None;
-    for times in creeps(fit) {
-        let mut trial = none.clone();
-        trial.restructure(|trial| trial.times = times);
-        for share in trial.layout().shares() {
-            trial.x[share] = FIRST_SHARE;
-        }
-        trial.settle(ROUGH)?;
-        if best.as_ref().is_none_or(|best| trial.rms < best.rms) {
-            best = Some(trial);
-        }
-    }
-    let Some(best) = best.filter(|best| best.rms < (1.0 - CREEP_GAIN) * none.rms) else {
-        *fit = none;
-        return Some(());
-    };
-    if settings.dynamics == DynamicsKind::Auto && none.form == Form::None {
-        let late = best_lag(&none)?;
-        let time = libm::exp(late.x[late.layout().poles().start]);
-        if time < LATE * fit.common.shortest_interval() && late.rms < SAME * best.rms {
-            *fit = none;
-            return Some(());
-        }
-    }
-    *fit = best;
-    Some(())
-}
-
 /// Mode or lag where they are not set, and the lags that explain the record as well.
 #[expect(clippy::option_option, reason = "stopped, or no lag to tell of")]
 fn choose_dynamics(
@@ -416,7 +302,7 @@ fn choose_dynamics(
 }
 
 /// The fit with the lag that explains most.
-fn best_lag<'a>(fit: &Fit<'a>) -> Option<Fit<'a>> {
+pub(super) fn best_lag<'a>(fit: &Fit<'a>) -> Option<Fit<'a>> {
     let ranges = Form::First.ranges(fit.common.longest().length(), fit.common.shortest_interval());
     let bounds = (libm::exp(ranges[0].0), libm::exp(ranges[0].1));
     let mut best: Option<Fit<'a>> = None;

@@ -17,6 +17,7 @@ mod layout;
 mod modes;
 mod places;
 mod record_path;
+mod slow_parts;
 
 use super::delay::Delay;
 use super::history::History;

@@ -101,12 +101,16 @@ fn reach(common: &Common<'_>) -> f64 {
     0.5 * (high - low)
 }
 
+/// Where the last third of a window begins, which is foretold from what is before it.
+pub(super) fn split(window: &Range<usize>) -> usize {
+    window.start + 2 * window.len() / 3
+}
+
 /// Other plays, where they foretell a part of the window that they were not fitted to.
 pub(super) fn choose_places(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
     if settings.places != PlacesKind::Auto {
         return Some(());
     }
-    let split = |window: &Range<usize>| window.start + 2 * window.len() / 3;
     let mut here = fit.clone();
     here.windows = fit.windows.iter().map(|one| one.start..split(one)).collect();
     here.settle(ROUGH)?;

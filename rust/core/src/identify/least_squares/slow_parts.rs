@@ -1,0 +1,157 @@
+//! Which slow parts a record shows: creep of the stage, drift of the sensor.
+
+use super::choices::{FIRST_SHARE, ROUGH, SAME, best_lag};
+use super::fit::Fit;
+use super::form::Form;
+use super::places::split;
+use super::{CreepKind, DriftKind, DynamicsKind, Settings, WeightsRecord};
+use crate::math::least;
+use crate::signal::{index, range, turns};
+
+/// Shares of the deviation that each has to take away.
+const CREEP_GAIN: f64 = 0.015;
+const DRIFT_GAIN: f64 = 0.015;
+
+/// Least time constant of the creep, relative to that of the drive.
+const SLOWER: f64 = 0.5;
+
+/// Longest lag that is as likely as creep, in samples: a reading may come late.
+const LATE: f64 = 3.0;
+
+/// Reversals of which size, as a share of the drive's range, that tell a drift.
+const REVERSALS: usize = 6;
+const LARGE_TURN: f64 = 0.1;
+
+/// Range of the time constant of a drift, as shares of the record.
+const DRIFTS: (f64, f64) = (0.1, 10.0);
+
+/// Time constants of the creep that a record may ask for, s: slower than the drive, whose phase a
+/// faster one would turn as a lag does.
+pub(super) fn creeps(fit: &Fit<'_>) -> Vec<Vec<f64>> {
+    let record = fit.common.longest();
+    let (drive, length) = (record.drive, record.length());
+    let u = &drive.u[record.start..];
+    let mean = u.iter().sum::<f64>() / index(u.len());
+    let moved: f64 = u.iter().map(|u| (u - mean).powi(2)).sum();
+    let changed: f64 = u.windows(2).map(|u| (u[1] - u[0]).powi(2)).sum();
+    let shortest = f64::max(SLOWER * drive.dt * libm::sqrt(moved / changed), 10.0 * drive.dt);
+    let pair = |divisor: f64| vec![length / divisor, 10.0 * length / divisor];
+    let all = [3.0, 10.0, 30.0, 100.0, 300.0].into_iter().map(pair);
+    all.filter(|times| times[0] >= shortest).collect()
+}
+
+/// Creep and drift where they are not set: none, one of the two, or both where each explains
+/// enough.
+pub(super) fn choose_slow(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
+    let mut crept = fit.clone();
+    choose_creep(&mut crept, settings)?;
+    if fit.common.records.iter().all(|one| one.drift != DriftKind::Auto) {
+        *fit = crept;
+        return Some(());
+    }
+    let mut drifted = fit.clone();
+    if settings.creep == CreepKind::Auto {
+        drifted.restructure(|fit| fit.times = Vec::new());
+        drifted.settle(ROUGH)?;
+    }
+    choose_drifts(&mut drifted)?;
+    let mut found = vec![drifted];
+    if found[0].drifts != fit.drifts {
+        let mut both = found[0].clone();
+        choose_creep(&mut both, settings)?;
+        found.push(both);
+    }
+    let without = crept.clone();
+    choose_drifts(&mut crept)?;
+    found.extend([crept, without]);
+    // One explains a record as well as the other, but goes on otherwise.
+    let mut least = f64::INFINITY;
+    for one in found {
+        let later = foretold(&one)?;
+        if later < least {
+            (least, *fit) = (later, one);
+        }
+    }
+    Some(())
+}
+
+/// RMS deviation on the last third of each window of a structure that is fitted to what is before
+/// it, m.
+fn foretold(fit: &Fit<'_>) -> Option<f64> {
+    let mut early = fit.clone();
+    early.windows = fit.windows.iter().map(|one| one.start..split(one)).collect();
+    early.settle(ROUGH)?;
+    early.windows = fit.windows.iter().map(|one| split(one)..one.end).collect();
+    Some(early.deviation())
+}
+
+/// Whether the drive comes back often enough for a drift to be told from a loop that is not closed.
+fn repeats(record: &WeightsRecord<'_>) -> bool {
+    let u = &record.drive.u[record.start..];
+    let (low, high) = range(u);
+    turns(u, LARGE_TURN * (high - low)).len() >= REVERSALS
+}
+
+/// The drift of each record of which nothing is said, where it explains enough.
+fn choose_drifts(fit: &mut Fit<'_>) -> Option<()> {
+    for r in 0..fit.common.records.len() {
+        let record = &fit.common.records[r];
+        if record.drift != DriftKind::Auto || fit.drifts[r].is_some() || !repeats(record) {
+            continue;
+        }
+        let length = fit.common.records[r].length();
+        let mut best: Option<Fit<'_>> = None;
+        let tried = |time: f64| {
+            let mut trial = fit.clone();
+            trial.restructure(|trial| trial.drifts[r] = Some(time));
+            trial.settle(ROUGH)?;
+            let rms = trial.rms;
+            if best.as_ref().is_none_or(|best| rms < best.rms) {
+                best = Some(trial);
+            }
+            Some(rms)
+        };
+        least((DRIFTS.0 * length, DRIFTS.1 * length), 0.02, tried)?;
+        let enough = (1.0 - DRIFT_GAIN) * fit.deviation_of(r);
+        if let Some(best) = best.filter(|best| best.deviation_of(r) < enough) {
+            *fit = best;
+        }
+    }
+    Some(())
+}
+
+/// Creep where it was not set: none, or the two relaxations that explain most.
+fn choose_creep(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
+    if settings.creep != CreepKind::Auto {
+        return Some(());
+    }
+    let mut none = fit.clone();
+    none.restructure(|none| none.times = Vec::new());
+    none.settle(ROUGH)?;
+    let mut best: Option<Fit<'_>> = None;
+    for times in creeps(fit) {
+        let mut trial = none.clone();
+        trial.restructure(|trial| trial.times = times);
+        for share in trial.layout().shares() {
+            trial.x[share] = FIRST_SHARE;
+        }
+        trial.settle(ROUGH)?;
+        if best.as_ref().is_none_or(|best| trial.rms < best.rms) {
+            best = Some(trial);
+        }
+    }
+    let Some(best) = best.filter(|best| best.rms < (1.0 - CREEP_GAIN) * none.rms) else {
+        *fit = none;
+        return Some(());
+    };
+    if settings.dynamics == DynamicsKind::Auto && none.form == Form::None {
+        let late = best_lag(&none)?;
+        let time = libm::exp(late.x[late.layout().poles().start]);
+        if time < LATE * fit.common.shortest_interval() && late.rms < SAME * best.rms {
+            *fit = none;
+            return Some(());
+        }
+    }
+    *fit = best;
+    Some(())
+}
