@@ -138,7 +138,7 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
         "expected none",
         "least squares",
     ),
-    "identify log.csv --model prandtl-ishlinskii --delay fit": ("delay is True", "expected none"),
+    "identify log.csv --model prandtl-ishlinskii --drift 0": ("drift is 0", "above 0"),
     "identify log.csv --model PI": ("model is 'PI'", "Did you mean 'prandtl-ishlinskii'?"),
     "identify log.csv --model Bouc_Wen": ("Did you mean 'bouc-wen'?",),
     "identify log.csv --plays 33": ("--plays is 33", "1 to 32 plays"),

@@ -171,7 +171,7 @@ def test_a_record_without_a_drift_gets_none() -> None:
         ({"drift": float("nan")}, "drift is nan: expected"),
         ({"delay": -1.0}, "delay is -1 s: expected 0 s or above"),
         ({"delay": 100.0}, "delay is 100 s: expected 0 s or above, below the record's 12"),
-        ({"delay": (2.0, 1.0)}, r"delay is \(2, 1\) s: expected the lower bound first"),
+        ({"delay": (2.0, 1.0)}, r"bounds of delay are \(2, 1\) s: expected the lower one first"),
     ],
 )
 def test_what_is_no_drift_or_delay_is_refused(given: dict[str, Any], said: str) -> None:

@@ -243,6 +243,11 @@ def _asked(one: Asked) -> dict[str, Any]:
     data = one.data
     with of_record(one.label):
         delay, drift = delay_bounds(one.delay), asked_drift(one.drift)
+        if not one.offset and one.drift not in (None, False):
+            raise ParameterError(
+                f"drift is {quoted(one.drift)}: expected none with offset=False, a sensor that "
+                "shows what there is"
+            )
     return {
         "u": data.full.u,
         "y": data.full.y,
@@ -251,7 +256,7 @@ def _asked(one: Asked) -> dict[str, Any]:
         "start": data.warmup,
         "history": one.history,
         "offset": one.offset,
-        "drift": drift,
+        "drift": drift if one.offset else 0.0,
         "delay": delay,
         "label": one.label,
         "weight": one.weight,

@@ -157,8 +157,10 @@ def delay_bounds(delay: object) -> tuple[float, float] | None:
         return None if delay else (0.0, 0.0)
     if isinstance(delay, Iterable) and not isinstance(delay, str):
         low, high = _pair("delay", delay)
-        if low == high:
-            raise ParameterError(f"bounds of delay are ({low}, {high}) s: expected the lower first")
+        if low >= high:
+            raise ParameterError(
+                f"bounds of delay are ({low:g}, {high:g}) s: expected the lower one first"
+            )
         return low, high
     known = _core.as_number("delay", delay)
     return known, known
