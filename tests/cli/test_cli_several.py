@@ -90,7 +90,10 @@ def test_a_model_of_several_logs_is_used_like_any_other() -> None:
         (("--weight", "1", "--weight", "-1"), "record 2 (b.csv): weight is -1"),
         (("--history", "virgin", "--history", "old"), "record 2 (b.csv): history is 'old'"),
         (("--window", "0:1", "--window", "9:"), "b.csv: --window 9:"),
-        (("--creep", "fit"), "--creep has no effect with several logs and a model that is searched"),
+        (
+            ("--creep", "fit"),
+            "--creep has no effect with several logs and a model that is searched",
+        ),
     ],
 )
 def test_refusals_name_the_option_or_the_log(options: tuple[str, ...], said: str) -> None:
