@@ -239,7 +239,7 @@ fn a_stage_shows_nothing_at_rest_and_moves_in_a_loop_as_in_a_simulation() {
 
 #[test]
 fn an_envelope_that_hardly_bends_is_none() {
-    let straight = GeneralisedPrandtlIshlinskiiStage::envelope(&[1.0, 1e-6], (-40.0, 40.0));
+    let straight = TanhEnvelope::fitted(&[1.0, 1e-6], (-40.0, 40.0));
     let operator =
         GeneralisedPlays::new(LINEAR, &THRESHOLDS, &WEIGHTS, straight, straight).unwrap();
     let plain = PlayHysteresis::new(LINEAR, &THRESHOLDS, &WEIGHTS, &[], &[]).unwrap();
@@ -259,7 +259,7 @@ fn an_envelope_that_hardly_bends_is_none() {
 #[test]
 fn an_envelope_has_the_ratio_of_slopes_that_was_asked_for() {
     for (ratio, bend) in [(0.25, 0.005), (0.8, 0.3), (1.0, 1.6), (4.0, 0.1)] {
-        let of = GeneralisedPrandtlIshlinskiiStage::envelope(&[ratio, bend], (-10.0, 90.0));
+        let of = TanhEnvelope::fitted(&[ratio, bend], (-10.0, 90.0));
         assert!((of.with_slope(90.0).1 / of.with_slope(-10.0).1 / ratio - 1.0).abs() < 1e-11);
         assert!((of.at(90.0) - of.at(-10.0) - 100.0).abs() < 1e-10);
         assert!(of.at(0.0).abs() < 1e-10);
@@ -283,7 +283,7 @@ fn a_fit_finds_what_the_record_was_made_with() {
         .iter()
         .fold((0.0, 0.0), |(low, high), volts| (f64::min(low, *volts), f64::max(high, *volts)));
     for shape in [[0.6, 0.7], [1.5, 0.09]] {
-        let made = GeneralisedPrandtlIshlinskiiStage::envelope(&shape, span);
+        let made = TanhEnvelope::fitted(&shape, span);
         let stage = GeneralisedPrandtlIshlinskiiStage {
             operator: GeneralisedPlays::new(LINEAR, &THRESHOLDS, &WEIGHTS, made, made).unwrap(),
             relaxation: Relaxation::new(&[], &[], Dynamics::None).unwrap(),

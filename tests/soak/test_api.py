@@ -25,6 +25,7 @@ from odd_values import (
     truth,
     word,
 )
+from piezotrack.stages.registry import MODELS
 from reference_slots import OTHER_FORMS, PATHS, REFERENCES
 from soak import Script, Tally
 
@@ -64,42 +65,13 @@ def slots_of(value: Any, **others: Slot) -> dict[str, Slot]:
     return {**made, **others}
 
 
+# Whether so many samples are work and not a mistake, and too many here.
 def sizeable(samples: float) -> bool:
-    """Whether so many samples are work and not a mistake, and too many here."""
     return 1e6 < samples < 1e11
 
 
-# Stages.
-
-FIRST_ORDER = pt.FirstOrderDahlStage(
-    mass=0.2, damping=300.0, stiffness=26065.0, piezo_coefficient=0.05,
-    rest_stiffness=2e4, coulomb_force=0.3,
-)  # fmt: skip
-PARALLEL = pt.ParallelDahlStage(
-    mass=0.2, damping=300.0, stiffness=26065.0, piezo_coefficient=0.05,
-    rest_stiffness_1=9e3, rest_stiffness_2=6e3, rest_stiffness_3=3e3, yield_path=2e-6,
-    path_ratio=4.0,
-)  # fmt: skip
-PLAYS = pt.PrandtlIshlinskiiStage(
-    linear=1e-6, thresholds=(5.0, 20.0), weights=(0.2e-6, 0.1e-6), dead_zone_thresholds=(3e-6,),
-    dead_zone_weights=(0.1,), creep_weights=(0.02,), creep_times=(1.0,),
-)  # fmt: skip
-ENVELOPE = pt.GeneralisedPrandtlIshlinskiiStage(
-    linear=1e-7, thresholds=(0.0, 0.2, 0.4), weights=(1e-5, 0.5e-5, 0.4e-5),
-    scale=2.0, slope=0.03, shift=-1.0, level=0.5,
-)  # fmt: skip
-STAGES = {
-    "pt.DahlStage": DAHL,
-    "pt.BoucWenStage": pt.BoucWenStage.xu_li_2010_corrected(),
-    "pt.BoucWenOscillator": pt.BoucWenOscillator.benchmark(),
-    "pt.FirstOrderDahlStage": FIRST_ORDER,
-    "pt.ParallelDahlStage": PARALLEL,
-    "pt.AsymmetricBoucWenStage": all_stages.STAGES["asymmetric-bouc-wen"],
-    "pt.LuGreStage": all_stages.STAGES["lugre"],
-    "pt.MaxwellSlipStage": all_stages.STAGES["maxwell-slip"],
-    "pt.PrandtlIshlinskiiStage": PLAYS,
-    "pt.GeneralisedPrandtlIshlinskiiStage": ENVELOPE,
-}
+STAGES = {f"pt.{type(one).__name__}": one for one in all_stages.STAGES.values()}
+PLAYS = STAGES["pt.PrandtlIshlinskiiStage"]
 DYNAMICS = {
     "time_constant": Slot(None, number(1e-3).other),
     "frequency": Slot(None, number(160.0).other),
@@ -416,13 +388,9 @@ def step_readings(script: Script, draw: Draw) -> None:
         script.on(step, "notes")
 
 
-KINDS = {
-    "dahl": DAHL, "bouc-wen": STAGES["pt.BoucWenStage"], "first-order-dahl": FIRST_ORDER,
-    "parallel-dahl": PARALLEL, "asymmetric-bouc-wen": STAGES["pt.AsymmetricBoucWenStage"],
-    "lugre": STAGES["pt.LuGreStage"], "bouc-wen-oscillator": STAGES["pt.BoucWenOscillator"],
-}  # fmt: skip
-
-
+# Models by their names: those that a swarm searches, and those of least squares.
+KINDS = {model.name: all_stages.STAGES[model.name] for model in MODELS if model.searched}
+WEIGHTED = [model.name for model in MODELS if not model.searched]
 TIES = st.sampled_from(["1.57 * stiffness", "mass ** -2", "-(damping)", "log(mass)", "2 *", ""])
 
 
@@ -470,7 +438,13 @@ def least_squares(script: Script, draw: Draw) -> None:
     }  # fmt: skip
     how = script.new("pt.identification.LeastSquares", **arguments(draw, slots, most=2))
     if how is not None:
-        fit = script.new("pt.identify", made, "prandtl-ishlinskii", least_squares=how)
+        kind = draw(st.sampled_from(WEIGHTED))
+        slots = {
+            "offset": truth(True), "drift": Slot(None, st.one_of(st.booleans(), number(1.0).other)),
+            "delay": Slot(None, st.one_of(st.booleans(), number(1e-3).other)),
+        }  # fmt: skip
+        given = arguments(draw, slots, most=2)
+        fit = script.new("pt.identify", made, kind, least_squares=how, **given)
         use_fit(script, fit, made)
 
 

@@ -445,32 +445,6 @@ impl Invertible for GeneralisedPrandtlIshlinskiiStage {
     }
 }
 
-impl GeneralisedPrandtlIshlinskiiStage {
-    /// The envelope of a fit, from the numbers of its shape and the range of the drive, V.
-    ///
-    /// It passes through 0 at 0 V, where the plays rest, and rises over the drive's range by as
-    /// much as the drive does: thresholds and weights mean what they do without it. Its scale
-    /// could be traded for the weights otherwise.
-    #[must_use]
-    pub fn envelope(shape: &[f64], (low, high): (f64, f64)) -> TanhEnvelope {
-        let [ratio, bend] = [0, 1].map(|i| shape.get(i).copied().unwrap_or(1.0));
-        // The ratio is cosh^2(A - B)/cosh^2(A + B), A the argument in the middle.
-        let root = libm::sqrt(ratio);
-        let lean = (1.0 - root) / (1.0 + root);
-        let half = libm::hypot(libm::atanh(lean), bend);
-        let middle = libm::atanh(lean / libm::tanh(half));
-        let slope = 2.0 * half / (high - low);
-        let bare = TanhEnvelope {
-            scale: 1.0,
-            slope,
-            shift: middle - 0.5 * slope * (low + high),
-            level: 0.0,
-        };
-        let scale = (high - low) / (bare.at(high) - bare.at(low));
-        TanhEnvelope { scale, level: -scale * bare.at(0.0), ..bare }
-    }
-}
-
 impl Edges for TanhEnvelope {
     #[inline(always)]
     fn at(&self, volts: f64) -> (f64, f64) {
@@ -490,13 +464,13 @@ impl Superposition for GeneralisedPrandtlIshlinskiiStage {
     }
 
     fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {
-        let edges = Self::envelope(of.shape, of.drive);
+        let edges = TanhEnvelope::fitted(of.shape, of.drive);
         Box::new(PlaySignals { edges, thresholds: of.places.to_vec() })
     }
 
     fn values(fitted: &FittedWeights) -> Values {
         let of = fitted.clone();
-        let TanhEnvelope { scale, slope, shift, level } = Self::envelope(&of.shape, of.drive);
+        let TanhEnvelope { scale, slope, shift, level } = TanhEnvelope::fitted(&of.shape, of.drive);
         let relaxation = of.relaxation.values();
         let operator = [
             vec![of.linear],

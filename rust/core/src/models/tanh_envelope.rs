@@ -51,4 +51,24 @@ impl TanhEnvelope {
             level: finite(&format!("{prefix}level"), level, "V")?,
         })
     }
+
+    /// The envelope of a fit, from the numbers of its shape and the range of the drive, V.
+    ///
+    /// It passes through 0 at 0 V, where the plays rest, and rises over the drive's range by as
+    /// much as the drive does: thresholds and weights mean what they do without it. Its scale
+    /// could be traded for the weights otherwise.
+    #[must_use]
+    pub fn fitted(shape: &[f64], (low, high): (f64, f64)) -> Self {
+        let [ratio, bend] = [0, 1].map(|i| shape.get(i).copied().unwrap_or(1.0));
+        // The ratio is cosh^2(A - B)/cosh^2(A + B), A the argument in the middle.
+        let root = libm::sqrt(ratio);
+        let lean = (1.0 - root) / (1.0 + root);
+        let half = libm::hypot(libm::atanh(lean), bend);
+        let middle = libm::atanh(lean / libm::tanh(half));
+        let slope = 2.0 * half / (high - low);
+        let bare =
+            Self { scale: 1.0, slope, shift: middle - 0.5 * slope * (low + high), level: 0.0 };
+        let scale = (high - low) / (bare.at(high) - bare.at(low));
+        Self { scale, level: -scale * bare.at(0.0), ..bare }
+    }
 }
