@@ -17,12 +17,12 @@ import piezotrack as pt
 
 
 def virtual_logs() -> tuple[pt.Dataset, pt.Dataset]:
-    """Make a log of full cycles and one whose amplitude falls, 12 s at 100 Hz each."""
-    stage, dt = pt.VirtualStage.xu_li_2010(seed=1), 1 / 100.0
-    phase = 2.0 * np.pi * 0.5 * dt * np.arange(1200)
+    """Make a log of full cycles and one whose amplitude falls, 12 s at 200 Hz each."""
+    stage, dt = pt.VirtualStage.xu_li_2010(seed=1), 1 / 200.0
+    phase = 2.0 * np.pi * 0.5 * dt * np.arange(2400)
     logs = [
         stage.record(37.5 - reach * np.cos(phase), dt)
-        for reach in (np.full(1200, 37.5), np.linspace(37.5, 2.0, 1200))
+        for reach in (np.full(2400, 37.5), np.linspace(37.5, 2.0, 2400))
     ]
     return logs[0], logs[1]
 
