@@ -67,6 +67,9 @@ from .stages.inverse import Inverse as Inverse
 from .stages.lugre import LuGreStage as LuGreStage
 from .stages.maxwell_slip import MaxwellSlipStage as MaxwellSlipStage
 from .stages.parallel_dahl import ParallelDahlStage as ParallelDahlStage
+from .stages.asymmetric_prandtl_ishlinskii import (
+    AsymmetricPrandtlIshlinskiiStage as AsymmetricPrandtlIshlinskiiStage,
+)
 from .stages.polynomial_prandtl_ishlinskii import (
     PolynomialPrandtlIshlinskiiStage as PolynomialPrandtlIshlinskiiStage,
 )

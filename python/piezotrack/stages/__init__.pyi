@@ -27,6 +27,9 @@ from .lugre import LuGreState as LuGreState
 from .maxwell_slip import MaxwellSlipStage as MaxwellSlipStage
 from .parallel_dahl import ParallelDahlStage as ParallelDahlStage
 from .parallel_dahl import ParallelDahlState as ParallelDahlState
+from .asymmetric_prandtl_ishlinskii import (
+    AsymmetricPrandtlIshlinskiiStage as AsymmetricPrandtlIshlinskiiStage,
+)
 from .polynomial_prandtl_ishlinskii import (
     PolynomialPrandtlIshlinskiiStage as PolynomialPrandtlIshlinskiiStage,
 )

@@ -243,12 +243,7 @@ impl<const PLAYS: usize> AsymmetricPlay<PLAYS> {
     /// Output and slope where the input has gone from a state to `input` on a rise or a fall.
     #[must_use]
     #[inline]
-    pub fn ahead(
-        &self,
-        from: &AsymmetricPlayState<PLAYS>,
-        input: f64,
-        rises: bool,
-    ) -> (f64, f64) {
+    pub fn ahead(&self, from: &AsymmetricPlayState<PLAYS>, input: f64, rises: bool) -> (f64, f64) {
         let state = self.taken(from, input, rises);
         (self.value(&state), state.slope)
     }
@@ -267,12 +262,7 @@ impl<const PLAYS: usize> AsymmetricPlay<PLAYS> {
     /// line to within `deviation`: where a play starts to move, an end of the range is passed, or
     /// the output has bent that far.
     #[must_use]
-    pub fn straight(
-        &self,
-        state: &AsymmetricPlayState<PLAYS>,
-        input: f64,
-        deviation: f64,
-    ) -> f64 {
+    pub fn straight(&self, state: &AsymmetricPlayState<PLAYS>, input: f64, deviation: f64) -> f64 {
         let from = state.input;
         let rises = input >= from;
         let side = if rises { 1.0 } else { -1.0 };
@@ -307,7 +297,9 @@ impl<const PLAYS: usize> AsymmetricPlay<PLAYS> {
     #[must_use]
     pub fn bend(&self) -> f64 {
         let (low, high) = self.range;
-        self.parts().map(|(bend, family)| family.total() * bend.curvature(low, high, self.range)).sum()
+        self.parts()
+            .map(|(bend, family)| family.total() * bend.curvature(low, high, self.range))
+            .sum()
     }
 
     /// Largest change of the slope that all corners together can make, Y/V.
