@@ -30,6 +30,7 @@ use super::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
 use super::values::{ParameterInfo, Values};
 use crate::design::{Gains, LoopPlant};
 use crate::error::Result;
+use crate::signal::index;
 
 /// The operator of a stage, V to m.
 pub type AsymmetricPlays = AsymmetricPlay<MOST_PLAYS>;
@@ -221,36 +222,81 @@ impl Invertible for AsymmetricPrandtlIshlinskiiStage {
     }
 }
 
-/// The drive, and plays of it, of f and of g with the same thresholds.
+/// Shares of a family that are found at most. Loops of one height determine the sum of the weights
+/// whose plays turn at a voltage, not those of neighbours in three families: weights that are free
+/// take the noise, and foretell loops of other heights worse.
+const MOST_SHARES: usize = 8;
+
+/// Where thresholds lie between those whose weights are found: the weights go straight from one to
+/// the next, as a density of thresholds.
+#[derive(Clone, Copy, Debug)]
+struct Density {
+    thresholds: usize,
+}
+
+impl Density {
+    /// How many weights are found.
+    fn count(self) -> usize {
+        self.thresholds.min(MOST_SHARES)
+    }
+
+    /// The weights found on both sides of a threshold, and how far it is from the first to the
+    /// second.
+    fn between(self, threshold: usize) -> (usize, usize, f64) {
+        let last = self.count().saturating_sub(1);
+        let steps = self.thresholds.saturating_sub(1).max(1);
+        // Whole numbers, so that a threshold whose weight is found has all of it.
+        let (first, rest) = (threshold * last / steps, threshold * last % steps);
+        (first, (first + 1).min(last), index(rest) / index(steps))
+    }
+
+    /// Weights of all thresholds.
+    fn weights(self, found: &[f64]) -> Vec<f64> {
+        let weight = |threshold| {
+            let (first, second, way) = self.between(threshold);
+            let of = |k: usize| found.get(k).copied().unwrap_or(0.0);
+            of(first) + way * (of(second) - of(first))
+        };
+        (0..self.thresholds).map(weight).collect()
+    }
+}
+
+/// The drive, and plays of it, of f and of g with the same thresholds, in the sums whose weights
+/// are found.
 #[derive(Clone, Debug)]
 struct FamilySignals {
     range: (f64, f64),
     thresholds: Vec<f64>,
+    density: Density,
 }
 
 impl Signals for FamilySignals {
     fn count(&self) -> usize {
-        1 + Bend::ALL.len() * self.thresholds.len()
+        1 + Bend::ALL.len() * self.density.count()
     }
 
     fn rest(&self) -> Vec<f64> {
-        vec![0.0; self.count() - 1]
+        vec![0.0; Bend::ALL.len() * self.thresholds.len()]
     }
 
     fn follow(&self, memory: &mut Vec<f64>, volts: f64, _dt: f64, signals: &mut [f64]) {
-        let Some((drive, rest)) = signals.split_first_mut() else { return };
+        signals.fill(0.0);
+        let Some((drive, sums)) = signals.split_first_mut() else { return };
         *drive = volts;
         if self.thresholds.is_empty() {
             return;
         }
         let families = memory.chunks_exact_mut(self.thresholds.len());
-        for (bend, plays) in Bend::ALL.into_iter().zip(families) {
+        let sums = sums.chunks_exact_mut(self.density.count());
+        for ((bend, plays), sums) in Bend::ALL.into_iter().zip(families).zip(sums) {
             let (edge, _) = bend.at(volts, self.range);
-            for (play, threshold) in plays.iter_mut().zip(&self.thresholds) {
+            for (i, (play, threshold)) in plays.iter_mut().zip(&self.thresholds).enumerate() {
                 *play = (edge - threshold).max((edge + threshold).min(*play));
+                let (first, second, way) = self.density.between(i);
+                sums[first] += (1.0 - way) * *play;
+                sums[second] += way * *play;
             }
         }
-        rest.copy_from_slice(memory);
     }
 }
 
@@ -258,15 +304,16 @@ impl Superposition for AsymmetricPrandtlIshlinskiiStage {
     const PLACES: Places = Places::Thresholds;
 
     fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {
-        Box::new(FamilySignals { range: of.drive, thresholds: of.places.to_vec() })
+        let density = Density { thresholds: of.places.len() };
+        Box::new(FamilySignals { range: of.drive, thresholds: of.places.to_vec(), density })
     }
 
     fn values(fitted: &FittedWeights) -> Values {
         let of = fitted.clone();
-        let count = of.places.len();
+        let density = Density { thresholds: of.places.len() };
         let family = |k: usize| {
-            let weights = of.weights.iter().skip(k * count).take(count).copied();
-            [of.places.clone(), weights.collect()]
+            let found = of.weights.iter().skip(k * density.count()).take(density.count()).copied();
+            [of.places.clone(), density.weights(&found.collect::<Vec<f64>>())]
         };
         let numbers = [of.linear, of.drive.0, of.drive.1].map(|number| vec![number]);
         let operator = numbers.into_iter().chain((0..Bend::ALL.len()).flat_map(family));
