@@ -55,6 +55,9 @@ from .references.waveforms import staircase as staircase
 from .references.waveforms import triangle as triangle
 from .references.xy_reference import XYReference as XYReference
 from .stages.asymmetric_bouc_wen import AsymmetricBoucWenStage as AsymmetricBoucWenStage
+from .stages.asymmetric_prandtl_ishlinskii import (
+    AsymmetricPrandtlIshlinskiiStage as AsymmetricPrandtlIshlinskiiStage,
+)
 from .stages.bouc_wen import BoucWenStage as BoucWenStage
 from .stages.bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
 from .stages.dahl import DahlStage as DahlStage
@@ -67,9 +70,6 @@ from .stages.inverse import Inverse as Inverse
 from .stages.lugre import LuGreStage as LuGreStage
 from .stages.maxwell_slip import MaxwellSlipStage as MaxwellSlipStage
 from .stages.parallel_dahl import ParallelDahlStage as ParallelDahlStage
-from .stages.asymmetric_prandtl_ishlinskii import (
-    AsymmetricPrandtlIshlinskiiStage as AsymmetricPrandtlIshlinskiiStage,
-)
 from .stages.polynomial_prandtl_ishlinskii import (
     PolynomialPrandtlIshlinskiiStage as PolynomialPrandtlIshlinskiiStage,
 )

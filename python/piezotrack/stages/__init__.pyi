@@ -4,6 +4,9 @@ from .apparatus import Amplifier as Amplifier
 from .apparatus import Preconditioning as Preconditioning
 from .apparatus import Sensor as Sensor
 from .asymmetric_bouc_wen import AsymmetricBoucWenStage as AsymmetricBoucWenStage
+from .asymmetric_prandtl_ishlinskii import (
+    AsymmetricPrandtlIshlinskiiStage as AsymmetricPrandtlIshlinskiiStage,
+)
 from .base import ForceState as ForceState
 from .base import Response as Response
 from .base import Stage as Stage
@@ -27,9 +30,6 @@ from .lugre import LuGreState as LuGreState
 from .maxwell_slip import MaxwellSlipStage as MaxwellSlipStage
 from .parallel_dahl import ParallelDahlStage as ParallelDahlStage
 from .parallel_dahl import ParallelDahlState as ParallelDahlState
-from .asymmetric_prandtl_ishlinskii import (
-    AsymmetricPrandtlIshlinskiiStage as AsymmetricPrandtlIshlinskiiStage,
-)
 from .polynomial_prandtl_ishlinskii import (
     PolynomialPrandtlIshlinskiiStage as PolynomialPrandtlIshlinskiiStage,
 )

@@ -302,6 +302,7 @@ impl Signals for FamilySignals {
 
 impl Superposition for AsymmetricPrandtlIshlinskiiStage {
     const PLACES: Places = Places::Thresholds;
+    const CREEP_GAIN: Option<f64> = Some(0.015);
 
     fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {
         let density = Density { thresholds: of.places.len() };
