@@ -184,7 +184,7 @@ def test_it_is_saved_and_tracks(tmp_path: Path) -> None:
     fit = measured().fits[NAME]
     found = pt.load(fit.save(tmp_path / "stage.json"))
     assert found.model == fit.model
-    reference = pt.sine(frequency=1.0, low=5e-6, high=35e-6, duration=4.0)
+    reference = pt.sine(frequency=1.0, low=8e-6, high=35e-6, duration=4.0)
     inverse = found.model.inverse(playback="online")
     loop = pt.Controller(dt=1e-3, limits=(0.0, 3.6), feedforward=inverse)
     run = pt.track(found.model, loop, reference)

@@ -280,7 +280,7 @@ impl<const PLAYS: usize> AsymmetricPlay<PLAYS> {
                     nearest(bend.reaches(play + side * threshold, self.range));
                 }
             }
-            if *bend != Bend::Straight && family.count > 0 {
+            if *bend != Bend::Straight && family.total() > 0.0 {
                 nearest(self.range.0);
                 nearest(self.range.1);
             }
