@@ -7,7 +7,6 @@ mod golden_section;
 mod lanes;
 mod memory;
 mod random;
-mod root;
 mod threads;
 mod transfer_function;
 
@@ -15,9 +14,10 @@ pub use bounded_least_squares::{FREE, NOT_NEGATIVE, Rows, bounded};
 pub use lanes::Lanes;
 pub use memory::{available, room, zeros};
 
+pub(crate) use piezotrack_control::root::rising_root;
+
 pub(crate) use dispatch::{dispatch_fused, dispatch_vectors, width};
 pub(crate) use golden_section::least;
 pub(crate) use random::Draws;
-pub(crate) use root::rising_root;
 pub(crate) use threads::on_all_threads;
 pub(crate) use transfer_function::{C, Jet, Ratio};

@@ -8,7 +8,7 @@ use super::form::Form;
 use super::gauss_newton::STEPS;
 use super::modes::{drop_modes, first_mode};
 use super::places::{add_once, choose_places, few_or_many, spread};
-use super::slow_parts::{choose_slow, creeps};
+use super::slow_parts::{choose_slow, creeps, without_creep};
 use super::{CreepKind, DynamicsKind, PlacesKind, Settings, WeightsRecord};
 use crate::identify::history::History;
 use crate::math::least;
@@ -110,7 +110,18 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Found<'a>> 
         fit.settle(ROUGH)?;
     }
     choose_slow(&mut fit, settings)?;
-    let lags = choose_dynamics(&mut fit, settings, mode)?;
+    let still = fit.clone();
+    let mut lags = choose_dynamics(&mut fit, settings, mode)?;
+    if let (Some(gain), CreepKind::Auto, false) =
+        (common.of.creep_gain(), &settings.creep, fit.times.is_empty())
+    {
+        // Creep was chosen before a lag, for some of which it stood.
+        let mut bare = without_creep(still)?;
+        let range = choose_dynamics(&mut bare, settings, mode)?;
+        if (1.0 - gain) * bare.rms <= fit.rms {
+            (fit, lags) = (bare, range);
+        }
+    }
     choose_places(&mut fit, settings)?;
     Some((fit, lags))
 }

@@ -394,7 +394,8 @@ fn signals(common: &Common<'_>, shape: &[f64], places: &[f64]) -> Arc<dyn Signal
     Arc::from(common.of.signals(&SignalsOf { shape, places, drive: common.drive }))
 }
 
-fn known_drift(record: &WeightsRecord<'_>) -> Option<f64> {
+/// Time constant of a drift of which the caller says so, s.
+pub(super) fn known_drift(record: &WeightsRecord<'_>) -> Option<f64> {
     match record.drift {
         DriftKind::Time(time) => Some(time),
         DriftKind::None | DriftKind::Auto => None,

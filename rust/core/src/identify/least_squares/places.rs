@@ -147,6 +147,10 @@ pub(super) fn choose_places(fit: &mut Fit<'_>, settings: &Settings) -> Option<()
 /// thresholds: two neighbours stand for one play between them. `None` where they do not gather.
 #[expect(clippy::option_option, reason = "stopped, or none")]
 fn gathered<'a>(fit: &Fit<'a>) -> Option<Option<Fit<'a>>> {
+    // Weights that are not those of single plays gather nowhere.
+    if fit.layout().weights <= fit.places.len() {
+        return Some(None);
+    }
     let mut trial = fit.clone();
     let mut gap = reach(fit.common) / index(fit.places.len() + 1);
     for _ in 0..ROUNDS {

@@ -1,7 +1,7 @@
 //! Which slow parts a record shows: creep of the stage, drift of the sensor.
 
 use super::choices::{FIRST_SHARE, ROUGH, SAME, best_lag};
-use super::fit::Fit;
+use super::fit::{Fit, known_drift};
 use super::form::Form;
 use super::places::split;
 use super::{CreepKind, DriftKind, DynamicsKind, Settings, WeightsRecord};
@@ -73,6 +73,17 @@ pub(super) fn choose_slow(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> 
         }
     }
     Some(())
+}
+
+/// The same without creep, its drifts chosen anew.
+pub(super) fn without_creep(mut fit: Fit<'_>) -> Option<Fit<'_>> {
+    fit.restructure(|fit| {
+        fit.times = Vec::new();
+        fit.drifts = fit.common.records.iter().map(known_drift).collect();
+    });
+    fit.settle(ROUGH)?;
+    choose_drifts(&mut fit)?;
+    Some(fit)
 }
 
 /// RMS deviation on the last third of each window of a structure that is fitted to what is before
