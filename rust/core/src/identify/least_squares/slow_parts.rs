@@ -3,6 +3,7 @@
 use super::choices::{FIRST_SHARE, ROUGH, SAME, best_lag};
 use super::fit::Fit;
 use super::form::Form;
+use super::gauss_newton::STEPS;
 use super::places::split;
 use super::{CreepKind, DriftKind, DynamicsKind, Settings, WeightsRecord};
 use crate::math::least;
@@ -80,7 +81,7 @@ pub(super) fn choose_slow(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> 
 fn foretold(fit: &Fit<'_>) -> Option<f64> {
     let mut early = fit.clone();
     early.windows = fit.windows.iter().map(|one| one.start..split(one)).collect();
-    early.settle(ROUGH)?;
+    early.settle_rigid(STEPS)?;
     early.windows = fit.windows.iter().map(|one| split(one)..one.end).collect();
     Some(early.deviation())
 }
@@ -102,9 +103,9 @@ fn choose_drifts(fit: &mut Fit<'_>) -> Option<()> {
         let length = fit.common.records[r].length();
         let mut best: Option<Fit<'_>> = None;
         let tried = |time: f64| {
-            let mut trial = fit.clone();
+            let mut trial = best.as_ref().unwrap_or(fit).clone();
             trial.restructure(|trial| trial.drifts[r] = Some(time));
-            trial.settle(ROUGH)?;
+            trial.settle_rigid(STEPS)?;
             let rms = trial.rms;
             if best.as_ref().is_none_or(|best| rms < best.rms) {
                 best = Some(trial);
@@ -113,7 +114,9 @@ fn choose_drifts(fit: &mut Fit<'_>) -> Option<()> {
         };
         least((DRIFTS.0 * length, DRIFTS.1 * length), 0.02, tried)?;
         let enough = (1.0 - DRIFT_GAIN) * fit.deviation_of(r);
-        if let Some(best) = best.filter(|best| best.deviation_of(r) < enough) {
+        let Some(mut best) = best else { continue };
+        best.settle(ROUGH)?;
+        if best.deviation_of(r) < enough {
             *fit = best;
         }
     }
@@ -135,10 +138,13 @@ fn choose_creep(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
         for share in trial.layout().shares() {
             trial.x[share] = FIRST_SHARE;
         }
-        trial.settle(ROUGH)?;
+        trial.settle_rigid(STEPS)?;
         if best.as_ref().is_none_or(|best| trial.rms < best.rms) {
             best = Some(trial);
         }
+    }
+    if let Some(best) = &mut best {
+        best.settle(ROUGH)?;
     }
     let Some(best) = best.filter(|best| best.rms < (1.0 - CREEP_GAIN) * none.rms) else {
         *fit = none;
