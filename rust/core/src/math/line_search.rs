@@ -83,16 +83,16 @@ fn brent(
         let next = (place, cost(place)?);
         if next.1 < best.1 {
             if place < best.0 {
-                b = best.0
+                b = best.0;
             } else {
-                a = best.0
+                a = best.0;
             }
             (best, second, third) = (next, best, second);
         } else {
             if place < best.0 {
-                a = place
+                a = place;
             } else {
-                b = place
+                b = place;
             }
             if next.1 < second.1 {
                 (second, third) = (next, second);

@@ -185,9 +185,9 @@ fn with_history<'a>(
         }
     }
     if steps == STEPS {
-        trial.settle(ROUGH)?
+        trial.settle(ROUGH)?;
     } else {
-        trial.settle_rigid(steps)?
+        trial.settle_rigid(steps)?;
     }
     Some(trial)
 }

@@ -72,7 +72,7 @@ impl Fit<'_> {
                 break;
             }
             // What the linear problem foretold: the next one would be the same.
-            if part == 1.0 && goal.free && (self.rms - goal.rms).abs() <= gain * self.rms {
+            if part > 0.9 && goal.free && (self.rms - goal.rms).abs() <= gain * self.rms {
                 break;
             }
         }
