@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from .. import _core
 from .._support.arguments import as_numbers
 from .._support.messages import quoted
-from .._support.units import of_drive
 from ..errors import ParameterError
 from .components import Lag, LowPass, Notch, Pid, Repetitive, StateSpace, ZeroPhase
 from .laws import DisturbanceObserver, LeadLag, PerturbationEstimator, SlidingMode
@@ -40,8 +39,8 @@ class Setting(NamedTuple):
     form: str = "number"
 
     def key(self, drive: str) -> str:
-        """The key of the entry, as kp_V_per_m."""
-        unit = of_drive(self.unit, drive) if drive == "m" else self.unit.replace("V", drive)
+        """Return the key of the entry, as kp_V_per_m."""
+        unit = self.unit.replace("V", drive)
         return f"{self.name}_{unit.replace('/', '_per_')}" if unit else self.name
 
 
