@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ... import _core
 from ...errors import ParameterError
 from ..description import controller_text
-from .c_check import CHECK_CODE
+from .c_check import check_code
 from .c_parts import feedforward_table, parts_of, shape_of
 from .c_text import (
     Operations,
@@ -29,21 +29,9 @@ if TYPE_CHECKING:
 __all__ = ["Sources", "c_sources", "checked_name"]
 
 # With these the static functions of the C file begin.
-INSIDE = frozenset(
-    [
-        "pid",
-        "law",
-        "sliding",
-        "observer",
-        "hysteresis",
-        "repetitive",
-        "line",
-        "table",
-        "inverse",
-        "online",
-        "readings",
-    ]
-    + ["filters", "is", "not"]
+INSIDE = (
+    *("pid", "law", "sliding", "observer", "hysteresis", "repetitive", "line", "table"),
+    *("inverse", "online", "readings", "filters", "is", "not"),
 )
 # A float has 24 bits, and an integral adds up what they leave out: the largest difference in 2000
 # steps, as a share of the limits' range. In a replay, where no reading answers, an observer around
@@ -144,9 +132,7 @@ def c_sources(
     texts = {
         f"{name}.h": _header(parts, facts, shape.forward, unit, single=single),
         f"{name}.c": _source(parts, facts, single=single),
-        "check.c": CHECK_CODE[shape.forward]
-        .replace("@bound", repr(bound))
-        .replace("@flags", str(flags)),
+        "check.c": check_code(shape.forward, bound, flags),
     }
     files = {
         file: named(name, text).replace("@GUARD", name.upper()).replace("@file", name)

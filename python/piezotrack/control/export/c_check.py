@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["CHECK_CODE"]
+__all__ = ["check_code"]
 
 COMMON = """\
 /*
@@ -86,8 +86,9 @@ int main(int count, char **arguments)
         steps++;
     }
     fclose(file);
-    printf("steps %ld, largest difference %.3g at step %ld, flags that differ %ld, state %lu bytes\\n",
-           steps, largest, worst, flags, (unsigned long)sizeof state);
+    printf("steps %ld, largest difference %.3g at step %ld, flags that differ %ld, ",
+           steps, largest, worst, flags);
+    printf("state %lu bytes\\n", (unsigned long)sizeof state);
     return steps > 0 && largest <= BOUND && flags <= @flags ? 0 : 1;
 }
 """
@@ -99,4 +100,27 @@ NAME_step(&state, (NAME_real)in[1], (NAME_real)in[3]);""",
     "online": """\
 NAME_step(&state, (NAME_real)in[1], (NAME_real)in[2], (NAME_real)in[3]);""",
 }
-CHECK_CODE = {forward: COMMON.replace("@call", call) for forward, call in CALLS.items()}
+
+
+def check_code(forward: str, bound: float, flags: int) -> str:
+    """Write the program.
+
+    Parameters
+    ----------
+    forward : {"given", "table", "online"}
+        Where the feedforward comes from.
+    bound : float
+        Largest difference that is accepted, in the unit of the drive.
+    flags : int
+        Flags that may differ.
+
+    Returns
+    -------
+    str
+        The program, with the names of its files open.
+    """
+    pieces = {"@call": CALLS[forward], "@bound": repr(bound), "@flags": str(flags)}
+    code = COMMON
+    for key, piece in pieces.items():
+        code = code.replace(key, piece)
+    return code

@@ -209,7 +209,7 @@ static int inverse_travel_turning(NAME_inverse *at, real w0, real rise, real w1)
     return inverse_travel(at, rise - here);
 }
 
-/* The voltage for displacement, velocity and acceleration; NaN, and nothing changed, without one. */
+/* The voltage for displacement, velocity and acceleration; NaN, and nothing changed, without it. */
 static real inverse_step(NAME_inverse *state, real x, real v, real a)
 {
     NAME_inverse at = *state;

@@ -18,6 +18,9 @@ READING = 0.01
 USABLE = {False: 1e100, True: 1e30}
 
 
+UNLEARNT = Field("real", "unlearnt", "error that is yet to be learnt, m")
+
+
 class Shape(NamedTuple):
     """What the composing functions have to know of the parts.
 
@@ -280,11 +283,7 @@ def loop(limits: tuple[float, float], unit: str, shape: Shape) -> Part:
     fields = (
         Field("real", "present", f"command to go on from, {unit}"),
         Field("real", "excess", f"voltage applied less the unclipped command, {unit}"),
-        *(
-            [Field("real", "unlearnt", "error that is yet to be learnt, m")]
-            if shape.repeats
-            else []
-        ),
+        *([UNLEARNT] if shape.repeats else []),
         Field("flag", "has_present", "whether there is a command to go on from"),
         Field("flag", "stepped", "whether there was a step"),
         Field("flag", "reported", "whether the excess is of a reported voltage"),
@@ -367,9 +366,8 @@ def _error_code(shape: Shape) -> str:
     measured = "filters_step(s, measured)" if shape.filtered else "measured"
     lines = "        struct sample in;\n" if shape.law else ""
     if "measured" in shape.sample:
-        return (
-            f"{lines}        in.measured = {measured};\n        error = reference - in.measured;\n"
-        )
+        lines += f"        in.measured = {measured};\n"
+        measured = "in.measured"
     return f"{lines}        error = reference - {measured};\n"
 
 

@@ -91,6 +91,9 @@ class Operations(NamedTuple):
         return f"{text}, {self.divisions} divisions" if self.divisions else text
 
 
+NOTHING = Operations()
+
+
 @dataclass(frozen=True, kw_only=True)
 class Part:
     """A part of a controller in C.
@@ -113,7 +116,7 @@ class Part:
     code: str
     constants: tuple[Constant, ...] = ()
     fields: tuple[Field, ...] = ()
-    operations: Operations = Operations()
+    operations: Operations = NOTHING
 
 
 def named(name: str, code: str) -> str:

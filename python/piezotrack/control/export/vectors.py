@@ -154,7 +154,7 @@ def _reach(controller: Controller) -> tuple[float, float]:
 def _motion(
     controller: Controller, steps: int, bottom: float, top: float, reference: Reference | None
 ) -> NDArray[np.float64]:
-    """Reference of the test [m]: a sine, larger than the reach for a while; two are missing."""
+    """Make the reference [m]: a sine, larger than the reach for a while; two are missing."""
     low, high = controller._valid
     k = np.arange(steps + 1, dtype=np.float64)
     period = 250.0
@@ -191,7 +191,7 @@ def _given(k: int, low: float, high: float) -> float:
 
 
 def _applied(k: int, steps: int, out: float, low: float, high: float) -> float:
-    """What the amplifier reports [V]: mostly nothing, then less than asked for, then overload."""
+    """Report of the amplifier [V]: mostly none, then less than asked for, then overload."""
     begin = steps * 3 // 5
     if begin <= k < begin + 40:
         return low + 0.9 * (out - low)
