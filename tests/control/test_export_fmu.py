@@ -128,7 +128,7 @@ def test_a_simulator_runs_it(tmp_path: Path) -> None:
 
 def test_other_steps_are_refused(tmp_path: Path) -> None:
     unit, _ = slave(unit_of(loop("PID"), tmp_path))
-    with pytest.raises(Exception, match="fmi2Error|error"):
+    with pytest.raises(Exception, match=r"fmi2Error|error"):
         unit.doStep(0.0, 0.3 * DT)
     unit.doStep(0.0, 3.0 * DT)
     unit.freeInstance()
@@ -136,7 +136,7 @@ def test_other_steps_are_refused(tmp_path: Path) -> None:
 
 def test_it_needs_no_python(tmp_path: Path) -> None:
     path = unit_of(loop("all"), tmp_path)
-    library = extract(str(path), str(tmp_path / "unpacked")) + "/binaries/linux64/axis.so"
+    library = f"{extract(str(path), str(tmp_path / 'unpacked'))}/binaries/linux64/axis.so"
     done = subprocess.run(["ldd", library], capture_output=True, text=True, check=True)
     needed = {line.split()[0].split(".so")[0].split("/")[-1] for line in done.stdout.splitlines()}
     assert needed <= {"linux-vdso", "libc", "ld-linux-x86-64", "ld-linux-aarch64"}

@@ -69,6 +69,8 @@ def export_command(
         if name is not None:
             raise
         raise ParameterError(f"{error}; --name gives one") from None
+    if single and to == "json":
+        raise ParameterError("--float has no effect with --to json: expected it left out")
     known = load_controller(controller)
     motion = None if reference is None else parsed_reference(reference, duration, period)
     result.will_write(names)

@@ -128,8 +128,8 @@ def _check_online(controller: Controller) -> None:
     else:
         return
     raise ParameterError(
-        f"feedforward is {what}, which has no form in C sample by sample: expected a reference "
-        "that repeats, for which a table of one period is written, or a Dahl stage without creep"
+        f"feedforward is {what}, which has no form in C sample by sample: expected "
+        "reference=, a motion that repeats, whose table is written, or a Dahl stage without creep"
     )
 
 
