@@ -25,6 +25,7 @@ from c_exports import (
     needs_gcc,
     needs_gxx,
 )
+from folders import ROOT
 from piezotrack.control.export.vectors import rows_of
 from piezotrack.errors import ParameterError
 
@@ -66,6 +67,7 @@ def test_floats_stay_within_the_bound_that_is_stated(name: str, tmp_path: Path) 
     # 1.5 mV of 75 V; an observer around an integral adds up twice where no reading answers.
     observes = name in ("disturbance observer", "hysteresis observer", "perturbation")
     assert done.bound == pytest.approx(7.5 if observes else 1.5e-3)
+    assert observes or figures["largest"] < 0.1 * done.bound
     assert figures["state"] == done.state_bytes
 
 
@@ -100,6 +102,23 @@ def test_the_vectors_have_what_can_go_wrong() -> None:
     # Of period 250: what was learnt comes back more than once.
     assert any(row.repetitive != 0.0 for row in rows[250:500])
     assert len(rows) == 2000
+
+
+@needs_gcc
+def test_the_commands_of_the_page_do_what_it_says(tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "export.md").read_text(encoding="utf-8")
+    compiling = next(line for line in page.splitlines() if line.startswith("cc "))
+    export(loop("all"), tmp_path, name="axis")
+    done = subprocess.run(
+        f"{compiling} && ./check vectors.csv",
+        shell=True,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stderr == ""
+    assert "largest difference 0 at step 0, flags that differ 0" in done.stdout
 
 
 @needs_gcc
