@@ -3,6 +3,7 @@
 # the packages: pt.control.StateSpace, pt.references.read_path and so on.
 from . import control as control
 from . import data as data
+from . import hardware as hardware
 from . import identification as identification
 from . import references as references
 from . import stages as stages
@@ -18,6 +19,7 @@ from .control.controller import Controller as Controller
 from .control.controller_file import load_controller as load_controller
 from .control.learning import learn as learn
 from .control.linear_systems import to_control as to_control
+from .control.on_device.playing import play as play
 from .control.stability import check_loop as check_loop
 from .control.tracking import track as track
 from .control.tuning.margins import Margins as Margins
@@ -28,12 +30,14 @@ from .data import datasets as datasets
 from .data.dataset import Dataset as Dataset
 from .data.reader import read as read
 from .errors import DataError as DataError
+from .errors import DeviceError as DeviceError
 from .errors import ExecutorError as ExecutorError
 from .errors import Interrupted as Interrupted
 from .errors import NumericalError as NumericalError
 from .errors import ParameterError as ParameterError
 from .errors import PiezotrackError as PiezotrackError
 from .errors import ShapeError as ShapeError
+from .hardware.measure import measure as measure
 from .identification.benchmarking.board import benchmark as benchmark
 from .identification.benchmarking.record import BenchmarkRecord as BenchmarkRecord
 from .identification.campaigns import campaign as campaign

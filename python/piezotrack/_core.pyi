@@ -339,6 +339,13 @@ class VirtualStage:
         visited: ArrayLike,
     ) -> TrackingRun: ...
 
+@final
+class VirtualRun:
+    def __new__(cls, stage: VirtualStage) -> VirtualRun: ...
+    def advance(
+        self, u: ArrayLike, dt: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+
 # Rms and largest error [m], effort [V], slew [V/s], clipped share.
 _Figures = tuple[float, float, float, float, float]
 

@@ -10,6 +10,7 @@ from typing import Any
 
 __all__ = [
     "DataError",
+    "DeviceError",
     "ExecutorError",
     "Interrupted",
     "NumericalError",
@@ -58,6 +59,10 @@ class DataError(PiezotrackError, ValueError):
 
 class NumericalError(PiezotrackError, ArithmeticError):
     """A computation with valid input did not reach a usable result."""
+
+
+class DeviceError(PiezotrackError, RuntimeError):
+    """A device did not do what it was asked, or does not answer: says which, and what it said."""
 
 
 class ExecutorError(PiezotrackError, RuntimeError):

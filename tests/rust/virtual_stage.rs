@@ -15,8 +15,8 @@ use piezotrack_core::models::{
 use piezotrack_core::signal::metrics::widest_loop;
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 use piezotrack_core::simulate::{
-    Amplifier, MissedTicks, OpenLoop, Preconditioning, Sensor, TwoAxes, VirtualStage, open_loop,
-    open_loops,
+    Amplifier, MissedTicks, OpenLoop, Preconditioning, Sensor, TwoAxes, VirtualRun, VirtualStage,
+    open_loop, open_loops,
 };
 
 const UM: f64 = 1e-6;
@@ -373,4 +373,40 @@ fn each_of_two_axes_has_its_own_sensor_delay() {
         assert!((along_x.measured[k] - 1.1 * alone(&x)[k]).abs() < 1e-13, "{k}");
         assert!((along_y.measured[k] - alone(&y)[k]).abs() < 1e-13, "{k}");
     }
+}
+
+#[test]
+fn a_run_that_goes_on_moves_as_one_that_was_not_divided() {
+    let commands: Vec<f64> = (0..300).map(|k| 30.0 - 30.0 * (0.05 * f64::from(k)).cos()).collect();
+    // A command that is held from sample to sample acts from the next on.
+    let shifted: Vec<f64> = [0.0].into_iter().chain(commands.iter().copied()).collect();
+    let mut late = published();
+    late.sensor = Sensor { delay: 2.5e-3, ..Sensor::IDEAL };
+    for stage in [VirtualStage { sensor: Sensor::IDEAL, ..published() }, late] {
+        let whole = drive(&stage, &shifted, 1e-3, Hold::Zero);
+        let mut run = VirtualRun::new(stage);
+        let mut before = 1;
+        for piece in [&commands[..1], &commands[1..4], &commands[4..200], &commands[200..]] {
+            let part = run.advance(piece, 1e-3, NEVER).unwrap().unwrap();
+            for k in 0..piece.len() {
+                assert_eq!(part.displacement[k], whole.displacement[before + k], "{}", before + k);
+                assert_eq!(part.measured[k], whole.measured[before + k], "{}", before + k);
+            }
+            before += piece.len();
+        }
+    }
+}
+
+#[test]
+fn a_run_goes_on_at_another_interval_and_is_unchanged_by_what_it_refuses() {
+    let stage = VirtualStage { sensor: Sensor::IDEAL, ..published() };
+    let mut run = VirtualRun::new(stage.clone());
+    let slow = run.advance(&[20.0; 50], 2e-3, NEVER).unwrap().unwrap();
+    assert!(run.advance(&[20.0, f64::NAN], 2e-3, NEVER).is_err());
+    assert!(run.advance(&[20.0], 2e-3, &|| true).unwrap().is_none());
+    let fast = run.advance(&[20.0; 400], 2.5e-4, NEVER).unwrap().unwrap();
+    let mut whole = VirtualRun::new(stage);
+    let other = whole.advance(&[20.0; 100], 2e-3, NEVER).unwrap().unwrap();
+    assert_eq!(slow.displacement[49], other.displacement[49]);
+    assert!((fast.displacement[399] - other.displacement[99]).abs() < 1e-3 * UM);
 }

@@ -38,7 +38,7 @@ OTHER_UNITS = {
     "deg": Unit("deg", "angle", "rad", factor=math.pi, divisor=180.0),
 }
 UNITS = {"frequency": "Hz, mHz, kHz", "angle": "rad, deg", "number": "none"}
-UNITS |= {quantity: known_units(quantity) for quantity in ("time", "displacement")}
+UNITS |= {quantity: known_units(quantity) for quantity in ("time", "displacement", "voltage")}
 PLAIN = Unit("", "number", "")
 
 

@@ -3,7 +3,9 @@
 use numpy::PyArray1;
 use piezotrack_core::models::Stage;
 use piezotrack_core::signal::Drive;
-use piezotrack_core::simulate::{Amplifier, OpenLoop, Preconditioning, Sensor, VirtualStage};
+use piezotrack_core::simulate::{
+    Amplifier, OpenLoop, Preconditioning, Sensor, VirtualRun, VirtualStage,
+};
 use pyo3::prelude::*;
 
 use crate::arrays::{array, samples};
@@ -16,7 +18,8 @@ use crate::stage::{PyStage, hold};
 use crate::tracking::{Arrays, PyTrackingRun, Sampling, stopped};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<PyVirtualStage>()
+    module.add_class::<PyVirtualStage>()?;
+    module.add_class::<PyVirtualRun>()
 }
 
 /// Bandwidth, slew rate, lowest and highest output.
@@ -144,5 +147,30 @@ impl PyVirtualStage {
         let visited = samples("visited", visited)?;
         let input = Arrays::new(reference, feedforward)?;
         enter(py, |stop| input.run(&self.0, &visited, controller, sampling, stop))
+    }
+}
+
+/// A virtual stage that goes on from command to command.
+#[pyclass(name = "VirtualRun", module = "piezotrack._core")]
+struct PyVirtualRun(VirtualRun);
+
+#[pymethods]
+impl PyVirtualRun {
+    #[new]
+    fn new(stage: &PyVirtualStage) -> Self {
+        Self(VirtualRun::new(stage.0))
+    }
+
+    /// Moves on through as many intervals as commands: true displacement, reading of the sensor
+    /// and applied voltage at the end of each, where its command goes out.
+    fn advance<'py>(
+        &mut self,
+        py: Python<'py>,
+        u: &Bound<'py, PyAny>,
+        dt: f64,
+    ) -> PyResult<OpenLoopArrays<'py>> {
+        let u = samples("u", u)?;
+        let run = enter(py, |stop| stopped(self.0.advance(&u, dt, stop)?))?;
+        open_loop_arrays(py, &run)
     }
 }

@@ -13,6 +13,7 @@ mod sensor_delay;
 mod timing;
 mod tracking;
 mod two_axes;
+mod virtual_run;
 mod virtual_stage;
 
 pub use amplifier::{Amplifier, AmplifierFlow};
@@ -25,6 +26,7 @@ pub use tracking::{DELAY_LINE, Law, LawState, MOST_STATES, ReferenceSamples, Tra
 pub use two_axes::{
     TwoAxes, TwoLogs, TwoMotions, TwoStates, TwoTracked, closed_loops, open_loops, track_both,
 };
+pub use virtual_run::VirtualRun;
 pub use virtual_stage::{Preconditioning, VirtualStage};
 
 pub(crate) use timing::{Delay, SAME};

@@ -1,0 +1,12 @@
+# The public names and their homes, each written once: type checkers read them here, and
+# _support/lazy.py does at run time. One name a line, as `ruff format` keeps it.
+from .addresses import connect as connect
+from .device import Device as Device
+from .device import Exchanging as Exchanging
+from .device import Rates as Rates
+from .device import Record as Record
+from .drives import Drive as Drive
+from .drives import decaying as decaying
+from .drives import parse_drive as parse_drive
+from .measure import measure as measure
+from .virtual import VirtualDevice as VirtualDevice

@@ -1,0 +1,187 @@
+"""A virtual stage behind a device: what is written for hardware runs on it."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import _core
+from .._support.arguments import finite, not_negative
+from .._support.arrays import signal_of
+from ..errors import DeviceError, ParameterError
+from ..identification.identified import load
+from ..stages.virtual import VirtualStage
+from .device import Rates, Record
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+__all__ = ["VirtualDevice"]
+
+RATES = Rates(lowest=0.1, highest=100e3)
+MEMORY = 10_000_000
+# Shortest time between two exchanges that is simulated [s].
+INSTANT = 1e-6
+
+
+class VirtualDevice:
+    """A virtual stage as a device: it remembers, from table to table, where it has been.
+
+    Parameters
+    ----------
+    stage : VirtualStage
+        The stage between its amplifier and its sensor.
+    limits : (float, float), optional
+        Lowest and highest voltage [V]; default those of the amplifier.
+    rates : Rates, optional
+        Sampling rates; default 0.1 Hz to 100 kHz.
+    memory : int, optional
+        Longest table [samples].
+    clock : callable, optional
+        Time [s] for `exchange`, default that of the computer: the stage moves on in real time.
+
+    Raises
+    ------
+    ParameterError
+        `limits` is not given, and the amplifier has none.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> device = pt.hardware.VirtualDevice(pt.VirtualStage.xu_li_2010(seed=1))
+    >>> log = pt.measure(device, "decaying:1Hz,0..75V", rate=1000.0)
+    >>> log
+    Dataset(12000 samples, 12 s at 1000 Hz, stroke 118 um, warm-up 500 samples)
+    """
+
+    def __init__(
+        self,
+        stage: VirtualStage,
+        *,
+        limits: tuple[float, float] | None = None,
+        rates: Rates = RATES,
+        memory: int = MEMORY,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        if not isinstance(stage, VirtualStage):
+            raise ParameterError(
+                f"stage is {type(stage).__name__}: expected pt.VirtualStage, as VirtualStage.of "
+                "makes one of any model"
+            )
+        low, high = stage.amplifier.limits if limits is None else limits
+        self._limits = finite("limits", low, "V"), finite("limits", high, "V")
+        self._rates, self._memory = rates, _core.as_count("memory", memory)
+        self._clock = clock
+        self._run = _core.VirtualRun(stage._core)
+        self._at, self._held, self._open = clock(), 0.0, True
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Lowest and highest voltage [V]."""
+        return self._limits
+
+    @property
+    def rates(self) -> Rates:
+        """Sampling rates."""
+        return self._rates
+
+    @property
+    def memory(self) -> int:
+        """Longest table [samples]."""
+        return self._memory
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of output and input."""
+        return ("virtual amplifier", "virtual sensor")
+
+    @property
+    def held(self) -> float:
+        """Voltage at the output [V]."""
+        return self._held
+
+    def play(self, volts: Array, rate: float, *, lead_in: float = 0.0) -> Record:
+        """Play a table and record; as `Device.play`. It takes no time.
+
+        Parameters
+        ----------
+        volts : ndarray, shape (n,)
+            Table [V].
+        rate : float
+            Sampling rate [Hz].
+        lead_in : float, optional
+            How long the first voltage is held before [s].
+
+        Returns
+        -------
+        Record
+            Of n samples.
+
+        Raises
+        ------
+        DeviceError
+            A voltage is beyond the limits, or the table is longer than the memory.
+        """
+        table = signal_of("volts", volts)
+        if table.size > self._memory:
+            raise DeviceError(
+                f"the table has {table.size} samples: the memory holds {self._memory}"
+            )
+        self._check(table)
+        obtained = self._rates.nearest(rate)
+        before = np.full(round(not_negative("lead_in", lead_in, "s") * obtained), table[0])
+        _, y, _ = self._run.advance(np.concatenate([before, table]), 1.0 / obtained)
+        self._at, self._held = self._clock(), float(table[-1])
+        return Record(
+            volts=table, displacement=y[before.size :], rate=obtained, channels=self.channels
+        )
+
+    def exchange(self, volts: float) -> float:
+        """Read the displacement [m] now, and put out a voltage [V]; as `Exchanging.exchange`."""
+        self._check(np.array([finite("volts", volts, "V")]))
+        now = self._clock()
+        _, y, _ = self._run.advance([volts], max(now - self._at, INSTANT))
+        self._at, self._held = now, float(volts)
+        return float(y[0])
+
+    def hold(self, volts: float) -> None:
+        """Put out a constant voltage [V] from now on."""
+        self.exchange(volts)
+
+    def close(self) -> None:
+        """Close it; what is asked of it afterwards is refused."""
+        self._open = False
+
+    def _check(self, volts: Array) -> None:
+        if not self._open:
+            raise DeviceError("the virtual device is closed")
+        low, high = self._limits
+        beyond = np.flatnonzero((volts < low) | (volts > high))
+        if beyond.size:
+            k = int(beyond[0])
+            raise DeviceError(
+                f"volts is {volts[k]:g} V at sample {k}: the device puts out {low:g} to {high:g} V"
+            )
+
+
+def from_address(
+    host: str | None, port: int | None, path: str, options: Mapping[str, str]
+) -> VirtualDevice:
+    """Make the virtual stage of an address: ``virtual:`` or ``virtual:MODEL.json``."""
+    if host or port or options:
+        raise ParameterError("device is a virtual stage: expected virtual: or virtual:MODEL.json")
+    if not path:
+        return VirtualDevice(VirtualStage.xu_li_2010())
+    known = load(path)
+    if known.drive_unit != "V":
+        raise ParameterError(
+            f"device {path}: its drive is in {known.drive_unit}: expected a stage that a voltage "
+            "drives"
+        )
+    return VirtualDevice(VirtualStage.of(known), limits=known.drive_range)
