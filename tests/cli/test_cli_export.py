@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import piezotrack as pt
-from c_exports import checked, compiled, needs_gcc
+from c_exports import checked, compiled, needs_gcc, needs_linux
 from commands import names, ran, refusal
 
 PI = pt.Pid.from_um(kp=0.05, ti=0.02)
@@ -59,7 +59,7 @@ def test_a_feedforward_is_played_from_a_table() -> None:
     assert len(document["feedforward_table_V"]) == 100
 
 
-@needs_gcc
+@needs_linux
 def test_a_unit_is_written() -> None:
     save()
     said = ran("export", "loop.json", "--to", "fmu", "--quiet")

@@ -52,9 +52,9 @@ def test_what_is_written_is_a_loop_that_keeps_the_margins_and_the_error() -> Non
     options = ("--noise-nm", "30", "--seed", "3", "--delay", "0.002", "--parts", "pid,low-pass")
     printed = ran("tune", "dahl.json", *COURSE, "--dt", "0.02", *options)
     assert names("results") == ["controller.json", "tuned.png", "tuned.svg", "tuning.json"]
-    kept = pt.load_controller("results/controller.json")
-    assert kept.provenance is not None
-    assert [one["name"] for one in kept.provenance["design"]["kept"]]
+    loaded = pt.load_controller("results/controller.json")
+    assert loaded.provenance is not None
+    assert [one["name"] for one in loaded.provenance["design"]["kept"]]
     document = report()
     assert document["format"] == "piezotrack-tuning"
     assert [one["kind"] for one in document["filters"]] == ["LowPass"]

@@ -214,8 +214,8 @@ def renamed(part: str, old: str, new: str) -> Callable[[dict[str, Any]], object]
 REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     "unit": (renamed("feedback", "kp_V_per_m", "kp_V_per_um"),
              "feedback: 'kp_V_per_um' is 33333.33333333333: expected 'kp_V_per_m'"),
-    "key": (lambda d: d.update(gain=3), "the file: 'gain' is 3: expected"),
-    "missing": (lambda d: d.pop("span_m"), "the file: 'span_m' is missing"),
+    "key": (lambda d: d.update(gain=3), "loop.json: 'gain' is 3: expected"),
+    "missing": (lambda d: d.pop("span_m"), "loop.json: 'span_m' is missing"),
     "version": (lambda d: d.update(schema_version=2), "schema_version is 2: expected 1"),
     "no version": (lambda d: d.update(schema_version=True), "schema_version is True: expected 1"),
     "format": (lambda d: d.update(format="piezotrack-model"), "is not a piezotrack controller"),

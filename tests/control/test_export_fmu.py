@@ -13,12 +13,12 @@ from fmpy.fmi2 import FMU2Slave
 from fmpy.validation import validate_fmu
 
 import piezotrack as pt
-from c_exports import loop, needs_gcc
+from c_exports import loop, needs_linux
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-pytestmark = needs_gcc
+pytestmark = needs_linux
 DT = 0.02
 
 
@@ -146,5 +146,12 @@ def test_without_a_compiler_it_is_refused(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)
     with pytest.raises(pt.ParameterError, match="no C compiler was found"):
+        unit_of(loop("PID"), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_on_another_machine_it_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("platform.machine", lambda: "aarch64")
+    with pytest.raises(pt.ParameterError, match="not compiled on Linux, aarch64: expected to="):
         unit_of(loop("PID"), tmp_path / "out")
     assert not (tmp_path / "out").exists()

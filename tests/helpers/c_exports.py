@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+import platform
 import shutil
 import subprocess
 from dataclasses import replace
@@ -16,8 +18,17 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 GCC, GXX = shutil.which("gcc"), shutil.which("g++")
-needs_gcc = pytest.mark.skipif(GCC is None, reason="no C compiler: gcc is not installed")
-needs_gxx = pytest.mark.skipif(GXX is None, reason="no C++ compiler: g++ is not installed")
+needs_gcc = pytest.mark.skipif(
+    GCC is None or os.name == "nt", reason="no C compiler: gcc is not installed, or Windows"
+)
+needs_gxx = pytest.mark.skipif(
+    GXX is None or os.name == "nt", reason="no C++ compiler: g++ is not installed, or Windows"
+)
+# Units have a binary for this one.
+needs_linux = pytest.mark.skipif(
+    GCC is None or (platform.system(), platform.machine()) != ("Linux", "x86_64"),
+    reason="units are compiled by gcc on Linux, x86-64",
+)
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-ffp-contract=off")
 
 PI = pt.Pid.from_um(kp=0.05, ti=0.02)

@@ -140,7 +140,7 @@ def _controller_of(document: dict[str, Any]) -> Controller:
     own = ("dt_s", f"limits_{drive}", "span_m", "max_jump_m")
     parts = ("feedforward", "feedback", "repetitive", "filters")
     keys = ("format", "schema_version", "drive_unit", *own, *parts, "provenance")
-    only("the file", document, keys)
+    only("", document, keys)
     dt, limits, span, jump = (document[key] for key in own)
     filters = document["filters"]
     if not isinstance(filters, list):

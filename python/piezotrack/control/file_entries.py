@@ -218,7 +218,7 @@ def only(place: str, entry: Mapping[str, Any], keys: Iterable[str]) -> None:
     Parameters
     ----------
     place : str
-        Where the entry is, for messages.
+        Where the entry is, for messages; empty for the file itself.
     entry : mapping
         What the file has there.
     keys : iterable of str
@@ -229,14 +229,14 @@ def only(place: str, entry: Mapping[str, Any], keys: Iterable[str]) -> None:
     ParameterError
         There is another, or one is not there.
     """
-    known = list(keys)
+    known, before = list(keys), f"{place}: " if place else ""
     missing = [key for key in known if key not in entry]
     for key, value in entry.items():
         if key not in known:
             expected = ", ".join(map(repr, missing or known))
-            raise ParameterError(f"{place}: {quoted(key)} is {quoted(value)}: expected {expected}")
+            raise ParameterError(f"{before}{quoted(key)} is {quoted(value)}: expected {expected}")
     if missing:
-        raise ParameterError(f"{place}: {missing[0]!r} is missing: expected all of {known}")
+        raise ParameterError(f"{before}{missing[0]!r} is missing: expected all of {known}")
 
 
 def _read(place: str, one: Setting, value: Any, drive: str) -> Any:

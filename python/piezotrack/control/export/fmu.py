@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import os
+import platform
 import shutil
 import subprocess
 import tempfile
@@ -73,8 +74,14 @@ def compiler() -> str:
     Raises
     ------
     ParameterError
-        There is none.
+        There is none, or it would not compile for Linux on x86-64.
     """
+    system, machine = platform.system(), platform.machine()
+    if (system, machine) != ("Linux", "x86_64"):
+        raise ParameterError(
+            f"a unit has a binary for Linux, x86-64, which is not compiled on {system}, {machine}: "
+            "expected to='c99', whose sources every machine compiles"
+        )
     for name in (os.environ.get("CC", ""), "gcc", "cc", "clang"):
         if name and (found := shutil.which(name)):
             return found

@@ -111,8 +111,8 @@ def export_controller(
     Raises
     ------
     ParameterError
-        A part of the controller has no such form; the message names it. There is no C compiler
-        for a unit.
+        A part of the controller has no such form; the message names it. A unit is asked for
+        where there is no C compiler, or not on Linux, x86-64.
     DataError
         A file cannot be written.
 
