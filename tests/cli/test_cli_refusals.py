@@ -223,6 +223,7 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "export loop.json --reference sine:1Hz,0..9um": ("loop.json: reference is given", "no feedf"),
     "export loop.json --reference gone.csv": ("gone.csv: there is no such file",),
     "export loop.json --to json --float": ("--float", "expected it left out"),
+    "export loop.json --period 2": ("--period has no effect without --reference",),
     "export gone.json": ("gone.json: no such file",),
     "export log.csv": ("log.csv:1: not JSON",),
     "export dahl.json": ("dahl.json is not a piezotrack controller",),

@@ -304,6 +304,21 @@ NO_FORM: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
     ),
     "plays": ({"feedforward": PLAYS.inverse()}, {}, "feedforward is the inverse of a Prandtl"),
     "reference": ({}, {"reference": SINE}, "the controller has no feedforward"),
+    "period": (
+        {"feedforward": PLAYS.inverse()},
+        {"reference": pt.sine(frequency=0.3, low=0.0, high=5e-5, duration=4.0)},
+        "has a period of 3.33333 s: expected a whole number of samples of 0.02 s",
+    ),
+    "repetitive": (
+        {"feedforward": PLAYS.inverse(), "repetitive": PARTS["repetitive"]["repetitive"]},
+        {"reference": SINE},
+        "repetitive has a period of 5 s: expected that of the reference",
+    ),
+    "multisine": (
+        {"feedforward": PLAYS.inverse()},
+        {"reference": pt.multisine(frequencies=[0.5, 1.3], low=0.0, high=5e-5, duration=4.0)},
+        "does not repeat: expected one that does",
+    ),
     "name": ({}, {"name": "1axis"}, "name is '1axis': expected a letter"),
     "name inside": ({}, {"name": "pid"}, "name is 'pid', as functions inside"),
     "form": ({}, {"to": "cobol"}, "to is 'cobol': expected one of 'c99', 'json', 'fmu'"),

@@ -9,7 +9,16 @@ import typer
 
 from ..errors import ParameterError
 from .error_messages import in_words
-from .options import Duration, Json, Out, Overwrite, Period, Quiet, of_file
+from .options import (
+    Duration,
+    Json,
+    Out,
+    Overwrite,
+    Period,
+    Quiet,
+    of_file,
+    refuse_without_effect,
+)
 from .output import Output
 from .track import parsed_reference
 
@@ -21,6 +30,7 @@ __all__ = ["export_command"]
 
 @in_words
 def export_command(
+    context: typer.Context,
     controller: Annotated[
         Path, typer.Argument(metavar="CONTROLLER", help="Controller file in JSON.")
     ],
@@ -71,6 +81,8 @@ def export_command(
         raise ParameterError(f"{error}; --name gives one") from None
     if single and to == "json":
         raise ParameterError("--float has no effect with --to json: expected it left out")
+    if reference is None:
+        refuse_without_effect(context, ("duration", "period"), "without --reference")
     known = load_controller(controller)
     motion = None if reference is None else parsed_reference(reference, duration, period)
     result.will_write(names)

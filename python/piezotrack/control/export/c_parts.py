@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..._support.units import of_drive
 from ...errors import ParameterError
+from ..checks import check_period
 from ..components import Pid, StateSpace
 from ..hysteresis_observer import HysteresisObserver
 from ..laws import DisturbanceObserver, LeadLag, PerturbationEstimator, SlidingMode
@@ -54,7 +55,8 @@ def feedforward_table(controller: Controller, reference: Reference | None) -> li
     Raises
     ------
     ParameterError
-        The controller has no feedforward, or the reference has no whole period.
+        The controller has no feedforward, the reference has no whole period, or not that of the
+        repetitive part.
     """
     if reference is None:
         return None
@@ -62,6 +64,17 @@ def feedforward_table(controller: Controller, reference: Reference | None) -> li
         raise ParameterError(
             "reference is given, but the controller has no feedforward: expected none"
         )
+    if reference.period is None:
+        raise ParameterError(
+            f"reference ({reference.name}) does not repeat: expected one that does, for its table"
+        )
+    samples = reference.period / controller.dt
+    if abs(samples - round(samples)) > 1e-6:
+        raise ParameterError(
+            f"reference ({reference.name}) has a period of {reference.period:g} s: expected a "
+            f"whole number of samples of {controller.dt:g} s, for its table"
+        )
+    check_period(controller, reference)
     table = controller.feedforward.table(reference, controller.dt, limits=controller.limits)
     return [float(one) for one in table]
 
