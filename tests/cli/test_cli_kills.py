@@ -73,7 +73,7 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     Path("log.csv").write_text(log_text(), encoding="utf-8")
     for seed in (1, 2):
         feedback = pt.Pid.from_um(kp=0.05 * seed, ti=0.02)
-        pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=feedback).save(f"{seed}.json")
+        pt.Controller(dt=0.02, limits=(0.0, 75.0 * seed), feedback=feedback).save(f"{seed}.json")
 
 
 def start(work: list[str], out: str, seed: int, *, slowly: bool = False) -> subprocess.Popen[bytes]:
