@@ -71,6 +71,50 @@ def test_floats_stay_within_the_bound_that_is_stated(name: str, tmp_path: Path) 
     assert figures["state"] == done.state_bytes
 
 
+CLOSED = """
+#include <stdio.h>
+#include "axis.h"
+#include "single.h"
+/* Both around the same lag of 1.5 um/V, along a triangle of 10 to 60 um. */
+int main(void)
+{
+    static axis_state s;
+    static single_state f;
+    double x = 0, y = 0, largest = 0;
+    long k;
+    axis_init(&s);
+    single_init(&f);
+    for (k = 0; k < 20000; k++) {
+        const double turn = (double)(k % 500) / 250.0;
+        const double r = 10e-6 + 50e-6 * (turn < 1.0 ? turn : 2.0 - turn);
+        const double one = axis_step(&s, r, x, 0.0);
+        const double other = (double)single_step(&f, (float)r, (float)y, 0.0f);
+        const double d = one > other ? one - other : other - one;
+        x += 0.3 * (1.5e-6 * one - x);
+        y += 0.3 * (1.5e-6 * other - y);
+        largest = d > largest ? d : largest;
+    }
+    printf("largest %.3g\\n", largest);
+    return 0;
+}
+"""
+
+
+@needs_gcc
+@pytest.mark.parametrize(
+    "name", [one for one in PARTS if "observer" in one or one in ("perturbation", "repetitive")]
+)
+def test_in_a_closed_loop_floats_add_up_nothing(name: str, tmp_path: Path) -> None:
+    """20 000 steps: ten times as many as the vectors, and no more than the bound of 2000."""
+    for which, single in (("axis", False), ("single", True)):
+        export(loop(name), tmp_path, name=which, single=single)
+    (tmp_path / "closed.c").write_text(CLOSED)
+    compiled(tmp_path, "closed.c", "axis.c", "single.c")
+    code, figures = checked(tmp_path)
+    assert code == 0
+    assert figures["largest"] < 1.5e-3
+
+
 @needs_gcc
 @pytest.mark.parametrize("inverse", [PLAYS.inverse(), DAHL.inverse()], ids=["plays", "Dahl"])
 def test_a_table_is_played(inverse: pt.Inverse, tmp_path: Path) -> None:
@@ -183,11 +227,13 @@ def test_a_bumpless_start_is_that_of_rust(tmp_path: Path) -> None:
         one = loop(name)
         export(one, tmp_path, name="axis")
         program = """#include <stdio.h>
+        #include <stdlib.h>
         #include "axis.h"
         int main(void) {
             axis_state s;
             int k;
             if (axis_start(&s, -1.0) || !axis_start(&s, 33.0)) return 1;
+            if (axis_applied(&s, strtod("nan", 0))) return 1;
             for (k = 0; k < 20; k++) printf("%a ", axis_step(&s, 5e-5, 4e-5 + 1e-7 * k, 1.0));
             return 0;
         }"""
