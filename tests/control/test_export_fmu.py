@@ -109,6 +109,24 @@ def slave(path: Path) -> tuple[Any, dict[str, int]]:
     return unit, {one.name: one.valueReference for one in description.modelVariables}
 
 
+def test_a_table_needs_no_third_input(tmp_path: Path) -> None:
+    plays = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(5.0,), weights=(5e-7,))
+    one = pt.Controller(dt=DT, limits=(0.0, 75.0), feedforward=plays.inverse())
+    motion = pt.sine(frequency=0.5, low=5e-6, high=40e-6, duration=4.0)
+    path = unit_of(one, tmp_path, reference=motion)
+    assert validate_fmu(str(path)) == []
+    unit, variables = slave(path)
+    assert sorted(variables)[0] == "applied"
+    assert not {"feedforward", "next"} & set(variables)
+    played = []
+    for k in range(150):
+        unit.doStep(k * DT, DT)
+        played += unit.getReal([variables["command"]])
+    table = plays.inverse().table(motion, DT)
+    assert played == [*table, *table[:50]]
+    unit.freeInstance()
+
+
 def test_a_simulator_runs_it(tmp_path: Path) -> None:
     one = loop("repetitive")
     path = unit_of(one, tmp_path)

@@ -11,7 +11,7 @@ from ..components import Pid, StateSpace
 from ..hysteresis_observer import HysteresisObserver
 from ..laws import DisturbanceObserver, LeadLag, PerturbationEstimator, SlidingMode
 from ..neural_network import NetworkInverse
-from . import c_dahl, c_inverse, c_laws, c_loop
+from . import c_dahl, c_input, c_inverse, c_laws, c_loop
 from .c_repetitive import repetitive
 
 if TYPE_CHECKING:
@@ -175,9 +175,9 @@ def parts_of(
         unit = "N"
     shape = shape_of(controller, table)
     low, high = numbers["span"]
-    parts = [c_loop.readings(low, high, controller.max_jump)]
+    parts = [c_input.readings(low, high, controller.max_jump)]
     if shape.filtered:
-        parts.append(c_loop.filters(numbers["filters"]))
+        parts.append(c_input.filters(numbers["filters"]))
     if shape.law:
         parts += [c_loop.sample(shape), *_laws(numbers, unit)]
     if shape.repeats:
@@ -193,7 +193,7 @@ def parts_of(
         parts.append(c_inverse.dahl_inverse(own, *settings, unit, single=single))
     parts.append(c_loop.loop(controller.limits, unit, shape))
     others = "".join(one.code for one in parts)
-    return c_loop.helpers(controller.limits, unit, others, single=single), *parts
+    return c_input.helpers(controller.limits, unit, others, single=single), *parts
 
 
 def _laws(numbers: Numbers, unit: str) -> list[Part]:

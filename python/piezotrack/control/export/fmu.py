@@ -30,41 +30,41 @@ FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC",
 # As of all archives that are to be the same for the same controller.
 LONG_AGO = (1980, 1, 1, 0, 0, 0)
 LONGEST_COMPILATION = 120.0
+# Value references from here on are truth values.
+FLAGS_FROM = 10
 
 
 class Variable(NamedTuple):
-    """A variable of the unit; value references count from 0."""
+    """A variable of the unit, with its value reference."""
 
+    number: int
     name: str
-    kind: str
     causality: str
     unit: str
     text: str
 
 
 def variables(forward: str, unit: str) -> list[Variable]:
-    """List the variables, in the order of their value references."""
-    inputs = [
-        Variable("reference", "Real", "input", "m", "Desired displacement"),
-        Variable("measured", "Real", "input", "m", "Measured displacement"),
-    ]
+    """List the variables; fmu_source has the same value references."""
+    third = []
     if forward in FORWARD_INPUT:
         name, text = FORWARD_INPUT[forward]
-        inputs.append(Variable(name, "Real", "input", unit if forward == "given" else "m", text))
-    else:
-        inputs.append(Variable("unused", "Real", "input", "m", "Has no effect"))
+        third = [Variable(2, name, "input", unit if forward == "given" else "m", text)]
+    report = "What the amplifier gave; 1e300 for no report"
     return [
-        *inputs,
-        Variable("applied", "Real", "input", unit, "What the amplifier gave; 1e300 for no report"),
-        Variable("command", "Real", "output", unit, "Command, within the limits"),
-        Variable("unclipped", "Real", "output", unit, "The same before it was clipped"),
-        Variable("feedforward_part", "Real", "output", unit, "Feedforward part"),
-        Variable("feedback_part", "Real", "output", unit, "Feedback part"),
-        Variable("repetitive_part", "Real", "output", unit, "Repetitive part"),
-        Variable("error", "Real", "output", "m", "Tracking error"),
-        Variable("saturated", "Boolean", "output", "", "Whether it was clipped"),
-        Variable("measurement_ok", "Boolean", "output", "", "Whether there was a measurement"),
-        Variable("reference_ok", "Boolean", "output", "", "Whether there was a reference"),
+        Variable(0, "reference", "input", "m", "Desired displacement"),
+        Variable(1, "measured", "input", "m", "Measured displacement"),
+        *third,
+        Variable(3, "applied", "input", unit, report),
+        Variable(4, "command", "output", unit, "Command, within the limits"),
+        Variable(5, "unclipped", "output", unit, "The same before it was clipped"),
+        Variable(6, "feedforward_part", "output", unit, "Feedforward part"),
+        Variable(7, "feedback_part", "output", unit, "Feedback part"),
+        Variable(8, "repetitive_part", "output", unit, "Repetitive part"),
+        Variable(9, "error", "output", "m", "Tracking error"),
+        Variable(FLAGS_FROM, "saturated", "output", "", "Whether it was clipped"),
+        Variable(FLAGS_FROM + 1, "measurement_ok", "output", "", "Whether there was a measurement"),
+        Variable(FLAGS_FROM + 2, "reference_ok", "output", "", "Whether there was a reference"),
     ]
 
 
@@ -161,7 +161,7 @@ def _description(controller: Controller, sources: Sources, digest: str, unit: st
     listed = variables(sources.forward, unit)
     outputs = [i for i, one in enumerate(listed, start=1) if one.causality == "output"]
     unknowns = "\n".join(f'      <Unknown index="{i}" dependencies=""/>' for i in outputs)
-    scalars = "\n".join(_scalar(i, one) for i, one in enumerate(listed))
+    scalars = "\n".join(_scalar(one) for one in listed)
     units = "\n".join(f'    <Unit name="{one}"/>' for one in sorted({"m", unit}))
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName={quoteattr(sources.name)}
@@ -194,14 +194,15 @@ def _description(controller: Controller, sources: Sources, digest: str, unit: st
 """
 
 
-def _scalar(reference: int, one: Variable) -> str:
+def _scalar(one: Variable) -> str:
+    kind = "Boolean" if one.number >= FLAGS_FROM else "Real"
     unit = f" unit={quoteattr(one.unit)}" if one.unit else ""
     start = ""
     if one.causality == "input":
         start = ' start="1e300"' if one.name == "applied" else ' start="0"'
     return (
         f"    <ScalarVariable name={quoteattr(one.name)} "
-        f'valueReference="{reference}" causality="{one.causality}" variability="discrete" '
-        f"description={quoteattr(one.text)}>\n      <{one.kind}{unit}{start}/>\n"
+        f'valueReference="{one.number}" causality="{one.causality}" variability="discrete" '
+        f"description={quoteattr(one.text)}>\n      <{kind}{unit}{start}/>\n"
         "    </ScalarVariable>"
     )
