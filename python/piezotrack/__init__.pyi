@@ -16,6 +16,7 @@ from .control.components import Pid as Pid
 from .control.components import Repetitive as Repetitive
 from .control.contouring import contour as contour
 from .control.controller import Controller as Controller
+from .control.controller_file import load_controller as load_controller
 from .control.learning import learn as learn
 from .control.linear_systems import to_control as to_control
 from .control.on_device.playing import play as play
