@@ -127,7 +127,7 @@ def array_answer(
         "# TYPE=1",
         "# SEPARATOR=32",
         f"# DIM={len(columns)}",
-        f"# SAMPLE_TIME={interval:.9g}",
+        f"# SAMPLE_TIME={interval:.9f}",
         f"# NDATA={columns[0].size}",
         "#",
         *titles,

@@ -88,7 +88,7 @@ class GcsServer:
         if port > 65535:
             raise ParameterError(f"port is {port}: expected 0 to 65535")
         speed = positive("speed", speed, "times real time")
-        self._host = host
+        self._host, self._limits = host, within
         controller = VirtualController(stage, within, speed=speed)
         try:
             self._server = _Server((host, port), controller)
@@ -101,6 +101,11 @@ class GcsServer:
             target=self._server.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True
         )
         self._thread.start()
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Lowest and highest voltage [V]."""
+        return self._limits
 
     @property
     def port(self) -> int:
