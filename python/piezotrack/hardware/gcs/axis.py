@@ -32,6 +32,8 @@ UM = 1e6
 SERVO_STEP, BANDWIDTH = 20, 30.0
 # Share of the travel within which a target is reached.
 ON_TARGET = 0.005
+# Decimals of the travel [um], so that its ends are in it as they are written.
+DIGITS = 3
 # Longest time after a change that is simulated [cycles]: what still creeps after a minute creeps no
 # further. With the servo on, which settles in a fraction of a second, less.
 LONGEST_REST, LONGEST_SERVO = round(60.0 * CLOCK), round(2.0 * CLOCK)
@@ -67,7 +69,7 @@ class VirtualAxis:
         self.limits = limits
         # Where the stage comes to rest at the limits [um].
         ends = [UM * _rest(stage, volts) for volts in limits]
-        self.travel = min(ends), max(ends)
+        self.travel = round(min(ends), DIGITS), round(max(ends), DIGITS)
         self._slope = (ends[1] - ends[0]) / (high - low)
         if not (math.isfinite(self._slope) and self._slope):
             raise ParameterError(

@@ -65,6 +65,7 @@ __all__ = ["VirtualController"]
 NAME = "(c) piezotrack, VIRTUAL-GCS, 0, 1.0.0"
 # Sizes of the memories, and the slowest rate of a table [servo cycles].
 WAVES, POINTS, TABLES, SLOWEST = 8, 262_144, 4, 10_000
+MOST_CYCLES = 2**31 - 1
 # Bits of the mode of WGO: start now; start from where the stage is.
 START, FROM_HERE = 0x1, 0x100
 
@@ -306,9 +307,7 @@ class VirtualController:
     def _set_cycles(self, words: Sequence[str]) -> None:
         for generator, cycles in pairs_of(words):
             channel_of(generator)
-            if whole_of(cycles) < 0:
-                raise Refusal(17)
-            self._cycles = whole_of(cycles)
+            self._cycles = numbered(cycles, MOST_CYCLES) if whole_of(cycles) else 0
 
     def _set_rate(self, words: Sequence[str]) -> None:
         self._still()

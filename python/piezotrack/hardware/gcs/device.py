@@ -29,7 +29,7 @@ __all__ = ["GcsDevice", "from_address"]
 PORT = 50000
 NEEDED = ("POS?", "SVO", "SVA", "WAV", "WSL", "WGC", "WTR", "WGO", "DRC", "RTR", "DRL?", "DRR?")
 # Metres in the units of positions that PUN? answers with.
-UNITS = {"UM": 1e-6, "MICRON": 1e-6, "\u00b5M": 1e-6, "\u03bcM": 1e-6, "NM": 1e-9, "MM": 1e-3}
+UNITS = {"um": 1e-6, "micron": 1e-6, "\u03bcm": 1e-6, "nm": 1e-9, "mm": 1e-3}
 # Longest command [characters], and commands after which errors are asked for.
 LINE, TOGETHER = 240, 50
 # Slowest rate of a table [servo cycles].
@@ -362,10 +362,10 @@ class GcsDevice:
     def _metres(self) -> float:
         """Return the unit of positions [m]."""
         if "PUN?" not in self._known:
-            return UNITS["UM"]
+            return UNITS["um"]
         query = f"PUN? {self._axis}"
         lines = self._line.ask(query)
-        unit = lines[0].partition("=")[2].strip().upper()
+        unit = lines[0].partition("=")[2].strip().casefold()
         if unit not in UNITS:
             raise self._line.unexpected(query, lines[:3], "um, nm or mm")
         return UNITS[unit]

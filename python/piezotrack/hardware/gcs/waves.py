@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["WaveTables"]
 
+# More points than any memory has, so that none is asked for them.
+LARGEST = 10_000_000
 APPENDS = ("X", "&", "+")
 
 
@@ -51,18 +53,25 @@ class WaveTables:
         if make is None:
             raise Refusal(1)
         old = np.empty(0) if append == "X" else self[number]
-        segment = make(rest, old.size if append == "&" else 0)
+        with np.errstate(over="ignore", invalid="ignore"):
+            table = self._with(append, old, make(rest, old.size if append == "&" else 0))
+        if not np.all(np.isfinite(table)):
+            raise Refusal(17)
+        others = sum(one.size for key, one in self._tables.items() if key != number)
+        if others + table.size > self.points:
+            raise Refusal(67)
+        self._tables[number] = table
+
+    @staticmethod
+    def _with(append: str, old: Array, segment: Array) -> Array:
+        """Return a table with another segment: behind it, or added to its points."""
         if append == "+":
             if segment.size > old.size:
                 raise Refusal(17)
             table = old.copy()
             table[: segment.size] += segment
-        else:
-            table = np.concatenate([old, segment])
-        others = sum(one.size for key, one in self._tables.items() if key != number)
-        if others + table.size > self.points:
-            raise Refusal(67)
-        self._tables[number] = table
+            return table
+        return np.concatenate([old, segment])
 
 
 def _points(words: Sequence[str], old: int) -> Array:
@@ -85,6 +94,8 @@ def _placed(words: Sequence[str], extra: int) -> tuple[int, float, float, int, i
     segment, length, start = (whole_of(words[k]) for k in (0, 3, 4))
     rest = [whole_of(word) for word in words[5:]]
     amplitude, offset = number_of(words[1]), number_of(words[2])
+    if segment > LARGEST:
+        raise Refusal(67)
     if segment < 1 or length < 1 or start < 0 or start + length > segment or min(rest) < 0:
         raise Refusal(17)
     return segment, amplitude, offset, length, start, rest
