@@ -126,7 +126,7 @@ class VirtualController:
             With the code for ERR?.
         """
         # One of the bytes is what else separates words.
-        words = [line] if len(line) == 1 else line.split()
+        words = [line] if line == GENERATOR else line.split()
         if not words:
             return None
         name, rest = words[0].upper(), words[1:]
