@@ -14,7 +14,7 @@ import pytest
 import piezotrack as pt
 from commands import COMMAND, refusal, write_model
 from gcs_peers import quiet_stage
-from piezotrack.hardware.gcs import GcsServer
+from piezotrack.hardware import GcsServer
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -9,7 +9,7 @@ import pytest
 
 import piezotrack as pt
 from gcs_peers import LIMITS, quiet_stage
-from piezotrack.hardware.gcs import GcsDevice, GcsServer
+from piezotrack.hardware import GcsDevice, GcsServer
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -393,6 +393,16 @@ def test_a_stage_that_rests_is_not_simulated_for_ever(bench: Bench) -> None:
     assert bench.value("POS? 1") == pytest.approx(40.0, abs=0.02)
 
 
+def test_a_wave_that_the_computer_cannot_keep_up_with_goes_slower(bench: Bench) -> None:
+    bench.points(1, np.arange(10.0))
+    bench("WSL 1 1", "WGC 1 0", "WTR 1 100 0", "RTR 1000", "WGO 1 1")
+    bench.wait(1e6)
+    # Two minutes have been simulated, and are recorded in steps of 50 ms.
+    assert bench.value("DRL? 1") == pytest.approx(120.0 / 0.05, abs=1)
+    bench.wait(1.0)
+    assert bench.value("DRL? 1") == pytest.approx(121.0 / 0.05, abs=1)
+
+
 def test_a_stage_whose_motion_its_sensor_does_not_see_is_refused() -> None:
     still = pt.VirtualStage.of(quiet_stage().stage, resolution=1e-3)
     with pytest.raises(pt.ParameterError, match="expected one that moves"):

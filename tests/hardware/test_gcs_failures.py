@@ -12,7 +12,7 @@ import pytest
 
 import piezotrack as pt
 from gcs_peers import GREETING, greeted, peer, quiet_stage
-from piezotrack.hardware.gcs import GcsDevice, GcsServer
+from piezotrack.hardware import GcsDevice, GcsServer
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -16,7 +16,7 @@ import pytest
 
 import piezotrack as pt
 from gcs_peers import LIMITS, quiet_stage
-from piezotrack.hardware.gcs import GcsServer
+from piezotrack.hardware import GcsServer
 
 pytestmark = pytest.mark.skipif(
     importlib.util.find_spec("pipython") is None,

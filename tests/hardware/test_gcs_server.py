@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from gcs_peers import quiet_stage
-from piezotrack.hardware.gcs import GcsServer
+from piezotrack.hardware import GcsServer
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

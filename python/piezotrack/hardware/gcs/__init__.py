@@ -3,9 +3,3 @@
 Source: General Command Set 2.0 as the manuals of digital piezo controllers have it, E-727 user
 manual E727T0005 (2019). Positions are in um there, and metres outside this package.
 """
-
-from __future__ import annotations
-
-from ..._support.lazy import attach
-
-__getattr__, __dir__, __all__ = attach(__name__, globals())

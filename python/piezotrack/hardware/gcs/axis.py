@@ -37,6 +37,8 @@ DIGITS = 3
 # Longest time after a change that is simulated [cycles]: what still creeps after a minute creeps no
 # further. With the servo on, which settles in a fraction of a second, less.
 LONGEST_REST, LONGEST_SERVO = round(60.0 * CLOCK), round(2.0 * CLOCK)
+# Longest time that is simulated at once while table or recorder run [cycles]: half a second's work.
+MOST, MOST_WITH_SERVO = round(120.0 * CLOCK), round(10.0 * CLOCK)
 # Most samples that are simulated in one piece.
 PIECE = 500_000
 
@@ -108,6 +110,11 @@ class VirtualAxis:
     def catch_up(self) -> None:
         """Bring the stage to the present."""
         present = math.floor((self._clock() - self._begun) * self._speed * CLOCK)
+        most = MOST_WITH_SERVO if self.servo else MOST
+        if (self.generator or self.recorder.active) and present - self._done > most:
+            # The computer does not keep up: what cannot be simulated has not been.
+            self._begun += (present - self._done - most) / (self._speed * CLOCK)
+            present = self._done + most
         while (cycles := present - self._done) > 0:
             if self._at_rest:
                 self._rest(cycles)

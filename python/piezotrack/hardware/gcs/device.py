@@ -72,9 +72,8 @@ class GcsDevice:
     Examples
     --------
     >>> import piezotrack as pt
-    >>> from piezotrack.hardware.gcs import GcsDevice, GcsServer
-    >>> with GcsServer(pt.VirtualStage.xu_li_2010(seed=1), speed=100.0) as server:
-    ...     device = GcsDevice("127.0.0.1", server.port)
+    >>> with pt.hardware.GcsServer(pt.VirtualStage.xu_li_2010(seed=1)) as server:
+    ...     device = pt.hardware.GcsDevice("127.0.0.1", server.port)
     ...     print(device.limits, device.rates.nearest(3000.0))
     ...     device.close()
     (0.0, 75.0) 2857.1428571428573

@@ -10,7 +10,7 @@ import threading
 from typing import TYPE_CHECKING, Self
 
 from ... import _core
-from ..._support.arguments import finite, positive
+from ..._support.arguments import finite
 from ..._support.messages import quoted
 from ...errors import ParameterError
 from ...stages.virtual import VirtualStage
@@ -25,6 +25,8 @@ __all__ = ["GcsServer"]
 
 SINGLE = {ord(byte) for byte in (MOVING, READY, GENERATOR, STOP)}
 ENDS = (ord("\n"), ord("\r"))
+# Speed beyond which no computer keeps up.
+FASTEST = 1e4
 # Longest command [bytes].
 LONGEST = 65536
 
@@ -47,7 +49,7 @@ class GcsServer:
     port : int, optional
         TCP port, 0 for any free one.
     speed : float, optional
-        How much faster than real time the stage goes.
+        How much faster than real time the stage goes, as far as the computer keeps up.
 
     Raises
     ------
@@ -57,8 +59,8 @@ class GcsServer:
     Examples
     --------
     >>> import piezotrack as pt
-    >>> from piezotrack.hardware.gcs import GcsServer
-    >>> with GcsServer(pt.VirtualStage.xu_li_2010(seed=1), speed=1000.0) as server:
+    >>> stage = pt.VirtualStage.xu_li_2010(seed=1)
+    >>> with pt.hardware.GcsServer(stage, speed=100.0) as server:
     ...     device = pt.hardware.connect(server.address)
     ...     log = pt.measure(device, "decaying:1Hz,0..75V", rate=1000.0)
     ...     device.close()
@@ -87,7 +89,11 @@ class GcsServer:
         port = _core.as_count("port", port)
         if port > 65535:
             raise ParameterError(f"port is {port}: expected 0 to 65535")
-        speed = positive("speed", speed, "times real time")
+        speed = _core.as_number("speed", speed)
+        if not 0.0 < speed <= FASTEST:
+            raise ParameterError(
+                f"speed is {speed:g}: expected above 0, and up to {FASTEST:g} times real time"
+            )
         self._host, self._limits = host, within
         controller = VirtualController(stage, within, speed=speed)
         try:
