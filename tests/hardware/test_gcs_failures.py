@@ -131,6 +131,16 @@ def test_positions_are_in_the_unit_of_the_controller(unit: str, metres: float) -
         assert device.position == pytest.approx(25.0 * metres, rel=1e-12)
 
 
+def test_a_controller_that_does_not_say_how_long_a_wave_may_be() -> None:
+    then: dict[str, str | None] = {
+        "SPA? 1 0x13000004": "",
+        "ERR?": "54\n",
+        "SPA? 1 0x16000200": "1 0x16000200=6000\n",
+    }
+    with connected(then, NEVER) as device:
+        assert device.memory == 3000
+
+
 def test_an_error_has_its_code_and_its_words() -> None:
     said = {"SVA 1 5": "", "ERR?": "66\n"}
     with connected({}) as device:
@@ -203,6 +213,40 @@ def test_a_record_is_taken_as_it_comes() -> None:
         record = device.play(np.full(10, 5.0), 1000.0)
     np.testing.assert_allclose(record.displacement, 1e-6 * np.arange(10), rtol=1e-12)
     assert record.volts.tolist() == [5.0] * 10
+
+
+def interrupted(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("where", ["between two looks", "while an answer comes", "before it"])
+def test_ctrl_c_in_a_table_stops_it_and_leads_home(
+    where: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with GcsServer(quiet_stage()) as server:
+        device = GcsDevice("127.0.0.1", server.port)
+        device.hold(5.0)
+        ask = device._line.ask
+
+        def once(command: str) -> list[str]:
+            if command == "\x09":
+                monkeypatch.undo()
+                device._line.send("\x09", "HLP?")
+                if where == "while an answer comes":
+                    device._line._next_line(["#9"], 0)
+                interrupted()
+            return ask(command)
+
+        if where == "between two looks":
+            monkeypatch.setattr("piezotrack.hardware.gcs.device.time.sleep", interrupted)
+        else:
+            monkeypatch.setattr(device._line, "ask", once)
+        with pytest.raises(KeyboardInterrupt):
+            pt.measure(device, "sine:0.1Hz,20..75V,600s", rate=100.0, rest=0.0)
+        monkeypatch.undo()
+        assert device._line.ask("\x09") == ["0x0"]
+        assert device.voltage == 0.0
+        device.close()
 
 
 def test_a_server_that_goes_in_the_middle_of_a_table() -> None:

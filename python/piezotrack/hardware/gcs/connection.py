@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..._support.messages import quoted
 from ...errors import DeviceError
-from .protocol import ENCODING, is_last, words_of
+from .protocol import ENCODING, STOP, is_last, words_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,6 +18,8 @@ __all__ = ["Connection"]
 CHUNK = 65536
 # Longest answer [bytes]: a whole data recorder is less.
 LONGEST = 64 * 1024 * 1024
+# Silence after which no answer is expected any more [s].
+QUIET = 0.2
 
 
 class Connection:
@@ -44,6 +46,8 @@ class Connection:
         self.name = f"gcs://{host}:{port}"
         self._timeout = timeout
         self._got = bytearray()
+        # Answers that have not come: the query was refused, or nobody waited to the end.
+        self._due = 0
         self._lost = ""
         try:
             self._socket = socket.create_connection((host, port), timeout)
@@ -55,6 +59,9 @@ class Connection:
         """Send commands in one message, without a wait for anything."""
         self._still_there(commands)
         try:
+            if self._due:
+                self._forget()
+            self._due = sum(map(_is_query, commands))
             self._socket.sendall("".join(map(_line, commands)).encode(ENCODING))
         except OSError as error:
             raise self._failed(commands, f"cannot be sent: {_reason(error)}") from None
@@ -72,6 +79,7 @@ class Connection:
             return self.answer(command)
         except _NoAnswerError:
             # A query that is refused has no answer. Why, ERR? says.
+            self._due = 0
             self.send("ERR?")
             try:
                 lines = self.answer(command, "ERR?")
@@ -119,6 +127,7 @@ class Connection:
             if size > LONGEST:
                 raise self._failed(asked, f"has an answer of more than {LONGEST} bytes")
             lines.append(line)
+        self._due -= 1
         return [line.rstrip(" ") for line in lines]
 
     def unexpected(self, asked: str, lines: Sequence[str], expected: str) -> DeviceError:
@@ -132,6 +141,17 @@ class Connection:
         """Close it."""
         self._lost = self._lost or "it is closed"
         self._socket.close()
+
+    def _forget(self) -> None:
+        """Leave out answers that still come, and end what may have been sent by half."""
+        self._socket.sendall(b"\nERR?\n")
+        self._socket.settimeout(QUIET)
+        try:
+            while self._socket.recv(CHUNK):
+                pass
+        except TimeoutError:
+            self._got.clear()
+        self._socket.settimeout(self._timeout)
 
     def _next_line(self, asked: Sequence[str], before: int) -> str:
         latest = time.monotonic() + self._timeout
@@ -202,6 +222,13 @@ class _NoAnswerError(Exception):
 def _line(command: str) -> str:
     """End a command; those of one byte have no end."""
     return command if len(command) == 1 else f"{command}\n"
+
+
+def _is_query(command: str) -> bool:
+    """Return whether a command has an answer."""
+    if len(command) == 1:
+        return command != STOP
+    return command.partition(" ")[0].endswith("?")
 
 
 def _code(lines: Sequence[str]) -> int | None:

@@ -385,7 +385,10 @@ class GcsDevice:
             points = self._parameter(RECORD_POINTS) / int(tables[0])
         except (ValueError, ZeroDivisionError):
             raise self._line.unexpected("TNR?", tables[:3], "the number of tables") from None
-        return int(min(points, self._parameter(WAVE_POINTS)))
+        # Not every controller says how long a wave may be; it refuses what is too long.
+        with suppress(DeviceError):
+            points = min(points, self._parameter(WAVE_POINTS))
+        return int(points)
 
 
 def _array(lines: Sequence[str]) -> tuple[Array | None, float]:
