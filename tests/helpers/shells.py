@@ -119,7 +119,7 @@ COMMANDS: dict[str, tuple[list[str], tuple[str, ...]]] = {
     "noise": (["log.csv"], ("--dt", "--unit", "--time", "--displacement", "--window")),
     "info": (["log.csv"], (*COLUMNS, "--displacement")),
     # With a port that there is not: else it would go on until it is stopped.
-    "serve": (["gcs", "--port", "65536"], ("--model", "--speed", "--host")),
+    "serve": (["gcs", "--port", "65536"], ("--model", "--limits", "--speed", "--host")),
 }  # fmt: skip
 # Their shares: those that identify take long.
 MIX = (

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from pathlib import Path  # noqa: TC003, which typer reads
 from typing import Annotated, Literal
 
 import typer
 
+from ..errors import ParameterError
 from .error_messages import in_words
+from .options import number_range
 
 __all__ = ["serve_command"]
 
@@ -22,6 +25,12 @@ def serve_command(
         Path | None,
         typer.Option(
             metavar="MODEL", help="Model file in JSON; default the stage of Xu and Li 2010."
+        ),
+    ] = None,
+    limits: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LOW:HIGH", help="Lowest and highest voltage in V; default those of the stage."
         ),
     ] = None,
     host: Annotated[
@@ -38,8 +47,14 @@ def serve_command(
     from ..hardware.virtual import virtual_stage
 
     assert protocol == "gcs"
-    stage, limits = virtual_stage(model)
-    with GcsServer(stage, limits=limits, host=host, port=port, speed=speed) as server:
+    stage, known = virtual_stage(model)
+    within = known if limits is None else number_range("--limits", limits)
+    if within is None and not all(map(math.isfinite, stage.amplifier.limits)):
+        raise ParameterError(
+            f"--limits is not given, and {model} does not say with which voltages it was "
+            "identified: expected --limits LOW:HIGH"
+        )
+    with GcsServer(stage, limits=within, host=host, port=port, speed=speed) as server:
         low, high = server.limits
         print(f"listening at {server.address}, {low:g} to {high:g} V", flush=True)
         threading.Event().wait()
