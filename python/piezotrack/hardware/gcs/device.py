@@ -199,7 +199,23 @@ class GcsDevice:
             raise
 
     def exchange(self, volts: float) -> float:
-        """Read the displacement [m], put out a voltage [V], in one message each way."""
+        """Read the displacement and put out a voltage, in one message each way.
+
+        Parameters
+        ----------
+        volts : float
+            Voltage [V].
+
+        Returns
+        -------
+        float
+            Displacement before it goes out [m].
+
+        Raises
+        ------
+        DeviceError
+            The controller refuses something, or does not answer.
+        """
         self._within(np.array([finite("volts", volts, "V")]))
         self._open_loop()
         query = f"POS? {self._axis}"
@@ -207,7 +223,18 @@ class GcsDevice:
         return self._unit * self._number(query, lines)
 
     def hold(self, volts: float) -> None:
-        """Put out a constant voltage [V] from now on."""
+        """Put out a constant voltage from now on.
+
+        Parameters
+        ----------
+        volts : float
+            Voltage [V].
+
+        Raises
+        ------
+        DeviceError
+            The controller refuses it, or does not answer.
+        """
         self._within(np.array([finite("volts", volts, "V")]))
         self._open_loop()
         self._line.command(f"SVA {self._axis} {self._control(volts)}")
