@@ -393,6 +393,21 @@ def test_a_stage_that_rests_is_not_simulated_for_ever(bench: Bench) -> None:
     assert bench.value("POS? 1") == pytest.approx(40.0, abs=0.02)
 
 
+def test_a_reading_in_a_slow_table_is_not_old(bench: Bench) -> None:
+    # Points of half a second: the mode of 160 Hz is over after a tenth of one.
+    bench.points(1, [10.0, 60.0])
+    bench("WSL 1 1", "WGC 1 1", "WTR 1 10000 0", "RTR 10000", "WGO 1 1")
+    bench.wait(0.5)
+    first = bench.value("POS? 1")
+    bench.wait(0.25)
+    settled = bench.value("POS? 1")
+    assert settled > first + 9.0
+    bench.wait(0.4)
+    assert bench.value("POS? 1") > settled + 45.0
+    # Each sample is read at the edge at which the next voltage goes out.
+    np.testing.assert_allclose(bench.array("DRR? 1 2 1").ravel(), [first, settled], atol=1e-3)
+
+
 def test_a_wave_that_the_computer_cannot_keep_up_with_goes_slower(bench: Bench) -> None:
     bench.points(1, np.arange(10.0))
     bench("WSL 1 1", "WGC 1 0", "WTR 1 100 0", "RTR 1000", "WGO 1 1")

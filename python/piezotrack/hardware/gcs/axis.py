@@ -30,6 +30,8 @@ UM = 1e6
 # Servo cycles between two steps of the servo, and its bandwidth [rad/s]: below what the damping of
 # a mode of 160 Hz with zeta = 0.065 allows an integrator, 2 zeta omega = 130 rad/s.
 SERVO_STEP, BANDWIDTH = 20, 30.0
+# Longest step of a stage under way [cycles], which is also how old a reading may be.
+LONGEST_STEP = 100
 # Share of the travel within which a target is reached.
 ON_TARGET = 0.005
 # Decimals of the travel [um], so that its ends are in it as they are written.
@@ -181,20 +183,19 @@ class VirtualAxis:
     def _step(self, cycles: int) -> int:
         """Go on in even steps, up to the next event; return their number."""
         rates, events = [], []
-        if self.servo:
-            rates.append(SERVO_STEP)
-            if self.generator is None and not self.recorder.active:
-                most = max(SERVO_STEP, LONGEST_SERVO - self._since)
-                self._since += cycles
-                self._done += max(0, cycles - most)
-                cycles = min(cycles, most)
         if one := self.generator:
             rates += [one.step, abs(one.start - self._done)]
             events += [] if one.end is None else [one.end]
         if self.recorder.active:
             rates += [self.recorder.rate, abs(self.recorder.start - self._done)]
             events.append(self.recorder.end)
-        step = math.gcd(*rates)
+        if not rates:
+            # A servo that has rested for long need not be followed through all of it.
+            skipped = max(0, cycles - max(SERVO_STEP, LONGEST_SERVO - self._since))
+            self._done += skipped
+            self._since += skipped
+            cycles -= skipped
+        step = _divided(math.gcd(*rates)) if rates else SERVO_STEP
         until = [event - self._done for event in events if event > self._done]
         count = min([cycles, *until]) // step
         count = min(count, PIECE)
@@ -229,12 +230,19 @@ class VirtualAxis:
         """Take over where the stage has come to."""
         if self.recorder.active:
             self.recorder.take(seen)
-        self._done = int(seen.cycles[-1])
+        last = int(seen.cycles[-1])
+        self._since += last - self._done
+        self._done = last
         self.position, self.voltage = float(seen.position[-1]), float(seen.voltage[-1])
         if not self.servo:
             self.control = float(seen.control[-1])
         if (one := self.generator) and one.end is not None and self._done >= one.end:
             self.generator, self._since = None, 0
+
+
+def _divided(step: int) -> int:
+    """Return the largest even part of a step that is not too long for servo and readings."""
+    return next(part for part in range(min(step, LONGEST_STEP), 0, -1) if step % part == 0)
 
 
 def _rest(stage: VirtualStage, volts: float) -> float:
