@@ -8,5 +8,7 @@ from .device import Record as Record
 from .drives import Drive as Drive
 from .drives import decaying as decaying
 from .drives import parse_drive as parse_drive
+from .gcs.device import GcsDevice as GcsDevice
+from .gcs.server import GcsServer as GcsServer
 from .measure import measure as measure
 from .virtual import VirtualDevice as VirtualDevice

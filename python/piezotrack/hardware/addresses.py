@@ -19,6 +19,7 @@ __all__ = ["SCHEMES", "connect"]
 # Where each scheme is: a module with `from_address(host, port, path, options)`.
 SCHEMES: Mapping[str, str] = {
     "virtual": "virtual",
+    "gcs": "gcs.device",
 }
 
 
@@ -29,7 +30,9 @@ def connect(address: str) -> Device:
     ----------
     address : str
         ``SCHEME:REST``: ``virtual:`` is the stage of Xu and Li 2010, ``virtual:MODEL.json`` an
-        identified one.
+        identified one. ``gcs://HOST[:PORT][/AXIS]``: a controller that speaks GCS, port 50000 and
+        axis 1 where they are not given; ``?limits=LOW:HIGH`` [V], ``factor=`` and ``timeout=`` as
+        of `GcsDevice`.
 
     Returns
     -------
