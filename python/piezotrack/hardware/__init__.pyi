@@ -9,4 +9,5 @@ from .drives import Drive as Drive
 from .drives import decaying as decaying
 from .drives import parse_drive as parse_drive
 from .measure import measure as measure
+from .ni import NiDevice as NiDevice
 from .virtual import VirtualDevice as VirtualDevice

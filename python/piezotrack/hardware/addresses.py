@@ -18,6 +18,7 @@ __all__ = ["SCHEMES", "connect"]
 
 # Where each scheme is: a module with `from_address(host, port, path, options)`.
 SCHEMES: Mapping[str, str] = {
+    "ni": "ni",
     "virtual": "virtual",
 }
 
