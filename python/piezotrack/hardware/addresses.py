@@ -19,6 +19,7 @@ __all__ = ["SCHEMES", "connect"]
 # Where each scheme is: a module with `from_address(host, port, path, options)`.
 SCHEMES: Mapping[str, str] = {
     "ni": "ni",
+    "scpi": "scpi",
     "virtual": "virtual",
 }
 
@@ -30,7 +31,8 @@ def connect(address: str) -> Device:
     ----------
     address : str
         ``SCHEME:REST``: ``virtual:`` is the stage of Xu and Li 2010, ``virtual:MODEL.json`` an
-        identified one.
+        identified one; ``ni:Dev1/ao0,Dev1/ai0?scale=10um/V&limits=0..7.5V`` as `NiDevice`;
+        ``scpi://HOST:PORT?unit=um&limits=0..75V`` as `ScpiDevice`.
 
     Returns
     -------
