@@ -18,6 +18,7 @@ from .control.contouring import contour as contour
 from .control.controller import Controller as Controller
 from .control.learning import learn as learn
 from .control.linear_systems import to_control as to_control
+from .control.on_device.playing import play as play
 from .control.stability import check_loop as check_loop
 from .control.tracking import track as track
 from .control.tuning.margins import Margins as Margins

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,11 +13,13 @@ from .._support.arguments import not_negative
 from .._support.files import write_columns
 from .._support.units import drive_word, shown_unit
 from ..errors import ParameterError
+from ..hardware.device import Device
 from .checks import check_drive_unit, check_stable, check_within_reach
 from .controller import Controller
 from .iterative_learning import IterativeLearning
-from .plant import plant_of, run_closed_loop, voltages_before
-from .tracking import collected
+from .learning_trials import PlayedTrials, SimulatedTrials
+from .on_device.playing import check_playable
+from .plant import plant_of, voltages_before
 
 if TYPE_CHECKING:
     import os
@@ -28,9 +30,9 @@ if TYPE_CHECKING:
 
     from ..identification.identified import IdentifiedModel
     from ..references.reference import Reference
-    from ..stages.virtual import VirtualStage
     from .iterative_learning import LearningTrial, Method
     from .learning_rules import Convergence
+    from .learning_trials import Trials
     from .plant import Plant
     from .tracking import Tracking
 
@@ -38,8 +40,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Learning", "heading", "learn", "trial_line"]
 
-# Instants kept in each sampling interval of a trial.
-SUBSTEPS = 4
 MOST_TRIALS = 10_000
 WHY = {
     "noise": "what repeats in the error is not distinguishable from the noise",
@@ -189,74 +189,8 @@ class Learning:
         return plot_learning(self, fig)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Trials:
-    """How a table is played and recorded on a simulated stage."""
-
-    plant: VirtualStage
-    learner: IterativeLearning
-    delay: float
-    settle: int
-    repeats: int
-    before: tuple[float, ...]
-
-    def run(self, table: Array, trial: int, repeat: int = 0) -> Tracking:
-        """Simulate a trial with noise of its own."""
-        learner, sensor = self.learner, self.plant.sensor
-        seed = (sensor.seed + trial * self.repeats + repeat) % 2**63
-        plant = replace(self.plant, sensor=replace(sensor, seed=seed))
-        controller = learner.controller
-        whole = self._whole()
-        samples = whole.sample(controller.dt)
-        learnt, played = table - learner.feedforward, np.zeros(len(samples))
-        if controller.feedforward is not None:
-            played = self._played(whole)
-        if learner.method == "lifted":
-            volts = played + learnt
-        else:
-            volts = played + np.resize(learnt, played.size) * _start(samples.t, whole.ramp)
-        run = run_closed_loop(
-            plant, controller, samples.x, volts, (self.delay, 0.0, SUBSTEPS), self.before
-        )
-        return collected(run, controller, whole, samples, "feedforward learnt", SUBSTEPS)
-
-    def record(self, run: Tracking) -> Array:
-        """Return the readings of the trial in a run [m], of shape (records, n)."""
-        count = self.learner.t.size
-        kept = 1 if self.learner.method == "lifted" else self.repeats
-        return run.measured[run.measured.size - kept * count :].reshape(kept, count)
-
-    def _played(self, whole: Reference) -> Array:
-        """Return the controller's own feedforward along a run [V]."""
-        inverse, dt = self.learner.controller.feedforward, self.learner.controller.dt
-        assert inverse is not None
-        if self.learner.method == "lifted":
-            return self.learner.feedforward
-        # Always from a table: what is learnt is added to the same voltage in each period.
-        as_table = replace(inverse, playback="table")
-        return as_table.played(whole, dt, limits=self.learner.controller.limits).voltage
-
-    def _whole(self) -> Reference:
-        """Return the reference of a run."""
-        reference = self.learner.reference
-        if self.learner.method == "lifted" or reference.period is None:
-            return reference
-        inverse = self.learner.controller.feedforward
-        started = int(np.ceil(reference.ramp / reference.period - 1e-9))
-        # Until the table begins to repeat, and as many periods for the stage to follow.
-        head = max(1 if inverse is None else inverse.settle, started) + self.settle
-        return replace(reference, duration=(head + self.repeats) * reference.period)
-
-
-def _start(t: Array, ramp: float) -> Array:
-    """Share of the learnt voltage during the smooth start: that of the motion."""
-    u = np.clip(t / ramp, 0.0, 1.0) if ramp > 0.0 else np.ones_like(t)
-    share: Array = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
-    return share
-
-
 def learn(
-    stage: Plant | IdentifiedModel,
+    stage: Plant | IdentifiedModel | Device,
     reference: Reference,
     controller: Controller,
     *,
@@ -284,18 +218,21 @@ def learn(
     beside the feedback if there is any; the record of its errors gives the next table. Before the
     first is played, monotone convergence is tested on a set of models. It ends where what repeats
     in the error is not distinguishable from what does not, or where the error falls no further.
-    For a stage of your own: `control.IterativeLearning`, which this runs.
+    For a stage of your own: a device (`hardware.Device`), which plays each trial as a table, or
+    `control.IterativeLearning`, which this runs.
 
     Parameters
     ----------
-    stage : Stage, VirtualStage or IdentifiedModel
-        The plant. Each trial begins where its experiments begin, with noise of its own.
+    stage : Stage, VirtualStage, IdentifiedModel or Device
+        The plant. Each trial begins where its experiments begin, with noise of its own; on a device
+        it begins and ends at the rest of `play`, and the controller has no feedback.
     reference : Reference
         The reference; of one that repeats, a settled period is learnt, however long it lasts.
     controller : Controller
         As of `control.IterativeLearning`.
     model : Stage, VirtualStage or IdentifiedModel, optional
-        The model to learn with; default that of the controller's feedforward, or else the stage.
+        The model to learn with; default that of the controller's feedforward, or else the stage;
+        a device needs one of them.
     trials : int, optional
         Trials at most, the one without learning included.
     settle : int, optional
@@ -334,8 +271,12 @@ def learn(
     >>> found.errors[found.best] < 0.1 * found.errors[0]
     np.True_
     """
-    plant = plant_of(stage)
     known = _model_of(stage, controller) if model is None else model
+    if isinstance(stage, Device):
+        check_playable(stage, controller)
+    # What is behind a device is what its model says.
+    behind = known if isinstance(stage, Device) else stage
+    plant = plant_of(behind)
     learner = IterativeLearning(
         known,
         reference,
@@ -351,20 +292,23 @@ def learn(
         change_weight=change_weight,
         noise=noise,
     )
-    check_drive_unit(stage, controller)
+    check_drive_unit(behind, controller)
     check_stable(plant, controller, delay)
     if not _core.as_truth("beyond_reach", beyond_reach):
         samples = reference.sample(controller.dt)
         check_within_reach(plant, controller.limits, samples, controller.drive_unit)
     most = _counted("trials", trials, MOST_TRIALS)
-    runs = _Trials(
-        plant=plant,
-        learner=learner,
-        delay=not_negative("delay", delay, "s"),
-        settle=_counted("settle", settle, 1000),
-        repeats=_counted("repeats", repeats, 1000),
-        before=voltages_before(plant, visited, controller.limits),
-    )
+    late = not_negative("delay", delay, "s")
+    periods = {
+        "settle": _counted("settle", settle, 1000),
+        "repeats": _counted("repeats", repeats, 1000),
+    }
+    runs: Trials
+    if isinstance(stage, Device):
+        runs = PlayedTrials(device=stage, learner=learner, **periods)
+    else:
+        before = voltages_before(plant, visited, controller.limits)
+        runs = SimulatedTrials(plant=plant, learner=learner, delay=late, before=before, **periods)
     return _learnt(runs, most, progress or _unseen)
 
 
@@ -372,7 +316,7 @@ def _unseen(_: IterativeLearning) -> None:
     """Show nothing."""
 
 
-def _learnt(runs: _Trials, most: int, progress: Callable[[IterativeLearning], None]) -> Learning:
+def _learnt(runs: Trials, most: int, progress: Callable[[IterativeLearning], None]) -> Learning:
     """Play and learn until it ends."""
     learner, first, final = runs.learner, None, None
     progress(learner)
@@ -401,11 +345,18 @@ def _learnt(runs: _Trials, most: int, progress: Callable[[IterativeLearning], No
     )
 
 
-def _model_of(stage: Plant | IdentifiedModel, controller: Controller) -> Plant | IdentifiedModel:
+def _model_of(
+    stage: Plant | IdentifiedModel | Device, controller: Controller
+) -> Plant | IdentifiedModel:
     """Return the model of the controller's feedforward with its delay, or else the stage."""
     from ..stages.virtual import VirtualStage
 
     if not isinstance(controller, Controller) or controller.feedforward is None:
+        if isinstance(stage, Device):
+            raise ParameterError(
+                "model is not given, and the controller has no feedforward: expected a model of "
+                "the stage behind the device, as pt.identify gives it"
+            )
         return stage
     return VirtualStage.of(controller.feedforward.stage, delay=controller.feedforward.delay)
 

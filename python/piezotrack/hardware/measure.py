@@ -19,7 +19,16 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["check_device", "check_table", "filled", "measure", "obtained_rate", "play_table"]
+__all__ = [
+    "check_device",
+    "check_table",
+    "filled",
+    "measure",
+    "obtained_rate",
+    "play_table",
+    "ramped",
+    "rest_of",
+]
 
 # Ramps from and to the rest [s].
 RAMP = 0.5
@@ -102,6 +111,14 @@ def filled(record: Record) -> tuple[Array, tuple[str, ...]]:
         )
     notes.append(f"lost samples: {record.lost} of {y.size}, filled in linearly")
     return np.interp(np.arange(y.size), known, y[known]), tuple(notes)
+
+
+def rest_of(device: Device, rest: float | None = None) -> float:
+    """Return the voltage before and after an experiment [V]: 0 V, or the limit nearest to it."""
+    low, high = device.limits
+    home = min(max(0.0, low), high) if rest is None else finite("rest", rest, "V")
+    check_table(device, "rest", np.array([home]))
+    return home
 
 
 def ramped(volts: Array, rest: float, rate: float, ramp: float) -> tuple[Array, int]:
@@ -191,9 +208,8 @@ def measure(
         volts = np.clip(volts, low, high)
         notes = (*notes, f"drive: {beyond} samples clipped to {plain(low)} and {plain(high)} V")
     check_table(device, "drive", volts)
-    home = min(max(0.0, low), high) if rest is None else finite("rest", rest, "V")
+    home = rest_of(device, rest)
     table, first = ramped(volts, home, exact, not_negative("ramp", ramp, "s"))
-    check_table(device, "rest", table[:1])
     check_table(device, "drive with its ramps", table)
     try:
         record = play_table(device, table, exact, not_negative("lead_in", lead_in, "s"))

@@ -1,0 +1,1 @@
+"""Controllers on a device: tables that it plays, and a loop that is closed point by point."""

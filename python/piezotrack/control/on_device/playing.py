@@ -1,0 +1,194 @@
+"""Following a reference without real time: a table of voltages on the clock of a device."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ... import _core
+from ..._support.arguments import finite, not_negative
+from ...errors import ParameterError
+from ...hardware.measure import (
+    RAMP,
+    check_device,
+    check_table,
+    filled,
+    obtained_rate,
+    play_table,
+    ramped,
+    rest_of,
+)
+from ...references.reference import Reference
+from ...stages.inverse import Inverse
+from ..controller import Controller
+from ..tracking import Tracking, feedforward_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ...hardware.device import Device
+
+    Array = NDArray[np.float64]
+
+__all__ = ["check_limits", "check_playable", "play", "played_on"]
+
+
+def check_limits(device: Device, controller: Controller) -> None:
+    """Raise ParameterError where a controller may ask for what a device must not put out."""
+    low, high = device.limits
+    least, most = controller.limits
+    if not low <= least < most <= high:
+        raise ParameterError(
+            f"limits of the controller are {least:g} to {most:g} V: expected a range within "
+            f"{low:g} to {high:g} V, the limits of {device.channels[0]}"
+        )
+
+
+def check_playable(device: Device, controller: Controller) -> None:
+    """Raise ParameterError unless a controller is a feedforward that a device can play."""
+    check_device(device)
+    if not isinstance(controller, Controller):
+        raise ParameterError(f"controller is {type(controller).__name__}: expected pt.Controller")
+    if controller.drive_unit != "V":
+        raise ParameterError(
+            f"controller commands in {controller.drive_unit}: expected V, which a device puts out"
+        )
+    given = {"feedback": controller.feedback, "repetitive": controller.repetitive}
+    if present := [name for name, part in given.items() if part is not None]:
+        raise ParameterError(
+            f"controller has {' and '.join(present)}, which a table cannot have: expected "
+            "feedforward alone; pt.track closes the loop on a device"
+        )
+    check_limits(device, controller)
+    near, notes = obtained_rate(device, 1.0 / controller.dt)
+    if notes and abs(near * controller.dt - 1.0) > 1e-6:
+        raise ParameterError(
+            f"dt of the controller is {controller.dt:.9g} s: expected {1.0 / near:.9g} s, an "
+            f"interval that {device.channels[0]} plays at"
+        )
+
+
+def played_on(
+    device: Device,
+    controller: Controller,
+    reference: Reference,
+    volts: Array,
+    note: str,
+    *,
+    rest: float | None = None,
+    ramp: float = RAMP,
+) -> Tracking:
+    """Play voltages along a reference on a device [V], and return what it recorded."""
+    rate = device.rates.nearest(1.0 / controller.dt)
+    samples = reference.sample(controller.dt)
+    check_table(device, "voltage", volts)
+    home = rest_of(device, rest)
+    table, first = ramped(volts, home, rate, ramp)
+    check_table(device, "voltage with its ramps", table)
+    try:
+        record = play_table(device, table, rate)
+    except BaseException:
+        device.hold(home)
+        raise
+    y, notes = filled(record)
+    part = slice(first, first + volts.size)
+    measured, applied = y[part], record.volts[part]
+    low, high = controller.limits
+    nothing = np.zeros(volts.size)
+    return Tracking(
+        reference=reference,
+        controller=controller,
+        t=samples.t,
+        desired=samples.x,
+        measured=measured,
+        displacement=measured,
+        loop_error=samples.x - measured,
+        voltage=applied,
+        feedforward=volts,
+        feedback=nothing,
+        repetitive=nothing,
+        saturated=(applied <= low) | (applied >= high),
+        fine_t=samples.t,
+        fine_displacement=measured,
+        fine_voltage=applied,
+        note="; ".join([f"{note}, played on {device.channels[0]}", *notes]),
+    )
+
+
+def play(
+    device: Device,
+    controller: Controller | Inverse,
+    reference: Reference,
+    *,
+    rate: float | None = None,
+    rest: float | None = None,
+    ramp: float = RAMP,
+) -> Tracking:
+    """Follow a reference with a feedforward that a device plays as a table.
+
+    The whole run is computed before, goes out on the clock of the device, and comes back with it:
+    no real time is needed. The output is led smoothly from `rest` and back to it. A voltage shows
+    in the reading of the next sample: at a low rate that interval is most of the error, and
+    `learn` removes it.
+
+    Parameters
+    ----------
+    device : Device
+        The device.
+    controller : Controller or Inverse
+        A controller with feedforward alone, or an inverse, as ``fit.inverse()``.
+    reference : Reference
+        The reference.
+    rate : float, optional
+        Sampling rate of an inverse [Hz]; a controller has its own.
+    rest : float, optional
+        Voltage before and after [V]; default 0 V, or the limit nearest to it.
+    ramp : float, optional
+        Length of the way from rest and back [s].
+
+    Returns
+    -------
+    Tracking
+        The motion as it was measured, and its metrics; the true displacement is the measured one.
+
+    Raises
+    ------
+    ParameterError
+        The controller has feedback, its limits or its interval do not suit the device, or a number
+        is out of its range.
+    DeviceError
+        The device does not do what it was asked.
+    DataError
+        More than 1 % of the samples have no reading.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> plays = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(5.0,), weights=(5e-7,))
+    >>> stage = pt.VirtualStage.of(plays, noise=5e-9, limits=(0.0, 75.0))
+    >>> device = pt.hardware.VirtualDevice(stage)
+    >>> reference = pt.sine(frequency=5.0, low=10e-6, high=60e-6, duration=1.0)
+    >>> run = pt.play(device, plays.inverse(), reference, rate=20e3)
+    >>> print(f"{1e9 * run.score(true=True).rms_error:.0f} nm")
+    28 nm
+    """
+    check_device(device)
+    if not isinstance(reference, Reference):
+        raise ParameterError(f"reference is {type(reference).__name__}: expected pt.Reference")
+    if isinstance(controller, Inverse):
+        if rate is None:
+            raise ParameterError("rate is not given: expected the sampling rate of an inverse, Hz")
+        exact, _ = obtained_rate(device, _core.as_number("rate", rate))
+        controller = Controller(dt=1.0 / exact, limits=device.limits, feedforward=controller)
+    elif rate is not None:
+        raise ParameterError(f"rate is {rate!r}: expected none, as the controller has an interval")
+    check_playable(device, controller)
+    if controller.feedforward is None:
+        raise ParameterError("controller has no feedforward: expected one, as fit.inverse() gives")
+    volts, note = feedforward_of(controller, reference, reference.sample(controller.dt))
+    volts = np.clip(volts, *controller.limits)
+    ways = None if rest is None else finite("rest", rest, "V")
+    return played_on(
+        device, controller, reference, volts, note, rest=ways, ramp=not_negative("ramp", ramp, "s")
+    )
