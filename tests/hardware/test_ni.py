@@ -71,7 +71,7 @@ def test_rates_are_whole_fractions_of_the_timebase(driver: Callable[..., NiStand
     # The slower of output and input.
     assert rates.highest == 1.25e6
     assert rates.nearest(30e3) == pytest.approx(80e6 / 2667)
-    given = pt.hardware.connect(f"{ADDRESS}&timebase=10MHz".replace("10MHz", "10000kHz"))
+    given = pt.hardware.connect(f"{ADDRESS}&timebase=10000kHz")
     assert given.rates.clock == 10e6
 
 
@@ -158,6 +158,12 @@ def test_nothing_beyond_the_limits_reaches_the_driver(driver: Callable[..., NiSt
     with pytest.raises(pt.DeviceError, match="-1 V"):
         device.hold(-1.0)
     assert below.calls == []
+
+
+def test_an_output_without_a_sample_clock_is_refused(driver: Callable[..., NiStandIn]) -> None:
+    driver(clocked=False)
+    with pytest.raises(pt.DeviceError, match=r"Dev1/ao0 is on a USB-6008.*no sample clock"):
+        pt.hardware.connect(ADDRESS)
 
 
 def test_without_the_vendors_driver_it_says_so() -> None:

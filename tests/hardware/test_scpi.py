@@ -258,6 +258,19 @@ def test_faults_that_the_adapter_cannot_see_do_what_they_should() -> None:
     assert settled["clip"] < settled["none"] * CLIPPED / 50.0
 
 
+def test_a_play_that_is_cut_off_ends_at_rest() -> None:
+    with misbehaving("drop", after=20, count=1) as place:
+        device = misbehaved(place)
+        with pytest.raises(pt.DeviceError, match="closed the connection"):
+            pt.measure(device, np.full(100, 40.0), rate=100.0, ramp=0.1)
+        device.close()
+        # The instrument itself says what it puts out.
+        asked = misbehaved(place, exchange="VOLT?;:VOLT {volts:.6f};:VOLT?")
+        with pytest.raises(pt.DeviceError, match=r"with '0;1'"):
+            asked.exchange(1.0)
+        asked.close()
+
+
 def test_after_a_lost_connection_the_output_can_still_be_led_home() -> None:
     with instrument() as (device, there):
         device.exchange(5.0)

@@ -1,12 +1,13 @@
 """An instrument in another process that misbehaves on purpose, over the SCPI template.
 
-`misbehaving("stale", after=100)` is well behaved for 100 readings and then has the fault; run as a
-program it is the instrument itself, and prints its port.
+`misbehaving("stale", after=100)` is well behaved for 100 readings and then has the fault, for
+`count` readings or for ever; run as a program it is the instrument itself, and prints its port.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import re
 import socket
 import subprocess
@@ -39,10 +40,13 @@ CLIPPED, JUMP = 30.0, 20.0
 
 
 @contextmanager
-def misbehaving(fault: str, *, after: int = 0, late: float = 1.0) -> Iterator[tuple[str, int]]:
+def misbehaving(
+    fault: str, *, after: int = 0, count: int | None = None, late: float = 1.0
+) -> Iterator[tuple[str, int]]:
     """Start the instrument in a process of its own: host and port."""
     assert fault in FAULTS, fault
     options = ["--fault", fault, "--after", str(after), "--late", str(late)]
+    options += [] if count is None else ["--count", str(count)]
     program = [sys.executable, str(Path(__file__)), *options]
     with subprocess.Popen(program, stdout=subprocess.PIPE, text=True) as child:
         try:
@@ -55,17 +59,18 @@ def misbehaving(fault: str, *, after: int = 0, late: float = 1.0) -> Iterator[tu
 class Instrument:
     """The virtual instrument, with one fault from the reading `after` on."""
 
-    def __init__(self, fault: str, after: int, late: float) -> None:
+    def __init__(self, fault: str, after: int, count: int | None, late: float) -> None:
         import piezotrack as pt
 
         device = pt.hardware.VirtualDevice(pt.VirtualStage.xu_li_2010(seed=1))
         self.inside = pt.hardware.VirtualScpi(device)
         self.fault, self.after, self.late = fault, after, late
+        self.until = math.inf if count is None else after + count
         self.readings, self.last = 0, "0.000000"
 
     @property
     def has_fault(self) -> bool:
-        return self.readings > self.after
+        return self.after < self.readings <= self.until
 
     def answer(self, line: str) -> bytes | None:
         """Answer a line: bytes to send, or None to close the connection."""
@@ -122,9 +127,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--fault", choices=FAULTS, default="none")
     parser.add_argument("--after", type=int, default=0, help="readings before the fault")
+    parser.add_argument("--count", type=int, help="readings with the fault; default all after")
     parser.add_argument("--late", type=float, default=1.0, help="seconds, of the fault `late`")
     given = parser.parse_args()
-    instrument = Instrument(given.fault, given.after, given.late)
+    instrument = Instrument(given.fault, given.after, given.count, given.late)
     with socket.create_server(("127.0.0.1", 0)) as listener:
         print(listener.getsockname()[1], flush=True)
         while True:

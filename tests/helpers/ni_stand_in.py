@@ -1,8 +1,8 @@
 """What stands below nidaqmx in place of National Instruments' driver: a virtual stage.
 
 nidaqmx calls its driver through an interpreter; this one does what the driver's manual says of the
-calls that are made, and refuses what a real device would: writing a finite generation while another
-task has the channel, or an acquisition whose clock never ticks.
+calls that are made, and refuses what a real device would: a second task on a channel, a buffer that
+is not filled, readings of an acquisition that was not armed.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 CHANNELS, CHANNELS_TO_READ, RATE, TIMEBASE = 0x1273, 0x1823, 0x1344, 0x1303
 DELAY, DELAY_UNITS, REGENERATION, CHANNEL_TYPE = 0x1317, 0x1304, 0x1453, 0x187F
 LIMITS = {0x298C: 1.25e6, 0x298E: 0.0, 0x2997: 2.86e6, 0x2998: 0.0}
+CLOCKED, PRODUCT = 0x2996, 0x631
 INPUT_RANGE = (-10.0, 10.0)
 
 
@@ -56,7 +57,9 @@ class NiStandIn(BaseInterpreter):  # type: ignore[misc]
         delay: float | None = 25e-9,
         metres_per_volt: float = 10e-6,
         fail: str = "",
+        clocked: bool = True,
     ) -> None:
+        self.clocked = clocked
         self.device, self.timebase, self.delay = device, timebase, delay
         self.scale, self.fail = metres_per_volt, fail
         self.tasks: dict[int, Task] = {}
@@ -131,6 +134,14 @@ class NiStandIn(BaseInterpreter):  # type: ignore[misc]
         self._called("device")
         assert device_name == "Dev1"
         return LIMITS.get(attribute, 0.0)
+
+    def get_device_attribute_bool(self, _device: Any, attribute: Any) -> bool:
+        assert attribute == CLOCKED
+        return self.clocked
+
+    def get_device_attribute_string(self, _device: Any, attribute: Any) -> str:
+        assert attribute == PRODUCT
+        return "PCIe-6363" if self.clocked else "USB-6008"
 
     def get_task_attribute_string(self, task: Any, attribute: Any) -> str:
         return self.tasks[task].channel if attribute == CHANNELS else f"task {task}"

@@ -256,6 +256,11 @@ channels of one device, as Dev1/ao0 and Dev1/ai0, which share a clock
     def _ask_rates(self, timebase: float | None) -> Rates:
         with self._sentences("connect"):
             device = self._module("system").Device(self._device)
+            if not device.ao_samp_clk_supported:
+                raise DeviceError(
+                    f"{self._output} is on a {device.product_type}, which has no sample clock for "
+                    "its outputs: expected a device that plays a table by its own clock"
+                )
             lowest = max(float(device.ao_min_rate), float(device.ai_min_rate))
             highest = min(float(device.ao_max_rate), float(device.ai_max_single_chan_rate))
             if timebase is None:
