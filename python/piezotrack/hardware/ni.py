@@ -14,12 +14,13 @@ from .._support.arrays import signal_of
 from .._support.messages import quoted
 from ..errors import DeviceError, ParameterError
 from .device import Rates, Record
+from .limits import check_within, ordered
 from .options import Options, required_package
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     Array = NDArray[np.float64]
 
@@ -108,8 +109,8 @@ channels of one device, as Dev1/ao0 and Dev1/ai0, which share a clock
         if self._scale == 0.0:
             raise ParameterError("metres_per_volt is 0: expected the scale of the sensor, in m/V")
         self._offset = finite("offset", offset, "m")
-        self._limits = _ordered("limits", limits)
-        self._sensor = _ordered("sensor", sensor)
+        self._limits = ordered("limits", limits)
+        self._sensor = ordered("sensor", sensor)
         self._memory = _core.as_count("memory", memory)
         self._single: tuple[Any, Any] | None = None
         self._open = True
@@ -193,7 +194,7 @@ channels of one device, as Dev1/ao0 and Dev1/ai0, which share a clock
 
     def exchange(self, volts: float) -> float:
         """Read the displacement [m] and put out a voltage [V], timed by the computer."""
-        self._check(np.array([finite("volts", volts, "V")]))
+        self._check(finite("volts", volts, "V"))
         with self._sentences("exchange"):
             if self._single is None:
                 self._single = self._task("ao"), self._task("ai")
@@ -206,7 +207,7 @@ channels of one device, as Dev1/ao0 and Dev1/ai0, which share a clock
 
     def hold(self, volts: float) -> None:
         """Put out a constant voltage [V] from now on."""
-        self._check(np.array([finite("volts", volts, "V")]))
+        self._check(finite("volts", volts, "V"))
         self._end_single()
         with self._sentences("hold"), self._task("ao") as task:
             task.write(float(volts), auto_start=True)
@@ -280,17 +281,10 @@ channels of one device, as Dev1/ao0 and Dev1/ai0, which share a clock
         )
         return metres
 
-    def _check(self, volts: Array) -> None:
+    def _check(self, volts: ArrayLike) -> None:
         if not self._open:
             raise DeviceError(f"{self._output} is closed")
-        low, high = self._limits
-        beyond = np.flatnonzero((volts < low) | (volts > high))
-        if beyond.size:
-            k = int(beyond[0])
-            raise DeviceError(
-                f"volts is {volts[k]:g} V at sample {k}: {self._output} puts out {low:g} to "
-                f"{high:g} V"
-            )
+        check_within(volts, self._limits, self._output)
 
     def _end_single(self) -> None:
         """Close the tasks of `exchange`, which reserve the channels."""
@@ -314,13 +308,6 @@ channels of one device, as Dev1/ao0 and Dev1/ai0, which share a clock
         except self._error as error:
             said = " ".join(str(error).split())
             raise DeviceError(f"{self._output}, {doing}: the driver says {quoted(said)}") from None
-
-
-def _ordered(name: str, pair: tuple[float, float]) -> tuple[float, float]:
-    low, high = (finite(name, one, "V") for one in pair)
-    if not low < high:
-        raise ParameterError(f"{name} is {low:g} to {high:g} V: expected the lower one first")
-    return low, high
 
 
 def from_address(

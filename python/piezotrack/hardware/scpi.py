@@ -15,6 +15,7 @@ from .._support.messages import quoted
 from .._support.units import require
 from ..errors import DeviceError, ParameterError
 from .device import Rates, Record
+from .limits import check_within, ordered
 from .options import Options
 from .pacing import play_paced
 from .scpi_link import Link, number_of
@@ -22,7 +23,7 @@ from .scpi_link import Link, number_of
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     Array = NDArray[np.float64]
 
@@ -164,10 +165,7 @@ class ScpiDevice:
         timeout: float = TIMEOUT,
     ) -> None:
         self._unit = require(unit, "displacement")
-        low, high = (finite("limits", one, "V") for one in limits)
-        if not low < high:
-            raise ParameterError(f"limits is {low:g} to {high:g} V: expected the lower one first")
-        self._limits = low, high
+        self._limits = ordered("limits", limits)
         _check_template("exchange", exchange, needed="volts")
         self._exchange, self._buffer, self._errors = exchange, buffer, errors
         self._link = Link(host, port, positive("timeout", timeout, "s"))
@@ -203,7 +201,7 @@ class ScpiDevice:
 
         NaN where the instrument says overload (9.9e37) or not a number.
         """
-        self._check(np.array([finite("volts", volts, "V")]))
+        self._check(finite("volts", volts, "V"))
         message = self._exchange.format(volts=volts)
         return self._number(message, self._link.ask(message))
 
@@ -241,7 +239,7 @@ class ScpiDevice:
 
     def hold(self, volts: float) -> None:
         """Put out a constant voltage [V] from now on; what the sensor says does not matter."""
-        self._check(np.array([finite("volts", volts, "V")]))
+        self._check(finite("volts", volts, "V"))
         self._link.ask(self._exchange.format(volts=volts))
         self._check_errors()
 
@@ -294,17 +292,10 @@ class ScpiDevice:
             f"{expected}"
         )
 
-    def _check(self, volts: Array) -> None:
+    def _check(self, volts: ArrayLike) -> None:
         if not self._open:
             raise DeviceError(f"{self._link.where} is closed")
-        low, high = self._limits
-        beyond = np.flatnonzero((volts < low) | (volts > high))
-        if beyond.size:
-            k = int(beyond[0])
-            raise DeviceError(
-                f"volts is {volts[k]:g} V at sample {k}: {self._link.where} puts out {low:g} to "
-                f"{high:g} V"
-            )
+        check_within(volts, self._limits, self._link.where)
 
 
 class _Table:
