@@ -38,7 +38,7 @@ STRESSED = PARTS | {
 }
 
 
-def hostile(controller: pt.Controller, seed: int, steps: int = 6000) -> list[Row]:
+def hostile(controller: pt.Controller, seed: int, steps: int = 3000) -> list[Row]:
     """Blocks of a motion, of jumps, of saturation at either limit, with reports and resets."""
     rng = np.random.default_rng(seed)
     session, rows, x = controller.start(), [], 5e-5
@@ -89,8 +89,8 @@ def test_hostile_inputs_give_the_bits_of_rust(name: str, tmp_path: Path) -> None
     compiled(tmp_path, "check.c", "axis.c")
     for seed in (1, 2):
         rows = hostile(controller, seed)
-        assert sum(row.saturated for row in rows) > 500
+        assert sum(row.saturated for row in rows) > 250
         (tmp_path / "vectors.csv").write_text(vectors_text(rows, "V"))
         code, figures = checked(tmp_path)
         assert (code, figures["largest"], figures["flags"]) == (0, 0.0, 0.0)
-        assert figures["steps"] == 6000
+        assert figures["steps"] == 3000
