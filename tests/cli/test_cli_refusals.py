@@ -22,7 +22,7 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 # The file, the line that is named, and pieces of the sentence.
 BAD_LOGS: dict[str, tuple[Callable[[], str | bytes], int | None, tuple[str, ...]]] = {
-    "empty": (lambda: "", None, ("is empty", "expected a header")),
+    "empty": (lambda: "", None, ("is empty", "is empty: expected a log")),
     "only a header": (lambda: HEADER + "\n", 1, ("no samples",)),
     "no displacement": (
         lambda: lines_with(1, "time_s,voltage_V,strain"),
@@ -269,6 +269,8 @@ def test_refuses_a_bad_argument(command: str) -> None:
         ("identify", "FILE"),
         ("identify log.csv --dynamics quick", "--dynamics"),
         ("simulate dahl.json", "DRIVE"),
+        ("serve scpi", "PROTOCOL"),
+        ("serve gcs --port some", "--port"),
         ("fly", "fly"),
     ],
 )

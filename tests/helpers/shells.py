@@ -81,6 +81,8 @@ OPTIONS: dict[str, list[str]] = {
     "--swarm": ["default", "spso-2011", "none"],
     "--to": ["c99", "json", "fmu", "x", ""],
     "--name": ["axis", "1x", "", "x" * 99, "pid", "\x1b[31m"],
+    "--speed": ["100", *NUMBERS],
+    "--host": ["127.0.0.1", "256.0.0.1", "", "\x1b[31m"],
 }
 COLUMNS = ("--dt", "--unit", "--time", "--drive")
 LOOP = ("--dt", "--limits", "--kp", "--ti", "--td", "--delay", "--jitter", "--seed", "--duration")
@@ -123,11 +125,13 @@ COMMANDS: dict[str, tuple[list[str], tuple[str, ...]]] = {
     "step": (["log.csv"], (*COLUMNS, "--stiffness", "--mass", "--second-level", "--window")),
     "noise": (["log.csv"], ("--dt", "--unit", "--time", "--displacement", "--window")),
     "info": (["log.csv"], (*COLUMNS, "--displacement")),
+    # With a port that there is not: else it would go on until it is stopped.
+    "serve": (["gcs", "--port", "65536"], ("--model", "--limits", "--speed", "--host")),
 }  # fmt: skip
 # Their shares: those that identify take long.
 MIX = (
     ["simulate", "feedforward", "track"] * 4
-    + ["step", "noise", "info", "export"] * 2
+    + ["step", "noise", "info", "export", "serve"] * 2
     + ["contour", "identify", "compare", "benchmark", "tune", "compare-controllers", "learn"]
 )
 
@@ -172,9 +176,12 @@ def invocations(draw: Any, right: list[str]) -> tuple[list[str], dict[str, str]]
         arguments += ["--path", PATHS[0]]
     for option in chosen:
         arguments += [option, draw(st.sampled_from(OPTIONS[option]))]
-    # `info` writes nothing. Others would not be asked any more after they have succeeded once.
+    # These write nothing. Others would not be asked any more after they have succeeded once.
     out = "out/t.csv" if command == "learn" else "out"
-    return [*arguments, *([] if command == "info" else ["--overwrite", "--out", out])], files
+    return [
+        *arguments,
+        *([] if command in ("info", "serve") else ["--overwrite", "--out", out]),
+    ], files
 
 
 def faults_of_command(arguments: list[str]) -> tuple[list[str], int | None]:

@@ -24,6 +24,7 @@ from .info import info_command
 from .learn import learn_command
 from .noise import noise_command
 from .reproduce import reproduce_command
+from .serve import serve_command
 from .simulate import simulate_command
 from .step import step_command
 from .track import feedforward_command, track_command
@@ -101,6 +102,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "compare-controllers": compare_controllers_command,
     "contour": contour_command,
     "noise": noise_command,
+    "serve": serve_command,
     "reproduce": reproduce_command,
     "demo": demo_command,
 }

@@ -42,6 +42,9 @@ from .learning_rules import LiftedRule as LiftedRule
 from .linear_systems import to_control as to_control
 from .neural_network import NetworkInverse as NetworkInverse
 from .neural_network import train_network as train_network
+from .on_device.closed_loop import DeviceTracking as DeviceTracking
+from .on_device.latency import Latency as Latency
+from .on_device.latency import measure_latency as measure_latency
 from .plant import Plant as Plant
 from .scheduled_pid import ScheduledPid as ScheduledPid
 from .session import Command as Command
