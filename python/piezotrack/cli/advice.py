@@ -31,6 +31,7 @@ ADVICE = [
     (r"\bscales=", "--scale", "--scale"),
     (r"\bfree=", "--free", "--free"),
     (r"\bbeyond_reach=True", "--beyond-reach", "--beyond-reach"),
+    (r"\breference=, ", "--reference, ", "--reference"),
     (r"\bunstable=True", "--unstable", "--unstable"),
     (r"pt\.\w+\.from_um\(k[pq]=.*\)", "a value in V/um", "--kp"),
     (r"\bcreep=False", "--creep none", "--creep"),

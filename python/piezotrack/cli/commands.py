@@ -18,6 +18,7 @@ from .contour import contour_command
 from .convert import convert_command
 from .demo import demo_command
 from .error_messages import of_the_system
+from .export import export_command
 from .identify import identify_command
 from .info import info_command
 from .learn import learn_command
@@ -96,6 +97,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "feedforward": feedforward_command,
     "track": track_command,
     "tune": tune_command,
+    "export": export_command,
     "learn": learn_command,
     "compare-controllers": compare_controllers_command,
     "contour": contour_command,

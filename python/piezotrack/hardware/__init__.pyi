@@ -10,5 +10,14 @@ from .drives import decaying as decaying
 from .drives import parse_drive as parse_drive
 from .gcs.device import GcsDevice as GcsDevice
 from .gcs.server import GcsServer as GcsServer
+from .epics import ophyd_player as ophyd_player
+from .epics import serve_epics as serve_epics
 from .measure import measure as measure
+from .ni import NiDevice as NiDevice
+from .pacing import RoundTrip as RoundTrip
+from .pacing import play_paced as play_paced
+from .pacing import round_trip as round_trip
+from .scpi import ScpiBuffer as ScpiBuffer
+from .scpi import ScpiDevice as ScpiDevice
 from .virtual import VirtualDevice as VirtualDevice
+from .virtual_scpi import VirtualScpi as VirtualScpi

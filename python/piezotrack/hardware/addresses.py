@@ -18,6 +18,8 @@ __all__ = ["SCHEMES", "connect"]
 
 # Where each scheme is: a module with `from_address(host, port, path, options)`.
 SCHEMES: Mapping[str, str] = {
+    "ni": "ni",
+    "scpi": "scpi",
     "virtual": "virtual",
     "gcs": "gcs.device",
 }
@@ -33,6 +35,8 @@ def connect(address: str) -> Device:
         identified one. ``gcs://HOST[:PORT][/AXIS]``: a controller that speaks GCS, port 50000 and
         axis 1 where they are not given; ``?limits=LOW:HIGH`` [V], ``factor=`` and ``timeout=`` as
         of `GcsDevice`.
+        identified one; ``ni:Dev1/ao0,Dev1/ai0?scale=10um/V&limits=0..7.5V`` as `NiDevice`;
+        ``scpi://HOST:PORT?unit=um&limits=0..75V`` as `ScpiDevice`.
 
     Returns
     -------

@@ -214,7 +214,7 @@ def _values(kind: Kind, text: str) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for item in filter(None, (part.strip() for part in text.split(","))):
         keyword, equals, written = (part.strip() for part in item.rpartition("="))
-        numbers, quantity, join = _item(written)
+        numbers, quantity, join = numbers_with_unit(written)
         if equals and keyword not in kind.keywords:
             known = ", ".join(kind.keywords)
             raise ParameterError(f"{quoted(keyword)} is not one of {known}: {kind.expected}")
@@ -236,7 +236,7 @@ def _values(kind: Kind, text: str) -> dict[str, Any]:
     return values
 
 
-def _item(text: str) -> tuple[list[float], str, str]:
+def numbers_with_unit(text: str) -> tuple[list[float], str, str]:
     """Parse one value or several: the numbers in SI, their quantity and their separator."""
     if "..." in text:
         raise ParameterError(f"{quoted(text)} has three dots: expected two, as in 0..110um")

@@ -1,0 +1,170 @@
+"""Messages and answers of an instrument over TCP: one line each."""
+
+from __future__ import annotations
+
+import re
+import socket
+import time
+
+from .._support.messages import quoted
+from .._support.units import Unit, lookup
+from ..errors import DeviceError
+
+__all__ = ["Link", "number_of"]
+
+# Longest answer [bytes]: a million numbers.
+LONGEST = 20_000_000
+# IEEE 488.2 and SCPI write infinity as 9.9e37 and not-a-number as 9.91e37.
+OVERLOAD = 9.9e37
+NO_NUMBER = ("NAN", "INF", "+INF", "-INF", "NINF")
+_ANSWER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s.+-]*)")
+
+
+class Link:
+    """A TCP connection that asks and tells in lines, with a time limit.
+
+    A message leaves in one segment, without Nagle's algorithm. After a failure the connection is
+    given up, and the next message makes a new one: an answer that comes late is never taken for
+    that of the next message.
+
+    Parameters
+    ----------
+    host : str
+        Name or address.
+    port : int
+        TCP port.
+    timeout : float
+        Time limit of an answer [s].
+    """
+
+    def __init__(self, host: str, port: int, timeout: float) -> None:
+        self._host, self._port, self._timeout = host, port, timeout
+        self.where = f"{host}:{port}"
+        self._socket: socket.socket | None = None
+        self._open()
+
+    def tell(self, message: str) -> None:
+        """Send a message that has no answer."""
+        self._send(self._ready(), message)
+
+    def ask(self, message: str, *, patience: float = 0.0) -> str:
+        """Send a message and return its answer, which is one line.
+
+        Raises
+        ------
+        DeviceError
+            No connection, no answer or half of one within the time limit, or more than one.
+        """
+        link = self._ready()
+        self._send(link, message)
+        limit = self._timeout + patience
+        parts: list[bytes] = []
+        end, length = time.monotonic() + limit, 0
+        while True:
+            try:
+                link.settimeout(max(end - time.monotonic(), 1e-6))
+                part = link.recv(65536)
+            except TimeoutError:
+                raise self._failed(message, b"".join(parts), f"within {limit:g} s") from None
+            except OSError as error:
+                raise self._failed(message, b"".join(parts), str(error)) from None
+            if not part:
+                raise self._failed(message, b"".join(parts), "and closed the connection")
+            parts.append(part)
+            length += len(part)
+            if b"\n" in part:
+                break
+            if length > LONGEST:
+                raise self._failed(message, b"".join(parts), f"in {LONGEST} bytes")
+        line, _, more = b"".join(parts).partition(b"\n")
+        if more:
+            self.close()
+            raise DeviceError(
+                f"{self.where} answered {quoted(message)} with {quoted(_text(line))} and then "
+                f"{quoted(_text(more))}: expected one line"
+            )
+        return _text(line).strip()
+
+    def close(self) -> None:
+        """Close the connection."""
+        link, self._socket = self._socket, None
+        if link is not None:
+            link.close()
+
+    def _open(self) -> socket.socket:
+        try:
+            link = socket.create_connection((self._host, self._port), timeout=self._timeout)
+        except OSError as error:
+            raise DeviceError(
+                f"{self.where} does not answer: {error.strerror or error}; expected an instrument "
+                "that takes messages over TCP there"
+            ) from None
+        # Else a second message waits for the acknowledgement of the first.
+        link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._socket = link
+        return link
+
+    def _ready(self) -> socket.socket:
+        """Return the connection, a new one where the last was given up; nothing waits in it."""
+        if self._socket is None:
+            return self._open()
+        link = self._socket
+        try:
+            link.setblocking(False)
+            unasked = link.recv(4096)
+        except BlockingIOError:
+            return link
+        except OSError:
+            unasked = b""
+        self.close()
+        if unasked:
+            raise DeviceError(
+                f"{self.where} sent {quoted(_text(unasked))} unasked: expected answers only"
+            )
+        # It closed the connection while nothing was asked.
+        return self._open()
+
+    def _send(self, link: socket.socket, message: str) -> None:
+        try:
+            link.settimeout(self._timeout)
+            link.sendall(message.encode("ascii") + b"\n")
+        except OSError as error:
+            self.close()
+            raise DeviceError(
+                f"{self.where} did not take {quoted(message)}: {error.strerror or error}"
+            ) from None
+
+    def _failed(self, message: str, got: bytes, why: str) -> DeviceError:
+        self.close()
+        if got:
+            said = f"answered {quoted(message)} with {quoted(_text(got))}, no end of line"
+            return DeviceError(f"{self.where} {said} {why}: expected a whole line")
+        return DeviceError(f"{self.where} did not answer {quoted(message)} {why}")
+
+
+def _text(raw: bytes) -> str:
+    return raw.decode("ascii", errors="backslashreplace")
+
+
+def number_of(answer: str, unit: Unit) -> float:
+    """Return a displacement [m] as an instrument wrote it in `unit`; NaN for an overload.
+
+    Raises
+    ------
+    ValueError
+        It is no number, or has another unit behind it.
+
+    Examples
+    --------
+    >>> from piezotrack._support.units import require
+    >>> number_of("+1.5E+00", require("um")), number_of("9.91E37", require("um"))
+    (1.5e-06, nan)
+    """
+    text = answer.strip()
+    if text.upper() in NO_NUMBER:
+        return float("nan")
+    match = _ANSWER.fullmatch(text)
+    if match is None or (match[2] and lookup(match[2]) != unit):
+        raise ValueError(answer)
+    number = float(match[1])
+    return float("nan") if abs(number) >= OVERLOAD else number * unit.factor / unit.divisor

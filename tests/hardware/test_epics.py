@@ -1,0 +1,173 @@
+"""EPICS on this computer: softioc in one process, ophyd-async and Bluesky in another."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import piezotrack as pt
+from folders import ROOT
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+PREFIX = "LAB:STAGE"
+# In the client: a table, and what is printed at the end comes back as JSON.
+CLIENT = """
+import asyncio, json
+import numpy as np
+import piezotrack as pt
+volts = 30.0 - 30.0 * np.cos(np.arange(400) / 60.0)
+stage = pt.hardware.ophyd_player("LAB:STAGE", name="stage")
+async def main():
+    await stage.connect()
+{body}
+    return found
+found = {{}}
+asyncio.run(main())
+print(json.dumps(found))
+"""
+PLAY = """
+    await stage.prepare((volts, 500.0))
+    await stage.kickoff()
+    await stage.complete()
+    read = await stage.read()
+    found["record"] = read["stage-record"]["value"].tolist()
+    found["table"] = read["stage-table"]["value"].tolist()
+    found["held"] = await stage.voltage.get_value()
+"""
+REFUSED = """
+    await stage.voltage.set(10.0)
+    try:
+        await stage.voltage.set(90.0)
+    except Exception as error:
+        found["put"] = type(error).__name__
+    found["held"] = await stage.voltage.get_value()
+    await stage.prepare((np.full(3, 80.0), 500.0))
+    await stage.kickoff()
+    try:
+        await stage.complete()
+    except pt.DeviceError as error:
+        found["play"] = str(error)
+    try:
+        await stage.complete()
+    except pt.DeviceError as error:
+        found["nothing"] = str(error)
+"""
+HELD = """
+    await stage.voltage.set(50.0)
+    await asyncio.sleep(1.0)
+    found["position"] = await stage.position.get_value()
+"""
+PLAN = """
+import json
+import bluesky.plan_stubs as bps
+import numpy as np
+import piezotrack as pt
+from bluesky import RunEngine
+from ophyd_async.core import init_devices
+engine = RunEngine()
+with init_devices():
+    stage = pt.hardware.ophyd_player("LAB:STAGE", name="stage")
+events = []
+def plan():
+    yield from bps.open_run()
+    yield from bps.prepare(stage, (np.linspace(0.0, 20.0, 50), 500.0), wait=True)
+    yield from bps.kickoff(stage, wait=True)
+    yield from bps.complete(stage, wait=True)
+    yield from bps.trigger_and_read([stage])
+    yield from bps.close_run()
+engine(plan(), lambda name, doc: events.append((name, doc)))
+(event,) = [doc for name, doc in events if name == "event"]
+print(json.dumps(np.asarray(event["data"]["stage-record"]).tolist()))
+"""
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as tcp:
+        tcp.bind(("127.0.0.1", 0))
+        return int(tcp.getsockname()[1])
+
+
+@pytest.fixture(scope="module")
+def surroundings() -> Iterator[dict[str, str]]:
+    """Serve the virtual stage in a process of its own: the environment in which it is found."""
+    port = str(free_port())
+    paths = os.pathsep.join(filter(None, [str(ROOT / "python"), os.environ.get("PYTHONPATH")]))
+    here = {
+        **os.environ,
+        "EPICS_CA_SERVER_PORT": port,
+        "EPICS_CA_REPEATER_PORT": str(free_port()),
+        "EPICS_CA_ADDR_LIST": "127.0.0.1",
+        "EPICS_CA_AUTO_ADDR_LIST": "NO",
+        "PYTHONPATH": paths,
+    }
+    command = [sys.executable, "-m", "piezotrack.hardware.epics", "virtual:", PREFIX]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=here) as child:
+        try:
+            assert child.stdout is not None
+            assert any(line.strip() == PREFIX for line in child.stdout), "it ended at once"
+            yield here
+        finally:
+            child.kill()
+
+
+def ask(program: str, surroundings: dict[str, str]) -> Any:
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(
+        command, env=surroundings, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def test_prepare_kickoff_complete_are_a_play(surroundings: dict[str, str]) -> None:
+    found = ask(CLIENT.format(body=PLAY), surroundings)
+    volts = 30.0 - 30.0 * np.cos(np.arange(400) / 60.0)
+    alone = pt.hardware.connect("virtual:").play(volts, 500.0)
+    np.testing.assert_array_equal(found["table"], volts)
+    # What differs is the sensor's noise: the server has read the stage at rest before.
+    np.testing.assert_allclose(found["record"], 1e6 * alone.displacement, atol=1.0)
+    assert np.ptp(found["record"]) > 50.0
+    assert found["held"] == volts[-1]
+
+
+def test_what_is_refused_is_said_and_puts_nothing_out(surroundings: dict[str, str]) -> None:
+    found = ask(CLIENT.format(body=REFUSED), surroundings)
+    assert found["held"] == 10.0
+    assert "stage: Table is 80 V at sample 0: expected 0 to 75 V" in found["play"]
+    assert "expected kickoff before complete" in found["nothing"]
+
+
+def test_a_voltage_moves_the_position(surroundings: dict[str, str]) -> None:
+    found = ask(CLIENT.format(body=HELD), surroundings)
+    assert 40.0 < found["position"] < 110.0
+
+
+def test_a_plan_of_bluesky_flies_it(surroundings: dict[str, str]) -> None:
+    record = ask(PLAN, surroundings)
+    assert len(record) == 50
+    assert np.all(np.isfinite(record))
+
+
+def test_without_the_packages_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    device = pt.hardware.connect("virtual:")
+    monkeypatch.setitem(sys.modules, "softioc.builder", None)
+    monkeypatch.setitem(sys.modules, "ophyd_async.epics.core", None)
+    with pytest.raises(pt.DeviceError, match=r"softioc, .*piezotrack\[epics\]"):
+        pt.hardware.serve_epics(device, PREFIX)
+    with pytest.raises(pt.DeviceError, match=r"ophyd_async, .*piezotrack\[epics\]"):
+        pt.hardware.ophyd_player(PREFIX)
+
+
+@pytest.mark.parametrize("prefix", ["", "LAB STAGE", "Bühne", 3])
+def test_prefixes_that_are_refused(prefix: Any) -> None:
+    with pytest.raises(pt.ParameterError, match="expected the start of names"):
+        pt.hardware.serve_epics(pt.hardware.connect("virtual:"), prefix)
