@@ -1,6 +1,6 @@
 # What a person types. Needs a Rust toolchain and Python 3.11 or newer; all else is put in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo reproduce benchmark test soak fuzz lint rust-test no-std python-test bench docs reference clean
+.PHONY: help demo reproduce benchmark test soak fuzz lint rust-test no-std python-test bench docs reference refused clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -73,6 +73,9 @@ docs: ## The crates' pages
 
 reference: $(VENV)/installed ## Write docs/reference from the commands and docstrings
 	$(BIN)/python docs/make_reference.py
+
+refused: $(VENV)/installed $(VENV)/tools ## Write docs/refused-logs.md: bad logs, and what is said of each
+	$(BIN)/python docs/make_refused_logs.py
 
 clean: ## Remove what was built, not your results
 	rm -rf $(VENV) target demo report

@@ -16,6 +16,7 @@ from .control.components import Pid as Pid
 from .control.components import Repetitive as Repetitive
 from .control.contouring import contour as contour
 from .control.controller import Controller as Controller
+from .control.controller_file import load_controller as load_controller
 from .control.learning import learn as learn
 from .control.linear_systems import to_control as to_control
 from .control.on_device.playing import play as play
@@ -59,6 +60,9 @@ from .references.waveforms import staircase as staircase
 from .references.waveforms import triangle as triangle
 from .references.xy_reference import XYReference as XYReference
 from .stages.asymmetric_bouc_wen import AsymmetricBoucWenStage as AsymmetricBoucWenStage
+from .stages.asymmetric_prandtl_ishlinskii import (
+    AsymmetricPrandtlIshlinskiiStage as AsymmetricPrandtlIshlinskiiStage,
+)
 from .stages.bouc_wen import BoucWenStage as BoucWenStage
 from .stages.bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
 from .stages.dahl import DahlStage as DahlStage

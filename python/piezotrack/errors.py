@@ -62,7 +62,15 @@ class NumericalError(PiezotrackError, ArithmeticError):
 
 
 class DeviceError(PiezotrackError, RuntimeError):
-    """A device did not do what it was asked, or does not answer: says which, and what it said."""
+    """A device did not do what it was asked, or does not answer: says which, and what it said.
+
+    Attributes
+    ----------
+    partial : piezotrack.control.tracking.Tracking or None
+        Of a loop that was closed on it, the run up to then.
+    """
+
+    partial: Any = None
 
 
 class ExecutorError(PiezotrackError, RuntimeError):

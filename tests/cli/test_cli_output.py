@@ -143,6 +143,7 @@ def test_settings_of_least_squares_reach_the_fit() -> None:
 
 
 @pytest.mark.usefixtures("_no_pictures")
+@pytest.mark.usefixtures("_no_pictures")
 def test_creep_reaches_what_auto_tries() -> None:
     ran("identify", "log.csv", "--creep", "0.5", "--runs", "1", "--seed", "2", "--quiet")
     (name,) = names("results")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+import piezotrack as pt
 from commands import HEADER, column, lines_with, log_text, refusal, run, write, write_model
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 # The file, the line that is named, and pieces of the sentence.
 BAD_LOGS: dict[str, tuple[Callable[[], str | bytes], int | None, tuple[str, ...]]] = {
-    "empty": (lambda: "", None, ("is empty", "expected a header")),
+    "empty": (lambda: "", None, ("is empty", "is empty: expected a log")),
     "only a header": (lambda: HEADER + "\n", 1, ("no samples",)),
     "no displacement": (
         lambda: lines_with(1, "time_s,voltage_V,strain"),
@@ -216,6 +217,17 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
     f"{LEARN} --seed -1 --noise-nm 5": ("seed is -1", "0 or above"),
     f"{LEARN} --limits 75:0": ("limits", "the lower one first"),
     f"{LEARN} --noise-nm -1": ("--noise-nm is -1", "0 or above"),
+    "export loop.json --out file": ("file cannot be made a folder",),
+    "export loop.json --json --quiet": ("--json and --quiet", "at most"),
+    "export loop.json --name 1x": ("name is '1x'", "a letter, then letters"),
+    "export loop.json --reference sine:1Hz,0..9um": ("loop.json: reference is given", "no feedf"),
+    "export loop.json --reference gone.csv": ("gone.csv: there is no such file",),
+    "export loop.json --to json --float": ("--float", "expected it left out"),
+    "export loop.json --period 2": ("--period has no effect without --reference",),
+    "export gone.json": ("gone.json: no such file",),
+    "export log.csv": ("log.csv:1: not JSON",),
+    "export dahl.json": ("dahl.json is not a piezotrack controller",),
+    "export 1.json": ("name is '1'", "--name gives one"),
     "demo --out file": ("file cannot be made a folder",),
     "demo --seed -1": ("seed is -1", "0 or above"),
 }
@@ -226,6 +238,7 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
 def test_refuses_a_bad_argument(command: str) -> None:
     write("file", "not a folder")
     write("other.json", "{}")
+    pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010()).save("loop.json")
     write("bad.csv", "time_s,target_um\n0,1\n0.1,high\n")
     write("huge.csv", "time_s,voltage_V\n0,0\n1,-1e9\n2,0\n3,1e9\n")
     write_model()
@@ -256,6 +269,8 @@ def test_refuses_a_bad_argument(command: str) -> None:
         ("identify", "FILE"),
         ("identify log.csv --dynamics quick", "--dynamics"),
         ("simulate dahl.json", "DRIVE"),
+        ("serve scpi", "PROTOCOL"),
+        ("serve gcs --port some", "--port"),
         ("fly", "fly"),
     ],
 )

@@ -51,7 +51,10 @@ def controller(document: dict[str, Any], **parts: Any) -> pt.Controller:
 def test_what_is_written_is_a_loop_that_keeps_the_margins_and_the_error() -> None:
     options = ("--noise-nm", "30", "--seed", "3", "--delay", "0.002", "--parts", "pid,low-pass")
     printed = ran("tune", "dahl.json", *COURSE, "--dt", "0.02", *options)
-    assert names("results") == ["tuned.png", "tuned.svg", "tuning.json"]
+    assert names("results") == ["controller.json", "tuned.png", "tuned.svg", "tuning.json"]
+    loaded = pt.load_controller("results/controller.json")
+    assert loaded.provenance is not None
+    assert [one["name"] for one in loaded.provenance["design"]["kept"]]
     document = report()
     assert document["format"] == "piezotrack-tuning"
     assert [one["kind"] for one in document["filters"]] == ["LowPass"]
@@ -84,7 +87,7 @@ def test_margins_alone_give_gains_without_a_reference() -> None:
     document = parsed(printed)
     assert document["references"] == []
     assert document["loops"] == 0
-    assert document.pop("written") == ["results/tuning.json"]
+    assert document.pop("written") == ["results/tuning.json", "results/controller.json"]
     assert document == report()
     # More delay and a stricter margin cost integral gain.
     ran("tune", "dahl.json", *QUICK, "--delay", "0.02", "--sensitivity", "1.4", "--overwrite")

@@ -6,9 +6,9 @@ most slots of a call right and draws the rest, so that the calls get past the fi
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -45,7 +45,7 @@ NOT_SIGNALS: list[Any] = [
 ]
 
 
-@dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True)
 class Slot:
     """An argument: `right` is a value or a strategy, `other` a strategy."""
 
@@ -140,6 +140,24 @@ def wave(seed: int, longest: int, size: float) -> np.ndarray[Any, np.dtype[np.fl
 def anything(right: Any, *others: Any) -> Slot:
     """A value and others that may stand in its place."""
     return Slot(right, st.one_of(st.sampled_from(others), _sampled(NOT_NUMBERS)))
+
+
+def slots_of(value: Any, **others: Slot) -> dict[str, Slot]:
+    """Slots for the fields of a dataclass, with its values as those that are right."""
+    made: dict[str, Slot] = {}
+    for field in dataclasses.fields(value):
+        right = getattr(value, field.name)
+        if isinstance(right, bool):
+            made[field.name] = truth(right)
+        elif isinstance(right, int):
+            made[field.name] = count(right)
+        elif isinstance(right, float):
+            made[field.name] = number(right)
+        elif isinstance(right, tuple):
+            made[field.name] = numbers(*right)
+        elif right is None:
+            made[field.name] = number(None)
+    return {**made, **others}
 
 
 def arguments(draw: Draw, slots: Mapping[str, Slot], *, most: int = 3) -> dict[str, Any]:

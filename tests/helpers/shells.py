@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import re
+from functools import cache
 from typing import Any
 
 from hypothesis import strategies as st
 
+import piezotrack as pt
 from commands import run
 from mutants import changed_document, log
+from piezotrack.control.controller_file import document_of
 from soak import LONGEST_MESSAGE, bad_message, judged
 
 NUMBERS = ["0.02", "0", "-1", "nan", "inf", "1e-9", "1e9", "1e300", "x", "", "\u0663", "1_0"]
@@ -75,6 +79,10 @@ OPTIONS: dict[str, list[str]] = {
     "--cutoff": ["5", "24", *NUMBERS],
     "--mode-scales": ["1", "0.9,1,1.1", "1,", "x", "0", "1e300,1"],
     "--swarm": ["default", "spso-2011", "none"],
+    "--to": ["c99", "json", "fmu", "x", ""],
+    "--name": ["axis", "1x", "", "x" * 99, "pid", "\x1b[31m"],
+    "--speed": ["100", *NUMBERS],
+    "--host": ["127.0.0.1", "256.0.0.1", "", "\x1b[31m"],
 }
 COLUMNS = ("--dt", "--unit", "--time", "--drive")
 LOOP = ("--dt", "--limits", "--kp", "--ti", "--td", "--delay", "--jitter", "--seed", "--duration")
@@ -108,6 +116,7 @@ COMMANDS: dict[str, tuple[list[str], tuple[str, ...]]] = {
         (*COLUMNS, "--displacement", "--hold", "--window", "--threads", "--fix", "--bound",
          "--free", "--model", "--stiffness", "--delay", "--swarm", "--seed"),
     ),
+    "export": (["controller.json"], ("--to", "--name", "--reference", "--duration", "--period")),
     "compare": (["log.csv", "--runs", "1"], (*COLUMNS, "--train", "--test", "--model", "--seed")),
     "benchmark": (
         ["log.csv", "--model", "plays-nnls"],
@@ -116,13 +125,31 @@ COMMANDS: dict[str, tuple[list[str], tuple[str, ...]]] = {
     "step": (["log.csv"], (*COLUMNS, "--stiffness", "--mass", "--second-level", "--window")),
     "noise": (["log.csv"], ("--dt", "--unit", "--time", "--displacement", "--window")),
     "info": (["log.csv"], (*COLUMNS, "--displacement")),
+    # With a port that there is not: else it would go on until it is stopped.
+    "serve": (["gcs", "--port", "65536"], ("--model", "--limits", "--speed", "--host")),
 }  # fmt: skip
 # Their shares: those that identify take long.
 MIX = (
     ["simulate", "feedforward", "track"] * 4
-    + ["step", "noise", "info"] * 2
+    + ["step", "noise", "info", "export", "serve"] * 2
     + ["contour", "identify", "compare", "benchmark", "tune", "compare-controllers", "learn"]
 )
+
+
+@cache
+def controller_text() -> str:
+    """A controller of many parts, as a file has it."""
+    loop = pt.Controller(
+        dt=0.02,
+        limits=(0.0, 75.0),
+        feedforward=pt.DahlStage.xu_li_2010().inverse(),
+        feedback=pt.control.DisturbanceObserver(
+            pid=pt.Pid.from_um(kp=0.05, ti=0.02), plant_gain=1.5e-6, cutoff=1.0
+        ),
+        repetitive=pt.Repetitive.from_um(period=1.0, kq=0.3, tq=0.05),
+        filters=[pt.LowPass(5.0), pt.Notch(12.0)],
+    )
+    return json.dumps(document_of(loop))
 
 
 @st.composite
@@ -133,6 +160,7 @@ def invocations(draw: Any, right: list[str]) -> tuple[list[str], dict[str, str]]
     text = draw(st.sampled_from(right))
     files = {
         "model.json": changed_document(draw, text) if draw(st.integers(0, 3)) else text,
+        "controller.json": changed_document(draw, controller_text()),
         "log.csv": log(),
         "reference.csv": log(titles="time_s,voltage_V,target_um"),
         "path.csv": log(titles="time_s,x_um,y_um"),
@@ -148,9 +176,12 @@ def invocations(draw: Any, right: list[str]) -> tuple[list[str], dict[str, str]]
         arguments += ["--path", PATHS[0]]
     for option in chosen:
         arguments += [option, draw(st.sampled_from(OPTIONS[option]))]
-    # `info` writes nothing. Others would not be asked any more after they have succeeded once.
+    # These write nothing. Others would not be asked any more after they have succeeded once.
     out = "out/t.csv" if command == "learn" else "out"
-    return [*arguments, *([] if command == "info" else ["--overwrite", "--out", out])], files
+    return [
+        *arguments,
+        *([] if command in ("info", "serve") else ["--overwrite", "--out", out]),
+    ], files
 
 
 def faults_of_command(arguments: list[str]) -> tuple[list[str], int | None]:

@@ -182,7 +182,7 @@ def test_rate_dependent_plays_follow_their_equations(monkeypatch: pytest.MonkeyP
     assert np.abs(made_up.rate_dependent_plays(u, dt) - plays.simulate(u, dt).x).max() < 1e-15
 
 
-@pytest.mark.parametrize("name", ["creep", "mode", "asymmetry", "rate-1hz"])
+@pytest.mark.parametrize("name", ["creep", "mode", "asymmetry", "rate-1hz", "rate-three"])
 def test_a_made_up_record_has_its_noise_and_begins_at_rest(name: str) -> None:
     one = RECORDS[name]()
     assert one.noise == 20e-9
@@ -192,6 +192,23 @@ def test_a_made_up_record_has_its_noise_and_begins_at_rest(name: str) -> None:
     # Nothing of the rest is in the part that is fitted.
     assert one.fitted.t[-1] < one.rest.t[0]
     assert one.fitted.warmup == 0
+
+
+def test_one_record_of_three_rates_tells_the_rate() -> None:
+    """Plays that know the rate are at the noise at each one, others are off at the fast one."""
+    (one,) = records_named(["rate-three"])
+    assert list(one.others) == ["at 0.1 Hz", "at 1 Hz", "at 10 Hz"]
+    assert [round(1.0 / (200 * log.dt), 6) for log in one.others.values()] == [0.1, 1.0, 10.0]
+    # One cycle of the slowest, four and 24 of the others.
+    assert one.fitted.duration == pytest.approx(10.0 + 4.0 + 2.4)
+    for model, limits in (
+        ("rate-dependent-prandtl-ishlinskii", [0.0, 1.25]),
+        ("prandtl-ishlinskii", [3.0, 6.0]),
+    ):
+        fit = pt.identify(one.fitted, model)
+        errors = [fit.score(log).rms for log in one.others.values()]
+        assert limits[0] < errors[2] / 20e-9 < limits[1], model
+        assert max(errors[:2]) < 2.0 * 20e-9, model
 
 
 def test_the_package_finds_asymmetry_to_the_noise() -> None:

@@ -8,7 +8,9 @@ import random
 import subprocess
 import sys
 import textwrap
-from typing import TYPE_CHECKING, Any
+import time
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,9 +18,6 @@ import pytest
 import piezotrack as pt
 from commands import ran, refusal
 from piezotrack.data.log_file import write_log
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 DT = 1e-3
 
@@ -104,11 +103,16 @@ SEARCH = """
 
 
 def killed(arguments: list[str], after: float) -> str:
-    """Search in another process that is killed after so many seconds; what it says if it ends."""
+    """Search in another process that is killed so many seconds after its first checkpoint is there.
+
+    Returns what it says if it ends before.
+    """
     command = [sys.executable, "-c", textwrap.dedent(SEARCH), *arguments]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "begun\n"
+        while not Path(arguments[1]).exists() and process.poll() is None:
+            time.sleep(0.01)
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(after)
         process.kill()
@@ -117,7 +121,8 @@ def killed(arguments: list[str], after: float) -> str:
 
 @pytest.mark.parametrize("kills", [3, pytest.param(50, marks=pytest.mark.slow)])
 def test_a_killed_search_goes_on(kills: int, tmp_path: Path) -> None:
-    log = record(count=10_000)
+    # Long enough that it is killed within.
+    log = record(count=4_000 if kills < 10 else 10_000)
     np.save(tmp_path / "log.npy", np.array([log.u, log.y]))
     path = tmp_path / "search.checkpoint"
     arguments = [str(tmp_path / "log.npy"), str(path)]

@@ -24,6 +24,7 @@ HEADLINE = {
     "generalised-prandtl-ishlinskii": (0.27, 0.28, 0.50),
     "rate-dependent-prandtl-ishlinskii": (0.27, 0.28, 0.39),
     "polynomial-prandtl-ishlinskii": (0.33, 0.34, 0.83),
+    "asymmetric-prandtl-ishlinskii": (0.17, 0.19, 0.34),
     "preisach": (0.16, 0.20, 0.54),
     "duhem": (0.19, 0.22, 0.93),
 }

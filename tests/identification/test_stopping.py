@@ -183,7 +183,7 @@ log = pt.Dataset(u=u, y=y, dt=1 / 250.0)
 
 def search():
     swarm = pt.ParticleSwarm(particles=12, iterations=20)
-    return pt.identify(log, swarm=swarm, seed=1, threads=3).cost.hex()
+    return pt.identify(log, "dahl", swarm=swarm, seed=1, threads=3).cost.hex()
 
 before = search()
 reading, writing = os.pipe()

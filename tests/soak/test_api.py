@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from odd_values import (
     number,
     numbers,
     signal,
+    slots_of,
     texts,
     truth,
     word,
@@ -45,24 +45,6 @@ DAHL = pt.DahlStage.xu_li_2010()
 VIRTUAL = pt.VirtualStage.xu_li_2010(seed=1)
 SINE = pt.sine(frequency=1.0, low=0.0, high=50e-6, duration=1.0)
 TINY = pt.ParticleSwarm(particles=4, iterations=3)
-
-
-def slots_of(value: Any, **others: Slot) -> dict[str, Slot]:
-    """Slots for the fields of a dataclass, with its values as those that are right."""
-    made: dict[str, Slot] = {}
-    for field in dataclasses.fields(value):
-        right = getattr(value, field.name)
-        if isinstance(right, bool):
-            made[field.name] = truth(right)
-        elif isinstance(right, int):
-            made[field.name] = count(right)
-        elif isinstance(right, float):
-            made[field.name] = number(right)
-        elif isinstance(right, tuple):
-            made[field.name] = numbers(*right)
-        elif right is None:
-            made[field.name] = number(None)
-    return {**made, **others}
 
 
 # Whether so many samples are work and not a mistake, and too many here.

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable, Sequence
 from itertools import islice
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
@@ -23,6 +24,7 @@ __all__ = [
     "check_length",
     "check_reach",
     "finite",
+    "has_entries",
     "hertz",
     "in_range",
     "not_negative",
@@ -193,6 +195,19 @@ def numbers(
     return array
 
 
+def has_entries(value: object) -> TypeGuard[Iterable[Any]]:
+    """Whether a value is several: texts are one, and so is an array of no dimension.
+
+    Examples
+    --------
+    >>> has_entries([1.0]), has_entries("mass"), has_entries(np.array(1.0))
+    (True, False, False)
+    """
+    if isinstance(value, (str, bytes, os.PathLike)) or getattr(value, "ndim", 1) == 0:
+        return False
+    return isinstance(value, Iterable)
+
+
 def as_numbers(name: str, values: object) -> tuple[float, ...]:
     """Return a sequence of numbers as a tuple of floats.
 
@@ -201,7 +216,7 @@ def as_numbers(name: str, values: object) -> tuple[float, ...]:
     >>> as_numbers("thresholds", [1, 2.5])
     (1.0, 2.5)
     """
-    if not isinstance(values, Iterable) or isinstance(values, (str, bytes)):
+    if not has_entries(values):
         raise ParameterError(f"{name} is {quoted(values)}: expected numbers in a list")
     entries = _entries(name, values)
     return tuple(_core.as_number(f"{name}[{i}]", value) for i, value in enumerate(entries))

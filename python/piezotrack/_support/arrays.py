@@ -74,7 +74,7 @@ def time_fault(
         if (uneven := _first(~(np.abs(steps - typical) <= UNEVEN * typical))) is not None:
             return uneven + 1, (
                 f"t is not even: it goes {steps[uneven]:.6g} s forward to sample {uneven + 1}, "
-                f"where most steps are {typical:.6g} s; {remedy}"
+                f"where most steps are {typical:.6g} s: expected even times; {remedy}"
             )
         if (drifted := _first(~(departure <= UNEVEN * dt))) is not None:
             return drifted, (

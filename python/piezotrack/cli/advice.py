@@ -31,6 +31,7 @@ ADVICE = [
     (r"\bscales=", "--scale", "--scale"),
     (r"\bfree=", "--free", "--free"),
     (r"\bbeyond_reach=True", "--beyond-reach", "--beyond-reach"),
+    (r"\breference=, ", "--reference, ", "--reference"),
     (r"\bunstable=True", "--unstable", "--unstable"),
     (r"pt\.\w+\.from_um\(k[pq]=.*\)", "a value in V/um", "--kp"),
     (r"\bcreep=False", "--creep none", "--creep"),
@@ -43,6 +44,7 @@ ADVICE = [
     (r"\brates (?=begins|ends)", "--rates ", "--rates"),
     (r"\bmode_scales is ", "--mode-scales is ", "--mode-scales"),
     (r"\bmargins\.sensitivity is ", "--sensitivity is ", "--sensitivity"),
+    (r"^(speed|port|host|limits) (?=is|are)", r"--\1 ", "--speed"),
     (r"\blog\[([^\]]*)\]", r"--window \1", "--window"),
     *(
         (rf"(?<!--unit )\b{name}=(?!\.\.\.) ?", f"--{name} ", f"--{name}")

@@ -18,11 +18,13 @@ from .contour import contour_command
 from .convert import convert_command
 from .demo import demo_command
 from .error_messages import of_the_system
+from .export import export_command
 from .identify import identify_command
 from .info import info_command
 from .learn import learn_command
 from .noise import noise_command
 from .reproduce import reproduce_command
+from .serve import serve_command
 from .simulate import simulate_command
 from .step import step_command
 from .track import feedforward_command, track_command
@@ -95,10 +97,12 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "feedforward": feedforward_command,
     "track": track_command,
     "tune": tune_command,
+    "export": export_command,
     "learn": learn_command,
     "compare-controllers": compare_controllers_command,
     "contour": contour_command,
     "noise": noise_command,
+    "serve": serve_command,
     "reproduce": reproduce_command,
     "demo": demo_command,
 }

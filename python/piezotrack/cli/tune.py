@@ -105,7 +105,7 @@ def tune_command(
     settings = Loop(True, dt, limits, None, None, None, None)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     pictures = [name for i in range(len(desired)) for name in picture_files(_name(i))]
-    result.will_write(["tuning.json", *pictures])
+    result.will_write(["tuning.json", "controller.json", *pictures])
     tuned = tune(
         [VirtualStage.of(known, noise=noise_metres(noise_nm), bandwidth=bandwidth, seed=seed)],
         desired or None,
@@ -177,12 +177,14 @@ def _document(tuned: Tuned) -> dict[str, Any]:
 
 
 def _write(tuned: Tuned, document: dict[str, Any], out: Path) -> list[Path]:
-    """Write the settings as JSON, and a picture of the loop along each reference."""
+    """Write report and controller as JSON, and a picture of the loop along each reference."""
     from .._support.files import make_folder, save_figures, together, write_document
+    from ..control.controller_file import save_controller
 
     with together(make_folder(out)) as folder:
         pictures = {_name(i): run.plot() for i, run in enumerate(tuned.report.runs)}
         return [
             write_document(folder / "tuning.json", document),
+            save_controller(tuned.controller, folder / "controller.json", tuned.report),
             *save_figures(pictures, folder),
         ]

@@ -20,6 +20,9 @@ from .contouring_plot import plot_contour_error as plot_contour_error
 from .contouring_plot import plot_magnified as plot_magnified
 from .contouring_plot import plot_path as plot_path
 from .controller import Controller as Controller
+from .controller_file import load_controller as load_controller
+from .export.write import Exported as Exported
+from .export.write import export_controller as export_controller
 from .h_infinity import MixedSensitivity as MixedSensitivity
 from .h_infinity import mixed_sensitivity as mixed_sensitivity
 from .hysteresis_observer import HysteresisObserver as HysteresisObserver
@@ -39,6 +42,9 @@ from .learning_rules import LiftedRule as LiftedRule
 from .linear_systems import to_control as to_control
 from .neural_network import NetworkInverse as NetworkInverse
 from .neural_network import train_network as train_network
+from .on_device.closed_loop import DeviceTracking as DeviceTracking
+from .on_device.latency import Latency as Latency
+from .on_device.latency import measure_latency as measure_latency
 from .plant import Plant as Plant
 from .scheduled_pid import ScheduledPid as ScheduledPid
 from .session import Command as Command

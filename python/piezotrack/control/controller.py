@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
 
 from .. import _core
 from .._support.arguments import TOO_FAR, finite
@@ -19,6 +19,13 @@ from .laws import NAMED_LAWS, DisturbanceObserver, LeadLag, PerturbationEstimato
 from .plant import reach
 from .scheduled_pid import ScheduledPid
 from .session import Session
+
+if TYPE_CHECKING:
+    import os
+    from pathlib import Path
+
+    from .stability import LoopReport
+    from .tuning.tuned import Tuned, TuningReport
 
 __all__ = ["Controller", "number_pair"]
 
@@ -101,6 +108,9 @@ class Controller:
     # Readings that are valid [m], also where `span` is not given.
     _valid: tuple[float, float] = field(init=False, repr=False, compare=False)
     _core: _core.Controller = field(init=False, repr=False, compare=False)
+    _provenance: Mapping[str, Any] | None = field(
+        default=None, init=False, repr=False, compare=False
+    )
 
     def __post_init__(self) -> None:
         dt = check_dt(self.dt)
@@ -244,6 +254,55 @@ class Controller:
             To be stepped once in each sampling interval.
         """
         return Session(self, present)
+
+    @property
+    def provenance(self) -> Mapping[str, Any] | None:
+        """Where the file came from that the controller was read from; None without a file."""
+        return self._provenance
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        report: LoopReport | TuningReport | Tuned | None = None,
+    ) -> Path:
+        """Write the controller as JSON, for `load_controller` and for ``piezotrack export``.
+
+        Settings have their units in their names. The file says by which version it was written, the
+        hash of the stage of the feedforward, and the margins at design where `report` is given. It
+        is written to a temporary file and renamed.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+        report : LoopReport, TuningReport or Tuned, optional
+            What `check_loop` or `tune` has returned for this controller. Without one the margins
+            of the file that the controller was read from are kept.
+
+        Returns
+        -------
+        pathlib.Path
+            The file.
+
+        Raises
+        ------
+        ParameterError
+            `report` is of another controller.
+        DataError
+            The file cannot be written.
+
+        Examples
+        --------
+        >>> import piezotrack as pt
+        >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+        >>> margins = pt.check_loop(pt.VirtualStage.xu_li_2010(), loop)
+        >>> loop.save("loop.json", report=margins).name
+        'loop.json'
+        """
+        from .controller_file import save_controller
+
+        return save_controller(self, path, report)
 
 
 T = TypeVar("T")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copyreg
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -139,6 +140,8 @@ def settled_bottom(
     return float(x[t >= 6.0].min())
 
 
+# A loop is run on one stage again and again, and each run asks for its reach twice.
+@lru_cache(maxsize=16)
 def _slow_cycle(
     stage: VirtualStage | Stage, low: float, high: float, dt: float
 ) -> tuple[Array, Array, Array]:
@@ -148,8 +151,12 @@ def _slow_cycle(
     if isinstance(stage, VirtualStage) and stage.preconditioning is None:
         # An amplifier that lags changes nothing here, and the model alone takes fewer steps.
         applied = np.clip(u, *stage.amplifier.limits)
-        return t, u, stage.stage.simulate(applied, dt).x + stage.sensor.offset
-    return t, u, stage.simulate(u, dt).x
+        x = stage.stage.simulate(applied, dt).x + stage.sensor.offset
+    else:
+        x = stage.simulate(u, dt).x
+    for array in (t, u, x):
+        array.setflags(write=False)
+    return t, u, x
 
 
 def linearised_plants(

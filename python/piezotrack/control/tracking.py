@@ -15,6 +15,7 @@ from .._support.frames import frame_of
 from .._support.statistics import FIGURES, ErrorStatistics
 from .._support.units import drive_word, shown_unit
 from ..errors import ParameterError
+from ..hardware.device import Device
 from ..references.reference import Reference, SampledReference
 from ..stages.inverse import PlayedVoltage
 from .checks import check_drive_unit, check_period, check_stable, check_within_reach
@@ -283,7 +284,7 @@ def _metrics(
 
 
 def track(
-    stage: Plant | IdentifiedModel,
+    stage: Plant | IdentifiedModel | Device,
     controller: Controller,
     reference: Reference,
     *,
@@ -293,16 +294,19 @@ def track(
     visited: float | Sequence[float] = (),
     beyond_reach: bool = False,
     unstable: bool = False,
+    safe: float | None = None,
 ) -> Tracking:
-    """Simulate closed-loop tracking of a reference.
+    """Track a reference in closed loop, on a simulated stage or on a device.
 
-    The stage moves in continuous time; at each sampling instant the sensor is read, and the
-    voltage computed from the reading is applied and held until the next.
+    A simulated stage moves in continuous time; at each sampling instant the sensor is read, and the
+    voltage computed from the reading is applied and held until the next. On a device this computer
+    closes the loop, in real time: see `control.DeviceTracking`.
 
     Parameters
     ----------
-    stage : Stage, VirtualStage or IdentifiedModel
-        The plant: any stage of ``pt.stages``, a `VirtualStage` or an `IdentifiedModel`. A stage
+    stage : Stage, VirtualStage, IdentifiedModel or Device
+        The plant: any stage of ``pt.stages``, a `VirtualStage` or an `IdentifiedModel`, or a
+        `hardware.Device` with `exchange`. A stage
         model has no noise and no amplifier (``VirtualStage.of`` gives it both), and starts at rest;
         offset and delay of an `IdentifiedModel` are included in the displacement.
     controller : Controller
@@ -327,19 +331,25 @@ def track(
         study saturation.
     unstable : bool, optional
         Whether a loop may be unstable for small motions.
+    safe : float, optional
+        Of a device: voltage before and after [V]; default 0 V, or the limit nearest to it. `delay`,
+        `jitter`, `substeps` and `visited` are those of a simulation.
 
     Returns
     -------
     Tracking
-        The motion and its metrics.
+        The motion and its metrics; of a device a `control.DeviceTracking`.
 
     Raises
     ------
     ParameterError
-        A number is out of its range, the reference exceeds the reach of the stage, or the loop
-        is unstable.
+        A number is out of its range, the reference exceeds the reach of the stage, the loop is
+        unstable, or a device is too slow for the interval.
     NumericalError
         The loop diverges.
+    DeviceError, Interrupted
+        A device failed, or the loop was interrupted: the output is at `safe`, and `partial` is the
+        run up to then.
 
     Examples
     --------
@@ -350,13 +360,26 @@ def track(
     >>> print(f"{run.metrics.phase_lag:.2f} rad")
     0.06 rad
     """
-    plant = plant_of(stage)
     for name, value, kind in (
         ("controller", controller, Controller),
         ("reference", reference, Reference),
     ):
         if not isinstance(value, kind):
             raise ParameterError(f"{name} is {type(value).__name__}: expected pt.{kind.__name__}")
+    if isinstance(stage, Device):
+        if (delay, jitter, substeps, visited) != (0.0, 0.0, 10, ()):
+            raise ParameterError(
+                "delay, jitter, substeps or visited is given: expected none of them on a device, "
+                "which has its own"
+            )
+        from .on_device.closed_loop import track_on
+
+        return track_on(
+            stage, controller, reference, safe=safe, beyond_reach=beyond_reach, unstable=unstable
+        )
+    if safe is not None:
+        raise ParameterError(f"safe is {safe!r}: expected none, as the stage is simulated")
+    plant = plant_of(stage)
     check_drive_unit(stage, controller)
     delay = not_negative("delay", delay, "s")
     substeps = _core.as_count("substeps", substeps)

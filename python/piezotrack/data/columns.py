@@ -288,7 +288,7 @@ def _check_unit(column: Column, role: str) -> None:
     quantities = ("voltage",) if is_voltage else QUANTITIES[role]
     if not column.unit:
         raise DataError(
-            f"{column} has no unit: write it into the header, or give it as "
+            f"{column} has no unit: state it in the file, or give it as "
             f"units={{{role!r}: ...}}, one of {known_units(*quantities)}"
         )
     try:

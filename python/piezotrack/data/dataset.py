@@ -11,7 +11,13 @@ from .._support.arrays import signal_of, time_axis
 from .._support.frames import frame_of
 from .._support.messages import quoted
 from ..errors import DataError, ParameterError
-from .dataset_arguments import MIN_SAMPLES, decimation_factor, further_columns, window_samples
+from .dataset_arguments import (
+    MIN_SAMPLES,
+    decimation_factor,
+    further_columns,
+    interpolation_factor,
+    window_samples,
+)
 from .dataset_text import as_line, as_table
 
 if TYPE_CHECKING:
@@ -29,9 +35,6 @@ if TYPE_CHECKING:
 __all__ = ["Dataset", "Hold"]
 
 Hold = Literal["foh", "zoh"]
-
-# Most samples of an interpolated record.
-MOST_SAMPLES = 50_000_000
 
 
 class Dataset:
@@ -391,12 +394,7 @@ class Dataset:
         """
         from .rates import at_lower_rate
 
-        factor = decimation_factor(factor)
-        if len(self) < MIN_SAMPLES * factor:
-            raise ParameterError(
-                f"factor is {quoted(factor)}: that leaves fewer than {MIN_SAMPLES} of {len(self)} "
-                "samples"
-            )
+        factor = decimation_factor(factor, len(self))
         less = at_lower_rate(self.full, factor, self._start % factor)
         return less._part(0, len(less), start=self._start // factor)
 
@@ -439,15 +437,7 @@ class Dataset:
         """
         from .rates import at_higher_rate
 
-        factor = decimation_factor(factor)
-        if self._hold == "zoh":
-            raise ParameterError("hold is 'zoh': expected 'foh', as nothing is between the samples")
-        if (self._t.size - 1) * factor + 1 > MOST_SAMPLES:
-            raise ParameterError(
-                f"factor is {quoted(factor)}: expected at most "
-                f"{(MOST_SAMPLES - 1) // (self._t.size - 1)}, with which {self._t.size} samples "
-                f"become {MOST_SAMPLES}"
-            )
+        factor = interpolation_factor(factor, self._t.size, self._hold)
         fine = at_higher_rate(self.full, factor)
         return fine._part(0, len(fine), start=self._start * factor)
 

@@ -18,13 +18,43 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["MIN_SAMPLES", "decimation_factor", "further_columns", "window_samples"]
+__all__ = [
+    "MIN_SAMPLES",
+    "decimation_factor",
+    "further_columns",
+    "interpolation_factor",
+    "window_samples",
+]
 
 MIN_SAMPLES = 3
+# Most samples of an interpolated record.
+MOST_SAMPLES = 50_000_000
 
 
-def decimation_factor(value: object) -> int:
-    """Check the factor of a decimation or an interpolation."""
+def decimation_factor(value: object, count: int) -> int:
+    """Check how many of `count` samples become one."""
+    factor = _factor(value)
+    if count < MIN_SAMPLES * factor:
+        raise ParameterError(
+            f"factor is {quoted(factor)}: that leaves fewer than {MIN_SAMPLES} of {count} samples"
+        )
+    return factor
+
+
+def interpolation_factor(value: object, count: int, hold: str) -> int:
+    """Check how many samples each of `count` becomes, and that there is something between them."""
+    factor = _factor(value)
+    if hold == "zoh":
+        raise ParameterError("hold is 'zoh': expected 'foh', as nothing is between the samples")
+    if (count - 1) * factor + 1 > MOST_SAMPLES:
+        raise ParameterError(
+            f"factor is {quoted(factor)}: expected at most {(MOST_SAMPLES - 1) // (count - 1)}, "
+            f"with which {count} samples become {MOST_SAMPLES}"
+        )
+    return factor
+
+
+def _factor(value: object) -> int:
     if isinstance(value, bool) or not isinstance(value, Integral) or value < 2:
         raise ParameterError(f"factor is {quoted(value)}: expected a whole number, 2 or more")
     return int(value)

@@ -16,6 +16,7 @@ from .._support.arrays import UNEVEN, backward, check_dt, time_fault
 from .._support.units import lookup, require
 from ..errors import ParameterError
 from .dataset import Dataset
+from .dataset_arguments import MIN_SAMPLES
 from .formats import open_log
 from .resampling import even_times, evened
 
@@ -274,6 +275,11 @@ class Log:
         """Read the samples."""
         main = {role: c for role, c in roles.items() if role != "time" or dt is None}
         table = dict(self.table.values(list(main.values())))
+        for role, column in main.items():
+            if role != "time" and (count := table[column.index].size) < MIN_SAMPLES:
+                raise self.source.error(
+                    f"{column} has {count} samples: expected at least {MIN_SAMPLES}"
+                )
         t = self._times(main["time"], table, resample) if "time" in main else None
         if dt is None and t is None:
             dt = self.table.interval(list(main.values()))

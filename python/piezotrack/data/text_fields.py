@@ -59,7 +59,7 @@ def field_fault(text: str, column: Column, swap: bool) -> str:
     if not text:
         return f"{column} is empty: expected a number"
     if text.lower().lstrip("+-") in ("nan", "inf", "infinity") or math.isinf(number_of(text)):
-        return f"{quoted(text)} in {column} is not a finite number"
+        return f"{quoted(text)} in {column} is not a finite number: expected one in each line"
     mark = "comma" if swap else "point"
     other = f": the decimal mark of this log is a {mark}" if "." in text or "," in text else ""
     return f"{quoted(text)} in {column} is not a number{other}"

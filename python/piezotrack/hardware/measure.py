@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -214,7 +215,9 @@ def measure(
     try:
         record = play_table(device, table, exact, not_negative("lead_in", lead_in, "s"))
     except BaseException:
-        device.hold(home)
+        # A device that has gone cannot be led home; what it was comes first.
+        with suppress(DeviceError):
+            device.hold(home)
         raise
     y, more = filled(record)
     log = Dataset(

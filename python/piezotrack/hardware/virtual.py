@@ -17,12 +17,13 @@ from .device import Rates, Record
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
 
-__all__ = ["VirtualDevice"]
+__all__ = ["VirtualDevice", "virtual_stage"]
 
 RATES = Rates(lowest=0.1, highest=100e3)
 MEMORY = 10_000_000
@@ -176,12 +177,38 @@ def from_address(
     """Make the virtual stage of an address: ``virtual:`` or ``virtual:MODEL.json``."""
     if host or port or options:
         raise ParameterError("device is a virtual stage: expected virtual: or virtual:MODEL.json")
-    if not path:
-        return VirtualDevice(VirtualStage.xu_li_2010())
+    stage, limits = virtual_stage(path or None)
+    return VirtualDevice(stage, limits=limits)
+
+
+def virtual_stage(path: str | Path | None) -> tuple[VirtualStage, tuple[float, float] | None]:
+    """Return the stage of a model file with the range of its drive [V], or that of the paper.
+
+    Parameters
+    ----------
+    path : str, pathlib.Path or None
+        Model file; None for the stage of Xu and Li 2010.
+
+    Returns
+    -------
+    stage : VirtualStage
+        The stage.
+    limits : (float, float) or None
+        Voltages that it was identified with [V]; None where its amplifier has limits.
+
+    Raises
+    ------
+    ParameterError
+        Its drive is no voltage.
+    DataError
+        The file is no model file.
+    """
+    if path is None:
+        return VirtualStage.xu_li_2010(), None
     known = load(path)
     if known.drive_unit != "V":
         raise ParameterError(
             f"device {path}: its drive is in {known.drive_unit}: expected a stage that a voltage "
             "drives"
         )
-    return VirtualDevice(VirtualStage.of(known), limits=known.drive_range)
+    return VirtualStage.of(known), known.drive_range

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import _core
+from .._support.arguments import has_entries
 from .._support.messages import quoted
 from ..data.dataset import Dataset
 from ..errors import ParameterError
@@ -17,6 +17,9 @@ from .campaign_run import Planned, compute
 from .campaign_task import FAILURE, Task, is_searched, settings
 from .keys import record_key
 from .selection import AUTO
+
+if TYPE_CHECKING:
+    import os
 
 __all__ = ["campaign"]
 
@@ -139,7 +142,7 @@ def campaign(
 
 def _records(records: object) -> dict[str, Dataset]:
     """Check the records, and give each a title."""
-    if isinstance(records, (Dataset, str, os.PathLike)) or not isinstance(records, Iterable):
+    if isinstance(records, Dataset) or not has_entries(records):
         raise ParameterError(f"records is {quoted(records)}: expected Datasets in a list, as [log]")
     if isinstance(records, Mapping):
         pairs = [(str(title), data) for title, data in records.items()]
@@ -180,7 +183,7 @@ def _title(data: Dataset, key: str, *, alone: bool) -> str:
 
 def _models(models: object) -> dict[str, dict[str, Any]]:
     """Check the models: settings by title."""
-    if isinstance(models, (str, os.PathLike)) or not isinstance(models, Iterable):
+    if not has_entries(models):
         raise ParameterError(f"models is {quoted(models)}: expected several in a list, as ['dahl']")
     if isinstance(models, Mapping):
         named = {str(title): settings(str(title), given) for title, given in models.items()}
@@ -208,7 +211,7 @@ def _models(models: object) -> dict[str, dict[str, Any]]:
 
 def _seeds(seeds: object) -> list[int]:
     """Check the seeds."""
-    if isinstance(seeds, (str, bytes)) or not isinstance(seeds, Iterable):
+    if not has_entries(seeds):
         raise ParameterError(
             f"seeds is {quoted(seeds)}: expected several in a list, as [0, 1] or range(10)"
         )

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from .. import _core
+from .._support.arguments import has_entries
 from .._support.files import picture_files, write_document
 from ..data.dataset import Dataset
 from ..errors import ParameterError
@@ -340,7 +341,7 @@ def _wanted(models: object, drive_unit: str) -> list[tuple[str, str, ModelInfo |
         # Models driven by a voltage also fit a record driven by a force, but not the reverse.
         suited = [info for info in MODELS if info.drive_unit in ("V", drive_unit)]
         return [(info.name, info.title, info) for info in suited]
-    if isinstance(models, (str, os.PathLike, Mapping)) or not isinstance(models, Iterable):
+    if isinstance(models, Mapping) or not has_entries(models):
         raise ParameterError(f"models is {models!r}: expected several in a list, as ['dahl']")
     sources = [_source(model) for model in models]
     if not sources:

@@ -33,6 +33,8 @@ __all__ = [
     "start_after",
     "start_entry",
     "start_of",
+    "state_entry",
+    "state_of",
 ]
 
 History = Literal["virgin", "settled", "fit"]
@@ -114,13 +116,51 @@ def start_entry(start: Start | None, unit: str) -> dict[str, Any] | None:
     """
     if start is None:
         return None
-    state = asdict(start.state)
     return {
         "history": start.history,
         "voltage": {"value": start.voltage, "unit": unit},
-        "state": {key: list(one) if isinstance(one, tuple) else one for key, one in state.items()},
+        "state": state_entry(start.state),
         "record": start.record,
     }
+
+
+def state_entry(state: StageState) -> dict[str, Any]:
+    """Entry of the state of a stage in a file: numbers and lists of them, in SI units."""
+    return {key: list(one) if isinstance(one, tuple) else one for key, one in asdict(state).items()}
+
+
+def state_of(place: str, entry: Any, state: type[StageState]) -> StageState:
+    """Read the state of a stage from a file.
+
+    Parameters
+    ----------
+    place : str
+        Where the entry is, for messages.
+    entry : Any
+        The entry.
+    state : type
+        State of the model.
+
+    Returns
+    -------
+    StageState
+        The state.
+
+    Raises
+    ------
+    ParameterError
+        The entry is not that of such a state.
+    """
+    numbers: dict[str, Any] = {
+        name: tuple(as_numbers(name, value))
+        if isinstance(value, list)
+        else _core.as_number(name, value)
+        for name, value in object_of(place, entry).items()
+    }
+    known = {one.name for one in fields(state)}
+    if extra := set(numbers) - known:
+        raise ParameterError(f"{place} has {quoted(min(extra))}: expected {sorted(known)}")
+    return state(**numbers)
 
 
 def start_of(entry: Any, state: type[StageState]) -> Start | None:
@@ -146,22 +186,14 @@ def start_of(entry: Any, state: type[StageState]) -> Start | None:
     found = object_of("start", entry)
     if not found:
         return None
-    numbers: dict[str, Any] = {
-        name: tuple(as_numbers(name, value))
-        if isinstance(value, list)
-        else _core.as_number(name, value)
-        for name, value in object_of("start: state", found["state"]).items()
-    }
-    known = {one.name for one in fields(state)}
-    if extra := set(numbers) - known:
-        raise ParameterError(f"start: state has {quoted(min(extra))}: expected {sorted(known)}")
+    begun = state_of("start: state", found["state"], state)
     history = checked_history(found["history"])
     if history is None:
         raise ParameterError("start: history is None: expected 'virgin', 'settled' or 'fit'")
     volts = found["voltage"]["value"]
     return Start(
         history=history,
-        state=state(**numbers),
+        state=begun,
         voltage=None if volts is None else _core.as_number("start: voltage", volts),
         record=text_of("start: record", found["record"]) or "",
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Mapping, Set
 from dataclasses import asdict, is_dataclass
 from hashlib import sha256
 from numbers import Integral, Real
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._support.arguments import has_entries
 from .._support.messages import quoted
 from ..errors import ParameterError
 
@@ -74,7 +75,7 @@ def plain(name: str, value: Any) -> Any:
     if isinstance(value, Set):
         # Its order is another one in every process.
         return sorted(plain(name, entry) for entry in value)
-    if isinstance(value, Iterable):
+    if has_entries(value):
         return [plain(name, entry) for entry in value]
     raise ParameterError(f"{name} is {quoted(value)}: expected numbers, texts, lists or mappings")
 

@@ -33,7 +33,16 @@ __all__ = ["LeastSquares", "solve_least_squares"]
 MOST_PLAYS, MOST_ZONES, MOST_RELAXATIONS = 32, 8, 8
 DYNAMICS = ("time_constant", "frequency", "damping_ratio")
 # Parameters that the settings and the record fix beforehand.
-CHOSEN = ("thresholds", "levels", "low", "high", "dead_zone_thresholds", "creep_times")
+CHOSEN = (
+    "thresholds",
+    "concave_thresholds",
+    "convex_thresholds",
+    "levels",
+    "low",
+    "high",
+    "dead_zone_thresholds",
+    "creep_times",
+)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from ..data.dataset import Dataset
-    from ..stages.base import StageState
+    from ..stages.base import Stage, StageState
     from ..stages.model_info import ModelInfo
     from .estimates import Constraint
     from .fitted_record import FittedRecord
@@ -32,11 +32,15 @@ __all__ = [
     "constraint_entries",
     "document_of",
     "drive_unit_of",
+    "entries_of",
     "fit_entry",
     "origin_of",
+    "parameter_entries",
     "provenance",
+    "read_content",
     "read_model",
     "sensor_number",
+    "stage_of",
 ]
 
 FORMAT = "piezotrack-model"
@@ -88,13 +92,8 @@ def document_of(model: IdentifiedModel) -> dict[str, Any]:
     found = details.pop("parameters", {})
     delay = dict(details.pop("delay", {}))
     parameters = {
-        one.name: {
-            "value": _plain(getattr(model.model, one.name)),
-            "unit": of_drive(one.unit, model.drive_unit),
-            "symbol": one.symbol,
-        }
-        | dict(found.get(one.name, {}))
-        for one in info.parameters
+        name: entry | dict(found.get(name, {}))
+        for name, entry in parameter_entries(model.model, model.drive_unit).items()
     }
     return {
         "format": FORMAT,
@@ -110,6 +109,65 @@ def document_of(model: IdentifiedModel) -> dict[str, Any]:
         **record_entries(model.records, model.drive_unit),
         **details,
     }
+
+
+def parameter_entries(stage: Stage, drive: str) -> dict[str, dict[str, Any]]:
+    """Entries of a file on the parameters of a stage.
+
+    Parameters
+    ----------
+    stage : Stage
+        The stage.
+    drive : str
+        Unit of its drive.
+
+    Returns
+    -------
+    dict
+        Value, unit and symbol of each parameter, by its name.
+    """
+    return {
+        one.name: {
+            "value": _plain(getattr(stage, one.name)),
+            "unit": of_drive(one.unit, drive),
+            "symbol": one.symbol,
+        }
+        for one in stage.info.parameters
+    }
+
+
+def stage_of(info: ModelInfo, parameters: dict[str, Any], drive: str) -> Stage:
+    """Read a stage from the entries of a file.
+
+    Parameters
+    ----------
+    info : ModelInfo
+        Its model.
+    parameters : dict
+        Entries by the name of the parameter; those of versions without a parameter get it.
+    drive : str
+        Unit of the drive.
+
+    Returns
+    -------
+    Stage
+        The stage.
+
+    Raises
+    ------
+    ParameterError
+        A parameter is in another unit, or out of its range.
+    """
+    for one in info.parameters:
+        unit = of_drive(one.unit, drive)
+        if one.is_list and one.is_optional and one.name not in parameters:
+            parameters[one.name] = {"value": [], "unit": unit}
+        require_unit(one.name, parameters[one.name], unit)
+    values = {one.name: parameters[one.name]["value"] for one in info.parameters}
+    for one in info.parameters:
+        if one.is_list:
+            values[one.name] = tuple(values[one.name])
+    return stage_class(info)(**values)
 
 
 def _plain(value: Any) -> Any:
@@ -144,20 +202,10 @@ def read_model(path: str | os.PathLike[str]) -> dict[str, Any]:
             _from_version_1(document, searched=info.searched)
         parameters = document["parameters"]
         _check_origin(document.get("provenance"))
-        drive = drive_unit_of(document, info)
-        for one in info.parameters:
-            unit = of_drive(one.unit, drive)
-            if one.is_list and one.is_optional and one.name not in parameters:
-                # Files of versions without it.
-                parameters[one.name] = {"value": [], "unit": unit}
-            require_unit(one.name, parameters[one.name], unit)
-        values = {one.name: parameters[one.name]["value"] for one in info.parameters}
-        for one in info.parameters:
-            if one.is_list:
-                values[one.name] = tuple(values[one.name])
+        stage = stage_of(info, parameters, drive_unit_of(document, info))
         delay = document["delay"]
         return {
-            "model": stage_class(info)(**values),
+            "model": stage,
             "offset": file_number("offset", document["offset"]),
             "offset_fitted": _core.as_truth("offset fitted", document["offset"]["fitted"]),
             "scale_assumed": _core.as_truth("scale_assumed", document["scale_assumed"]),
@@ -257,6 +305,38 @@ def read_document(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
     DataError
         The file is missing, is not a model file, or was written by a newer version.
     """
+    name, document = read_content(path)
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise DataError(f"{name} is not a piezotrack model: its 'format' is not '{FORMAT}'")
+    version = document.get("schema_version")
+    if version not in (1, SCHEMA_VERSION) or isinstance(version, bool):
+        raise DataError(
+            f"{name} has schema_version {version!r}: this version of piezotrack reads "
+            f"1 to {SCHEMA_VERSION}"
+        )
+    return name, document
+
+
+def read_content(path: str | os.PathLike[str]) -> tuple[str, Any]:
+    """Read what a JSON file holds.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+
+    Returns
+    -------
+    name : str
+        Of the file, for messages.
+    content : object
+        What it holds.
+
+    Raises
+    ------
+    DataError
+        The file is missing, or is no JSON.
+    """
     try:
         file = Path(path)
     except TypeError:
@@ -267,16 +347,7 @@ def read_document(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
         raise DataError(f"{file.name}: {(error.strerror or str(error)).lower()}") from None
     except ValueError as error:
         raise DataError(f"{file.name} cannot be read: {error}") from None
-    document = parse_json(file.name, content)
-    if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise DataError(f"{file.name} is not a piezotrack model: its 'format' is not '{FORMAT}'")
-    version = document.get("schema_version")
-    if version not in (1, SCHEMA_VERSION) or isinstance(version, bool):
-        raise DataError(
-            f"{file.name} has schema_version {version!r}: this version of piezotrack reads "
-            f"1 to {SCHEMA_VERSION}"
-        )
-    return file.name, document
+    return file.name, parse_json(file.name, content)
 
 
 @contextmanager

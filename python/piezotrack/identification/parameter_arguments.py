@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from .. import _core
+from .._support.arguments import has_entries
 from .._support.messages import quoted
 from ..errors import ParameterError
 
@@ -100,7 +101,7 @@ def _texts(argument: str, one: str, mapping: object, example: str) -> list[tuple
 def _inequalities(constraints: object) -> list[str]:
     if constraints is None:
         return []
-    if isinstance(constraints, str) or not isinstance(constraints, Iterable):
+    if not has_entries(constraints):
         raise ParameterError(
             f"constraints is {quoted(constraints)}: expected texts in a list, as ['a2 < b1']"
         )
@@ -112,7 +113,7 @@ def _inequalities(constraints: object) -> list[str]:
 
 
 def _value_and_width(name: str, pair: object) -> tuple[float, float]:
-    two = list(pair) if isinstance(pair, Iterable) and not isinstance(pair, str) else []
+    two = list(pair) if has_entries(pair) else []
     if len(two) != 2:
         raise ParameterError(
             f"prior of {name} is {quoted(pair)}: expected (value, standard deviation)"

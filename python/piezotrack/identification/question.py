@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from .. import _core
-from .._support.arguments import as_numbers
+from .._support.arguments import as_numbers, has_entries
 from .._support.messages import quoted
 from ..data import diagnostics
 from ..errors import ParameterError
@@ -92,7 +92,7 @@ def _names(free: object) -> list[str] | None:
     """Check that free names parameters in a list."""
     if free is None:
         return None
-    if isinstance(free, str) or not isinstance(free, Iterable):
+    if not has_entries(free):
         raise ParameterError(f"free is {quoted(free)}: expected names in a list, as ['mass']")
     return [str(name) for name in free]
 
@@ -125,7 +125,7 @@ def _items(argument: str, mapping: object) -> list[tuple[str, Any]]:
 
 def _pair(name: str, pair: object) -> tuple[float, float]:
     """Check that bounds are two numbers."""
-    two = list(pair) if isinstance(pair, Iterable) and not isinstance(pair, str) else []
+    two = list(pair) if has_entries(pair) else []
     if len(two) != 2:
         raise ParameterError(f"bounds of {name} are {quoted(pair)}: expected (low, high)")
     low, high = two
@@ -155,7 +155,7 @@ def delay_bounds(delay: object) -> tuple[float, float] | None:
     """
     if delay is None or isinstance(delay, bool):
         return None if delay else (0.0, 0.0)
-    if isinstance(delay, Iterable) and not isinstance(delay, str):
+    if has_entries(delay):
         low, high = _pair("delay", delay)
         if low >= high:
             raise ParameterError(
@@ -170,7 +170,7 @@ def _creep_times(creep: object) -> list[float] | None:
     """Time constants of the creep: None if the core chooses them, empty if there is none."""
     if isinstance(creep, bool):
         return None if creep else []
-    if not isinstance(creep, Iterable) or isinstance(creep, str):
+    if not has_entries(creep):
         raise ParameterError(
             f"creep is {quoted(creep)}: expected True, False or time constants in seconds, "
             "as [0.1, 1.0]"

@@ -4,6 +4,9 @@ from .apparatus import Amplifier as Amplifier
 from .apparatus import Preconditioning as Preconditioning
 from .apparatus import Sensor as Sensor
 from .asymmetric_bouc_wen import AsymmetricBoucWenStage as AsymmetricBoucWenStage
+from .asymmetric_prandtl_ishlinskii import (
+    AsymmetricPrandtlIshlinskiiStage as AsymmetricPrandtlIshlinskiiStage,
+)
 from .base import ForceState as ForceState
 from .base import Response as Response
 from .base import Stage as Stage

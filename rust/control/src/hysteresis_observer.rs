@@ -245,6 +245,18 @@ impl<O: ObservedOperator, F> HysteresisObserved<O, F> {
         &self.inner
     }
 
+    /// The operator of the hysteresis.
+    #[must_use]
+    pub fn operator(&self) -> &O {
+        &self.operator
+    }
+
+    /// The longest piece of its path, m or V.
+    #[must_use]
+    pub fn longest(&self) -> f64 {
+        self.longest
+    }
+
     /// p, g (1 - p) in m/V, and L.
     #[must_use]
     pub fn coefficients(&self) -> [f64; 3] {

@@ -57,6 +57,7 @@ mod number;
 pub mod online_feedforward;
 pub mod pid;
 pub mod repetitive;
+pub mod root;
 pub mod scheduled_pid;
 pub mod sliding_mode;
 pub mod snapshot;
@@ -74,11 +75,12 @@ pub use hysteresis_observer::{
     HysteresisObserved, HysteresisObservedState, HysteresisObserver, Observable, ObservedOperator,
 };
 pub use inverse::{
-    AsymmetricBoucWenInverse, BoucWenInverse, BoucWenInverseState, CreepingInverse,
-    CreepingInverseState, DahlInverse, FeedbackInverse, FeedbackInverseState,
-    FirstOrderDahlInverse, InputInverse, InputInverseState, Inverse, InverseState, LuGreInverse,
-    LuGreInverseState, ModesInverse, ModesInverseState, OperatorInverse, OscillatorInverse,
-    ParallelDahlInverse, PlayInverse, PrandtlIshlinskiiInverse, SampledDahlInverse,
+    AsymmetricBoucWenInverse, AsymmetricPlayInverse, AsymmetricPlayInverseState, BoucWenInverse,
+    BoucWenInverseState, CreepingInverse, CreepingInverseState, DahlInverse, FeedbackInverse,
+    FeedbackInverseState, FirstOrderDahlInverse, InputInverse, InputInverseState, Inverse,
+    InverseState, LuGreInverse, LuGreInverseState, ModesInverse, ModesInverseState,
+    OperatorInverse, OscillatorInverse, ParallelDahlInverse, PlayInverse, PrandtlIshlinskiiInverse,
+    SampledDahlInverse,
 };
 pub use iterative_learning::IterativeLearning;
 pub use lead_lag::LeadLag;

@@ -161,6 +161,12 @@ impl SampledPid {
         [self.proportional, self.integral, self.derivative]
     }
 
+    /// Ts/Tt: the weight of the voltage applied less the command, in the sample before.
+    #[must_use]
+    pub fn tracking(&self) -> f64 {
+        self.tracking
+    }
+
     /// The controller whose coefficients are a share, 0 to 1, of the way to those of another.
     #[must_use]
     pub fn towards(&self, other: &Self, share: f64) -> Self {

@@ -116,6 +116,12 @@ impl SampledSlidingMode {
         [self.gain, self.integral, self.derivative, self.fresh]
     }
 
+    /// eta, V: the largest output.
+    #[must_use]
+    pub fn switching(&self) -> f64 {
+        self.switching
+    }
+
     /// The first output is the voltage to begin with: as much of it as can be is integral.
     #[inline]
     fn begin(&self, state: &mut SlidingModeState, error: f64) {

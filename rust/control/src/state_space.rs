@@ -84,6 +84,12 @@ impl<const N: usize> StateSpace<N> {
         (&self.a, &self.b, &self.c, self.d)
     }
 
+    /// Number of states that are used; the others stay 0.
+    #[must_use]
+    pub fn states(&self) -> usize {
+        self.used
+    }
+
     /// The gain `l` of back-calculation; `None` where the state is held under saturation instead.
     #[must_use]
     pub fn antiwindup(&self) -> Option<&[f64; N]> {

@@ -12,6 +12,7 @@ use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
+use crate::coefficients::of_controller;
 use crate::displacements::{meant, outside};
 use crate::errors::raise;
 use crate::snapshots::{load, saved};
@@ -90,6 +91,12 @@ impl PyController {
     #[getter]
     fn line_length(&self) -> usize {
         self.controller.repetitive.map_or(0, |part| part.length())
+    }
+
+    /// The numbers of every part as it is sampled, by name: of the law, the filters and the
+    /// repetitive part.
+    fn coefficients(&self) -> Vec<(String, Vec<f64>)> {
+        of_controller(&self.controller)
     }
 
     /// Time of a step, s: the mean over some samples of a slow motion, measured.

@@ -142,6 +142,19 @@ impl PyInverse {
         })
     }
 
+    /// The numbers of the inverse of a Dahl stage without creep; `None` of any other.
+    fn coefficients(&self) -> Option<Vec<f64>> {
+        match self.online.inverse() {
+            AnyInverse::Stage(inverse) => match inverse.as_ref() {
+                StageInverse::Dahl(inverse) => {
+                    inverse.without_creep().map(|inverse| inverse.coefficients().to_vec())
+                }
+                _ => None,
+            },
+            AnyInverse::Network(_) => None,
+        }
+    }
+
     /// Sets the drives that reach the stage, V.
     fn limit(&mut self, low: f64, high: f64) -> PyResult<()> {
         self.limits = Some(Limits::new(low, high).map_err(|error| raise(&error.into()))?);

@@ -2,6 +2,7 @@
 
 mod arrays;
 mod checkpoint;
+mod coefficients;
 mod control;
 mod descents;
 mod design;

@@ -8,20 +8,11 @@ import pytest
 
 import piezotrack as pt
 from format_logs import DT, U, Y, is_the_log, refusal
+from log_writers import gcs
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-HEADER = {
-    "VERSION": "1",
-    "TYPE": "1",
-    "SEPARATOR": "32",
-    "DIM": "2",
-    "SAMPLE_TIME": "0.005",
-    "NDATA": "400",
-    "NAME0": "Control Voltage of piezo 1",
-    "NAME1": "Actual Position of axis 1",
-}
 GIVEN: dict[str, Any] = {
     "drive": "control voltage of piezo 1",
     "displacement": 1,
@@ -29,14 +20,12 @@ GIVEN: dict[str, Any] = {
 }
 
 
+NAMED = {"NAME0": "Control Voltage of piezo 1", "NAME1": "Actual Position of axis 1"}
+SIGNALS = {"u": (U, ""), "y": (Y, "")}
+
+
 def write(path: Path, separator: str = " ", **entries: str | None) -> Path:
-    lines = [
-        f"# {name} = {text}" for name, text in {**HEADER, **entries}.items() if text is not None
-    ]
-    rows = [f"{u:.7e}{separator}{y:.7e}{separator}" for u, y in zip(U, Y, strict=True)]
-    text = "\n".join([*lines, "# ", "# END_HEADER ", *rows]) + "\n"
-    path.write_text(text, encoding="ascii")
-    return path
+    return gcs(path, SIGNALS, separator=separator, **{**NAMED, **entries})
 
 
 @pytest.mark.parametrize("name", ["log.gcs", "log.dat", "log.txt"])

@@ -11,6 +11,7 @@ import pytest
 
 import piezotrack as pt
 from format_logs import DT, T, U, Y, is_the_log, refusal, survives
+from log_writers import MAT_HEADER, mat_array, mat_element
 from piezotrack.data.formats.mat_elements import read_variables
 from piezotrack.data.formats.source import Source
 
@@ -100,35 +101,21 @@ def test_a_version_that_is_not_read_is_named(tmp_path: Path) -> None:
     scipy_io.savemat(tmp_path / "log.mat", PLAIN, format="4")
     assert "version 5, 7 or 7.3" in refusal(tmp_path / "log.mat")
     (tmp_path / "log.mat").write_bytes(b"")
-    assert "version 5, 7 or 7.3" in refusal(tmp_path / "log.mat")
-
-
-HEADER = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
-
-
-def element(kind: int, content: bytes, count: int | None = None) -> bytes:
-    size = len(content) if count is None else count
-    return struct.pack("<II", kind, size) + content + bytes(-len(content) % 8)
-
-
-def array(shape: tuple[int, ...], values: bytes, kind: int = 6, count: int | None = None) -> bytes:
-    flags = element(6, struct.pack("<II", kind, 0))
-    dimensions = element(5, struct.pack(f"<{len(shape)}i", *shape))
-    return flags + dimensions + element(1, b"voltage_V") + element(9, values, count)
+    assert refusal(tmp_path / "log.mat") == "log.mat: is empty: expected a log"
 
 
 LIES = {
-    "an element beyond the file": element(14, array((1, 3), bytes(24)), 4_000_000_000),
-    "values beyond the file": element(14, array((1, 3), bytes(24), count=4_000_000_000)),
-    "dimensions beyond the values": element(14, array((100_000, 100_000), bytes(24))),
-    "a compressed size": element(
-        15, zlib.compress(struct.pack("<II", 14, 4_000_000_000) + array((1, 3), bytes(24)))
+    "an element beyond the file": mat_element(14, mat_array((1, 3), bytes(24)), 4_000_000_000),
+    "values beyond the file": mat_element(14, mat_array((1, 3), bytes(24), count=4_000_000_000)),
+    "dimensions beyond the values": mat_element(14, mat_array((100_000, 100_000), bytes(24))),
+    "a compressed size": mat_element(
+        15, zlib.compress(struct.pack("<II", 14, 4_000_000_000) + mat_array((1, 3), bytes(24)))
     ),
-    "compressed dimensions": element(
-        15, zlib.compress(element(14, array((2_000_000_000, 1), bytes(24))))
+    "compressed dimensions": mat_element(
+        15, zlib.compress(mat_element(14, mat_array((2_000_000_000, 1), bytes(24))))
     ),
-    "a bomb": element(
-        15, zlib.compress(element(14, array((25_000_000, 1), bytes(200_000_000))), 9)
+    "a bomb": mat_element(
+        15, zlib.compress(mat_element(14, mat_array((25_000_000, 1), bytes(200_000_000))), 9)
     ),
 }
 
@@ -136,7 +123,7 @@ LIES = {
 @pytest.mark.parametrize("lie", LIES)
 def test_a_file_that_lies_about_its_sizes_is_refused(tmp_path: Path, lie: str) -> None:
     path = tmp_path / "log.mat"
-    path.write_bytes(HEADER + LIES[lie])
+    path.write_bytes(MAT_HEADER + LIES[lie])
     found = refusal(path)
     assert "said to have" in found
     assert "expected" in found
@@ -145,14 +132,14 @@ def test_a_file_that_lies_about_its_sizes_is_refused(tmp_path: Path, lie: str) -
 @pytest.mark.parametrize("kind", [1, 2, 3, 4, 5])
 def test_cells_and_structures_take_no_memory_however_many(tmp_path: Path, kind: int) -> None:
     path = tmp_path / "log.mat"
-    path.write_bytes(HEADER + element(14, array((500_000, 1000), bytes(24), kind=kind)))
+    path.write_bytes(MAT_HEADER + mat_element(14, mat_array((500_000, 1000), bytes(24), kind=kind)))
     assert "no column of numbers" in refusal(path)
 
 
 def test_what_the_lies_are_made_of_is_true(tmp_path: Path) -> None:
     """The same elements with true sizes are a file that is read."""
     path = tmp_path / "log.mat"
-    path.write_bytes(HEADER + element(14, array((1, 400), U.tobytes())))
+    path.write_bytes(MAT_HEADER + mat_element(14, mat_array((1, 400), U.tobytes())))
     assert np.array_equal(scipy_io.loadmat(path)["voltage_V"].ravel(), U)
     assert "known to be the displacement" in refusal(path, dt=DT)
 
@@ -169,7 +156,7 @@ def test_the_other_order_of_bytes(tmp_path: Path) -> None:
     named = ((b"time_s", T), (b"voltage_V", U), (b"displacement_um", Y))
     body = b"".join(variable(name, values) for name, values in named)
     path = tmp_path / "log.mat"
-    path.write_bytes(HEADER[:124] + b"\x01\x00MI" + body)
+    path.write_bytes(MAT_HEADER[:124] + b"\x01\x00MI" + body)
     assert is_the_log(pt.read(path))
     assert np.array_equal(scipy_io.loadmat(path)["voltage_V"].ravel(), U)
 

@@ -9,6 +9,7 @@ import pytest
 
 import piezotrack as pt
 from format_logs import T, U, Y, is_the_log, refusal, survives
+from log_writers import parquet as parquet_log
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -29,12 +30,10 @@ def test_units_in_titles(tmp_path: Path) -> None:
 
 
 def test_units_in_the_metadata_of_the_fields(tmp_path: Path) -> None:
-    fields = [
-        arrow.field(name, arrow.float64(), metadata={"unit": unit})
-        for name, unit in (("time", "s"), ("voltage", "V"), ("displacement", "um"))
-    ]
-    table = arrow.table([T, U, Y], schema=arrow.schema(fields))
-    parquet.write_table(table, tmp_path / "log.parquet")
+    parquet_log(
+        tmp_path / "log.parquet",
+        {"time": (T, "s"), "voltage": (U, "V"), "displacement": (Y, "um")},
+    )
     assert is_the_log(pt.read(tmp_path / "log.parquet"))
 
 

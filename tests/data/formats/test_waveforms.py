@@ -8,19 +8,11 @@ import pytest
 
 import piezotrack as pt
 from format_logs import T, U, Y, is_the_log, refusal
+from log_writers import waveforms
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-COMMENTS = """#Digilent WaveForms Oscilloscope Acquisition
-#Device Name: Discovery2
-#Serial Number: SN:000000000000
-#Date Time: 2024-03-12 10:00:00.000
-#Sample rate: {rate}
-#Samples: 400
-#Trigger: Source: None at 0 s, Condition: Rising
-
-"""
 GIVEN: dict[str, Any] = {
     "drive": "Channel 1",
     "displacement": "Channel 2 (V)",
@@ -29,14 +21,9 @@ GIVEN: dict[str, Any] = {
 
 
 def write(path: Path, rate: str = "200Hz", time: bool = True) -> Path:
-    title = "Time (s)," if time else ""
-    lines = [
-        (f"{t - 1.0:.9f}," if time else "") + f"{u:.9f},{y:.9f}"
-        for t, u, y in zip(T, U, Y, strict=True)
-    ]
-    text = COMMENTS.format(rate=rate) + f"{title}Channel 1 (V),Channel 2 (V)\n" + "\n".join(lines)
-    path.write_text(text, encoding="utf-8")
-    return path
+    channels = {"Channel 1": (U, "V"), "Channel 2": (Y, "V")}
+    begins = {"Time": (T - 1.0, "s")} if time else {}
+    return waveforms(path, {**begins, **channels}, rate=rate)
 
 
 def test_the_time_may_begin_before_the_trigger(tmp_path: Path) -> None:
@@ -58,6 +45,6 @@ def test_a_rate_that_is_none_is_refused(tmp_path: Path) -> None:
 
 def test_a_fault_is_named_by_its_line(tmp_path: Path) -> None:
     path = write(tmp_path / "log.csv")
-    text = path.read_text(encoding="utf-8").replace("-0.995000000,", "-0.995000000,x")
+    text = path.read_text(encoding="utf-8").replace("-0.995,", "-0.995,x")
     path.write_text(text, encoding="utf-8")
     assert refusal(path, **GIVEN).startswith("log.csv:11: 'x0.")

@@ -68,4 +68,6 @@ def open_log(path: str | os.PathLike[str]) -> Table:
         `path` is no name of a file.
     """
     source = Source(path)
+    if not source.size:
+        raise source.error("is empty: expected a log")
     return format_of(source).opens(source)

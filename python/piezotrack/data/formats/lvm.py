@@ -24,6 +24,8 @@ __all__ = ["FORMAT"]
 END = "***End_of_Header***"
 SPECIAL = "***Start_Special***", "***End_Special***"
 X = "X_Value"
+# Intervals off their place from which a time says that samples are missing.
+LOST = 0.5
 
 
 class Segment(NamedTuple):
@@ -109,7 +111,8 @@ def _channels(
             "many; the log may have been cut off",
             segment.titles,
         )
-    number, time = 0, None
+    number = 0
+    time: np.ndarray | None = None
     for column in table.columns:
         is_x = column.title == X
         delta = number_of(_entry(segment, "Delta_X", number).replace(",", "."))
@@ -117,8 +120,9 @@ def _channels(
         seconds = _entry(segment, "X_Dimension", number) in ("Time", "")
         if is_x:
             values = table.column(column)
-            time = values if np.isfinite(values).all() and seconds else None
-            if time is not None:
+            before, time = time, values if np.isfinite(values).all() and seconds else None
+            # Each channel may have a column of its own with the same times.
+            if time is not None and (before is None or not np.array_equal(time, before)):
                 name = X if _agree(time, interval) else "time"
                 yield _channel(table, column, name, group, "s", None)
             continue
@@ -166,11 +170,14 @@ def _entry(segment: Segment, name: str, number: int) -> str:
 
 
 def _agree(times: np.ndarray, interval: float | None) -> bool:
-    """Whether times are those of an interval."""
+    """Whether times are those of an interval, but for their last digits: none is lost between."""
     if interval is None or times.size < 2:
         return False
-    steps = np.diff(times)
-    return bool(abs(float(np.median(steps)) - interval) <= UNEVEN * interval)
+    mean = float(times[-1] - times[0]) / (times.size - 1)
+    if abs(mean - interval) > UNEVEN * interval:
+        return False
+    even = times[0] + interval * np.arange(times.size)
+    return bool(np.abs(times - even).max() < LOST * interval)
 
 
 FORMAT = Format(

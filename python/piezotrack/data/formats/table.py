@@ -213,7 +213,10 @@ class ChannelTable(Table):
         self.source = source
         self.channels = [channel for channel in found if channel.count > 1]
         if not self.channels:
-            raise source.error("holds no column of numbers with two samples or more")
+            raise source.error(
+                "holds no column of numbers with two samples or more: expected those of the drive "
+                "and of the displacement"
+            )
         if len(self.channels) > MOST_COLUMNS:
             raise source.error(f"has {len(self.channels)} columns: expected {MOST_COLUMNS} at most")
         self.columns = Columns.of(

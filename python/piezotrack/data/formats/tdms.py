@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from ..._support.messages import listed
 from .table import Channel, ChannelTable, Format
 
 if TYPE_CHECKING:
@@ -29,7 +30,20 @@ def _opens(source: Source) -> ChannelTable:
             "is cut off in its last segment, as when the program that wrote it was ended: expected "
             "a whole file, as LabVIEW's TDMS Defragment makes it"
         )
+    _check_counts(source, file)
     return ChannelTable(source, channels)
+
+
+def _check_counts(source: Source, file: Any) -> None:
+    """Refuse more samples than there are, for which npTDMS would take those of other channels."""
+    for segment in getattr(getattr(file, "_reader", None), "_segments", None) or ():
+        if segment.num_chunks == 1 and getattr(segment, "final_chunk_lengths_override", None):
+            counts = [one.number_values for one in segment.ordered_objects if one.has_data]
+            stored = segment.next_segment_pos - segment.data_position
+            raise source.error(
+                f"channels of a segment are said to have {listed(counts)} samples: expected "
+                f"{stored} bytes of samples, as it holds"
+            )
 
 
 def _channel(source: Source, nptdms: Any, channel: Any) -> Channel:

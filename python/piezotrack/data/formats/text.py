@@ -36,6 +36,7 @@ __all__ = ["FORMAT", "Layout", "TextTable", "lines_of"]
 MOST_LETTERS = 1_000_000
 # Formats that are opened as text by mistake.
 SPREADSHEETS = (".xls", ".xlsx", ".ods")
+CUT_OFF = "; the log may have been cut off in this last line"
 
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 _SWAP = str.maketrans(",.", ".,")
@@ -83,7 +84,9 @@ def _decode(source: Source, data: bytes) -> str:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
     if found := _CONTROL.search(text):
         line = text.count("\n", 0, found.start()) + 1
-        raise source.error(f"is not a text log: it holds the byte {ord(found[0])}", line)
+        raise source.error(
+            f"is not a text log: it holds the byte {ord(found[0])}, expected text", line
+        )
     return text
 
 
@@ -162,12 +165,17 @@ class TextTable(Table):
         self.header = layout.header
         first = next(layout.rows(), None)
         if first is None:
-            raise source.error("holds a header and no samples", self.header)
+            raise source.error(
+                "holds a header and no samples: expected one line for each", self.header
+            )
         self._count = sum(1 for _ in layout.rows())
         self._dates: dict[int, Instant] = {}
         for column, text in zip(list(self.columns), self._fields(first[1]), strict=False):
-            if math.isnan(number_of(text)) and (instant := instant_of(text)) is not None:
+            if not math.isnan(number_of(text)):
+                continue
+            if (instant := instant_of(text)) is not None:
                 self._dates[column.index] = instant
+            if instant is not None or (not column.unit and is_ambiguous(text)):
                 self.columns[column.index] = replace(column, unit="s")
 
     def count(self, column: Column) -> int:
@@ -225,10 +233,9 @@ class TextTable(Table):
         for row, (line, text) in enumerate(self.layout.rows()):
             fields = self._fields(text)
             if len(fields) != shape[1]:
-                last = "; the log may have been cut off in this last line"
                 raise self.source.error(
                     f"this line has {len(fields)} fields, expected {shape[1]} as in line "
-                    f"{self.header}{last if row == shape[0] - 1 else ''}",
+                    f"{self.header}{CUT_OFF if row == shape[0] - 1 else ''}",
                     line,
                 )
             values = [number_of(field.translate(_SWAP) if swap else field) for field in fields]
@@ -236,7 +243,9 @@ class TextTable(Table):
                 values[index] = _seconds(fields[index], first)
             for column in main:
                 if not math.isfinite(values[column.index]):
-                    raise self.source.error(self._fault(fields[column.index], column, swap), line)
+                    fault = self._fault(fields[column.index], column, swap)
+                    ends = not fields[-1] and row == shape[0] - 1
+                    raise self.source.error(f"{fault}{CUT_OFF if ends else ''}", line)
             table[row] = values
         return table
 

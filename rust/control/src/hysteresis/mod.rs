@@ -6,6 +6,7 @@
 //! distance along it.
 
 mod asymmetric_bouc_wen;
+mod asymmetric_play;
 mod bouc_wen;
 mod dahl;
 mod decay;
@@ -15,6 +16,7 @@ mod parallel_dahl;
 mod play;
 
 pub use asymmetric_bouc_wen::AsymmetricBoucWen;
+pub use asymmetric_play::{AsymmetricPlay, AsymmetricPlayState, Bend, PlayFamily};
 pub use bouc_wen::{BoucWen, BoucWenBranch, BoucWenState};
 pub use dahl::{Dahl, DahlBranch, DahlState};
 pub use first_order_dahl::FirstOrderDahl;

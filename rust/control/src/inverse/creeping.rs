@@ -92,6 +92,12 @@ impl<I: Inverse, const N: usize> CreepingInverse<I, N> {
         CreepingInverseState { inner, last: [0.0; 2], reached: [0.0; N], begun: false }
     }
 
+    /// The inverse of the mechanics, where there is no relaxation behind it.
+    #[must_use]
+    pub fn without_creep(&self) -> Option<&I> {
+        (self.count == 0).then_some(&self.inverse)
+    }
+
     /// Relaxations in use, with their lags.
     fn used(&self) -> impl Iterator<Item = (&Creep, &CubicLag)> {
         self.creep.iter().zip(&self.lags).take(self.count)

@@ -163,6 +163,23 @@ impl SampledDahlInverse {
         InverseState { x: 0.0, w: None, memory: self.operator.rest() }
     }
 
+    /// M/T, D/T, K/T, b1/T, b0/T, a1, a2, up, and the longest move in one piece (m).
+    #[must_use]
+    pub fn coefficients(&self) -> [f64; 9] {
+        let Dahl { a1, a2, gain } = self.operator;
+        [
+            self.inertia,
+            self.damping,
+            self.stiffness,
+            self.level,
+            self.friction,
+            a1.0,
+            a2.0,
+            gain.0,
+            self.piece,
+        ]
+    }
+
     /// The voltage for displacement `x` (m), velocity `v` (m/s) and acceleration `a` (m/s^2) of
     /// the reference. The first sample is taken to be reached in a monotone move from 0.
     ///

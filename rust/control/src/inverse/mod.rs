@@ -4,6 +4,7 @@
 //! go in, one sample at a time, and the drive comes out. [`crate::OnlineFeedforward`] estimates
 //! the derivatives where they are not known and compensates offset and delay.
 
+mod asymmetric_play;
 mod bouc_wen;
 mod creeping;
 mod dahl;
@@ -15,6 +16,7 @@ mod modes;
 mod neural_network;
 mod play;
 
+pub use asymmetric_play::{AsymmetricPlayInverse, AsymmetricPlayInverseState};
 pub use bouc_wen::{AsymmetricBoucWenInverse, BoucWenInverse, BoucWenInverseState};
 pub use creeping::{CreepingInverse, CreepingInverseState};
 pub use dahl::{DahlInverse, InverseState, SampledDahlInverse};

@@ -29,7 +29,8 @@ pub struct SampledRepetitive {
     pub(super) unread: usize,
 }
 
-/// Coefficients of a repetitive controller: see [`SampledRepetitive::recursion`].
+/// Coefficients of a repetitive controller and the lengths of its memory: see
+/// [`SampledRepetitive::recursion`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Recursion<'a> {
     /// Period of the reference, in samples.
@@ -44,6 +45,14 @@ pub struct Recursion<'a> {
     pub nearest: usize,
     /// Weights of the samples, the oldest first; the last one has the delay `nearest`.
     pub taps: &'a [f64],
+    /// Entries of each of the two lines of the memory.
+    pub entries: usize,
+    /// Oldest entries of a line that no tap reads.
+    pub unread: usize,
+    /// The period as a whole number of samples.
+    pub whole: u32,
+    /// Whether learning pauses under saturation.
+    pub pause: bool,
 }
 
 /// Sum of products in two independent sums, which the processor can compute in parallel.
@@ -148,7 +157,7 @@ impl SampledRepetitive {
         (self.lengths.period, self.entries)
     }
 
-    /// Coefficients of the recursion, for a stability analysis:
+    /// Coefficients of the recursion, for a stability analysis or a controller in another language:
     /// `uRC[k] = pole uRC[k-1] + sum of tap (uRC[k-n] + gain e[k-n+lead])`, n the delay of a tap.
     #[must_use]
     pub fn recursion(&self) -> Recursion<'_> {
@@ -159,6 +168,10 @@ impl SampledRepetitive {
             lead: self.lead,
             nearest: self.nearest,
             taps: self.taps.get(..self.reads).unwrap_or_default(),
+            entries: self.entries,
+            unread: self.unread,
+            whole: self.lengths.whole,
+            pause: self.pause,
         }
     }
 

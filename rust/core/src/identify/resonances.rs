@@ -282,7 +282,8 @@ impl<'a> Trial<'a> {
             rows.push(&[u[k], rate(k), 1.0], moved[k]);
         }
         let (low, high) = range(&self.y);
-        (high - low) * rows.rms(&rows.solve(&[FREE; 3]), index(self.rows.len()))
+        let weights = rows.solve(&[FREE; 3]);
+        (high - low) * rows.rms(&weights, index(self.rows.len()))
     }
 
     fn cost(&self, modes: &[Mode]) -> (f64, Vec<f64>) {

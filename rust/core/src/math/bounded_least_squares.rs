@@ -7,19 +7,6 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// A least squares problem `min |A x - b|`, its rows `[A b]` compressed as they come.
-///
-/// The rows are triangularised in blocks, so that a record of any length needs no more memory
-/// than a few times the square of the number of unknowns.
-#[derive(Clone, Debug)]
-pub struct Rows {
-    block: DMatrix<f64>,
-    filled: usize,
-}
-
-/// Rows that are triangularised at once, besides those of the triangle.
-const BLOCK: usize = 256;
-
 /// Bounds of an unknown that must not fall below 0.
 pub const NOT_NEGATIVE: (f64, f64) = (0.0, f64::INFINITY);
 
@@ -28,63 +15,6 @@ pub const FREE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 
 /// Smallest pivot of a column of length 1 that counts as independent of those before it.
 const INDEPENDENT: f64 = 1e-10;
-
-impl Rows {
-    /// A problem with so many unknowns and no rows yet.
-    #[must_use]
-    pub fn new(unknowns: usize) -> Self {
-        let columns = unknowns + 1;
-        Self { block: DMatrix::zeros(columns + BLOCK, columns), filled: 0 }
-    }
-
-    /// Takes a row of A and the entry of b.
-    pub fn push(&mut self, row: &[f64], right: f64) {
-        let columns = self.block.ncols();
-        if self.filled == self.block.nrows() {
-            let triangle = self.block.clone().qr().r();
-            self.block.rows_mut(0, columns).copy_from(&triangle);
-            self.filled = columns;
-        }
-        for (slot, value) in self.block.row_mut(self.filled).iter_mut().zip(row) {
-            *slot = *value;
-        }
-        self.block[(self.filled, columns - 1)] = right;
-        self.filled += 1;
-    }
-
-    /// Root of the mean square that `x` leaves of so many rows.
-    #[must_use]
-    pub fn rms(&self, x: &[f64], count: f64) -> f64 {
-        let rows = self.block.rows(0, self.filled);
-        let left = |row: usize| {
-            let a = rows.row(row);
-            let known: f64 = x.iter().enumerate().map(|(j, x)| a[j] * x).sum();
-            let left = a[x.len()] - known;
-            left * left
-        };
-        let squares: f64 = (0..self.filled).map(left).sum();
-        libm::sqrt(squares / count.max(1.0))
-    }
-
-    /// Largest entry of A, at least the smallest positive number.
-    #[must_use]
-    pub fn size(&self) -> f64 {
-        let unknowns = self.block.ncols() - 1;
-        let entries = self.block.rows(0, self.filled).into_owned();
-        entries.columns(0, unknowns).amax().max(f64::MIN_POSITIVE)
-    }
-
-    /// The unknowns, each between its bounds.
-    #[must_use]
-    pub fn solve(&self, bounds: &[(f64, f64)]) -> Vec<f64> {
-        let unknowns = self.block.ncols() - 1;
-        let rows = self.block.rows(0, self.filled).into_owned();
-        let rows = if self.filled > unknowns + 1 { rows.qr().r() } else { rows };
-        let a = rows.columns(0, unknowns).into_owned();
-        let b = rows.column(unknowns).into_owned();
-        bounded(a, &b, bounds).as_slice().to_vec()
-    }
-}
 
 /// The `x` with the smallest `|A x - b|` whose entries lie between their bounds.
 ///

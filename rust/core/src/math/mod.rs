@@ -3,21 +3,23 @@
 
 mod bounded_least_squares;
 mod dispatch;
-mod golden_section;
 mod lanes;
+mod line_search;
 mod memory;
 mod random;
-mod root;
+mod rows;
 mod threads;
 mod transfer_function;
 
-pub use bounded_least_squares::{FREE, NOT_NEGATIVE, Rows, bounded};
+pub use bounded_least_squares::{FREE, NOT_NEGATIVE, bounded};
 pub use lanes::Lanes;
 pub use memory::{available, room, zeros};
+pub use rows::Rows;
+
+pub(crate) use piezotrack_control::root::rising_root;
 
 pub(crate) use dispatch::{dispatch_fused, dispatch_vectors, width};
-pub(crate) use golden_section::least;
+pub(crate) use line_search::least;
 pub(crate) use random::Draws;
-pub(crate) use root::rising_root;
 pub(crate) use threads::on_all_threads;
 pub(crate) use transfer_function::{C, Jet, Ratio};

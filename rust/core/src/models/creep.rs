@@ -118,15 +118,22 @@ impl ModeFlow {
     fn step<N: Number>(&self, step: f64, x: &mut N, v: &mut N, before: N, rise: N) {
         let Self { propagator: p, stiffness } = self;
         let number = |value: f64| before.like(value);
-        let (force, ramp) = (number(*stiffness) * before, number(*stiffness) * rise);
-        let (from, w) = (*x, *v * number(step));
-        let end = |position: f64, velocity: f64, constant: f64, slope: f64| {
-            let held = number(constant).mul_add(force, number(slope) * ramp);
-            number(position).mul_add(from, number(velocity).mul_add(w, held))
-        };
-        *x = end(p.position.x, p.velocity.x, p.constant.x, p.ramp.x);
-        *v = end(p.position.w, p.velocity.w, p.constant.w, p.ramp.w) / number(step);
+        let by = |one: f64, other: f64| (number(one), number(other));
+        let state = (*x, *v * number(step));
+        let load = (number(*stiffness) * before, number(*stiffness) * rise);
+        *x = after(state, by(p.position.x, p.velocity.x), load, by(p.constant.x, p.ramp.x));
+        let w = after(state, by(p.position.w, p.velocity.w), load, by(p.constant.w, p.ramp.w));
+        *v = w / number(step);
     }
+}
+
+/// What a step makes of displacement and velocity and of force and ramp, each with its factor.
+///
+/// No closure: those of lanes are not compiled for their instruction set unless they are inlined.
+#[inline(always)]
+fn after<N: Number>(state: (N, N), of_state: (N, N), load: (N, N), of_load: (N, N)) -> N {
+    let held = of_load.0.mul_add(load.0, of_load.1 * load.1);
+    of_state.0.mul_add(state.0, of_state.1.mul_add(state.1, held))
 }
 
 /// Steps of the dynamics of one length, s.
@@ -219,11 +226,13 @@ impl Relaxation {
 
     /// Input of the dynamics, d, m.
     #[must_use]
+    #[inline(always)]
     pub fn target<N: Number>(&self, state: &RelaxationState<N>) -> N {
         output(self.used(), state.input, &state.creep)
     }
 
     /// The input jumps to `input`, m.
+    #[inline(always)]
     pub fn jump<N: Number>(&self, state: &mut RelaxationState<N>, input: N) {
         state.input = input;
         if matches!(self.dynamics, Dynamics::None) {
@@ -261,6 +270,7 @@ impl Relaxation {
     }
 
     /// What the modes beside the main one add to displacement and velocity.
+    #[inline(always)]
     fn beside<N: Number>(&self, state: &RelaxationState<N>) -> (N, N) {
         let modes = self.dynamics.further().iter().zip(state.mode_x.iter().zip(&state.mode_v));
         let zero = state.x.like(0.0);

@@ -1,6 +1,7 @@
 //! Models of a stage: one file each, the traits that it implements, and the list of models.
 
 mod asymmetric_bouc_wen;
+mod asymmetric_prandtl_ishlinskii;
 mod bouc_wen;
 mod bouc_wen_oscillator;
 mod creep;
@@ -36,6 +37,9 @@ mod traits;
 mod values;
 
 pub use asymmetric_bouc_wen::{AsymmetricBoucWenHysteresis, AsymmetricBoucWenStage};
+pub use asymmetric_prandtl_ishlinskii::{
+    AsymmetricPlays, AsymmetricPrandtlIshlinskiiStage, asymmetric_plays,
+};
 pub use bouc_wen::{BoucWenHysteresis, BoucWenStage};
 pub use bouc_wen_oscillator::{BoucWenOscillator, BoucWenOscillatorKernel};
 pub use creep::{

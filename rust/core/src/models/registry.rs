@@ -325,6 +325,7 @@ models! {
     GeneralisedPrandtlIshlinskii: super::GeneralisedPrandtlIshlinskiiStage, least_squares;
     RateDependentPrandtlIshlinskii: super::RateDependentPrandtlIshlinskiiStage, least_squares;
     PolynomialPrandtlIshlinskii: super::PolynomialPrandtlIshlinskiiStage, least_squares;
+    AsymmetricPrandtlIshlinskii: super::AsymmetricPrandtlIshlinskiiStage, least_squares;
     Preisach: super::PreisachStage, least_squares;
     Duhem: super::DuhemStage, least_squares;
 }

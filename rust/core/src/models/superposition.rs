@@ -115,6 +115,11 @@ pub trait Superposition: StageModel {
     /// Where its signals have their places.
     const PLACES: Places;
 
+    /// Share of the deviation that creep has to take away in the end, beside lag and drift, where
+    /// the signals are so many that they follow what creep does within a cycle; `None` where it
+    /// stays as it was chosen before the lag.
+    const CREEP_GAIN: Option<f64> = None;
+
     /// Numbers that shape the signals and are searched around the least squares. One that gains
     /// little stays at its neutral value.
     #[must_use]
@@ -140,6 +145,8 @@ pub trait AnySuperposition: Sync {
     fn has_dead_zones(&self) -> bool;
     /// See [`Superposition::PLACES`].
     fn places(&self) -> Places;
+    /// See [`Superposition::CREEP_GAIN`].
+    fn creep_gain(&self) -> Option<f64>;
     /// See [`Superposition::shapes`].
     fn shapes(&self) -> Vec<Shape>;
     /// See [`Superposition::signals`].
@@ -164,6 +171,10 @@ impl<M: Superposition> AnySuperposition for Of<M> {
 
     fn places(&self) -> Places {
         M::PLACES
+    }
+
+    fn creep_gain(&self) -> Option<f64> {
+        M::CREEP_GAIN
     }
 
     fn shapes(&self) -> Vec<Shape> {

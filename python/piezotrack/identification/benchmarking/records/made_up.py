@@ -3,7 +3,7 @@
 All have ten plays and a stroke of about 40 um at 0 to 100 V, and noise of 20 nm. What is fitted is
 a sine whose amplitude falls to a fifth; the rest of the record repeats it in other steps, and the
 other record is another motion. The stage whose plays depend on the rate is also judged at another
-rate than the one that is fitted.
+rate than the one that is fitted; one record of it has three rates, and is judged at each of them.
 """
 
 from __future__ import annotations
@@ -33,6 +33,9 @@ THRESHOLDS = np.linspace(4.0, 40.0, 10)
 WEIGHTS = 0.03e-6 * np.exp(-THRESHOLDS / 25.0)
 # Samples in a cycle, and cycles in each part.
 CYCLE, CYCLES = 200, 12
+# Of the record of several rates: frequencies [Hz], cycles of each in a part, samples in a second.
+RATES = {0.1: 1, 1.0: 4, 10.0: 24}
+SAMPLES = 400.0
 # Lag of the thresholds behind the rate: V per V/s.
 RATE = 2e-3
 
@@ -83,12 +86,21 @@ def _plays(more: dict[str, Any], u: Array, dt: float) -> Array:
     return stage.simulate(u, dt).x
 
 
-def _falling(seed: int) -> Array:
+def _falling(seed: int, cycles: int = CYCLES, samples: int = CYCLE) -> Array:
     """Cycles from 0 V whose heights fall to a fifth, in another order for each seed."""
-    heights = np.linspace(100.0, 20.0, CYCLES)
+    heights = np.linspace(100.0, 20.0, cycles)
     heights[1:] = np.random.default_rng(seed).permutation(heights[1:])
-    phase = 2.0 * np.pi * np.arange(CYCLE) / CYCLE
+    phase = 2.0 * np.pi * np.arange(samples) / samples
     return np.concatenate([0.5 * height * (1.0 - np.cos(phase)) for height in heights])
+
+
+def _of_three_rates(seed: int) -> Array:
+    """Cycles of 0.1 Hz, 1 Hz and 10 Hz, one after the other in one record."""
+    parts = [
+        _falling(seed + k, cycles, round(SAMPLES / frequency))
+        for k, (frequency, cycles) in enumerate(RATES.items())
+    ]
+    return np.concatenate(parts)
 
 
 def _wandering(seed: int) -> Array:
@@ -105,7 +117,10 @@ def _wandering(seed: int) -> Array:
 
 def _log(u: Array, motion: Motion, frequency: float, seed: int) -> Dataset:
     """Simulate a drive at a number of cycles in a second, with noise."""
-    dt = 1.0 / (CYCLE * frequency)
+    return _noisy(u, motion, 1.0 / (CYCLE * frequency), seed)
+
+
+def _noisy(u: Array, motion: Motion, dt: float, seed: int) -> Dataset:
     noise = NOISE * np.random.default_rng(seed).standard_normal(u.size)
     return Dataset(u=u, y=motion(u, dt) + noise, dt=dt)
 
@@ -138,6 +153,27 @@ def _of_rate(frequency: float) -> BenchmarkRecord:
     return _made(name, f"rate: {frequency:g} Hz", rate_dependent_plays, frequency, also)
 
 
-RECORDS: Mapping[str, Callable[[], BenchmarkRecord]] = {
-    name: partial(_of_plays, name, more, frequency) for name, more, frequency in ONE_MORE
-} | {f"rate-{frequency:g}hz": partial(_of_rate, frequency) for frequency in (0.1, 1.0, 10.0)}
+def _of_rates() -> BenchmarkRecord:
+    """Make one record of all rates, judged on another of them and at each rate alone."""
+    u = _of_three_rates(1)
+    whole = _noisy(np.concatenate([u, _of_three_rates(11)]), rate_dependent_plays, 1 / SAMPLES, 3)
+    middle = float(whole.t[u.size])
+    others = {
+        f"at {frequency:g} Hz": _log(_wandering(4), rate_dependent_plays, frequency, 6 + k)
+        for k, frequency in enumerate(RATES)
+    }
+    return BenchmarkRecord(
+        name="rate-three",
+        title="rate: 0.1, 1 and 10 Hz",
+        fitted=whole[:middle],
+        rest=whole[middle:],
+        others=others,
+        noise=NOISE,
+    )
+
+
+RECORDS: Mapping[str, Callable[[], BenchmarkRecord]] = (
+    {name: partial(_of_plays, name, more, frequency) for name, more, frequency in ONE_MORE}
+    | {f"rate-{frequency:g}hz": partial(_of_rate, frequency) for frequency in RATES}
+    | {"rate-three": _of_rates}
+)

@@ -8,7 +8,7 @@ use super::form::Form;
 use super::gauss_newton::STEPS;
 use super::modes::{drop_modes, first_mode};
 use super::places::{add_once, choose_places, few_or_many, spread};
-use super::slow_parts::{choose_slow, creeps};
+use super::slow_parts::{choose_slow, creeps, without_creep};
 use super::{CreepKind, DynamicsKind, PlacesKind, Settings, WeightsRecord};
 use crate::identify::history::History;
 use crate::math::least;
@@ -44,7 +44,10 @@ const ROWS: usize = 4000;
 const LONGEST_PHASE: f64 = 0.06;
 
 /// Steps of a trial among many: the best one is settled.
-const FEW_STEPS: usize = 4;
+const FEW_STEPS: usize = 2;
+
+/// Ratio of neighbouring lags that are tried.
+const LAG_SPREAD: f64 = 2.5;
 
 /// Deviation of the lag that is taken, relative to the least.
 const LAG_SAME: f64 = 1.003;
@@ -110,7 +113,18 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Found<'a>> 
         fit.settle(ROUGH)?;
     }
     choose_slow(&mut fit, settings)?;
-    let lags = choose_dynamics(&mut fit, settings, mode)?;
+    let still = fit.clone();
+    let mut lags = choose_dynamics(&mut fit, settings, mode)?;
+    if let (Some(gain), CreepKind::Auto, false) =
+        (common.of.creep_gain(), &settings.creep, fit.times.is_empty())
+    {
+        // Creep was chosen before a lag, for some of which it stood.
+        let mut bare = without_creep(still)?;
+        let range = choose_dynamics(&mut bare, settings, mode)?;
+        if (1.0 - gain) * bare.rms <= fit.rms {
+            (fit, lags) = (bare, range);
+        }
+    }
     choose_places(&mut fit, settings)?;
     Some((fit, lags))
 }
@@ -145,7 +159,7 @@ fn search_shape(fit: &mut Fit<'_>) -> Option<()> {
             let here = fit.clone();
             let mut best = here.clone();
             least(range, 1e-4, |place| {
-                let mut trial = here.clone();
+                let mut trial = best.clone();
                 trial.reshape(i, place);
                 trial.settle(1e-5)?;
                 let rms = trial.rms;
@@ -181,7 +195,11 @@ fn with_history<'a>(
             trial.x[share] = trial.x[share].max(FIRST_SHARE);
         }
     }
-    trial.settle_within(steps, ROUGH)?;
+    if steps == STEPS {
+        trial.settle(ROUGH)?;
+    } else {
+        trial.settle_rigid(steps)?;
+    }
     Some(trial)
 }
 
@@ -301,30 +319,32 @@ fn choose_dynamics(
     }
 }
 
-/// The fit with the lag that explains most.
+/// The fit with the lag that explains most: the best of some, and from there on with the lag as one
+/// of the unknowns.
 pub(super) fn best_lag<'a>(fit: &Fit<'a>) -> Option<Fit<'a>> {
     let ranges = Form::First.ranges(fit.common.longest().length(), fit.common.shortest_interval());
-    let bounds = (libm::exp(ranges[0].0), libm::exp(ranges[0].1));
+    let (mut time, longest) = (libm::exp(ranges[0].0), libm::exp(ranges[0].1));
+    let mut trial = fit.clone();
     let mut best: Option<Fit<'a>> = None;
-    least(bounds, 0.1, |time| {
-        let trial = at_lag(fit, time)?;
-        let rms = trial.rms;
-        if best.as_ref().is_none_or(|best| rms < best.rms) {
-            best = Some(trial);
+    while time < longest {
+        // Each from the one before: their weights differ little.
+        trial = at_lag(&trial, time, 1)?;
+        if best.as_ref().is_none_or(|best| trial.rms < best.rms) {
+            best = Some(trial.clone());
         }
-        Some(rms)
-    })?;
+        time *= LAG_SPREAD;
+    }
     let mut best = best?;
     best.settle(1e-5)?;
     Some(best)
 }
 
-/// The fit with a lag of so many seconds, which is held.
-fn at_lag<'a>(fit: &Fit<'a>, time: f64) -> Option<Fit<'a>> {
+/// The fit with a lag of so many seconds, which is held, after so many steps at most.
+fn at_lag<'a>(fit: &Fit<'a>, time: f64, steps: usize) -> Option<Fit<'a>> {
     let mut trial = fit.clone();
     trial.set_poles(Form::First, &[libm::log(time)]);
     trial.held = true;
-    trial.settle(ROUGH)?;
+    trial.settle_rigid(steps)?;
     trial.held = false;
     Some(trial)
 }
@@ -333,7 +353,7 @@ fn at_lag<'a>(fit: &Fit<'a>, time: f64) -> Option<Fit<'a>> {
 fn smallest_lag<'a>(still: Fit<'a>, best: &Fit<'a>) -> Option<(Fit<'a>, (f64, f64))> {
     let time = libm::exp(best.x[best.layout().poles().start]);
     let enough = SAME * f64::min(best.rms, still.rms);
-    let as_good = |time: f64| Some(at_lag(best, time)?.rms <= enough);
+    let as_good = |time: f64| Some(at_lag(best, time, STEPS)?.rms <= enough);
     let longest = libm::exp(best.pole_ranges()[0].1);
     let mut high = time;
     while high < longest && as_good(1.5 * high)? {
@@ -348,7 +368,7 @@ fn smallest_lag<'a>(still: Fit<'a>, best: &Fit<'a>) -> Option<(Fit<'a>, (f64, f6
         let (mut low, mut short) = (time, 0.0);
         for _ in 0..6 {
             let middle = 0.5 * (low + short);
-            if at_lag(best, middle)?.rms <= enough { low = middle } else { short = middle }
+            if at_lag(best, middle, STEPS)?.rms <= enough { low = middle } else { short = middle }
         }
         Some(low)
     };
@@ -357,8 +377,9 @@ fn smallest_lag<'a>(still: Fit<'a>, best: &Fit<'a>) -> Option<(Fit<'a>, (f64, f6
     if still.rms <= least {
         return Some((still, (low, high)));
     }
-    let mut chosen = at_lag(best, shortest(least)?)?;
+    let mut chosen = at_lag(best, shortest(least)?, STEPS)?;
     chosen.held = true;
+    chosen.settle(ROUGH)?;
     Some((chosen, (low, high)))
 }
 
@@ -379,10 +400,12 @@ fn unseen_mode<'a>(fit: &Fit<'a>) -> Option<Fit<'a>> {
     {
         let mut trial = fit.clone();
         trial.set_poles(Form::Modes(1), &[libm::log(frequency / dt), libm::log(damping_ratio)]);
-        trial.settle(ROUGH)?;
+        trial.settle_rigid(STEPS)?;
         if best.as_ref().is_none_or(|best| SAME * trial.rms < best.rms) {
             best = Some(trial);
         }
     }
-    best
+    let mut best = best?;
+    best.settle(ROUGH)?;
+    Some(best)
 }

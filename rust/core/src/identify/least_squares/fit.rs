@@ -1,5 +1,6 @@
 //! A stage of weighted signals on its way to the records, and how far it is from them.
 
+use core::cell::OnceCell;
 use core::ops::Range;
 use std::sync::Arc;
 
@@ -20,6 +21,9 @@ pub(super) struct Beginning {
     pub from: f64,
 }
 
+/// Signals of all samples of a record, one sample after the other.
+pub(super) type Kept = OnceCell<Arc<[f64]>>;
+
 /// A stage on its way to the best one of its structure.
 #[derive(Clone)]
 pub(super) struct Fit<'a> {
@@ -34,6 +38,8 @@ pub(super) struct Fit<'a> {
     pub form: Form,
     /// Whether the numbers of the dynamics stay as they are.
     pub held: bool,
+    /// Whether the thresholds of the dead zones stay as they are.
+    pub rigid: bool,
     /// Where each record begins.
     pub begins: Vec<Beginning>,
     /// Time constant of the drift of each record, s; `None` where there is none.
@@ -41,6 +47,8 @@ pub(super) struct Fit<'a> {
     /// Numbers of the shape, and what shape and places make.
     pub shape: Vec<f64>,
     pub signals: Arc<dyn Signals>,
+    /// Signals of each record, once they were needed.
+    pub kept: Vec<Kept>,
     /// Whether the motion is that of the stage's simulation, exact between samples too.
     pub exact: bool,
     /// Window of each record that is judged, and every how many of its samples.
@@ -68,8 +76,10 @@ impl<'a> Fit<'a> {
             times: Vec::new(),
             form: Form::None,
             held: false,
+            rigid: false,
             begins: common.records.iter().map(|one| begin(one.history)).collect(),
             drifts: common.records.iter().map(known_drift).collect(),
+            kept: none_kept(common),
             exact: false,
             windows: windows(common),
             every: vec![1; common.records.len()],
@@ -88,6 +98,7 @@ impl<'a> Fit<'a> {
         Fit {
             common,
             signals: signals(common, &self.shape, &self.places),
+            kept: none_kept(common),
             places: self.places,
             times: self.times,
             shape: self.shape,
@@ -98,6 +109,7 @@ impl<'a> Fit<'a> {
             bent: self.bent,
             form: self.form,
             held: self.held,
+            rigid: self.rigid,
             begins: self.begins,
             drifts: self.drifts,
             exact: false,
@@ -146,6 +158,12 @@ impl<'a> Fit<'a> {
         change(self);
         if self.places != before.places {
             self.signals = signals(self.common, &self.shape, &self.places);
+            self.kept = none_kept(self.common);
+        }
+        for ((kept, now), was) in self.kept.iter_mut().zip(&self.begins).zip(&before.begins) {
+            if now != was {
+                *kept = Kept::new();
+            }
         }
         let (was, now) = (before.layout(), self.layout());
         self.x = vec![0.0; self.unknowns()];
@@ -176,6 +194,7 @@ impl<'a> Fit<'a> {
     pub fn reshape(&mut self, i: usize, place: f64) {
         self.shape[i] = place;
         self.signals = signals(self.common, &self.shape, &self.places);
+        self.kept = none_kept(self.common);
     }
 
     /// Sets the numbers of the dynamics, logarithms.
@@ -390,11 +409,16 @@ impl<'a> Fit<'a> {
     }
 }
 
+fn none_kept(common: &Common<'_>) -> Vec<Kept> {
+    vec![Kept::new(); common.records.len()]
+}
+
 fn signals(common: &Common<'_>, shape: &[f64], places: &[f64]) -> Arc<dyn Signals> {
     Arc::from(common.of.signals(&SignalsOf { shape, places, drive: common.drive }))
 }
 
-fn known_drift(record: &WeightsRecord<'_>) -> Option<f64> {
+/// Time constant of a drift of which the caller says so, s.
+pub(super) fn known_drift(record: &WeightsRecord<'_>) -> Option<f64> {
     match record.drift {
         DriftKind::Time(time) => Some(time),
         DriftKind::None | DriftKind::Auto => None,

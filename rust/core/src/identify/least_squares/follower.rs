@@ -7,7 +7,8 @@ use crate::signal::Hold;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Follower {
     pub state: RelaxationState,
-    before: f64,
+    /// Input of the latest sample.
+    pub before: f64,
 }
 
 impl Follower {

@@ -3,17 +3,13 @@
 use core::ops::Range;
 use std::collections::VecDeque;
 
+use super::choices::ROUGH;
+use super::columns::Columns;
 use super::fit::Fit;
-use super::follower::Follower;
 use super::record_path::Late;
 use super::{WeightsDelay, WeightsRecord};
 use crate::error::Result;
 use crate::math::Rows;
-use crate::models::{Relaxation, RelaxationFlow, RelaxationState};
-use crate::signal::Hold;
-
-/// Change of a logarithm for a derivative by differences.
-const NUDGE: f64 = 1e-5;
 
 /// Weight of a row that holds a sum at its bound, relative to all others together.
 const STIFF: f64 = 1e4;
@@ -24,36 +20,59 @@ const ALIKE: f64 = 1e-4;
 /// Most steps.
 pub(super) const STEPS: usize = 60;
 
+/// Where a step goes.
+struct Goal {
+    x: Vec<f64>,
+    /// RMS deviation that the linear problem has there, m, and that before the step.
+    rms: f64,
+    before: f64,
+    /// Whether no bound of this step alone keeps it from going further.
+    free: bool,
+}
+
 impl Fit<'_> {
     /// Gauss and Newton's method until a step gains less than `gain`; `None` where stopped.
     pub fn settle(&mut self, gain: f64) -> Option<()> {
         self.settle_within(STEPS, gain)
     }
 
+    /// The same for one trial of many, the best of which is settled after: the thresholds of dead
+    /// zones, which take many steps, stay as they are.
+    pub fn settle_rigid(&mut self, steps: usize) -> Option<()> {
+        self.rigid = true;
+        let settled = self.settle_within(steps, ROUGH);
+        self.rigid = false;
+        settled
+    }
+
     /// The same with so many steps at most.
     pub fn settle_within(&mut self, steps: usize, gain: f64) -> Option<()> {
-        self.rms = self.deviation();
         for _ in 0..steps {
             if (self.common.stop)() {
                 return None;
             }
-            let (before, start) = (self.rms, self.x.clone());
-            let goal = self.goal();
+            let (start, goal) = (self.x.clone(), self.goal());
+            // Rounding alone may forbid a step from which nothing is to be gained.
+            let worth = goal.before - goal.rms > gain * goal.before;
             let mut part = 1.0;
             loop {
-                self.x = start.iter().zip(&goal).map(|(a, b)| a + part * (b - a)).collect();
+                self.x = start.iter().zip(&goal.x).map(|(a, b)| a + part * (b - a)).collect();
                 self.rms =
                     if self.layout().admits(&self.x) { self.deviation() } else { f64::INFINITY };
-                if self.rms < before || part < 1e-3 {
+                if self.rms < goal.before || part < 1e-3 || !worth {
                     break;
                 }
                 part *= 0.5;
             }
-            if self.rms >= before || self.rms.is_nan() {
-                (self.rms, self.x) = (before, start);
+            if self.rms >= goal.before || self.rms.is_nan() {
+                (self.rms, self.x) = (goal.before, start);
                 break;
             }
-            if before - self.rms <= gain * before {
+            if goal.before - self.rms <= gain * goal.before {
+                break;
+            }
+            // What the linear problem foretold: the next one would be the same.
+            if part > 0.9 && goal.free && (self.rms - goal.rms).abs() <= gain * self.rms {
                 break;
             }
         }
@@ -61,12 +80,14 @@ impl Fit<'_> {
     }
 
     /// The solution of the problem linearised about the present unknowns.
-    fn goal(&self) -> Vec<f64> {
-        let Ok(rows) = self.linearised() else { return self.x.clone() };
+    fn goal(&self) -> Goal {
+        let Ok((mut rows, before)) = self.linearised() else {
+            let none = f64::INFINITY;
+            return Goal { x: self.x.clone(), rms: none, before: none, free: false };
+        };
         let layout = self.layout();
         let bounds = self.bounds();
-        let mut held = rows.clone();
-        let mut x = held.solve(&bounds);
+        let mut x = rows.solve(&bounds);
         // Sums beyond their bounds are held there, one more each time.
         let sums = layout.sums();
         for _ in 0..sums.len() {
@@ -78,18 +99,26 @@ impl Fit<'_> {
             });
             let Some((part, bound)) = beyond else { break };
             let mut row = vec![0.0; self.unknowns()];
-            let stiff = STIFF * held.size();
+            let stiff = STIFF * rows.size();
             row[part].fill(stiff);
-            held.push(&row, stiff * bound);
-            x = held.solve(&bounds);
+            rows.push(&row, stiff * bound);
+            x = rows.solve(&bounds);
         }
-        x
+        // A number that may only move so far in one step goes on in the next.
+        let moving = |still: bool, part: Range<usize>| if still { 0..0 } else { part };
+        let corners = moving(self.rigid, layout.corners());
+        let mut stops = corners.chain(moving(self.held, layout.poles()));
+        let free = stops.all(|slot| bounds[slot].0 < x[slot] && x[slot] < bounds[slot].1);
+        Goal { rms: rows.rms(&x, self.counted()), x, before, free }
     }
 
     /// Bounds of all unknowns for a step.
     fn bounds(&self) -> Vec<(f64, f64)> {
         let ranges = self.pole_ranges();
         let mut bounds = self.layout().bounds(&self.x, self.held, self.bent, &ranges);
+        for slot in if self.rigid { self.layout().corners() } else { 0..0 } {
+            bounds[slot] = (self.x[slot], self.x[slot]);
+        }
         for (r, record) in self.common.records.iter().enumerate() {
             let delay = match record.delay {
                 WeightsDelay::Known(delay) => (delay, delay),
@@ -100,15 +129,16 @@ impl Fit<'_> {
         bounds
     }
 
-    /// The rows of the linearised problem.
-    fn linearised(&self) -> Result<Rows> {
+    /// The rows of the linearised problem, and the RMS deviation, m.
+    fn linearised(&self) -> Result<(Rows, f64)> {
         self.common.evaluations.set(self.common.evaluations.get() + 1);
         let mut rows = Rows::new(self.unknowns());
+        let mut squares = 0.0;
         for r in 0..self.common.records.len() {
-            self.push_rows(r, &mut rows)?;
+            squares += self.push_rows(r, &mut rows)?;
         }
         self.push_alike(&mut rows);
-        Ok(rows)
+        Ok((rows, libm::sqrt(squares / self.counted())))
     }
 
     /// Rows that draw weights of neighbours together where the model asks for it.
@@ -121,161 +151,49 @@ impl Fit<'_> {
         }
     }
 
-    /// The rows of one record.
-    fn push_rows(&self, r: usize, rows: &mut Rows) -> Result<()> {
+    /// The rows of one record; the sum of the squares of what is left, each as often as it counts.
+    fn push_rows(&self, r: usize, rows: &mut Rows) -> Result<f64> {
         let WeightsRecord { drive, y, start, .. } = self.common.records[r];
         let (layout, own) = (self.layout(), self.own(r));
-        let (motion, added, fades) = (self.undelayed(r)?, self.added(r), self.fading(r));
-        let parts = Parts::of(self, drive.dt)?;
-        let inner = layout.weights + layout.bends + layout.corners;
-        let mut inputs = vec![0.0; inner + 1];
-        let mut path = self.before(r);
-        let mut columns: Option<Columns> = None;
+        let (added, fades) = (self.added(r), self.fading(r));
+        let mut columns = Columns::of(self, r)?;
+        let exact = if self.exact { Some(self.undelayed(r)?) } else { None };
         let late = Late::new(self.delay(r), drive.dt);
         let factor = libm::sqrt(self.weight(r));
-        let mut recent = Recent::new(layout.count() + own.departures.len(), late);
+        let mut recent = Recent::new(columns.count(), late);
         let mut row = vec![0.0; self.unknowns()];
         let mut judged = self.judged(r).peekable();
-        for (k, &volts) in drive.u.iter().enumerate().take(self.windows[r].end) {
-            self.push(&mut path, volts, self.common.records[r].step(k));
-            self.inputs(&path.signals, &mut inputs);
-            let columns = match &mut columns {
-                None => {
-                    let departed = &self.x[layout.shares()][..own.departures.len()];
-                    let creep = self.creep_before(r, inner + 1);
-                    columns.insert(Columns::at_rest(&parts, &inputs, &creep, departed))
+        let mut motion = Vec::with_capacity(self.windows[r].end);
+        let mut squares = 0.0;
+        while let Some((first, count)) = columns.next() {
+            for (i, k) in (first..first + count).enumerate() {
+                motion.push(exact.as_ref().map_or(columns.displacement(i), |exact| exact[k]));
+                let counts = judged.next_if_eq(&k).is_some();
+                if !counts && late.is_none() {
+                    continue;
                 }
-                Some(columns) => {
-                    columns.next(&parts, drive.hold, &inputs);
-                    columns
+                recent.push(columns.row(i));
+                if !counts {
+                    continue;
                 }
-            };
-            let counts = judged.next_if_eq(&k).is_some();
-            if !counts && late.is_none() {
-                continue;
+                recent.read(&mut row[..layout.count()], 0);
+                recent.read(&mut row[own.departures.clone()], layout.count());
+                row[own.offset.clone()].fill(1.0);
+                row[own.drift.clone()].fill(fades(k, start));
+                let (before, after) = late.between(k);
+                row[own.delay.clone()].fill((motion[before] - motion[after]) / drive.dt);
+                let known: f64 = row.iter().zip(&self.x).map(|(a, b)| a * b).sum();
+                let left = factor * (y[k] - late.of(k, |k| motion[k]) - added(k));
+                squares += left * left;
+                for entry in &mut row {
+                    *entry *= factor;
+                }
+                rows.push(&row, factor.mul_add(known, left));
             }
-            let now = recent.next();
-            columns.write(now);
-            if !counts {
-                continue;
-            }
-            recent.read(&mut row[..layout.count()], 0);
-            recent.read(&mut row[own.departures.clone()], layout.count());
-            row[own.offset.clone()].fill(1.0);
-            row[own.drift.clone()].fill(fades(k, start));
-            let (before, after) = late.between(k);
-            row[own.delay.clone()].fill((motion[before] - motion[after]) / drive.dt);
-            let known: f64 = row.iter().zip(&self.x).map(|(a, b)| a * b).sum();
-            let left = y[k] - late.of(k, |k| motion[k]) - added(k);
-            for entry in &mut row {
-                *entry *= factor;
-            }
-            rows.push(&row, factor * (left + known));
         }
-        Ok(())
-    }
-
-    /// Creep and dynamics with each number of the dynamics changed a little.
-    fn nudged(&self, dt: f64) -> Result<Vec<(Relaxation, RelaxationFlow)>> {
-        let of = |i: usize| {
-            let mut other = self.clone();
-            let slot = other.layout().poles().start + i;
-            other.x[slot] += NUDGE;
-            let part = other.relaxation()?;
-            Ok((part, part.flow(dt)))
-        };
-        (0..self.layout().poles).map(of).collect()
+        Ok(squares)
     }
 }
-
-/// What the columns go through.
-struct Parts {
-    whole: (Relaxation, RelaxationFlow),
-    /// Behind the creep: what its relaxations have reached goes through the dynamics alone.
-    bare: (Relaxation, RelaxationFlow),
-    /// With each number of the dynamics changed a little.
-    nudged: Vec<(Relaxation, RelaxationFlow)>,
-    /// What a sampling interval leaves of each relaxation's departure.
-    decay: Vec<f64>,
-}
-
-impl Parts {
-    fn of(fit: &Fit<'_>, dt: f64) -> Result<Self> {
-        let (whole, bare) = (fit.relaxation()?, Relaxation::new(&[], &[], fit.dynamics())?);
-        let decay = fit.times.iter().map(|time| libm::exp(-dt / time)).collect();
-        let nudged = fit.nudged(dt)?;
-        Ok(Self { whole: (whole, whole.flow(dt)), bare: (bare, bare.flow(dt)), nudged, decay })
-    }
-}
-
-/// What the row of a sample is made of.
-struct Columns {
-    /// Of weights, dead zones and corners; last the stage's own input.
-    inputs: Vec<Follower>,
-    /// What each relaxation has reached, behind the dynamics.
-    reached: Vec<Follower>,
-    /// What is left of each departure, and that behind the dynamics.
-    left: Vec<f64>,
-    faded: Vec<Follower>,
-    /// The stage with each number of the dynamics changed a little.
-    nudged: Vec<Follower>,
-}
-
-impl Columns {
-    /// At rest behind the inputs of the first sample, the creep where it stood.
-    fn at_rest(parts: &Parts, signals: &[f64], creep: &[Vec<f64>], departed: &[f64]) -> Self {
-        let ready = |(input, q): (&f64, &Vec<f64>)| Follower::at_rest(&parts.whole.0, *input, q);
-        let bare = |q: &f64| Follower::at_rest(&parts.bare.0, *q, &[]);
-        let inputs: Vec<Follower> = signals.iter().zip(creep).map(ready).collect();
-        Self {
-            reached: creep.last().map_or(&[][..], Vec::as_slice).iter().map(bare).collect(),
-            left: departed.to_vec(),
-            faded: departed.iter().map(bare).collect(),
-            nudged: inputs.last().map_or_else(Vec::new, |last| vec![*last; parts.nudged.len()]),
-            inputs,
-        }
-    }
-
-    /// Where the stage itself is: its input is the last.
-    fn stage(&self) -> RelaxationState {
-        self.inputs[self.inputs.len() - 1].state
-    }
-
-    /// How each weight, dead zone, corner, creep share, number of the dynamics and departure
-    /// moves the stage.
-    fn write(&self, row: &mut [f64]) {
-        let x = self.stage().x;
-        let moved = |one: &Follower| one.state.x;
-        let inputs = self.inputs[..self.inputs.len() - 1].iter().chain(&self.reached).map(moved);
-        let slopes = self.nudged.iter().map(|one| (one.state.x - x) / NUDGE);
-        for (slot, value) in
-            row.iter_mut().zip(inputs.chain(slopes).chain(self.faded.iter().map(moved)))
-        {
-            *slot = value;
-        }
-    }
-
-    fn next(&mut self, parts: &Parts, hold: Hold, signals: &[f64]) {
-        let ((whole, flow), (bare, bare_flow)) = (&parts.whole, &parts.bare);
-        for (column, signal) in self.inputs.iter_mut().zip(signals) {
-            column.next(whole, flow, hold, *signal);
-        }
-        // These move from sample to sample whatever the hold.
-        let reached = self.stage().creep;
-        for (column, q) in self.reached.iter_mut().zip(reached) {
-            bare.step(bare_flow, &mut column.state, q);
-        }
-        for ((column, left), factor) in self.faded.iter_mut().zip(&mut self.left).zip(&parts.decay)
-        {
-            *left *= factor;
-            bare.step(bare_flow, &mut column.state, *left);
-        }
-        for (column, (part, flow)) in self.nudged.iter_mut().zip(&parts.nudged) {
-            column.next(part, flow, hold, signals[signals.len() - 1]);
-        }
-    }
-}
-
 /// The rows of the latest samples, as many as a late reading needs.
 struct Recent {
     rows: VecDeque<Vec<f64>>,
@@ -288,21 +206,24 @@ impl Recent {
         Self { rows: VecDeque::new(), length, late }
     }
 
-    /// Room for the row of the next sample.
-    fn next(&mut self) -> &mut Vec<f64> {
-        let oldest =
-            if self.rows.len() < self.late.whole() + 2 { None } else { self.rows.pop_front() };
-        self.rows.push_back(oldest.unwrap_or_else(|| vec![0.0; self.length]));
-        let last = self.rows.len() - 1;
-        &mut self.rows[last]
+    /// Takes the row of the next sample.
+    fn push(&mut self, row: &[f64]) {
+        let kept = if self.late.is_none() { 1 } else { self.late.whole() + 2 };
+        let oldest = if self.rows.len() < kept { None } else { self.rows.pop_front() };
+        let mut slot = oldest.unwrap_or_else(|| vec![0.0; self.length]);
+        slot.copy_from_slice(row);
+        self.rows.push_back(slot);
     }
 
     /// The entries from `from` on as they are read at the latest sample.
     fn read(&self, entries: &mut [f64], from: usize) {
         let last = self.rows.len() - 1;
+        if self.late.is_none() {
+            entries.copy_from_slice(&self.rows[last][from..from + entries.len()]);
+            return;
+        }
         for (i, entry) in entries.iter_mut().enumerate() {
-            let at = |k: usize| self.rows[k][from + i];
-            *entry = if self.late.is_none() { at(last) } else { self.late.of(last, at) };
+            *entry = self.late.of(last, |k| self.rows[k][from + i]);
         }
     }
 }

@@ -8,6 +8,7 @@
 //! spectrum has a mode; the numbers of an envelope are searched along one line at a time.
 
 mod choices;
+mod columns;
 mod common;
 mod fit;
 mod follower;

@@ -5,6 +5,7 @@ use core::ops::Range;
 
 use super::common::Common;
 use super::fit::Fit;
+use super::gauss_newton::STEPS;
 use super::{PlacesKind, Settings};
 use crate::models::{MOST_PLAYS, Places};
 use crate::signal::index;
@@ -113,7 +114,7 @@ pub(super) fn choose_places(fit: &mut Fit<'_>, settings: &Settings) -> Option<()
     }
     let mut here = fit.clone();
     here.windows = fit.windows.iter().map(|one| one.start..split(one)).collect();
-    here.settle(ROUGH)?;
+    here.settle_rigid(STEPS)?;
     let later: Vec<Range<usize>> = fit.windows.iter().map(|one| split(one)..one.end).collect();
     let foretold = |fit: &Fit<'_>| {
         let mut trial = fit.clone();
@@ -126,7 +127,7 @@ pub(super) fn choose_places(fit: &mut Fit<'_>, settings: &Settings) -> Option<()
         let mut trial = here.clone();
         let thresholds = spread(trial.common, (count, power), has_once(fit));
         trial.restructure(|trial| trial.places = thresholds);
-        trial.settle(ROUGH)?;
+        trial.settle_rigid(STEPS)?;
         let few = if count == MANY_PLAYS { gathered(&trial)? } else { None };
         for trial in [Some(trial), few].into_iter().flatten() {
             let rms = foretold(&trial);
@@ -147,6 +148,10 @@ pub(super) fn choose_places(fit: &mut Fit<'_>, settings: &Settings) -> Option<()
 /// thresholds: two neighbours stand for one play between them. `None` where they do not gather.
 #[expect(clippy::option_option, reason = "stopped, or none")]
 fn gathered<'a>(fit: &Fit<'a>) -> Option<Option<Fit<'a>>> {
+    // Weights that are not those of single plays gather nowhere.
+    if fit.layout().weights <= fit.places.len() {
+        return Some(None);
+    }
     let mut trial = fit.clone();
     let mut gap = reach(fit.common) / index(fit.places.len() + 1);
     for _ in 0..ROUNDS {
@@ -159,11 +164,11 @@ fn gathered<'a>(fit: &Fit<'a>) -> Option<Option<Fit<'a>>> {
             middle.iter().flat_map(|at| [f64::max(at - 0.5 * gap, 0.0), at + 0.5 * gap]).collect();
         pairs.sort_by(f64::total_cmp);
         trial.restructure(|trial| trial.places = pairs);
-        trial.settle(ROUGH)?;
+        trial.settle_rigid(STEPS)?;
     }
     let middle = middles(&trial, 1.1 * gap);
     trial.restructure(|trial| trial.places = middle);
-    trial.settle(ROUGH)?;
+    trial.settle_rigid(STEPS)?;
     Some(Some(trial))
 }
 

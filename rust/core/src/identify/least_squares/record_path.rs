@@ -1,11 +1,16 @@
 //! The way of a stage through one of the records: memory and creep before it, and its motion.
 
+use std::sync::Arc;
+
 use super::fit::Fit;
 use super::follower::Follower;
 use crate::error::Result;
 use crate::identify::history::{History, visited};
 use crate::models::{Dynamics, Experiment, Relaxation, Rest, Values};
 use crate::signal::{FractionalDelay, index};
+
+/// Signals of a record that are kept, at most: those of a longer one are made whenever they are needed.
+const MOST_KEPT: usize = 1 << 22;
 
 /// Signals of a drive, and the memory that they come from.
 #[derive(Clone, Debug)]
@@ -14,7 +19,51 @@ pub(super) struct Path {
     pub signals: Vec<f64>,
 }
 
-impl Fit<'_> {
+/// The signals of a record, sample by sample.
+pub(super) struct Walk<'f, 'a> {
+    fit: &'f Fit<'a>,
+    r: usize,
+    k: usize,
+    path: Path,
+    kept: Option<Arc<[f64]>>,
+}
+
+impl Walk<'_, '_> {
+    /// The signals at the next sample, of which there is one.
+    #[inline(always)]
+    pub fn next(&mut self) -> &[f64] {
+        let (k, width) = (self.k, self.path.signals.len());
+        self.k += 1;
+        if let Some(kept) = &self.kept {
+            return &kept[k * width..][..width];
+        }
+        let record = &self.fit.common.records[self.r];
+        self.fit.push(&mut self.path, record.drive.u[k], record.step(k));
+        &self.path.signals
+    }
+}
+
+impl<'a> Fit<'a> {
+    /// The way of record `r` from its first sample on.
+    pub fn walk<'f>(&'f self, r: usize) -> Walk<'f, 'a> {
+        let walk = || Walk { fit: self, r, k: 0, path: self.before(r), kept: None };
+        let samples = self.common.records[r].drive.u.len();
+        let count = samples * self.signals.count();
+        if count > MOST_KEPT {
+            return walk();
+        }
+        let make = || {
+            let (mut walk, mut all) = (walk(), Vec::with_capacity(count));
+            for _ in 0..samples {
+                all.extend_from_slice(walk.next());
+            }
+            all.into()
+        };
+        let kept = self.kept[r].get_or_init(make).clone();
+        let path = Path { memory: Vec::new(), signals: vec![0.0; self.signals.count()] };
+        Walk { fit: self, r, k: 0, path, kept: Some(kept) }
+    }
+
     /// The signals after the voltages that the stage visited slowly before record `r`.
     pub fn before(&self, r: usize) -> Path {
         let mut path =
@@ -34,20 +83,17 @@ impl Fit<'_> {
 
     /// Where the creep stands before record `r` behind each of so many inputs.
     pub fn creep_before(&self, r: usize, width: usize) -> Vec<Vec<f64>> {
-        let record = &self.common.records[r];
-        let drive = record.drive;
-        let mut path = self.before(r);
+        let drive = self.common.records[r].drive;
+        let mut walk = self.walk(r);
         let mut inputs = vec![0.0; width];
-        let whole_only = width == 1;
-        let take = |fit: &Self, path: &mut Path, (volts, dt): (f64, f64), inputs: &mut Vec<f64>| {
-            fit.push(path, volts, dt);
-            if whole_only {
-                inputs[0] = fit.bent(fit.sum(&path.signals));
+        let mut take = |inputs: &mut Vec<f64>| {
+            if width == 1 {
+                inputs[0] = self.bent(self.sum(walk.next()));
             } else {
-                fit.inputs(&path.signals, inputs);
+                self.inputs(walk.next(), inputs);
             }
         };
-        take(self, &mut path, (drive.u[0], f64::INFINITY), &mut inputs);
+        take(&mut inputs);
         let relaxed = |input: &f64| vec![*input; self.times.len()];
         if self.begins[r].history != History::Settled || self.times.is_empty() {
             let mut reached: Vec<Vec<f64>> = inputs.iter().map(relaxed).collect();
@@ -65,8 +111,8 @@ impl Fit<'_> {
         let flow = creep.flow(drive.dt);
         let mut followers: Vec<Follower> =
             inputs.iter().map(|input| Follower::at_rest(&creep, *input, &[])).collect();
-        for &volts in &drive.u[1..] {
-            take(self, &mut path, (volts, record.step(1)), &mut inputs);
+        for _ in &drive.u[1..] {
+            take(&mut inputs);
             for (follower, input) in followers.iter_mut().zip(&inputs) {
                 follower.next(&creep, &flow, drive.hold, *input);
             }
@@ -103,18 +149,17 @@ impl Fit<'_> {
         }
         let relaxation = self.relaxation()?;
         let flow = relaxation.flow(drive.dt);
-        let mut path = self.before(r);
+        let mut walk = self.walk(r);
         let creep = self.creep_before(r, 1);
         let mut follower: Option<Follower> = None;
-        let through = |(k, volts): (usize, &f64)| {
-            self.push(&mut path, *volts, self.common.records[r].step(k));
-            let output = self.bent(self.sum(&path.signals));
+        let through = |_| {
+            let output = self.bent(self.sum(walk.next()));
             match &mut follower {
                 Some(follower) => follower.next(&relaxation, &flow, drive.hold, output),
                 none => none.insert(Follower::at_rest(&relaxation, output, &creep[0])).state.x,
             }
         };
-        Ok(drive.u.iter().take(self.windows[r].end).enumerate().map(through).collect())
+        Ok((0..self.windows[r].end).map(through).collect())
     }
 
     /// State of the stage before the first sample of record `r`; that of its mirror image where it

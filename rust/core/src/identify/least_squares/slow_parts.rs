@@ -1,8 +1,9 @@
 //! Which slow parts a record shows: creep of the stage, drift of the sensor.
 
 use super::choices::{FIRST_SHARE, ROUGH, SAME, best_lag};
-use super::fit::Fit;
+use super::fit::{Fit, known_drift};
 use super::form::Form;
+use super::gauss_newton::STEPS;
 use super::places::split;
 use super::{CreepKind, DriftKind, DynamicsKind, Settings, WeightsRecord};
 use crate::math::least;
@@ -75,12 +76,23 @@ pub(super) fn choose_slow(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> 
     Some(())
 }
 
+/// The same without creep, its drifts chosen anew.
+pub(super) fn without_creep(mut fit: Fit<'_>) -> Option<Fit<'_>> {
+    fit.restructure(|fit| {
+        fit.times = Vec::new();
+        fit.drifts = fit.common.records.iter().map(known_drift).collect();
+    });
+    fit.settle(ROUGH)?;
+    choose_drifts(&mut fit)?;
+    Some(fit)
+}
+
 /// RMS deviation on the last third of each window of a structure that is fitted to what is before
 /// it, m.
 fn foretold(fit: &Fit<'_>) -> Option<f64> {
     let mut early = fit.clone();
     early.windows = fit.windows.iter().map(|one| one.start..split(one)).collect();
-    early.settle(ROUGH)?;
+    early.settle_rigid(STEPS)?;
     early.windows = fit.windows.iter().map(|one| split(one)..one.end).collect();
     Some(early.deviation())
 }
@@ -99,25 +111,38 @@ fn choose_drifts(fit: &mut Fit<'_>) -> Option<()> {
         if record.drift != DriftKind::Auto || fit.drifts[r].is_some() || !repeats(record) {
             continue;
         }
-        let length = fit.common.records[r].length();
-        let mut best: Option<Fit<'_>> = None;
-        let tried = |time: f64| {
-            let mut trial = fit.clone();
-            trial.restructure(|trial| trial.drifts[r] = Some(time));
-            trial.settle(ROUGH)?;
-            let rms = trial.rms;
-            if best.as_ref().is_none_or(|best| rms < best.rms) {
-                best = Some(trial);
-            }
-            Some(rms)
-        };
-        least((DRIFTS.0 * length, DRIFTS.1 * length), 0.02, tried)?;
+        let mut best = with_drift(fit, r)?;
+        best.settle(ROUGH)?;
+        // Once more: the thresholds of the dead zones moved with it.
+        let again = with_drift(&best, r)?;
+        if again.rms < best.rms {
+            best = again;
+            best.settle(ROUGH)?;
+        }
         let enough = (1.0 - DRIFT_GAIN) * fit.deviation_of(r);
-        if let Some(best) = best.filter(|best| best.deviation_of(r) < enough) {
+        if best.deviation_of(r) < enough {
             *fit = best;
         }
     }
     Some(())
+}
+
+/// The fit with the drift of record `r` that explains most.
+fn with_drift<'a>(fit: &Fit<'a>, r: usize) -> Option<Fit<'a>> {
+    let length = fit.common.records[r].length();
+    let mut best: Option<Fit<'a>> = None;
+    let tried = |time: f64| {
+        let mut trial = best.as_ref().unwrap_or(fit).clone();
+        trial.restructure(|trial| trial.drifts[r] = Some(time));
+        trial.settle_rigid(STEPS)?;
+        let rms = trial.rms;
+        if best.as_ref().is_none_or(|best| rms < best.rms) {
+            best = Some(trial);
+        }
+        Some(rms)
+    };
+    least((DRIFTS.0 * length, DRIFTS.1 * length), 0.02, tried)?;
+    best
 }
 
 /// Creep where it was not set: none, or the two relaxations that explain most.
@@ -135,10 +160,13 @@ fn choose_creep(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
         for share in trial.layout().shares() {
             trial.x[share] = FIRST_SHARE;
         }
-        trial.settle(ROUGH)?;
+        trial.settle_rigid(STEPS)?;
         if best.as_ref().is_none_or(|best| trial.rms < best.rms) {
             best = Some(trial);
         }
+    }
+    if let Some(best) = &mut best {
+        best.settle(ROUGH)?;
     }
     let Some(best) = best.filter(|best| best.rms < (1.0 - CREEP_GAIN) * none.rms) else {
         *fit = none;

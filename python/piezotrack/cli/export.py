@@ -1,0 +1,101 @@
+"""``piezotrack export``: a controller for firmware or for another program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from ..errors import ParameterError
+from .error_messages import in_words
+from .options import (
+    Duration,
+    Json,
+    Out,
+    Overwrite,
+    Period,
+    Quiet,
+    of_file,
+    refuse_without_effect,
+)
+from .output import Output
+from .track import parsed_reference
+
+if TYPE_CHECKING:
+    from ..control.export.write import Exported
+
+__all__ = ["export_command"]
+
+
+@in_words
+def export_command(
+    context: typer.Context,
+    controller: Annotated[
+        Path, typer.Argument(metavar="CONTROLLER", help="Controller file in JSON.")
+    ],
+    to: Annotated[
+        Literal["c99", "json", "fmu"],
+        typer.Option(
+            help="C99 without a library, coefficients in JSON, or a co-simulation unit (FMI 2.0)."
+        ),
+    ] = "c99",
+    out: Out = Path("results"),
+    overwrite: Overwrite = False,
+    name: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Name of files and functions; default that of CONTROLLER.",
+            show_default=False,
+        ),
+    ] = None,
+    single: Annotated[
+        bool, typer.Option("--float", help="Numbers of 4 bytes in place of 8.")
+    ] = False,
+    reference: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TEXT|FILE",
+            help="Motion that repeats, as of `track`: the feedforward is played from a table of "
+            "one period.",
+            show_default=False,
+        ),
+    ] = None,
+    duration: Duration = None,
+    period: Period = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a controller as C for firmware, as coefficients or as an FMU."""
+    from ..control.controller_file import load_controller
+    from ..control.export.write import export_controller, export_files
+
+    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
+    chosen = controller.stem.replace("-", "_") if name is None else name
+    try:
+        names = export_files(to, chosen)
+    except ParameterError as error:
+        if name is not None:
+            raise
+        raise ParameterError(f"{error}; --name gives one") from None
+    if single and to == "json":
+        raise ParameterError("--float has no effect with --to json: expected it left out")
+    if reference is None:
+        refuse_without_effect(context, ("duration", "period"), "without --reference")
+    known = load_controller(controller)
+    motion = None if reference is None else parsed_reference(reference, duration, period)
+    result.will_write(names)
+    with of_file(controller):
+        done = export_controller(known, out, to=to, name=chosen, single=single, reference=motion)
+    result.show(f"{known!r}\n{done}", _document(done), done.files)
+
+
+def _document(done: Exported) -> dict[str, Any]:
+    return {
+        "state_bytes": done.state_bytes,
+        "additions": done.additions,
+        "multiplications": done.multiplications,
+        "divisions": done.divisions,
+        "bound": done.bound,
+    }

@@ -1,0 +1,1 @@
+"""Controllers for firmware and for other programs."""

@@ -1,0 +1,298 @@
+"""A loop that this computer closes on a device, point by point, and that always ends safe."""
+
+from __future__ import annotations
+
+import math
+import signal
+import threading
+import time
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...errors import DeviceError, Interrupted, ParameterError
+from ...hardware.measure import rest_of
+from ..checks import check_period, check_stable, check_within_reach
+from ..tracking import Tracking, feedforward_of
+from .guard import Guard
+from .latency import Latency, check_exchanging, measure_latency, wait_until
+from .playing import check_limits
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from types import FrameType
+
+    from numpy.typing import NDArray
+
+    from ...hardware.device import Device, Exchanging
+    from ...references.reference import Reference, SampledReference
+    from ..controller import Controller
+
+    Array = NDArray[np.float64]
+
+__all__ = ["DeviceTracking", "track_on"]
+
+# The way to the safe voltage [s].
+RAMP = 0.5
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class DeviceTracking(Tracking):
+    """A motion that was tracked on a device; the true displacement is the measured one.
+
+    Attributes
+    ----------
+    latency : Latency
+        What was measured before the loop began.
+    lateness : ndarray, shape (n,)
+        Time from each tick until its voltage was out [s]; NaN where the tick was left out.
+    """
+
+    latency: Latency
+    lateness: Array
+
+    @property
+    def overruns(self) -> int:
+        """Ticks whose voltage was not out within their interval, those left out included."""
+        return int(np.sum(~(self.lateness <= self.controller.dt)))
+
+    def summary(self) -> str:
+        """Table of the run, and how late it was.
+
+        Returns
+        -------
+        str
+            Several lines.
+        """
+        done = Latency.of(self.lateness[np.isfinite(self.lateness)])
+        return f"{super().summary()}\nlateness  {done}, {self.overruns} overruns"
+
+
+class _Log:
+    """What a loop keeps, sample by sample."""
+
+    def __init__(self, count: int) -> None:
+        self.rows = np.full((count, 7), np.nan)
+        self.lateness = np.full(count, np.nan)
+        self.done = 0
+
+    def tracking(
+        self, latency: Latency, controller: Controller, reference: Reference, note: str
+    ) -> DeviceTracking | None:
+        """Return what was tracked up to now; a tick that was left out has the values before it."""
+        n = self.done
+        if n < 2:
+            return None
+        samples = reference.sample(controller.dt)
+        kept = np.maximum.accumulate(np.where(np.isfinite(self.lateness[:n]), np.arange(n), 0))
+        y, volts, feedforward, feedback, repetitive, error, saturated = self.rows[:n][kept].T
+        t = samples.t[:n]
+        return DeviceTracking(
+            reference=reference,
+            controller=controller,
+            t=t,
+            desired=samples.x[:n],
+            measured=y,
+            displacement=y,
+            loop_error=error,
+            voltage=volts,
+            feedforward=feedforward,
+            feedback=feedback,
+            repetitive=repetitive,
+            saturated=saturated > 0.5,
+            fine_t=t,
+            fine_displacement=y,
+            fine_voltage=volts,
+            note=note,
+            latency=latency,
+            lateness=self.lateness[:n].copy(),
+        )
+
+
+@contextmanager
+def _terminated() -> Iterator[None]:
+    """Turn SIGTERM into KeyboardInterrupt meanwhile, where nobody else answers it."""
+    main = threading.current_thread() is threading.main_thread()
+    if not main or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
+        yield
+        return
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        del number, frame
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+def track_on(
+    asked: Device,
+    controller: Controller,
+    reference: Reference,
+    *,
+    safe: float | None = None,
+    beyond_reach: bool = False,
+    unstable: bool = False,
+) -> DeviceTracking:
+    """Close the loop of a controller on a device; `pt.track` calls it for a device.
+
+    Parameters
+    ----------
+    asked : Device
+        One with `exchange`.
+    controller, reference, beyond_reach, unstable
+        As of `pt.track`; reach and stability are checked on the model of the feedforward, with the
+        latency measured.
+    safe : float, optional
+        Voltage before and after [V]; default 0 V, or the limit nearest to it.
+
+    Returns
+    -------
+    DeviceTracking
+        The motion and its metrics, with the lateness of each tick.
+
+    Raises
+    ------
+    ParameterError
+        A number is out of its range, or the device is too slow for the interval.
+    DeviceError
+        The device or the clock failed; the output is at `safe`, or the message says where it may
+        be. Its `partial` is the run up to then.
+    Interrupted
+        Ctrl-C or SIGTERM came; the output is at `safe`. Its `partial` is the run up to then.
+    """
+    device = check_exchanging(asked)
+    check_limits(device, controller)
+    if controller.drive_unit != "V":
+        raise ParameterError(
+            f"controller commands in {controller.drive_unit}: expected V, which a device puts out"
+        )
+    home = rest_of(device, safe)
+    check_period(controller, reference)
+    samples = reference.sample(controller.dt)
+    volts, note = feedforward_of(controller, reference, samples)
+    log = _Log(len(samples))
+    with _terminated(), _safe_after(device, home, controller.dt, log):
+        latency = measure_latency(device, controller.dt, rest=home)
+        latency.check(controller.dt)
+        _check_model(controller, samples, latency, beyond_reach=beyond_reach, unstable=unstable)
+        told = f"{note}; the loop closed on {device.channels[0]}"
+        try:
+            _run(device, controller, samples, volts, home, log)
+        except DeviceError as error:
+            error.partial = log.tracking(latency, controller, reference, told)
+            raise
+        except KeyboardInterrupt:
+            part = log.tracking(latency, controller, reference, told)
+            raise Interrupted("the loop was interrupted", part) from None
+    run = log.tracking(latency, controller, reference, told)
+    assert run is not None
+    return run
+
+
+def _check_model(
+    controller: Controller,
+    samples: SampledReference,
+    latency: Latency,
+    *,
+    beyond_reach: bool,
+    unstable: bool,
+) -> None:
+    """Check what can be checked before: with the model of the feedforward, where there is one."""
+    from ...stages.virtual import VirtualStage
+
+    if controller.feedforward is None:
+        return
+    inverse = controller.feedforward
+    plant = VirtualStage.of(inverse.stage, delay=inverse.delay)
+    if not unstable:
+        check_stable(plant, controller, latency.p99)
+    if not beyond_reach:
+        check_within_reach(plant, controller.limits, samples)
+
+
+def _run(
+    device: Exchanging,
+    controller: Controller,
+    samples: SampledReference,
+    feedforward: Array,
+    home: float,
+    log: _Log,
+) -> None:
+    """Go from tick to tick by the absolute time; a tick that is over is left out."""
+    session, dt = controller.start(present=home), controller.dt
+    low, high = controller.limits
+    guard = Guard(session, dt, high - low)
+    x, held = samples.x, home
+    start = time.perf_counter() + dt
+    for k in range(x.size):
+        tick = start + k * dt
+        late = time.perf_counter() - tick
+        log.done = k + 1
+        guard.tick(late, k * dt)
+        if late > dt:
+            continue
+        wait_until(tick)
+        y = _number(device.exchange(held))
+        held = session.step(x[k], y, feedforward=feedforward[k])
+        device.hold(held)
+        log.lateness[k] = time.perf_counter() - tick
+        last = session.last
+        parts = (last.feedforward, last.feedback, last.repetitive, last.error, last.saturated)
+        log.rows[k] = (y, held, *parts)
+        guard.reading(y, held, k * dt)
+
+
+def _number(reading: object) -> float:
+    """Return a reading as a float; what is no number is no measurement."""
+    return float(reading) if isinstance(reading, (int, float, np.floating)) else math.nan
+
+
+@contextmanager
+def _safe_after(device: Exchanging, home: float, dt: float, log: _Log) -> Iterator[None]:
+    """Lead the output to a voltage [V] at the end, however it comes to it."""
+    try:
+        yield
+    except BaseException as error:
+        _to_safe(device, home, dt, log, error)
+        raise
+    _to_safe(device, home, dt, log, None)
+
+
+def _to_safe(
+    device: Exchanging, home: float, dt: float, log: _Log, error: BaseException | None
+) -> None:
+    done = np.flatnonzero(np.isfinite(log.lateness))
+    held = float(log.rows[done[-1], 1]) if done.size else home
+    steps = max(1, round(RAMP / max(dt, 1e-3)))
+    problem: Exception | None = None
+    begun = time.perf_counter()
+    # Slowly, so that nothing is excited; at once where that does not work, or is interrupted.
+    try:
+        for k in range(1, steps + 1):
+            wait_until(begun + k * RAMP / steps)
+            device.hold(held + (home - held) * k / steps)
+        return
+    except KeyboardInterrupt:
+        pass
+    except Exception as failed:
+        problem = failed
+    try:
+        device.hold(home)
+        return
+    except Exception as failed:
+        problem = failed
+    with suppress(Exception):
+        device.close()
+    first = f"{error}; " if error is not None else ""
+    lost = DeviceError(
+        f"{first}the output could not be led to {home:g} V ({problem}): it may still be at "
+        f"{held:.4g} V"
+    )
+    lost.partial = getattr(error, "partial", None)
+    raise lost from error

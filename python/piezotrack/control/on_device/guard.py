@@ -1,0 +1,90 @@
+"""What a loop on a device watches its readings and its clock for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from ...errors import DeviceError
+
+if TYPE_CHECKING:
+    from ..session import RefusedReadings, Session
+
+__all__ = ["Guard"]
+
+# Readings in a row that are no measurements, and time without one [s], after which a loop ends.
+MOST_INVALID, LONGEST_INVALID = 5, 0.1
+# Equal readings in a row that show a sensor that stands still, while the drive moved by this
+# share of its range.
+MOST_EQUAL, MOVED = 20, 0.05
+# Ticks in a row that are over before they begin.
+MOST_OVERRUN = 10
+
+
+@dataclass
+class Guard:
+    """Ends a loop whose device or clock has failed.
+
+    Attributes
+    ----------
+    session : Session
+        The running controller, which counts the readings that it refuses.
+    dt : float
+        Its interval [s].
+    span : float
+        Range of the limits [V].
+    """
+
+    session: Session
+    dt: float
+    span: float
+    _invalid: int = 0
+    _overrun: int = 0
+    _equal: int = 0
+    _reading: float = math.nan
+    _lowest: float = math.inf
+    _highest: float = -math.inf
+    _before: RefusedReadings | None = field(default=None)
+
+    def reading(self, y: float, volts: float, t: float) -> None:
+        """Take a reading [m] and the voltage [V] that the controller answered with at `t` s."""
+        self._check_valid(y, t)
+        if y != self._reading:
+            self._reading, self._equal = y, 0
+            self._lowest = self._highest = volts
+            return
+        self._equal += 1
+        self._lowest, self._highest = min(self._lowest, volts), max(self._highest, volts)
+        if self._equal >= MOST_EQUAL and self._highest - self._lowest > MOVED * self.span:
+            raise DeviceError(
+                f"the reading stands still at {1e6 * y:.6g} um since {self._equal} samples, at "
+                f"{t:.4g} s, while the voltage moved by {self._highest - self._lowest:.3g} V: the "
+                "sensor is stale, or the stage does not move"
+            )
+
+    def _check_valid(self, y: float, t: float) -> None:
+        if self.session.last.measurement_valid:
+            self._invalid, self._before = 0, self.session.refused
+            return
+        self._invalid += 1
+        if self._invalid < max(MOST_INVALID, LONGEST_INVALID / self.dt):
+            return
+        before, now = self._before, self.session.refused
+        counts = now if before is None else [a - b for a, b in zip(now, before, strict=True)]
+        kinds = ("not finite", "outside of the span of the sensor", "too far from the last")
+        what = " and ".join(f"{n} {kind}" for n, kind in zip(counts, kinds, strict=True) if n)
+        raise DeviceError(
+            f"{self._invalid} readings in a row are no measurements, at {t:.4g} s: {what}; the "
+            f"last is {1e6 * y:.6g} um"
+        )
+
+    def tick(self, late: float, t: float) -> None:
+        """Take how late a tick began [s], at `t` s."""
+        self._overrun = self._overrun + 1 if late > self.dt else 0
+        if self._overrun >= MOST_OVERRUN:
+            raise DeviceError(
+                f"{self._overrun} ticks in a row began more than an interval late, the last by "
+                f"{1e3 * late:.3g} ms at {t:.4g} s: the device hangs, or the computer is too slow "
+                f"for an interval of {1e3 * self.dt:.4g} ms"
+            )

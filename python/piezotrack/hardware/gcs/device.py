@@ -1,0 +1,471 @@
+"""A controller that speaks GCS as a device: wave tables out, the data recorder back."""
+
+from __future__ import annotations
+
+import math
+import time
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..._support.arguments import finite, not_negative, plain, positive
+from ..._support.arrays import signal_of
+from ..._support.messages import quoted
+from ...errors import DeviceError, ParameterError
+from ..device import Rates, Record
+from .connection import Connection
+from .protocol import GENERATOR, POSITION, RECORD_POINTS, SERVO_CYCLE, VOLTAGE, WAVE_POINTS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+__all__ = ["GcsDevice", "from_address"]
+
+PORT = 50000
+NEEDED = ("POS?", "SVO", "SVA", "WAV", "WSL", "WGC", "WTR", "WGO", "DRC", "RTR", "DRL?", "DRR?")
+# Metres in the units of positions that PUN? answers with.
+UNITS = {"um": 1e-6, "micron": 1e-6, "\u03bcm": 1e-6, "nm": 1e-9, "mm": 1e-3}
+# Longest command [characters], and commands after which errors are asked for.
+LINE, TOGETHER = 240, 50
+# Slowest rate of a table [servo cycles].
+SLOWEST = 10_000
+# Waits between two looks at the generator [s].
+FIRST_LOOK, LONGEST_LOOK = 1e-3, 0.05
+# Largest share of the range by which the output may differ from the table without a note.
+NEAR = 1e-3
+
+
+class GcsDevice:
+    """A piezo controller with wave generator and data recorder, over TCP.
+
+    It drives one axis in open loop, by control values that are taken for volts, and records the
+    position and the voltage of the output channel of the same number. Positions are in the unit
+    that the controller says (``PUN?``), um where it says none.
+
+    Parameters
+    ----------
+    host : str
+        Name or address.
+    port : int, optional
+        TCP port, 50000 by default.
+    axis : str, optional
+        Axis, wave generator and output channel.
+    limits : (float, float), optional
+        Lowest and highest voltage [V]; default those of the controller, ``VMI?`` and ``VMA?``.
+    factor : float, optional
+        Voltage of a control value of 1 [V], where the controller's are not volts.
+    timeout : float, optional
+        Longest wait for an answer [s].
+
+    Raises
+    ------
+    ParameterError
+        An argument is out of its range, or the controller does not say its limits.
+    DeviceError
+        Nobody answers, or the controller lacks a command.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> with pt.hardware.GcsServer(pt.VirtualStage.xu_li_2010(seed=1)) as server:
+    ...     device = pt.hardware.GcsDevice("127.0.0.1", server.port)
+    ...     print(device.limits, device.rates.nearest(3000.0))
+    ...     device.close()
+    (0.0, 75.0) 2857.1428571428573
+    """
+
+    def __init__(
+        self,
+        host: str,
+        port: int = PORT,
+        *,
+        axis: str = "1",
+        limits: tuple[float, float] | None = None,
+        factor: float = 1.0,
+        timeout: float = 2.0,
+    ) -> None:
+        if not (isinstance(axis, str) and axis.isdecimal() and axis.isascii()):
+            raise ParameterError(f"axis is {quoted(axis)}: expected a number, as '1'")
+        self._axis, self._factor = axis, positive("factor", factor, "V")
+        self._open = True
+        self._servo_off = False
+        self._line = Connection(host, port, positive("timeout", timeout, "s"))
+        try:
+            self._name = " ".join(self._line.ask("*IDN?"))
+            self._known = {words[0].upper() for line in self._line.ask("HLP?")
+                           if (words := line.split())}  # fmt: skip
+            missing = [name for name in NEEDED if name not in self._known]
+            if missing:
+                raise DeviceError(
+                    f"{self._line.name}: {self._name} does not know {', '.join(missing)}: expected "
+                    "a controller with wave generator and data recorder"
+                )
+            self._unit = self._metres()
+            self._limits = self._range() if limits is None else _checked(limits)
+            clock = 1.0 / self._parameter(SERVO_CYCLE)
+            self._rates = Rates(lowest=clock / SLOWEST, highest=clock, clock=clock)
+            self._memory = self._points()
+        except BaseException:
+            self._line.close()
+            raise
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Lowest and highest voltage [V]."""
+        return self._limits
+
+    @property
+    def rates(self) -> Rates:
+        """Sampling rates: whole fractions of the servo clock."""
+        return self._rates
+
+    @property
+    def memory(self) -> int:
+        """Longest table [samples]: what both a wave table and the recorder hold."""
+        return self._memory
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of output and input."""
+        name = self._line.name
+        return (f"{name} output {self._axis}", f"{name} axis {self._axis}")
+
+    @property
+    def travel(self) -> tuple[float, float]:
+        """Lowest and highest position of the axis [m]."""
+        return self._unit * self._value("TMN?"), self._unit * self._value("TMX?")
+
+    @property
+    def position(self) -> float:
+        """Reading of the sensor now [m]."""
+        return self._unit * self._value("POS?")
+
+    @property
+    def voltage(self) -> float:
+        """Voltage at the output now [V]."""
+        return self._value("VOL?")
+
+    def play(self, volts: Array, rate: float, *, lead_in: float = 0.0) -> Record:
+        """Play a table by the wave generator and record; as `Device.play`.
+
+        Parameters
+        ----------
+        volts : ndarray, shape (n,)
+            Table [V].
+        rate : float
+            Sampling rate [Hz].
+        lead_in : float, optional
+            How long the first voltage is held before [s].
+
+        Returns
+        -------
+        Record
+            Of n samples, with the voltage that the recorder saw at the output.
+
+        Raises
+        ------
+        DeviceError
+            The controller refuses something, or does not answer.
+        """
+        table = signal_of("volts", volts)
+        self._within(table)
+        if table.size > self._memory:
+            raise DeviceError(
+                f"the table has {table.size} samples: the memory of {self._line.name} holds "
+                f"{self._memory}"
+            )
+        cycles = round(self._clock / self._rates.nearest(rate))
+        rate = self._clock / cycles
+        before = round(not_negative("lead_in", lead_in, "s") * rate)
+        if before + table.size > self._memory:
+            self.hold(float(table[0]))
+            time.sleep(lead_in)
+            before = 0
+        self._open_loop()
+        self._upload(np.concatenate([np.full(before, table[0]), table]), cycles)
+        count = before + table.size
+        try:
+            self._line.command(f"WGO {self._axis} 1")
+            self._wait(count / rate)
+            return self._record(table, before, rate)
+        except BaseException:
+            with suppress(DeviceError):
+                self._line.send(f"WGO {self._axis} 0")
+            raise
+
+    def exchange(self, volts: float) -> float:
+        """Read the displacement and put out a voltage, in one message each way.
+
+        Parameters
+        ----------
+        volts : float
+            Voltage [V].
+
+        Returns
+        -------
+        float
+            Displacement before it goes out [m].
+
+        Raises
+        ------
+        DeviceError
+            The controller refuses something, or does not answer.
+        """
+        self._within(np.array([finite("volts", volts, "V")]))
+        self._open_loop()
+        query = f"POS? {self._axis}"
+        lines = self._line.exchange(f"SVA {self._axis} {self._control(volts)}", query)
+        return self._unit * self._number(query, lines)
+
+    def hold(self, volts: float) -> None:
+        """Put out a constant voltage from now on.
+
+        Parameters
+        ----------
+        volts : float
+            Voltage [V].
+
+        Raises
+        ------
+        DeviceError
+            The controller refuses it, or does not answer.
+        """
+        self._within(np.array([finite("volts", volts, "V")]))
+        self._open_loop()
+        self._line.command(f"SVA {self._axis} {self._control(volts)}")
+
+    def close(self) -> None:
+        """Give the connection back; the output stays where it is."""
+        self._open = False
+        self._line.close()
+
+    @property
+    def _clock(self) -> float:
+        assert self._rates.clock is not None
+        return self._rates.clock
+
+    def _within(self, volts: Array) -> None:
+        if not self._open:
+            raise DeviceError(f"{self._line.name} is closed")
+        low, high = self._limits
+        beyond = np.flatnonzero(~((volts >= low) & (volts <= high)))
+        if beyond.size:
+            k = int(beyond[0])
+            raise DeviceError(
+                f"volts is {volts[k]:g} V at sample {k}: {self._line.name} puts out {low:g} to "
+                f"{high:g} V"
+            )
+
+    def _open_loop(self) -> None:
+        """Switch the servo off, once: whoever switches it on meanwhile gets its error."""
+        if not self._servo_off:
+            self._line.command(f"SVO {self._axis} 0")
+            self._servo_off = True
+
+    def _control(self, volts: float) -> str:
+        """Write a voltage [V] as a control value."""
+        return f"{volts / self._factor:.9g}"
+
+    def _upload(self, table: Array, cycles: int) -> None:
+        """Write the wave table, and set up generator and recorder."""
+        axis = self._axis
+        waiting: list[str] = []
+        for command in self._points_of(table):
+            waiting.append(command)
+            if len(waiting) == TOGETHER:
+                self._line.command(*waiting)
+                waiting.clear()
+        self._line.command(
+            *waiting,
+            f"WSL {axis} {axis}",
+            f"WGC {axis} 1",
+            f"WTR {axis} {cycles} 0",
+            f"RTR {cycles}",
+            f"DRC 1 {axis} {POSITION}",
+            f"DRC 2 {axis} {VOLTAGE}",
+        )
+
+    def _points_of(self, table: Array) -> Iterator[str]:
+        """Write a table as commands of a length that controllers take."""
+        words = [self._control(float(volts)) for volts in table]
+        k = 0
+        while k < len(words):
+            size, count = 0, 0
+            while k + count < len(words) and size + len(words[k + count]) < LINE:
+                size += len(words[k + count]) + 1
+                count += 1
+            append = "&" if k else "X"
+            values = " ".join(words[k : k + count])
+            yield f"WAV {self._axis} {append} PNT {k + 1} {count} {values}"
+            k += count
+
+    def _wait(self, duration: float) -> None:
+        """Wait until the generator has ended."""
+        bit = 1 << (int(self._axis) - 1)
+        latest = time.monotonic() + 1.5 * duration + 5.0
+        pause = FIRST_LOOK
+        while True:
+            lines = self._line.ask(GENERATOR)
+            try:
+                running = int(lines[0], 16) & bit
+            except ValueError:
+                raise self._line.unexpected("#9", lines, "a hexadecimal number") from None
+            if not running:
+                return
+            if time.monotonic() > latest:
+                raise DeviceError(
+                    f"{self._line.name}: the wave generator still runs: expected it to end after "
+                    f"{duration:g} s"
+                )
+            time.sleep(pause)
+            pause = min(2.0 * pause, LONGEST_LOOK)
+
+    def _record(self, table: Array, before: int, rate: float) -> Record:
+        """Read the data recorder."""
+        count = before + table.size
+        query = "DRL? 1"
+        there = self._number(query, self._line.ask(query), "1")
+        if there < count:
+            raise DeviceError(
+                f"{self._line.name}: the data recorder has {there:g} samples: expected {count}"
+            )
+        query = f"DRR? {before + 1} {table.size} 1 2"
+        lines = self._line.ask(query)
+        data, interval = _array(lines)
+        if data is None or data.shape != (table.size, 2):
+            shown = lines if data is None else [f"... {len(lines)} lines ..."]
+            raise self._line.unexpected(query, shown[:3], f"2 columns of {table.size} samples")
+        if not math.isclose(interval, 1.0 / rate, rel_tol=1e-4):
+            raise DeviceError(
+                f"{self._line.name}: the data recorder says {interval:g} s from sample to sample: "
+                f"expected {1.0 / rate:g} s"
+            )
+        low, high = self._limits
+        other = float(np.max(np.abs(data[:, 1] - table)))
+        notes = () if other <= NEAR * (high - low) else (
+            f"output: up to {plain(other)} V other than the table, as the data recorder says",
+        )  # fmt: skip
+        return Record(
+            volts=data[:, 1],
+            displacement=self._unit * data[:, 0],
+            rate=rate,
+            channels=self.channels,
+            notes=notes,
+        )
+
+    def _value(self, query: str) -> float:
+        """Ask for a number of the axis."""
+        command = f"{query} {self._axis}"
+        return self._number(command, self._line.ask(command))
+
+    def _number(self, query: str, lines: Sequence[str], item: str = "") -> float:
+        """Read ``ITEM=NUMBER``."""
+        name, equals, text = lines[0].partition("=")
+        wanted = item or self._axis
+        try:
+            if len(lines) != 1 or not equals or name.strip() != wanted:
+                raise ValueError
+            return float(text)
+        except ValueError:
+            raise self._line.unexpected(query, lines[:3], f"{wanted}=NUMBER") from None
+
+    def _parameter(self, number: int) -> float:
+        query = f"SPA? {self._axis} 0x{number:08X}"
+        lines = self._line.ask(query)
+        try:
+            value = float(lines[0].partition("=")[2])
+        except ValueError:
+            value = math.nan
+        if not 0.0 < value < math.inf:
+            raise self._line.unexpected(query, lines[:3], "a parameter above 0")
+        return value
+
+    def _metres(self) -> float:
+        """Return the unit of positions [m]."""
+        if "PUN?" not in self._known:
+            return UNITS["um"]
+        query = f"PUN? {self._axis}"
+        lines = self._line.ask(query)
+        unit = lines[0].partition("=")[2].strip().casefold()
+        if unit not in UNITS:
+            raise self._line.unexpected(query, lines[:3], "um, nm or mm")
+        return UNITS[unit]
+
+    def _range(self) -> tuple[float, float]:
+        """Return the limits of the output [V]."""
+        if not {"VMI?", "VMA?"} <= self._known:
+            raise ParameterError(
+                f"limits are not given, and {self._line.name} does not say them: expected (low, "
+                "high) in V, in an address ?limits=LOW:HIGH"
+            )
+        return _checked((self._value("VMI?"), self._value("VMA?")))
+
+    def _points(self) -> int:
+        """Return the samples that both a wave table and the recorder hold."""
+        tables = self._line.ask("TNR?") if "TNR?" in self._known else ["1"]
+        try:
+            points = self._parameter(RECORD_POINTS) / int(tables[0])
+        except (ValueError, ZeroDivisionError):
+            raise self._line.unexpected("TNR?", tables[:3], "the number of tables") from None
+        # Not every controller says how long a wave may be; it refuses what is too long.
+        with suppress(DeviceError):
+            points = min(points, self._parameter(WAVE_POINTS))
+        return int(points)
+
+
+def _array(lines: Sequence[str]) -> tuple[Array | None, float]:
+    """Read an array of data: rows, and the sampling interval [s]; None where it is none."""
+    interval = math.nan
+    try:
+        end = next(k for k, line in enumerate(lines) if line.startswith("# END_HEADER"))
+        for line in lines[:end]:
+            name, _, text = line.lstrip("# ").partition("=")
+            if name.strip() == "SAMPLE_TIME":
+                interval = float(text)
+        rows = [line.split() for line in lines[end + 1 :]]
+        return np.array(rows, dtype=np.float64), interval
+    except (StopIteration, ValueError):
+        return None, interval
+
+
+def _checked(limits: tuple[float, float]) -> tuple[float, float]:
+    low, high = (finite("limits", one, "V") for one in limits)
+    if not low < high:
+        raise ParameterError(f"limits are {low:g} and {high:g} V: expected the lower one first")
+    return low, high
+
+
+def from_address(
+    host: str | None, port: int | None, path: str, options: Mapping[str, str]
+) -> GcsDevice:
+    """Connect to the controller of an address: ``gcs://HOST[:PORT][/AXIS][?limits=0:100]``."""
+    if not host:
+        raise ParameterError("device has no host: expected gcs://HOST[:PORT][/AXIS]")
+    given = dict(options)
+    limits, factor, timeout = (given.pop(name, None) for name in ("limits", "factor", "timeout"))
+    if given:
+        raise ParameterError(
+            f"device has the option {quoted(next(iter(given)))}: expected limits, factor or timeout"
+        )
+    arguments: dict[str, float] = {}
+    try:
+        if factor is not None:
+            arguments["factor"] = float(factor)
+        if timeout is not None:
+            arguments["timeout"] = float(timeout)
+        within = None
+        if limits is not None:
+            low, high = limits.split(":")
+            within = float(low), float(high)
+    except ValueError:
+        raise ParameterError(
+            f"device has the options {quoted(dict(options))}: expected limits=LOW:HIGH in V, "
+            "factor=VOLTS or timeout=SECONDS"
+        ) from None
+    axis = path.strip("/") or "1"
+    return GcsDevice(host, port or PORT, axis=axis, limits=within, **arguments)

@@ -1,0 +1,75 @@
+"""`piezotrack export`: what it writes and prints."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import piezotrack as pt
+from c_exports import checked, compiled, needs_gcc, needs_linux
+from commands import names, ran, refusal
+
+PI = pt.Pid.from_um(kp=0.05, ti=0.02)
+PLAYS = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(5.0,), weights=(5e-7,))
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def save(name: str = "loop.json", **parts: object) -> pt.Controller:
+    given: dict[str, object] = {"dt": 0.02, "limits": (0.0, 75.0), "feedback": PI} | parts
+    controller = pt.Controller(**given)  # type: ignore[arg-type]
+    controller.save(name)
+    return controller
+
+
+@needs_gcc
+def test_the_c_of_a_file_is_that_of_the_controller() -> None:
+    save("x-axis.json")
+    said = ran("export", "x-axis.json", "--out", "c")
+    assert names("c") == ["check.c", "vectors.csv", "x_axis.c", "x_axis.h"]
+    assert "state 120 bytes; a step has 10 additions, 4 multiplications" in said
+    compiled(Path("c"), "check.c", "x_axis.c")
+    assert checked(Path("c"))[0] == 0
+    before = Path("c/x_axis.c").read_bytes()
+    assert "exists: expected --overwrite" in refusal("export", "x-axis.json", "--out", "c")
+    said = ran("export", "x-axis.json", "--out", "c", "--overwrite", "--float", "--json")
+    document = json.loads(said)
+    assert document["state_bytes"] == 68
+    assert document["bound"] == pytest.approx(1.5e-3)
+    assert Path("c/x_axis.c").read_bytes() != before
+
+
+@needs_gcc
+def test_a_feedforward_is_played_from_a_table() -> None:
+    save(feedforward=PLAYS.inverse())
+    said = refusal("export", "loop.json")
+    assert said.startswith("loop.json: feedforward is the inverse of a Prandtl-Ishlinskii stage")
+    assert "--reference" in said
+    motion = ("--reference", "sine:0.5Hz,5..60um,4s", "--name", "axis")
+    ran("export", "loop.json", *motion, "--out", "c")
+    compiled(Path("c"), "check.c", "axis.c")
+    assert checked(Path("c"))[0] == 0
+    ran("export", "loop.json", *motion, "--to", "json", "--out", "j")
+    document = json.loads(Path("j/axis.json").read_text(encoding="utf-8"))
+    assert len(document["feedforward_table_V"]) == 100
+
+
+@needs_linux
+def test_a_unit_is_written() -> None:
+    save()
+    said = ran("export", "loop.json", "--to", "fmu", "--quiet")
+    assert said == ""
+    assert names("results") == ["loop.fmu"]
+
+
+def test_the_name_of_a_file_that_is_none_of_c() -> None:
+    save("2nd.json")
+    assert "--name gives one" in refusal("export", "2nd.json")
+    assert "name is 'pid', as functions" in refusal("export", "2nd.json", "--name", "pid")
+    ran("export", "2nd.json", "--name", "second", "--to", "json")
+    assert names("results") == ["second.json"]

@@ -1,0 +1,97 @@
+"""``piezotrack serve``: a controller of one's own, until it is stopped."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import pytest
+
+import piezotrack as pt
+from commands import COMMAND, refusal, write_model
+from gcs_peers import quiet_stage
+from piezotrack.hardware import GcsServer
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@contextmanager
+def serving(*options: str) -> Iterator[tuple[subprocess.Popen[str], str, str]]:
+    """The command, the address that it prints, and the rest of the line."""
+    with subprocess.Popen(
+        [*COMMAND, "serve", "gcs", "--port", "0", *options],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            assert process.stdout is not None
+            line = process.stdout.readline()
+            found = re.fullmatch(r"listening at (gcs://\S+:\d+), (.*)\n", line)
+            assert found, line
+            yield process, found[1], found[2]
+        finally:
+            process.kill()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C in another way")
+@pytest.mark.parametrize(
+    ("number", "code", "word"),
+    [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
+)
+def test_it_serves_until_a_signal_ends_it(number: signal.Signals, code: int, word: str) -> None:
+    with serving("--speed", "100") as (process, address, rest):
+        assert rest == "0 to 75 V"
+        device = pt.hardware.connect(address)
+        log = pt.measure(device, "sine:1Hz,0..75V,2s", rate=500.0)
+        # The stage of the paper: 75 V end at 117.76 um.
+        assert log.stroke == pytest.approx(117.76e-6, rel=0.02)
+        process.send_signal(number)
+        assert process.wait(60.0) == code
+        with pytest.raises(pt.DeviceError, match=r"closed the connection|cannot be sent"):
+            device.hold(1.0)
+        device.close()
+        assert process.communicate() == ("", f"piezotrack: {word}\n")
+
+
+def test_it_serves_a_model_file() -> None:
+    log = pt.VirtualStage.xu_li_2010(seed=1).record(
+        pt.hardware.parse_drive("decaying:1Hz,0..60V").sample(2e-3), 2e-3, hold="zoh"
+    )
+    pt.identify(log, "prandtl-ishlinskii").save("model.json")
+    with serving("--model", "model.json") as (_, address, rest):
+        assert rest == "0 to 60 V"
+        device = pt.hardware.connect(address)
+        assert device.limits == (0.0, 60.0)
+        device.close()
+    with serving("--model", "model.json", "--limits", "10:40") as (_, _, rest):
+        assert rest == "10 to 40 V"
+
+
+def test_what_cannot_be_served_is_refused() -> None:
+    write_model()
+    assert refusal("serve", "gcs", "--model", "none.json").startswith("none.json: no such file")
+    # It was never identified from a record.
+    said = refusal("serve", "gcs", "--model", "dahl.json")
+    assert said.startswith("--limits is not given, and dahl.json does not say")
+    for limits in ("75:0", "0:0", "0:inf", "nan:1"):
+        assert refusal("serve", "gcs", "--limits", limits).startswith("--limits ")
+    assert refusal("serve", "gcs", "--limits", "75").startswith("--limits has '75'")
+    assert refusal("serve", "gcs", "--port", "70000").startswith("--port is 70000: expected 0 to")
+    for speed in ("0", "nan", "-1", "20000"):
+        assert refusal("serve", "gcs", "--speed", speed).startswith(f"--speed is {speed}: expected")
+    assert refusal("serve", "gcs", "--host", "256.0.0.1").startswith("--host is '256.0.0.1'")
+    with GcsServer(quiet_stage()) as server:
+        said = refusal("serve", "gcs", "--port", str(server.port))
+    assert said.startswith(f"--port is {server.port}: it cannot be listened at")
