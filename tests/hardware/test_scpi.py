@@ -288,6 +288,16 @@ def test_nobody_there() -> None:
         pt.hardware.connect(f"scpi://127.0.0.1:{port}?unit=um&limits=0..75V")
 
 
+def test_a_place_where_it_cannot_listen() -> None:
+    with pt.hardware.VirtualScpi(stage()) as there:
+        port = there.address[1]
+        second = pt.hardware.VirtualScpi(stage(), port=port)
+        with pytest.raises(pt.ParameterError, match=f"port is {port}: it cannot be listened at"):
+            second.__enter__()
+    with pytest.raises(pt.ParameterError, match="port is 70000: expected 0 to 65535"):
+        pt.hardware.VirtualScpi(stage(), port=70000)
+
+
 def test_an_address_says_everything() -> None:
     with pt.hardware.VirtualScpi(stage()) as there:
         host, port = there.address
