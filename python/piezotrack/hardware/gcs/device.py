@@ -87,7 +87,7 @@ class GcsDevice:
         axis: str = "1",
         limits: tuple[float, float] | None = None,
         factor: float = 1.0,
-        timeout: float = 2.0,
+        timeout: float = 5.0,
     ) -> None:
         if not (isinstance(axis, str) and axis.isdecimal() and axis.isascii()):
             raise ParameterError(f"axis is {quoted(axis)}: expected a number, as '1'")
