@@ -155,9 +155,11 @@ def test_addresses() -> None:
 def test_a_device_that_cannot_be_led_back_is_said_to_be_anywhere() -> None:
     class Lost(VirtualDevice):
         def play(self, volts: Array, rate: float, *, lead_in: float = 0.0) -> Record:
+            del volts, rate, lead_in
             raise pt.DeviceError("the connection was lost")
 
         def hold(self, volts: float) -> None:
+            del volts
             raise pt.DeviceError("nobody answers")
 
     used = Lost(pt.VirtualStage.of(PLAYS, limits=(0.0, 75.0)))
