@@ -8,10 +8,10 @@ from .device import Record as Record
 from .drives import Drive as Drive
 from .drives import decaying as decaying
 from .drives import parse_drive as parse_drive
-from .gcs.device import GcsDevice as GcsDevice
-from .gcs.server import GcsServer as GcsServer
 from .epics import ophyd_player as ophyd_player
 from .epics import serve_epics as serve_epics
+from .gcs.device import GcsDevice as GcsDevice
+from .gcs.server import GcsServer as GcsServer
 from .measure import measure as measure
 from .ni import NiDevice as NiDevice
 from .pacing import RoundTrip as RoundTrip
