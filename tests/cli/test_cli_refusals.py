@@ -269,7 +269,7 @@ def test_refuses_a_bad_argument(command: str) -> None:
         ("identify", "FILE"),
         ("identify log.csv --dynamics quick", "--dynamics"),
         ("simulate dahl.json", "DRIVE"),
-        ("serve scpi", "PROTOCOL"),
+        ("serve modbus", "PROTOCOL"),
         ("serve gcs --port some", "--port"),
         ("fly", "fly"),
     ],

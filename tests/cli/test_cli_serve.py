@@ -27,10 +27,12 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 @contextmanager
-def serving(*options: str) -> Iterator[tuple[subprocess.Popen[str], str, str]]:
+def serving(
+    *options: str, protocol: str = "gcs"
+) -> Iterator[tuple[subprocess.Popen[str], str, str]]:
     """The command, the address that it prints, and the rest of the line."""
     with subprocess.Popen(
-        [*COMMAND, "serve", "gcs", "--port", "0", *options],
+        [*COMMAND, "serve", protocol, "--port", "0", *options],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -38,7 +40,7 @@ def serving(*options: str) -> Iterator[tuple[subprocess.Popen[str], str, str]]:
         try:
             assert process.stdout is not None
             line = process.stdout.readline()
-            found = re.fullmatch(r"listening at (gcs://\S+:\d+), (.*)\n", line)
+            found = re.fullmatch(rf"listening at ({protocol}://\S+:\d+\S*), (.*)\n", line)
             assert found, line
             yield process, found[1], found[2]
         finally:
@@ -77,6 +79,18 @@ def test_it_serves_a_model_file() -> None:
         device.close()
     with serving("--model", "model.json", "--limits", "10:40") as (_, _, rest):
         assert rest == "10 to 40 V"
+
+
+def test_it_serves_scpi_at_an_address_that_connects() -> None:
+    with serving("--limits", "0:60", protocol="scpi") as (_, address, rest):
+        assert rest == "0 to 60 V"
+        device = pt.hardware.connect(address)
+        assert device.limits == (0.0, 60.0)
+        assert isinstance(device, pt.hardware.Exchanging)
+        assert abs(device.exchange(0.0)) < 1e-6
+        device.close()
+    assert refusal("serve", "scpi", "--speed", "0").startswith("--speed is 0: expected")
+    assert refusal("serve", "scpi", "--port", "70000").startswith("--port is 70000: expected 0 to")
 
 
 def test_what_cannot_be_served_is_refused() -> None:

@@ -79,6 +79,19 @@ OPTIONS: dict[str, list[str]] = {
     "--cutoff": ["5", "24", *NUMBERS],
     "--mode-scales": ["1", "0.9,1,1.1", "1,", "x", "0", "1e300,1"],
     "--swarm": ["default", "spso-2011", "none"],
+    "--device": [
+        "virtual:",
+        "virtual:model.json",
+        "virtual:gone.json",
+        "ni:",
+        "x:",
+        "gcs://",
+        "scpi://localhost:1",
+    ],
+    "--drive": ["sine:1Hz,0..75V", "decaying:2Hz,0..20V", "sine:1Hz,0..75um", "log.csv", "x", ""],
+    "--rate": ["100", *NUMBERS],
+    "--rest": ["10", *NUMBERS],
+    "--ramp": ["0.1", *NUMBERS],
     "--to": ["c99", "json", "fmu", "x", ""],
     "--name": ["axis", "1x", "", "x" * 99, "pid", "\x1b[31m"],
     "--speed": ["100", *NUMBERS],
@@ -125,13 +138,21 @@ COMMANDS: dict[str, tuple[list[str], tuple[str, ...]]] = {
     "step": (["log.csv"], (*COLUMNS, "--stiffness", "--mass", "--second-level", "--window")),
     "noise": (["log.csv"], ("--dt", "--unit", "--time", "--displacement", "--window")),
     "info": (["log.csv"], (*COLUMNS, "--displacement")),
+    "measure": (
+        ["--device", "virtual:", "--drive", "sine:1Hz,0..75V", "--rate", "100", "--out", "out.csv"],
+        ("--device", "--drive", "--rate", "--duration", "--rest", "--ramp"),
+    ),
+    "play": (
+        ["controller.json", "--device", "virtual:"],
+        ("--device", "--reference", "--duration", "--period", "--rest"),
+    ),
     # With a port that there is not: else it would go on until it is stopped.
     "serve": (["gcs", "--port", "65536"], ("--model", "--limits", "--speed", "--host")),
 }  # fmt: skip
 # Their shares: those that identify take long.
 MIX = (
     ["simulate", "feedforward", "track"] * 4
-    + ["step", "noise", "info", "export", "serve"] * 2
+    + ["step", "noise", "info", "export", "serve", "measure", "play"] * 2
     + ["contour", "identify", "compare", "benchmark", "tune", "compare-controllers", "learn"]
 )
 

@@ -13,11 +13,12 @@ const CORE: [&str; 9] =
     ["error", "math", "signal", "integrator", "design", "models", "simulate", "identify", "tune"];
 
 /// From the bottom up.
-const CONTROL: [&str; 26] = [
+const CONTROL: [&str; 27] = [
     "error",
     "number",
     "unfused",
     "snapshot",
+    "root",
     "cubic_motion",
     "cubic_segment",
     "hysteresis",

@@ -22,7 +22,9 @@ from .export import export_command
 from .identify import identify_command
 from .info import info_command
 from .learn import learn_command
+from .measure import measure_command
 from .noise import noise_command
+from .play import play_command
 from .reproduce import reproduce_command
 from .serve import serve_command
 from .simulate import simulate_command
@@ -86,6 +88,7 @@ class Command(TyperCommand):
 
 
 COMMANDS: dict[str, Callable[..., None]] = {
+    "measure": measure_command,
     "info": info_command,
     "convert": convert_command,
     "identify": identify_command,
@@ -96,6 +99,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "simulate": simulate_command,
     "feedforward": feedforward_command,
     "track": track_command,
+    "play": play_command,
     "tune": tune_command,
     "export": export_command,
     "learn": learn_command,

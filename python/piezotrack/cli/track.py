@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from ..errors import ParameterError
+from ..errors import DeviceError, Interrupted, ParameterError
+from .devices import connected
 from .error_messages import in_words
 from .loop_options import (
     MODEL,
@@ -55,7 +56,19 @@ if TYPE_CHECKING:
     from ..identification.identified import IdentifiedModel
     from ..references.reference import Reference
 
-__all__ = ["BeyondReach", "feedforward_command", "parsed_reference", "track_command"]
+__all__ = [
+    "BeyondReach",
+    "ControllerFile",
+    "feedforward_command",
+    "parsed_reference",
+    "track_command",
+    "tracking_document",
+    "write_tracking",
+]
+
+ControllerFile = Annotated[
+    Path, typer.Argument(metavar="CONTROLLER", help="Controller file in JSON, as `tune` writes it.")
+]
 
 Online = Annotated[
     bool,
@@ -133,16 +146,31 @@ def track_command(
             "--unstable", help="Simulate although the loop is unstable for small motions."
         ),
     ] = False,
+    device: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Device on which this computer closes the loop, as of `measure`; MODEL is then a "
+            "controller file, as `tune` writes it.",
+            show_default=False,
+        ),
+    ] = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Simulate closed-loop tracking of a reference."""
+    """Track a reference in closed loop, simulated or on a device."""
     from .._support.files import picture_files
     from ..control.controller import Controller
     from ..control.stability import check_loop
     from ..control.tracking import track
     from ..identification.identified import load
 
+    if device is not None:
+        refuse_without_effect(context, SIMULATED, "with --device")
+        desired = parsed_reference(reference, duration, period)
+        result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
+        _on_device(model, device, desired, result, beyond_reach=beyond_reach, unstable=unstable)
+        return
     check_stage(stage)
     own = stage != PAPER
     settings = Loop(own, dt, limits, feedback, kp, ti, td, tt)
@@ -182,8 +210,43 @@ def track_command(
         lines += [f"note  {note}" for note in small_margins(margins)]
     elif own:
         lines.append(NO_FEEDBACK)
-    document = _document(run, known, loop, notes) | {"stage": MODEL if own else PAPER}
-    result.show("\n".join(lines), document, _write(run, document, out))
+    document = tracking_document(run, known, loop, notes) | {"stage": MODEL if own else PAPER}
+    result.show("\n".join(lines), document, write_tracking(run, document, out))
+
+
+# Options of a simulation, or of a controller that a file has.
+SIMULATED = (
+    *("stage", "dt", "limits", "feedforward", "online", "feedback", "kp", "ti", "td", "tt"),
+    *("repetitive", "kq", "tq", "delay", "jitter", "noise_nm", "bandwidth", "seed"),
+)
+
+
+def _on_device(
+    file: Path,
+    address: str,
+    desired: Reference,
+    result: Output,
+    *,
+    beyond_reach: bool,
+    unstable: bool,
+) -> None:
+    """Close the loop of a controller file on a device; what was tracked before a fault is kept."""
+    from .._support.files import picture_files
+    from ..control.controller_file import load_controller
+    from ..control.tracking import track
+
+    loop = load_controller(file)
+    result.will_write(["tracking.csv", "tracking.json", *picture_files("tracking")])
+    with connected(address) as used:
+        try:
+            run = track(used, loop, desired, beyond_reach=beyond_reach, unstable=unstable)
+        except (DeviceError, Interrupted) as error:
+            if error.partial is not None:
+                document = tracking_document(error.partial, None, loop, [f"ended: {error}"])
+                write_tracking(error.partial, document, result.out)
+            raise
+    document = tracking_document(run, None, loop, [])
+    result.show(run.summary(), document, write_tracking(run, document, result.out))
 
 
 @in_words
@@ -281,8 +344,8 @@ def parsed_reference(text: str, duration: float | None, period: float | None) ->
     return parse_reference(text, duration=duration)
 
 
-def _document(
-    run: Tracking, known: IdentifiedModel, loop: Controller, notes: list[str]
+def tracking_document(
+    run: Tracking, known: IdentifiedModel | None, loop: Controller, notes: list[str]
 ) -> dict[str, Any]:
     """Content of the JSON file: the loop and its metrics."""
     from .. import __version__
@@ -300,13 +363,13 @@ def _document(
         "from_s": run.settled,
         "metrics": asdict(run.metrics),
         "periods": [asdict(one) for one in run.periods],
-        "model_drive_range": known.drive_range,
+        "model_drive_range": None if known is None else known.drive_range,
         "notes": notes,
         "provenance": {"package": "piezotrack", "version": __version__},
     }
 
 
-def _write(run: Tracking, document: dict[str, Any], out: Path) -> list[Path]:
+def write_tracking(run: Tracking, document: dict[str, Any], out: Path) -> list[Path]:
     """Write the samples as CSV, the metrics as JSON, and the pictures."""
     from .._support.files import (
         make_folder,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +16,8 @@ from .device import Device, Record
 from .drives import Drive, parse_drive
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import ArrayLike, NDArray
 
     Array = NDArray[np.float64]
@@ -24,6 +26,7 @@ __all__ = [
     "check_device",
     "check_table",
     "filled",
+    "led_back",
     "measure",
     "obtained_rate",
     "play_table",
@@ -120,6 +123,22 @@ def rest_of(device: Device, rest: float | None = None) -> float:
     home = min(max(0.0, low), high) if rest is None else finite("rest", rest, "V")
     check_table(device, "rest", np.array([home]))
     return home
+
+
+@contextmanager
+def led_back(device: Device, home: float) -> Iterator[None]:
+    """Put the output to a voltage [V] where what is played fails or is interrupted."""
+    try:
+        yield
+    except BaseException as error:
+        try:
+            device.hold(home)
+        except Exception as other:
+            raise DeviceError(
+                f"{error}; the output could not be led to {home:g} V ({other}): it may be anywhere "
+                "in the table"
+            ) from error
+        raise
 
 
 def ramped(volts: Array, rest: float, rate: float, ramp: float) -> tuple[Array, int]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import PiezotrackError
+from .listening import cannot_listen, checked_port
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -39,6 +40,11 @@ class VirtualScpi:
     port : int, optional
         TCP port; default any that is free.
 
+    Raises
+    ------
+    ParameterError
+        It cannot listen there; this is seen when it begins to.
+
     Examples
     --------
     >>> import piezotrack as pt
@@ -49,7 +55,7 @@ class VirtualScpi:
 
     def __init__(self, device: VirtualDevice, *, host: str = "127.0.0.1", port: int = 0) -> None:
         self.device = device
-        self._place = host, port
+        self._place = host, checked_port(port)
         self._list: list[float] = []
         self._rate, self._fetched, self._error = 1000.0, "", NO_ERROR
         self._lock, self._ends = threading.Lock(), threading.Event()
@@ -66,7 +72,10 @@ class VirtualScpi:
 
     def __enter__(self) -> VirtualScpi:
         """Listen, in the background."""
-        self._listener = socket.create_server(self._place)
+        try:
+            self._listener = socket.create_server(self._place)
+        except OSError as error:
+            raise cannot_listen(*self._place, error) from None
         self._listener.settimeout(GLANCE)
         self._begin(threading.Thread(target=self._accept, args=(self._listener,), daemon=True))
         return self

@@ -14,6 +14,7 @@ from ...hardware.measure import (
     check_device,
     check_table,
     filled,
+    led_back,
     obtained_rate,
     play_table,
     ramped,
@@ -86,11 +87,8 @@ def played_on(
     home = rest_of(device, rest)
     table, first = ramped(volts, home, rate, ramp)
     check_table(device, "voltage with its ramps", table)
-    try:
+    with led_back(device, home):
         record = play_table(device, table, rate)
-    except BaseException:
-        device.hold(home)
-        raise
     y, notes = filled(record)
     part = slice(first, first + volts.size)
     measured, applied = y[part], record.volts[part]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import socket
 import socketserver
 import sys
@@ -11,9 +10,9 @@ from typing import TYPE_CHECKING, Self
 
 from ... import _core
 from ..._support.arguments import finite
-from ..._support.messages import quoted
 from ...errors import ParameterError
 from ...stages.virtual import VirtualStage
+from ..listening import cannot_listen, checked_port
 from .arguments import Refusal
 from .controller import VirtualController
 from .protocol import ENCODING, GENERATOR, MOVING, READY, STOP, one_answer
@@ -86,9 +85,7 @@ class GcsServer:
         within = finite("limits", low, "V"), finite("limits", high, "V")
         if not within[0] < within[1]:
             raise ParameterError(f"limits are {within}: expected (low, high) in V")
-        port = _core.as_count("port", port)
-        if port > 65535:
-            raise ParameterError(f"port is {port}: expected 0 to 65535")
+        port = checked_port(port)
         speed = _core.as_number("speed", speed)
         if not 0.0 < speed <= FASTEST:
             raise ParameterError(
@@ -99,10 +96,7 @@ class GcsServer:
         try:
             self._server = _Server((host, port), controller)
         except OSError as error:
-            taken = error.errno in (errno.EADDRINUSE, errno.EACCES)
-            name = f"port is {port}" if taken else f"host is {quoted(host)}"
-            reason = (error.strerror or str(error)).lower()
-            raise ParameterError(f"{name}: it cannot be listened at: {reason}") from None
+            raise cannot_listen(host, port, error) from None
         self._thread = threading.Thread(
             target=self._server.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True
         )

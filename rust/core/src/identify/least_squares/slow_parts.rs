@@ -113,12 +113,6 @@ fn choose_drifts(fit: &mut Fit<'_>) -> Option<()> {
         }
         let mut best = with_drift(fit, r)?;
         best.settle(ROUGH)?;
-        // Once more: the thresholds of the dead zones moved with it.
-        let again = with_drift(&best, r)?;
-        if again.rms < best.rms {
-            best = again;
-            best.settle(ROUGH)?;
-        }
         let enough = (1.0 - DRIFT_GAIN) * fit.deviation_of(r);
         if best.deviation_of(r) < enough {
             *fit = best;
