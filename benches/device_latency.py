@@ -1,6 +1,6 @@
 """How late a loop on this computer is, over each path to a device: a table for docs/hardware.md.
 
-    python benches/device_latency.py
+Run it as `python benches/device_latency.py`.
 """
 
 from __future__ import annotations

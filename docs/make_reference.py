@@ -11,6 +11,7 @@ import inspect
 import re
 import textwrap
 import types
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,7 +25,10 @@ __all__ = ["FOLDER", "pages"]
 FOLDER = Path(__file__).parent / "reference"
 HEAD = "<!-- Made by docs/make_reference.py: do not edit, run `make reference`. -->\n\n"
 # In the order in which they are used.
-ROOMS = (pt.data, pt.identification, pt.stages, pt.references, pt.control, pt.xu_li_2010)
+ROOMS = (
+    *(pt.data, pt.identification, pt.stages, pt.references, pt.hardware, pt.control),
+    pt.xu_li_2010,
+)
 
 
 class Doc(NamedTuple):
@@ -186,7 +190,7 @@ def _read(text: str) -> Doc:
         if line and set(lines[i + 1]) == {"-"} and len(lines[i + 1]) >= 3
     ]
     sections = {}
-    for start, stop in zip(heads, [*heads[1:], len(lines)], strict=True):
+    for start, stop in pairwise([*heads, len(lines)]):
         sections[lines[start]] = _entries(lines[start + 2 : stop])
     return Doc(_first(text), sections)
 

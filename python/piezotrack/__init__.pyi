@@ -37,7 +37,7 @@ from .errors import NumericalError as NumericalError
 from .errors import ParameterError as ParameterError
 from .errors import PiezotrackError as PiezotrackError
 from .errors import ShapeError as ShapeError
-from .hardware.measure import measure as measure
+from .hardware.measuring import measure as measure
 from .identification.benchmarking.board import benchmark as benchmark
 from .identification.benchmarking.record import BenchmarkRecord as BenchmarkRecord
 from .identification.campaigns import campaign as campaign

@@ -24,6 +24,7 @@ __all__ = [
     "SwarmSettings",
     "Task",
     "TrackingRun",
+    "VirtualRun",
     "VirtualStage",
     "XYStage",
     "__version__",

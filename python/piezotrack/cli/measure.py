@@ -48,7 +48,7 @@ def measure_command(
     """
     from ..data.log_file import format_to_write
     from ..hardware.drives import parse_drive
-    from ..hardware.measure import measure
+    from ..hardware.measuring import measure
 
     format_to_write(out)
     if out.exists() and not overwrite:

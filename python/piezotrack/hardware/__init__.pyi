@@ -12,7 +12,7 @@ from .epics import ophyd_player as ophyd_player
 from .epics import serve_epics as serve_epics
 from .gcs.device import GcsDevice as GcsDevice
 from .gcs.server import GcsServer as GcsServer
-from .measure import measure as measure
+from .measuring import measure as measure
 from .ni import NiDevice as NiDevice
 from .pacing import RoundTrip as RoundTrip
 from .pacing import play_paced as play_paced

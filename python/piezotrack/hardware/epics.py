@@ -15,7 +15,7 @@ from .._support.messages import quoted
 from ..errors import ParameterError, PiezotrackError
 from .addresses import connect
 from .device import Device, Exchanging
-from .measure import check_device, check_table, play_table
+from .measuring import check_device, check_table, play_table
 from .options import required_package
 
 if TYPE_CHECKING:

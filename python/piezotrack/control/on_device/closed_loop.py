@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...errors import DeviceError, Interrupted, ParameterError
-from ...hardware.measure import rest_of
+from ...hardware.measuring import rest_of
 from ..checks import check_period, check_stable, check_within_reach
 from ..tracking import Tracking, feedforward_of
 from .guard import Guard

@@ -12,7 +12,7 @@ import numpy as np
 from ..._support.arrays import check_dt
 from ...errors import ParameterError
 from ...hardware.device import Exchanging
-from ...hardware.measure import check_device, rest_of
+from ...hardware.measuring import check_device, rest_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

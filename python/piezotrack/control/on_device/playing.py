@@ -9,7 +9,7 @@ import numpy as np
 from ... import _core
 from ..._support.arguments import finite, not_negative
 from ...errors import ParameterError
-from ...hardware.measure import (
+from ...hardware.measuring import (
     RAMP,
     check_device,
     check_table,
