@@ -400,7 +400,7 @@ fn a_run_that_goes_on_moves_as_one_that_was_not_divided() {
 #[test]
 fn a_run_goes_on_at_another_interval_and_is_unchanged_by_what_it_refuses() {
     let stage = VirtualStage { sensor: Sensor::IDEAL, ..published() };
-    let mut run = VirtualRun::new(stage.clone());
+    let mut run = VirtualRun::new(stage);
     let slow = run.advance(&[20.0; 50], 2e-3, NEVER).unwrap().unwrap();
     assert!(run.advance(&[20.0, f64::NAN], 2e-3, NEVER).is_err());
     assert!(run.advance(&[20.0], 2e-3, &|| true).unwrap().is_none());

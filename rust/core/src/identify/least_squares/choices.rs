@@ -8,7 +8,7 @@ use super::form::Form;
 use super::gauss_newton::STEPS;
 use super::modes::{drop_modes, first_mode};
 use super::places::{add_once, choose_places, few_or_many, spread};
-use super::slow_parts::{choose_slow, creeps, without_creep};
+use super::slow_parts::{choose_slow, creeps, drop_drifts, without_creep};
 use super::{CreepKind, DynamicsKind, PlacesKind, Settings, WeightsRecord};
 use crate::identify::history::History;
 use crate::math::least;
@@ -126,6 +126,7 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Found<'a>> 
         }
     }
     choose_places(&mut fit, settings)?;
+    drop_drifts(&mut fit)?;
     Some((fit, lags))
 }
 

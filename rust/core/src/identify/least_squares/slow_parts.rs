@@ -121,6 +121,23 @@ fn choose_drifts(fit: &mut Fit<'_>) -> Option<()> {
     Some(())
 }
 
+/// Leaves out the drifts that explain too little beside what was chosen after them, as creep and
+/// places: what a drift stood for may be explained by now.
+pub(super) fn drop_drifts(fit: &mut Fit<'_>) -> Option<()> {
+    for r in 0..fit.common.records.len() {
+        if fit.common.records[r].drift != DriftKind::Auto || fit.drifts[r].is_none() {
+            continue;
+        }
+        let mut bare = fit.clone();
+        bare.restructure(|bare| bare.drifts[r] = None);
+        bare.settle(ROUGH)?;
+        if (1.0 - DRIFT_GAIN) * bare.deviation_of(r) <= fit.deviation_of(r) {
+            *fit = bare;
+        }
+    }
+    Some(())
+}
+
 /// The fit with the drift of record `r` that explains most.
 fn with_drift<'a>(fit: &Fit<'a>, r: usize) -> Option<Fit<'a>> {
     let length = fit.common.records[r].length();
