@@ -52,7 +52,7 @@ def test_a_played_inverse_is_late_by_the_sample_in_which_a_voltage_shows() -> No
     reference = pt.triangle(frequency=5.0, low=20e-6, high=80e-6, duration=1.0)
     run = pt.play(VirtualDevice(stage()), PLAYS.inverse(), reference, rate=rate)
     # 600 um/s for a sample, but near the turns.
-    assert run.metrics.max_error == pytest.approx(600e-6 / rate, abs=6 * NOISE)
+    assert run.metrics.max_error == pytest.approx(600e-6 / rate, abs=10 * NOISE)
     assert np.array_equal(run.measured, run.displacement)
     assert "played on virtual amplifier" in run.note
 
@@ -230,7 +230,7 @@ def test_an_output_that_cannot_be_led_back_is_said_to_be_where_it_was() -> None:
 # one reading tells nothing (a clipped output, a short jump), as a run that shows it.
 ENDS = {
     "stale": "stands still",
-    "silent": "answered",
+    "silent": "did not answer",
     "nan": "not finite",
     "half": "no end of line within 1 s",
     "drop": "closed|connection",

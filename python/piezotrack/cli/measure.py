@@ -42,9 +42,10 @@ def measure_command(
     ] = False,
     quiet: Quiet = False,
 ) -> None:
-    """Record a log with a device: a drive goes out, the displacement comes back.
+    """Record a log with a device.
 
-    The log has the way from rest and back too, so that its hysteresis is known from the start.
+    A drive goes out, the displacement comes back. The log has the way from rest and back too, so
+    that its hysteresis is known from the start.
     """
     from ..data.log_file import format_to_write
     from ..hardware.drives import parse_drive

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -231,13 +231,8 @@ def measure(
     home = rest_of(device, rest)
     table, first = ramped(volts, home, exact, not_negative("ramp", ramp, "s"))
     check_table(device, "drive with its ramps", table)
-    try:
+    with led_back(device, home):
         record = play_table(device, table, exact, not_negative("lead_in", lead_in, "s"))
-    except BaseException:
-        # A device that has gone cannot be led home; what it was comes first.
-        with suppress(DeviceError):
-            device.hold(home)
-        raise
     y, more = filled(record)
     log = Dataset(
         u=record.volts,

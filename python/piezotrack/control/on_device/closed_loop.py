@@ -17,7 +17,13 @@ from ...hardware.measuring import rest_of
 from ..checks import check_period, check_stable, check_within_reach
 from ..tracking import Tracking, feedforward_of
 from .guard import Guard
-from .latency import Latency, check_exchanging, measure_latency, wait_until
+from .latency import (
+    check_exchanging,
+    latency_of,
+    measure_latency,
+    refuse_slow,
+    wait_until,
+)
 from .playing import check_limits
 
 if TYPE_CHECKING:
@@ -29,6 +35,7 @@ if TYPE_CHECKING:
     from ...hardware.device import Device, Exchanging
     from ...references.reference import Reference, SampledReference
     from ..controller import Controller
+    from .latency import Latency
 
     Array = NDArray[np.float64]
 
@@ -66,7 +73,7 @@ class DeviceTracking(Tracking):
         str
             Several lines.
         """
-        done = Latency.of(self.lateness[np.isfinite(self.lateness)])
+        done = latency_of(self.lateness[np.isfinite(self.lateness)])
         return f"{super().summary()}\nlateness  {done}, {self.overruns} overruns"
 
 
@@ -179,7 +186,7 @@ def track_on(
     log = _Log(len(samples))
     with _terminated(), _safe_after(device, home, controller.dt, log):
         latency = measure_latency(device, controller.dt, rest=home)
-        latency.check(controller.dt)
+        refuse_slow(latency, controller.dt)
         _check_model(controller, samples, latency, beyond_reach=beyond_reach, unstable=unstable)
         told = f"{note}; the loop closed on {device.channels[0]}"
         try:

@@ -17,11 +17,18 @@ from ...hardware.measuring import check_device, rest_of
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
 
-__all__ = ["Latency", "check_exchanging", "measure_latency", "wait_until"]
+__all__ = [
+    "Latency",
+    "check_exchanging",
+    "latency_of",
+    "measure_latency",
+    "refuse_slow",
+    "wait_until",
+]
 
 # Ticks of a measurement: enough that one in a hundred is among them, within some seconds.
 TICKS, FEWEST, LONGEST = 300, 100, 2.0
@@ -48,20 +55,6 @@ class Latency:
     worst: float
     ticks: int
 
-    @classmethod
-    def of(cls, times: ArrayLike) -> Latency:
-        """Return the figures of some times [s].
-
-        Examples
-        --------
-        >>> from piezotrack.control.on_device.latency import Latency
-        >>> print(Latency.of([1e-4, 2e-4, 6e-4]))
-        median 0.2 ms, 99th percentile 0.592 ms, worst 0.6 ms of 3 ticks
-        """
-        taken = np.asarray(times, dtype=np.float64)
-        median, p99 = np.percentile(taken, (50.0, 99.0))
-        return cls(median=float(median), p99=float(p99), worst=taken.max().item(), ticks=taken.size)
-
     def __str__(self) -> str:
         median, p99, worst = (1e3 * one for one in (self.median, self.p99, self.worst))
         return (
@@ -69,15 +62,30 @@ class Latency:
             f"{self.ticks} ticks"
         )
 
-    def check(self, dt: float) -> None:
-        """Raise ParameterError where the 99th percentile is above a third of an interval [s]."""
-        if self.p99 > MOST * dt:
-            slowest = self.p99 / MOST
-            raise ParameterError(
-                f"dt of the controller is {1e3 * dt:.4g} ms: expected {1e3 * slowest:.3g} ms or "
-                f"more on this computer with this device, whose voltage is late by {self}; "
-                "a table (pt.play, pt.learn) goes out on the device's own clock"
-            )
+
+def latency_of(times: Array) -> Latency:
+    """Return the figures of some times [s].
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from piezotrack.control.on_device.latency import latency_of
+    >>> print(latency_of(np.array([1e-4, 2e-4, 6e-4])))
+    median 0.2 ms, 99th percentile 0.592 ms, worst 0.6 ms of 3 ticks
+    """
+    median, p99 = np.percentile(times, (50.0, 99.0))
+    return Latency(median=float(median), p99=float(p99), worst=times.max().item(), ticks=times.size)
+
+
+def refuse_slow(late: Latency, dt: float) -> None:
+    """Raise ParameterError where the 99th percentile is above a third of an interval [s]."""
+    if late.p99 > MOST * dt:
+        slowest = late.p99 / MOST
+        raise ParameterError(
+            f"dt of the controller is {1e3 * dt:.4g} ms: expected {1e3 * slowest:.3g} ms or more "
+            f"on this computer with this device, whose voltage is late by {late}; a table "
+            "(pt.play, pt.learn) goes out on the device's own clock"
+        )
 
 
 def wait_until(instant: float, clock: Callable[[], float] = time.perf_counter) -> None:
@@ -142,4 +150,4 @@ def measure_latency(device: Exchanging, dt: float, *, rest: float | None = None)
         device.exchange(volts)
         device.hold(volts)
         times.append(time.perf_counter() - tick)
-    return Latency.of(times)
+    return latency_of(np.array(times))
