@@ -12,6 +12,7 @@ CALLS ?= 20000
 FILES ?= 4000
 CASES ?= 2048
 TABLE ?= target/tries.md
+LOOP ?= 10
 # A Cortex-M4F.
 EMBEDDED := thumbv7em-none-eabihf
 SOURCES := $(shell find rust python/piezotrack -name '*.rs' -o -name '*.py' -o -name '*.pyi' -o -name '*.json' -o -name '*.css' -o -name '*.js' -o -name '*.gz' -o -name Cargo.toml) benches/Cargo.toml Cargo.toml Cargo.lock pyproject.toml
@@ -36,7 +37,7 @@ soak: fuzz ## The tests that take long: fuzzers, properties, examples, searches 
 	$(BIN)/pytest -n auto -m slow --ignore=tests/soak
 
 fuzz: $(VENV)/installed $(VENV)/tools ## The fuzzers, with their table of tries and failures: SEED=7 CALLS=1000000 FILES=100000
-	$(BIN)/pytest -n auto --dist worksteal -m slow tests/soak --soak-seed=$(SEED) --soak-calls=$(CALLS) --soak-files=$(FILES) --soak-table=$(TABLE)
+	$(BIN)/pytest -n auto --dist worksteal -m slow tests/soak --soak-seed=$(SEED) --soak-calls=$(CALLS) --soak-files=$(FILES) --soak-table=$(TABLE) --soak-loop=$(LOOP)
 
 lint: $(VENV)/installed $(VENV)/tools ## Formatting, clippy, ruff, types, layers, stubs
 	cargo fmt --all --check

@@ -47,6 +47,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--soak-files", type=int, default=4_000, help="files read, all formats")
     group.addoption("--soak-trace", default=None, help="folder for the calls under way")
     group.addoption("--soak-table", default=None, help="file for the table of tries and failures")
+    group.addoption("--soak-loop", type=float, default=10.0, help="length of a loop on a device, s")
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -210,6 +210,38 @@ def test_a_fault_of_the_device_ends_the_loop_safe(
     assert 2 <= caught.value.partial.t.size < 75
 
 
+class Hanging(VirtualDevice):
+    """Takes some seconds for one exchange, or for each from then on."""
+
+    def __init__(self, pause: float, *, each: bool) -> None:
+        super().__init__(stage())
+        self.pause, self.each, self.readings = pause, each, 0
+
+    def exchange(self, volts: float) -> float:
+        self.readings += 1
+        if self.readings == 25 or (self.each and self.readings > 25):
+            threading.Event().wait(self.pause)
+        return super().exchange(volts)
+
+    def hold(self, volts: float) -> None:
+        VirtualDevice.exchange(self, volts)
+
+
+@pytest.mark.usefixtures("_short")
+@pytest.mark.parametrize(
+    ("pause", "each", "words"),
+    [(0.6, False, "the device hangs, or the computer"), (0.1, True, "too slow for an interval of")],
+)
+def test_a_device_that_hangs_or_gets_slow_ends_the_loop_safe(
+    pause: float, each: bool, words: str
+) -> None:
+    device = Hanging(pause, each=each)
+    reference = pt.sine(frequency=0.5, low=20e-6, high=60e-6, duration=6.0)
+    with pytest.raises(pt.DeviceError, match=words):
+        pt.track(device, LOOP, reference)
+    assert device.held == 0.0
+
+
 @pytest.mark.usefixtures("_short")
 def test_an_output_that_cannot_be_led_back_is_said_to_be_where_it_was() -> None:
     class Lost(Failing):

@@ -18,8 +18,10 @@ MOST_INVALID, LONGEST_INVALID = 5, 0.1
 # Equal readings in a row that show a sensor that stands still, while the drive moved by this
 # share of its range.
 MOST_EQUAL, MOVED = 20, 0.05
-# Ticks in a row that are over before they begin.
-MOST_OVERRUN = 10
+# Lateness of a tick with which a device counts as hung: intervals, and at least this time [s].
+HUNG_INTERVALS, HUNG = 10.0, 0.25
+# Share of late ticks over about a second, or some ticks, that is too much.
+MOST_LATE, FEWEST = 0.5, 20.0
 
 
 @dataclass
@@ -40,7 +42,7 @@ class Guard:
     dt: float
     span: float
     _invalid: int = 0
-    _overrun: int = 0
+    _late: float = 0.0
     _equal: int = 0
     _reading: float = math.nan
     _lowest: float = math.inf
@@ -81,10 +83,16 @@ class Guard:
 
     def tick(self, late: float, t: float) -> None:
         """Take how late a tick began [s], at `t` s."""
-        self._overrun = self._overrun + 1 if late > self.dt else 0
-        if self._overrun >= MOST_OVERRUN:
+        if late > max(HUNG_INTERVALS * self.dt, HUNG):
             raise DeviceError(
-                f"{self._overrun} ticks in a row began more than an interval late, the last by "
-                f"{1e3 * late:.3g} ms at {t:.4g} s: the device hangs, or the computer is too slow "
-                f"for an interval of {1e3 * self.dt:.4g} ms"
+                f"the exchange before {t:.4g} s took {1e3 * late:.4g} ms longer than an interval: "
+                "the device hangs, or the computer does"
+            )
+        missed = 1.0 if late > self.dt else 0.0
+        self._late += (missed - self._late) / max(FEWEST, 1.0 / self.dt)
+        if self._late > MOST_LATE:
+            raise DeviceError(
+                f"most ticks up to {t:.4g} s began more than an interval late, the last by "
+                f"{1e3 * late:.3g} ms: device or computer is too slow for an interval of "
+                f"{1e3 * self.dt:.4g} ms"
             )
