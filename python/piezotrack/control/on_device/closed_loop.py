@@ -283,7 +283,8 @@ def _to_safe(
     try:
         for k in range(1, steps + 1):
             wait_until(begun + k * RAMP / steps)
-            device.hold(held + (home - held) * k / steps)
+            # Rounding would leave the limits at the end of the way.
+            device.hold(home if k == steps else held + (home - held) * k / steps)
         return
     except KeyboardInterrupt:
         pass
