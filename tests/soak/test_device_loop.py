@@ -23,7 +23,7 @@ def test_the_loop_goes_on_by_the_absolute_time(
     length = float(request.config.getoption("--soak-loop"))
     stage = pt.VirtualStage.of(PLAYS, noise=5e-9, limits=(0.0, 75.0))
     device = VirtualDevice(stage)
-    feedback = pt.Pid.from_um(kp=0.02, ti=5.0 / rate)
+    feedback = pt.Pid.from_um(kp=0.1, ti=0.05)
     loop = pt.Controller(dt=1.0 / rate, limits=(0.0, 75.0), feedback=feedback)
     reference = pt.sine(frequency=0.1, low=20e-6, high=60e-6, duration=length)
     run = pt.track(device, loop, reference)
