@@ -14,6 +14,7 @@ from ..errors import DeviceError, ParameterError
 from ..identification.identified import load
 from ..stages.virtual import VirtualStage
 from .device import Rates, Record
+from .limits import check_within, ordered
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -75,8 +76,7 @@ class VirtualDevice:
                 f"stage is {type(stage).__name__}: expected pt.VirtualStage, as VirtualStage.of "
                 "makes one of any model"
             )
-        low, high = stage.amplifier.limits if limits is None else limits
-        self._limits = finite("limits", low, "V"), finite("limits", high, "V")
+        self._limits = ordered("limits", stage.amplifier.limits if limits is None else limits)
         self._rates, self._memory = rates, _core.as_count("memory", memory)
         self._clock = clock
         self._run = _core.VirtualRun(stage._core)
@@ -162,13 +162,7 @@ class VirtualDevice:
     def _check(self, volts: Array) -> None:
         if not self._open:
             raise DeviceError("the virtual device is closed")
-        low, high = self._limits
-        beyond = np.flatnonzero((volts < low) | (volts > high))
-        if beyond.size:
-            k = int(beyond[0])
-            raise DeviceError(
-                f"volts is {volts[k]:g} V at sample {k}: the device puts out {low:g} to {high:g} V"
-            )
+        check_within(volts, self._limits, self.channels[0])
 
 
 def from_address(
