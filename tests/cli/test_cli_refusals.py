@@ -87,6 +87,8 @@ def test_refuses_a_bad_drive(name: str) -> None:
 
 TUNE = "tune dahl.json --dt 0.02 --limits 0:75"
 COMPARE = "compare-controllers dahl.json --dt 0.02 --limits 0:75 --rates 0.5,1,2"
+MEASURE = "measure --device virtual: --rate 100"
+PLAY = "play --device virtual: --reference sine:1Hz,10..50um"
 LEARN = "learn dahl.json --dt 0.02 --limits 0:75 --reference sine:0.5Hz,10..60um,4s"
 BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "identify gone.csv": ("gone.csv: there is no such file",),
@@ -217,6 +219,19 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
     f"{LEARN} --seed -1 --noise-nm 5": ("seed is -1", "0 or above"),
     f"{LEARN} --limits 75:0": ("limits", "the lower one first"),
     f"{LEARN} --noise-nm -1": ("--noise-nm is -1", "0 or above"),
+    "measure --device usb:1 --drive sine:1Hz,0..75V --rate 100": ("device is 'usb:1'", "virtual:"),
+    f"{MEASURE} --drive sine:1Hz,0..75um": ("'0..75um'", "sine:0.5Hz,0..75V"),
+    f"{MEASURE} --drive sine:1Hz,0..90V": ("drive is", "0 to 75 V, the limits of virtual"),
+    f"{MEASURE} --drive sine:1Hz,0..75V --rest -1": ("rest is -1 V", "0 to 75 V"),
+    f"{MEASURE} --drive sine:1Hz,0..75V --out log.csv": ("log.csv exists", "--overwrite"),
+    f"{MEASURE} --drive sine:1Hz,0..75V --out log.xyz": ("log.xyz",),
+    f"{PLAY} loop.json": ("controller has feedback", "pt.track"),
+    f"{PLAY} gone.json": ("gone.json: no such file",),
+    f"{PLAY} dahl.json": ("dahl.json is not a piezotrack controller",),
+    f"{PLAY} dahl.json --rate 1e9": ("rate is 1e+09 Hz", "0.1 to 100000 Hz"),
+    "track dahl.json --reference sine:1Hz,0..9um --device virtual:": ("not a piezotrack contr",),
+    "track loop.json --reference sine:1Hz,0..9um --device virtual: --kp 1": ("--kp has no effect",),
+    "track loop.json --reference sine:1Hz,0..9um --device scpi://x": ("device",),
     "export loop.json --out file": ("file cannot be made a folder",),
     "export loop.json --json --quiet": ("--json and --quiet", "at most"),
     "export loop.json --name 1x": ("name is '1x'", "a letter, then letters"),

@@ -144,7 +144,7 @@ COMMANDS: dict[str, tuple[list[str], tuple[str, ...]]] = {
     ),
     "play": (
         ["controller.json", "--device", "virtual:"],
-        ("--device", "--reference", "--duration", "--period", "--rest"),
+        ("--device", "--reference", "--rate", "--duration", "--period", "--rest"),
     ),
     # With a port that there is not: else it would go on until it is stopped.
     "serve": (["gcs", "--port", "65536"], ("--model", "--limits", "--speed", "--host")),

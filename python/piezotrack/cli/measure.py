@@ -62,7 +62,8 @@ def measure_command(
     if quiet:
         return
     print(f"{log.full!r}")
-    print(f"{volts!r} from {first:.4g} s to {last:.4g} s: identify --window {first:.4g}:{last:.4g}")
+    print(f"{volts!r}, held between samples, from {first:.4g} s to {last:.4g} s")
+    print(f"  piezotrack identify {out} --hold zoh --window {first:.4g}:{last:.4g}")
     for note in log.notes:
         print(f"note  {note}")
     list_files([written])

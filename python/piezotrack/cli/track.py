@@ -58,16 +58,11 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BeyondReach",
-    "ControllerFile",
     "feedforward_command",
     "parsed_reference",
     "track_command",
     "tracking_document",
     "write_tracking",
-]
-
-ControllerFile = Annotated[
-    Path, typer.Argument(metavar="CONTROLLER", help="Controller file in JSON, as `tune` writes it.")
 ]
 
 Online = Annotated[
@@ -158,7 +153,7 @@ def track_command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Track a reference in closed loop, simulated or on a device."""
+    """Track a reference in closed loop."""
     from .._support.files import picture_files
     from ..control.controller import Controller
     from ..control.stability import check_loop
