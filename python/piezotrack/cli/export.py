@@ -67,7 +67,7 @@ def export_command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a controller as C for firmware, as coefficients or as an FMU."""
+    """Write a controller as C, coefficients or FMU."""
     from ..control.controller_file import load_controller
     from ..control.export.write import export_controller, export_files
 

@@ -40,7 +40,7 @@ def play_command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Follow a reference on a device, which plays a feedforward as a table."""
+    """Play a feedforward as a table on a device."""
     from .._support.files import picture_files
     from ..control.controller_file import load_controller
     from ..control.on_device.playing import play

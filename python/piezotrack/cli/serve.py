@@ -61,7 +61,9 @@ def serve_command(
     ] = None,
     speed: Annotated[float, typer.Option(help="How much faster than real time it goes.")] = 1.0,
 ) -> None:
-    """Serve a virtual stage, for software that controls a stage to test against.
+    """Serve a virtual stage as a controller.
+
+    Software that controls a stage can test against it.
 
     It prints its address, and goes on until Ctrl-C or SIGTERM.
     """
