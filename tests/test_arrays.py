@@ -63,6 +63,9 @@ TAKERS: dict[str, Taker] = {
         lambda u: pt.DahlStage.xu_li_2010().simulate(u, DT, method="rk45", accuracy=1e-6)
     ),
     "VirtualStage.simulate": Taker(lambda u: VIRTUAL.simulate(u, DT)),
+    "measure": Taker(
+        lambda u: pt.measure(pt.hardware.VirtualDevice(VIRTUAL, limits=(-1e9, 1e9)), u, 1.0 / DT).y
+    ),
     "VirtualStage.record": Taker(lambda u: VIRTUAL.record(u, DT).y),
     "XYStage.simulate": Taker(lambda u, w: XY.simulate(u, w, DT), arrays=2),
     "XYStage.record": Taker(lambda u, w: XY.record(u, w, DT).y.y, arrays=2),

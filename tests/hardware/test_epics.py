@@ -7,13 +7,13 @@ import os
 import socket
 import subprocess
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 import piezotrack as pt
-from folders import ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -100,7 +100,9 @@ def free_port() -> int:
 def surroundings() -> Iterator[dict[str, str]]:
     """Serve the virtual stage in a process of its own: the environment in which it is found."""
     port = str(free_port())
-    paths = os.pathsep.join(filter(None, [str(ROOT / "python"), os.environ.get("PYTHONPATH")]))
+    paths = os.pathsep.join(
+        filter(None, [str(Path(pt.__file__).parents[1]), os.environ.get("PYTHONPATH")])
+    )
     here = {
         **os.environ,
         "EPICS_CA_SERVER_PORT": port,
