@@ -87,6 +87,7 @@ def test_a_device_remembers_where_it_has_been() -> None:
         ("sine:1Hz,0..75V,1000s", 100e3, ("samples", "at most 10000000, the memory")),
         ("gone.csv", 100.0, ("gone.csv",)),
         (np.array([0.0, np.nan]), 100.0, ("drive is nan at sample 1",)),
+        (np.array([]), 100.0, ("drive has 0 samples: expected at least 3",)),
         (np.zeros((2, 2)), 100.0, ("drive has the shape (2, 2)",)),
     ],
 )

@@ -11,6 +11,7 @@ from .. import _core
 from .._support.arguments import finite, not_negative, plain
 from .._support.arrays import signal_of
 from ..data.dataset import Dataset
+from ..data.dataset_arguments import MIN_SAMPLES
 from ..errors import DataError, DeviceError, ParameterError
 from .device import Device, Record
 from .drives import Drive, parse_drive
@@ -223,6 +224,8 @@ def measure(
         )
     else:
         volts = np.array(signal_of("drive", drive))
+    if volts.size < MIN_SAMPLES:
+        raise ParameterError(f"drive has {volts.size} samples: expected at least {MIN_SAMPLES}")
     low, high = device.limits
     if _core.as_truth("clip", clip) and (beyond := int(np.sum((volts < low) | (volts > high)))):
         volts = np.clip(volts, low, high)
