@@ -174,7 +174,8 @@ def _call(name: str, value: Any) -> str:
         for one in inspect.signature(value).parameters.values()
         if one.name not in ("self", "cls")
     ]
-    return f"{name}{inspect.Signature(given)}"
+    # In the quotes of a formatter.
+    return f"{name}{inspect.Signature(given)}".replace("'", '"')
 
 
 def _wrapped(call: str) -> str:
