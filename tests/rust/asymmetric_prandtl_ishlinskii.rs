@@ -321,3 +321,13 @@ fn parameters_out_of_range_are_named() {
     let many = [1.0; 33];
     assert!(refused(1e-6, RANGE, [none, none, (&many, &many)]).starts_with("convex_weights"));
 }
+
+#[test]
+fn beyond_the_range_a_way_of_any_length_is_one_straight_line() {
+    let operator = plays(1.0);
+    for side in [1.0, -1.0] {
+        let mut state = operator.at_rest();
+        operator.follow(&mut state, side * 1e3);
+        assert_eq!(operator.straight(&state, side * 1e9, 1e-15), side * 1e9);
+    }
+}

@@ -88,10 +88,13 @@ impl Bend {
         }
     }
 
-    /// The largest second derivative between two inputs, 1/V.
+    /// The largest second derivative between two inputs, 1/V; none outside of the range.
     #[must_use]
     pub fn curvature(self, one: f64, other: f64, (low, high): (f64, f64)) -> f64 {
         let length = high - low;
+        if one.max(other) <= low || one.min(other) >= high {
+            return 0.0;
+        }
         let away = match self {
             Self::Straight => return 0.0,
             Self::Concave => (high - one).max(high - other),
