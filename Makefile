@@ -1,6 +1,6 @@
 # What a person types. Needs a Rust toolchain and Python 3.11 or newer; all else is put in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo reproduce benchmark test soak fuzz lint rust-test no-std python-test bench docs reference refused clean
+.PHONY: help demo reproduce benchmark test soak fuzz lint rust-test no-std python-test bench docs reference refused c-library c-header c-header-test clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -15,7 +15,7 @@ TABLE ?= target/tries.md
 LOOP ?= 10
 # A Cortex-M4F.
 EMBEDDED := thumbv7em-none-eabihf
-SOURCES := $(shell find rust python/piezotrack -name '*.rs' -o -name '*.py' -o -name '*.pyi' -o -name '*.json' -o -name '*.css' -o -name '*.js' -o -name '*.gz' -o -name Cargo.toml) benches/Cargo.toml Cargo.toml Cargo.lock pyproject.toml
+SOURCES := $(shell find rust python/piezotrack -name '*.rs' -o -name '*.py' -o -name '*.pyi' -o -name '*.json' -o -name '*.css' -o -name '*.js' -o -name '*.gz' -o -name Cargo.toml | grep -v rust/capi) benches/Cargo.toml Cargo.toml Cargo.lock pyproject.toml
 
 help: ## What can be typed
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/'
@@ -30,7 +30,7 @@ benchmark: $(VENV)/installed ## Every model on every record, and the page of it
 	$(BIN)/piezotrack benchmark --out benchmark --overwrite
 	$(BIN)/python docs/make_benchmark.py benchmark
 
-test: lint rust-test no-std python-test ## Everything that must hold before a change lands
+test: lint rust-test no-std c-header-test python-test ## Everything that must hold before a change lands
 
 soak: fuzz ## The tests that take long: fuzzers, properties, examples, searches with full budgets
 	PROPTEST_CASES=$(CASES) PROPTEST_RNG_SEED=$(SEED) cargo test --locked --release -p piezotrack-core --test properties
@@ -63,8 +63,18 @@ no-std: ## The control crate where there is no std and no allocator
 		echo "not built for $(EMBEDDED), which is not installed; to have it: rustup target add $(EMBEDDED)"; \
 	fi
 
-python-test: $(VENV)/installed $(VENV)/tools ## Tests of the package, its docstrings and pages
+python-test: $(VENV)/installed $(VENV)/tools c-library ## Tests of the package, its docstrings and pages
 	$(BIN)/pytest -n auto --dist worksteal -m "not slow"
+
+# Beside the Python module, so that the compiled crates are those of the wheel.
+c-library: $(VENV)/pip ## The C library: target/release/libpiezotrack.a and .so; header in rust/capi/include
+	PYO3_PYTHON=$(abspath $(BIN)/python) cargo build --locked --release -p piezotrack-capi -p piezotrack-py
+
+c-header: ## Write rust/capi/include/piezotrack.h from the functions of the C library
+	WRITE=1 $(MAKE) --no-print-directory c-header-test
+
+c-header-test:
+	cargo test --quiet --locked --manifest-path tests/c_header/Cargo.toml --target-dir target/c-header
 
 bench: ## Criterion benches: throughput of the swarm, latency of a step
 	cargo bench --locked

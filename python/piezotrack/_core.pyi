@@ -289,8 +289,8 @@ class Controller:
         pid: tuple[float, float, float, float | None] | None,
         state_space: tuple[list[float], list[float], list[float], float, list[float] | None] | None,
         law: tuple[str, list[float]] | None,
-        repetitive: tuple[float, float, str, float, float, int, bool] | None,
-        filters: list[tuple[str, float, float, float]],
+        repetitive: tuple[str, list[float]] | None,
+        filters: list[tuple[str, list[float]]],
     ) -> Controller: ...
     @property
     def line_length(self) -> int: ...

@@ -89,10 +89,12 @@ def loop(name: str) -> pt.Controller:
     return pt.Controller(dt=0.02, limits=(0.0, 75.0), **PARTS[name])
 
 
-def compiled(folder: Path, *sources: str, flags: tuple[str, ...] = STRICT) -> None:
+def compiled(
+    folder: Path, *sources: str, flags: tuple[str, ...] = STRICT, libraries: tuple[str, ...] = ()
+) -> None:
     """Compile the sources of a folder, without a warning."""
     assert GCC is not None
-    command = [GCC, *flags, "-O2", "-o", "check", *sources]
+    command = [GCC, *flags, "-O2", "-o", "check", *sources, *libraries]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
 

@@ -35,9 +35,10 @@ def export_command(
         Path, typer.Argument(metavar="CONTROLLER", help="Controller file in JSON.")
     ],
     to: Annotated[
-        Literal["c99", "json", "fmu"],
+        Literal["c99", "library", "json", "fmu"],
         typer.Option(
-            help="C99 without a library, coefficients in JSON, or a co-simulation unit (FMI 2.0)."
+            help="C99 without a library, C that calls libpiezotrack, coefficients in JSON, or a "
+            "co-simulation unit (FMI 2.0)."
         ),
     ] = "c99",
     out: Out = Path("results"),
@@ -79,8 +80,8 @@ def export_command(
         if name is not None:
             raise
         raise ParameterError(f"{error}; --name gives one") from None
-    if single and to == "json":
-        raise ParameterError("--float has no effect with --to json: expected it left out")
+    if single and to in ("json", "library"):
+        raise ParameterError(f"--float has no effect with --to {to}: expected it left out")
     if reference is None:
         refuse_without_effect(context, ("duration", "period"), "without --reference")
     known = load_controller(controller)

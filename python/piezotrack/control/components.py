@@ -364,8 +364,8 @@ class Repetitive:
         return cls(period=period, forgetting_factor=1.0, pause=False)
 
     @property
-    def _settings(self) -> tuple[float, float, str, float, float, int, bool]:
-        """The numbers as the core takes them, the gain in V/um."""
+    def _settings(self) -> tuple[str, list[float]]:
+        """Name of the smoothing and the numbers as the core takes them."""
         match self.smoothing:
             case Lag(tq=tq, compensated=compensated):
                 kind, number = ("compensated lag" if compensated else "lag"), tq
@@ -373,8 +373,8 @@ class Repetitive:
                 kind, number = "zero phase", float(order)
             case None:
                 kind, number = "none", 0.0
-        gain = self.kq / 1e6
-        return self.period, gain, kind, number, self.forgetting_factor, self.lead, self.pause
+        last = self.forgetting_factor, self.lead, self.pause
+        return kind, [float(one) for one in (self.period, self.kq, number, *last)]
 
 
 @dataclass(frozen=True)
@@ -393,9 +393,9 @@ class LowPass:
         positive("cutoff", self.cutoff, "Hz")
 
     @property
-    def _settings(self) -> tuple[str, float, float, float]:
-        """The numbers as the core takes them."""
-        return "low pass", self.cutoff, 0.0, 0.0
+    def _settings(self) -> tuple[str, list[float]]:
+        """The name and the numbers as the core takes them."""
+        return "low pass", [self.cutoff]
 
 
 @dataclass(frozen=True)
@@ -422,6 +422,6 @@ class Notch:
         in_range("depth", self.depth, 1.0, "parts of 1")
 
     @property
-    def _settings(self) -> tuple[str, float, float, float]:
-        """The numbers as the core takes them."""
-        return "notch", self.frequency, self.width, self.depth
+    def _settings(self) -> tuple[str, list[float]]:
+        """The name and the numbers as the core takes them."""
+        return "notch", [self.frequency, self.width, self.depth]

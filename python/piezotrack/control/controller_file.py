@@ -19,7 +19,7 @@ from ..stages.registry import model_named, stage_class
 from .controller import DRIVE_UNITS, Controller
 from .file_entries import Setting, only, part_entry, part_of
 from .hysteresis_observer import HysteresisObserver
-from .neural_network import NetworkInverse
+from .neural_network import NETWORK, NetworkInverse
 from .stability import LoopCheck, LoopReport
 from .tuning.tuned import Tuned, TuningReport
 
@@ -38,8 +38,6 @@ LAWS = (
     *("disturbance-observer", "perturbation-estimator", "scheduled-pid"),
 )
 OBSERVER = "hysteresis-observer"
-# Numbers of a network, in the order in which the core takes them.
-NETWORK = ("centre", "scales", "thresholds", "hidden", "biases", "outputs", "direct", "constant")
 
 
 def save_controller(

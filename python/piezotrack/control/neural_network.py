@@ -32,8 +32,10 @@ if TYPE_CHECKING:
         float,
     ]
 
-__all__ = ["NetworkInverse", "train_network"]
+__all__ = ["NETWORK", "NetworkInverse", "train_network"]
 
+# Names of the numbers of a network, in their order.
+NETWORK = ("centre", "scales", "thresholds", "hidden", "biases", "outputs", "direct", "constant")
 MOST_UNITS, MOST_PLAYS = 16, 8
 # Steps at most, and those without a better held-out error after which the training ends.
 MOST_STEPS, PATIENCE = 300, 20

@@ -212,8 +212,12 @@ class Stage:
     @cached_property
     def _core(self) -> CoreStage:
         """The stage in the core."""
-        entries = [(name, _entries(name, getattr(self, name))) for name in self.parameter_names()]
-        return CoreStage(self.info.name, entries)
+        return CoreStage(self.info.name, self._named)
+
+    @property
+    def _named(self) -> Named:
+        """Names and numbers of the parameters."""
+        return [(name, _entries(name, getattr(self, name))) for name in self.parameter_names()]
 
     def simulate(
         self,

@@ -1,13 +1,9 @@
 //! Controllers, as configuration and as sessions.
 
-use piezotrack_control::hysteresis::{BoucWen, Dahl};
-use piezotrack_control::{
-    Command, Controller, ControllerState, DisturbanceObserver, Filter, HysteresisObserver, LeadLag,
-    Limits, Pid, Repetitive, SampledPid, ScheduledPid, SlidingMode, Smoothing, Span, StateSpace,
-};
+use piezotrack_control::{Command, Controller, ControllerState, Limits, Pid, Span, StateSpace};
 use piezotrack_core::design::LinearFeedback;
 use piezotrack_core::math::zeros;
-use piezotrack_core::simulate::{DELAY_LINE, Law, LawState};
+use piezotrack_core::simulate::{DELAY_LINE, Law, LawState, filter_named, repetitive_named};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -29,11 +25,8 @@ type PidGains = (f64, f64, f64, Option<f64>);
 /// A row by row, B, C, D, and the vector of back-calculation where it is given.
 type Matrices = (Vec<f64>, Vec<f64>, Vec<f64>, f64, Option<Vec<f64>>);
 
-/// Another law by its name, with its numbers.
-type NamedLaw = (String, Vec<f64>);
-
-/// period, kq, smoothing by its name, its number, forgetting factor, lead, pause.
-type RepetitiveSettings = (f64, f64, String, f64, f64, u32, bool);
+/// A part by its name, with its numbers.
+type NamedPart = (String, Vec<f64>);
 
 /// A controller for one sampling interval.
 #[pyclass(name = "Controller", frozen, module = "piezotrack._core")]
@@ -54,14 +47,14 @@ impl PyController {
         max_jump: Option<f64>,
         pid: Option<PidGains>,
         state_space: Option<Matrices>,
-        law: Option<NamedLaw>,
-        repetitive: Option<RepetitiveSettings>,
-        filters: Vec<(String, f64, f64, f64)>,
+        law: Option<NamedPart>,
+        repetitive: Option<NamedPart>,
+        filters: Vec<NamedPart>,
     ) -> PyResult<Self> {
         let build = move || -> Result<Self> {
             piezotrack_core::error::positive("dt", dt, "s")?;
             let law = match law {
-                Some(named) => law_from(&named, dt)?,
+                Some((name, numbers)) => Law::named(&name, &numbers, dt)?,
                 None => pid_or_state_space(dt, pid, state_space)?,
             };
             let mut controller = Controller::new(Limits::new(limits.0, limits.1)?, law);
@@ -72,15 +65,15 @@ impl PyController {
                 controller.span = controller.span.with_max_jump(jump)?;
             }
             controller.repetitive = match repetitive {
-                Some(settings) => Some(repetitive_from(settings)?.at(dt)?),
+                Some((name, numbers)) => Some(repetitive_named(&name, &numbers)?.at(dt)?),
                 None => None,
             };
             let most = controller.filters.len();
             if filters.len() > most {
                 return Err(Error::parameter("filters", filters.len(), format!("{most} at most")));
             }
-            for (slot, filter) in controller.filters.iter_mut().zip(&filters) {
-                *slot = Some(filter_from(filter, dt)?);
+            for (slot, (name, numbers)) in controller.filters.iter_mut().zip(&filters) {
+                *slot = Some(filter_named(name, numbers, dt)?);
             }
             Ok(Self { controller, dt })
         };
@@ -142,106 +135,12 @@ fn pid_or_state_space(
     }
 }
 
-/// A law from its name and its numbers.
-fn law_from((kind, numbers): &NamedLaw, dt: f64) -> Result<Law> {
-    let sliding = |[switching, layer, ti, td, tf]: [f64; 5]| {
-        SlidingMode::new(switching, layer, ti, td, tf)?.at(dt)
-    };
-    Ok(match (kind.as_str(), &numbers[..]) {
-        ("lead-lag", &[kp, lead, lag, matched]) => {
-            let mut law = LeadLag::new(kp, lead, lag)?;
-            law.matched = matched > 0.0;
-            Law::StateSpace(law.at(dt)?)
-        }
-        ("sliding mode", &[switching, layer, ti, td, tf]) => {
-            Law::SlidingMode(sliding([switching, layer, ti, td, tf])?)
-        }
-        ("perturbation", &[switching, layer, ti, td, tf, gain, time, cutoff]) => {
-            let inner = sliding([switching, layer, ti, td, tf])?;
-            let observer = DisturbanceObserver::new(gain, time, cutoff)?;
-            Law::ObservedSlidingMode(observer.around(inner, dt)?)
-        }
-        ("disturbance observer", &[kp, ti, td, tt, gain, time, cutoff]) => {
-            let observer = DisturbanceObserver::new(gain, time, cutoff)?;
-            Law::ObservedPid(observer.around(pid_at([kp, ti, td, tt], dt)?, dt)?)
-        }
-        ("Dahl observer", &[kp, ti, td, tt, gain, time, correction, stroke, a1, a2, curvature]) => {
-            let operator = Dahl { a1, a2, gain: curvature };
-            let observer = HysteresisObserver::new(operator, gain, time, correction, stroke)?;
-            Law::DahlObserver(observer.around(pid_at([kp, ti, td, tt], dt)?, dt)?)
-        }
-        (
-            "Bouc-Wen observer",
-            &[kp, ti, td, tt, gain, time, correction, stroke, rise, beta, gamma, exponent],
-        ) => {
-            let operator = BoucWen { rise, beta, gamma, exponent };
-            let observer = HysteresisObserver::new(operator, gain, time, correction, stroke)?;
-            Law::BoucWenObserver(observer.around(pid_at([kp, ti, td, tt], dt)?, dt)?)
-        }
-        ("scheduled pid", numbers) => Law::Scheduled(scheduled(numbers, dt)?),
-        (other, _) => {
-            let expected = "the name of a feedback law with its numbers";
-            return Err(Error::parameter("law", format!("'{other}'"), expected));
-        }
-    })
-}
-
-/// A PID from its numbers, the last NaN for the default of tt.
-fn pid_at([kp, ti, td, tt]: [f64; 4], dt: f64) -> Result<SampledPid> {
-    Ok(Pid::new(kp, ti, td, (!tt.is_nan()).then_some(tt))?.at(dt)?)
-}
-
-/// Counts of amplitudes and rates, their values, those at first, then four numbers of each PID.
-fn scheduled(numbers: &[f64], dt: f64) -> Result<ScheduledPid> {
-    let short = || Error::parameter("law", format!("{} numbers", numbers.len()), "a whole grid");
-    let (counts, rest) = numbers.split_at_checked(2).ok_or_else(short)?;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-    let (along, across) = (counts[0] as usize, counts[1] as usize);
-    let (amplitudes, rest) = rest.split_at_checked(along).ok_or_else(short)?;
-    let (rates, rest) = rest.split_at_checked(across).ok_or_else(short)?;
-    let (first, gains) = rest.split_at_checked(2).ok_or_else(short)?;
-    let pids: Result<Vec<Pid>> = gains
-        .chunks_exact(4)
-        .map(|one| Ok(Pid::new(one[0], one[1], one[2], (!one[3].is_nan()).then_some(one[3]))?))
-        .collect();
-    Ok(ScheduledPid::new(amplitudes, rates, &pids?, (first[0], first[1]), dt)?)
-}
-
 /// Numerator and denominator of a law in powers of `z - 1`, constant term first.
 #[pyfunction]
 #[expect(clippy::needless_pass_by_value, reason = "as Python gives them")]
-fn law_transfer_function(law: NamedLaw, dt: f64) -> PyResult<[Vec<f64>; 2]> {
-    let law = law_from(&law, dt).map_err(|error| raise(&error))?;
+fn law_transfer_function(law: NamedPart, dt: f64) -> PyResult<[Vec<f64>; 2]> {
+    let law = Law::named(&law.0, &law.1, dt).map_err(|error| raise(&error))?;
     Ok(law.transfer_function())
-}
-
-/// A repetitive part from plain numbers.
-pub fn repetitive_from(settings: RepetitiveSettings) -> Result<Repetitive> {
-    let (period, kq, smoothing, number, forgetting_factor, lead, pause) = settings;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked there")]
-    let smoothing = match smoothing.as_str() {
-        "lag" => Smoothing::Lag { tq: number, compensated: false },
-        "compensated lag" => Smoothing::Lag { tq: number, compensated: true },
-        "zero phase" => Smoothing::ZeroPhase { order: number as u32 },
-        "none" => Smoothing::None,
-        other => {
-            let expected = "'lag', 'compensated lag', 'zero phase' or 'none'";
-            return Err(Error::parameter("smoothing", format!("'{other}'"), expected));
-        }
-    };
-    Ok(Repetitive { forgetting_factor, lead, pause, ..Repetitive::new(period, smoothing, kq)? })
-}
-
-/// A filter from its name and three numbers.
-fn filter_from((kind, first, second, third): &(String, f64, f64, f64), dt: f64) -> Result<Filter> {
-    Ok(match kind.as_str() {
-        "notch" => Filter::notch(*first, *second, *third, dt)?,
-        "low pass" => Filter::low_pass(*first, dt)?,
-        other => {
-            let expected = "'notch' or 'low pass'";
-            return Err(Error::parameter("filters", format!("'{other}'"), expected));
-        }
-    })
 }
 
 /// A controller at work.

@@ -1,14 +1,10 @@
 //! The inverse of a stage, for feedforward.
 
 use numpy::PyArray1;
-use piezotrack_control::inverse::{
-    Inverse, NetworkNumbers, NeuralNetworkInverse, NeuralNetworkState, after_drive,
-};
-use piezotrack_control::{
-    Limits, OnlineFeedforward, OnlineFeedforwardState, ReferenceSample, Snapshot,
-};
+use piezotrack_control::inverse::{Inverse, NetworkNumbers, NeuralNetworkInverse, after_drive};
+use piezotrack_control::{Limits, OnlineFeedforward, OnlineFeedforwardState, ReferenceSample};
 use piezotrack_core::math::room;
-use piezotrack_core::models::{StageInverse, StageInverseState};
+use piezotrack_core::models::{AnyInverse, AnyInverseState, StageInverse, StageInverseState};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -26,8 +22,8 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 #[pyclass(name = "Inverse", module = "piezotrack._core")]
 pub struct PyInverse {
     online: OnlineFeedforward<AnyInverse>,
-    start: AnyState,
-    state: OnlineFeedforwardState<AnyState>,
+    start: AnyInverseState,
+    state: OnlineFeedforwardState<AnyInverseState>,
     /// Drives that reach the stage, where that is known.
     limits: Option<Limits>,
 }
@@ -42,60 +38,14 @@ impl PyInverse {
         delay: f64,
     ) -> Result<Self> {
         let any = AnyInverse::Stage(Box::new(inverse));
-        Ok(Self::new(OnlineFeedforward::new(any, dt, offset, delay)?, &AnyState::Stage(*start)))
+        Ok(Self::new(
+            OnlineFeedforward::new(any, dt, offset, delay)?,
+            &AnyInverseState::Stage(*start),
+        ))
     }
 
-    fn new(online: OnlineFeedforward<AnyInverse>, start: &AnyState) -> Self {
+    fn new(online: OnlineFeedforward<AnyInverse>, start: &AnyInverseState) -> Self {
         Self { state: online.start(*start), online, start: *start, limits: None }
-    }
-}
-
-/// The inverse of a stage, or a network in its place.
-enum AnyInverse {
-    Stage(Box<StageInverse>),
-    Network(Box<NeuralNetworkInverse>),
-}
-
-/// State of the same kind.
-#[derive(Clone, Copy)]
-#[expect(clippy::large_enum_variant, reason = "a state is copied, as each of an inverse is")]
-enum AnyState {
-    Stage(StageInverseState),
-    Network(NeuralNetworkState),
-}
-
-impl Inverse for AnyInverse {
-    type State = AnyState;
-
-    fn rest(&self) -> AnyState {
-        match self {
-            Self::Stage(inverse) => AnyState::Stage(inverse.rest()),
-            Self::Network(inverse) => AnyState::Network(inverse.rest()),
-        }
-    }
-
-    fn step(&self, state: &mut AnyState, x: f64, v: f64, a: f64) -> f64 {
-        match (self, state) {
-            (Self::Stage(inverse), AnyState::Stage(state)) => inverse.step(state, x, v, a),
-            (Self::Network(inverse), AnyState::Network(state)) => inverse.step(state, x, v, a),
-            _ => f64::NAN,
-        }
-    }
-}
-
-impl Snapshot for AnyState {
-    fn save(&self, write: &mut dyn FnMut(f64)) {
-        match self {
-            Self::Stage(state) => state.save(write),
-            Self::Network(state) => state.save(write),
-        }
-    }
-
-    fn load(&mut self, read: &mut dyn FnMut() -> Option<f64>) -> Option<()> {
-        match self {
-            Self::Stage(state) => state.load(read),
-            Self::Network(state) => state.load(read),
-        }
     }
 }
 
@@ -119,7 +69,7 @@ impl PyInverse {
                 direct: &direct,
                 offset: constant,
             })?;
-            let start = AnyState::Network(network.rest());
+            let start = AnyInverseState::Network(network.rest());
             let any = AnyInverse::Network(Box::new(network));
             Ok(Self::new(OnlineFeedforward::new(any, dt, offset, delay)?, &start))
         };
@@ -196,7 +146,7 @@ impl PyInverse {
 /// What is beyond the limits does not reach the stage, and the inverse does not remember it.
 fn along(
     inverse: &AnyInverse,
-    mut state: AnyState,
+    mut state: AnyInverseState,
     limits: Option<&Limits>,
     [x, v, a]: [&[f64]; 3],
 ) -> Result<Vec<f64>> {

@@ -9,7 +9,7 @@ COMMON = """\
  * Runs vectors.csv through NAME_step and prints the largest difference to what the controller of
  * piezotrack gives. Returns 0 where all are within the bound and all flags are equal.
  *
- *     cc -std=c99 -O2 -ffp-contract=off -o check check.c @file.c && ./check vectors.csv
+ *     cc -std=c99 -O2 -ffp-contract=off -o check check.c @file.c@link && ./check vectors.csv
  */
 #include <stdio.h>
 #include <stdlib.h>
@@ -102,7 +102,7 @@ NAME_step(&state, (NAME_real)in[1], (NAME_real)in[2], (NAME_real)in[3]);""",
 }
 
 
-def check_code(forward: str, bound: float, flags: int) -> str:
+def check_code(forward: str, bound: float, flags: int, link: str = "") -> str:
     """Write the program.
 
     Parameters
@@ -113,13 +113,15 @@ def check_code(forward: str, bound: float, flags: int) -> str:
         Largest difference that is accepted, in the unit of the drive.
     flags : int
         Flags that may differ.
+    link : str, optional
+        What the compiler is told besides, after a space.
 
     Returns
     -------
     str
         The program, with the names of its files open.
     """
-    pieces = {"@call": CALLS[forward], "@bound": repr(bound), "@flags": str(flags)}
+    pieces = {"@call": CALLS[forward], "@bound": repr(bound), "@flags": str(flags), "@link": link}
     code = COMMON
     for key, piece in pieces.items():
         code = code.replace(key, piece)

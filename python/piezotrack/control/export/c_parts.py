@@ -125,7 +125,7 @@ def _law_of(law: Any) -> tuple[str, tuple[str, ...]]:
     raise ParameterError(
         f"feedback is a {what}, which has no form in C: its step needs powers or logarithms; "
         "expected a PID, state space, lead-lag, sliding mode, a disturbance observer or the "
-        "hysteresis observer of a Dahl stage"
+        "hysteresis observer of a Dahl stage, or to='library', which has all"
     )
 
 
@@ -142,7 +142,8 @@ def _check_online(controller: Controller) -> None:
         return
     raise ParameterError(
         f"feedforward is {what}, which has no form in C sample by sample: expected "
-        "reference=, a motion that repeats, whose table is written, or a Dahl stage without creep"
+        "reference=, a motion that repeats, whose table is written, a Dahl stage without creep, or "
+        "to='library', which has all"
     )
 
 

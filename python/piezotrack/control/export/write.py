@@ -1,4 +1,4 @@
-"""Export of a controller: C99, coefficients in JSON, a unit of FMI 2.0."""
+"""Export of a controller: C99, calls of the C library, coefficients in JSON, FMI 2.0."""
 
 from __future__ import annotations
 
@@ -13,17 +13,16 @@ from ..controller import Controller
 from .c99 import c_sources, checked_name
 from .fmu import compiler, fmu_bytes
 from .json_form import coefficients_document
+from .library import library_sources
 
 if TYPE_CHECKING:
     import os
     from pathlib import Path
 
-    from .c99 import Sources
-
 __all__ = ["Exported", "export_controller", "export_files"]
 
-To = Literal["c99", "json", "fmu"]
-FORMS = ("c99", "json", "fmu")
+To = Literal["c99", "library", "json", "fmu"]
+FORMS = ("c99", "library", "json", "fmu")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,16 +33,19 @@ class Exported:
     ----------
     files : tuple of pathlib.Path
         The files.
+    to : {"c99", "library", "json", "fmu"}
+        The form.
     state_bytes : int or None
-        Bytes of the state in C; None for coefficients.
+        Bytes of the state in C; None for coefficients and for calls of the library.
     additions, multiplications, divisions : int or None
-        Floating-point operations of a step that does not saturate; None for coefficients.
+        Floating-point operations of a step that does not saturate; None as above.
     bound : float or None
         Largest difference to the Rust controller that ``check.c`` accepts, in the unit of the
         drive: 0 for doubles. None for coefficients.
     """
 
     files: tuple[Path, ...]
+    to: To
     state_bytes: int | None = None
     additions: int | None = None
     multiplications: int | None = None
@@ -52,7 +54,7 @@ class Exported:
 
     def __str__(self) -> str:
         if self.state_bytes is None:
-            return "coefficients"
+            return "coefficients" if self.to == "json" else "calls libpiezotrack"
         text = f"state {self.state_bytes} bytes; a step has {self.additions} additions, "
         text += f"{self.multiplications} multiplications, {self.divisions} divisions"
         return text + ("" if self.bound == 0.0 else f"; within {self.bound:.3g} of the doubles")
@@ -63,6 +65,7 @@ def export_files(to: To, name: str) -> list[str]:
     checked_name(name)
     names = {
         "c99": [f"{name}.h", f"{name}.c", "check.c", "vectors.csv"],
+        "library": [f"{name}.h", f"{name}.c", "check.c", "vectors.csv"],
         "json": [f"{name}.json"],
         "fmu": [f"{name}.fmu"],
     }
@@ -84,7 +87,8 @@ def export_controller(
 
     ``"c99"`` writes NAME.h and NAME.c, which allocate nothing and call no library, with test
     vectors and a program that checks them: doubles give the same bits as `Controller`.
-    ``"json"`` writes the linear parts as coefficients. ``"fmu"`` compiles the C into a unit for
+    ``"library"`` writes the same functions for a program that is linked with libpiezotrack: every
+    controller has this form, with the inverse of any stage sample by sample. ``"json"`` writes the linear parts as coefficients. ``"fmu"`` compiles the C into a unit for
     co-simulation (FMI 2.0, Linux x86-64), with its sources.
 
     Parameters
@@ -93,7 +97,7 @@ def export_controller(
         The controller.
     folder : path-like
         Folder of the files; files of the same names are replaced.
-    to : {"c99", "json", "fmu"}, optional
+    to : {"c99", "library", "json", "fmu"}, optional
         The form.
     name : str, optional
         Of the files and functions: an identifier of C.
@@ -101,7 +105,7 @@ def export_controller(
         Numbers are floats, not doubles.
     reference : Reference, optional
         Motion that repeats: the feedforward is then played from a table of one settled period.
-        Needed for every feedforward other than that of a Dahl stage.
+        C99 and FMU need it for every feedforward other than that of a Dahl stage.
 
     Returns
     -------
@@ -134,17 +138,35 @@ def export_controller(
         if single:
             raise ParameterError("single is True with to='json': expected False, JSON has doubles")
         document = coefficients_document(controller, reference)
-        return Exported(files=(write_document(make_folder(folder) / names[0], document),))
+        path = write_document(make_folder(folder) / names[0], document)
+        return Exported(files=(path,), to=to)
+    if to == "library":
+        if single:
+            raise ParameterError(
+                "single is True with to='library': expected False, the library has doubles"
+            )
+        texts = library_sources(controller, name, reference=reference)
+        paths = _written({key: text.encode() for key, text in texts.items()}, folder)
+        return Exported(files=paths, to=to, bound=0.0)
     if to == "fmu":
         compiler()
     sources = c_sources(controller, name, single=single, reference=reference)
     files = {key: text.encode() for key, text in sources.files.items()}
     if to == "fmu":
         files = {names[0]: fmu_bytes(controller, sources)}
-    return _written(files, sources, folder)
+    additions, multiplications, divisions = sources.operations
+    return Exported(
+        files=_written(files, folder),
+        to=to,
+        state_bytes=sources.state_bytes,
+        additions=additions,
+        multiplications=multiplications,
+        divisions=divisions,
+        bound=sources.bound,
+    )
 
 
-def _written(files: dict[str, bytes], sources: Sources, folder: str | os.PathLike[str]) -> Exported:
+def _written(files: dict[str, bytes], folder: str | os.PathLike[str]) -> tuple[Path, ...]:
     """Write the files in one go."""
     paths = []
     with together(make_folder(folder)) as there:
@@ -152,12 +174,4 @@ def _written(files: dict[str, bytes], sources: Sources, folder: str | os.PathLik
             with replacing(there / key) as temporary:
                 temporary.write_bytes(content)
             paths.append(there / key)
-    additions, multiplications, divisions = sources.operations
-    return Exported(
-        files=tuple(paths),
-        state_bytes=sources.state_bytes,
-        additions=additions,
-        multiplications=multiplications,
-        divisions=divisions,
-        bound=sources.bound,
-    )
+    return tuple(paths)

@@ -1,5 +1,6 @@
 //! Models of a stage: one file each, the traits that it implements, and the list of models.
 
+mod any_inverse;
 mod asymmetric_bouc_wen;
 mod asymmetric_prandtl_ishlinskii;
 mod bouc_wen;
@@ -36,6 +37,7 @@ mod tanh_envelope;
 mod traits;
 mod values;
 
+pub use any_inverse::{AnyInverse, AnyInverseState};
 pub use asymmetric_bouc_wen::{AsymmetricBoucWenHysteresis, AsymmetricBoucWenStage};
 pub use asymmetric_prandtl_ishlinskii::{
     AsymmetricPlays, AsymmetricPrandtlIshlinskiiStage, asymmetric_plays,

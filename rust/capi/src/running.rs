@@ -1,0 +1,218 @@
+//! A controller with its feedforward and the state of both, in Rust.
+
+use piezotrack_control::inverse::{Inverse, NetworkNumbers, NeuralNetworkInverse};
+use piezotrack_control::{
+    Command, Controller, ControllerState, Limits, OnlineFeedforward, OnlineFeedforwardState,
+    ReferenceSample, Refused, Span,
+};
+use piezotrack_core::math::zeros;
+use piezotrack_core::models::{AnyInverse, AnyInverseState, Model, ParameterInfo, Values};
+use piezotrack_core::simulate::{DELAY_LINE, Law, LawState, filter_named, repetitive_named};
+use piezotrack_core::{Error, Result};
+
+/// What the model of the feedforward is called that is a network.
+const NETWORK: &str = "neural network";
+
+/// A name with its numbers.
+pub type Named<'a> = (&'a str, &'a [f64]);
+
+/// What a controller is made of.
+pub struct Parts<'a> {
+    pub dt: f64,
+    pub limits: (f64, f64),
+    pub span: Option<(f64, f64)>,
+    pub max_jump: Option<f64>,
+    pub law: Option<Named<'a>>,
+    pub repetitive: Option<Named<'a>>,
+    pub filters: Vec<Named<'a>>,
+    pub feedforward: Option<FeedforwardParts<'a>>,
+}
+
+/// What the feedforward is made of.
+pub struct FeedforwardParts<'a> {
+    pub model: &'a str,
+    pub parameters: Vec<Named<'a>>,
+    pub initial: Vec<Named<'a>>,
+    pub offset: f64,
+    pub delay: f64,
+}
+
+/// Inverse of the stage, sample by sample.
+struct Feedforward {
+    online: OnlineFeedforward<AnyInverse>,
+    start: AnyInverseState,
+    state: OnlineFeedforwardState<AnyInverseState>,
+}
+
+/// A controller at work.
+pub struct Running {
+    controller: Controller<Law>,
+    state: ControllerState<LawState, Vec<f64>>,
+    feedforward: Option<Feedforward>,
+}
+
+impl Running {
+    /// A controller that begins at 0 V.
+    pub fn new(parts: &Parts<'_>) -> Result<Self> {
+        let dt = piezotrack_core::error::positive("dt", parts.dt, "s")?;
+        let law = match parts.law {
+            Some((name, numbers)) => Law::named(name, numbers, dt)?,
+            None => Law::None,
+        };
+        let limits = Limits::new(parts.limits.0, parts.limits.1)?;
+        let mut controller = Controller::new(limits, law);
+        if let Some((low, high)) = parts.span {
+            controller.span = Span::new(low, high)?;
+        }
+        if let Some(jump) = parts.max_jump {
+            controller.span = controller.span.with_max_jump(jump)?;
+        }
+        if let Some((name, numbers)) = parts.repetitive {
+            controller.repetitive = Some(repetitive_named(name, numbers)?.at(dt)?);
+        }
+        let most = controller.filters.len();
+        if parts.filters.len() > most {
+            let expected = format!("{most} at most");
+            return Err(Error::parameter("filter_count", parts.filters.len(), expected));
+        }
+        for (slot, (name, numbers)) in controller.filters.iter_mut().zip(&parts.filters) {
+            *slot = Some(filter_named(name, numbers, dt)?);
+        }
+        let feedforward = match &parts.feedforward {
+            Some(forward) => Some(Feedforward::new(forward, dt)?),
+            None => None,
+        };
+        let state = controller.rest(line(&controller)?)?;
+        Ok(Self { controller, state, feedforward })
+    }
+
+    /// The voltage of a sample, V; the reference one sample ahead where it is known.
+    pub fn step(&mut self, reference: f64, next: Option<f64>, measured: f64) -> f64 {
+        let mut volts = 0.0;
+        if let Some(Feedforward { online, state, .. }) = &mut self.feedforward {
+            let sample = ReferenceSample { preview: next, ..ReferenceSample::new(reference) };
+            volts = online.step_within(state, &sample, &self.controller.limits);
+        }
+        self.step_given(reference, measured, volts)
+    }
+
+    /// The voltage of a sample with a feedforward of the caller's, V.
+    pub fn step_given(&mut self, reference: f64, measured: f64, feedforward: f64) -> f64 {
+        self.controller.step(&mut self.state, reference, measured, feedforward).volts
+    }
+
+    /// Begins anew, without a bump from the voltage that is there, V.
+    pub fn start(&mut self, present: f64) -> Result<()> {
+        self.state = self.controller.start(present, line(&self.controller)?)?;
+        self.restart();
+        Ok(())
+    }
+
+    /// Forgets what was learnt, and goes on from the voltage that is there.
+    pub fn reset(&mut self) {
+        self.controller.reset(&mut self.state);
+        self.restart();
+    }
+
+    fn restart(&mut self) {
+        if let Some(Feedforward { online, start, state }) = &mut self.feedforward {
+            *state = online.start(*start);
+        }
+    }
+
+    /// Takes the voltage that the actuator got for the last command, V.
+    pub fn applied(&mut self, volts: f64) -> Result<()> {
+        self.controller.applied(&mut self.state, volts)?;
+        let reached = self.controller.reached(&self.state);
+        if let (Some(forward), Some(reached)) = (&mut self.feedforward, reached) {
+            forward.online.applied(&mut forward.state, reached);
+        }
+        Ok(())
+    }
+
+    /// The last command.
+    pub fn last(&self) -> &Command {
+        self.state.last()
+    }
+
+    /// Readings that were no measurements.
+    pub fn refused(&self) -> Refused {
+        self.state.refused()
+    }
+}
+
+/// Memory of the repetitive part.
+fn line(controller: &Controller<Law>) -> Result<Vec<f64>> {
+    zeros(DELAY_LINE, controller.repetitive.map_or(0, |part| part.length()))
+}
+
+impl Feedforward {
+    fn new(parts: &FeedforwardParts<'_>, dt: f64) -> Result<Self> {
+        let (inverse, start) = if parts.model == NETWORK {
+            let network = network(&parts.parameters)?;
+            let start = AnyInverseState::Network(network.rest());
+            (AnyInverse::Network(Box::new(network)), start)
+        } else {
+            let model = Model::named(parts.model)?;
+            let parameters = model.info().parameters;
+            let given = whole(parameters, &parts.parameters);
+            let stage = model.build(&Values::named(parameters, given)?)?;
+            let initial = match &parts.initial[..] {
+                [] => None,
+                initial => Some(Values::named(model.info().state, owned(initial))?),
+            };
+            let (inverse, start) = stage.inverse(dt, initial.as_ref())?;
+            (AnyInverse::Stage(Box::new(inverse)), AnyInverseState::Stage(start))
+        };
+        let online = OnlineFeedforward::new(inverse, dt, parts.offset, parts.delay)?;
+        Ok(Self { state: online.start(start), online, start })
+    }
+}
+
+/// The parameters that are given, with the defaults of the others: none of a list, none of what is
+/// optional.
+fn whole(infos: &[ParameterInfo], given: &[Named<'_>]) -> Vec<(String, Vec<f64>)> {
+    let mut named = owned(given);
+    for info in infos {
+        let left_out = given.iter().all(|(name, _)| *name != info.name);
+        let default = match info.default {
+            Some(number) => Some(vec![number]),
+            None => (info.is_list || info.is_optional).then(Vec::new),
+        };
+        if let (true, Some(numbers)) = (left_out, default) {
+            named.push((info.name.into(), numbers));
+        }
+    }
+    named
+}
+
+fn owned(named: &[Named<'_>]) -> Vec<(String, Vec<f64>)> {
+    named.iter().map(|&(name, numbers)| (name.into(), numbers.to_vec())).collect()
+}
+
+fn network(parameters: &[Named<'_>]) -> Result<NeuralNetworkInverse> {
+    let numbers = |name: &str| {
+        let found = parameters.iter().find(|(known, _)| *known == name);
+        found.map(|&(_, numbers)| numbers).ok_or_else(|| {
+            Error::parameter("parameters", format!("without '{name}'"), "all numbers of a network")
+        })
+    };
+    let single = |name: &str| match numbers(name)? {
+        &[number] => Ok(number),
+        more => Err(Error::parameter(name, format!("{} numbers", more.len()), "one number")),
+    };
+    let scales = numbers("scales")?;
+    let scales = scales.try_into().map_err(|_| {
+        Error::parameter("scales", format!("{} numbers", scales.len()), "three numbers")
+    })?;
+    Ok(NeuralNetworkInverse::new(&NetworkNumbers {
+        centre: single("centre")?,
+        scales,
+        thresholds: numbers("thresholds")?,
+        hidden: numbers("hidden")?,
+        biases: numbers("biases")?,
+        outputs: numbers("outputs")?,
+        direct: numbers("direct")?,
+        offset: single("constant")?,
+    })?)
+}

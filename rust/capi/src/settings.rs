@@ -1,0 +1,154 @@
+//! Settings as C gives them.
+
+use core::ffi::{CStr, c_char};
+use core::slice;
+
+use piezotrack_core::{Error, Result};
+
+use crate::running::{FeedforwardParts, Named, Parts};
+
+/// A part, a parameter or a state, with its numbers.
+#[repr(C)]
+pub struct Numbers {
+    /// Its name; NULL for none.
+    pub name: *const c_char,
+    /// Its numbers.
+    pub values: *const f64,
+    /// How many there are.
+    pub count: usize,
+}
+
+/// What a controller is made of. Units are SI: m, V, s, Hz. What is 0 or NULL has its default, so
+/// name what you set: `piezotrack_settings settings = {.dt = 0.001, .high = 75.0};`
+///
+/// The feedback law is one of
+///
+/// | name | values |
+/// | --- | --- |
+/// | "pid" | kp (V/m), ti, td (s), tt (s; NAN for its default) |
+/// | "state space" | n, then A row by row, B, C, D (V/m), and n for back-calculation or none |
+/// | "lead-lag" | kp (V/m), lead, lag (s), 1 for matched poles or 0 |
+/// | "sliding mode" | switching gain (V), layer (m), ti, td, tf (s) |
+/// | "disturbance observer" | those of the PID; gain (m/V), time (s), cutoff (Hz) |
+/// | "perturbation" | those of the sliding mode; gain (m/V), time (s), cutoff (Hz) |
+/// | "Dahl observer" | those of the PID; gain (m/V), time (s), correction, stroke (m); a1, a2, curvature |
+/// | "Bouc-Wen observer" | the same to the stroke; rise, beta, gamma, exponent |
+/// | "scheduled pid" | counts of amplitudes and rates, both (m, Hz), the first of each; PIDs |
+#[repr(C)]
+pub struct Settings {
+    /// Sampling interval, s.
+    pub dt: f64,
+    /// Lowest voltage, V.
+    pub low: f64,
+    /// Highest voltage, V.
+    pub high: f64,
+    /// Lowest displacement that the sensor can show, m; both 0 for -10 to 10 mm.
+    pub span_low: f64,
+    /// Highest displacement that the sensor can show, m.
+    pub span_high: f64,
+    /// Largest displacement in a sampling interval, m; 0 for any.
+    pub max_jump: f64,
+    /// Feedback law.
+    pub law: Numbers,
+    /// Repetitive control: "lag", "compensated lag", "zero phase" or "none" for its smoothing, with
+    /// period (s), kq (V/m), time constant (s) or order, forgetting factor, lead (samples), 1 to
+    /// pause under saturation or 0.
+    pub repetitive: Numbers,
+    /// Filters of the measurement: "low pass" with its cutoff (Hz), "notch" with frequency (Hz),
+    /// width and depth.
+    pub filters: *const Numbers,
+    /// How many there are, 2 at most.
+    pub filter_count: usize,
+    /// Model of the stage whose inverse is the feedforward, by its name as in Python
+    /// ("prandtl-ishlinskii"), or "neural network"; NULL for no feedforward.
+    pub model: *const c_char,
+    /// Parameters of the model, by their names; lists and what is optional may be left out.
+    pub parameters: *const Numbers,
+    /// How many there are.
+    pub parameter_count: usize,
+    /// State of the stage at the start, by the names of the model's states; NULL for a stage that
+    /// never moved.
+    pub initial: *const Numbers,
+    /// How many there are.
+    pub initial_count: usize,
+    /// What the sensor shows where the stage rests without drive, m.
+    pub offset: f64,
+    /// Time by which the displacement lags behind the drive beyond the model, s.
+    pub delay: f64,
+}
+
+/// The parts of a controller, borrowed from settings.
+///
+/// # Safety
+/// Each pointer of `settings` is NULL, or points to as many elements as its count says, or to a
+/// text that ends with 0.
+pub unsafe fn parts(settings: &Settings) -> Result<Parts<'_>> {
+    let span = (settings.span_low, settings.span_high);
+    // SAFETY: pointers and counts are the caller's promise.
+    unsafe {
+        let feedforward = match text("model", settings.model)? {
+            None => None,
+            Some(model) => Some(FeedforwardParts {
+                model,
+                parameters: list("parameters", settings.parameters, settings.parameter_count)?,
+                initial: list("initial", settings.initial, settings.initial_count)?,
+                offset: settings.offset,
+                delay: settings.delay,
+            }),
+        };
+        Ok(Parts {
+            dt: settings.dt,
+            limits: (settings.low, settings.high),
+            span: (span != (0.0, 0.0)).then_some(span),
+            max_jump: (settings.max_jump != 0.0).then_some(settings.max_jump),
+            law: named("law", &settings.law)?,
+            repetitive: named("repetitive", &settings.repetitive)?,
+            filters: list("filters", settings.filters, settings.filter_count)?,
+            feedforward,
+        })
+    }
+}
+
+/// A list of which each entry has a name.
+unsafe fn list<'a>(what: &str, entries: *const Numbers, count: usize) -> Result<Vec<Named<'a>>> {
+    let entries = unsafe { elements(what, entries, count)? };
+    let one = |(i, entry)| {
+        let place = format!("{what}[{i}]");
+        unsafe { named(&place, entry)? }
+            .ok_or_else(|| Error::parameter(format!("{place}.name"), "NULL", "a name"))
+    };
+    entries.iter().enumerate().map(one).collect()
+}
+
+unsafe fn named<'a>(what: &str, entry: &Numbers) -> Result<Option<Named<'a>>> {
+    let Some(name) = (unsafe { text(&format!("{what}.name"), entry.name)? }) else {
+        return Ok(None);
+    };
+    let values = unsafe { elements(&format!("{what}.values"), entry.values, entry.count)? };
+    Ok(Some((name, values)))
+}
+
+unsafe fn elements<'a, T>(what: &str, first: *const T, count: usize) -> Result<&'a [T]> {
+    if count == 0 {
+        return Ok(&[]);
+    }
+    if first.is_null() {
+        let expected = format!("{count} elements, as the count beside it says");
+        return Err(Error::parameter(what, "NULL", expected));
+    }
+    if count > isize::MAX.cast_unsigned() / size_of::<T>() || !first.is_aligned() {
+        let expected = format!("an aligned pointer to {count} elements");
+        return Err(Error::parameter(what, "out of reach", expected));
+    }
+    // SAFETY: it is not NULL, is aligned, and has these elements by the caller's promise.
+    Ok(unsafe { slice::from_raw_parts(first, count) })
+}
+
+unsafe fn text<'a>(what: &str, first: *const c_char) -> Result<Option<&'a str>> {
+    if first.is_null() {
+        return Ok(None);
+    }
+    // SAFETY: it is not NULL and ends with 0 by the caller's promise.
+    let text = unsafe { CStr::from_ptr(first) }.to_str();
+    text.map(Some).map_err(|_| Error::parameter(what, "no text", "a name in UTF-8"))
+}
