@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,10 +14,9 @@ from ..data.dataset_arguments import MIN_SAMPLES
 from ..errors import DataError, DeviceError, ParameterError
 from .device import Device, Record
 from .drives import Drive, parse_drive
+from .safe_end import led_back
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from numpy.typing import ArrayLike, NDArray
 
     Array = NDArray[np.float64]
@@ -27,7 +25,6 @@ __all__ = [
     "check_device",
     "check_table",
     "filled",
-    "led_back",
     "measure",
     "obtained_rate",
     "play_table",
@@ -63,9 +60,13 @@ def check_table(device: Device, name: str, volts: Array) -> None:
             f"{name} is {volts[k]:g} V at sample {k}: expected {low:g} to {high:g} V, the limits "
             f"of {device.channels[0]}"
         )
-    if volts.size > device.memory:
+    _check_count(device, name, volts.size)
+
+
+def _check_count(device: Device, name: str, count: int) -> None:
+    if count > device.memory:
         raise ParameterError(
-            f"{name} has {volts.size} samples: expected at most {device.memory}, the memory of "
+            f"{name} has {count} samples: expected at most {device.memory}, the memory of "
             f"{device.channels[0]}; a lower rate or a shorter drive fits"
         )
 
@@ -126,22 +127,6 @@ def rest_of(device: Device, rest: float | None = None) -> float:
     return home
 
 
-@contextmanager
-def led_back(device: Device, home: float) -> Iterator[None]:
-    """Put the output to a voltage [V] where what is played fails or is interrupted."""
-    try:
-        yield
-    except BaseException as error:
-        try:
-            device.hold(home)
-        except Exception as other:
-            raise DeviceError(
-                f"{error}; the output could not be led to {home:g} V ({other}): it may be anywhere "
-                "in the table"
-            ) from error
-        raise
-
-
 def ramped(volts: Array, rest: float, rate: float, ramp: float) -> tuple[Array, int]:
     """Return a table that leads from rest to a drive and back [V], and where the drive begins."""
     count = max(2, round(ramp * rate))
@@ -165,7 +150,7 @@ def measure(
     """Record a log of a stage: a drive goes out of a device, the displacement comes back.
 
     The output is led smoothly from `rest` to the drive and back, all in one table on the device's
-    clock; it ends at `rest`, also where something fails.
+    clock; it ends at `rest`, also where something fails, or Ctrl-C or SIGTERM comes.
 
     Parameters
     ----------
@@ -216,6 +201,8 @@ def measure(
     if isinstance(drive, str):
         drive = parse_drive(drive)
     if isinstance(drive, Drive):
+        # Before gigabytes of samples are made.
+        _check_count(device, "drive", drive.count(1.0 / exact))
         volts = drive.sample(1.0 / exact)
     elif notes:
         raise ParameterError(

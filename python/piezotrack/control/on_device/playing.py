@@ -14,12 +14,12 @@ from ...hardware.measuring import (
     check_device,
     check_table,
     filled,
-    led_back,
     obtained_rate,
     play_table,
     ramped,
     rest_of,
 )
+from ...hardware.safe_end import led_back
 from ...references.reference import Reference
 from ...stages.inverse import Inverse
 from ..controller import Controller
