@@ -122,7 +122,7 @@ COMMANDS: dict[str, tuple[list[str], tuple[str, ...]]] = {
          "--trials", "3"],
         ("--reference", "--dt", "--limits", "--kp", "--ti", "--td", "--delay", "--seed",
          "--duration", "--period", "--stage", "--trials", "--method", "--gain", "--cutoff",
-         "--mode-scales", "--noise-nm", "--bandwidth"),
+         "--mode-scales", "--noise-nm", "--bandwidth", "--device", "--rest"),
     ),
     "contour": (["model.json"], (*LOOP, "--path", "--lag", "--cross-talk", "--path-dt")),
     "identify": (
