@@ -100,11 +100,10 @@ def test_a_table_is_played(tmp_path: Path) -> None:
 @pytest.mark.parametrize("linked", ["shared", "static"])
 def test_the_example_learns(linked: str, tmp_path: Path) -> None:
     source = str(ROOT / "rust" / "capi" / "examples" / "track.c")
-    flags, libraries = (*STRICT, *LINK), ("-lpiezotrack", "-lm")
+    libraries: tuple[str, ...] = ("-lpiezotrack", "-lm")
     if linked == "static":
-        flags = (*STRICT, f"-I{HEADER}")
         libraries = (str(RELEASE / "libpiezotrack.a"), "-lpthread", "-ldl", "-lm")
-    compiled(tmp_path, source, flags=flags, libraries=libraries)
+    compiled(tmp_path, source, flags=(*STRICT, *LINK), libraries=libraries)
     done = subprocess.run(
         ["./check"], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60
     )

@@ -367,7 +367,7 @@ NO_FORM: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
     ),
     "name": ({}, {"name": "1axis"}, "name is '1axis': expected a letter"),
     "name inside": ({}, {"name": "pid"}, "name is 'pid', as functions inside"),
-    "form": ({}, {"to": "cobol"}, "to is 'cobol': expected one of 'c99', 'json', 'fmu'"),
+    "form": ({}, {"to": "cobol"}, "to is 'cobol': expected one of 'c99', 'library', 'json', 'fmu'"),
     "float": (
         {"feedback": pt.control.StateSpace([[1e60]], [1.0], [1.0])},
         {"single": True},

@@ -81,9 +81,8 @@ def library_sources(
         file: named(name, text).replace("@GUARD", name.upper()).replace("@file", name)
         for file, text in texts.items()
     }
-    files["vectors.csv"] = vectors_text(
-        rows_of(controller, table, reference), controller.drive_unit
-    )
+    rows = rows_of(controller, table, reference)
+    files["vectors.csv"] = vectors_text(rows, controller.drive_unit)
     return files
 
 
@@ -142,10 +141,8 @@ def _law(controller: Controller) -> Numbers | None:
 
 def _network(inverse: NetworkInverse) -> list[Numbers]:
     """Names and numbers of a network."""
-    return [
-        (name, [float(one) for one in (value if isinstance(value, (list, tuple)) else [value])])
-        for name, value in zip(NETWORK, inverse.numbers, strict=True)
-    ]
+    lists = (one if isinstance(one, (list, tuple)) else [one] for one in inverse.numbers)
+    return [(name, [*map(float, one)]) for name, one in zip(NETWORK, lists, strict=True)]
 
 
 def _list(
@@ -190,9 +187,9 @@ HEADER = """\
 /*
 @facts
  *
- * Displacements in m, commands in @unit, times in s. Call NAME_init once, NAME_step in each sampling
- * interval, NAME_free at the end. The controller is one of libpiezotrack, which is linked with it; a
- * step does not allocate. The functions are those of piezotrack export --to c99.
+ * Displacements in m, commands in @unit, times in s. Call NAME_init once, NAME_step in each
+ * sampling interval, NAME_free at the end. The controller is one of libpiezotrack, which is linked
+ * with it; a step does not allocate. The functions are those of piezotrack export --to c99.
  */
 #ifndef @GUARD_H
 #define @GUARD_H
@@ -216,8 +213,8 @@ typedef struct {
    of another version refuses the settings. */
 int NAME_init(NAME_state *s);
 
-/* Begins without a bump at the command `present` that is there now, in place of NAME_init; returns 0
-   where that is outside of the limits. */
+/* Begins without a bump at the command `present` that is there now, in place of NAME_init; returns
+   0 where that is outside of the limits. */
 int NAME_start(NAME_state *s, NAME_real present);
 
 @declaration

@@ -88,8 +88,9 @@ def export_controller(
     ``"c99"`` writes NAME.h and NAME.c, which allocate nothing and call no library, with test
     vectors and a program that checks them: doubles give the same bits as `Controller`.
     ``"library"`` writes the same functions for a program that is linked with libpiezotrack: every
-    controller has this form, with the inverse of any stage sample by sample. ``"json"`` writes the linear parts as coefficients. ``"fmu"`` compiles the C into a unit for
-    co-simulation (FMI 2.0, Linux x86-64), with its sources.
+    controller has this form, with the inverse of any stage sample by sample. ``"json"`` writes the
+    linear parts as coefficients. ``"fmu"`` compiles the C into a unit for co-simulation (FMI 2.0,
+    Linux x86-64), with its sources.
 
     Parameters
     ----------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 from ..._support.plot_style import LEVEL, folded, literal, panels, whole
@@ -19,8 +20,13 @@ __all__ = ["plot_board"]
 COLUMNS, LABEL = 2, 34
 FITTED: dict[str, Any] = {"marker": "|", "color": "0.35", "markersize": 11, "markeredgewidth": 1.6}
 CARRIED: dict[str, Any] = {"marker": "o", "color": "#d98200", "markersize": 6}
-JUDGED: dict[str, Any] = {"marker": "D", "color": "#1b6ca8", "markersize": 6}
-FURTHER: dict[str, Any] = {"marker": "s", "color": "#7a3b8f", "markersize": 6}
+# Other records, in their order; from the fifth on again.
+OTHERS: tuple[dict[str, Any], ...] = (
+    {"marker": "D", "color": "#1b6ca8", "markersize": 6},
+    {"marker": "s", "color": "#7a3b8f", "markersize": 6},
+    {"marker": "^", "color": "#2e7d32", "markersize": 7},
+    {"marker": "v", "color": "#a3333d", "markersize": 7},
+)
 
 
 def plot_board(board: Benchmark, fig: Figure | SubFigure | None = None) -> Figure:
@@ -101,16 +107,14 @@ def _plain_ticks(ax: Axes) -> None:
 
 def _styles(rows: list[BenchmarkResult]) -> list[dict[str, Any]]:
     """Give each part its mark: what was fitted, the rest of the record, and other records."""
-    others = [JUDGED, FURTHER]
-    found = []
+    others, found = cycle(OTHERS), []
     for part in rows[0].parts:
         if part.part == "fitted":
             found.append(FITTED)
         elif part.part == "rest":
             found.append(CARRIED)
         else:
-            found.append(others[0])
-            others = others[1:] + others[:1]
+            found.append(next(others))
     return found
 
 
