@@ -104,6 +104,12 @@ def test_what_is_asked_wrongly_is_refused_before_it_goes_out(
     assert used.held == 0.0
 
 
+@pytest.mark.parametrize("ramp", [1e5, 1e300])
+def test_a_way_from_rest_that_the_memory_does_not_hold_is_refused_at_once(ramp: float) -> None:
+    with pytest.raises(pt.ParameterError, match=r"ramp is 1\S+ s: expected at most 10000 s"):
+        pt.measure(device(), "sine:1Hz,0..75V", rate=1000.0, ramp=ramp)
+
+
 def test_a_drive_beyond_the_limits_is_clipped_where_that_is_asked() -> None:
     log = pt.measure(device(), "sine:1Hz,-10..80V,1s", rate=100.0, clip=True)
     assert (log.u.min(), log.u.max()) == (0.0, 75.0)

@@ -127,14 +127,29 @@ def rest_of(device: Device, rest: float | None = None) -> float:
     return home
 
 
-def ramped(volts: Array, rest: float, rate: float, ramp: float) -> tuple[Array, int]:
-    """Return a table that leads from rest to a drive and back [V], and where the drive begins."""
+def ramped(
+    device: Device, name: str, volts: Array, rest: float, rate: float, ramp: float
+) -> tuple[Array, int]:
+    """Return a table that leads from rest to a drive and back [V], and where the drive begins.
+
+    Raises
+    ------
+    ParameterError
+        The table is beyond what the device takes.
+    """
+    if ramp * rate > device.memory:
+        raise ParameterError(
+            f"ramp is {ramp:g} s: expected at most {device.memory / rate:g} s, which the memory "
+            f"of {device.channels[0]} holds"
+        )
     count = max(2, round(ramp * rate))
     # The share of a smooth step: no jump of the acceleration excites a mode.
     s = np.arange(count) / count
     share = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
     up, down = rest + (volts[0] - rest) * share, volts[-1] + (rest - volts[-1]) * share
-    return np.concatenate([up, volts, down, [rest]]), count
+    table = np.concatenate([up, volts, down, [rest]])
+    check_table(device, f"{name} with its ramps", table)
+    return table, count
 
 
 def measure(
@@ -219,8 +234,7 @@ def measure(
         notes = (*notes, f"drive: {beyond} samples clipped to {plain(low)} and {plain(high)} V")
     check_table(device, "drive", volts)
     home = rest_of(device, rest)
-    table, first = ramped(volts, home, exact, not_negative("ramp", ramp, "s"))
-    check_table(device, "drive with its ramps", table)
+    table, first = ramped(device, "drive", volts, home, exact, not_negative("ramp", ramp, "s"))
     with led_back(device, home):
         record = play_table(device, table, exact, not_negative("lead_in", lead_in, "s"))
     y, more = filled(record)

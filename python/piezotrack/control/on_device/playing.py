@@ -85,8 +85,7 @@ def played_on(
     samples = reference.sample(controller.dt)
     check_table(device, "voltage", volts)
     home = rest_of(device, rest)
-    table, first = ramped(volts, home, rate, ramp)
-    check_table(device, "voltage with its ramps", table)
+    table, first = ramped(device, "voltage", volts, home, rate, ramp)
     with led_back(device, home):
         record = play_table(device, table, rate)
     y, notes = filled(record)
