@@ -65,6 +65,7 @@ def errors_of(lines: list[str]) -> list[float]:
 def test_a_line_of_a_raster_is_learnt_on_a_device_and_the_table_follows_it() -> None:
     printed = ran(*LEARN, *VIRTUAL, "--trials", "6", "-o", "out/line.csv", "--picture")
     assert names("out") == ["line.csv", "line.png", "line.svg"]
+    assert "\nfeedforward learnt, played on virtual amplifier\n" in printed
     errors = errors_of([line for line in printed.splitlines() if line.strip()])
     assert all(after < 0.6 * before for before, after in pairwise(errors[:4]))
     # A tenth of the gain, and what the mode makes of the turns above the cutoff.
@@ -196,6 +197,23 @@ def test_what_was_learnt_before_the_device_failed_is_kept(monkeypatch: pytest.Mo
         np.allclose(played[k : k + written.size], written, atol=1e-7)
         for k in range(played.size - written.size)
     )
+
+
+def test_a_device_that_may_be_anywhere_is_said_although_nothing_can_be_written(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail() -> None:
+        monkeypatch.setattr(device, "_open", False)
+        monkeypatch.setattr(device, "exchange", fail)
+        # A file where the folder of the table was.
+        Path("out").write_text("", encoding="utf-8")
+        raise pt.DeviceError("the connection was lost")
+
+    device = Watched(fail)
+    use(monkeypatch, device)
+    said = refusal(*LEARN, "--device", "virtual:", "-o", "out/line.csv", "--quiet")
+    assert said.startswith("the connection was lost; the output could not be led to 0 V (")
+    assert "it may be anywhere in the table; what was learnt is lost: " in said
 
 
 def test_before_the_first_trial_is_there_nothing_is_written(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from ..errors import DataError, DeviceError, Interrupted, ParameterError
+from ..errors import DataError, DeviceError, Interrupted, ParameterError, PiezotrackError
 from .devices import Rest, connected
 from .error_messages import in_words
 from .interruption import heard
@@ -133,16 +133,9 @@ def learn_command(
     from ..control.learning import learn
     from ..identification.identified import load
 
-    if device is None:
-        refuse_without_effect(context, ["rest"], "without --device")
-    else:
-        refuse_without_effect(context, SIMULATED, "with --device")
     own = stage != PAPER
     settings = Loop(own, dt, limits, feedback, kp, ti, td)
-    settings.check(context)
-    refuse_of_other_stage(context, own)
-    if own and not noise_nm:
-        refuse_without_effect(context, ["seed"], "without --noise-nm")
+    _check_options(context, settings, device, noise_nm)
     _check_file(out)
     known = load(model) if own else driven_by_voltage(load(model), model)
     desired = parsed_reference(reference, duration, period)
@@ -179,7 +172,22 @@ def learn_command(
             )
     except (DeviceError, DataError, Interrupted) as error:
         raise _with_what_was_learnt(error, out, picture) from None
-    result.show(_outcome(found), _document(found), _write(found, out, picture))
+    words = _outcome(found) if device is None else f"{_outcome(found)}\n{found.final.note}"
+    result.show(words, _document(found), _write(found, out, picture))
+
+
+def _check_options(
+    context: typer.Context, settings: Loop, device: str | None, noise_nm: float
+) -> None:
+    """Refuse options without effect."""
+    if device is None:
+        refuse_without_effect(context, ["rest"], "without --device")
+    else:
+        refuse_without_effect(context, SIMULATED, "with --device")
+    settings.check(context)
+    refuse_of_other_stage(context, settings.own)
+    if settings.own and not noise_nm:
+        refuse_without_effect(context, ["seed"], "without --noise-nm")
 
 
 def _check_file(out: Path) -> None:
@@ -223,8 +231,13 @@ def _with_what_was_learnt(
         heard()
     if error.partial is None:
         return error
-    table, *_ = _write(error.partial, out, picture)
-    words = f"{error}; the best table so far, of trial {error.partial.best}, is in {table}"
+    try:
+        table, *_ = _write(error.partial, out, picture)
+        kept = f"the best table so far, of trial {error.partial.best}, is in {table}"
+    except (PiezotrackError, OSError) as failed:
+        # Where the output may be is said first.
+        kept = f"what was learnt is lost: {failed}"
+    words = f"{error}; {kept}"
     return KeyboardInterrupt(words) if isinstance(error, Interrupted) else type(error)(words)
 
 
@@ -277,6 +290,7 @@ def _document(found: Learning) -> dict[str, Any]:
             for one in found.trials
         ],
         "best": found.best,
+        "feedforward": found.final.note,
         "stopped": found.stopped,
         "provenance": {"package": "piezotrack", "version": __version__},
     }
