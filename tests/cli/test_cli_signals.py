@@ -122,6 +122,10 @@ LOST = {
         begun.acquire(), begun.acquire(), os.kill(os.getpid(), signal.SIGINT)
     threading.Thread(target=later).start()
     reproduction._scored(None, range(4), reproduction.ProgressBar(False, "test"))""",
+    "put into words by a codec": """import codecs
+    def decode(raw, errors="strict"): press()
+    codecs.register(lambda name: name == "odd" and codecs.CodecInfo(None, decode) or None)
+    b"x".decode("odd")""",
     "while threads compute": """threading.Thread(target=time.sleep, args=(50,)).start()
     press()""",
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import sys
 from contextlib import suppress
 from functools import wraps
@@ -30,6 +31,8 @@ READER_LEFT = 141
 
 # Reasons for which the output cannot be printed.
 OUTPUT = (errno.ENOSPC, errno.EIO, errno.EBADF, errno.EDQUOT, errno.EFBIG)
+
+CODEC = re.compile(r"^(?:de|en)coding with '[^']*' codec failed \(KeyboardInterrupt: ([^)]*)\)")
 
 P = ParamSpec("P")
 
@@ -79,7 +82,8 @@ def _say(sentence: str) -> None:
 
 def _stopped(error: KeyboardInterrupt) -> int:
     at_rest()
-    _say(str(error) or "interrupted")
+    # A codec at work puts what interrupts it into a sentence of its own.
+    _say(CODEC.sub(r"\1", str(error)) or "interrupted")
     return exit_code()
 
 
