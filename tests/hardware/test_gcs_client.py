@@ -152,7 +152,7 @@ def test_what_is_closed_is_refused_and_closed_again_without_a_word(server: GcsSe
 
 
 def test_options_of_an_address(server: GcsServer) -> None:
-    device = pt.hardware.connect(f"{server.address}/1?limits=5:60&timeout=9&factor=2")
+    device = pt.hardware.connect(f"{server.address}/1?limits=5..60V&timeout=9s&factor=2V")
     assert device.limits == (5.0, 60.0)
     device.hold(40.0)
     assert isinstance(device, GcsDevice)
@@ -166,13 +166,15 @@ def test_options_of_an_address(server: GcsServer) -> None:
 @pytest.mark.parametrize(
     ("rest", "pieces"),
     [
-        ("?limits=5", ("limits=LOW:HIGH",)),
-        ("?limits=a:b", ("limits=LOW:HIGH",)),
-        ("?limits=9:1", ("lower one first",)),
-        ("?factor=0", ("factor is 0",)),
-        ("?factor=x", ("factor=VOLTS",)),
-        ("?timeout=-1", ("timeout is -1",)),
-        ("?speed=2", ("'speed'", "limits, factor or timeout")),
+        ("?limits=5V", ("limits='5V'", "LOW..HIGH with its unit")),
+        ("?limits=a..bV", ("limits='a..bV'", "LOW..HIGH with its unit")),
+        ("?limits=5..60um", ("limits='5..60um'", "expected voltage")),
+        ("?limits=9..1V", ("lower one first",)),
+        ("?factor=0V", ("factor is 0",)),
+        ("?factor=x", ("factor='x'", "voltage with its unit")),
+        ("?factor=2", ("factor='2'", "voltage with its unit")),
+        ("?timeout=-1s", ("timeout is -1",)),
+        ("?speed=2", ("'speed'", "[&factor=1V][&timeout=5s]")),
         ("/x", ("axis is 'x'",)),
     ],
 )

@@ -113,7 +113,7 @@ def test_a_controller_without_a_wave_generator() -> None:
 
 def test_a_controller_that_does_not_say_its_limits_needs_them() -> None:
     known = GREETING["HLP?"].replace("VMI? ... \n", "")
-    needed = pytest.raises(pt.ParameterError, match=r"limits are not given.*\?limits=LOW:HIGH")
+    needed = pytest.raises(pt.ParameterError, match=r"limits are not given.*\?limits=0..100V")
     with peer(greeted({"HLP?": known})) as port, needed:
         GcsDevice("127.0.0.1", port, timeout=SOON)
     with peer(greeted({"HLP?": known})) as port:

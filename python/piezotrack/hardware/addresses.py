@@ -33,7 +33,7 @@ def connect(address: str) -> Device:
     address : str
         ``SCHEME:REST``: ``virtual:`` is the stage of Xu and Li 2010, ``virtual:MODEL.json`` an
         identified one; ``gcs://HOST[:PORT][/AXIS]``: a controller that speaks GCS, port 50000 and
-        axis 1 where they are not given; ``?limits=LOW:HIGH`` [V], ``factor=`` and ``timeout=`` as
+        axis 1 where they are not given; ``?limits=0..100V``, ``factor=1V`` and ``timeout=5s`` as
         of `GcsDevice`; ``ni:Dev1/ao0,Dev1/ai0?scale=10um/V&limits=0..7.5V`` as
         `NiDevice`; ``scpi://HOST:PORT?unit=um&limits=0..75V`` as `ScpiDevice`.
 

@@ -15,6 +15,7 @@ from ..._support.messages import quoted
 from ...errors import DeviceError, ParameterError
 from ..device import Rates, Record
 from ..limits import check_within, ordered
+from ..options import Options
 from .connection import Connection
 from .protocol import GENERATOR, POSITION, RECORD_POINTS, SERVO_CYCLE, VOLTAGE, WAVE_POINTS
 
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
 
 __all__ = ["GcsDevice", "from_address"]
 
-PORT = 50000
+PORT, TIMEOUT = 50000, 5.0
+FORM = "gcs://HOST[:PORT][/AXIS][?limits=0..100V][&factor=1V][&timeout=5s]"
 NEEDED = ("POS?", "SVO", "SVA", "WAV", "WSL", "WGC", "WTR", "WGO", "DRC", "RTR", "DRL?", "DRR?")
 # Metres in the units of positions that PUN? answers with.
 UNITS = {"um": 1e-6, "micron": 1e-6, "\u03bcm": 1e-6, "nm": 1e-9, "mm": 1e-3}
@@ -88,7 +90,7 @@ class GcsDevice:
         axis: str = "1",
         limits: tuple[float, float] | None = None,
         factor: float = 1.0,
-        timeout: float = 5.0,
+        timeout: float = TIMEOUT,
     ) -> None:
         if not (isinstance(axis, str) and axis.isdecimal() and axis.isascii()):
             raise ParameterError(f"axis is {quoted(axis)}: expected a number, as '1'")
@@ -395,7 +397,7 @@ class GcsDevice:
         if not {"VMI?", "VMA?"} <= self._known:
             raise ParameterError(
                 f"limits are not given, and {self._line.name} does not say them: expected (low, "
-                "high) in V, in an address ?limits=LOW:HIGH"
+                "high) in V, in an address ?limits=0..100V"
             )
         return self._value("VMI?"), self._value("VMA?")
 
@@ -430,29 +432,19 @@ def _array(lines: Sequence[str]) -> tuple[Array | None, float]:
 def from_address(
     host: str | None, port: int | None, path: str, options: Mapping[str, str]
 ) -> GcsDevice:
-    """Connect to the controller of an address: ``gcs://HOST[:PORT][/AXIS][?limits=0:100]``."""
+    """Connect to the controller of an address: ``gcs://HOST[:PORT][/AXIS][?limits=0..100V]``."""
     if not host:
         raise ParameterError("device has no host: expected gcs://HOST[:PORT][/AXIS]")
-    given = dict(options)
-    limits, factor, timeout = (given.pop(name, None) for name in ("limits", "factor", "timeout"))
-    if given:
-        raise ParameterError(
-            f"device has the option {quoted(next(iter(given)))}: expected limits, factor or timeout"
-        )
-    arguments: dict[str, float] = {}
-    try:
-        if factor is not None:
-            arguments["factor"] = float(factor)
-        if timeout is not None:
-            arguments["timeout"] = float(timeout)
-        within = None
-        if limits is not None:
-            low, high = limits.split(":")
-            within = float(low), float(high)
-    except ValueError:
-        raise ParameterError(
-            f"device has the options {quoted(dict(options))}: expected limits=LOW:HIGH in V, "
-            "factor=VOLTS or timeout=SECONDS"
-        ) from None
-    axis = path.strip("/") or "1"
-    return GcsDevice(host, port or PORT, axis=axis, limits=within, **arguments)
+    given = Options(FORM, options)
+    limits = given.span("limits", "voltage") if "limits" in options else None
+    factor = given.value("factor", "voltage", 1.0)
+    timeout = given.value("timeout", "time", TIMEOUT)
+    given.done()
+    return GcsDevice(
+        host,
+        port or PORT,
+        axis=path.strip("/") or "1",
+        limits=limits,
+        factor=factor,
+        timeout=timeout,
+    )
