@@ -63,9 +63,14 @@ def check_table(device: Device, name: str, volts: Array) -> None:
             f"{name} is {volts[k]:g} V at sample {k}: expected {low:g} to {high:g} V, the limits "
             f"of {device.channels[0]}"
         )
-    if volts.size > device.memory:
+    check_count(device, name, volts.size)
+
+
+def check_count(device: Device, name: str, count: float) -> None:
+    """Raise ParameterError where a table has more samples than a device holds."""
+    if count > device.memory:
         raise ParameterError(
-            f"{name} has {volts.size} samples: expected at most {device.memory}, the memory of "
+            f"{name} has {count:.0f} samples: expected at most {device.memory}, the memory of "
             f"{device.channels[0]}; a lower rate or a shorter drive fits"
         )
 
@@ -216,6 +221,7 @@ def measure(
     if isinstance(drive, str):
         drive = parse_drive(drive)
     if isinstance(drive, Drive):
+        check_count(device, "drive", drive.duration * exact)
         volts = drive.sample(1.0 / exact)
     elif notes:
         raise ParameterError(
