@@ -20,6 +20,7 @@ from folders import ROOT
 from piezotrack.control.demo import demo_logs
 from piezotrack.data.log_file import write_log
 from piezotrack.identification.fit import identify
+from served import serving
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -79,18 +80,22 @@ def test_what_a_page_shows_runs(
         write_log(log, Path("demo", f"{name}.csv"))
     names: dict[str, Any] = {"__name__": "__main__"}
     printed = ""
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), contextlib.ExitStack() as served:
         warnings.simplefilter("error")
         for block in blocks(page):
             where = f"{page.name}:{block.line}"
             if block.language == "python":
                 printed = python(block, names, where)
             elif block.language == "console":
-                printed = "".join(console(block, where))
+                printed = "".join(console(block, where, served))
             elif block.language == "text":
                 for line in block.code.splitlines():
                     assert line.strip() in printed, f"{where}: {line}\nis not printed:\n{printed}"
             plt.close("all")
+
+
+# Where the servers of a page really are, by the addresses in it.
+ADDRESSES: dict[str, str] = {}
 
 
 def python(block: Block, names: dict[str, Any], where: str) -> str:
@@ -107,14 +112,23 @@ def python(block: Block, names: dict[str, Any], where: str) -> str:
     return out.getvalue()
 
 
-def console(block: Block, where: str) -> Iterator[str]:
-    """Type the commands of a block, the lines behind a dollar sign; what they print."""
+def console(block: Block, where: str, served: contextlib.ExitStack) -> Iterator[str]:
+    """Type the commands of a block, the lines behind a dollar sign; what they print.
+
+    A server in the background is a process until the end of the page, at any free port.
+    """
     for line in block.code.replace("\\\n", "").splitlines():
         if not line.startswith("$ "):
             continue
         name, *arguments = shlex.split(line.removeprefix("$ "), comments=True)
         # Other commands, as pip and make, are not those of the package.
-        if name == "piezotrack":
+        if name == "piezotrack" and arguments[-1] == "&":
+            _, protocol, *options = arguments[:-1]
+            _, ADDRESSES[f"{protocol}://127.0.0.1"], _ = served.enter_context(
+                serving(*options, protocol=protocol)
+            )
+        elif name == "piezotrack":
+            arguments = [ADDRESSES.get(one, one) for one in arguments]
             done = run(*arguments)
             assert done.exit_code == 0, f"{where}: {line}\n{done.output}"
             yield done.stdout

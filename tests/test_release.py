@@ -8,6 +8,7 @@ from typing import Any
 
 import piezotrack as pt
 from folders import ROOT
+from piezotrack.hardware.addresses import SCHEMES
 
 
 def toml(name: str) -> dict[str, Any]:
@@ -37,3 +38,12 @@ def test_the_citation_and_the_changelog_have_the_version_and_one_date() -> None:
     assert newest is not None
     assert newest[1] == VERSION
     assert f"\nversion: {VERSION}\ndate-released: {newest[2]}\n" in citation
+
+
+def test_each_kind_of_device_has_an_extra_and_what_imports_nothing_installs_nothing() -> None:
+    """`pip install 'piezotrack[gcs]'` is what somebody types who has such a controller."""
+    extras = toml("pyproject.toml")["project"]["optional-dependencies"]
+    # A virtual stage is no device that one buys.
+    devices = {*SCHEMES, "epics"} - {"virtual"}
+    assert devices <= extras.keys()
+    assert {name for name in devices if not extras[name]} == {"gcs", "scpi"}

@@ -54,7 +54,15 @@ class ShapeError(PiezotrackError, ValueError):
 
 
 class DataError(PiezotrackError, ValueError):
-    """A file or a record cannot be used: names the file and line, or the sample."""
+    """A file or a record cannot be used: names the file and line, or the sample.
+
+    Attributes
+    ----------
+    partial : piezotrack.control.Learning or None
+        Of a learning on a device, what was learnt up to then.
+    """
+
+    partial: Any = None
 
 
 class NumericalError(PiezotrackError, ArithmeticError):
@@ -66,8 +74,8 @@ class DeviceError(PiezotrackError, RuntimeError):
 
     Attributes
     ----------
-    partial : piezotrack.control.tracking.Tracking or None
-        Of a loop that was closed on it, the run up to then.
+    partial : piezotrack.control.tracking.Tracking or piezotrack.control.Learning or None
+        Of a loop that was closed on it, the run up to then; of a learning, what was learnt.
     """
 
     partial: Any = None
@@ -78,12 +86,12 @@ class ExecutorError(PiezotrackError, RuntimeError):
 
 
 class Interrupted(KeyboardInterrupt):
-    """A search was stopped by Ctrl-C or by its callback.
+    """A search, a loop on a device or a learning was stopped by Ctrl-C or by its callback.
 
     Attributes
     ----------
-    partial : piezotrack.Identification or None
-        The best result up to then; None where not one cost had been computed.
+    partial : piezotrack.Identification, Tracking or Learning, or None
+        The best result up to then, the run or what was learnt; None where there is nothing yet.
     """
 
     def __init__(self, message: str = "interrupted", partial: Any = None) -> None:

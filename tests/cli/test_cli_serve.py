@@ -3,48 +3,24 @@
 from __future__ import annotations
 
 import os
-import re
 import signal
-import subprocess
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import pytest
 
 import piezotrack as pt
-from commands import COMMAND, refusal, write_model
+from commands import refusal, write_model
 from gcs_peers import quiet_stage
 from piezotrack.hardware import GcsServer
+from served import serving
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
 
 @pytest.fixture(autouse=True)
 def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-
-
-@contextmanager
-def serving(
-    *options: str, protocol: str = "gcs"
-) -> Iterator[tuple[subprocess.Popen[str], str, str]]:
-    """The command, the address that it prints, and the rest of the line."""
-    with subprocess.Popen(
-        [*COMMAND, "serve", protocol, "--port", "0", *options],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
-        try:
-            assert process.stdout is not None
-            line = process.stdout.readline()
-            found = re.fullmatch(rf"listening at ({protocol}://\S+:\d+\S*), (.*)\n", line)
-            assert found, line
-            yield process, found[1], found[2]
-        finally:
-            process.kill()
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C in another way")

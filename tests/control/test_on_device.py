@@ -66,6 +66,51 @@ def test_what_is_learnt_on_a_device_takes_that_away() -> None:
     assert device.held == 0.0
 
 
+class Ending(VirtualDevice):
+    """Ends its third play in the middle of the table, as a function does."""
+
+    def __init__(self, end: Callable[[], None]) -> None:
+        super().__init__(stage())
+        self.end, self.plays = end, 0
+
+    def play(self, volts: Any, rate: float, *, lead_in: float = 0.0) -> Any:
+        made = super().play(volts, rate, lead_in=lead_in)
+        self.plays += 1
+        if self.plays == 3:
+            self.hold(40.0)
+            self.end()
+        return made
+
+
+def _lost_samples() -> None:
+    raise pt.DataError("the record has 90 of 200 samples without a reading")
+
+
+@pytest.mark.parametrize(
+    ("end", "kind"),
+    [
+        (lambda: _broken(0.0), pt.DeviceError),
+        (_lost_samples, pt.DataError),
+        (lambda: os.kill(os.getpid(), signal.SIGINT), pt.Interrupted),
+        (lambda: os.kill(os.getpid(), signal.SIGTERM), pt.Interrupted),
+    ],
+)
+def test_a_learning_that_ends_early_ends_at_rest_and_has_what_was_learnt(
+    end: Callable[[], None], kind: type[Any]
+) -> None:
+    reference = pt.triangle(frequency=5.0, low=20e-6, high=80e-6, duration=1.0)
+    device, before = Ending(end), signal.getsignal(signal.SIGTERM)
+    with pytest.raises(kind) as caught:
+        pt.learn(device, reference, feedforward(), model=stage(mode=(310.0, 0.1)), rest=3.0)
+    assert device.held == 3.0
+    assert signal.getsignal(signal.SIGTERM) is before
+    found = caught.value.partial
+    assert (len(found.trials), found.best, found.stopped) == (2, 1, "interrupted")
+    assert found.tables.shape == (2, 200)
+    assert found.errors[1] < 0.6 * found.errors[0]
+    assert found.final.metrics.rms_error < found.first.metrics.rms_error
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [
@@ -88,6 +133,9 @@ def test_what_is_learnt_on_a_device_takes_that_away() -> None:
             lambda d: pt.learn(d, SINE, pt.Controller(dt=1e-3, limits=LIMITS)),
             ("model is not given",),
         ),
+        (lambda d: pt.learn(d, SINE, feedforward(), rest=80.0), ("rest is 80 V", "0 to 75 V")),
+        (lambda d: pt.learn(d, SINE, feedforward(), visited=9.0), ("visited is 9.0", "device")),
+        (lambda _: pt.learn(stage(), SINE, feedforward(), rest=0.0), ("rest is 0.0", "simulated")),
         (lambda d: pt.track(d, LOOP, SINE, jitter=0.1), ("jitter", "on a device")),
         (lambda d: pt.track(d, LOOP, SINE, safe=-5.0), ("rest is -5 V", "0 to 75 V")),
         (lambda _: pt.track(stage(), LOOP, SINE, safe=0.0), ("safe is 0.0", "simulated")),

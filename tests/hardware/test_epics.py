@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import socket
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +16,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
+from commands import COMMAND, refusal, write_model
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -96,14 +99,13 @@ def free_port() -> int:
         return int(tcp.getsockname()[1])
 
 
-@pytest.fixture(scope="module")
-def surroundings() -> Iterator[dict[str, str]]:
-    """Serve the virtual stage in a process of its own: the environment in which it is found."""
+def environment() -> dict[str, str]:
+    """Return an environment in which server and clients find each other, on ports of their own."""
     port = str(free_port())
     paths = os.pathsep.join(
         filter(None, [str(Path(pt.__file__).parents[1]), os.environ.get("PYTHONPATH")])
     )
-    here = {
+    return {
         **os.environ,
         "EPICS_CA_SERVER_PORT": port,
         "EPICS_CA_REPEATER_PORT": str(free_port()),
@@ -111,12 +113,31 @@ def surroundings() -> Iterator[dict[str, str]]:
         "EPICS_CA_AUTO_ADDR_LIST": "NO",
         "PYTHONPATH": paths,
     }
-    command = [sys.executable, "-m", "piezotrack.hardware.epics", "virtual:", PREFIX]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=here) as child:
+
+
+@pytest.fixture(scope="module")
+def surroundings() -> Iterator[dict[str, str]]:
+    """Serve the virtual stage in a process of its own: the environment in which it is found."""
+    here = environment()
+    with serving(here, PREFIX) as (_, line):
+        assert line.endswith(":Message of virtual amplifier, 0 to 75 V")
+        yield here
+
+
+@contextmanager
+def serving(
+    here: dict[str, str], prefix: str, *options: str
+) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """`piezotrack serve epics` in a process of its own, and the line in which it says what."""
+    command = [*COMMAND, "serve", "epics", "--prefix", prefix, *options]
+    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(command, **pipes, text=True, env=here) as child:
         try:
             assert child.stdout is not None
-            assert any(line.strip() == PREFIX for line in child.stdout), "it ended at once"
-            yield here
+            # The banner of EPICS comes before.
+            line = next((one for one in child.stdout if one.startswith("serving ")), "")
+            assert line.startswith(f"serving {prefix}:Voltage, {prefix}:Position, "), line
+            yield child, line.rstrip("\n")
         finally:
             child.kill()
 
@@ -173,3 +194,90 @@ def test_without_the_packages_the_extra_is_named(monkeypatch: pytest.MonkeyPatch
 def test_prefixes_that_are_refused(prefix: Any) -> None:
     with pytest.raises(pt.ParameterError, match="expected the start of names"):
         pt.hardware.serve_epics(pt.hardware.connect("virtual:"), prefix)
+
+
+ASKED = """
+import asyncio, json
+import piezotrack as pt
+stage = pt.hardware.ophyd_player("A:B", name="stage")
+async def main():
+    await stage.connect()
+    await stage.voltage.set(61.0)
+    return await stage.voltage.get_value()
+print(json.dumps(asyncio.run(main())))
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C in another way")
+@pytest.mark.parametrize(
+    ("number", "code", "word"),
+    [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
+)
+def test_a_model_is_served_within_its_limits_until_a_signal(
+    number: signal.Signals,
+    code: int,
+    word: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_model()
+    here = environment()
+    options = ("--model", "dahl.json", "--limits", "0:62", "--speed", "10")
+    with serving(here, "A:B", *options) as (child, line):
+        assert line.endswith(", 0 to 62 V")
+        assert ask(ASKED, here) == 61.0
+        child.send_signal(number)
+        assert child.wait(60.0) == code
+        assert child.stderr is not None
+        assert child.stderr.read().splitlines()[-1] == f"piezotrack: {word}"
+
+
+def test_a_device_is_published_in_the_place_of_the_virtual_stage() -> None:
+    here = environment()
+    with (
+        pt.hardware.GcsServer(pt.VirtualStage.xu_li_2010(seed=1), limits=(0.0, 62.0)) as server,
+        serving(here, "A:B", "--device", server.address) as (_, line),
+    ):
+        assert line.endswith(f" of {server.address} output 1, 0 to 62 V")
+        assert ask(ASKED, here) == 61.0
+        there = pt.hardware.GcsDevice("127.0.0.1", server.port)
+        assert there.voltage == 61.0
+        there.close()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ("epics", "--prefix is missing: expected the start of names, as LAB:STAGE"),
+        ("epics --prefix", "--prefix is '': expected the start of names, as LAB:STAGE"),
+        ("epics --prefix A --port 5064", "--port has no effect with epics, which listens where"),
+        ("epics --prefix A --host 127.0.0.1", "--host has no effect with epics"),
+        ("epics --prefix A --device virtual: --speed 2", "--speed has no effect with --device"),
+        ("epics --prefix A --device virtual: --limits 0:9", "--limits has no effect with --dev"),
+        ("epics --prefix A --device virtual: --model m", "--model has no effect with --device"),
+        ("epics --prefix A --device usb:1", "device is 'usb:1': expected an address"),
+        ("epics --prefix A --model gone.json", "gone.json: no such file"),
+        ("epics --prefix A --limits 75:0", "--limits is 75 to 0 V: expected the lower one first"),
+        ("epics --prefix A --speed 0", "--speed is 0: expected"),
+        ("gcs --prefix A", "--prefix has no effect with gcs: expected it left out"),
+        ("scpi --prefix A", "--prefix has no effect with scpi: expected it left out"),
+        ("scpi --device virtual:", "--device has no effect with scpi: expected it left out"),
+    ],
+)
+def test_what_cannot_be_served_is_refused_by_name(options: str, words: str) -> None:
+    given = options.split()
+    if given[-1] == "--prefix":
+        given.append("")
+    assert refusal("serve", *given).startswith(words)
+
+
+def test_the_command_names_the_extra_where_softioc_is_not_installed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "softioc.builder", None)
+    said = refusal("serve", "epics", "--prefix", "A")
+    assert said == (
+        "serving EPICS needs softioc, which is not installed: expected pip install "
+        "'piezotrack[epics]'"
+    )

@@ -197,7 +197,7 @@ def test_an_axis_that_is_not_there_is_refused_in_the_controllers_words(server: G
     [
         ({"speed": 0.0}, "speed is 0"),
         ({"port": 70000}, "port is 70000: expected 0 to 65535"),
-        ({"limits": (5.0, 5.0)}, "expected \\(low, high\\)"),
+        ({"limits": (5.0, 5.0)}, "5 to 5 V: expected the lower one first"),
         ({"host": "256.0.0.1"}, "host is '256.0.0.1'"),
     ],
 )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -102,6 +104,12 @@ def test_what_is_asked_wrongly_is_refused_before_it_goes_out(
     assert used.held == 0.0
 
 
+@pytest.mark.parametrize("ramp", [1e5, 1e300])
+def test_a_way_from_rest_that_the_memory_does_not_hold_is_refused_at_once(ramp: float) -> None:
+    with pytest.raises(pt.ParameterError, match=r"ramp is 1\S+ s: expected at most 10000 s"):
+        pt.measure(device(), "sine:1Hz,0..75V", rate=1000.0, ramp=ramp)
+
+
 def test_a_drive_beyond_the_limits_is_clipped_where_that_is_asked() -> None:
     log = pt.measure(device(), "sine:1Hz,-10..80V,1s", rate=100.0, clip=True)
     assert (log.u.min(), log.u.max()) == (0.0, 75.0)
@@ -168,3 +176,30 @@ def test_a_device_that_cannot_be_led_back_is_said_to_be_anywhere() -> None:
         pt.DeviceError, match=r"lost; .* 0 V \(nobody answers\): it may be anywhere"
     ):
         pt.measure(used, "sine:1Hz,0..75V", rate=100.0)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C in another way")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_leads_the_output_to_rest_even_where_it_comes_twice(
+    number: signal.Signals,
+) -> None:
+    class Interrupted(VirtualDevice):
+        holds = 0
+
+        def play(self, volts: Array, rate: float, *, lead_in: float = 0.0) -> Record:
+            super().play(volts[: volts.size // 2], rate, lead_in=lead_in)
+            os.kill(os.getpid(), number)
+            raise AssertionError("it is not interrupted")
+
+        def hold(self, volts: float) -> None:
+            self.holds += 1
+            if self.holds == 1:
+                os.kill(os.getpid(), number)
+            super().hold(volts)
+
+    before = signal.getsignal(signal.SIGTERM)
+    used = Interrupted(pt.VirtualStage.of(PLAYS, limits=(0.0, 75.0)))
+    with pytest.raises(KeyboardInterrupt):
+        pt.measure(used, "sine:1Hz,0..75V,3s", rate=100.0, rest=5.0)
+    assert (used.held, used.holds) == (5.0, 2)
+    assert signal.getsignal(signal.SIGTERM) is before

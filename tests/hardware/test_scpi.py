@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
 import re
+import signal
 import socket
+import threading
 import time
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -227,6 +230,18 @@ def test_a_late_answer_is_never_taken_for_the_next() -> None:
             device.exchange(20.0)
         with pytest.raises(pt.DeviceError, match="did not answer"):
             device.exchange(40.0)
+        device.close()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C in another way")
+def test_the_answer_to_an_interrupted_message_is_never_taken_for_the_next() -> None:
+    with misbehaving("late", after=0, count=1, late=1.0) as place:
+        device = misbehaved(place, timeout=30.0)
+        threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+        with pytest.raises(KeyboardInterrupt):
+            device.exchange(20.0)
+        device.hold(3.0)
+        assert math.isfinite(device.exchange(3.0))
         device.close()
 
 

@@ -96,6 +96,7 @@ OPTIONS: dict[str, list[str]] = {
     "--name": ["axis", "1x", "", "x" * 99, "pid", "\x1b[31m"],
     "--speed": ["100", *NUMBERS],
     "--host": ["127.0.0.1", "256.0.0.1", "", "\x1b[31m"],
+    "--prefix": ["LAB:STAGE", "", "A B", "\x1b[31m"],
 }
 COLUMNS = ("--dt", "--unit", "--time", "--drive")
 LOOP = ("--dt", "--limits", "--kp", "--ti", "--td", "--delay", "--jitter", "--seed", "--duration")
@@ -121,7 +122,7 @@ COMMANDS: dict[str, tuple[list[str], tuple[str, ...]]] = {
          "--trials", "3"],
         ("--reference", "--dt", "--limits", "--kp", "--ti", "--td", "--delay", "--seed",
          "--duration", "--period", "--stage", "--trials", "--method", "--gain", "--cutoff",
-         "--mode-scales", "--noise-nm", "--bandwidth"),
+         "--mode-scales", "--noise-nm", "--bandwidth", "--device", "--rest"),
     ),
     "contour": (["model.json"], (*LOOP, "--path", "--lag", "--cross-talk", "--path-dt")),
     "identify": (
@@ -147,7 +148,10 @@ COMMANDS: dict[str, tuple[list[str], tuple[str, ...]]] = {
         ("--device", "--reference", "--rate", "--duration", "--period", "--rest"),
     ),
     # With a port that there is not: else it would go on until it is stopped.
-    "serve": (["gcs", "--port", "65536"], ("--model", "--limits", "--speed", "--host")),
+    "serve": (
+        ["gcs", "--port", "65536"],
+        ("--model", "--limits", "--speed", "--host", "--prefix", "--device"),
+    ),
 }  # fmt: skip
 # Their shares: those that identify take long.
 MIX = (

@@ -44,7 +44,7 @@ ADVICE = [
     (r"\brates (?=begins|ends)", "--rates ", "--rates"),
     (r"\bmode_scales is ", "--mode-scales is ", "--mode-scales"),
     (r"\bmargins\.sensitivity is ", "--sensitivity is ", "--sensitivity"),
-    (r"^(speed|port|host|limits) (?=is|are)", r"--\1 ", "--speed"),
+    (r"^(speed|port|host|limits|prefix) (?=is|are)", r"--\1 ", "--speed"),
     (r"\blog\[([^\]]*)\]", r"--window \1", "--window"),
     *(
         (rf"(?<!--unit )\b{name}=(?!\.\.\.) ?", f"--{name} ", f"--{name}")

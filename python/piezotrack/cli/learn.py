@@ -1,15 +1,18 @@
-"""``piezotrack learn``: a voltage table, learnt between trials on a simulated stage."""
+"""``piezotrack learn``: a voltage table, learnt between trials on a simulated stage or a device."""
 
 from __future__ import annotations
 
 import math
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from ..errors import ParameterError
+from ..errors import DataError, DeviceError, Interrupted, ParameterError, PiezotrackError
+from .devices import Rest, connected
 from .error_messages import in_words
+from .interruption import heard
 from .loop_options import (
     PAPER,
     AmplifierBandwidth,
@@ -44,10 +47,18 @@ from .output import Output
 from .track import BeyondReach, parsed_reference
 
 if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
     from ..control.iterative_learning import IterativeLearning
     from ..control.learning import Learning
+    from ..hardware.device import Device
+    from ..identification.identified import IdentifiedModel
+    from ..stages.virtual import VirtualStage
 
 __all__ = ["learn_command"]
+
+# Options of a simulation, or of a feedback, which a table that a device plays cannot have.
+SIMULATED = ("stage", "feedback", "kp", "ti", "td", "noise_nm", "bandwidth", "seed")
 
 
 @in_words
@@ -62,6 +73,15 @@ def learn_command(
         ),
     ],
     stage: StageFile = None,
+    device: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Device that plays the trials, as of `measure`, in the place of a simulated "
+            "stage.",
+            show_default=False,
+        ),
+    ] = None,
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="TABLE.csv", help="File for the table.")
     ] = Path("learnt.csv"),
@@ -101,54 +121,73 @@ def learn_command(
     bandwidth: AmplifierBandwidth = math.inf,
     duration: Duration = None,
     period: Period = None,
+    rest: Rest = None,
     seed: Annotated[int, typer.Option(help="Random seed of the sensor noise.")] = 1,
     beyond_reach: BeyondReach = False,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Learn the voltage of a repeated motion."""
-    from .._support.files import make_folder, picture_files, save_figures, together
+    from .._support.files import picture_files
     from ..control.controller import Controller
     from ..control.learning import learn
     from ..identification.identified import load
 
     own = stage != PAPER
     settings = Loop(own, dt, limits, feedback, kp, ti, td)
-    settings.check(context)
-    refuse_of_other_stage(context, own)
-    if own and not noise_nm:
-        refuse_without_effect(context, ["seed"], "without --noise-nm")
+    _check_options(context, settings, device, noise_nm)
     _check_file(out)
     known = load(model) if own else driven_by_voltage(load(model), model)
     desired = parsed_reference(reference, duration, period)
-    loop = Controller(
-        dt=settings.dt(known, desired),
-        limits=settings.volts(known),
-        feedforward=known.inverse() if feedforward else None,
-        feedback=settings.pid(known),
-        drive_unit=unit_of(own, known),
-    )
     result = Output(out.parent, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write([out.name, *(picture_files(out.stem) if picture else [])])
-    found = learn(
-        simulated(stage, known, noise_metres(noise_nm), bandwidth, seed),
-        desired,
-        loop,
-        model=known,
-        trials=trials,
-        method=method,
-        delay=delay,
-        gain=gain,
-        cutoff=cutoff,
-        mode_scales=[number("--mode-scales", one) for one in mode_scales.split(",")],
-        beyond_reach=beyond_reach,
-        progress=None if json or quiet else _show,
+    plays: AbstractContextManager[VirtualStage | Device] = (
+        nullcontext(simulated(stage, known, noise_metres(noise_nm), bandwidth, seed))
+        if device is None
+        else connected(device)
     )
-    with together(make_folder(out.parent)) as folder:
-        written = [found.save(folder / out.name)]
-        if picture:
-            written += save_figures({out.stem: found.plot()}, folder)
-    result.show(_outcome(found), _document(found), written)
+    try:
+        with plays as plant:
+            loop = Controller(
+                dt=settings.dt(known, desired),
+                limits=_within(plant, settings, known),
+                feedforward=known.inverse() if feedforward else None,
+                feedback=settings.pid(known),
+                drive_unit=unit_of(own, known),
+            )
+            found = learn(
+                plant,
+                desired,
+                loop,
+                model=known,
+                trials=trials,
+                method=method,
+                delay=delay,
+                gain=gain,
+                cutoff=cutoff,
+                mode_scales=[number("--mode-scales", one) for one in mode_scales.split(",")],
+                rest=rest,
+                beyond_reach=beyond_reach,
+                progress=None if json or quiet else _show,
+            )
+    except (DeviceError, DataError, Interrupted) as error:
+        raise _with_what_was_learnt(error, out, picture) from None
+    words = _outcome(found) if device is None else f"{_outcome(found)}\n{found.final.note}"
+    result.show(words, _document(found), _write(found, out, picture))
+
+
+def _check_options(
+    context: typer.Context, settings: Loop, device: str | None, noise_nm: float
+) -> None:
+    """Refuse options without effect."""
+    if device is None:
+        refuse_without_effect(context, ["rest"], "without --device")
+    else:
+        refuse_without_effect(context, SIMULATED, "with --device")
+    settings.check(context)
+    refuse_of_other_stage(context, settings.own)
+    if settings.own and not noise_nm:
+        refuse_without_effect(context, ["seed"], "without --noise-nm")
 
 
 def _check_file(out: Path) -> None:
@@ -156,6 +195,50 @@ def _check_file(out: Path) -> None:
         raise ParameterError(f"--out is {out}: expected the name of a file, as table.csv")
     if out.is_dir():
         raise ParameterError(f"--out is {out}, a folder: expected the name of a file in it")
+
+
+def _within(
+    plant: VirtualStage | Device, settings: Loop, known: IdentifiedModel
+) -> tuple[float, float]:
+    """Return the limits of the table [V]; by default no more than those of a device."""
+    from ..hardware.device import Device
+
+    low, high = settings.volts(known)
+    if settings.limits is None and isinstance(plant, Device):
+        # A recorder may have said a little more than what can be put out.
+        least, most = max(low, plant.limits[0]), min(high, plant.limits[1])
+        if least < most:
+            return least, most
+    return low, high
+
+
+def _write(found: Learning, out: Path, picture: bool) -> list[Path]:
+    """Write the table and, where it is asked for, the picture."""
+    from .._support.files import make_folder, save_figures, together
+
+    with together(make_folder(out.parent)) as folder:
+        written = [found.save(folder / out.name)]
+        if picture:
+            written += save_figures({out.stem: found.plot()}, folder)
+    return written
+
+
+def _with_what_was_learnt(
+    error: DeviceError | DataError | Interrupted, out: Path, picture: bool
+) -> BaseException:
+    """Write what was learnt before an error, and return an error that says where it is."""
+    if isinstance(error, Interrupted):
+        heard()
+    if error.partial is None:
+        return error
+    try:
+        table, *_ = _write(error.partial, out, picture)
+        kept = f"the best table so far, of trial {error.partial.best}, is in {table}"
+    except (PiezotrackError, OSError) as failed:
+        # Where the output may be is said first.
+        kept = f"what was learnt is lost: {failed}"
+    words = f"{error}; {kept}"
+    return KeyboardInterrupt(words) if isinstance(error, Interrupted) else type(error)(words)
 
 
 def _show(learner: IterativeLearning) -> None:
@@ -207,6 +290,7 @@ def _document(found: Learning) -> dict[str, Any]:
             for one in found.trials
         ],
         "best": found.best,
+        "feedforward": found.final.note,
         "stopped": found.stopped,
         "provenance": {"package": "piezotrack", "version": __version__},
     }

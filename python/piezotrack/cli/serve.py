@@ -1,4 +1,4 @@
-"""``piezotrack serve``: a virtual stage behind the protocol of a controller."""
+"""``piezotrack serve``: a stage behind the protocol of a controller, or as records of EPICS."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from ..errors import ParameterError
+from .devices import connected
 from .error_messages import in_words
-from .options import number_range
+from .options import number_range, refuse_without_effect
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import TypeAlias
 
+    from ..hardware.device import Device
+    from ..hardware.virtual import VirtualDevice
     from ..stages.virtual import VirtualStage
 
     Limits: TypeAlias = tuple[float, float]
@@ -28,16 +31,26 @@ if TYPE_CHECKING:
 __all__ = ["serve_command"]
 
 PORTS = {"gcs": 50000, "scpi": 5025}
+# Options of the other protocols.
+OTHERS = {
+    "gcs": (("prefix", "device"), "with gcs"),
+    "scpi": (("prefix", "device"), "with scpi"),
+    "epics": (
+        ("host", "port"),
+        "with epics, which listens where EPICS_CAS_INTF_ADDR_LIST and EPICS_CA_SERVER_PORT say",
+    ),
+}
 
 
 @in_words
 def serve_command(
+    context: typer.Context,
     protocol: Annotated[
-        Literal["gcs", "scpi"],
+        Literal["gcs", "scpi", "epics"],
         typer.Argument(
             metavar="PROTOCOL",
             help="gcs: PI's command set, over TCP; scpi: a small instrument with messages as VOLT "
-            "and MEAS?.",
+            "and MEAS?; epics: records over Channel Access.",
         ),
     ],
     model: Annotated[
@@ -60,13 +73,45 @@ def serve_command(
         typer.Option(help="TCP port; 0 for any free one; default 50000, of scpi 5025."),
     ] = None,
     speed: Annotated[float, typer.Option(help="How much faster than real time it goes.")] = 1.0,
+    prefix: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help="First part of the names of epics' records, as LAB:STAGE."
+        ),
+    ] = None,
+    device: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Device, as of `measure`, that epics publishes in the place of a virtual stage.",
+        ),
+    ] = None,
 ) -> None:
     """Serve a virtual stage as a controller.
 
-    Software that controls a stage can test against it.
+    Software that controls a stage can test against it; epics also publishes a real device.
 
-    It prints its address, and goes on until Ctrl-C or SIGTERM.
+    It prints what it serves, and goes on until Ctrl-C or SIGTERM.
     """
+    refuse_without_effect(context, *OTHERS[protocol])
+    if device is not None:
+        refuse_without_effect(context, ("model", "limits", "speed"), "with --device")
+    if protocol == "epics":
+        if prefix is None:
+            raise ParameterError("--prefix is missing: expected the start of names, as LAB:STAGE")
+        with _published(device, model, limits, speed) as one:
+            _epics(one, prefix)
+        return
+    stage, within = _stage(model, limits)
+    place = PORTS[protocol] if port is None else port
+    serving = _scpi if protocol == "scpi" else _gcs
+    with serving(stage, within, host, place, speed) as (address, (low, high)):
+        print(f"listening at {address}, {low:g} to {high:g} V", flush=True)
+        threading.Event().wait()
+
+
+def _stage(model: Path | None, limits: str | None) -> tuple[VirtualStage, Limits | None]:
+    """Return the virtual stage of the options, with its limits [V]; None for the amplifier's."""
     from ..hardware.virtual import virtual_stage
 
     stage, known = virtual_stage(model)
@@ -76,11 +121,16 @@ def serve_command(
             f"--limits is not given, and {model} does not say with which voltages it was "
             "identified: expected --limits LOW:HIGH"
         )
-    place = PORTS[protocol] if port is None else port
-    serving = _scpi if protocol == "scpi" else _gcs
-    with serving(stage, within, host, place, speed) as (address, (low, high)):
-        print(f"listening at {address}, {low:g} to {high:g} V", flush=True)
-        threading.Event().wait()
+    return stage, within
+
+
+def _timed(stage: VirtualStage, limits: Limits | None, speed: float) -> VirtualDevice:
+    """Return a stage as a device whose time goes faster."""
+    from .._support.arguments import positive
+    from ..hardware.virtual import VirtualDevice
+
+    speed = positive("speed", speed, "times real time")
+    return VirtualDevice(stage, limits=limits, clock=lambda: speed * time.monotonic())
 
 
 @contextmanager
@@ -93,13 +143,31 @@ def _gcs(stage: VirtualStage, limits: Limits | None, host: str, port: int, speed
 
 @contextmanager
 def _scpi(stage: VirtualStage, limits: Limits | None, host: str, port: int, speed: float) -> Served:
-    from .._support.arguments import positive
-    from ..hardware.virtual import VirtualDevice
     from ..hardware.virtual_scpi import VirtualScpi
 
-    speed = positive("speed", speed, "times real time")
-    device = VirtualDevice(stage, limits=limits, clock=lambda: speed * time.monotonic())
+    device = _timed(stage, limits, speed)
     with VirtualScpi(device, host=host, port=port) as server:
         name, number = server.address
         low, high = device.limits
         yield f"scpi://{name}:{number}?unit=um&limits={low:g}..{high:g}V", device.limits
+
+
+@contextmanager
+def _published(
+    address: str | None, model: Path | None, limits: str | None, speed: float
+) -> Iterator[Device]:
+    """Connect to the device of an address; without one make a virtual one of the options."""
+    if address is None:
+        yield _timed(*_stage(model, limits), speed)
+        return
+    with connected(address) as device:
+        yield device
+
+
+def _epics(device: Device, prefix: str) -> None:
+    from ..hardware.epics import RECORDS, serve_epics
+
+    low, high = device.limits
+    records = ", ".join(f"{prefix}:{name}" for name in RECORDS)
+    words = f"serving {records} of {device.channels[0]}, {low:g} to {high:g} V"
+    serve_epics(device, prefix, ready=lambda: print(words, flush=True))

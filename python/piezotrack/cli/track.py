@@ -12,6 +12,7 @@ import typer
 from ..errors import DeviceError, Interrupted, ParameterError
 from .devices import connected
 from .error_messages import in_words
+from .interruption import heard
 from .loop_options import (
     MODEL,
     NO_FEEDBACK,
@@ -236,6 +237,7 @@ def _on_device(
         try:
             run = track(used, loop, desired, beyond_reach=beyond_reach, unstable=unstable)
         except (DeviceError, Interrupted) as error:
+            heard()
             if error.partial is not None:
                 document = tracking_document(error.partial, None, loop, [f"ended: {error}"])
                 write_tracking(error.partial, document, result.out)

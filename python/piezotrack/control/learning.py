@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -12,8 +12,9 @@ from .. import _core
 from .._support.arguments import not_negative
 from .._support.files import write_columns
 from .._support.units import drive_word, shown_unit
-from ..errors import ParameterError
+from ..errors import DataError, DeviceError, Interrupted, ParameterError
 from ..hardware.device import Device
+from ..hardware.measuring import rest_of
 from .checks import check_drive_unit, check_stable, check_within_reach
 from .controller import Controller
 from .iterative_learning import IterativeLearning
@@ -46,6 +47,7 @@ WHY = {
     "no change": "the error falls no further",
     "grows": "the error grows",
     "trials": "all trials were made",
+    "interrupted": "it was interrupted, or the device failed",
 }
 
 
@@ -80,7 +82,7 @@ class Learning:
     best : int
         Place of the trial with the smallest rms error.
     stopped : str
-        "noise", "no change", "grows" or "trials".
+        "noise", "no change", "grows" or "trials"; "interrupted" of what an error has as `partial`.
     first, final : Tracking
         The runs of the first trial and of the best.
     """
@@ -209,6 +211,7 @@ def learn(
     change_weight: float = 0.01,
     noise: float | None = None,
     visited: float | Sequence[float] = (),
+    rest: float | None = None,
     beyond_reach: bool = False,
     progress: Callable[[IterativeLearning], None] | None = None,
 ) -> Learning:
@@ -225,7 +228,7 @@ def learn(
     ----------
     stage : Stage, VirtualStage, IdentifiedModel or Device
         The plant. Each trial begins where its experiments begin, with noise of its own; on a device
-        it begins and ends at the rest of `play`, and the controller has no feedback.
+        it begins and ends at `rest`, and the controller has no feedback.
     reference : Reference
         The reference; of one that repeats, a settled period is learnt, however long it lasts.
     controller : Controller
@@ -244,7 +247,10 @@ def learn(
     forgetting_factor, change_weight, noise : optional
         As there.
     visited, beyond_reach : optional
-        As of `track`.
+        As of `track`; a device has been where it has been.
+    rest : float, optional
+        Voltage of a device before and after each trial [V]; default 0 V, or the limit nearest to
+        it.
     progress : callable, optional
         Called with the learner before the first trial and after each.
 
@@ -259,6 +265,11 @@ def learn(
         As of `control.IterativeLearning` and `track`.
     NumericalError
         The loop diverges.
+    DeviceError, DataError
+        The device failed, or did not read enough; the output is at `rest`, or the message says
+        where it may be. `partial` is what was learnt up to then.
+    Interrupted
+        Ctrl-C or SIGTERM came; the output of a device is at `rest`. `partial` is what was learnt.
 
     Examples
     --------
@@ -272,8 +283,7 @@ def learn(
     np.True_
     """
     known = _model_of(stage, controller) if model is None else model
-    if isinstance(stage, Device):
-        check_playable(stage, controller)
+    home = _rest_on(stage, controller, rest, visited)
     # What is behind a device is what its model says.
     behind = known if isinstance(stage, Device) else stage
     plant = plant_of(behind)
@@ -305,7 +315,7 @@ def learn(
     }
     runs: Trials
     if isinstance(stage, Device):
-        runs = PlayedTrials(device=stage, learner=learner, **periods)
+        runs = PlayedTrials(device=stage, rest=home, learner=learner, **periods)
     else:
         before = voltages_before(plant, visited, controller.limits)
         runs = SimulatedTrials(plant=plant, learner=learner, delay=late, before=before, **periods)
@@ -316,32 +326,57 @@ def _unseen(_: IterativeLearning) -> None:
     """Show nothing."""
 
 
+class _Done(NamedTuple):
+    """Trials that are complete: how many, the best of them, the runs of the first and the best."""
+
+    trials: int
+    best: int
+    first: Tracking
+    final: Tracking
+
+
 def _learnt(runs: Trials, most: int, progress: Callable[[IterativeLearning], None]) -> Learning:
-    """Play and learn until it ends."""
-    learner, first, final = runs.learner, None, None
-    progress(learner)
-    while True:
-        trial = len(learner.trials)
-        made = [runs.run(learner.table, trial)]
-        if learner.method == "lifted":
-            made += [runs.run(learner.table, trial, i) for i in range(1, runs.repeats)]
-        learner.update(np.concatenate([runs.record(one) for one in made]))
+    """Play and learn until it ends; what ends it early has what was learnt."""
+    learner, done = runs.learner, None
+    try:
         progress(learner)
-        first = first or made[0]
-        if learner.best == trial:
-            final = made[0]
-        stopped = learner.stopped or ("trials" if trial + 1 >= most else None)
-        if stopped is not None:
-            break
-    assert final is not None
+        while True:
+            run, best = _played(runs), learner.best
+            count = len(learner.trials)
+            first, final = (done.first, done.final) if done else (run, run)
+            done = _Done(count, best, first, run if best == count - 1 else final)
+            progress(learner)
+            stopped = learner.stopped or ("trials" if count >= most else None)
+            if stopped is not None:
+                return _learning(learner, done, stopped)
+    except (DeviceError, DataError) as error:
+        error.partial = _learning(learner, done, "interrupted") if done else None
+        raise
+    except KeyboardInterrupt as error:
+        part = _learning(learner, done, "interrupted") if done else None
+        raise Interrupted(str(error) or "the learning was interrupted", part) from None
+
+
+def _played(runs: Trials) -> Tracking:
+    """Play the table of a trial and learn from it; return the run, the first of several."""
+    learner = runs.learner
+    trial = len(learner.trials)
+    made = [runs.run(learner.table, trial)]
+    if learner.method == "lifted":
+        made += [runs.run(learner.table, trial, i) for i in range(1, runs.repeats)]
+    learner.update(np.concatenate([runs.record(one) for one in made]))
+    return made[0]
+
+
+def _learning(learner: IterativeLearning, done: _Done, stopped: str) -> Learning:
     return Learning(
         learner=learner,
-        trials=learner.trials,
-        tables=learner.tables[:-1],
-        best=learner.best,
+        trials=learner.trials[: done.trials],
+        tables=learner.tables[: done.trials],
+        best=done.best,
         stopped=stopped,
-        first=first,
-        final=final,
+        first=done.first,
+        final=done.final,
     )
 
 
@@ -359,6 +394,25 @@ def _model_of(
             )
         return stage
     return VirtualStage.of(controller.feedforward.stage, delay=controller.feedforward.delay)
+
+
+def _rest_on(
+    stage: Plant | IdentifiedModel | Device,
+    controller: Controller,
+    rest: float | None,
+    visited: float | Sequence[float],
+) -> float:
+    """Return the voltage at which a device rests [V], after what it needs is checked."""
+    if not isinstance(stage, Device):
+        if rest is not None:
+            raise ParameterError(f"rest is {rest!r}: expected none, as the stage is simulated")
+        return 0.0
+    check_playable(stage, controller)
+    if visited != ():
+        raise ParameterError(
+            f"visited is {visited!r}: expected none on a device, which has been where it has been"
+        )
+    return rest_of(stage, rest)
 
 
 def _counted(name: str, value: object, most: int) -> int:

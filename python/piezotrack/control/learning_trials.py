@@ -130,16 +130,19 @@ class PlayedTrials(Trials):
     ----------
     device : Device
         The device.
+    rest : float
+        Voltage before and after each trial [V].
     """
 
     device: Device
+    rest: float
 
     def run(self, table: Array, trial: int, repeat: int = 0) -> Tracking:
         """Play a trial; what is random is the device's own."""
         del trial, repeat
         whole = self.whole()
         volts = np.clip(self.voltage(whole, table), *self.learner.controller.limits)
-        return played_on(self.device, self.learner.controller, whole, volts, NOTE)
+        return played_on(self.device, self.learner.controller, whole, volts, NOTE, rest=self.rest)
 
 
 def _start(t: Array, ramp: float) -> Array:

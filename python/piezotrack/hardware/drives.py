@@ -65,6 +65,10 @@ class Drive:
     def __repr__(self) -> str:
         return f"Drive({self.name}, {plain(self.duration)} s)"
 
+    def count(self, dt: float) -> int:
+        """Return the number of samples at a sampling interval [s]."""
+        return math.ceil(self.duration / check_dt(dt) - 1e-3)
+
     def sample(self, dt: float) -> Array:
         """Return the voltage at even instants [V], those with 0 <= t < `duration`.
 
@@ -78,7 +82,7 @@ class Drive:
         ndarray, shape (n,)
             Voltage [V].
         """
-        count = math.ceil(self.duration / check_dt(dt) - 1e-3)
+        count = self.count(dt)
         volts = np.asarray(self.at(dt * np.arange(count, dtype=np.float64)), dtype=np.float64)
         return np.broadcast_to(volts, (count,)).copy()
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-import sys
 import threading
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +12,6 @@ import numpy as np
 from .. import _core
 from .._support.messages import quoted
 from ..errors import ParameterError, PiezotrackError
-from .addresses import connect
 from .device import Device, Exchanging
 from .measuring import check_device, check_table, play_table
 from .options import required_package
@@ -21,10 +19,15 @@ from .options import required_package
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
 
-__all__ = ["ophyd_player", "serve_epics"]
+__all__ = ["RECORDS", "ophyd_player", "serve_epics"]
 
+RECORDS = ("Voltage", "Position", "Table", "Rate", "Play", "Record", "Status", "Message")
 # Channel Access stays on this computer where nothing else is said.
-LOCAL = {"EPICS_CAS_INTF_ADDR_LIST": "127.0.0.1", "EPICS_CAS_BEACON_ADDR_LIST": "127.0.0.1"}
+LOCAL = {
+    "EPICS_CAS_INTF_ADDR_LIST": "127.0.0.1",
+    "EPICS_CAS_BEACON_ADDR_LIST": "127.0.0.1",
+    "EPICS_CAS_AUTO_BEACON_ADDR_LIST": "NO",
+}
 # Longest table in the records [samples], unless the device holds less.
 LONGEST = 100_000
 # Time between two readings of the position [s].
@@ -72,7 +75,8 @@ def serve_epics(
 
     Notes
     -----
-    It listens on this computer only, unless ``EPICS_CAS_INTF_ADDR_LIST`` says otherwise.
+    It listens on this computer only, unless ``EPICS_CAS_INTF_ADDR_LIST`` says otherwise. At the end
+    the output stays where it is. ``piezotrack serve epics`` calls it.
 
     Examples
     --------
@@ -88,13 +92,13 @@ def serve_epics(
             f"prefix is {quoted(prefix)}: expected the start of names, as LAB:STAGE"
         )
     longest = min(_core.as_count("longest", longest), device.memory)
-    for name, value in LOCAL.items():
-        os.environ.setdefault(name, value)
     builder = required_package("softioc.builder", "epics", "serving EPICS")
     ioc = required_package("softioc.softioc", "epics", "serving EPICS")
     dispatcher = required_package(
         "softioc.asyncio_dispatcher", "epics", "serving EPICS"
     ).AsyncioDispatcher()
+    if not LOCAL.keys() & os.environ.keys():
+        os.environ.update(LOCAL)
     records = _Records(device, prefix, longest, builder)
     builder.LoadDatabase()
     ioc.iocInit(dispatcher, enable_pva=False)
@@ -223,19 +227,3 @@ def ophyd_player(prefix: str, name: str = "") -> Any:
     from .ophyd_device import TablePlayer
 
     return TablePlayer(prefix, name)
-
-
-def main() -> None:
-    """Serve the device of an address: ``python -m piezotrack.hardware.epics ADDRESS PREFIX``."""
-    if len(sys.argv) != 3:
-        sys.exit("expected python -m piezotrack.hardware.epics ADDRESS PREFIX")
-    try:
-        serve_epics(connect(sys.argv[1]), sys.argv[2], ready=lambda: print(sys.argv[2], flush=True))
-    except PiezotrackError as error:
-        sys.exit(str(error))
-    except KeyboardInterrupt:
-        sys.exit(130)
-
-
-if __name__ == "__main__":
-    main()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,10 +14,9 @@ from ..data.dataset_arguments import MIN_SAMPLES
 from ..errors import DataError, DeviceError, ParameterError
 from .device import Device, Record
 from .drives import Drive, parse_drive
+from .safe_end import led_back
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from numpy.typing import ArrayLike, NDArray
 
     Array = NDArray[np.float64]
@@ -27,7 +25,6 @@ __all__ = [
     "check_device",
     "check_table",
     "filled",
-    "led_back",
     "measure",
     "obtained_rate",
     "play_table",
@@ -63,14 +60,13 @@ def check_table(device: Device, name: str, volts: Array) -> None:
             f"{name} is {volts[k]:g} V at sample {k}: expected {low:g} to {high:g} V, the limits "
             f"of {device.channels[0]}"
         )
-    check_count(device, name, volts.size)
+    _check_count(device, name, volts.size)
 
 
-def check_count(device: Device, name: str, count: float) -> None:
-    """Raise ParameterError where a table has more samples than a device holds."""
+def _check_count(device: Device, name: str, count: int) -> None:
     if count > device.memory:
         raise ParameterError(
-            f"{name} has {count:.0f} samples: expected at most {device.memory}, the memory of "
+            f"{name} has {count} samples: expected at most {device.memory}, the memory of "
             f"{device.channels[0]}; a lower rate or a shorter drive fits"
         )
 
@@ -131,30 +127,29 @@ def rest_of(device: Device, rest: float | None = None) -> float:
     return home
 
 
-@contextmanager
-def led_back(device: Device, home: float) -> Iterator[None]:
-    """Put the output to a voltage [V] where what is played fails or is interrupted."""
-    try:
-        yield
-    except BaseException as error:
-        try:
-            device.hold(home)
-        except Exception as other:
-            raise DeviceError(
-                f"{error}; the output could not be led to {home:g} V ({other}): it may be anywhere "
-                "in the table"
-            ) from error
-        raise
+def ramped(
+    device: Device, name: str, volts: Array, rest: float, rate: float, ramp: float
+) -> tuple[Array, int]:
+    """Return a table that leads from rest to a drive and back [V], and where the drive begins.
 
-
-def ramped(volts: Array, rest: float, rate: float, ramp: float) -> tuple[Array, int]:
-    """Return a table that leads from rest to a drive and back [V], and where the drive begins."""
+    Raises
+    ------
+    ParameterError
+        The table is beyond what the device takes.
+    """
+    if ramp * rate > device.memory:
+        raise ParameterError(
+            f"ramp is {ramp:g} s: expected at most {device.memory / rate:g} s, which the memory "
+            f"of {device.channels[0]} holds"
+        )
     count = max(2, round(ramp * rate))
     # The share of a smooth step: no jump of the acceleration excites a mode.
     s = np.arange(count) / count
     share = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
     up, down = rest + (volts[0] - rest) * share, volts[-1] + (rest - volts[-1]) * share
-    return np.concatenate([up, volts, down, [rest]]), count
+    table = np.concatenate([up, volts, down, [rest]])
+    check_table(device, f"{name} with its ramps", table)
+    return table, count
 
 
 def measure(
@@ -170,7 +165,7 @@ def measure(
     """Record a log of a stage: a drive goes out of a device, the displacement comes back.
 
     The output is led smoothly from `rest` to the drive and back, all in one table on the device's
-    clock; it ends at `rest`, also where something fails.
+    clock; it ends at `rest`, also where something fails, or Ctrl-C or SIGTERM comes.
 
     Parameters
     ----------
@@ -221,7 +216,8 @@ def measure(
     if isinstance(drive, str):
         drive = parse_drive(drive)
     if isinstance(drive, Drive):
-        check_count(device, "drive", drive.duration * exact)
+        # Before gigabytes of samples are made.
+        _check_count(device, "drive", drive.count(1.0 / exact))
         volts = drive.sample(1.0 / exact)
     elif notes:
         raise ParameterError(
@@ -238,8 +234,7 @@ def measure(
         notes = (*notes, f"drive: {beyond} samples clipped to {plain(low)} and {plain(high)} V")
     check_table(device, "drive", volts)
     home = rest_of(device, rest)
-    table, first = ramped(volts, home, exact, not_negative("ramp", ramp, "s"))
-    check_table(device, "drive with its ramps", table)
+    table, first = ramped(device, "drive", volts, home, exact, not_negative("ramp", ramp, "s"))
     with led_back(device, home):
         record = play_table(device, table, exact, not_negative("lead_in", lead_in, "s"))
     y, more = filled(record)

@@ -56,8 +56,15 @@ class Link:
             No connection, no answer or half of one within the time limit, or more than one.
         """
         link = self._ready()
-        self._send(link, message)
-        limit = self._timeout + patience
+        try:
+            self._send(link, message)
+            return self._answer(link, message, self._timeout + patience)
+        except KeyboardInterrupt:
+            # Its answer may still come, and the output is to be led to a safe voltage.
+            self.close()
+            raise
+
+    def _answer(self, link: socket.socket, message: str, limit: float) -> str:
         parts: list[bytes] = []
         end, length = time.monotonic() + limit, 0
         while True:

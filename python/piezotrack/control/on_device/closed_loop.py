@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import signal
-import threading
 import time
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -14,6 +12,7 @@ import numpy as np
 
 from ...errors import DeviceError, Interrupted, ParameterError
 from ...hardware.measuring import rest_of
+from ...hardware.safe_end import terminated
 from ..checks import check_period, check_stable, check_within_reach
 from ..tracking import Tracking, feedforward_of
 from .guard import Guard
@@ -28,7 +27,6 @@ from .playing import check_limits
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from types import FrameType
 
     from numpy.typing import NDArray
 
@@ -118,25 +116,6 @@ class _Log:
         )
 
 
-@contextmanager
-def _terminated() -> Iterator[None]:
-    """Turn SIGTERM into KeyboardInterrupt meanwhile, where nobody else answers it."""
-    main = threading.current_thread() is threading.main_thread()
-    if not main or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
-        yield
-        return
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        del number, frame
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, stop)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-
-
 def track_on(
     asked: Device,
     controller: Controller,
@@ -184,7 +163,7 @@ def track_on(
     samples = reference.sample(controller.dt)
     volts, note = feedforward_of(controller, reference, samples)
     log = _Log(len(samples))
-    with _terminated(), _safe_after(device, home, controller.dt, log):
+    with terminated(), _safe_after(device, home, controller.dt, log):
         latency = measure_latency(device, controller.dt, rest=home)
         refuse_slow(latency, controller.dt)
         _check_model(controller, samples, latency, beyond_reach=beyond_reach, unstable=unstable)

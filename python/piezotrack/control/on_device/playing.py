@@ -14,12 +14,12 @@ from ...hardware.measuring import (
     check_device,
     check_table,
     filled,
-    led_back,
     obtained_rate,
     play_table,
     ramped,
     rest_of,
 )
+from ...hardware.safe_end import led_back
 from ...references.reference import Reference
 from ...stages.inverse import Inverse
 from ..controller import Controller
@@ -85,8 +85,7 @@ def played_on(
     samples = reference.sample(controller.dt)
     check_table(device, "voltage", volts)
     home = rest_of(device, rest)
-    table, first = ramped(volts, home, rate, ramp)
-    check_table(device, "voltage with its ramps", table)
+    table, first = ramped(device, "voltage", volts, home, rate, ramp)
     with led_back(device, home):
         record = play_table(device, table, rate)
     y, notes = filled(record)

@@ -14,13 +14,14 @@ from ..._support.arrays import signal_of
 from ..._support.messages import quoted
 from ...errors import DeviceError, ParameterError
 from ..device import Rates, Record
+from ..limits import check_within, ordered
 from .connection import Connection
 from .protocol import GENERATOR, POSITION, RECORD_POINTS, SERVO_CYCLE, VOLTAGE, WAVE_POINTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     Array = NDArray[np.float64]
 
@@ -106,7 +107,7 @@ class GcsDevice:
                     "a controller with wave generator and data recorder"
                 )
             self._unit = self._metres()
-            self._limits = self._range() if limits is None else _checked(limits)
+            self._limits = ordered("limits", self._range() if limits is None else limits)
             clock = 1.0 / self._parameter(SERVO_CYCLE)
             self._rates = Rates(lowest=clock / SLOWEST, highest=clock, clock=clock)
             self._memory = self._points()
@@ -173,7 +174,7 @@ class GcsDevice:
             The controller refuses something, or does not answer.
         """
         table = signal_of("volts", volts)
-        self._within(table)
+        self._check(table)
         if table.size > self._memory:
             raise DeviceError(
                 f"the table has {table.size} samples: the memory of {self._line.name} holds "
@@ -216,7 +217,7 @@ class GcsDevice:
         DeviceError
             The controller refuses something, or does not answer.
         """
-        self._within(np.array([finite("volts", volts, "V")]))
+        self._check(finite("volts", volts, "V"))
         self._open_loop()
         query = f"POS? {self._axis}"
         lines = self._line.exchange(f"SVA {self._axis} {self._control(volts)}", query)
@@ -235,7 +236,7 @@ class GcsDevice:
         DeviceError
             The controller refuses it, or does not answer.
         """
-        self._within(np.array([finite("volts", volts, "V")]))
+        self._check(finite("volts", volts, "V"))
         self._open_loop()
         self._line.command(f"SVA {self._axis} {self._control(volts)}")
 
@@ -249,17 +250,10 @@ class GcsDevice:
         assert self._rates.clock is not None
         return self._rates.clock
 
-    def _within(self, volts: Array) -> None:
+    def _check(self, volts: ArrayLike) -> None:
         if not self._open:
             raise DeviceError(f"{self._line.name} is closed")
-        low, high = self._limits
-        beyond = np.flatnonzero(~((volts >= low) & (volts <= high)))
-        if beyond.size:
-            k = int(beyond[0])
-            raise DeviceError(
-                f"volts is {volts[k]:g} V at sample {k}: {self._line.name} puts out {low:g} to "
-                f"{high:g} V"
-            )
+        check_within(volts, self._limits, self._line.name)
 
     def _open_loop(self) -> None:
         """Switch the servo off, once: whoever switches it on meanwhile gets its error."""
@@ -403,7 +397,7 @@ class GcsDevice:
                 f"limits are not given, and {self._line.name} does not say them: expected (low, "
                 "high) in V, in an address ?limits=LOW:HIGH"
             )
-        return _checked((self._value("VMI?"), self._value("VMA?")))
+        return self._value("VMI?"), self._value("VMA?")
 
     def _points(self) -> int:
         """Return the samples that both a wave table and the recorder hold."""
@@ -431,13 +425,6 @@ def _array(lines: Sequence[str]) -> tuple[Array | None, float]:
         return np.array(rows, dtype=np.float64), interval
     except (StopIteration, ValueError):
         return None, interval
-
-
-def _checked(limits: tuple[float, float]) -> tuple[float, float]:
-    low, high = (finite("limits", one, "V") for one in limits)
-    if not low < high:
-        raise ParameterError(f"limits are {low:g} and {high:g} V: expected the lower one first")
-    return low, high
 
 
 def from_address(

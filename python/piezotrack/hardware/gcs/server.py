@@ -9,9 +9,9 @@ import threading
 from typing import TYPE_CHECKING, Self
 
 from ... import _core
-from ..._support.arguments import finite
 from ...errors import ParameterError
 from ...stages.virtual import VirtualStage
+from ..limits import ordered
 from ..listening import cannot_listen, checked_port
 from .arguments import Refusal
 from .controller import VirtualController
@@ -81,10 +81,7 @@ class GcsServer:
                 f"stage is {type(stage).__name__}: expected pt.VirtualStage, as VirtualStage.of "
                 "makes one of any model"
             )
-        low, high = stage.amplifier.limits if limits is None else limits
-        within = finite("limits", low, "V"), finite("limits", high, "V")
-        if not within[0] < within[1]:
-            raise ParameterError(f"limits are {within}: expected (low, high) in V")
+        within = ordered("limits", stage.amplifier.limits if limits is None else limits)
         port = checked_port(port)
         speed = _core.as_number("speed", speed)
         if not 0.0 < speed <= FASTEST:
