@@ -148,7 +148,10 @@ def test_every_field_of_a_class_is_documented(name: str) -> None:
 
 
 # Those that search with full budgets.
-SLOW = {"bouc_wen_benchmark.py", "calibrate_virtual_stage.py", "hundred_cycles.py"}
+SLOW = {
+    *("bouc_wen_benchmark.py", "calibrate_virtual_stage.py", "hundred_cycles.py"),
+    *("compare_models.py", "track_virtual_stage.py"),
+}
 
 
 @pytest.mark.parametrize(

@@ -59,6 +59,25 @@ def test_a_feedforward_is_played_from_a_table() -> None:
     assert len(document["feedforward_table_V"]) == 100
 
 
+@needs_gcc
+def test_what_was_learnt_is_played() -> None:
+    save()
+    volts = [10.0 + k % 50 for k in range(100)]
+    rows = (f"{0.02 * k},{v},{v}" for k, v in enumerate(volts))
+    Path("line.csv").write_text("\n".join(["time_s,voltage_V,feedforward_V", *rows]))
+    for form in ("c99", "json"):
+        ran("export", "loop.json", "--table", "line.csv", "--to", form, "--out", form)
+    compiled(Path("c99"), "check.c", "loop.c")
+    assert checked(Path("c99"))[0] == 0
+    document = json.loads(Path("json/loop.json").read_text(encoding="utf-8"))
+    assert document["feedforward_table_V"] == volts
+    both = ("--table", "line.csv", "--reference", "sine:0.5Hz,5..60um,4s")
+    assert "expected one of them" in refusal("export", "loop.json", *both, "--out", "no")
+    Path("fast.csv").write_text("time_s,voltage_V\n0,1\n0.001,2\n0.002,1\n")
+    said = refusal("export", "loop.json", "--table", "fast.csv", "--out", "no")
+    assert "samples every 1 ms: expected those of the controller, every 20 ms" in said
+
+
 @needs_linux
 def test_a_unit_is_written() -> None:
     save()

@@ -375,7 +375,48 @@ NO_FORM: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
     ),
     "float in JSON": ({}, {"to": "json", "single": True}, "single is True with to='json'"),
     "motion": ({}, {"reference": 3}, "reference is int: expected a Reference"),
+    "table and motion": (
+        {"feedforward": PLAYS.inverse()},
+        {"reference": SINE, "table": [1.0]},
+        "reference is given beside table: expected one of them",
+    ),
+    "period of a table": (
+        {"repetitive": PARTS["repetitive"]["repetitive"]},
+        {"table": np.zeros(100)},
+        "repetitive has a period of 5 s: expected that of the table, 2 s, or a multiple",
+    ),
 }
+# What is no table, and the sentence.
+NO_TABLE: dict[str, tuple[Any, str]] = {
+    "beyond the limits": ([0.0, 80.0], "table[1] is 80 V: expected voltages within the limits, 0"),
+    "not finite": ([0.0, math.nan], "table is nan at sample 1: expected finite numbers"),
+    "empty": ([], "table has 0 samples: expected 1 to"),
+    "rows": ([[0.0, 1.0]], "table has the shape (1, 2): expected one dimension"),
+}
+
+
+@pytest.mark.parametrize("name", NO_TABLE)
+def test_what_is_no_table_is_refused(name: str, tmp_path: Path) -> None:
+    table, sentence = NO_TABLE[name]
+    with pytest.raises(pt.PiezotrackError, match=re.escape(sentence)):
+        export(loop("PID"), tmp_path / "out", table=table)
+    assert not (tmp_path / "out").exists()
+
+
+@needs_gcc
+@pytest.mark.parametrize("forward", ["none", "plays"])
+def test_a_learnt_table_is_played(forward: str, tmp_path: Path) -> None:
+    """What was learnt between trials, with a feedback around it."""
+    parts: dict[str, Any] = {} if forward == "none" else {"feedforward": PLAYS.inverse()}
+    one = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=PI, **parts)
+    table = 20.0 + 15.0 * np.sin(2.0 * np.pi * np.arange(100) / 100.0)
+    export(one, tmp_path, name="axis", table=table)
+    compiled(tmp_path, "check.c", "axis.c")
+    code, figures = checked(tmp_path)
+    assert (code, figures["steps"], figures["largest"]) == (0, 2000, 0.0)
+    with (tmp_path / "vectors.csv").open() as file:
+        given = [float(row["feedforward_V"]) for row in csv.DictReader(file)]
+    assert given == [*table] * 20
 
 
 @pytest.mark.parametrize("name", NO_FORM)

@@ -147,6 +147,47 @@ fn one_lane_and_many_of_models_with_an_exponent() {
     }
 }
 
+/// A limit of the friction that does not depend on the speed, which takes a shorter way where all
+/// lanes have one, beside lanes whose limit does.
+#[test]
+fn one_lane_and_many_with_a_limit_that_falls_in_some() {
+    let (u, y) = log();
+    let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
+    let free = ["damping", "piezo_coefficient", "rest_stiffness", "coulomb_force", "static_ratio"];
+    let spec = Spec {
+        model: Model::LuGre,
+        free: Some(free.map(String::from).to_vec()),
+        bounds: vec![("static_ratio".into(), (1.0, 1.5))],
+        fixed: vec![("mass".into(), 0.3)],
+        stiffness: Some(19567.0),
+        offset: true,
+        ..Spec::of(Model::Dahl)
+    };
+    let problem = Problem::new(&record, &spec, NEVER).unwrap();
+    let infos = Model::LuGre.info().parameters;
+    let ratio = problem.free().position(|i| infos.get(i).is_some_and(|p| p.name == "static_ratio"));
+    let count = problem.free().count();
+    // The first eight are alike, then they alternate.
+    let place = |i: u32| -> Vec<f64> {
+        let part = |d: usize| f64::from((7 * i + 5 * u32::try_from(d).unwrap()) % 23) / 23.0;
+        let mut place: Vec<f64> = (0..count).map(part).collect();
+        if i < 8 || i % 2 == 0 {
+            place[ratio.unwrap()] = 0.0;
+        }
+        place
+    };
+    let at = |i| Candidate { theta: problem.theta(&place(i)), limit: f64::INFINITY };
+    let asked: Vec<Candidate> = (0..23).map(at).collect();
+    let expected = bits(&Evaluator::new(&record, &problem, NEVER), &asked);
+    assert!(expected.iter().filter(|c| f64::from_bits(c.0).is_finite()).count() > 15);
+    for arch in instruction_sets() {
+        let evaluator = Evaluator::new(&record, &problem, NEVER).on(arch);
+        assert_eq!(bits(&evaluator, &asked), expected, "{arch:?}");
+        let alone: Vec<_> = asked.iter().flat_map(|one| bits(&evaluator, &[*one])).collect();
+        assert_eq!(alone, expected, "{arch:?}, one by one");
+    }
+}
+
 /// Shares of the creep within the cost, with and without a delay.
 #[test]
 fn one_lane_and_many_with_creep() {

@@ -246,6 +246,7 @@ def test_the_readings_are_those_of_a_sensor() -> None:
     assert np.std(run.measured - run.displacement) == pytest.approx(0.097e-6, rel=0.1)
 
 
+@pytest.mark.slow
 def test_the_same_seeds_give_the_same_numbers() -> None:
     again = pt.xu_li_2010.reproduce(seeds=2)
     assert again.values == quick().values

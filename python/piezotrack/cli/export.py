@@ -23,6 +23,9 @@ from .output import Output
 from .track import parsed_reference
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ..control.export.write import Exported
 
 __all__ = ["export_command"]
@@ -63,6 +66,14 @@ def export_command(
             show_default=False,
         ),
     ] = None,
+    table: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="One period of a feedforward of your own to play, as `learn` writes it.",
+            show_default=False,
+        ),
+    ] = None,
     duration: Duration = None,
     period: Period = None,
     json: Json = False,
@@ -85,11 +96,31 @@ def export_command(
     if reference is None:
         refuse_without_effect(context, ("duration", "period"), "without --reference")
     known = load_controller(controller)
+    volts = None if table is None else _table(table, known.dt, known.drive_unit)
     motion = None if reference is None else parsed_reference(reference, duration, period)
     result.will_write(names)
     with of_file(controller):
-        done = export_controller(known, out, to=to, name=chosen, single=single, reference=motion)
+        done = export_controller(
+            known, out, to=to, name=chosen, single=single, reference=motion, table=volts
+        )
     result.show(f"{known!r}\n{done}", _document(done), done.files)
+
+
+def _table(file: Path, dt: float, unit: str) -> NDArray[np.float64]:
+    """Read one period of a feedforward, with a sample for each interval."""
+    from ..data.reader import drive_dataset
+
+    record = drive_dataset(file)
+    if abs(record.dt - dt) > 1e-6 * dt:
+        raise ParameterError(
+            f"--table {file} has samples every {1e3 * record.dt:g} ms: expected those of the "
+            f"controller, every {1e3 * dt:g} ms"
+        )
+    if record.drive_unit != unit:
+        raise ParameterError(
+            f"--table {file} has a drive in {record.drive_unit}: expected {unit}, as the controller"
+        )
+    return record.u
 
 
 def _document(done: Exported) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from ... import _core
 from ...errors import ParameterError
 from ..description import controller_text
 from .c_check import check_code
-from .c_parts import feedforward_table, parts_of, shape_of
+from .c_parts import parts_of, shape_of
 from .c_text import (
     Operations,
     constant_text,
@@ -93,6 +93,7 @@ def c_sources(
     name: str,
     *,
     single: bool = False,
+    table: list[float] | None = None,
     reference: Reference | None = None,
 ) -> Sources:
     """Write a controller in C99.
@@ -105,8 +106,10 @@ def c_sources(
         With which functions and files begin.
     single : bool, optional
         Numbers are floats, not doubles.
+    table : list of float, optional
+        One period of the feedforward, which is played from it.
     reference : Reference, optional
-        Motion that repeats, for which the feedforward is played from a table of one period.
+        What the table was made for, for the test vectors.
 
     Returns
     -------
@@ -119,7 +122,6 @@ def c_sources(
         A part of the controller has no form in C; a number is none that a float can have.
     """
     checked_name(name)
-    table = feedforward_table(controller, reference)
     shape = shape_of(controller, table)
     parts = parts_of(controller, table, single=single)
     fields = [field for one in parts for field in one.fields]

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from ..._support.arrays import signal_of
 from ..._support.units import of_drive
-from ...errors import ParameterError
+from ...errors import DataError, ParameterError, ShapeError
 from ..checks import check_period
 from ..components import Pid, StateSpace
 from ..hysteresis_observer import HysteresisObserver
@@ -17,6 +20,8 @@ from .c_repetitive import repetitive
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import ArrayLike
+
     from ...references.reference import Reference
     from ..controller import Controller
     from .c_text import Part
@@ -24,6 +29,8 @@ if TYPE_CHECKING:
 __all__ = ["coefficients_of", "feedforward_table", "parts_of", "shape_of"]
 
 Numbers = dict[str, Any]
+# Longest table: its text has 50 bytes a sample.
+MOST_SAMPLES = 1_000_000
 
 
 def coefficients_of(controller: Controller) -> Numbers:
@@ -37,15 +44,19 @@ def coefficients_of(controller: Controller) -> Numbers:
     return found
 
 
-def feedforward_table(controller: Controller, reference: Reference | None) -> list[float] | None:
-    """Compute one settled period of the feedforward; None without a reference.
+def feedforward_table(
+    controller: Controller, reference: Reference | None, given: ArrayLike | None = None
+) -> list[float] | None:
+    """Return one period of the feedforward: that which is given, or the inverse's; None for none.
 
     Parameters
     ----------
     controller : Controller
         The controller.
     reference : Reference or None
-        What the table is for.
+        Motion for which the inverse makes it, settled.
+    given : array_like, shape (n,), optional
+        The voltages themselves, in the unit of the drive.
 
     Returns
     -------
@@ -56,8 +67,14 @@ def feedforward_table(controller: Controller, reference: Reference | None) -> li
     ------
     ParameterError
         The controller has no feedforward, the reference has no whole period, or not that of the
-        repetitive part.
+        repetitive part; both are given.
+    DataError, ShapeError
+        What is given is no table for these limits.
     """
+    if given is not None:
+        if reference is not None:
+            raise ParameterError("reference is given beside table: expected one of them")
+        return _given_table(controller, given)
     if reference is None:
         return None
     if controller.feedforward is None:
@@ -76,6 +93,29 @@ def feedforward_table(controller: Controller, reference: Reference | None) -> li
         )
     check_period(controller, reference)
     table = controller.feedforward.table(reference, controller.dt, limits=controller.limits)
+    return [float(one) for one in table]
+
+
+def _given_table(controller: Controller, given: ArrayLike) -> list[float]:
+    """Check a table of the caller's."""
+    table = signal_of("table", given)
+    low, high = controller.limits
+    if not 1 <= table.size <= MOST_SAMPLES:
+        raise ShapeError(f"table has {table.size} samples: expected 1 to {MOST_SAMPLES}")
+    far = np.flatnonzero((table < low) | (table > high))
+    if far.size:
+        unit = controller.drive_unit
+        raise DataError(
+            f"table[{far[0]}] is {table[far[0]]:g} {unit}: expected voltages within the limits, "
+            f"{low:g} to {high:g} {unit}"
+        )
+    if controller.repetitive is not None:
+        turns = controller.repetitive.period / (table.size * controller.dt)
+        if abs(turns - max(1, round(turns))) > 1e-6 * turns:
+            raise ParameterError(
+                f"repetitive has a period of {controller.repetitive.period:g} s: expected that of "
+                f"the table, {table.size * controller.dt:g} s, or a multiple"
+            )
     return [float(one) for one in table]
 
 

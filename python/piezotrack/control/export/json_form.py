@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ... import _core
-from .c_parts import coefficients_of, feedforward_table, shape_of
+from .c_parts import coefficients_of, shape_of
 
 if TYPE_CHECKING:
-    from ...references.reference import Reference
     from ..controller import Controller
 
 __all__ = ["coefficients_document"]
@@ -19,7 +18,7 @@ DAHL = ("pole", "fresh", "correction", "a1", "a2", "gain", "longest")
 
 
 def coefficients_document(
-    controller: Controller, reference: Reference | None = None
+    controller: Controller, table: list[float] | None = None
 ) -> dict[str, Any]:
     """Write the coefficients of a controller: biquads, state space, taps.
 
@@ -27,8 +26,8 @@ def coefficients_document(
     ----------
     controller : Controller
         The controller.
-    reference : Reference, optional
-        Motion that repeats, for a table of the feedforward.
+    table : list of float, optional
+        One period of the feedforward.
 
     Returns
     -------
@@ -40,7 +39,6 @@ def coefficients_document(
     ParameterError
         The feedback law is not made of coefficients.
     """
-    table = feedforward_table(controller, reference)
     # A feedforward without a table is left out: its inverse is not linear.
     laws = shape_of(controller, table if controller.feedforward is None else table or [])
     numbers, unit = coefficients_of(controller), controller.drive_unit

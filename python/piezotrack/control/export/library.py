@@ -11,7 +11,6 @@ from ..description import controller_text
 from ..neural_network import NETWORK, NetworkInverse
 from .c99 import checked_name
 from .c_check import check_code
-from .c_parts import feedforward_table
 from .c_text import literal, named
 from .vectors import rows_of, vectors_text
 
@@ -28,7 +27,11 @@ IN_A_LINE = 2
 
 
 def library_sources(
-    controller: Controller, name: str, *, reference: Reference | None = None
+    controller: Controller,
+    name: str,
+    *,
+    table: list[float] | None = None,
+    reference: Reference | None = None,
 ) -> dict[str, str]:
     """Write the settings of a controller for the C library.
 
@@ -38,8 +41,10 @@ def library_sources(
         The controller; every one has this form.
     name : str
         With which functions and files begin.
+    table : list of float, optional
+        One period of the feedforward, which is played from it.
     reference : Reference, optional
-        Motion that repeats, for which the feedforward is played from a table of one period.
+        What the table was made for, for the test vectors.
 
     Returns
     -------
@@ -49,10 +54,9 @@ def library_sources(
     Raises
     ------
     ParameterError
-        `name` is no identifier of C, or the controller has no table for the reference.
+        `name` is no identifier of C.
     """
     checked_name(name)
-    table = feedforward_table(controller, reference)
     forward = "given" if controller.feedforward is None else "online"
     forward = forward if table is None else "table"
     facts = "\n".join(

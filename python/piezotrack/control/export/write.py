@@ -11,6 +11,7 @@ from ...errors import ParameterError
 from ...references.reference import Reference
 from ..controller import Controller
 from .c99 import c_sources, checked_name
+from .c_parts import feedforward_table
 from .fmu import compiler, fmu_bytes
 from .json_form import coefficients_document
 from .library import library_sources
@@ -18,6 +19,8 @@ from .library import library_sources
 if TYPE_CHECKING:
     import os
     from pathlib import Path
+
+    from numpy.typing import ArrayLike
 
 __all__ = ["Exported", "export_controller", "export_files"]
 
@@ -82,6 +85,7 @@ def export_controller(
     name: str = "controller",
     single: bool = False,
     reference: Reference | None = None,
+    table: ArrayLike | None = None,
 ) -> Exported:
     """Write a controller for firmware or for another program.
 
@@ -107,6 +111,9 @@ def export_controller(
     reference : Reference, optional
         Motion that repeats: the feedforward is then played from a table of one settled period.
         C99 and FMU need it for every feedforward other than that of a Dahl stage.
+    table : array_like, shape (n,), optional
+        One period of a feedforward of your own, as `Learning.table`, in the unit of the drive: a
+        sample for each interval of the controller. It takes the place of the controller's own.
 
     Returns
     -------
@@ -119,7 +126,9 @@ def export_controller(
         A part of the controller has no such form; the message names it. A unit is asked for
         where there is no C compiler, or not on Linux, x86-64.
     DataError
-        A file cannot be written.
+        A file cannot be written; `table` has a voltage that is not finite or beyond the limits.
+    ShapeError
+        `table` is no table.
 
     Examples
     --------
@@ -135,10 +144,11 @@ def export_controller(
             f"reference is {type(reference).__name__}: expected a Reference, as pt.sine(...)"
         )
     names = export_files(to, name)
+    played = feedforward_table(controller, reference, table)
     if to == "json":
         if single:
             raise ParameterError("single is True with to='json': expected False, JSON has doubles")
-        document = coefficients_document(controller, reference)
+        document = coefficients_document(controller, played)
         path = write_document(make_folder(folder) / names[0], document)
         return Exported(files=(path,), to=to)
     if to == "library":
@@ -146,12 +156,12 @@ def export_controller(
             raise ParameterError(
                 "single is True with to='library': expected False, the library has doubles"
             )
-        texts = library_sources(controller, name, reference=reference)
+        texts = library_sources(controller, name, table=played, reference=reference)
         paths = _written({key: text.encode() for key, text in texts.items()}, folder)
         return Exported(files=paths, to=to, bound=0.0)
     if to == "fmu":
         compiler()
-    sources = c_sources(controller, name, single=single, reference=reference)
+    sources = c_sources(controller, name, single=single, table=played, reference=reference)
     files = {key: text.encode() for key, text in sources.files.items()}
     if to == "fmu":
         files = {names[0]: fmu_bytes(controller, sources)}

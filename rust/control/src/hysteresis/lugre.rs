@@ -71,6 +71,13 @@ struct Leg<N> {
     accelerations: [N; 2],
 }
 
+impl<N> Leg<N> {
+    #[inline(always)]
+    fn new(direction: N, ways: [N; 2], squares: [N; 2], accelerations: [N; 2]) -> Self {
+        Self { direction, ways, squares, accelerations }
+    }
+}
+
 /// Terms of the series below: the next is below 0.5^12 / 15! = 2e-16.
 const TERMS: usize = 12;
 
@@ -78,9 +85,20 @@ const TERMS: usize = 12;
 const SHORT: f64 = 0.5;
 
 impl<N: Number> LuGre<N> {
+    /// Whether the limit depends on the speed, in any lane.
+    #[inline(always)]
+    fn falls(&self) -> bool {
+        (self.coulomb_force - self.static_force).any_negative()
+            || (self.static_force - self.coulomb_force).any_negative()
+    }
+
     /// g at the square of a speed.
     #[inline(always)]
     pub fn limit(&self, square: N) -> N {
+        if !self.falls() {
+            // As the formula gives it, to the last bit.
+            return self.static_force;
+        }
         let fall = decay(square / (self.stribeck_velocity * self.stribeck_velocity));
         (self.static_force - self.coulomb_force).mul_add(fall, self.static_force)
     }
@@ -90,6 +108,9 @@ impl<N: Number> LuGre<N> {
     #[inline(always)]
     pub fn along(&self, z: N, length: N, squares: [N; 3]) -> N {
         let number = |value: f64| z.like(value);
+        if !self.falls() {
+            return self.along_constant(z, length);
+        }
         let [start, middle, end] = squares;
         let limits = [self.limit(start), self.limit(middle), self.limit(end)];
         let [first, second, third] = [
@@ -114,6 +135,18 @@ impl<N: Number> LuGre<N> {
         (z - first).mul_add(change, z) + driven
     }
 
+    /// The same where the limit does not depend on the speed, operation by operation: what the
+    /// other lanes hold must not show in the bits of one.
+    #[inline(always)]
+    fn along_constant(&self, z: N, length: N) -> N {
+        let number = |value: f64| z.like(value);
+        let limit = self.static_force / self.rest_stiffness;
+        let part = number(1.0) / limit;
+        let sum = part.mul_add(number(4.0), part + part);
+        let path = length * sum * number(1.0 / 6.0);
+        (z - limit).mul_add(decay(path), z) + number(0.0)
+    }
+
     /// Deflection where a motion ends, through the reversals within it, from the deflection `z` on:
     /// between the `ends`, displacement and velocity per interval, with the velocity of the cubic
     /// through them; `rate` is the number of intervals in a second.
@@ -127,13 +160,12 @@ impl<N: Number> LuGre<N> {
     ) -> N {
         let (zero, one) = (z.like(0.0), z.like(1.0));
         let direction = velocity.direction;
-        let acceleration = |s: N| direction * (velocity.a + velocity.a).mul_add(s, velocity.b);
         let (start, end) = (w0 * w0, w1 * w1);
         let turned = direction * w1;
         let dips = turned.where_negative(one, velocity.dips());
         if !turned.any_negative() && !dips.any_negative() {
-            let accelerations = [acceleration(zero), acceleration(one)];
-            let leg = Leg { direction, ways: [x0, x1], squares: [start, end], accelerations };
+            let accelerations = [acceleration(velocity, zero), acceleration(velocity, one)];
+            let leg = Leg::new(direction, [x0, x1], [start, end], accelerations);
             return self.leg(z, &leg, rate);
         }
         // Lanes without a reversal go to the end at once; their further legs have length 0.
@@ -145,17 +177,13 @@ impl<N: Number> LuGre<N> {
         let coming = dips.where_negative(between(x0, w0, x1, w1, second), x1);
         let late = dips.where_negative(zero, end);
         let still = turned.where_negative(zero, late);
-        let bends = [zero, first, second, one].map(acceleration);
-        let legs = [
-            (direction, [x0, turning], [start, still], [bends[0], bends[1]]),
-            (-direction, [turning, coming], [still, late], [bends[1], bends[2]]),
-            (direction, [coming, x1], [late, end], [bends[2], bends[3]]),
-        ];
-        let mut z = z;
-        for (direction, ways, squares, accelerations) in legs {
-            z = self.leg(z, &Leg { direction, ways, squares, accelerations }, rate);
-        }
-        z
+        // No closure, as of `map`: it would not be compiled for the vector instructions of its caller.
+        let [a0, a1] = [acceleration(velocity, zero), acceleration(velocity, first)];
+        let [a2, a3] = [acceleration(velocity, second), acceleration(velocity, one)];
+        let there = Leg::new(direction, [x0, turning], [start, still], [a0, a1]);
+        let back = Leg::new(-direction, [turning, coming], [still, late], [a1, a2]);
+        let on = Leg::new(direction, [coming, x1], [late, end], [a2, a3]);
+        self.leg(self.leg(self.leg(z, &there, rate), &back, rate), &on, rate)
     }
 
     /// The deflection after a leg.
@@ -214,6 +242,12 @@ fn means<N: Number>(q: N, change: N) -> [N; 2] {
     let far_linear = number(1.0) + change / q;
     let far_square = number(1.0) - far_linear * number(2.0) / q;
     [short.where_negative(linear, far_linear), short.where_negative(square, far_square)]
+}
+
+/// Acceleration along the direction of motion, a part `s` of a step after its beginning.
+#[inline(always)]
+fn acceleration<N: Number>(velocity: &CubicVelocity<N>, s: N) -> N {
+    velocity.direction * (velocity.a + velocity.a).mul_add(s, velocity.b)
 }
 
 #[inline(always)]

@@ -176,7 +176,10 @@ pub(super) fn advance_operator<N: Number, O: Operator<N>>(
     let dips = turned.where_negative(x.like(1.0), velocity.dips());
     if dips.any_negative() {
         // Lanes without a leg go to its end before; it then has length 0.
-        let [first, second] = velocity.dip().map(|part| between(from.x, from.w, x, w, part));
+        // No closure, as of `map`: it would not be compiled for the vector instructions of its caller.
+        let [first, second] = velocity.dip();
+        let first = between(from.x, from.w, x, w, first);
+        let second = between(from.x, from.w, x, w, second);
         let first = dips.where_negative(first, x);
         let first = turned.where_negative(turning_point(from, x, w), first);
         let second = dips.where_negative(second, x);
