@@ -110,6 +110,14 @@ def test_a_way_from_rest_that_the_memory_does_not_hold_is_refused_at_once(ramp: 
         pt.measure(device(), "sine:1Hz,0..75V", rate=1000.0, ramp=ramp)
 
 
+@pytest.mark.parametrize("lead_in", [-1.0, 3601.0, 1e300, np.nan])
+def test_a_time_at_rest_that_cannot_be_meant_is_refused(lead_in: float) -> None:
+    with pytest.raises(
+        pt.ParameterError, match="lead_in is .*: expected a finite number from 0 to"
+    ):
+        pt.measure(device(), "sine:1Hz,0..75V,1s", rate=100.0, lead_in=lead_in)
+
+
 def test_a_drive_beyond_the_limits_is_clipped_where_that_is_asked() -> None:
     log = pt.measure(device(), "sine:1Hz,-10..80V,1s", rate=100.0, clip=True)
     assert (log.u.min(), log.u.max()) == (0.0, 75.0)

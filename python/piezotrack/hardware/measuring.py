@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from .._support.arguments import finite, not_negative, plain
+from .._support.arguments import finite, in_range, not_negative, plain
 from .._support.arrays import signal_of
 from ..data.dataset import Dataset
 from ..data.dataset_arguments import MIN_SAMPLES
@@ -36,6 +36,8 @@ __all__ = [
 RAMP = 0.5
 # Largest share of samples without a reading that is filled in.
 MOST_LOST = 0.01
+# Longest time at rest before a record [s].
+MOST_LEAD_IN = 3600.0
 
 
 def check_device(device: object) -> None:
@@ -181,7 +183,7 @@ def measure(
     ramp : float, optional
         Length of the way from rest and back [s].
     lead_in : float, optional
-        How long the output is held at rest before the record begins [s].
+        How long the output is held at rest before the record begins [s]; an hour at most.
     clip : bool, optional
         Whether a drive beyond the limits is clipped to them, before it reaches the device; refused
         by default. The log has the clipped voltage.
@@ -234,9 +236,10 @@ def measure(
         notes = (*notes, f"drive: {beyond} samples clipped to {plain(low)} and {plain(high)} V")
     check_table(device, "drive", volts)
     home = rest_of(device, rest)
+    lead_in = in_range("lead_in", lead_in, MOST_LEAD_IN, "s")
     table, first = ramped(device, "drive", volts, home, exact, not_negative("ramp", ramp, "s"))
     with led_back(device, home):
-        record = play_table(device, table, exact, not_negative("lead_in", lead_in, "s"))
+        record = play_table(device, table, exact, lead_in)
     y, more = filled(record)
     log = Dataset(
         u=record.volts,
