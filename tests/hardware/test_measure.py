@@ -113,7 +113,7 @@ def test_a_way_from_rest_that_the_memory_does_not_hold_is_refused_at_once(ramp: 
 @pytest.mark.parametrize("lead_in", [-1.0, 3601.0, 1e300, np.nan])
 def test_a_time_at_rest_that_cannot_be_meant_is_refused(lead_in: float) -> None:
     with pytest.raises(
-        pt.ParameterError, match="lead_in is .*: expected a finite number from 0 to"
+        pt.ParameterError, match=r"lead_in is .*: expected a finite number from 0 to"
     ):
         pt.measure(device(), "sine:1Hz,0..75V,1s", rate=100.0, lead_in=lead_in)
 
