@@ -9,7 +9,9 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import inspect
+import json
 import re
+import tempfile
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -54,6 +56,14 @@ class Taker(NamedTuple):
     scale: float = 1.0
 
 
+def exported(table: Any) -> Any:
+    """The table of a feedforward as a file has it."""
+    loop = pt.Controller(dt=DT, limits=(-1e9, 1e9))
+    with tempfile.TemporaryDirectory() as folder:
+        done = pt.control.export_controller(loop, folder, to="json", table=table)
+        return json.loads(done.files[0].read_text(encoding="utf-8"))["feedforward_table_V"]
+
+
 TAKERS: dict[str, Taker] = {
     **{
         f"{name}.simulate": Taker(lambda u, stage=stage: stage.simulate(u, DT, accuracy=1e-7))
@@ -66,6 +76,7 @@ TAKERS: dict[str, Taker] = {
     "measure": Taker(
         lambda u: pt.measure(pt.hardware.VirtualDevice(VIRTUAL, limits=(-1e9, 1e9)), u, 1.0 / DT).y
     ),
+    "control.export_controller": Taker(exported),
     "VirtualStage.record": Taker(lambda u: VIRTUAL.record(u, DT).y),
     "XYStage.simulate": Taker(lambda u, w: XY.simulate(u, w, DT), arrays=2),
     "XYStage.record": Taker(lambda u, w: XY.record(u, w, DT).y.y, arrays=2),
