@@ -62,6 +62,26 @@ def errors_of(lines: list[str]) -> list[float]:
     return [float(line.split()[1]) for line in lines if line.split()[:1][0].isdecimal()]
 
 
+def test_a_loop_that_fails_says_where_its_beginning_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the first period of the reference, of which nothing would count in a whole run."""
+    loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.from_um(kp=0.02, ti=0.06))
+    loop.save("loop.json")
+    readings = [0]
+
+    class Lost(VirtualDevice):
+        def exchange(self, volts: float) -> float:
+            readings[0] += 1
+            if readings[0] == 1000:
+                raise pt.DeviceError("the connection was lost")
+            return super().exchange(volts)
+
+    use(monkeypatch, Lost(pt.VirtualStage.of(PLAYS, limits=(0.0, 75.0))))
+    motion = ("--reference", "sine:0.2Hz,20..60um,20s")
+    said = refusal("track", "loop.json", "--device", "virtual:", *motion, "--out", "tk")
+    assert "the connection was lost; what was tracked up to then is in tk" in said
+    assert names("tk") == ["tracking.csv", "tracking.json", "tracking.png", "tracking.svg"]
+
+
 def test_a_line_of_a_raster_is_learnt_on_a_device_and_the_table_follows_it() -> None:
     printed = ran(*LEARN, *VIRTUAL, "--trials", "6", "-o", "out/line.csv", "--picture")
     assert names("out") == ["line.csv", "line.png", "line.svg"]

@@ -206,11 +206,38 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
         "span is -1e-6 m: expected an upper end",
     ),
     "span in um": ({"span_low": 0.0, "span_high": 80.0}, "span is 80 m: expected a displacement"),
-    "no such law": ({"law": numbers("pdi", 1.0)}, "law is 'pdi' with 1 numbers: expected the name"),
+    "no such law": (
+        {"law": numbers("pdi", 1.0)},
+        "law is 'pdi' with 1 numbers: expected 'pid' with 4",
+    ),
     "too few numbers": ({"law": numbers("pid", 1.0, 2.0)}, "law is 'pid' with 2 numbers"),
     "a state too many": (
         {"law": numbers("state space", 1e300, 1.0)},
         "law is state space with 2 numbers: expected the number of states n",
+    ),
+    "numbers without a name": (
+        {"law": numbers(None, 1.0)},
+        "law.name is NULL: expected a name, as there are 1 values",
+    ),
+    "a part of a state": (
+        {"law": numbers("state space", 1.5, 1.0)},
+        "state space, n is 1.5: expected a whole number from 1 on",
+    ),
+    "no truth value": (
+        {"repetitive": numbers("lag", 1.0, 3e5, 0.1, 0.99, 0.0, 7.0)},
+        "pause is 7.0: expected 0 or 1",
+    ),
+    "a lead without end": (
+        {"repetitive": numbers("lag", 1.0, 3e5, 0.1, 0.99, 1e18, 1.0)},
+        "lead is 1e18: expected a whole number from 0 on",
+    ),
+    "a grid without numbers": (
+        {"law": numbers("scheduled pid", 2.0)},
+        "scheduled pid with 1 numbers: expected two counts",
+    ),
+    "a name that moves the cursor": (
+        {"law": numbers("p\x1b[2Jid", 1.0)},
+        "law.name is no text: expected a name in UTF-8, without control characters",
     ),
     "numbers that are not there": ({"law": Numbers(b"pid", None, 4)}, "law.values is NULL"),
     "a name that is no text": (
@@ -221,7 +248,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
         {"repetitive": numbers("box", 1.0, 1e5, 1.0, 0.99, 0.0, 1.0)},
         "smoothing is 'box': expected 'lag'",
     ),
-    "no such model": ({"model": b"dhal"}, "'dhal'"),
+    "no such model": ({"model": b"dhal"}, ", or neural network"),
     "a parameter is missing": ({"model": b"dahl"}, "missing: expected a value"),
     "filters that are not there": ({"filter_count": 2}, "filters is NULL: expected 2 elements"),
 }

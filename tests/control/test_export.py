@@ -367,6 +367,8 @@ NO_FORM: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
     ),
     "name": ({}, {"name": "1axis"}, "name is '1axis': expected a letter"),
     "name inside": ({}, {"name": "pid"}, "name is 'pid', as functions inside"),
+    "name of the harness": ({}, {"name": "check"}, "name is 'check', as a file or function beside"),
+    "name of the library": ({}, {"name": "piezotrack"}, "name is 'piezotrack', as a file or"),
     "form": ({}, {"to": "cobol"}, "to is 'cobol': expected one of 'c99', 'library', 'json', 'fmu'"),
     "float": (
         {"feedback": pt.control.StateSpace([[1e60]], [1.0], [1.0])},
@@ -430,6 +432,13 @@ def test_what_has_no_form_is_refused(name: str, tmp_path: Path) -> None:
 
 
 # Coefficients.
+
+
+def test_coefficients_without_their_feedforward_say_so(tmp_path: Path) -> None:
+    one = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=PLAYS.inverse(), feedback=PI)
+    said = str(export(one, tmp_path, to="json"))
+    assert said.startswith("coefficients; without the feedforward")
+    assert str(export(one, tmp_path, to="json", reference=SINE)) == "coefficients"
 
 
 def test_the_biquads_and_matrices_are_those_of_the_step(tmp_path: Path) -> None:

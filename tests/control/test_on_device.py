@@ -256,6 +256,10 @@ def test_a_fault_of_the_device_ends_the_loop_safe(
     # What was tracked before the fault is kept.
     assert caught.value.partial is not None
     assert 2 <= caught.value.partial.t.size < 75
+    # It ends before the period that counts in a whole run, and can be read all the same.
+    assert caught.value.partial.settled == 0.0
+    assert "Tracking" in repr(caught.value.partial)
+    assert caught.value.partial.summary()
 
 
 class Hanging(VirtualDevice):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -108,6 +108,52 @@ def test_what_is_asked_wrongly_is_refused_before_it_goes_out(
 def test_a_way_from_rest_that_the_memory_does_not_hold_is_refused_at_once(ramp: float) -> None:
     with pytest.raises(pt.ParameterError, match=r"ramp is 1\S+ s: expected at most 10000 s"):
         pt.measure(device(), "sine:1Hz,0..75V", rate=1000.0, ramp=ramp)
+
+
+def test_a_virtual_stage_that_was_left_alone_for_a_day_answers() -> None:
+    now = [0.0]
+    used = device(clock=lambda: now[0])
+    used.hold(30.0)
+    now[0] = 86_400.0
+    before = used.exchange(30.0)
+    now[0] += 1e-3
+    assert used.exchange(30.0) == pytest.approx(before, abs=1e-9)
+    assert before > 20e-6
+
+
+class Failing(pt.hardware.VirtualDevice):
+    """Fails at 60 V in a table, and says at which voltage its output is, or does not."""
+
+    def __init__(self, voltage: float | None) -> None:
+        super().__init__(pt.VirtualStage.of(PLAYS), limits=(0.0, 75.0))
+        self.went: list[float] = []
+        if voltage is not None:
+            self.voltage = voltage
+
+    def play(self, volts: Array, rate: float, *, lead_in: float = 0.0) -> Record:
+        del volts, rate, lead_in
+        super().hold(60.0)
+        raise pt.DeviceError("it failed")
+
+    def hold(self, volts: float) -> None:
+        super().hold(volts)
+        self.went.append(volts)
+
+
+@pytest.mark.parametrize("says", [60.0, None, np.nan])
+def test_after_a_failure_the_output_is_led_down_slowly_where_it_is_known(says: Any) -> None:
+    used = Failing(says)
+    with pytest.raises(pt.DeviceError, match="it failed"):
+        pt.measure(used, "sine:1Hz,0..75V,1s", rate=100.0)
+    if says is None or np.isnan(says):
+        assert used.went == [0.0]
+        return
+    steps = np.diff([60.0, *used.went])
+    assert used.went[-1] == 0.0
+    assert len(steps) > 20
+    assert np.all(steps <= 0.0)
+    # No jump, however busy the machine is: a step in one go would be 60 V.
+    assert np.abs(steps).max() < 30.0
 
 
 @pytest.mark.parametrize("lead_in", [-1.0, 3601.0, 1e300, np.nan])

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+from ..errors import Interrupted, PiezotrackError
+from .interruption import heard
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from ..errors import DataError, DeviceError
     from ..hardware.device import Device
 
-__all__ = ["DeviceAddress", "Rest", "connected"]
+__all__ = ["DeviceAddress", "Rest", "connected", "with_what_is_kept"]
 
 DeviceAddress = Annotated[
     str,
@@ -29,6 +33,27 @@ Rest = Annotated[
         show_default=False,
     ),
 ]
+
+
+def with_what_is_kept(
+    error: DeviceError | DataError | Interrupted, what: str, write: Callable[[Any], str]
+) -> BaseException:
+    """Write what an error has of a run, and return an error that says where it is.
+
+    `write` writes what is `partial`, and returns the words that follow the error's own; `what` was
+    done, for words where it cannot be written.
+    """
+    if isinstance(error, Interrupted):
+        heard()
+    if error.partial is None:
+        return error
+    try:
+        kept = write(error.partial)
+    except (PiezotrackError, OSError) as failed:
+        # Where the output may be is said first.
+        kept = f"what was {what} is lost: {failed}"
+    words = f"{error}; {kept}"
+    return KeyboardInterrupt(words) if isinstance(error, Interrupted) else type(error)(words)
 
 
 @contextmanager

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from ..errors import DataError, DeviceError, Interrupted, ParameterError, PiezotrackError
-from .devices import Rest, connected
+from ..errors import DataError, DeviceError, Interrupted, ParameterError
+from .devices import Rest, connected, with_what_is_kept
 from .error_messages import in_words
-from .interruption import heard
 from .loop_options import (
     PAPER,
     AmplifierBandwidth,
@@ -171,7 +170,9 @@ def learn_command(
                 progress=None if json or quiet else _show,
             )
     except (DeviceError, DataError, Interrupted) as error:
-        raise _with_what_was_learnt(error, out, picture) from None
+        raise with_what_is_kept(
+            error, "learnt", lambda learnt: _kept(learnt, out, picture)
+        ) from None
     words = _outcome(found) if device is None else f"{_outcome(found)}\n{found.final.note}"
     result.show(words, _document(found), _write(found, out, picture))
 
@@ -223,22 +224,10 @@ def _write(found: Learning, out: Path, picture: bool) -> list[Path]:
     return written
 
 
-def _with_what_was_learnt(
-    error: DeviceError | DataError | Interrupted, out: Path, picture: bool
-) -> BaseException:
-    """Write what was learnt before an error, and return an error that says where it is."""
-    if isinstance(error, Interrupted):
-        heard()
-    if error.partial is None:
-        return error
-    try:
-        table, *_ = _write(error.partial, out, picture)
-        kept = f"the best table so far, of trial {error.partial.best}, is in {table}"
-    except (PiezotrackError, OSError) as failed:
-        # Where the output may be is said first.
-        kept = f"what was learnt is lost: {failed}"
-    words = f"{error}; {kept}"
-    return KeyboardInterrupt(words) if isinstance(error, Interrupted) else type(error)(words)
+def _kept(learnt: Learning, out: Path, picture: bool) -> str:
+    """Write what was learnt before an error, and say where."""
+    table, *_ = _write(learnt, out, picture)
+    return f"the best table so far, of trial {learnt.best}, is in {table}"
 
 
 def _show(learner: IterativeLearning) -> None:

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ..errors import DeviceError, Interrupted, ParameterError
-from .devices import connected
+from .devices import connected, with_what_is_kept
 from .error_messages import in_words
-from .interruption import heard
 from .loop_options import (
     MODEL,
     NO_FEEDBACK,
@@ -237,11 +236,14 @@ def _on_device(
         try:
             run = track(used, loop, desired, beyond_reach=beyond_reach, unstable=unstable)
         except (DeviceError, Interrupted) as error:
-            heard()
-            if error.partial is not None:
-                document = tracking_document(error.partial, None, loop, [f"ended: {error}"])
-                write_tracking(error.partial, document, result.out)
-            raise
+            ended = f"ended: {error}"
+
+            def write(run: Tracking) -> str:
+                document = tracking_document(run, None, loop, [ended])
+                table, *_ = write_tracking(run, document, result.out)
+                return f"what was tracked up to then is in {table.parent}"
+
+            raise with_what_is_kept(error, "tracked", write) from None
     document = tracking_document(run, None, loop, [])
     result.show(run.summary(), document, write_tracking(run, document, result.out))
 

@@ -127,7 +127,9 @@ class Tracking:
         After the smooth start; of a reference that repeats, from the first whole period after it
         if there is one. 0 where the smooth start lasts to the end.
         """
-        return settled_from(self.reference, float(self.t[-1]))
+        first = settled_from(self.reference, float(self.t[-1]))
+        # A run that was ended before counts as a whole.
+        return first if first < self.t[-1] - 1e-9 else 0.0
 
     @cached_property
     def metrics(self) -> Metrics:
@@ -153,10 +155,16 @@ class Tracking:
         """
         part = self.part(self.t, start, stop)
         actual = self.displacement if true else self.measured
+        # A device may have no reading at a sample.
+        read = part & np.isfinite(actual)
+        whole = bool(read.sum() == part.sum())
+        part = read if read.sum() >= 2 else part
         dt, period = self.controller.dt, self.reference.period
         # A phase needs a whole period, and more than two samples of it.
         frequency = None if period is None else 1.0 / period
-        if frequency and not (part.sum() * dt * frequency >= 0.999 and frequency * dt < 0.5):
+        if frequency and not (
+            whole and part.sum() * dt * frequency >= 0.999 and frequency * dt < 0.5
+        ):
             frequency = None
         return _metrics(_core.tracking_metrics(self.desired[part], actual[part], dt, frequency))
 

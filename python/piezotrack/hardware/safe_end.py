@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import threading
+import time
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -16,6 +18,9 @@ if TYPE_CHECKING:
     from .device import Device
 
 __all__ = ["led_back", "terminated"]
+
+# Time that the way to a safe voltage takes [s], and between two of its steps.
+RAMP, PAUSE = 0.5, 0.002
 
 
 @contextmanager
@@ -39,7 +44,10 @@ def terminated() -> Iterator[None]:
 
 @contextmanager
 def led_back(device: Device, home: float) -> Iterator[None]:
-    """Put the output to a voltage [V] where what is played fails or is interrupted."""
+    """Lead the output to a voltage [V] where what is played fails or is interrupted.
+
+    In half a second where the device has `voltage`, that which is there [V]; in one step otherwise.
+    """
     with terminated():
         try:
             yield
@@ -49,8 +57,13 @@ def led_back(device: Device, home: float) -> Iterator[None]:
 
 
 def _lead_back(device: Device, home: float, error: BaseException) -> None:
-    problem: BaseException | None = None
-    # Twice: a connection may have to be made anew first, and Ctrl-C may come again.
+    try:
+        _ramp(device, home)
+        return
+    # Where that does not work, or Ctrl-C comes again: at once.
+    except (Exception, KeyboardInterrupt) as failed:
+        problem: BaseException = failed
+    # Twice: a connection may have to be made anew first.
     for _ in range(2):
         try:
             device.hold(home)
@@ -61,6 +74,21 @@ def _lead_back(device: Device, home: float, error: BaseException) -> None:
         f"{_words(error)}; the output could not be led to {home:g} V ({_words(problem)}): it may "
         "be anywhere in the table"
     ) from error
+
+
+def _ramp(device: Device, home: float) -> None:
+    """Lead the output to a voltage [V] slowly, from that which the device says is there."""
+    present = getattr(device, "voltage", math.nan)
+    if not (isinstance(present, float) and math.isfinite(present)):
+        device.hold(home)
+        return
+    low, high = device.limits
+    begin, begun = min(max(present, low), high), time.perf_counter()
+    while (share := (time.perf_counter() - begun) / RAMP) < 1.0:
+        # Between two voltages within the limits, whatever the rounding.
+        device.hold(min(max(begin + (home - begin) * share, low), high))
+        time.sleep(PAUSE)
+    device.hold(home)
 
 
 def _words(error: BaseException | None) -> str:

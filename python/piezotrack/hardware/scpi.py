@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from string import Formatter
 from typing import TYPE_CHECKING
@@ -169,7 +170,7 @@ class ScpiDevice:
         _check_template("exchange", exchange, needed="volts")
         self._exchange, self._buffer, self._errors = exchange, buffer, errors
         self._link = Link(host, port, positive("timeout", timeout, "s"))
-        self._open = True
+        self._open, self._voltage = True, math.nan
         try:
             self._name = self._link.ask(identify) if identify else "instrument"
         except BaseException:
@@ -196,6 +197,11 @@ class ScpiDevice:
         """Name and place of the instrument."""
         return (f"{self._name[:60]} at {self._link.where}",)
 
+    @property
+    def voltage(self) -> float:
+        """Voltage that was put out last [V]; NaN from the start of a buffer to its end."""
+        return self._voltage
+
     def exchange(self, volts: float) -> float:
         """Put out a voltage [V] and read the displacement [m], in one message.
 
@@ -203,6 +209,7 @@ class ScpiDevice:
         """
         self._check(finite("volts", volts, "V"))
         message = self._exchange.format(volts=volts)
+        self._voltage = float(volts)
         return self._number(message, self._link.ask(message))
 
     def play(self, volts: Array, rate: float, *, lead_in: float = 0.0) -> Record:
@@ -234,12 +241,15 @@ class ScpiDevice:
             return play_paced(self.exchange, table, rate, lead_in=lead_in, channels=self.channels)
         before = round(not_negative("lead_in", lead_in, "s") * rate)
         whole = np.concatenate([np.full(before, table[0]), table])
+        self._voltage = math.nan
         y = self._play_buffered(self._buffer, whole, rate)
+        self._voltage = float(table[-1])
         return Record(volts=table, displacement=y[before:], rate=rate, channels=self.channels)
 
     def hold(self, volts: float) -> None:
         """Put out a constant voltage [V] from now on; what the sensor says does not matter."""
         self._check(finite("volts", volts, "V"))
+        self._voltage = float(volts)
         self._link.ask(self._exchange.format(volts=volts))
         self._check_errors()
 

@@ -30,6 +30,8 @@ RATES = Rates(lowest=0.1, highest=100e3)
 MEMORY = 10_000_000
 # Shortest time between two exchanges that is simulated [s].
 INSTANT = 1e-6
+# Longest time between two exchanges that is simulated, in steps of the stage.
+LONGEST_IDLE = 2e6
 
 
 class VirtualDevice:
@@ -79,7 +81,7 @@ class VirtualDevice:
         self._limits = ordered("limits", stage.amplifier.limits if limits is None else limits)
         self._rates, self._memory = rates, _core.as_count("memory", memory)
         self._clock = clock
-        self._run = _core.VirtualRun(stage._core)
+        self._run, self._step = _core.VirtualRun(stage._core), stage.step
         self._at, self._held, self._open = clock(), 0.0, True
 
     @property
@@ -147,7 +149,9 @@ class VirtualDevice:
         """Read the displacement [m] now, and put out a voltage [V]; as `Exchanging.exchange`."""
         self._check(np.array([finite("volts", volts, "V")]))
         now = self._clock()
-        _, y, _ = self._run.advance([volts], max(now - self._at, INSTANT))
+        # A stage that was left alone for longer has settled.
+        idle = min(now - self._at, LONGEST_IDLE * self._step)
+        _, y, _ = self._run.advance([volts], max(idle, INSTANT))
         self._at, self._held = now, float(volts)
         return float(y[0])
 

@@ -153,19 +153,41 @@ impl Feedforward {
             let start = AnyInverseState::Network(network.rest());
             (AnyInverse::Network(Box::new(network)), start)
         } else {
-            let model = Model::named(parts.model)?;
+            let model = Model::named(parts.model).map_err(or_network)?;
             let parameters = model.info().parameters;
             let given = whole(parameters, &parts.parameters);
             let stage = model.build(&Values::named(parameters, given)?)?;
             let initial = match &parts.initial[..] {
                 [] => None,
-                initial => Some(Values::named(model.info().state, owned(initial))?),
+                initial => {
+                    Some(Values::named(model.info().state, owned(initial)).map_err(of_initial)?)
+                }
             };
             let (inverse, start) = stage.inverse(dt, initial.as_ref())?;
             (AnyInverse::Stage(Box::new(inverse)), AnyInverseState::Stage(start))
         };
         let online = OnlineFeedforward::new(inverse, dt, parts.offset, parts.delay)?;
         Ok(Self { state: online.start(start), online, start })
+    }
+}
+
+/// A model that is not known, with what is none of the list.
+fn or_network(error: Error) -> Error {
+    match error {
+        Error::Parameter { name, value, expected } => {
+            Error::Parameter { name, value, expected: format!("{expected}, or {NETWORK}") }
+        }
+        other => other,
+    }
+}
+
+/// An error of a list of states, which is not one of parameters.
+fn of_initial(error: Error) -> Error {
+    match error {
+        Error::Parameter { name, value, expected } if name == "parameters" => {
+            Error::Parameter { name: "initial".into(), value, expected }
+        }
+        other => other.of("initial"),
     }
 }
 

@@ -62,7 +62,13 @@ pub struct Settings {
     /// Model of the stage whose inverse is the feedforward, by its name as in Python
     /// ("prandtl-ishlinskii"), or "neural network"; NULL for no feedforward.
     pub model: *const c_char,
-    /// Parameters of the model, by their names; lists and what is optional may be left out.
+    /// Parameters of the model, by their names; lists and what is optional may be left out. Names
+    /// and units are those of the stage's class in Python: "prandtl-ishlinskii" has linear (m/V),
+    /// thresholds (V) with weights (m/V), dead_zone_thresholds (m) with dead_zone_weights,
+    /// creep_weights with creep_times (s), and time_constant (s), or frequency (Hz) and
+    /// damping_ratio. `piezotrack export --to library` writes those of any controller.
+    /// A "neural network" has centre, 3 scales, thresholds, hidden, biases, outputs, direct and
+    /// constant, as the crate's NetworkNumbers.
     pub parameters: *const Numbers,
     /// How many there are.
     pub parameter_count: usize,
@@ -122,7 +128,13 @@ unsafe fn list<'a>(what: &str, entries: *const Numbers, count: usize) -> Result<
 
 unsafe fn named<'a>(what: &str, entry: &Numbers) -> Result<Option<Named<'a>>> {
     let Some(name) = (unsafe { text(&format!("{what}.name"), entry.name)? }) else {
-        return Ok(None);
+        return match entry.count {
+            0 => Ok(None),
+            count => {
+                let expected = format!("a name, as there are {count} values");
+                Err(Error::parameter(format!("{what}.name"), "NULL", expected))
+            }
+        };
     };
     let values = unsafe { elements(&format!("{what}.values"), entry.values, entry.count)? };
     Ok(Some((name, values)))
@@ -149,6 +161,8 @@ unsafe fn text<'a>(what: &str, first: *const c_char) -> Result<Option<&'a str>> 
         return Ok(None);
     }
     // SAFETY: it is not NULL and ends with 0 by the caller's promise.
-    let text = unsafe { CStr::from_ptr(first) }.to_str();
-    text.map(Some).map_err(|_| Error::parameter(what, "no text", "a name in UTF-8"))
+    match unsafe { CStr::from_ptr(first) }.to_str() {
+        Ok(text) if !text.chars().any(char::is_control) => Ok(Some(text)),
+        _ => Err(Error::parameter(what, "no text", "a name in UTF-8, without control characters")),
+    }
 }

@@ -33,6 +33,8 @@ INSIDE = (
     *("pid", "law", "sliding", "observer", "hysteresis", "repetitive", "line", "table"),
     *("inverse", "online", "readings", "filters", "is", "not"),
 )
+# Files and functions of these names are there beside those of the controller.
+BESIDE = ("check", "main", "piezotrack")
 # A float has 24 bits, and an integral adds up what they leave out: the largest difference in 2000
 # steps, as a share of the limits' range. In a replay, where no reading answers, an observer around
 # an integral adds it up twice.
@@ -80,6 +82,10 @@ def checked_name(name: str) -> str:
     if name in INSIDE:
         raise ParameterError(
             f"name is {name!r}, as functions inside of the C file begin: expected another name"
+        )
+    if name in BESIDE:
+        raise ParameterError(
+            f"name is {name!r}, as a file or function beside the controller: expected another name"
         )
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,39}", name):
         raise ParameterError(

@@ -26,6 +26,9 @@ __all__ = ["Exported", "export_controller", "export_files"]
 
 To = Literal["c99", "library", "json", "fmu"]
 FORMS = ("c99", "library", "json", "fmu")
+LEFT_OUT = (
+    "without the feedforward, whose inverse is no filter: reference= or table= writes it as a table"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +48,8 @@ class Exported:
     bound : float or None
         Largest difference to the Rust controller that ``check.c`` accepts, in the unit of the
         drive: 0 for doubles. None for coefficients.
+    note : str
+        What a person should know; empty for nothing.
     """
 
     files: tuple[Path, ...]
@@ -54,10 +59,12 @@ class Exported:
     multiplications: int | None = None
     divisions: int | None = None
     bound: float | None = None
+    note: str = ""
 
     def __str__(self) -> str:
         if self.state_bytes is None:
-            return "coefficients" if self.to == "json" else "calls libpiezotrack"
+            text = "coefficients" if self.to == "json" else "calls libpiezotrack"
+            return f"{text}; {self.note}" if self.note else text
         text = f"state {self.state_bytes} bytes; a step has {self.additions} additions, "
         text += f"{self.multiplications} multiplications, {self.divisions} divisions"
         return text + ("" if self.bound == 0.0 else f"; within {self.bound:.3g} of the doubles")
@@ -150,7 +157,8 @@ def export_controller(
             raise ParameterError("single is True with to='json': expected False, JSON has doubles")
         document = coefficients_document(controller, played)
         path = write_document(make_folder(folder) / names[0], document)
-        return Exported(files=(path,), to=to)
+        left_out = controller.feedforward is not None and played is None
+        return Exported(files=(path,), to=to, note=LEFT_OUT if left_out else "")
     if to == "library":
         if single:
             raise ParameterError(

@@ -173,9 +173,9 @@ def track_on(
         except DeviceError as error:
             error.partial = log.tracking(latency, controller, reference, told)
             raise
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as error:
             part = log.tracking(latency, controller, reference, told)
-            raise Interrupted("the loop was interrupted", part) from None
+            raise Interrupted(str(error) or "the loop was interrupted", part) from None
     run = log.tracking(latency, controller, reference, told)
     assert run is not None
     return run

@@ -37,7 +37,7 @@ impl Law {
             ("state space", numbers) => Self::StateSpace(state_space(numbers)?),
             ("lead-lag", &[kp, lead, lag, matched]) => {
                 let mut law = LeadLag::new(kp, lead, lag)?;
-                law.matched = matched > 0.0;
+                law.matched = truth("lead-lag, matched", matched)?;
                 Self::StateSpace(law.at(dt)?)
             }
             ("sliding mode", &[switching, layer, ti, td, tf]) => {
@@ -71,12 +71,16 @@ impl Law {
             ("scheduled pid", numbers) => Self::Scheduled(scheduled(numbers, dt)?),
             (other, numbers) => {
                 let value = format!("'{other}' with {} numbers", numbers.len());
-                let expected = "the name of a feedback law with its numbers";
-                return Err(Error::parameter("law", value, expected));
+                return Err(Error::parameter("law", value, LAWS));
             }
         })
     }
 }
+
+/// What a law has to be.
+const LAWS: &str = "'pid' with 4 numbers, 'lead-lag' with 4, 'sliding mode' with 5, 'disturbance \
+    observer' with 7, 'perturbation' with 8, 'Dahl observer' with 11, 'Bouc-Wen observer' with 12, \
+    'state space' or 'scheduled pid'";
 
 /// The last number is NaN for the default of tt.
 fn optional(tt: f64) -> Option<f64> {
@@ -93,7 +97,7 @@ fn state_space<const N: usize>(numbers: &[f64]) -> Result<StateSpace<N>> {
         Error::parameter("law", format!("state space with {} numbers", numbers.len()), expected)
     };
     let (n, rest) = split(numbers, 1).ok_or_else(short)?;
-    let n = count(n[0]).min(rest.len());
+    let n = whole("state space, n", n[0], 1.0)?.min(rest.len());
     let (a, rest) = split(rest, n.saturating_mul(n)).ok_or_else(short)?;
     let (b, rest) = split(rest, n).ok_or_else(short)?;
     let (c, rest) = split(rest, n).ok_or_else(short)?;
@@ -103,10 +107,15 @@ fn state_space<const N: usize>(numbers: &[f64]) -> Result<StateSpace<N>> {
 
 /// Counts of amplitudes and rates, their values, those at first, then four numbers of each PID.
 fn scheduled(numbers: &[f64], dt: f64) -> Result<ScheduledPid> {
-    let short = || Error::parameter("law", format!("{} numbers", numbers.len()), "a whole grid");
+    let short = || {
+        let expected = "two counts, as many amplitudes and rates, the first of each, and 4 numbers \
+            for each pair";
+        Error::parameter("law", format!("scheduled pid with {} numbers", numbers.len()), expected)
+    };
     let (counts, rest) = split(numbers, 2).ok_or_else(short)?;
-    let (amplitudes, rest) = split(rest, count(counts[0])).ok_or_else(short)?;
-    let (rates, rest) = split(rest, count(counts[1])).ok_or_else(short)?;
+    let along = |number| whole("scheduled pid, counts", number, 1.0);
+    let (amplitudes, rest) = split(rest, along(counts[0])?).ok_or_else(short)?;
+    let (rates, rest) = split(rest, along(counts[1])?).ok_or_else(short)?;
     let (first, gains) = split(rest, 2).ok_or_else(short)?;
     let pids: Result<Vec<Pid>> = gains
         .chunks_exact(4)
@@ -119,10 +128,22 @@ fn split(numbers: &[f64], at: usize) -> Option<(&[f64], &[f64])> {
     numbers.split_at_checked(at)
 }
 
-/// A count that came as a float: 0 where it is none, and never more than a list can have.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-fn count(number: f64) -> usize {
-    number as usize
+/// A count that came as a float.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
+fn whole(name: &str, number: f64, least: f64) -> Result<usize> {
+    if (least..=f64::from(u32::MAX)).contains(&number) && number.fract().abs() <= 0.0 {
+        return Ok(number as usize);
+    }
+    Err(Error::parameter(name, format!("{number:?}"), format!("a whole number from {least} on")))
+}
+
+/// A truth value that came as a float.
+fn truth(name: &str, number: f64) -> Result<bool> {
+    match number {
+        0.0 => Ok(false),
+        1.0 => Ok(true),
+        other => Err(Error::parameter(name, format!("{other:?}"), "0 or 1")),
+    }
 }
 
 /// A filter of the measurement: `low pass` with its cutoff (Hz), `notch` with its frequency (Hz),
@@ -155,18 +176,20 @@ pub fn repetitive_named(smoothing: &str, numbers: &[f64]) -> Result<Repetitive> 
         let value = format!("'{smoothing}' with {} numbers", numbers.len());
         return Err(Error::parameter("repetitive", value, "six numbers"));
     };
-    let whole = |number: f64| u32::try_from(count(number)).unwrap_or(u32::MAX);
+    let whole = |name, number| -> Result<u32> {
+        Ok(u32::try_from(whole(name, number, 0.0)?).unwrap_or(u32::MAX))
+    };
     let smoothing = match smoothing {
         "lag" => Smoothing::Lag { tq: number, compensated: false },
         "compensated lag" => Smoothing::Lag { tq: number, compensated: true },
-        "zero phase" => Smoothing::ZeroPhase { order: whole(number) },
+        "zero phase" => Smoothing::ZeroPhase { order: whole("order", number)? },
         "none" => Smoothing::None,
         other => {
             let expected = "'lag', 'compensated lag', 'zero phase' or 'none'";
             return Err(Error::parameter("smoothing", format!("'{other}'"), expected));
         }
     };
-    let (lead, pause) = (whole(lead), pause > 0.0);
+    let (lead, pause) = (whole("lead", lead)?, truth("pause", pause)?);
     // The bound of the gain holds for errors in um.
     let learner = Repetitive::new(period, smoothing, kq / 1e6)?;
     Ok(Repetitive { forgetting_factor, lead, pause, ..learner })
