@@ -196,6 +196,61 @@ def test_prefixes_that_are_refused(prefix: Any) -> None:
         pt.hardware.serve_epics(pt.hardware.connect("virtual:"), prefix)
 
 
+def test_a_prefix_whose_names_epics_cannot_hold_is_refused() -> None:
+    # :Position and :Message.. have nine letters at most, names sixty.
+    said = refusal("serve", "epics", "--prefix", "A" * 52)
+    assert said.startswith("--prefix is 'AAAA")
+    assert "52 letters: expected 51 at most" in said
+
+
+def test_the_longest_prefix_is_served() -> None:
+    with serving(environment(), "A" * 51) as (_, line):
+        assert f"{'A' * 51}:Position" in line
+
+
+FAILING = """
+import asyncio, json, sys
+import aioca
+async def alarms():
+    return {one: (await aioca.caget("A:B:" + one, format=aioca.FORMAT_TIME)).severity
+            for one in ("Voltage", "Position")}
+async def main():
+    await aioca.caput("A:B:Voltage", 20.0, wait=True)
+    await asyncio.sleep(1.0)
+    found = {"before": await alarms()}
+    print("ready", flush=True)
+    sys.stdin.readline()
+    await asyncio.sleep(1.5)
+    async def message():
+        return (await aioca.caget("A:B:Message", datatype=aioca.DBR_CHAR_STR))
+    found["first"] = await message()
+    await aioca.caput("A:B:Voltage", 55.0, wait=True, timeout=20.0, throw=False)
+    found |= {"after": await alarms(), "voltage": await aioca.caget("A:B:Voltage"),
+              "message": await message()}
+    return found
+found = asyncio.run(main())
+print(json.dumps(found))
+"""
+
+
+def test_a_device_that_fails_is_an_alarm_with_its_first_sentence() -> None:
+    here = environment()
+    pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    server = pt.hardware.GcsServer(pt.VirtualStage.xu_li_2010(seed=1), limits=(0.0, 75.0))
+    with server, serving(here, "A:B", "--device", server.address):
+        command = [sys.executable, "-c", FAILING]
+        with subprocess.Popen(command, **pipes, text=True, env=here) as client:
+            assert client.stdout is not None
+            assert client.stdout.readline() == "ready\n"
+            server.close()
+            said, _ = client.communicate("\n", timeout=120)
+    found = json.loads(said.splitlines()[-1])
+    assert found["before"] == {"Voltage": 0, "Position": 0}
+    assert found["after"] == {"Voltage": 3, "Position": 3}
+    assert found["voltage"] == 20.0
+    assert found["first"] and found["message"] == found["first"]
+
+
 ASKED = """
 import asyncio, json
 import piezotrack as pt

@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import _core
 from .._support.messages import quoted
-from ..errors import ParameterError, PiezotrackError
+from ..errors import DeviceError, ParameterError, PiezotrackError
 from .device import Device, Exchanging
 from .measuring import check_device, check_table, play_table
 from .options import required_package
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 __all__ = ["RECORDS", "ophyd_player", "serve_epics"]
 
 RECORDS = ("Voltage", "Position", "Table", "Rate", "Play", "Record", "Status", "Message")
+# Letters of a record's name that EPICS can hold, and of the longest prefix before a colon.
+LONGEST_NAME = 60
+LONGEST_PREFIX = LONGEST_NAME - 1 - max(map(len, RECORDS))
 # Channel Access stays on this computer where nothing else is said.
 LOCAL = {
     "EPICS_CAS_INTF_ADDR_LIST": "127.0.0.1",
@@ -54,6 +57,10 @@ def serve_epics(
     ``PREFIX:Status``   ``idle``, ``playing``, ``done`` or ``failed``
     ``PREFIX:Message``  the sentence of the last failure
     ==================  =====================================================================
+
+    From a failure of the device until it answers again, ``Voltage`` and ``Position`` have the
+    severity ``INVALID``, ``Voltage`` is the last one that went out, and ``Message`` the first
+    failure.
 
     Parameters
     ----------
@@ -91,15 +98,21 @@ def serve_epics(
         raise ParameterError(
             f"prefix is {quoted(prefix)}: expected the start of names, as LAB:STAGE"
         )
+    if len(prefix) > LONGEST_PREFIX:
+        raise ParameterError(
+            f"prefix is {quoted(prefix)}, {len(prefix)} letters: expected {LONGEST_PREFIX} at most, "
+            f"as a name in EPICS has at most {LONGEST_NAME} with :{max(RECORDS, key=len)}"
+        )
     longest = min(_core.as_count("longest", longest), device.memory)
     builder = required_package("softioc.builder", "epics", "serving EPICS")
+    alarm = required_package("softioc.alarm", "epics", "serving EPICS")
     ioc = required_package("softioc.softioc", "epics", "serving EPICS")
     dispatcher = required_package(
         "softioc.asyncio_dispatcher", "epics", "serving EPICS"
     ).AsyncioDispatcher()
     if not LOCAL.keys() & os.environ.keys():
         os.environ.update(LOCAL)
-    records = _Records(device, prefix, longest, builder)
+    records = _Records(device, prefix, longest, builder, alarm)
     builder.LoadDatabase()
     ioc.iocInit(dispatcher, enable_pva=False)
     dispatcher(records.read_position_on)
@@ -114,8 +127,12 @@ def serve_epics(
 class _Records:
     """The records of a device, and what a put into them does."""
 
-    def __init__(self, device: Device, prefix: str, longest: int, builder: Any) -> None:
-        self._device, self._lock = device, asyncio.Lock()
+    def __init__(
+        self, device: Device, prefix: str, longest: int, builder: Any, alarm: Any
+    ) -> None:
+        self._device, self._lock, self._is_failing = device, asyncio.Lock(), False
+        self._fine = {"severity": alarm.NO_ALARM, "alarm": alarm.NO_ALARM}
+        self._invalid = {"severity": alarm.INVALID_ALARM, "alarm": alarm.COMM_ALARM}
         low, high = device.limits
         self._held = min(max(0.0, low), high)
         builder.SetDeviceName(prefix)
@@ -127,6 +144,8 @@ class _Records:
             HOPR=high,
             validate=self._is_within,
             on_update=self._hold,
+            # After a failure the voltage that is shown may be asked for again.
+            always_update=True,
             blocking=True,
             **volts,
         )
@@ -162,6 +181,13 @@ class _Records:
         async with self._lock:
             if await self._tried(lambda: asyncio.to_thread(self._device.hold, volts)):
                 self._held = volts
+            self._show_voltage()
+
+    def _show_voltage(self) -> None:
+        """Publish the last voltage that went out, with an alarm while the device fails."""
+        self._voltage.set(
+            self._held, process=False, **(self._invalid if self._is_failing else self._fine)
+        )
 
     async def _read_position(self) -> None:
         assert isinstance(self._device, Exchanging)
@@ -181,17 +207,31 @@ class _Records:
         record = await asyncio.to_thread(play_table, self._device, table, rate)
         self._held = float(table[-1])
         self._rate.set(rate, process=False)
-        self._voltage.set(self._held, process=False)
+        self._show_voltage()
         self._record.set(1e6 * record.displacement)
 
     async def _tried(self, doing: Callable[[], Awaitable[None]]) -> bool:
         """Do something; where it fails, publish the sentence."""
         try:
             await doing()
+        except DeviceError as error:
+            self._set_failing(str(error))
+            return False
         except PiezotrackError as error:
             self._message.set(str(error))
             return False
+        self._set_failing("")
         return True
+
+    def _set_failing(self, why: str) -> None:
+        """Set or clear the alarms; what follows the first failure is not its reason."""
+        if bool(why) == self._is_failing:
+            return
+        self._is_failing = bool(why)
+        self._show_voltage()
+        if why:
+            self._message.set(why)
+            self._position.set_alarm(**self._invalid)
 
 
 def ophyd_player(prefix: str, name: str = "") -> Any:
