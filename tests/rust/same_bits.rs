@@ -171,7 +171,7 @@ fn one_lane_and_many_with_a_limit_that_falls_in_some() {
     let place = |i: u32| -> Vec<f64> {
         let part = |d: usize| f64::from((7 * i + 5 * u32::try_from(d).unwrap()) % 23) / 23.0;
         let mut place: Vec<f64> = (0..count).map(part).collect();
-        if i < 8 || i % 2 == 0 {
+        if i < 8 || i.is_multiple_of(2) {
             place[ratio.unwrap()] = 0.0;
         }
         place

@@ -36,6 +36,9 @@ pub(super) const SAME: f64 = 1.01;
 /// Gain of a step below which a choice is settled.
 pub(super) const ROUGH: f64 = 1e-3;
 
+/// Share of the deviation that dead zones in other places have to take away.
+const CORNER_GAIN: f64 = 0.02;
+
 /// Rows that choices are made on, about.
 const ROWS: usize = 4000;
 
@@ -127,6 +130,7 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Found<'a>> 
     }
     choose_places(&mut fit, settings)?;
     drop_drifts(&mut fit)?;
+    replace_corners(&mut fit)?;
     Some((fit, lags))
 }
 
@@ -148,6 +152,21 @@ fn place_corners(fit: &mut Fit<'_>, count: usize) {
     for (j, slot) in fit.layout().corners().enumerate() {
         fit.x[slot] = corner(j + 1);
     }
+}
+
+/// Spreads the dead zones anew, where that is better: while other parts were missing, they may have
+/// moved to where they cannot come back from.
+fn replace_corners(fit: &mut Fit<'_>) -> Option<()> {
+    if fit.zones == 0 {
+        return Some(());
+    }
+    let mut anew = fit.clone();
+    place_corners(&mut anew, fit.zones);
+    anew.settle(ROUGH)?;
+    if anew.rms < (1.0 - CORNER_GAIN) * fit.rms {
+        *fit = anew;
+    }
+    Some(())
 }
 
 /// The numbers of the shape in turn, each from its range.
