@@ -68,7 +68,7 @@ def test_a_list_says_of_each_log_what_is_fitted() -> None:
     Path("logs").mkdir()
     Path("logs/list.txt").write_text(
         "# my stages\n\n../log.csv train=0.5:2 test=2:3  # the old one\n"
-        "../second.csv other=../log.csv\n",
+        "../second.csv other=../log.csv other-test=1:\n",
         encoding="utf-8",
     )
     ran("benchmark", "--list", "logs/list.txt", *PLAYS, "--quiet")
@@ -88,6 +88,7 @@ def test_a_list_says_of_each_log_what_is_fitted() -> None:
         (["--list", "gone.txt"], "gone.txt cannot be read"),
         (["--list", "empty.txt"], "empty.txt: no log is listed"),
         (["--list", "bad.txt"], "bad.txt:2: 'from=3': expected NAME=VALUE"),
+        (["--list", "window.txt"], "window.txt:1: other-test has no effect without other="),
         (["log.csv", "log.csv"], "records has log.csv twice"),
         (["log.csv", "--train", "3"], "--train is '3'"),
         (["log.csv", "--train", "30:40"], "log.csv: train"),
@@ -98,5 +99,6 @@ def test_a_list_says_of_each_log_what_is_fitted() -> None:
 )
 def test_wrong_options_are_named(options: list[str], words: str) -> None:
     Path("empty.txt").write_text("# nothing\n", encoding="utf-8")
+    Path("window.txt").write_text("log.csv other-test=3:\n", encoding="utf-8")
     Path("bad.txt").write_text("log.csv\nlog.csv from=3\n", encoding="utf-8")
     assert words in refusal("benchmark", *options)

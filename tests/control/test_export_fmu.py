@@ -168,6 +168,17 @@ def test_without_a_compiler_it_is_refused(tmp_path: Path, monkeypatch: pytest.Mo
     assert not (tmp_path / "out").exists()
 
 
+def test_a_compiler_that_is_asked_for_and_not_there_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CC", "/nonexistent -O3")
+    with pytest.raises(pt.ParameterError, match="CC is '/nonexistent', which cannot be run"):
+        unit_of(loop("PID"), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    monkeypatch.setenv("CC", "gcc -g0")
+    assert unit_of(loop("PID"), tmp_path / "out").exists()
+
+
 def test_on_another_machine_it_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("platform.machine", lambda: "aarch64")
     with pytest.raises(pt.ParameterError, match="not compiled on Linux, aarch64: expected to="):

@@ -11,6 +11,7 @@ import pytest
 
 import piezotrack as pt
 from piezotrack.control.learning_plants import learning_plants
+from piezotrack.control.learning_rules import _largest
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -291,3 +292,21 @@ def test_filters_for_firmware_learn_as_the_update_does() -> None:
     expected = rule.after(table, error)
     found = filtered(smoothing, table) + filtered(learning, error)
     assert np.abs(found - expected).max() < 0.02 * np.ptp(expected)
+
+
+@pytest.mark.parametrize("count", [8, 50, 1500])
+def test_the_largest_singular_value_of_many_that_crowd_together(count: int) -> None:
+    """Of a second difference: 2 + 2 cos(pi/(n + 1)), with the next one closer the longer it is."""
+    matrix = 2.0 * np.eye(count) - np.eye(count, k=1) - np.eye(count, k=-1)
+    size, frequency = _largest(matrix, DT)
+    known = 2.0 + 2.0 * math.cos(math.pi / (count + 1))
+    assert known * (1.0 - 1e-3) < size < known * (1.0 + 1e-12)
+    # Its vector changes sign from sample to sample.
+    assert frequency > 0.4 / DT
+
+
+def test_a_long_lifted_trial_of_a_model_without_a_mode_converges() -> None:
+    static = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(5.0,), weights=(2e-7,))
+    line = pt.triangle(frequency=2.0, low=20e-6, high=60e-6, duration=1.0, rounding=0.2)
+    learner = pt.control.IterativeLearning(static, line, OPEN, method="lifted")
+    assert learner.convergence.monotone

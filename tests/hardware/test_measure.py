@@ -257,3 +257,27 @@ def test_an_interruption_leads_the_output_to_rest_even_where_it_comes_twice(
         pt.measure(used, "sine:1Hz,0..75V,3s", rate=100.0, rest=5.0)
     assert (used.held, used.holds) == (5.0, 2)
     assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_a_range_the_wrong_way_round_is_refused_in_volts() -> None:
+    for text in ("sine:1Hz,10..0V,2s", "chirp:1..5Hz,10..0V,2s", "decaying:1Hz,10..0V"):
+        with pytest.raises(pt.ParameterError, match="low is 10 V: expected less than high, 0 V"):
+            pt.hardware.parse_drive(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "sine:60Hz,0..10V,2s",
+        "triangle:60Hz,0..10V,2s",
+        "decaying:60Hz,0..10V,2s",
+        "chirp:1..60Hz,0..10V,2s",
+        "multisine:1/60Hz,0..10V,2s",
+    ],
+)
+def test_a_drive_above_half_the_rate_is_refused(text: str) -> None:
+    drive = pt.hardware.parse_drive(text)
+    assert "60 Hz" in str(drive) or "multisine" in str(drive)
+    with pytest.raises(pt.ParameterError, match="60 Hz: expected at most half the rate, 50 Hz"):
+        pt.measure(pt.hardware.connect("virtual:"), drive, rate=100.0)
+    assert np.ptp(drive.sample(1.0 / 1000.0)) > 5.0

@@ -27,8 +27,8 @@ def serving(
         try:
             assert process.stdout is not None
             line = process.stdout.readline()
-            found = re.fullmatch(rf"listening at ({protocol}://\S+:\d+\S*), (.*)\n", line)
+            found = re.fullmatch(rf"listening from (.*) at ({protocol}://\S+:\d+\S*)\n", line)
             assert found, line
-            yield process, found[1], found[2]
+            yield process, found[2], found[1]
         finally:
             process.kill()

@@ -31,7 +31,7 @@ def changed(*where: str, to: Any = None, drop: bool = False) -> bytes:
 HEAD = '{"format": "piezotrack-model", '
 
 BAD: dict[str, tuple[bytes, str]] = {
-    "empty": (b"", "dahl.json:1: not JSON"),
+    "empty": (b"", "Expecting value; expected a file that piezotrack saved, as a model"),
     "text": (b"time_s,voltage_V\n0,1\n", "dahl.json:1: not JSON"),
     "a comma too many": (b'{\n"format": 1,\n}', "dahl.json:3: not JSON"),
     "cut off": (changed("stroke", "value", to=1.0)[:400], "dahl.json:1: not JSON"),

@@ -51,7 +51,10 @@ def parse_json(name: str, content: bytes) -> Any:
     except UnicodeDecodeError:
         raise DataError(f"{name} is not a text file: expected JSON") from None
     except json.JSONDecodeError as error:
-        raise DataError(f"{name}:{error.lineno}: not JSON: {error.msg}") from None
+        raise DataError(
+            f"{name}:{error.lineno}: not JSON: {error.msg}; expected a file that piezotrack saved, "
+            "as a model or a controller"
+        ) from None
     except ValueError as error:
         raise DataError(f"{name} cannot be read: {error}") from None
 

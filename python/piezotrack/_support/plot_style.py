@@ -92,14 +92,22 @@ MARKS: dict[str, Any] = {
     "markersize": 5.0,
     "markerfacecolor": "none",
 }
-# Models beside each other; distinct in black and white as well.
-MODELS: tuple[dict[str, Any], ...] = (
-    {"color": BLUE, "linestyle": "-"},
-    {"color": ORANGE, "linestyle": "--"},
-    {"color": GREEN, "linestyle": "-."},
-    {"color": PURPLE, "linestyle": ":"},
-    {"color": "#7a5b00", "linestyle": (0, (6, 1.5, 1, 1.5, 1, 1.5))},
-    {"color": "#000000", "linestyle": (0, (8, 3))},
+# Models beside each other, sixteen of them; distinct in black and white as well.
+HUES = (BLUE, ORANGE, GREEN, PURPLE, "#7a5b00", "#000000", RED, "#0a8f8f")
+DASHES: tuple[Any, ...] = (
+    "-",
+    "--",
+    "-.",
+    ":",
+    (0, (6, 1.5, 1, 1.5, 1, 1.5)),
+    (0, (8, 3)),
+    (0, (2, 1)),
+    (0, (10, 2, 3, 2)),
+)
+MODELS: tuple[dict[str, Any], ...] = tuple(
+    {"color": hue, "linestyle": DASHES[(i + shift) % len(DASHES)]}
+    for shift in (0, 4)
+    for i, hue in enumerate(HUES)
 )
 # More points than columns of pixels, yet few enough for a small SVG.
 MOST_POINTS = 6000

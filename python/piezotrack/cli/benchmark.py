@@ -25,6 +25,7 @@ from .options import (
     of_file,
     refuse_without_effect,
     seconds,
+    windowed,
 )
 from .output import Output
 
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 __all__ = ["benchmark_command"]
 
 # What a line of a list may say of its log.
-SAID = ("train", "test", "other")
+SAID = ("train", "test", "other", "other-test")
 
 
 @in_words
@@ -109,7 +110,10 @@ def benchmark_command(
     records += [_record(file, read(file), train, test, None) for file in files or []]
     if listed is not None:
         for file, said in _lines(listed):
-            other = read(listed.parent / said["other"]) if "other" in said else None
+            other = None
+            if "other" in said:
+                path = listed.parent / said["other"]
+                other = windowed(read(path), path, "other-test", said.get("other-test"))
             records.append(_record(file, read(file), said.get("train"), said.get("test"), other))
     found = benchmark(
         records or None, model or None, folder=out, overwrite=overwrite, progress=result.progress
@@ -160,6 +164,8 @@ def _lines(listed: Path) -> list[tuple[Path, dict[str, str]]]:
                 f"{where}: '{' '.join(words[1:])}': expected NAME=VALUE with the names "
                 f"{', '.join(SAID)}, each once at most"
             )
+        if "other-test" in said and "other" not in said:
+            raise DataError(f"{where}: other-test has no effect without other=")
         found.append((listed.parent / words[0], said))
     if not found:
         raise DataError(f"{listed}: no log is listed: expected one a line")

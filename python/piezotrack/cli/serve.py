@@ -106,7 +106,7 @@ def serve_command(
     place = PORTS[protocol] if port is None else port
     serving = _scpi if protocol == "scpi" else _gcs
     with serving(stage, within, host, place, speed) as (address, (low, high)):
-        print(f"listening at {address}, {low:g} to {high:g} V", flush=True)
+        print(f"listening from {low:g} to {high:g} V at {address}", flush=True)
         threading.Event().wait()
 
 

@@ -49,6 +49,9 @@ class Drive:
         Length [s].
     at : callable
         Takes times [s], an array, and returns voltages [V] of the same shape.
+    frequency : float, optional
+        The highest that it has [Hz], of triangles that of the turns: `sample` refuses a sampling
+        rate below twice of it.
 
     Examples
     --------
@@ -61,6 +64,7 @@ class Drive:
     name: str
     duration: float
     at: Callable[[Array], Array]
+    frequency: float | None = None
 
     def __repr__(self) -> str:
         return f"Drive({self.name}, {plain(self.duration)} s)"
@@ -81,8 +85,18 @@ class Drive:
         -------
         ndarray, shape (n,)
             Voltage [V].
+
+        Raises
+        ------
+        ParameterError
+            The drive is faster than half the sampling rate: another motion would come out.
         """
         count = self.count(dt)
+        if self.frequency is not None and 2.0 * self.frequency * dt > 1.0 + 1e-9:
+            raise ParameterError(
+                f"drive ({self.name}) goes up to {plain(self.frequency)} Hz: expected at most half "
+                f"the rate, {plain(0.5 / dt)} Hz"
+            )
         volts = np.asarray(self.at(dt * np.arange(count, dtype=np.float64)), dtype=np.float64)
         return np.broadcast_to(volts, (count,)).copy()
 
@@ -145,13 +159,32 @@ def decaying(
         return volts
 
     name = f"decaying {plain(frequency)} Hz, {plain(bottom)} to {plain(top)} V"
-    return Drive(name=name, duration=turns / frequency, at=at)
+    return Drive(name=name, duration=turns / frequency, at=at, frequency=frequency)
+
+
+def _highest_frequency(others: dict[str, Any]) -> float | None:
+    """Return the highest frequency among the arguments of a waveform, where it has one [Hz]."""
+    several = others.get("frequencies", ())
+    single = (others.get(key) for key in ("frequency", "start_frequency", "stop_frequency"))
+    return max((one for one in (*several, *single) if one is not None), default=None)
+
+
+def _named(word: str, others: dict[str, Any]) -> str:
+    """Return the name of a waveform with its frequency, where it has one."""
+    if "frequency" in others:
+        return f"{word} {plain(others['frequency'])} Hz"
+    if "stop_frequency" in others:
+        ends = (others["start_frequency"], others["stop_frequency"])
+        return f"{word} {plain(ends[0])} to {plain(ends[1])} Hz"
+    return word
 
 
 def _in_volts(waveform: Callable[..., Reference], word: str) -> Callable[..., Drive]:
     """Return a waveform of voltage, from one of displacement."""
 
     def make(*, low: float = math.nan, high: float = math.nan, **others: Any) -> Drive:
+        if low >= high:
+            raise ParameterError(f"low is {low:g} V: expected less than high, {high:g} V")
         if "levels" in others:
             others["levels"] = [METRES_PER_VOLT * one for one in others["levels"]]
         else:
@@ -159,10 +192,12 @@ def _in_volts(waveform: Callable[..., Reference], word: str) -> Callable[..., Dr
         if "frequency" in others and others["frequency"] > 0.0:
             others.setdefault("duration", PERIODS / others["frequency"])
         reference = waveform(**others)
+        highest = _highest_frequency(others)
         ends = (reference.low / METRES_PER_VOLT, reference.high / METRES_PER_VOLT)
         return Drive(
-            name=f"{word}, {plain(ends[0])} to {plain(ends[1])} V",
+            name=f"{_named(word, others)}, {plain(ends[0])} to {plain(ends[1])} V",
             duration=reference.duration,
+            frequency=highest,
             at=lambda t: np.clip(reference.at(t)[0] / METRES_PER_VOLT, *ends),
         )
 
@@ -261,7 +296,7 @@ def parse_drive(text: str, *, duration: float | None = None) -> Drive:
     --------
     >>> import piezotrack as pt
     >>> pt.hardware.parse_drive("sine:0.5Hz,0..75V")
-    Drive(sine, 0 to 75 V, 8 s)
+    Drive(sine 0.5 Hz, 0 to 75 V, 8 s)
     """
     drive: Drive = made_from_text("drive", text, DRIVES, _recorded, duration)
     return drive

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from xml.sax.saxutils import quoteattr
 
 from ... import _core
+from ..._support.messages import quoted
 from ...errors import DataError, ParameterError
 from .c_text import named
 from .fmu_source import FMU_CODE, FORWARD_INPUT
@@ -68,13 +69,14 @@ def variables(forward: str, unit: str) -> list[Variable]:
     ]
 
 
-def compiler() -> str:
-    """Find the C compiler.
+def compiler() -> list[str]:
+    """Find the C compiler: the program, and the options that CC in the environment has beside it.
 
     Raises
     ------
     ParameterError
-        There is none, or it would not compile for Linux on x86-64.
+        There is none, that of CC in the environment is not there, or it would not compile for
+        Linux on x86-64.
     """
     system, machine = platform.system(), platform.machine()
     if (system, machine) != ("Linux", "x86_64"):
@@ -82,9 +84,17 @@ def compiler() -> str:
             f"a unit has a binary for Linux, x86-64, which is not compiled on {system}, {machine}: "
             "expected to='c99', whose sources every machine compiles"
         )
-    for name in (os.environ.get("CC", ""), "gcc", "cc", "clang"):
-        if name and (found := shutil.which(name)):
-            return found
+    asked = os.environ.get("CC", "").split()
+    if asked and shutil.which(asked[0]) is None:
+        raise ParameterError(
+            f"CC is {quoted(asked[0])}, which cannot be run: expected the name of a C compiler, or "
+            "no CC in the environment"
+        )
+    if asked:
+        return asked
+    for name in ("gcc", "cc", "clang"):
+        if found := shutil.which(name):
+            return [found]
     raise ParameterError(
         "no C compiler was found for the binary of the unit: expected gcc, cc or clang, or CC= in "
         "the environment"
@@ -141,7 +151,7 @@ def _binary(name: str, code: dict[str, str]) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         for key, text in code.items():
             Path(folder, key).write_text(text, encoding="utf-8")
-        command = [compiler(), *FLAGS, "-o", f"{name}.so", "fmu.c", f"{name}.c"]
+        command = [*compiler(), *FLAGS, "-o", f"{name}.so", "fmu.c", f"{name}.c"]
         done = subprocess.run(
             command,
             cwd=folder,
