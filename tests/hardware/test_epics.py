@@ -248,7 +248,8 @@ def test_a_device_that_fails_is_an_alarm_with_its_first_sentence() -> None:
     assert found["before"] == {"Voltage": 0, "Position": 0}
     assert found["after"] == {"Voltage": 3, "Position": 3}
     assert found["voltage"] == 20.0
-    assert found["first"] and found["message"] == found["first"]
+    assert found["first"]
+    assert found["message"] == found["first"]
 
 
 ASKED = """

@@ -100,8 +100,8 @@ def serve_epics(
         )
     if len(prefix) > LONGEST_PREFIX:
         raise ParameterError(
-            f"prefix is {quoted(prefix)}, {len(prefix)} letters: expected {LONGEST_PREFIX} at most, "
-            f"as a name in EPICS has at most {LONGEST_NAME} with :{max(RECORDS, key=len)}"
+            f"prefix is {quoted(prefix)}, {len(prefix)} letters: expected {LONGEST_PREFIX} at "
+            f"most, as a name in EPICS has at most {LONGEST_NAME} with :{max(RECORDS, key=len)}"
         )
     longest = min(_core.as_count("longest", longest), device.memory)
     builder = required_package("softioc.builder", "epics", "serving EPICS")
@@ -127,9 +127,7 @@ def serve_epics(
 class _Records:
     """The records of a device, and what a put into them does."""
 
-    def __init__(
-        self, device: Device, prefix: str, longest: int, builder: Any, alarm: Any
-    ) -> None:
+    def __init__(self, device: Device, prefix: str, longest: int, builder: Any, alarm: Any) -> None:
         self._device, self._lock, self._is_failing = device, asyncio.Lock(), False
         self._fine = {"severity": alarm.NO_ALARM, "alarm": alarm.NO_ALARM}
         self._invalid = {"severity": alarm.INVALID_ALARM, "alarm": alarm.COMM_ALARM}
