@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from tempfile import TemporaryDirectory
@@ -20,6 +22,8 @@ from piezotrack._support.plot_style import folded, legend_inside, plain_log_tick
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+
+    from matplotlib.axes import Axes
 
 UM = 1e-6
 PI = {"model": "prandtl-ishlinskii"}
@@ -227,3 +231,31 @@ def test_a_legend_covers_no_data(scale: str) -> None:
     assert legend is not None
     lowest = ax.transData.inverted().transform((0.0, legend.get_window_extent().y0))[1]
     assert lowest > 0.99 * top
+
+
+def test_sixteen_models_have_lines_of_their_own() -> None:
+    lines = [(one["color"], str(one["linestyle"])) for one in plot_style.MODELS]
+    assert len(set(lines)) == len(lines) == 16
+    # A colour is there twice at most, with other dashes.
+    assert max(Counter(color for color, _ in lines).values()) == 2
+
+
+def test_names_of_many_models_leave_the_loop_its_panel() -> None:
+    few = PICTURES["comparison"]()
+    many = replace(few, rows=tuple((list(few.rows) * 16)[:16]))
+    figure = many.plot()
+    figure.canvas.draw()
+    loop, errors = figure.axes[0], figure.axes[-1]
+    assert loop.get_position().width > 0.3 * errors.get_position().width
+    low, high = loop.get_ylim()
+    drawn = np.concatenate([np.asarray(line.get_ydata()) for line in loop.lines])
+    assert np.ptp(drawn) > 0.8 * (high - low)
+    (names,) = [ax.get_legend() for ax in figure.axes if len(_names(ax)) > 10]
+    box = names.get_window_extent(figure.canvas.get_renderer())
+    assert box.x0 >= 0.0
+    assert box.x1 <= errors.get_window_extent().x0
+
+
+def _names(ax: Axes) -> list[str]:
+    legend = ax.get_legend()
+    return [] if legend is None else [text.get_text() for text in legend.get_texts()]

@@ -37,8 +37,8 @@ FITTED: dict[str, Any] = {"color": "0.8", "edgecolor": "0.3", "hatch": "///", "l
 JUDGED: dict[str, Any] = {"color": "0.35", "edgecolor": "0.2", "label": "not fitted"}
 # Letters of a name in a line beside its bars.
 LABEL = 20
-# Names of lines in a row below the loop.
-NAMES = 2
+# Most names for which there is room to the right of the loop's lower end.
+NAMES_INSIDE = 6
 
 
 def plot_comparison(comparison: Comparison, fig: Figure | SubFigure | None = None) -> Figure:
@@ -59,21 +59,21 @@ def plot_comparison(comparison: Comparison, fig: Figure | SubFigure | None = Non
     rows = comparison.rows
     figure = panels(fig, (11.0, max(7.4, 1.25 * len(rows) + 2.2)))
     grid = figure.add_gridspec(1, 2, width_ratios=[1.0, 1.35])
-    names = 0.1 + 0.05 * -(-(len(rows) + 1) // NAMES)
+    # Many names are beside each other nowhere: they get a place of their own below the loop.
+    names = 0.25 + 0.045 * len(rows) if len(rows) > NAMES_INSIDE else 0.01
     left = grid[0].subgridspec(4, 1, height_ratios=[1.5, names, 1.1, 0.6 + 0.16 * len(rows)])
     right = grid[1].subgridspec(len(rows), 1)
     loop = figure.add_subplot(left[0])
-    between = figure.add_subplot(left[1])
     _loops(comparison, loop, figure.add_subplot(left[2], sharex=loop))
-    between.set_axis_off()
-    between.legend(
-        *loop.get_legend_handles_labels(),
-        loc="center",
-        ncols=NAMES,
-        frameon=False,
-        fontsize="small",
-        handlelength=3.4,
-    )
+    if len(rows) > NAMES_INSIDE:
+        below = figure.add_subplot(left[1])
+        below.set_axis_off()
+        named = loop.get_legend_handles_labels()
+        below.legend(*named, loc="center", frameon=False, fontsize="small", handlelength=4.0)
+    else:
+        low, high = loop.get_ylim()
+        loop.set_ylim(bottom=low - 0.07 * len(rows) * (high - low))
+        loop.legend(loc="lower right", frameon=False, fontsize="small")
     _bars(comparison, figure.add_subplot(left[3]))
     _errors(comparison, [figure.add_subplot(right[i]) for i in range(len(rows))])
     figure.suptitle(_title(comparison), fontsize="large")
