@@ -284,7 +284,7 @@ def test_a_drive_above_half_the_rate_is_refused(text: str) -> None:
 
 
 def test_dead_zones_that_were_placed_too_early_are_placed_anew() -> None:
-    """With this noise they moved, before the creep was known, to where nothing brought them back."""
+    """With this noise they moved, before the creep was known, and did not come back."""
     used = VirtualDevice(pt.VirtualStage.xu_li_2010(seed=11))
     used.hold(0.0)
     log = pt.measure(used, "decaying:1Hz,0..75V", rate=1000.0)
