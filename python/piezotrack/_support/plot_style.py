@@ -93,7 +93,7 @@ MARKS: dict[str, Any] = {
     "markerfacecolor": "none",
 }
 # Models beside each other, sixteen of them; distinct in black and white as well.
-HUES = (BLUE, ORANGE, GREEN, PURPLE, "#7a5b00", "#000000", RED, "#0a8f8f")
+HUES = (BLUE, ORANGE, GREEN, PURPLE, "#7a5b00", "#000000", "#c2478f", "#0a8f8f")
 DASHES: tuple[Any, ...] = (
     "-",
     "--",
