@@ -63,12 +63,12 @@ pub struct Settings {
     /// ("prandtl-ishlinskii"), or "neural network"; NULL for no feedforward.
     pub model: *const c_char,
     /// Parameters of the model, by their names; lists and what is optional may be left out. Names
-    /// and units are those of the stage's class in Python: "prandtl-ishlinskii" has linear (m/V),
-    /// thresholds (V) with weights (m/V), dead_zone_thresholds (m) with dead_zone_weights,
-    /// creep_weights with creep_times (s), and time_constant (s), or frequency (Hz) and
-    /// damping_ratio. `piezotrack export --to library` writes those of any controller.
-    /// A "neural network" has centre, 3 scales, thresholds, hidden, biases, outputs, direct and
-    /// constant, as the crate's NetworkNumbers.
+    /// and units are those of the stage's class in Python: "prandtl-ishlinskii" has `linear` (m/V),
+    /// `thresholds` (V) with `weights` (m/V), `dead_zone_thresholds` (m) with `dead_zone_weights`,
+    /// `creep_weights` with `creep_times` (s), and `time_constant` (s), or `frequency` (Hz) and
+    /// `damping_ratio`. `piezotrack export --to library` writes those of any controller. A "neural
+    /// network" has `centre`, 3 `scales`, `thresholds`, `hidden`, `biases`, `outputs`, `direct` and
+    /// `constant`, as `NetworkNumbers` of the crate.
     pub parameters: *const Numbers,
     /// How many there are.
     pub parameter_count: usize,
