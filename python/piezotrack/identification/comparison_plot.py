@@ -60,12 +60,13 @@ def plot_comparison(comparison: Comparison, fig: Figure | SubFigure | None = Non
     figure = panels(fig, (11.0, max(7.4, 1.25 * len(rows) + 2.2)))
     grid = figure.add_gridspec(1, 2, width_ratios=[1.0, 1.35])
     # Many names are beside each other nowhere: they get a place of their own below the loop.
-    names = 0.25 + 0.045 * len(rows) if len(rows) > NAMES_INSIDE else 0.01
-    left = grid[0].subgridspec(4, 1, height_ratios=[1.5, names, 1.1, 0.6 + 0.16 * len(rows)])
+    names = [0.25 + 0.045 * len(rows)] if len(rows) > NAMES_INSIDE else []
+    heights = [1.5, *names, 1.1, 0.6 + 0.16 * len(rows)]
+    left = grid[0].subgridspec(len(heights), 1, height_ratios=heights)
     right = grid[1].subgridspec(len(rows), 1)
     loop = figure.add_subplot(left[0])
-    _loops(comparison, loop, figure.add_subplot(left[2], sharex=loop))
-    if len(rows) > NAMES_INSIDE:
+    _loops(comparison, loop, figure.add_subplot(left[-2], sharex=loop))
+    if names:
         below = figure.add_subplot(left[1])
         below.set_axis_off()
         named = loop.get_legend_handles_labels()
@@ -74,7 +75,7 @@ def plot_comparison(comparison: Comparison, fig: Figure | SubFigure | None = Non
         low, high = loop.get_ylim()
         loop.set_ylim(bottom=low - 0.07 * len(rows) * (high - low))
         loop.legend(loc="lower right", frameon=False, fontsize="small")
-    _bars(comparison, figure.add_subplot(left[3]))
+    _bars(comparison, figure.add_subplot(left[-1]))
     _errors(comparison, [figure.add_subplot(right[i]) for i in range(len(rows))])
     figure.suptitle(_title(comparison), fontsize="large")
     return whole(figure)
