@@ -286,8 +286,6 @@ class Controller:
         limits: tuple[float, float],
         span: tuple[float, float] | None,
         max_jump: float | None,
-        pid: tuple[float, float, float, float | None] | None,
-        state_space: tuple[list[float], list[float], list[float], float, list[float] | None] | None,
         law: tuple[str, list[float]] | None,
         repetitive: tuple[str, list[float]] | None,
         filters: list[tuple[str, list[float]]],

@@ -60,11 +60,18 @@ def check_period(controller: Controller, reference: Reference) -> None:
             f"reference ({reference.name}) does not repeat: expected one that does, for the "
             "repetitive part"
         )
-    turns = controller.repetitive.period / reference.period
+    check_turns(controller, reference.period, f"reference ({reference.name})")
+
+
+def check_turns(controller: Controller, period: float, whose: str) -> None:
+    """Refuse a repetitive part whose period [s] is not that of something, or a multiple."""
+    if controller.repetitive is None:
+        return
+    turns = controller.repetitive.period / period
     if abs(turns - max(1, round(turns))) > 1e-6 * turns:
         raise ParameterError(
             f"repetitive has a period of {controller.repetitive.period:g} s: expected that of the "
-            f"reference ({reference.name}), {reference.period:g} s, or a multiple"
+            f"{whose}, {period:g} s, or a multiple"
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -65,6 +66,12 @@ class Pid:
         not_negative("td", self.td, "s")
         if self.tt is not None and not (_core.as_number("tt", self.tt) > 0.0):
             raise ParameterError(f"tt is {self.tt} s: expected a time above 0")
+
+    @property
+    def _settings(self) -> tuple[str, list[float]]:
+        """The name and the numbers as the core takes them; NaN for the default of tt."""
+        tt = math.nan if self.tt is None else self.tt
+        return "pid", [float(one) for one in (self.kp, self.ti, self.td, tt)]
 
     @classmethod
     def from_um(cls, *, kp: float, ti: float, td: float = 0.0, tt: float | None = None) -> Pid:
@@ -148,6 +155,14 @@ class StateSpace:
             )
         back = None if self.back is None else _matrix("back", self.back).tolist()
         return a.tolist(), b.tolist(), c.tolist(), finite("d", _single("d", self.d), "V/m"), back
+
+    @property
+    def _settings(self) -> tuple[str, list[float]]:
+        """The name and the numbers as the core takes them."""
+        a, b, c, d, back = self._matrices
+        if back == []:
+            raise ParameterError("back is 0 entries: expected as many entries as b")
+        return "state space", [float(len(b)), *a, *b, *c, d, *(back or [])]
 
 
 def _single(name: str, value: object) -> object:

@@ -137,16 +137,13 @@ class Controller:
             _check_unit("kp", self.feedback.pid.kp, high - low, "Pid", self.drive_unit)
         if isinstance(self.repetitive, Repetitive):
             _check_unit("kq", self.repetitive.kq, high - low, "Repetitive", self.drive_unit)
-        pid, law = self.feedback, self.feedback
         span = self._span(low, high)
         core = _core.Controller(
             dt=dt,
             limits=(low, high),
             span=span,
             max_jump=None if self.max_jump is None else _core.as_number("max_jump", self.max_jump),
-            pid=(pid.kp, pid.ti, pid.td, pid.tt) if isinstance(pid, Pid) else None,
-            state_space=law._matrices if isinstance(law, StateSpace) else None,
-            law=law._settings if isinstance(law, NAMED_LAWS) else None,
+            law=None if self.feedback is None else self.feedback._settings,
             repetitive=None if self.repetitive is None else self.repetitive._settings,
             filters=[one._settings for one in self.filters],
         )

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from .device import Device
 
-__all__ = ["led_back", "terminated"]
+__all__ = ["lead", "led_back", "terminated"]
 
 # Time that the way to a safe voltage takes [s], and between two of its steps.
 RAMP, PAUSE = 0.5, 0.002
@@ -79,15 +79,20 @@ def _lead_back(device: Device, home: float, error: BaseException) -> None:
 def _ramp(device: Device, home: float) -> None:
     """Lead the output to a voltage [V] slowly, from that which the device says is there."""
     present = getattr(device, "voltage", math.nan)
-    if not (isinstance(present, float) and math.isfinite(present)):
+    if isinstance(present, float) and math.isfinite(present):
+        lead(device, present, home)
+    else:
         device.hold(home)
-        return
+
+
+def lead(device: Device, present: float, home: float, pause: float = PAUSE) -> None:
+    """Lead the output from one voltage to another [V] in half a second, in steps of `pause` [s]."""
     low, high = device.limits
     begin, begun = min(max(present, low), high), time.perf_counter()
     while (share := (time.perf_counter() - begun) / RAMP) < 1.0:
         # Between two voltages within the limits, whatever the rounding.
         device.hold(min(max(begin + (home - begin) * share, low), high))
-        time.sleep(PAUSE)
+        time.sleep(pause)
     device.hold(home)
 
 

@@ -80,7 +80,8 @@ pub unsafe extern "C" fn piezotrack_new(
         // SAFETY: as the caller promises.
         let settings = unsafe { settings.as_ref() }
             .ok_or_else(|| Error::parameter("settings", "NULL", "a piezotrack_settings"))?;
-        Running::new(&unsafe { settings::parts(settings) }?)
+        let (parts, feedforward) = unsafe { settings::parts(settings) }?;
+        Running::new(&parts, feedforward.as_ref())
     };
     let made = catch_unwind(AssertUnwindSafe(make));
     let text = match &made {

@@ -2,31 +2,16 @@
 
 use piezotrack_control::inverse::{Inverse, NetworkNumbers, NeuralNetworkInverse};
 use piezotrack_control::{
-    Command, Controller, ControllerState, Limits, OnlineFeedforward, OnlineFeedforwardState,
-    ReferenceSample, Refused, Span,
+    Command, Controller, ControllerState, OnlineFeedforward, OnlineFeedforwardState,
+    ReferenceSample, Refused,
 };
 use piezotrack_core::math::zeros;
 use piezotrack_core::models::{AnyInverse, AnyInverseState, Model, ParameterInfo, Values};
-use piezotrack_core::simulate::{DELAY_LINE, Law, LawState, filter_named, repetitive_named};
+use piezotrack_core::simulate::{ControllerParts, DELAY_LINE, Law, LawState, Named};
 use piezotrack_core::{Error, Result};
 
 /// What the model of the feedforward is called that is a network.
 const NETWORK: &str = "neural network";
-
-/// A name with its numbers.
-pub type Named<'a> = (&'a str, &'a [f64]);
-
-/// What a controller is made of.
-pub struct Parts<'a> {
-    pub dt: f64,
-    pub limits: (f64, f64),
-    pub span: Option<(f64, f64)>,
-    pub max_jump: Option<f64>,
-    pub law: Option<Named<'a>>,
-    pub repetitive: Option<Named<'a>>,
-    pub filters: Vec<Named<'a>>,
-    pub feedforward: Option<FeedforwardParts<'a>>,
-}
 
 /// What the feedforward is made of.
 pub struct FeedforwardParts<'a> {
@@ -53,33 +38,13 @@ pub struct Running {
 
 impl Running {
     /// A controller that begins at 0 V.
-    pub fn new(parts: &Parts<'_>) -> Result<Self> {
-        let dt = piezotrack_core::error::positive("dt", parts.dt, "s")?;
-        let law = match parts.law {
-            Some((name, numbers)) => Law::named(name, numbers, dt)?,
-            None => Law::None,
-        };
-        let limits = Limits::new(parts.limits.0, parts.limits.1)?;
-        let mut controller = Controller::new(limits, law);
-        if let Some((low, high)) = parts.span {
-            controller.span = Span::new(low, high)?;
-        }
-        if let Some(jump) = parts.max_jump {
-            controller.span = controller.span.with_max_jump(jump)?;
-        }
-        if let Some((name, numbers)) = parts.repetitive {
-            controller.repetitive = Some(repetitive_named(name, numbers)?.at(dt)?);
-        }
-        let most = controller.filters.len();
-        if parts.filters.len() > most {
-            let expected = format!("{most} at most");
-            return Err(Error::parameter("filter_count", parts.filters.len(), expected));
-        }
-        for (slot, (name, numbers)) in controller.filters.iter_mut().zip(&parts.filters) {
-            *slot = Some(filter_named(name, numbers, dt)?);
-        }
-        let feedforward = match &parts.feedforward {
-            Some(forward) => Some(Feedforward::new(forward, dt)?),
+    pub fn new(
+        parts: &ControllerParts<'_>,
+        forward: Option<&FeedforwardParts<'_>>,
+    ) -> Result<Self> {
+        let controller = parts.controller()?;
+        let feedforward = match forward {
+            Some(forward) => Some(Feedforward::new(forward, parts.dt)?),
             None => None,
         };
         let state = controller.rest(line(&controller)?)?;

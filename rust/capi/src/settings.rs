@@ -3,9 +3,10 @@
 use core::ffi::{CStr, c_char};
 use core::slice;
 
+use piezotrack_core::simulate::{ControllerParts, Named};
 use piezotrack_core::{Error, Result};
 
-use crate::running::{FeedforwardParts, Named, Parts};
+use crate::running::FeedforwardParts;
 
 /// A part, a parameter or a state, with its numbers.
 #[repr(C)]
@@ -83,26 +84,18 @@ pub struct Settings {
     pub delay: f64,
 }
 
-/// The parts of a controller, borrowed from settings.
+/// The parts of a controller and of its feedforward, borrowed from settings.
 ///
 /// # Safety
 /// Each pointer of `settings` is NULL, or points to as many elements as its count says, or to a
 /// text that ends with 0.
-pub unsafe fn parts(settings: &Settings) -> Result<Parts<'_>> {
+pub unsafe fn parts(
+    settings: &Settings,
+) -> Result<(ControllerParts<'_>, Option<FeedforwardParts<'_>>)> {
     let span = (settings.span_low, settings.span_high);
     // SAFETY: pointers and counts are the caller's promise.
     unsafe {
-        let feedforward = match text("model", settings.model)? {
-            None => None,
-            Some(model) => Some(FeedforwardParts {
-                model,
-                parameters: list("parameters", settings.parameters, settings.parameter_count)?,
-                initial: list("initial", settings.initial, settings.initial_count)?,
-                offset: settings.offset,
-                delay: settings.delay,
-            }),
-        };
-        Ok(Parts {
+        let parts = ControllerParts {
             dt: settings.dt,
             limits: (settings.low, settings.high),
             span: (span != (0.0, 0.0)).then_some(span),
@@ -110,8 +103,16 @@ pub unsafe fn parts(settings: &Settings) -> Result<Parts<'_>> {
             law: named("law", &settings.law)?,
             repetitive: named("repetitive", &settings.repetitive)?,
             filters: list("filters", settings.filters, settings.filter_count)?,
-            feedforward,
-        })
+        };
+        let Some(model) = text("model", settings.model)? else { return Ok((parts, None)) };
+        let feedforward = FeedforwardParts {
+            model,
+            parameters: list("parameters", settings.parameters, settings.parameter_count)?,
+            initial: list("initial", settings.initial, settings.initial_count)?,
+            offset: settings.offset,
+            delay: settings.delay,
+        };
+        Ok((parts, Some(feedforward)))
     }
 }
 

@@ -1,10 +1,10 @@
 //! Controllers, as configuration and as sessions.
 
-use piezotrack_control::{Command, Controller, ControllerState, Limits, Pid, Span, StateSpace};
+use piezotrack_control::{Command, Controller, ControllerState};
+use piezotrack_core::Error;
 use piezotrack_core::design::LinearFeedback;
 use piezotrack_core::math::zeros;
-use piezotrack_core::simulate::{DELAY_LINE, Law, LawState, filter_named, repetitive_named};
-use piezotrack_core::{Error, Result};
+use piezotrack_core::simulate::{ControllerParts, DELAY_LINE, Law, LawState, Named};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -19,12 +19,6 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PySession>()
 }
 
-/// kp, ti, td, and tt where it is given.
-type PidGains = (f64, f64, f64, Option<f64>);
-
-/// A row by row, B, C, D, and the vector of back-calculation where it is given.
-type Matrices = (Vec<f64>, Vec<f64>, Vec<f64>, f64, Option<Vec<f64>>);
-
 /// A part by its name, with its numbers.
 type NamedPart = (String, Vec<f64>);
 
@@ -38,46 +32,28 @@ pub struct PyController {
 #[pymethods]
 impl PyController {
     #[new]
-    #[pyo3(signature = (*, dt, limits, span, max_jump, pid, state_space, law, repetitive, filters))]
-    #[expect(clippy::too_many_arguments, reason = "all named in Python")]
+    #[pyo3(signature = (*, dt, limits, span, max_jump, law, repetitive, filters))]
+    #[expect(clippy::needless_pass_by_value, reason = "as Python gives them")]
     fn new(
         dt: f64,
         limits: (f64, f64),
         span: Option<(f64, f64)>,
         max_jump: Option<f64>,
-        pid: Option<PidGains>,
-        state_space: Option<Matrices>,
         law: Option<NamedPart>,
         repetitive: Option<NamedPart>,
         filters: Vec<NamedPart>,
     ) -> PyResult<Self> {
-        let build = move || -> Result<Self> {
-            piezotrack_core::error::positive("dt", dt, "s")?;
-            let law = match law {
-                Some((name, numbers)) => Law::named(&name, &numbers, dt)?,
-                None => pid_or_state_space(dt, pid, state_space)?,
-            };
-            let mut controller = Controller::new(Limits::new(limits.0, limits.1)?, law);
-            if let Some((low, high)) = span {
-                controller.span = Span::new(low, high)?;
-            }
-            if let Some(jump) = max_jump {
-                controller.span = controller.span.with_max_jump(jump)?;
-            }
-            controller.repetitive = match repetitive {
-                Some((name, numbers)) => Some(repetitive_named(&name, &numbers)?.at(dt)?),
-                None => None,
-            };
-            let most = controller.filters.len();
-            if filters.len() > most {
-                return Err(Error::parameter("filters", filters.len(), format!("{most} at most")));
-            }
-            for (slot, (name, numbers)) in controller.filters.iter_mut().zip(&filters) {
-                *slot = Some(filter_named(name, numbers, dt)?);
-            }
-            Ok(Self { controller, dt })
+        let parts = ControllerParts {
+            dt,
+            limits,
+            span,
+            max_jump,
+            law: law.as_ref().map(borrowed),
+            repetitive: repetitive.as_ref().map(borrowed),
+            filters: filters.iter().map(borrowed).collect(),
         };
-        build().map_err(|error| raise(&error))
+        let controller = parts.controller().map_err(|error| raise(&error))?;
+        Ok(Self { controller, dt })
     }
 
     /// Entries of the repetitive part's delay line.
@@ -121,18 +97,8 @@ impl PyController {
     }
 }
 
-fn pid_or_state_space(
-    dt: f64,
-    pid: Option<PidGains>,
-    state_space: Option<Matrices>,
-) -> Result<Law> {
-    match (pid, state_space) {
-        (Some((kp, ti, td, tt)), _) => Ok(Law::Pid(Pid::new(kp, ti, td, tt)?.at(dt)?)),
-        (None, Some((a, b, c, d, back))) => {
-            Ok(Law::StateSpace(StateSpace::new(&a, &b, &c, d, back.as_deref())?))
-        }
-        (None, None) => Ok(Law::None),
-    }
+fn borrowed((name, numbers): &NamedPart) -> Named<'_> {
+    (name, numbers)
 }
 
 /// Numerator and denominator of a law in powers of `z - 1`, constant term first.

@@ -16,7 +16,7 @@ from .c_text import (
     constant_text,
     field_text,
     in_order,
-    named,
+    named_in,
     state_bytes,
 )
 from .vectors import STEPS, rows_of, vectors_text
@@ -142,10 +142,7 @@ def c_sources(
         f"{name}.c": _source(parts, facts, single=single),
         "check.c": check_code(shape.forward, bound, flags),
     }
-    files = {
-        file: named(name, text).replace("@GUARD", name.upper()).replace("@file", name)
-        for file, text in texts.items()
-    }
+    files = {file: named_in(name, text) for file, text in texts.items()}
     files["vectors.csv"] = vectors_text(rows, unit)
     return Sources(
         name=name,

@@ -9,7 +9,7 @@ import numpy as np
 from ..._support.arrays import signal_of
 from ..._support.units import of_drive
 from ...errors import DataError, ParameterError, ShapeError
-from ..checks import check_period
+from ..checks import check_period, check_turns
 from ..components import Pid, StateSpace
 from ..hysteresis_observer import HysteresisObserver
 from ..laws import DisturbanceObserver, LeadLag, PerturbationEstimator, SlidingMode
@@ -109,13 +109,7 @@ def _given_table(controller: Controller, given: ArrayLike) -> list[float]:
             f"table[{far[0]}] is {table[far[0]]:g} {unit}: expected voltages within the limits, "
             f"{low:g} to {high:g} {unit}"
         )
-    if controller.repetitive is not None:
-        turns = controller.repetitive.period / (table.size * controller.dt)
-        if abs(turns - max(1, round(turns))) > 1e-6 * turns:
-            raise ParameterError(
-                f"repetitive has a period of {controller.repetitive.period:g} s: expected that of "
-                f"the table, {table.size * controller.dt:g} s, or a multiple"
-            )
+    check_turns(controller, table.size * controller.dt, "table")
     return [float(one) for one in table]
 
 

@@ -19,11 +19,13 @@ __all__ = [
     "Field",
     "Operations",
     "Part",
+    "array_lines",
     "constant_text",
     "field_text",
     "in_order",
     "literal",
     "named",
+    "named_in",
     "state_bytes",
 ]
 
@@ -124,6 +126,11 @@ def named(name: str, code: str) -> str:
     return re.sub(r"\bNAME(?=_)", name, code)
 
 
+def named_in(name: str, text: str) -> str:
+    """Put the name of an export into a whole file."""
+    return named(name, text).replace("@GUARD", name.upper()).replace("@file", name)
+
+
 def literal(value: float, name: str, *, single: bool) -> str:
     """Write a number of C exactly, in hexadecimal, with its decimal in a comment.
 
@@ -178,12 +185,17 @@ def constant_text(one: Constant, *, single: bool) -> str:
         number = literal(one.value, one.name, single=single)
         return f"{above}static const real {one.name} = {number.replace(' /*', '; /*', 1)}\n"
     numbers = [literal(value, one.name, single=single) for value in one.value]
-    entries = [number.replace(" /*", ", /*", 1) for number in numbers]
-    lines = [
-        "    " + " ".join(entries[i : i + IN_A_LINE]) for i in range(0, len(entries), IN_A_LINE)
+    size, body = len(numbers), array_lines(numbers)
+    return f"{above}static const real {one.name}[{size}] = {{\n{body}\n}};\n"
+
+
+def array_lines(numbers: Iterable[str]) -> str:
+    """Write the entries of an array, each with a comma before its comment."""
+    entries = [
+        number.replace(" /*", ", /*", 1) if "/*" in number else f"{number}," for number in numbers
     ]
-    body = "\n".join(lines)
-    return f"{above}static const real {one.name}[{len(entries)}] = {{\n{body}\n}};\n"
+    places = range(0, len(entries), IN_A_LINE)
+    return "\n".join("    " + " ".join(entries[i : i + IN_A_LINE]) for i in places)
 
 
 TYPES = {

@@ -6,12 +6,11 @@ import math
 from typing import TYPE_CHECKING
 
 from ... import _core
-from ..components import Pid, StateSpace
 from ..description import controller_text
 from ..neural_network import NETWORK, NetworkInverse
 from .c99 import checked_name
 from .c_check import check_code
-from .c_text import literal, named
+from .c_text import array_lines, literal, named_in
 from .vectors import rows_of, vectors_text
 
 if TYPE_CHECKING:
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
 __all__ = ["library_sources"]
 
 Numbers = tuple[str, list[float]]
-IN_A_LINE = 2
 
 
 def library_sources(
@@ -81,10 +79,7 @@ def library_sources(
     }
     for key, piece in pieces.items():
         texts = {file: text.replace(key, piece) for file, text in texts.items()}
-    files = {
-        file: named(name, text).replace("@GUARD", name.upper()).replace("@file", name)
-        for file, text in texts.items()
-    }
+    files = {file: named_in(name, text) for file, text in texts.items()}
     rows = rows_of(controller, table, reference)
     files["vectors.csv"] = vectors_text(rows, controller.drive_unit)
     return files
@@ -94,19 +89,18 @@ def _settings_text(controller: Controller, table: list[float] | None) -> str:
     """Write the arrays of the settings, and the settings."""
     arrays: list[str] = []
     low, high = controller.limits
-    span = controller._span(low, high)
+    least, most = controller._valid
     fields = [
         ("dt", _number(controller.dt)),
         ("low", _number(low)),
         ("high", _number(high)),
+        ("span_low", _number(least)),
+        ("span_high", _number(most)),
     ]
-    if span is not None:
-        fields += [("span_low", _number(span[0])), ("span_high", _number(span[1]))]
     if controller.max_jump is not None:
         fields.append(("max_jump", _number(controller.max_jump)))
-    law = _law(controller)
-    if law is not None:
-        fields.append(("law", _entry(arrays, "law", law)))
+    if controller.feedback is not None:
+        fields.append(("law", _entry(arrays, "law", controller.feedback._settings)))
     if controller.repetitive is not None:
         part = controller.repetitive._settings
         fields.append(("repetitive", _entry(arrays, "repetitive", part)))
@@ -128,19 +122,6 @@ def _settings_text(controller: Controller, table: list[float] | None) -> str:
     body = "".join(f"    .{name} = {value},\n" for name, value in fields)
     settings = f"static const piezotrack_settings settings = {{\n{body}}};\n"
     return "\n".join([*arrays, settings])
-
-
-def _law(controller: Controller) -> Numbers | None:
-    """Name and numbers of the feedback law."""
-    law = controller.feedback
-    if law is None:
-        return None
-    if isinstance(law, Pid):
-        return "pid", [law.kp, law.ti, law.td, math.nan if law.tt is None else law.tt]
-    if isinstance(law, StateSpace):
-        a, b, c, d, back = law._matrices
-        return "state space", [float(len(b)), *a, *b, *c, d, *(back or [])]
-    return law._settings
 
 
 def _network(inverse: NetworkInverse) -> list[Numbers]:
@@ -171,12 +152,7 @@ def _entry(arrays: list[str], array: str, part: Numbers) -> str:
 
 
 def _array(name: str, numbers: list[float]) -> str:
-    entries = [_number(one).replace(" /*", ", /*", 1) for one in numbers]
-    entries = [one if "/*" in one else f"{one}," for one in entries]
-    lines = [
-        "    " + " ".join(entries[i : i + IN_A_LINE]) for i in range(0, len(entries), IN_A_LINE)
-    ]
-    return f"static const double {name}[] = {{\n" + "\n".join(lines) + "\n};\n"
+    return f"static const double {name}[] = {{\n{array_lines(map(_number, numbers))}\n}};\n"
 
 
 def _number(value: float) -> str:

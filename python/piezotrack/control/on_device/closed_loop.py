@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import DeviceError, Interrupted, ParameterError
 from ...hardware.measuring import rest_of
-from ...hardware.safe_end import terminated
+from ...hardware.safe_end import lead, terminated
 from ..checks import check_period, check_stable, check_within_reach
 from ..tracking import Tracking, feedforward_of
 from .guard import Guard
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
 __all__ = ["DeviceTracking", "track_on"]
 
 # The way to the safe voltage [s].
-RAMP = 0.5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -255,15 +254,10 @@ def _to_safe(
 ) -> None:
     done = np.flatnonzero(np.isfinite(log.lateness))
     held = float(log.rows[done[-1], 1]) if done.size else home
-    steps = max(1, round(RAMP / max(dt, 1e-3)))
     problem: Exception | None = None
-    begun = time.perf_counter()
     # Slowly, so that nothing is excited; at once where that does not work, or is interrupted.
     try:
-        for k in range(1, steps + 1):
-            wait_until(begun + k * RAMP / steps)
-            # Rounding would leave the limits at the end of the way.
-            device.hold(home if k == steps else held + (home - held) * k / steps)
+        lead(device, held, home, max(dt, 1e-3))
         return
     except KeyboardInterrupt:
         pass

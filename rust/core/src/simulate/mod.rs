@@ -20,7 +20,7 @@ mod virtual_stage;
 pub use amplifier::{Amplifier, AmplifierFlow};
 pub use apparatus::{Apparatus, ApparatusState};
 pub use closed_loop::{ClosedLoop, closed_loop};
-pub use named_parts::{filter_named, repetitive_named};
+pub use named_parts::{ControllerParts, Named};
 pub use open_loop::{OpenLoop, open_loop};
 pub use sensor::{Sensor, SensorState};
 pub use timing::{MissedTicks, Timing};

@@ -14,12 +14,67 @@
 
 use piezotrack_control::hysteresis::{BoucWen, Dahl};
 use piezotrack_control::{
-    DisturbanceObserver, Filter, HysteresisObserver, LeadLag, Pid, Repetitive, SampledPid,
-    ScheduledPid, SlidingMode, Smoothing, StateSpace,
+    Controller, DisturbanceObserver, Filter, HysteresisObserver, LeadLag, Limits, Pid, Repetitive,
+    SampledPid, ScheduledPid, SlidingMode, Smoothing, Span, StateSpace,
 };
 
 use super::tracking::Law;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, positive};
+
+/// A part by its name, with its numbers.
+pub type Named<'a> = (&'a str, &'a [f64]);
+
+/// What a controller is made of.
+#[derive(Clone, Debug)]
+pub struct ControllerParts<'a> {
+    /// Sampling interval, s.
+    pub dt: f64,
+    /// Lowest and highest voltage, V.
+    pub limits: (f64, f64),
+    /// Lowest and highest displacement that the sensor can show, m; the default where not given.
+    pub span: Option<(f64, f64)>,
+    /// Largest displacement in a sampling interval, m.
+    pub max_jump: Option<f64>,
+    /// Feedback law, as of [`Law::named`].
+    pub law: Option<Named<'a>>,
+    /// Repetitive part, by the name of its smoothing.
+    pub repetitive: Option<Named<'a>>,
+    /// Filters of the measurement.
+    pub filters: Vec<Named<'a>>,
+}
+
+impl ControllerParts<'_> {
+    /// The controller.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a name that is unknown, another count of numbers, and a number out
+    /// of its range.
+    pub fn controller(&self) -> Result<Controller<Law>> {
+        let dt = positive("dt", self.dt, "s")?;
+        let law = match self.law {
+            Some((name, numbers)) => Law::named(name, numbers, dt)?,
+            None => Law::None,
+        };
+        let mut controller = Controller::new(Limits::new(self.limits.0, self.limits.1)?, law);
+        if let Some((low, high)) = self.span {
+            controller.span = Span::new(low, high)?;
+        }
+        if let Some(jump) = self.max_jump {
+            controller.span = controller.span.with_max_jump(jump)?;
+        }
+        if let Some((name, numbers)) = self.repetitive {
+            controller.repetitive = Some(repetitive(name, numbers)?.at(dt)?);
+        }
+        let most = controller.filters.len();
+        if self.filters.len() > most {
+            return Err(Error::parameter("filters", self.filters.len(), format!("{most} at most")));
+        }
+        for (slot, (name, numbers)) in controller.filters.iter_mut().zip(&self.filters) {
+            *slot = Some(filter(name, numbers, dt)?);
+        }
+        Ok(controller)
+    }
+}
 
 impl Law {
     /// A law for samples every `dt` seconds, from its name and its numbers; see the table of the
@@ -148,11 +203,7 @@ fn truth(name: &str, number: f64) -> Result<bool> {
 
 /// A filter of the measurement: `low pass` with its cutoff (Hz), `notch` with its frequency (Hz),
 /// width and depth.
-///
-/// # Errors
-/// [`Error::Parameter`] for a name that is unknown, another count of numbers, and a number out of
-/// its range.
-pub fn filter_named(name: &str, numbers: &[f64], dt: f64) -> Result<Filter> {
+fn filter(name: &str, numbers: &[f64], dt: f64) -> Result<Filter> {
     Ok(match (name, numbers) {
         ("notch", &[frequency, width, depth]) => Filter::notch(frequency, width, depth, dt)?,
         ("low pass", &[cutoff]) => Filter::low_pass(cutoff, dt)?,
@@ -167,11 +218,7 @@ pub fn filter_named(name: &str, numbers: &[f64], dt: f64) -> Result<Filter> {
 /// A repetitive part from the name of its smoothing and six numbers: period (s), kq (V/m), time
 /// constant (s) or order of the smoothing, forgetting factor, lead (samples), 1 for a pause under
 /// saturation.
-///
-/// # Errors
-/// [`Error::Parameter`] for a name that is unknown, another count of numbers, and a number out of
-/// its range.
-pub fn repetitive_named(smoothing: &str, numbers: &[f64]) -> Result<Repetitive> {
+fn repetitive(smoothing: &str, numbers: &[f64]) -> Result<Repetitive> {
     let &[period, kq, number, forgetting_factor, lead, pause] = numbers else {
         let value = format!("'{smoothing}' with {} numbers", numbers.len());
         return Err(Error::parameter("repetitive", value, "six numbers"));
