@@ -39,8 +39,6 @@ if TYPE_CHECKING:
 
 __all__ = ["DeviceTracking", "track_on"]
 
-# The way to the safe voltage [s].
-
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class DeviceTracking(Tracking):
