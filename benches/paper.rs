@@ -30,7 +30,7 @@ pub fn paper_spec() -> Spec {
 pub fn candidates(problem: &Problem, particles: u32) -> Vec<Candidate> {
     (0..particles)
         .map(|i| problem.theta(&[f64::from(i) / f64::from(particles); 4]))
-        .map(|theta| Candidate { theta, limit: f64::INFINITY })
+        .map(Candidate::of)
         .collect()
 }
 

@@ -73,6 +73,16 @@ def test_an_option_given_once_is_for_all_logs() -> None:
     assert [one["data"]["window_s"][0] for one in found["records"]] == [1.0, 1.0]
 
 
+def test_several_logs_share_the_creep_of_a_model_that_is_searched() -> None:
+    document = json.loads(
+        ran("identify", "a.csv", "b.csv", *KINDS, *FIXED, "--creep", "1,5", "--json")
+    )
+    (found,) = document["models"]
+    assert found["parameters"]["creep_times"]["value"] == [1.0, 5.0]
+    # The stage has none.
+    assert max(found["parameters"]["creep_weights"]["value"]) < 1e-3
+
+
 def test_a_model_of_several_logs_is_used_like_any_other() -> None:
     ran("identify", "a.csv", "b.csv", *KINDS, *FIXED, "--delay", "0", "--delay", "0.02")
     ran("simulate", "results/dahl.json", "b.csv", "--out", "simulated.csv")
@@ -90,10 +100,7 @@ def test_a_model_of_several_logs_is_used_like_any_other() -> None:
         (("--weight", "1", "--weight", "-1"), "record 2 (b.csv): weight is -1"),
         (("--history", "virgin", "--history", "old"), "record 2 (b.csv): history is 'old'"),
         (("--window", "0:1", "--window", "9:"), "b.csv: --window 9:"),
-        (
-            ("--creep", "fit"),
-            "--creep has no effect with several logs and a model that is searched",
-        ),
+        (("--creep", "1,0"), "creep[1] is 0 s: expected a finite number above 0"),
     ],
 )
 def test_refusals_name_the_option_or_the_log(options: tuple[str, ...], said: str) -> None:

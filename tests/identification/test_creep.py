@@ -114,6 +114,114 @@ def test_time_constants_from_the_record() -> None:
         pt.identify(short, "first-order-dahl", **options)
 
 
+def two_records(noise: float = 0.0) -> list[pt.Dataset]:
+    """A slow one and a quick one, which a wave that no stage makes disturbs each in its own way."""
+    one = record()
+    t = 2e-3 * np.arange(2000)
+    u = 20.0 * (1 - np.cos(2 * np.pi * 5.0 * t))
+    quick = pt.Dataset(u=u, y=STAGE.simulate(u, 2e-3).x - 1e-6, dt=2e-3)
+    waves = [
+        noise * np.sin(2 * np.pi * rate * each.t) for rate, each in ((0.07, one), (0.9, quick))
+    ]
+    return [
+        pt.Dataset(u=each.u, y=each.y + wave, dt=each.dt)
+        for each, wave in zip((one, quick), waves, strict=True)
+    ]
+
+
+def together(records: list[pt.Dataset], **asked: Any) -> pt.identification.Identification:
+    asked = {"creep": (0.3, 4.0), "history": "virgin", "progress": False, **asked}
+    return pt.identify(records, "first-order-dahl", fixed=HELD, **asked)
+
+
+@pytest.mark.parametrize("method", ["descents", "swarm"])
+def test_several_records_have_the_same_weights(method: Any) -> None:
+    swarm = pt.ParticleSwarm(iterations=20, particles=16) if method == "swarm" else None
+    fit = together(two_records(), method=method, swarm=swarm)
+    assert fit.model.creep_weights == pytest.approx((0.02, 0.03), rel=2e-3)
+    assert fit.model.damping == pytest.approx(500.0, rel=1e-2)
+    assert [one.offset for one in fit.records] == pytest.approx([3e-6, -1e-6], abs=1e-9)
+    assert fit.cost < 1e-9
+
+
+@pytest.mark.parametrize("weights", [(1.0, 1.0), (1.0, 20.0)])
+@pytest.mark.parametrize("offset", [True, False, [True, False]])
+def test_the_weights_are_those_of_least_squares_of_all_records(
+    offset: Any, weights: tuple[float, float]
+) -> None:
+    """Of the mechanics that were found: by the active set method of SciPy, on stacked columns."""
+    nnls = pytest.importorskip("scipy.optimize").nnls
+    records = two_records(noise=1e-7)
+    fit = together(records, offset=offset, weights=weights)
+    alone = replace(fit.model, creep_weights=(), creep_times=())
+    offsets = offset if isinstance(offset, list) else [offset] * 2
+    rows, measured = [], []
+    for i, (data, weight) in enumerate(zip(records, weights, strict=True)):
+        x = alone.simulate(data.u, data.dt).x
+        columns = [
+            replace(alone, creep_weights=(1.0,), creep_times=(time,)).simulate(data.u, data.dt).x
+            - x
+            for time in (0.3, 4.0)
+        ]
+        # An offset of either sign.
+        for k, each in enumerate(offsets):
+            one = np.full(x.size, 1e-5 if each and k == i else 0.0)
+            columns += [one, -one]
+        rows.append(np.sqrt(weight) * np.column_stack(columns))
+        measured.append(np.sqrt(weight) * (data.y - x))
+    found, left = nnls(np.vstack(rows), np.concatenate(measured))
+    assert fit.model.creep_weights == pytest.approx(found[:2], abs=2e-5)
+    counts = sum(w * len(data) for w, data in zip(weights, records, strict=True))
+    assert fit.cost == pytest.approx(left / np.sqrt(counts), rel=1e-4)
+
+
+def test_the_search_of_several_records_ends_at_a_minimum() -> None:
+    """A parameter held a little aside, the rest fitted again, makes the cost larger."""
+    records = two_records(noise=1e-7)
+    fit = together(records)
+    for name in ("damping", "piezo_coefficient"):
+        value = getattr(fit.model, name)
+        for change in (0.98, 1.02):
+            held = {**HELD, name: change * value}
+            beside = pt.identify(
+                records, "first-order-dahl", fixed=held, creep=(0.3, 4.0), history="virgin"
+            )
+            assert beside.cost > fit.cost
+
+
+def test_the_cost_of_several_records_is_that_of_the_stage() -> None:
+    fit = together(two_records(noise=1e-7), weights=(1.0, 3.0), delay=[0.0, 1e-3])
+    for one, score in zip(fit.records, fit.scores, strict=True):
+        assert score.rms == pytest.approx(one.cost, abs=2e-10)
+    counts = np.array([1.0, 3.0]) * [len(data) for data in two_records()]
+    squares = np.array([one.cost**2 for one in fit.records])
+    assert fit.cost == pytest.approx(np.sqrt(counts @ squares / counts.sum()), rel=1e-9)
+
+
+@pytest.mark.parametrize("method", ["descents", "swarm"])
+def test_candidates_that_diverge_are_no_best_ones(method: Any) -> None:
+    """Measured records, on which the bounds hold stages that do not stay finite."""
+    records = [pt.datasets.dbo_training()[3.0:], pt.datasets.dbo_tracking()[3.0:]]
+    asked: dict[str, Any] = {"history": "virgin", "progress": False, "seed": 1}
+    fit = pt.identify(records, "first-order-dahl", creep=True, method=method, **asked)
+    without = pt.identify(records, "first-order-dahl", method=method, **asked)
+    assert 0.5 * without.cost < fit.cost <= without.cost
+    assert [one.rms for one in fit.scores] == pytest.approx(
+        [one.cost for one in fit.records], rel=1e-3
+    )
+
+
+def test_time_constants_from_several_records() -> None:
+    swarm = pt.ParticleSwarm(iterations=1, particles=4, polish=False)
+    options: dict[str, Any] = {"creep": True, "swarm": swarm, "runs": 1}
+    fit = together(two_records(), **options)
+    # The period of the quick one, and half of the window of the slow one.
+    assert fit.model.creep_times == pytest.approx((0.2, 7.5), rel=0.1)
+    quick = pt.Dataset(u=two_records()[1].u, y=two_records()[1].y, dt=2e-4)
+    fit = together([record(), quick], **options)
+    assert fit.model.creep_times == pytest.approx((0.02, np.sqrt(0.02 * 7.5), 7.5), rel=0.1)
+
+
 @pytest.mark.parametrize(
     ("creep", "message"),
     [

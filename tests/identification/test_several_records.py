@@ -448,7 +448,12 @@ def still() -> pt.Dataset:
         ),
         (lambda: [slow(), quick()], {"history": ["fit"]}, "history has 1 entries: expected 2"),
         (lambda: [slow(), quick()], {"offset": [True, 3]}, "record 2: offset is 3"),
-        (lambda: [slow(), quick()], {"creep": True}, "creep is True: expected none with 2 records"),
+        (lambda: [slow(), quick()], {"creep": [1.0, 0.0]}, r"creep\[1\] is 0 s: expected"),
+        (
+            lambda: [slow(), quick()[0.0:0.1]],
+            {"creep": True},
+            "record 2: the window has .* samples: expected at least 400 to show creep",
+        ),
         (
             lambda: [slow(), quick()],
             {"model": "prandtl-ishlinskii"},

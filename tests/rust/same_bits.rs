@@ -36,7 +36,7 @@ fn candidates(problem: &Problem) -> Vec<Candidate> {
             let place: Vec<f64> = (0..count)
                 .map(|d| f64::from((7 * i + 5 * u32::try_from(d).unwrap()) % 23) / 23.0)
                 .collect();
-            Candidate { theta: problem.theta(&place), limit: f64::INFINITY }
+            Candidate::of(problem.theta(&place))
         })
         .collect()
 }
@@ -176,7 +176,7 @@ fn one_lane_and_many_with_a_limit_that_falls_in_some() {
         }
         place
     };
-    let at = |i| Candidate { theta: problem.theta(&place(i)), limit: f64::INFINITY };
+    let at = |i| Candidate::of(problem.theta(&place(i)));
     let asked: Vec<Candidate> = (0..23).map(at).collect();
     let expected = bits(&Evaluator::new(&record, &problem, NEVER), &asked);
     assert!(expected.iter().filter(|c| f64::from_bits(c.0).is_finite()).count() > 15);

@@ -8,7 +8,9 @@ use piezotrack_core::identify::{
     Candidate, Coordinate, DELAY, Delay, DescentSettings, Evaluator, Identification, Method, Plan,
     Problem, Progress, Record, Spec, identify, identify_together,
 };
-use piezotrack_core::models::{DahlStage, Experiment, Model, StageModel};
+use piezotrack_core::models::{
+    Creeping, DahlStage, Experiment, FirstOrderDahlStage, Model, StageModel,
+};
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 
 const DT: f64 = 4e-3;
@@ -69,7 +71,7 @@ fn the_cost_is_the_weighted_rms_of_the_costs_of_each() {
     // Each cost is that of the record alone, with the same bits: nothing of the other is in it.
     for (one, record) in found.records.iter().zip([&a, &b]) {
         let evaluator = Evaluator::new(record, &one.problem, NEVER);
-        let alone = evaluator.costs(&[Candidate { theta: one.theta, limit: f64::INFINITY }], NEVER);
+        let alone = evaluator.costs(&[Candidate::of(one.theta)], NEVER);
         assert_eq!(alone[0].rms.to_bits(), one.costs.rms.to_bits());
         assert_eq!(alone[0].offset.to_bits(), one.costs.offset.to_bits());
     }
@@ -114,9 +116,68 @@ fn what_cannot_be_used_is_refused_by_its_record() {
     let refused = Problem::of_records(&[(&record(), &spec()), (&second, &late)], NEVER);
     assert!(refused.unwrap_err().to_string().starts_with("record 2: delay is -1 s: expected"));
     assert!(matches!(Problem::of_records(&[], NEVER), Err(Error::Parameter { .. })));
-    let creeping = Spec { creep_times: vec![0.1], ..spec() };
-    let mut quiet = |_: &Progress| ControlFlow::Continue(());
-    let both = [(&second, &creeping), (&second, &creeping)];
-    let refused = identify_together(&both, &plan(), &mut quiet, NEVER).unwrap_err();
-    assert!(refused.to_string().starts_with("creep is 1 time constants: expected none with"));
+}
+
+/// Drive and displacement of a first-order Dahl stage that creeps, from rest at 0 V.
+fn creeping_log(size: f64, rate: f64, samples: i32, offset: f64) -> (Vec<f64>, Vec<f64>) {
+    let (u, _) = log(size, rate, samples);
+    let drive = Drive::new(&u, DT, Hold::First).unwrap();
+    let dahl = FirstOrderDahlStage::new(&[0.1828, 500.0, 26065.0, 0.0468, 9e3, 0.15, 1.0]).unwrap();
+    let stage = Creeping::new(dahl, &SHARES, &TIMES).unwrap();
+    let x = stage.simulate(&Experiment::of(&drive, NEVER)).unwrap().unwrap().x;
+    (u, x.iter().map(|x| x + offset).collect())
+}
+
+const SHARES: [f64; 2] = [0.02, 0.03];
+const TIMES: [f64; 2] = [0.3, 4.0];
+
+fn creeping() -> Spec {
+    Spec {
+        model: Model::FirstOrderDahl,
+        fixed: vec![("mass".into(), 0.1828)],
+        creep_times: TIMES.to_vec(),
+        ..spec()
+    }
+}
+
+#[test]
+fn creep_has_the_same_shares_in_all_records() {
+    let (slow, quick) = (creeping_log(30.0, 1.5, 2000, 3e-6), creeping_log(5.0, 40.0, 900, 0.0));
+    let a = Record::new(&slow.0, &slow.1, DT, Hold::First, 0).unwrap();
+    let b = Record::new(&quick.0, &quick.1, DT, Hold::First, 0).unwrap();
+    let b = b.among("record 2", 2.0).unwrap();
+    let spec = creeping();
+    let found = together(&[(&a, &spec), (&b, &spec)]);
+    let best = &found.runs[found.best.unwrap()];
+    assert!(best.costs.rms < 1e-9, "{:e}", best.costs.rms);
+    for (share, known) in best.costs.shares.iter().zip(SHARES) {
+        assert!((share / known - 1.0).abs() < 1e-3, "{:?}", best.costs.shares);
+    }
+    assert!((found.records[0].costs.offset - 3e-6).abs() < 1e-9);
+    assert!(found.records[1].costs.offset.abs() < 1e-9);
+    // Each record has these shares, not those that suit it best alone.
+    for one in &found.records {
+        assert_eq!(one.costs.shares.map(f64::to_bits), best.costs.shares.map(f64::to_bits));
+    }
+}
+
+#[test]
+fn a_record_given_twice_is_as_one() {
+    let (u, y) = creeping_log(30.0, 1.5, 1200, 3e-6);
+    // Wrong by a slow wave, so that the shares are a compromise.
+    let y: Vec<f64> =
+        y.iter().zip(0..).map(|(y, k)| y + 1e-7 * libm::sin(1e-2 * f64::from(k))).collect();
+    let once = Record::new(&u, &y, DT, Hold::First, 0).unwrap();
+    let again = once.clone().among("record 2", 1.0).unwrap();
+    let spec = creeping();
+    let (alone, both) = (together(&[(&once, &spec)]), together(&[(&once, &spec), (&again, &spec)]));
+    let of = |found: &Identification| found.runs[found.best.unwrap()].clone();
+    let (alone, twice) = (of(&alone), of(&both));
+    assert!((twice.costs.rms / alone.costs.rms - 1.0).abs() < 1e-6);
+    for (one, other) in alone.theta.0.iter().zip(twice.theta.0) {
+        assert!((one - other).abs() <= 1e-3 * one.abs(), "{one} {other}");
+    }
+    for (one, other) in alone.costs.shares.iter().zip(twice.costs.shares) {
+        assert!((one - other).abs() < 1e-4, "{one} {other}");
+    }
 }

@@ -55,7 +55,6 @@ from .options import (
     TimeColumn,
     Units,
     of_file,
-    refuse_without_effect,
     windowed,
 )
 from .output import Output
@@ -134,8 +133,6 @@ def identify_command(
     """Identify models of a stage from one log or several."""
     kinds = Kinds.checked(model)
     kinds.refuse_without_effect(context)
-    if len(files) > 1 and any(map(searched, kinds.names)):
-        refuse_without_effect(context, ("creep",), "with several logs and a model that is searched")
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     given = fit_options(
         free=free,

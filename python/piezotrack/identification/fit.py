@@ -10,7 +10,7 @@ from .checkpoint import checkpoint_of
 from .drift import asked_drift
 from .kinds import identify_kind, refuse_given
 from .selection import AUTO, identify_best
-from .together import best_together, identify_together, refuse_several
+from .together import best_together, identify_together
 
 if TYPE_CHECKING:
     import os
@@ -92,8 +92,8 @@ def identify(
     ----------
     data : Dataset or sequence of Dataset
         The record. ``log[3.0:23.0]`` counts this window only and keeps the drive before it as
-        warm-up. Or several records, in a list, whose drives have one unit; for a model that is
-        searched, without `creep`. `Identification.records` has what is each one's own.
+        warm-up. Or several records, in a list, whose drives have one unit.
+        `Identification.records` has what is each one's own.
     model : str, optional
         Name of the model. By default, ``"auto"``, those that suit the record are fitted to the
         first three fifths of the window and judged on the rest, and the best is fitted to all of
@@ -169,10 +169,11 @@ def identify(
     creep : bool or iterable of float, optional
         Creep of the stage: none (False, the default), relaxations with these time constants [s],
         three at most, or two whose time constants follow from the record (True): the drive's
-        period and half of the window. What relaxes within a period widens the loop, as damping and
-        hysteresis do, and one record does not tell them apart. The weights, 0.5 together at most,
-        are the best for each candidate, by linear least squares, and add nothing to what
-        is searched.
+        period and half of the window; of several records the shortest and the longest of these,
+        and one between where they are a hundred apart. What relaxes within a period widens the
+        loop, as damping and hysteresis do, and one record does not tell them apart. The weights,
+        0.5 together at most and the same in all records, are the best for each candidate, by
+        linear least squares, and add nothing to what is searched.
         For models found by least squares, see ``LeastSquares.creep``.
     method : {"descents", "swarm"}, optional
         What searches: descents from random points until independent ones agree, or a particle
@@ -264,8 +265,6 @@ def identify(
     }
     info = None if model == AUTO else model_named(model)
     several = len(records) > 1
-    if several:
-        refuse_several("creep", creep, len(records))
     if info is not None:
         refuse_given(info, of_swarm, least_squares)
     for one in records:

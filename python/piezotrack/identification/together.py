@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._support.messages import quoted
 from .._support.statistics import sample_noise
-from ..errors import DataError, NumericalError, ParameterError
+from ..errors import DataError, NumericalError
 from .history import GAIN
 from .kinds import identify_weights, refuse_drift
 from .search import search_records
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
     from .asked import Asked
     from .result import Identification
 
-__all__ = ["best_together", "identify_together", "refuse_several"]
+__all__ = ["best_together", "identify_together"]
 
 # A history that a record shows and that nobody gave.
 SHOWN = (("settled", None), ("fit", None))
@@ -152,24 +151,3 @@ def best_together(
     if apart or best is not found[-1][0]:
         fit = identify_together(records, info, full, least_squares)
     return with_trials(fit, found, float(first[0].data.t[-1]) if apart else None)
-
-
-def refuse_several(name: str, value: object, count: int) -> None:
-    """Refuse an argument of one record's least squares beside several records.
-
-    Parameters
-    ----------
-    name : str
-        The argument.
-    value : object
-        What was given; None where it was not.
-    count : int
-        Number of records.
-
-    Raises
-    ------
-    ParameterError
-        It was given.
-    """
-    if value is not None and value is not False:
-        raise ParameterError(f"{name} is {quoted(value)}: expected none with {count} records")

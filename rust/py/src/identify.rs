@@ -232,7 +232,6 @@ impl PySearch {
     }
 }
 
-/// What a stage went through before a record, by its name.
 /// The name of a history.
 pub fn history_name(history: History) -> &'static str {
     match history {
@@ -242,6 +241,7 @@ pub fn history_name(history: History) -> &'static str {
     }
 }
 
+/// What a stage went through before a record, by its name.
 pub fn history_named(name: &str) -> Result<History> {
     match name {
         "virgin" => Ok(History::Virgin),
@@ -310,10 +310,8 @@ fn identify(
     let watchers = Watchers { callback, progress, journal };
     let found = enter_pool(py, threads, &watchers, |monitor, stop| {
         let records: Vec<Record<'_>> = asked.iter().map(Asked::record).collect::<Result<_>>()?;
-        let spec = |(one, record): (&Asked, &Record<'_>)| {
-            one.spec(record).map_err(|error| record.named(error))
-        };
-        let specs: Vec<Spec> = asked.iter().zip(&records).map(spec).collect::<Result<_>>()?;
+        let all: Vec<&Record<'_>> = records.iter().collect();
+        let specs: Vec<Spec> = asked.iter().map(|one| one.spec(&all)).collect::<Result<_>>()?;
         let together: Vec<(&Record<'_>, &Spec)> = records.iter().zip(&specs).collect();
         identify_together(&together, &plan, monitor, stop)
     })?;

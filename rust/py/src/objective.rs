@@ -36,7 +36,7 @@ impl PyObjective {
         let asked = question.asked()?;
         let (problem, stepping) = enter_quiet_pool(py, threads, |stop| {
             let record = asked.record()?;
-            let problem = Problem::new(&record, &asked.spec(&record)?, stop)?;
+            let problem = Problem::new(&record, &asked.spec(&[&record])?, stop)?;
             let stepping = Evaluator::new(&record, &problem, stop).stepping;
             Ok((problem, stepping))
         })?;

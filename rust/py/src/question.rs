@@ -45,7 +45,7 @@ pub struct Asked {
     hold: Hold,
     start: usize,
     spec: Spec,
-    /// Known time constants of the creep; those that suit the record where there are none.
+    /// Known time constants of the creep; those that suit the records where there are none.
     creep: Option<Vec<f64>>,
     label: String,
     weight: f64,
@@ -95,9 +95,9 @@ impl Asked {
         record.map_err(|error| error.of(&self.label))?.among(&self.label, self.weight)
     }
 
-    /// What is searched, with the creep that suits the record.
-    pub fn spec(&self, record: &Record<'_>) -> Result<Spec> {
-        let creep_times = self.creep.clone().map_or_else(|| creep_times(record), Ok)?;
+    /// What is searched, with the creep that suits the records.
+    pub fn spec(&self, records: &[&Record<'_>]) -> Result<Spec> {
+        let creep_times = self.creep.clone().map_or_else(|| creep_times(records), Ok)?;
         Ok(Spec { creep_times, ..self.spec.clone() })
     }
 }

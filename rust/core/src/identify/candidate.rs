@@ -1,5 +1,6 @@
 //! A point of the search: the parameters of a stage, the delay of its sensor, and where it came from.
 
+use super::creep_shares::Shares;
 use crate::integrator::{MOST_PARAMETERS, Parameters};
 
 /// Places of a [`Theta`]: the parameters of a model, the delay and the voltage before the record.
@@ -52,4 +53,14 @@ pub struct Candidate {
     pub theta: Theta,
     /// The cost, m, beyond which nobody asks how bad the candidate is; infinite for none.
     pub limit: f64,
+    /// Shares of the creep; those that suit the record best where none are given.
+    pub shares: Option<Shares>,
+}
+
+impl Candidate {
+    /// Parameters that are simulated to the end however bad, with the shares that suit best.
+    #[must_use]
+    pub fn of(theta: Theta) -> Self {
+        Self { theta, limit: f64::INFINITY, shares: None }
+    }
 }

@@ -13,7 +13,7 @@ use piezotrack_control::Number;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::candidate::{BEFORE, Candidate, Theta};
-use super::creep_shares::ShareSums;
+use super::creep_shares::{ShareCost, ShareSums, Shares};
 use super::history::visited;
 use super::motion::motion;
 use super::problem::Problem;
@@ -94,10 +94,15 @@ impl<'a> Evaluator<'a> {
         Evaluator { residuals, problem, held: problem.held(), arch, stepping, halvings, visited }
     }
 
-    /// Displacement of a candidate as it is read in the window, with the best shares of the creep
-    /// but without offset, stepped as its cost is; `None` where it is not finite.
-    pub(super) fn reading(&self, theta: &Theta, stop: Stop<'_>) -> Option<Vec<f64>> {
-        let Residuals { record, centre, creep_times, .. } = self.residuals;
+    /// Displacement as it is read in the window, with these shares of the creep but without offset,
+    /// stepped as a cost is; `None` where it is not finite.
+    pub(super) fn reading(
+        &self,
+        theta: &Theta,
+        shares: &Shares,
+        stop: Stop<'_>,
+    ) -> Option<Vec<f64>> {
+        let Residuals { record, creep_times, .. } = self.residuals;
         let dt = record.drive.dt;
         let Problem { model, history, .. } = *self.problem;
         let [x, v] = motion(model, history, theta, &record.drive, self.stepping, stop)?;
@@ -111,18 +116,8 @@ impl<'a> Evaluator<'a> {
             .map(|&time| relaxed(time, dt, None, [&x, &v]))
             .map(|[q, slopes]| read(&q, &slopes))
             .collect();
-        let outputs = outputs?;
-        if outputs.is_empty() {
-            return Some(total);
-        }
-        let mut sums = ShareSums::default();
-        for (k, (x, y)) in total.iter().zip(&record.y[record.window.clone()]).enumerate() {
-            let at: Vec<f64> = outputs.iter().map(|output| output[k] - centre).collect();
-            sums.add(y - centre - x, &at);
-        }
-        let shares = self.residuals.costs(&sums, total.len(), false).shares;
-        for (output, share) in outputs.iter().zip(shares) {
-            total.iter_mut().zip(output).for_each(|(x, q)| *x += share * q);
+        for (output, share) in outputs?.iter().zip(shares) {
+            total.iter_mut().zip(output).for_each(|(x, q)| *x += *share * q);
         }
         Some(total)
     }
@@ -150,30 +145,31 @@ impl<'a> Evaluator<'a> {
 
     /// RMS deviations of candidates, without the factors of priors.
     pub(super) fn deviations(&self, candidates: &[Candidate], stop: Stop<'_>) -> Vec<Costs> {
-        let found = self.simulated(candidates, 0, stop);
-        let costs = found.map(|all| all.into_iter().map(|one| one.costs).collect());
-        costs.unwrap_or_else(|| vec![Costs::FAILED; candidates.len()])
+        self.simulated(candidates, 0, stop).into_iter().map(|one| one.costs).collect()
     }
 
-    /// Costs of candidates, and what is read of them every `stride` samples of the window; empty
-    /// where a simulation did not stay finite, or was not finished when `stop` said so.
-    pub(super) fn readings(
+    /// Candidates simulated, and what is read of them every `stride` samples of the window, or
+    /// never; nothing is read where a simulation did not stay finite, or was not finished when
+    /// `stop` said so.
+    pub(super) fn simulated(
         &self,
         candidates: &[Candidate],
         stride: usize,
         stop: Stop<'_>,
     ) -> Vec<Simulated> {
-        self.simulated(candidates, stride, stop).unwrap_or_default()
+        let all = All { of: self, candidates, stride, stop };
+        let found = self.problem.model.kernel(&self.held, self.stepping.order, all);
+        found.unwrap_or_else(|| candidates.iter().map(|_| Simulated::FAILED).collect())
     }
 
-    fn simulated(
-        &self,
-        candidates: &[Candidate],
-        stride: usize,
-        stop: Stop<'_>,
-    ) -> Option<Vec<Simulated>> {
-        let all = All { of: self, candidates, stride, stop };
-        self.problem.model.kernel(&self.held, self.stepping.order, all)
+    /// Cost and offset with these shares of the creep, from sums over the whole window.
+    pub(super) fn costs_with(&self, sums: &ShareSums, shares: Shares) -> Costs {
+        self.residuals.costs(sums, Some(shares), self.record().window.len(), false)
+    }
+
+    /// What sums over the whole window say of the shares of the creep.
+    pub(super) fn share_cost(&self, sums: &ShareSums) -> ShareCost {
+        sums.cost(self.record().window.len(), self.problem.offset)
     }
 }
 

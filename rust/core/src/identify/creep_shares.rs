@@ -5,7 +5,7 @@
 //! ```
 //!
 //! With given time constants the displacement is linear in the shares c, so their best values
-//! follow for each candidate from sums over the record, and no swarm searches them: variable
+//! follow for each candidate from sums over the records, and no swarm searches them: variable
 //! projection, Golub and Pereyra 1973, doi 10.1137/0710036.
 
 use super::record::Record;
@@ -19,7 +19,7 @@ pub const MOST_SHARES: usize = 3;
 pub const MOST_CREEP: f64 = 0.5;
 
 /// A pivot below this part of its diagonal is 0: the column is a combination of the others.
-const LEAST_PIVOT: f64 = 1e-12;
+pub(super) const LEAST_PIVOT: f64 = 1e-12;
 
 /// What a column that is a combination of others, but for [`LEAST_PIVOT`], can still move.
 pub(super) const SLACK: f64 = 1e-6;
@@ -40,35 +40,18 @@ pub(super) struct ShareSums {
     pub products: [Shares; MOST_SHARES],
 }
 
-/// The shares that suit best.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct BestShares {
-    /// c.
-    pub shares: Shares,
-    /// Mean square of what is left, m^2.
-    pub square: f64,
-    /// Mean of what is left, m, before an offset is taken off.
-    pub mean: f64,
-    /// Largest rms of an output, m.
-    pub size: f64,
+/// Mean square of what is left as a function of the shares c, m^2: `square - 2 slope c + c matrix c`,
+/// with the best offset where one is fitted.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct ShareCost {
+    square: f64,
+    slope: Shares,
+    matrix: [Shares; MOST_SHARES],
 }
 
 impl ShareSums {
-    /// Adds a sample.
-    pub fn add(&mut self, deviation: f64, outputs: &[f64]) {
-        self.deviation[0] += deviation;
-        self.deviation[1] += deviation * deviation;
-        for (j, g) in outputs.iter().enumerate() {
-            self.outputs[j] += g;
-            self.cross[j] += g * deviation;
-            for (i, other) in outputs.iter().enumerate().take(j + 1) {
-                self.products[j][i] += g * other;
-            }
-        }
-    }
-
-    /// The best of `count` shares over so many samples, with a free offset or none.
-    pub fn best(&self, count: usize, samples: usize, offset: bool) -> BestShares {
+    /// What they say of the shares over so many samples, with a free offset or none.
+    pub fn cost(&self, samples: usize, offset: bool) -> ShareCost {
         let n = index(samples);
         let [mean, mut square] = self.deviation.map(|sum| sum / n);
         let means = self.outputs.map(|sum| sum / n);
@@ -89,35 +72,79 @@ impl ShareSums {
         if offset {
             square -= mean * mean;
         }
-        let diagonal = [0, 1, 2].map(|j: usize| matrix[j][j]);
-        let size = diagonal.iter().fold(0.0, |most: f64, d| most.max(*d));
-        let mut best = ([0.0; MOST_SHARES], square);
+        ShareCost { square, slope, matrix }
+    }
+
+    /// Mean of what is left with these shares, m, before an offset is taken off.
+    pub fn mean(&self, samples: usize, shares: &Shares) -> f64 {
+        let n = index(samples);
+        let outputs = self.outputs.iter().zip(shares);
+        outputs.fold(self.deviation[0] / n, |mean, (sum, c)| mean - c * (sum / n))
+    }
+}
+
+impl ShareCost {
+    /// Adds that of another record, as much as its share of the samples of all.
+    pub fn add(&mut self, other: &Self, part: f64) {
+        self.square += part * other.square;
+        for j in 0..MOST_SHARES {
+            self.slope[j] += part * other.slope[j];
+            for (sum, one) in self.matrix[j].iter_mut().zip(other.matrix[j]) {
+                *sum += part * one;
+            }
+        }
+    }
+
+    /// The best of `count` shares.
+    pub fn best(&self, count: usize) -> Shares {
+        let mut best = ([0.0; MOST_SHARES], self.square);
         // The minimum lies on a face of the simplex, and is the minimum of that face's plane.
         for face in 1..1_usize << count {
             for full in [false, true] {
-                let Some(shares) = on_face(&matrix, &slope, face, full) else { continue };
+                let Some(shares) = on_face(&self.matrix, &self.slope, face, full) else { continue };
                 let total: f64 = shares.iter().sum();
                 let inside = shares.iter().all(|c| *c >= 0.0) && (full || total <= MOST_CREEP);
-                let left = remainder(&matrix, &slope, &shares, square);
+                let left = self.at(&shares);
                 if inside && left < best.1 {
                     best = (shares, left);
                 }
             }
         }
-        let (shares, square) = best;
-        let mean = means.iter().zip(&shares).fold(mean, |mean, (g, c)| mean - c * g);
-        BestShares { shares, square, mean, size: libm::sqrt(size) }
+        best.0
+    }
+
+    /// Mean square that is left with these shares, m^2.
+    pub fn at(&self, shares: &Shares) -> f64 {
+        let mut left = self.square;
+        for j in 0..MOST_SHARES {
+            let along: f64 = (0..MOST_SHARES).map(|i| self.matrix[j][i] * shares[i]).sum();
+            left += shares[j] * (along - 2.0 * self.slope[j]);
+        }
+        left
+    }
+
+    /// Largest rms of an output, m.
+    pub fn size(&self) -> f64 {
+        let diagonal = [0, 1, 2].map(|j: usize| self.matrix[j][j]);
+        libm::sqrt(diagonal.iter().fold(0.0, |most: f64, d| most.max(*d)))
     }
 }
 
-/// Mean square that is left with these shares.
-fn remainder(matrix: &[Shares; 3], slope: &Shares, shares: &Shares, square: f64) -> f64 {
-    let mut left = square;
-    for j in 0..MOST_SHARES {
-        let along: f64 = (0..MOST_SHARES).map(|i| matrix[j][i] * shares[i]).sum();
-        left += shares[j] * (along - 2.0 * slope[j]);
-    }
-    left
+/// Directions in which the shares can move to both sides: those above 0, against each other only
+/// where their sum is the largest.
+pub(super) fn directions(shares: &Shares) -> Vec<Shares> {
+    let mut free = (0..MOST_SHARES).filter(|&j| shares[j] > 0.0);
+    let full = shares.iter().sum::<f64>() >= MOST_CREEP * (1.0 - LEAST_PIVOT);
+    let against = if full { free.next() } else { None };
+    let direction = |j: usize| {
+        let mut direction = [0.0; MOST_SHARES];
+        direction[j] = 1.0;
+        if let Some(other) = against {
+            direction[other] = -1.0;
+        }
+        direction
+    };
+    free.map(direction).collect()
 }
 
 /// The best shares of those in `face` (bit j for share j), the others 0; where it is `full`, with
@@ -178,15 +205,33 @@ const FEWEST_TURNS: usize = 3;
 /// Fewest samples of a window with creep.
 const FEWEST_SAMPLES: usize = 400;
 
-/// Two time constants for a record, s: the drive's period and half of the window; at least three
-/// apart. Where the drive does not swing, a fiftieth of the window and half of it.
+/// How far apart the shortest and the longest time constant of several records may be without one
+/// between them.
+const APART: f64 = 100.0;
+
+/// Time constants for records, s. Of one record the drive's period and half of the window, at least
+/// three apart; where the drive does not swing, a fiftieth of the window and half of it. Of several
+/// the shortest and the longest of these, and where they are a hundred apart their geometric mean.
 ///
 /// What relaxes within a period widens the loop, as damping and hysteresis do: one record does
 /// not tell them apart.
 ///
 /// # Errors
-/// [`Error::Data`] where the window is too short.
-pub fn creep_times(record: &Record<'_>) -> Result<Vec<f64>> {
+/// [`Error::Data`] where a window is too short, with the record's label.
+pub fn creep_times(records: &[&Record<'_>]) -> Result<Vec<f64>> {
+    let (mut shortest, mut longest) = (f64::INFINITY, 0.0_f64);
+    for record in records {
+        let [short, long] = two_times(record).map_err(|error| record.named(error))?;
+        (shortest, longest) = (shortest.min(short), longest.max(long));
+    }
+    let mut times = vec![shortest, longest];
+    if records.len() > 1 && longest > APART * shortest {
+        times.insert(1, libm::sqrt(shortest * longest));
+    }
+    Ok(times)
+}
+
+fn two_times(record: &Record<'_>) -> Result<[f64; 2]> {
     let u = &record.drive.u[record.window.clone()];
     let window = record.drive.dt * index(u.len());
     if u.len() < FEWEST_SAMPLES {
@@ -204,5 +249,5 @@ pub fn creep_times(record: &Record<'_>) -> Result<Vec<f64>> {
         (2.0 * window / index(reversals)).max(10.0 * record.drive.dt)
     };
     let longest = 0.5 * window;
-    Ok(vec![shortest.min(longest / 3.0), longest])
+    Ok([shortest.min(longest / 3.0), longest])
 }

@@ -6,6 +6,7 @@
 //! 10.1007/BF01581046.
 
 use super::candidate::Point;
+use super::creep_shares::Shares;
 use super::levenberg_marquardt::{LocalRefinement, Polished, damped_step};
 use super::normal::Normal;
 use super::progress::{Monitor, Outcome, Progress, StopReason};
@@ -288,7 +289,8 @@ impl<'a> Search<'a> {
     fn iterate(&mut self, descents: &mut [Descent]) {
         let active: Vec<&mut Descent> =
             descents.iter_mut().filter(|one| one.reason.is_none()).collect();
-        let places: Vec<Vec<f64>> = active.iter().map(|one| one.place.clone()).collect();
+        let places: Vec<(Vec<f64>, Shares)> =
+            active.iter().map(|one| (one.place.clone(), one.costs.shares)).collect();
         let normals = self.local.records.normals(&places, self.local.stop);
         let each = self.coordinates + 1;
         self.evaluations += each * active.len();

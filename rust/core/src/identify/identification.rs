@@ -13,7 +13,7 @@ use super::record::Record;
 use super::records::Records;
 use super::residual_sums::Costs;
 use super::search::search;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::integrator::Stepping;
 use crate::math::available;
 use crate::signal::{FractionalDelay, Stop};
@@ -69,11 +69,11 @@ pub fn identify(
 }
 
 /// Identifies one stage from several records, each with its own offset, delay, history and weight,
-/// as [`Problem::of_records`] and [`Records`] say: no state goes from one record to the next.
+/// as [`Problem::of_records`] and [`Records`] say: no state goes from one record to the next. The
+/// creep has the same shares in all.
 ///
 /// # Errors
-/// As [`identify`]; [`crate::Error::Parameter`] for creep, whose shares are fitted to one record, and
-/// where there is no record.
+/// As [`identify`]; [`crate::Error::Parameter`] where there is no record.
 pub fn identify_together(
     asked: &[(&Record<'_>, &Spec)],
     plan: &Plan,
@@ -81,13 +81,6 @@ pub fn identify_together(
     stop: Stop<'_>,
 ) -> Result<Identification> {
     plan.validate()?;
-    if asked.len() > 1
-        && let Some((_, spec)) = asked.iter().find(|(_, spec)| !spec.creep_times.is_empty())
-    {
-        let found = format!("{} time constants", spec.creep_times.len());
-        let expected = "none with several records, as its weights are fitted to one";
-        return Err(Error::parameter("creep", found, expected));
-    }
     let problems = Problem::of_records(asked, stop)?;
     let each = || asked.iter().map(|&(record, _)| record).zip(&problems);
     for (record, problem) in each() {
@@ -180,7 +173,7 @@ fn told_by(local: &LocalRefinement<'_>, run: &mut Outcome, polished: bool) -> To
         let records = local.records.of(&problems);
         run.theta = records.theta(&run.place);
         let freed = LocalRefinement { records: &records, ..*local };
-        let sensitivities = freed.sensitivities(&run.place, run.costs.rms);
+        let sensitivities = freed.sensitivities(&run.place, run.costs);
         return Told { sensitivities, with_mass: Some(problems), lags: None };
     }
     let slow = polished && local.records.problem().slow;
@@ -190,7 +183,7 @@ fn told_by(local: &LocalRefinement<'_>, run: &mut Outcome, polished: bool) -> To
         run.theta = local.records.theta(&run.place);
         run.polish_evaluations += found.evaluations;
     }
-    let sensitivities = local.sensitivities(&run.place, run.costs.rms);
+    let sensitivities = local.sensitivities(&run.place, run.costs);
     Told { lags, sensitivities, with_mass: None }
 }
 

@@ -47,7 +47,7 @@ pub(super) fn with_mass(
     let best = freed.polish(&beside(k), costs_beside);
     let samples = index(local.records.samples());
     let gain = 2.0 * samples * libm::log(costs.rms / best.costs.rms);
-    if gain > GAIN && freed.is_white(&best.place) {
+    if gain > GAIN && freed.is_white(&best.place, &best.costs) {
         return Some((problems, Polished { evaluations: best.evaluations + STARTS, ..best }));
     }
     None

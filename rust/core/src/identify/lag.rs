@@ -57,7 +57,7 @@ pub(super) fn lag_range(
     let place_of = |&(_, free): &(usize, usize)| free == parameter;
     let damping = local.records.coordinates().iter().position(place_of)?;
     let by_chance = libm::exp(0.5 * LIKELY / index(local.records.samples())) - 1.0;
-    let white = local.is_white(place);
+    let white = local.is_white(place, &costs);
     let limit = costs.rms * (1.0 + if white { by_chance.min(AS_WELL) } else { AS_WELL });
     let mut profile = Profile { local: *local, damping, limit, evaluations: 0 };
     let (least, least_costs) = profile.towards(place, costs, 0.0);

@@ -63,7 +63,8 @@ impl LocalRefinement<'_> {
         let mut best = Polished { place: place.to_vec(), costs, evaluations: 0 };
         let mut damping = 1e-3;
         for _ in 0..ITERATIONS {
-            let Some(normal) = self.records.normal(&best.place, 1.0, self.stop) else {
+            let shares = best.costs.shares;
+            let Some(normal) = self.records.normal(&best.place, shares, 1.0, self.stop) else {
                 break;
             };
             best.evaluations += 2 * place.len() + 1;
@@ -97,13 +98,14 @@ impl LocalRefinement<'_> {
     ///
     /// Empty where the candidate or its neighbours cannot be simulated.
     #[must_use]
-    pub fn sensitivities(&self, place: &[f64], rms: f64) -> Vec<Sensitivity> {
+    pub fn sensitivities(&self, place: &[f64], costs: Costs) -> Vec<Sensitivity> {
         let freedom = self.freedom(place.len());
         let Self { records, stop } = *self;
-        let Some(normal) = records.normal(place, index(records.samples()) / freedom, stop) else {
+        let left = index(records.samples()) / freedom;
+        let Some(normal) = records.normal(place, costs.shares, left, stop) else {
             return Vec::new();
         };
-        let rms = rms / records.problem().relations.factor(&records.theta(place));
+        let rms = costs.rms / records.problem().relations.factor(&records.theta(place));
         let (spreads, along) = self.spreads(&normal, rms, place);
         let free = records.coordinates().iter().zip(place).zip(spreads);
         let found = free.map(|((&(record, parameter), &z), spread)| {
@@ -134,9 +136,10 @@ impl LocalRefinement<'_> {
     /// from sample to sample is near their variance, and less of correlated ones (von Neumann 1941,
     /// doi 10.1214/aoms/1177731677); those of every record.
     #[must_use]
-    pub fn is_white(&self, place: &[f64]) -> bool {
+    pub fn is_white(&self, place: &[f64], costs: &Costs) -> bool {
         self.records.members().iter().all(|one| {
-            let Some(residual) = one.evaluator.residual(&one.own(place), self.stop) else {
+            let own = one.own(place);
+            let Some(residual) = one.evaluator.residual(&own, &costs.shares, self.stop) else {
                 return false;
             };
             let squares = product(&residual, &residual);

@@ -1,13 +1,17 @@
 //! Normal equations about a candidate, from central or one-sided differences, of all records.
+//!
+//! The shares of the creep are linear: they enter as coordinates, and are eliminated.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::candidate::Candidate;
 use super::cost::Evaluator;
+use super::creep_shares::{LEAST_PIVOT, Shares, directions};
 use super::information::add_priors;
 use super::journal::{Answer, remembered};
 use super::records::{Member, Records};
+use super::residual_sums::Simulated;
 use crate::signal::{Stop, index};
 
 /// Most samples of a record in the Jacobian: more would hardly change the result.
@@ -66,26 +70,29 @@ impl Answer for Option<Normal> {
     }
 }
 
-/// What one record adds to them, in its own coordinates.
+/// What one record adds to them, in its own coordinates and after them the directions of the shares.
 struct Block {
     square: DMatrix<f64>,
     slope: DVector<f64>,
+    directions: usize,
     /// Sum of r^2.
     squares: f64,
     rows: usize,
 }
 
 impl Records<'_> {
-    /// Normal equations at a place by central differences, with the priors, for which the mean
+    /// Normal equations at a place with its shares of the creep, by central differences, with the
+    /// priors, for which the mean
     /// square of the deviations times `samples_over_freedom` is the variance of one; `None` where a
     /// neighbour cannot be simulated.
     pub(super) fn normal(
         &self,
         place: &[f64],
+        shares: Shares,
         samples_over_freedom: f64,
         stop: Stop<'_>,
     ) -> Option<Normal> {
-        let block = |one: &Member<'_>| one.evaluator.central(&one.own(place), stop);
+        let block = |one: &Member<'_>| one.evaluator.central(&one.own(place), shares, stop);
         let computed = || {
             let blocks: Option<Vec<Block>> = self.members().iter().map(block).collect();
             vec![blocks.map(|blocks| self.joined(place, &blocks, samples_over_freedom))]
@@ -93,17 +100,22 @@ impl Records<'_> {
         remembered(self.journal(), (1, place.len()), stop, computed).pop().flatten()
     }
 
-    /// Normal equations at each of some places by one-sided differences, all simulated side by
-    /// side; `None` for one where a neighbour cannot be simulated.
-    pub(super) fn normals(&self, places: &[Vec<f64>], stop: Stop<'_>) -> Vec<Option<Normal>> {
+    /// Normal equations at each of some places with its shares of the creep, by one-sided
+    /// differences, all simulated side by side; `None` for one where a neighbour cannot be simulated.
+    pub(super) fn normals(
+        &self,
+        places: &[(Vec<f64>, Shares)],
+        stop: Stop<'_>,
+    ) -> Vec<Option<Normal>> {
         let questions = (places.len(), self.coordinates().len());
         remembered(self.journal(), questions, stop, || self.differentiated(places, stop))
     }
 
-    fn differentiated(&self, places: &[Vec<f64>], stop: Stop<'_>) -> Vec<Option<Normal>> {
+    fn differentiated(&self, places: &[(Vec<f64>, Shares)], stop: Stop<'_>) -> Vec<Option<Normal>> {
         let mut all: Vec<Option<Vec<Block>>> = places.iter().map(|_| Some(Vec::new())).collect();
         for one in self.members() {
-            let own: Vec<Vec<f64>> = places.iter().map(|place| one.own(place)).collect();
+            let own: Vec<(Vec<f64>, Shares)> =
+                places.iter().map(|(place, shares)| (one.own(place), *shares)).collect();
             for (blocks, block) in all.iter_mut().zip(one.evaluator.one_sided(&own, stop)) {
                 match (blocks.as_mut(), block) {
                     (Some(blocks), Some(block)) => blocks.push(block),
@@ -111,28 +123,33 @@ impl Records<'_> {
                 }
             }
         }
-        let joined = |(place, blocks): (&Vec<f64>, Option<Vec<Block>>)| {
+        let joined = |((place, _), blocks): (&(Vec<f64>, Shares), Option<Vec<Block>>)| {
             Some(self.joined(place, &blocks?, 1.0))
         };
         places.iter().zip(all).map(joined).collect()
     }
 
-    /// The equations of all records, each as much as its share, and the priors.
+    /// The equations of all records, each as much as its share, about the best shares of the creep;
+    /// and the priors.
     fn joined(&self, place: &[f64], blocks: &[Block], samples_over_freedom: f64) -> Normal {
         let count = place.len();
         let rows = blocks.iter().map(|block| block.rows).sum();
-        let (mut square, mut slope) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        let directions = blocks.first().map_or(0, |block| block.directions);
+        let all = count + directions;
+        let (mut square, mut slope) = (DMatrix::zeros(all, all), DVector::zeros(all));
         let mut squares = 0.0;
         for (one, block) in self.members().iter().zip(blocks) {
             let scale = one.share * index(rows) / index(block.rows);
-            for (i, &row) in one.slots().iter().enumerate() {
+            let slots: Vec<usize> = one.slots().iter().copied().chain(count..all).collect();
+            for (i, &row) in slots.iter().enumerate() {
                 slope[row] += scale * block.slope[i];
-                for (j, &column) in one.slots().iter().enumerate() {
+                for (j, &column) in slots.iter().enumerate() {
                     square[(row, column)] += scale * block.square[(i, j)];
                 }
             }
             squares += scale * block.squares;
         }
+        let (mut square, mut slope) = eliminated(square, slope, count);
         // Some rows stand for all samples, and weigh less against the priors by their share.
         let variance = squares / index(self.samples()) * samples_over_freedom;
         add_priors(self, place, variance, &mut square, &mut slope);
@@ -142,50 +159,49 @@ impl Records<'_> {
 
 impl Evaluator<'_> {
     /// By central differences.
-    fn central(&self, place: &[f64], stop: Stop<'_>) -> Option<Block> {
+    fn central(&self, place: &[f64], shares: Shares, stop: Stop<'_>) -> Option<Block> {
         let stride = self.stride(MOST_ROWS);
         let pairs: Vec<(f64, f64)> =
             place.iter().map(|z| ((z - CHANGE).max(0.0), (z + CHANGE).min(1.0))).collect();
         let ends = pairs.iter().enumerate().flat_map(|(d, &(low, high))| [(d, low), (d, high)]);
-        let moved = ends.map(|(d, z)| with(place, d, z));
-        let candidates: Vec<Candidate> =
-            [place.to_vec()].into_iter().chain(moved).map(|place| self.at(&place)).collect();
-        let found = self.readings(&candidates, stride, stop);
-        if found.len() < candidates.len() || found.iter().any(|one| one.reading.is_empty()) {
+        let moved = ends.map(|(d, z)| self.beside(&with(place, d, z), shares));
+        let candidates: Vec<Candidate> = [self.at(place)].into_iter().chain(moved).collect();
+        let found = self.simulated(&candidates, stride, stop);
+        if found.iter().any(|one| one.reading.is_empty()) {
             return None;
         }
-        let readings: Vec<Vec<f64>> = found.into_iter().map(|one| one.reading).collect();
-        let [base, ends @ ..] = &readings[..] else { return None };
+        let [base, ends @ ..] = &found[..] else { return None };
         let columns = ends.chunks_exact(2).zip(pairs).map(|(ends, (low, high))| {
             let scale = 1.0 / (high - low);
-            ends[1].iter().zip(&ends[0]).map(|(x, below)| (x - below) * scale).collect()
+            let (above, below) = (&ends[1].reading, &ends[0].reading);
+            above.iter().zip(below).map(|(x, below)| (x - below) * scale).collect()
         });
-        Some(self.block(columns.collect(), base, stride))
+        Some(self.block(columns.collect(), base, &with_creep(base, &shares), shares, stride))
     }
 
     /// By one-sided differences, at each of some places.
-    fn one_sided(&self, places: &[Vec<f64>], stop: Stop<'_>) -> Vec<Option<Block>> {
+    fn one_sided(&self, places: &[(Vec<f64>, Shares)], stop: Stop<'_>) -> Vec<Option<Block>> {
         let stride = self.stride(FEW_ROWS);
         let change = |z: f64| if z < 0.5 { CHANGE } else { -CHANGE };
-        let neighbours = |place: &Vec<f64>| {
+        let neighbours = |(place, shares): &(Vec<f64>, Shares)| {
             let moved = place.iter().enumerate().map(|(d, z)| with(place, d, z + change(*z)));
-            [place.clone()].into_iter().chain(moved).collect::<Vec<_>>()
+            let moved = moved.map(|place| self.beside(&place, *shares));
+            [self.at(place)].into_iter().chain(moved).collect::<Vec<_>>()
         };
-        let all: Vec<Candidate> =
-            places.iter().flat_map(neighbours).map(|place| self.at(&place)).collect();
-        let found = self.readings(&all, stride, stop);
-        let block = |(i, place): (usize, &Vec<f64>)| {
+        let all: Vec<Candidate> = places.iter().flat_map(neighbours).collect();
+        let found = self.simulated(&all, stride, stop);
+        let block = |(i, (place, shares)): (usize, &(Vec<f64>, Shares))| {
             let each = 1 + place.len();
             let own = found.get(i * each..(i + 1) * each)?;
             if own.iter().any(|one| one.reading.is_empty()) {
                 return None;
             }
-            let base = &own[0].reading;
+            let read = with_creep(&own[0], shares);
             let columns = place.iter().zip(&own[1..]).map(|(z, one)| {
                 let scale = 1.0 / change(*z);
-                one.reading.iter().zip(base).map(|(x, base)| (x - base) * scale).collect()
+                one.reading.iter().zip(&read).map(|(x, base)| (x - base) * scale).collect()
             });
-            Some(self.block(columns.collect(), base, stride))
+            Some(self.block(columns.collect(), &own[0], &read, *shares, stride))
         };
         places.par_iter().enumerate().map(block).collect()
     }
@@ -195,13 +211,32 @@ impl Evaluator<'_> {
         self.record().window.len().div_ceil(most)
     }
 
-    /// The candidate at a place of this record's problem, simulated to its end however bad.
+    /// The candidate at a place of this record's problem, its creep read apart.
     fn at(&self, place: &[f64]) -> Candidate {
-        Candidate { theta: self.problem().theta(place), limit: f64::INFINITY }
+        Candidate::of(self.problem().theta(place))
     }
 
-    /// The normal equations of the columns of a Jacobian and what is read at their place.
-    fn block(&self, mut columns: Vec<Vec<f64>>, read: &[f64], stride: usize) -> Block {
+    /// One beside it, with the same shares of the creep.
+    fn beside(&self, place: &[f64], shares: Shares) -> Candidate {
+        Candidate { shares: Some(shares), ..self.at(place) }
+    }
+
+    /// The normal equations of the columns of a Jacobian, and of the directions in which the shares
+    /// can move, with what is read at their place.
+    fn block(
+        &self,
+        mut columns: Vec<Vec<f64>>,
+        base: &Simulated,
+        read: &[f64],
+        shares: Shares,
+        stride: usize,
+    ) -> Block {
+        let directions = directions(&shares);
+        for direction in &directions {
+            let mut column = vec![0.0; read.len()];
+            add_creep(&mut column, &base.outputs, direction);
+            columns.push(column);
+        }
         for column in &mut columns {
             self.centre(column);
         }
@@ -218,13 +253,20 @@ impl Evaluator<'_> {
             }
         }
         let slope = DVector::from_fn(count, |i, _| product(&columns[i], &residual));
-        Block { square, slope, squares: product(&residual, &residual), rows: residual.len() }
+        let (squares, rows) = (product(&residual, &residual), residual.len());
+        Block { square, slope, directions: directions.len(), squares, rows }
     }
 
-    /// Measured less simulated at a place, the mean taken off where an offset is fitted.
-    pub(super) fn residual(&self, place: &[f64], stop: Stop<'_>) -> Option<Vec<f64>> {
+    /// Measured less simulated at a place with its shares of the creep, the mean taken off where an
+    /// offset is fitted.
+    pub(super) fn residual(
+        &self,
+        place: &[f64],
+        shares: &Shares,
+        stop: Stop<'_>,
+    ) -> Option<Vec<f64>> {
         let record = self.record();
-        let mut residual = self.reading(&self.problem().theta(place), stop)?;
+        let mut residual = self.reading(&self.problem().theta(place), shares, stop)?;
         let measured = &record.y[record.window.clone()];
         residual.iter_mut().zip(measured).for_each(|(x, y)| *x = y - *x);
         self.centre(&mut residual);
@@ -239,6 +281,44 @@ impl Evaluator<'_> {
                 *value -= mean;
             }
         }
+    }
+}
+
+/// What is left of normal equations for the first `count` coordinates, about the best values of
+/// those after them (Kaufman 1975, doi 10.1007/BF01932995): those that are combinations of others
+/// stay where they are.
+fn eliminated(
+    mut square: DMatrix<f64>,
+    mut slope: DVector<f64>,
+    count: usize,
+) -> (DMatrix<f64>, DVector<f64>) {
+    let sizes = square.diagonal();
+    for last in (count..slope.len()).rev() {
+        let pivot = square[(last, last)];
+        if pivot.is_nan() || pivot <= LEAST_PIVOT * sizes[last] {
+            continue;
+        }
+        for row in 0..last {
+            let factor = square[(row, last)] / pivot;
+            slope[row] -= factor * slope[last];
+            for column in 0..last {
+                square[(row, column)] -= factor * square[(last, column)];
+            }
+        }
+    }
+    (square.resize(count, count, 0.0), slope.resize_vertically(count, 0.0))
+}
+
+/// What is read of a candidate whose creep was read apart, with these shares.
+fn with_creep(base: &Simulated, shares: &Shares) -> Vec<f64> {
+    let mut read = base.reading.clone();
+    add_creep(&mut read, &base.outputs, shares);
+    read
+}
+
+fn add_creep(values: &mut [f64], outputs: &[Vec<f64>], shares: &Shares) {
+    for (output, share) in outputs.iter().zip(shares) {
+        values.iter_mut().zip(output).for_each(|(x, q)| *x += share * q);
     }
 }
 

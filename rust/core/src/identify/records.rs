@@ -13,9 +13,10 @@ use std::sync::Arc;
 
 use super::candidate::{Candidate, DELAY, Point, Theta};
 use super::cost::Evaluator;
+use super::creep_shares::{ShareCost, ShareSums, Shares};
 use super::journal::{Journal, remembered};
 use super::problem::Problem;
-use super::residual_sums::Costs;
+use super::residual_sums::{Costs, Simulated};
 use crate::signal::{NEVER, Stop, index};
 
 /// Records with one problem, and what computes their costs.
@@ -166,26 +167,29 @@ impl<'a> Records<'a> {
             limit * limit * (1.0 + 1e-9)
         });
         let limits: Vec<f64> = limits.collect();
-        let mut found = vec![Costs { rms: 0.0, ..Costs::FAILED }; points.len()];
-        // While records are added up, the field has the mean square.
+        let creeping = self.problem().creep_times.len();
+        let mut found = vec![Together::none(); points.len()];
         let mut left: Vec<usize> = (0..points.len()).collect();
         for (r, one) in self.members.iter().enumerate() {
             let candidate = |&i: &usize| {
-                let rest = (limits[i] - found[i].rms) / one.share;
+                let rest = (limits[i] - found[i].square) / one.share;
                 one.candidate(&points[i].place, libm::sqrt(rest))
             };
             let candidates: Vec<Candidate> = left.iter().map(candidate).collect();
-            for (&i, costs) in left.iter().zip(one.evaluator.deviations(&candidates, stop)) {
-                let square = found[i].rms + one.share * costs.rms * costs.rms;
-                found[i] = Costs { rms: square, ..if r == 0 { costs } else { found[i] } };
+            for (&i, simulated) in left.iter().zip(one.evaluator.simulated(&candidates, 0, stop)) {
+                found[i].add(r, one, &simulated, creeping);
             }
             // What is beyond its limit is not simulated on the records after.
-            left.retain(|&i| found[i].rms <= limits[i] && found[i].rms.is_finite());
+            left.retain(|&i| found[i].square <= limits[i] && found[i].square.is_finite());
         }
-        for (one, factor) in found.iter_mut().zip(&factors) {
-            one.rms = libm::sqrt(one.rms) * factor;
-        }
-        found
+        let costs = found.iter().zip(&factors).map(|(one, factor)| {
+            let rms = libm::sqrt(one.square) * factor;
+            let first = &self.first().evaluator;
+            let costs =
+                if creeping > 0 { first.costs_with(&one.sums, one.shares) } else { one.first };
+            Costs { rms, ..costs }
+        });
+        costs.collect()
     }
 
     /// What each record has at a place: its parameters, and cost and offset without priors; `whole`
@@ -197,12 +201,50 @@ impl<'a> Records<'a> {
             return vec![(theta, Costs { rms: whole.rms / factor, ..whole })];
         }
         let found = self.members.iter().map(|one| {
-            let candidate = one.candidate(place, f64::INFINITY);
+            let shares = (!self.problem().creep_times.is_empty()).then_some(whole.shares);
+            let candidate = Candidate { shares, ..one.candidate(place, f64::INFINITY) };
             // Also where the search was stopped: what it found so far is told.
             let costs = one.evaluator.deviations(&[candidate], NEVER);
             (candidate.theta, costs.first().copied().unwrap_or(Costs::FAILED))
         });
         found.collect()
+    }
+}
+
+/// What the records simulated so far say of a point together.
+#[derive(Clone, Copy)]
+struct Together {
+    /// Their part of the mean square of all, with the shares of the creep that suit them best, m^2.
+    square: f64,
+    shares: Shares,
+    cost: ShareCost,
+    /// Of the first record.
+    first: Costs,
+    sums: ShareSums,
+}
+
+impl Together {
+    /// Of no record.
+    fn none() -> Self {
+        let (cost, sums) = (ShareCost::default(), ShareSums::default());
+        Self { square: 0.0, shares: Costs::FAILED.shares, cost, first: Costs::FAILED, sums }
+    }
+
+    /// Adds a record with so many relaxations.
+    fn add(&mut self, r: usize, of: &Member<'_>, simulated: &Simulated, relaxations: usize) {
+        let finite = simulated.costs.rms.is_finite();
+        let sums = simulated.sums.filter(|_| relaxations > 0 && finite);
+        if r == 0 {
+            (self.first, self.sums) = (simulated.costs, sums.unwrap_or_default());
+        }
+        let Some(sums) = sums else {
+            // Without creep; or given up or diverged, and beyond the limit with any shares.
+            self.square += of.share * simulated.costs.rms * simulated.costs.rms;
+            return;
+        };
+        self.cost.add(&of.evaluator.share_cost(&sums), of.share);
+        self.shares = self.cost.best(relaxations);
+        self.square = self.cost.at(&self.shares).max(0.0);
     }
 }
 
@@ -224,6 +266,6 @@ impl Member<'_> {
 
     /// The candidate at a place of all.
     pub fn candidate(&self, place: &[f64], limit: f64) -> Candidate {
-        Candidate { theta: self.theta(place), limit }
+        Candidate { limit, ..Candidate::of(self.theta(place)) }
     }
 }

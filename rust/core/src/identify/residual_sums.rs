@@ -45,23 +45,32 @@ pub(super) struct Residuals<'a> {
 }
 
 impl Residuals<'_> {
-    /// Cost, offset and shares from the sums; a bound of the cost where they are of the part of
-    /// the window seen so far.
-    pub(super) fn costs(&self, sums: &ShareSums, samples: usize, bound: bool) -> Costs {
+    /// Cost, offset and shares from the sums, of the best shares where none are given; a bound of
+    /// the cost where they are of the part of the window seen so far.
+    pub(super) fn costs(
+        &self,
+        sums: &ShareSums,
+        given: Option<Shares>,
+        samples: usize,
+        bound: bool,
+    ) -> Costs {
         let [sum, squares] = sums.deviation;
         let count = self.creep_times.len();
         if count == 0 {
             return self.conclude(sum, squares, samples);
         }
-        let best = sums.best(count, samples, self.offset);
-        let rms = libm::sqrt(best.square.max(0.0));
+        let cost = sums.cost(samples, self.offset);
+        let shares = given.unwrap_or_else(|| cost.best(count));
+        let square = cost.at(&shares);
+        let rms = libm::sqrt(square.max(0.0));
         // Outputs that hardly differ may have been left out of the best shares.
-        let rms = if bound { (rms - MOST_CREEP * SLACK * best.size).max(0.0) } else { rms };
-        let total: f64 = best.shares.iter().sum();
+        let rms = if bound { (rms - MOST_CREEP * SLACK * cost.size()).max(0.0) } else { rms };
+        let total: f64 = shares.iter().sum();
         // The outputs were taken from the centre too.
-        let offset = if self.offset { best.mean + self.centre - self.centre * total } else { 0.0 };
-        if rms.is_finite() && offset.is_finite() && best.square.is_finite() {
-            Costs { rms, offset, shares: best.shares }
+        let mean = sums.mean(samples, &shares);
+        let offset = if self.offset { mean + self.centre - self.centre * total } else { 0.0 };
+        if rms.is_finite() && offset.is_finite() && square.is_finite() {
+            Costs { rms, offset, shares }
         } else {
             Costs::FAILED
         }
@@ -149,9 +158,19 @@ pub(super) struct ResidualSums<'a, const V: usize, S: Simd, R> {
 pub(super) struct Simulated {
     /// Its cost.
     pub costs: Costs,
-    /// What is read at the samples that were asked for, with the best shares of the creep but
-    /// without offset, m.
+    /// Sums over the whole window; `None` where it was not simulated to its end.
+    pub sums: Option<ShareSums>,
+    /// What is read at the samples that were asked for, without offset, m: with the creep where the
+    /// candidate has its shares given, else of the mechanics alone.
     pub reading: Vec<f64>,
+    /// What is read there of each relaxation of the creep, where no shares are given, m.
+    pub outputs: Vec<Vec<f64>>,
+}
+
+impl Simulated {
+    /// A candidate that could not be simulated.
+    pub const FAILED: Self =
+        Self { costs: Costs::FAILED, sums: None, reading: Vec::new(), outputs: Vec::new() };
 }
 
 impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
@@ -226,7 +245,7 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
                 if self.verdicts[lane].is_some() {
                     continue;
                 }
-                let part = of.costs(&self.sums(lane), seen, true);
+                let part = of.costs(&self.sums(lane), candidate.shares, seen, true);
                 let bound = Costs { rms: share * part.rms, ..part };
                 // A hair above, so that rounding cannot abandon one that ends at its limit.
                 if bound.rms > candidate.limit * (1.0 + 1e-9) {
@@ -240,32 +259,36 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
     /// The costs, where the lanes `ended` or were given up before, and what was kept.
     pub fn conclude(self, ended: bool) -> Vec<Simulated> {
         let samples = self.of.record.window.len();
-        let simulated = self.verdicts.iter().enumerate().map(|(lane, verdict)| {
-            let costs = match verdict {
-                Some(verdict) => *verdict,
-                None if ended => self.of.costs(&self.sums(lane), samples, false),
-                None => Costs::FAILED,
-            };
-            Simulated { costs, reading: self.reading_of(lane, &costs) }
+        let candidates = self.candidates.iter().zip(&self.verdicts).enumerate();
+        let simulated = candidates.map(|(lane, (candidate, verdict))| {
+            let sums = (verdict.is_none() && ended).then(|| self.sums(lane));
+            let costs = sums.map(|sums| self.of.costs(&sums, candidate.shares, samples, false));
+            let costs = costs.or(*verdict).unwrap_or(Costs::FAILED);
+            if self.stride == 0 || costs.rms.is_infinite() {
+                return Simulated { costs, sums, ..Simulated::FAILED };
+            }
+            let (reading, outputs) = self.read(lane, candidate.shares);
+            Simulated { costs, sums, reading, outputs }
         });
         simulated.collect()
     }
 
-    /// What was kept of a lane, the creep added.
-    fn reading_of(&self, lane: usize, costs: &Costs) -> Vec<f64> {
-        if self.stride == 0 || costs.rms.is_infinite() {
-            return Vec::new();
-        }
-        if self.creep.is_empty() {
-            return self.kept.iter().map(|lanes| lanes.as_slice()[lane]).collect();
-        }
-        let row = |row: &[Lanes<S, V>]| {
-            let mut at = row.iter().map(|lanes| lanes.as_slice()[lane]);
-            let displacement = at.next().unwrap_or(f64::NAN);
-            let creep = at.zip(&costs.shares).map(|(output, c)| c * (output + self.of.centre));
-            displacement + creep.sum::<f64>()
+    /// What was kept of a lane: with the creep of these shares, or apart from it.
+    fn read(&self, lane: usize, shares: Option<Shares>) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let count = self.creep.len();
+        let rows = self.kept.chunks_exact(1 + count);
+        let at = |lanes: &Lanes<S, V>| lanes.as_slice()[lane];
+        let centre = self.of.centre;
+        let Some(shares) = shares else {
+            let output = |j: usize| rows.clone().map(|row| at(&row[j]) + centre).collect();
+            let outputs = (1..=count).map(output).collect();
+            return (rows.clone().map(|row| at(&row[0])).collect(), outputs);
         };
-        self.kept.chunks_exact(1 + self.creep.len()).map(row).collect()
+        let read = rows.map(|row| {
+            let creep = row[1..].iter().zip(&shares).map(|(q, c)| c * (at(q) + centre));
+            at(&row[0]) + creep.sum::<f64>()
+        });
+        (read.collect(), Vec::new())
     }
 }
 
