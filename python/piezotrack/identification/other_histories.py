@@ -76,7 +76,8 @@ def other_histories(
     Returns
     -------
     list of Gaining
-        Those by which the cost falls enough, the one with less freedom first.
+        Those by which the cost falls enough, the one with less freedom first; not that one where
+        the cost falls as much again by the other.
     """
 
     def objective_of(part: Dataset, history: History) -> Objective:
@@ -100,7 +101,8 @@ def other_histories(
         "settled": objective_of(part, "settled"),
         "fit": fitted,
     }
-    gaining = [Gaining(name, lowest(one) / cost) for name, one in objectives.items()]
+    settled, before = (Gaining(name, lowest(one) / cost) for name, one in objectives.items())
+    gaining = [before] if before.share < (1.0 - GAIN) * settled.share else [settled, before]
     return [one for one in gaining if one.share < 1.0 - GAIN]
 
 

@@ -132,13 +132,13 @@ def best_together(
     for info in kinds_tried(records[0].data, {**of_search, "drift": drifts or None}):
         try:
             fit = identify_together(first, info, trial if apart else full, least_squares)
+            left = [
+                rest.y - fit.simulate(rest, offset=own.offset).x
+                for rest, own in zip(rests, fit.records, strict=True)
+            ]
         except (DataError, NumericalError) as error:
             refused = refused or error
             continue
-        left = [
-            rest.y - fit.simulate(rest, offset=own.offset).x
-            for rest, own in zip(rests, fit.records, strict=True)
-        ]
         rms = np.array([math.sqrt(float(np.mean(one**2))) for one in left])
         whole = math.sqrt(float(counts @ rms**2) / float(counts.sum()))
         found.append((Trial(info.name, info.title, whole), info))

@@ -1,14 +1,14 @@
 //! Many descents: random points of the box, and from the best distinct ones the way down, side by
 //! side in the lanes, until independent descents agree at the lowest cost.
 //!
-//! Each descent is the method of Levenberg and Marquardt (Marquardt 1963, doi 10.1137/0111030).
+//! Each descent takes the steps of [`super::damped_step`].
 //! Multistart with a reduced sample: Boender, Rinnooy Kan, Timmer and Stougie 1982, doi
 //! 10.1007/BF01581046.
 
 use super::candidate::Point;
-use super::creep_shares::Shares;
-use super::levenberg_marquardt::{LocalRefinement, Polished, damped_step};
-use super::normal::Normal;
+use super::damped_step::DampedStep;
+use super::levenberg_marquardt::{LocalRefinement, Polished};
+use super::normal::{Normal, STEPS, Spot};
 use super::progress::{Monitor, Outcome, Progress, StopReason};
 use super::records::Records;
 use super::residual_sums::Costs;
@@ -74,10 +74,10 @@ const ITERATIONS: usize = 60;
 /// Shares of the cost that an iteration gains: below the first it is over, below the second twice
 /// in a row too.
 const NOTHING: f64 = 1e-9;
-const LITTLE: f64 = 1e-4;
+const LITTLE: f64 = 3e-4;
 
 /// Dampings that are tried side by side, as factors of the last one that gained.
-const DAMPINGS: [f64; 3] = [0.1, 1.0, 10.0];
+const DAMPINGS: [f64; STEPS] = [0.1, 1.0, 10.0];
 
 /// The damping beyond which nothing is tried.
 const MOST_DAMPING: f64 = 1e8;
@@ -101,6 +101,12 @@ impl Descent {
     fn new(place: Vec<f64>, costs: Costs, evaluations: usize) -> Self {
         let history = vec![costs.rms];
         Self { place, costs, damping: 1e-2, stalled: 0, evaluations, history, reason: None }
+    }
+
+    /// Where it asks for normal equations, with the curvature along its steps.
+    fn spot(&self) -> Spot {
+        let dampings = DAMPINGS.map(|factor| factor * self.damping);
+        Spot { place: self.place.clone(), shares: self.costs.shares, dampings }
     }
 
     /// Takes what an iteration gained.
@@ -289,10 +295,9 @@ impl<'a> Search<'a> {
     fn iterate(&mut self, descents: &mut [Descent]) {
         let active: Vec<&mut Descent> =
             descents.iter_mut().filter(|one| one.reason.is_none()).collect();
-        let places: Vec<(Vec<f64>, Shares)> =
-            active.iter().map(|one| (one.place.clone(), one.costs.shares)).collect();
-        let normals = self.local.records.normals(&places, self.local.stop);
-        let each = self.coordinates + 1;
+        let spots: Vec<Spot> = active.iter().map(|one| one.spot()).collect();
+        let normals = self.local.records.normals(&spots, self.local.stop);
+        let each = self.coordinates + 1 + STEPS;
         self.evaluations += each * active.len();
         let mut moving = Vec::new();
         for (one, normal) in active.into_iter().zip(normals) {
@@ -314,8 +319,15 @@ impl<'a> Search<'a> {
             .iter()
             .map(|(one, normal)| {
                 let dampings = DAMPINGS.map(|factor| factor * one.damping);
-                let next = |damping| Some((damping, damped_step(normal, &one.place, damping)?));
-                dampings.into_iter().filter_map(next).collect()
+                let next = |(damping, bend): (f64, &Option<_>)| {
+                    let step = DampedStep::new(normal, &one.place, damping)?;
+                    let end = match bend {
+                        Some(bend) => step.bent_end(normal, &one.place, bend),
+                        None => step.end(&one.place),
+                    };
+                    Some((damping, end?))
+                };
+                dampings.into_iter().zip(&normal.bends).filter_map(next).collect()
             })
             .collect();
         let points: Vec<Point> = moving
@@ -349,7 +361,8 @@ impl<'a> Search<'a> {
                 one.iterated(before);
                 return None;
             }
-            Some((one, normal))
+            // The bends are those of longer steps.
+            Some((one, Normal { bends: [const { None }; STEPS], ..normal }))
         });
         tried.collect()
     }

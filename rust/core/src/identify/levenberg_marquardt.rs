@@ -1,17 +1,18 @@
 //! Local refinement: Jacobian, Levenberg-Marquardt, Cramer-Rao standard deviations.
 //!
-//! The polish is the method of Levenberg and Marquardt (Marquardt 1963, doi 10.1137/0111030)
-//! in the unit box, with coordinates held while the descent would cross their bound. Standard
+//! The polish takes the steps of [`super::damped_step`] without acceleration. Standard
 //! deviations are the Cramer-Rao bound: with the Jacobian J of the simulated displacement, the covariance of the
 //! parameters is at least s^2 (J^T J)^-1 for independent deviations of variance s^2.
 //! Correlated deviations, such as those of an inexact model, make the true spread larger: Ljung 1999, System Identification, section 9.4.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use super::candidate::Point;
 use super::coordinate::Coordinate;
+use super::damped_step::DampedStep;
 use super::information::Spread;
-use super::normal::{CHANGE, Normal, product};
+use super::jacobian::{CHANGE, product};
+use super::normal::Normal;
 use super::records::Records;
 use super::residual_sums::Costs;
 use crate::signal::{Stop, index};
@@ -70,7 +71,8 @@ impl LocalRefinement<'_> {
             best.evaluations += 2 * place.len() + 1;
             let before = best.costs.rms;
             while damping < 1e8 {
-                let Some(next) = damped_step(&normal, &best.place, damping) else {
+                let step = DampedStep::new(&normal, &best.place, damping);
+                let Some(next) = step.and_then(|step| step.end(&best.place)) else {
                     break;
                 };
                 let point = Point { place: next, limit: best.costs.rms };
@@ -182,49 +184,6 @@ impl LocalRefinement<'_> {
         let along = along.map(|parameter| (parameter, several.of(self.records, place, parameter)));
         (spreads, along.collect())
     }
-}
-
-/// A damped step that stays in the box; `None` where nothing can move.
-///
-/// A coordinate whose step would cross a bound goes to the bound, and the others take the step
-/// that is best with it there.
-pub(super) fn damped_step(normal: &Normal, place: &[f64], damping: f64) -> Option<Vec<f64>> {
-    let presses = |d: usize, z: f64| {
-        (z <= 0.0 && normal.slope[d] < 0.0) || (z >= 1.0 && normal.slope[d] > 0.0)
-    };
-    let mut moving: Vec<usize> = (0..place.len())
-        .filter(|&d| normal.square[(d, d)] > 0.0 && !presses(d, place[d]))
-        .collect();
-    let mut change = DVector::zeros(place.len());
-    while !moving.is_empty() {
-        let square = DMatrix::from_fn(moving.len(), moving.len(), |i, j| {
-            let value = normal.square[(moving[i], moving[j])];
-            if i == j { value * (1.0 + damping) } else { value }
-        });
-        // What those at their bounds leave of the slope.
-        let left = &normal.slope - &normal.square * &change;
-        let slope = DVector::from_fn(moving.len(), |i, _| left[moving[i]]);
-        let found = square.cholesky()?.solve(&slope);
-        let mut inside = Vec::with_capacity(moving.len());
-        for (&d, found) in moving.iter().zip(found.iter()) {
-            let z = place[d] + found;
-            if (0.0..=1.0).contains(&z) {
-                inside.push((d, *found));
-            } else {
-                change[d] = z.clamp(0.0, 1.0) - place[d];
-            }
-        }
-        if inside.len() == moving.len() {
-            for (d, found) in inside {
-                change[d] = found;
-            }
-            break;
-        }
-        moving = inside.into_iter().map(|(d, _)| d).collect();
-    }
-    let next: Vec<f64> =
-        place.iter().zip(change.iter()).map(|(z, change)| (z + change).clamp(0.0, 1.0)).collect();
-    (next != place).then_some(next)
 }
 
 /// Change of a parameter with its coordinate.

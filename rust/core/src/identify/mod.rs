@@ -1,5 +1,6 @@
 //! Identification: parameters searched, cost of a candidate, particle swarm, local refinement.
 
+mod acceleration;
 pub mod bounds;
 mod candidate;
 mod constraint;
@@ -7,17 +8,20 @@ mod coordinate;
 mod cost;
 mod creep_shares;
 mod cross_talk;
+mod damped_step;
 mod delay;
 mod descents;
 mod history;
 mod identification;
 mod inertia;
 mod information;
+mod jacobian;
 mod journal;
 mod lag;
 mod least_squares;
 mod levenberg_marquardt;
 mod motion;
+mod neighbourhood;
 mod normal;
 mod plan;
 mod prior;

@@ -256,39 +256,69 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
         stop() || self.verdicts.iter().all(Option::is_some)
     }
 
+    /// What was kept, a column for each candidate: of the displacement, then of each output.
+    fn columns(&self) -> Vec<Vec<f64>> {
+        let (entries, lanes) = (1 + self.creep.len(), self.candidates.len());
+        let rows = self.kept.len() / entries;
+        let count = if rows > 0 { entries * lanes } else { 0 };
+        let mut columns: Vec<Vec<f64>> = (0..count).map(|_| vec![0.0; rows]).collect();
+        for from in (0..rows).step_by(BLOCK) {
+            let block = from..rows.min(from + BLOCK);
+            for (i, column) in columns.iter_mut().enumerate() {
+                let (entry, lane) = (i / lanes, i % lanes);
+                let kept = self.kept[block.start * entries..block.end * entries].iter();
+                let values = kept.skip(entry).step_by(entries);
+                for (slot, value) in column[block.clone()].iter_mut().zip(values) {
+                    *slot = value.as_slice()[lane];
+                }
+            }
+        }
+        columns
+    }
+
     /// The costs, where the lanes `ended` or were given up before, and what was kept.
     pub fn conclude(self, ended: bool) -> Vec<Simulated> {
         let samples = self.of.record.window.len();
-        let candidates = self.candidates.iter().zip(&self.verdicts).enumerate();
-        let simulated = candidates.map(|(lane, (candidate, verdict))| {
-            let sums = (verdict.is_none() && ended).then(|| self.sums(lane));
-            let costs = sums.map(|sums| self.of.costs(&sums, candidate.shares, samples, false));
-            let costs = costs.or(*verdict).unwrap_or(Costs::FAILED);
-            if self.stride == 0 || costs.rms.is_infinite() {
+        let lanes = self.candidates.len();
+        let settled = (0..lanes).map(|lane| {
+            let sums = (self.verdicts[lane].is_none() && ended).then(|| self.sums(lane));
+            let shares = self.candidates[lane].shares;
+            let costs = sums.map(|sums| self.of.costs(&sums, shares, samples, false));
+            (costs.or(self.verdicts[lane]).unwrap_or(Costs::FAILED), sums)
+        });
+        let settled: Vec<(Costs, Option<ShareSums>)> = settled.collect();
+        let mut kept = self.columns().into_iter();
+        let mut readings: Vec<Vec<f64>> = kept.by_ref().take(lanes).collect();
+        readings.resize_with(lanes, Vec::new);
+        let mut outputs: Vec<Vec<Vec<f64>>> = vec![Vec::new(); lanes];
+        for (i, mut output) in kept.enumerate() {
+            for q in &mut output {
+                *q += self.of.centre;
+            }
+            outputs[i % lanes].push(output);
+        }
+        let each = settled.into_iter().zip(self.candidates).zip(readings.into_iter().zip(outputs));
+        let simulated = each.map(|(((costs, sums), candidate), (mut reading, mut outputs))| {
+            if costs.rms.is_infinite() {
                 return Simulated { costs, sums, ..Simulated::FAILED };
             }
-            let (reading, outputs) = self.read(lane, candidate.shares);
+            if let Some(shares) = candidate.shares {
+                add_creep(&mut reading, &outputs, &shares);
+                outputs.clear();
+            }
             Simulated { costs, sums, reading, outputs }
         });
         simulated.collect()
     }
+}
 
-    /// What was kept of a lane: with the creep of these shares, or apart from it.
-    fn read(&self, lane: usize, shares: Option<Shares>) -> (Vec<f64>, Vec<Vec<f64>>) {
-        let count = self.creep.len();
-        let rows = self.kept.chunks_exact(1 + count);
-        let at = |lanes: &Lanes<S, V>| lanes.as_slice()[lane];
-        let centre = self.of.centre;
-        let Some(shares) = shares else {
-            let output = |j: usize| rows.clone().map(|row| at(&row[j]) + centre).collect();
-            let outputs = (1..=count).map(output).collect();
-            return (rows.clone().map(|row| at(&row[0])).collect(), outputs);
-        };
-        let read = rows.map(|row| {
-            let creep = row[1..].iter().zip(&shares).map(|(q, c)| c * (at(q) + centre));
-            at(&row[0]) + creep.sum::<f64>()
-        });
-        (read.collect(), Vec::new())
+/// Samples whose lanes are in the nearest cache together.
+const BLOCK: usize = 64;
+
+/// Adds what is read of the relaxations of a creep, with these shares.
+pub(super) fn add_creep(values: &mut [f64], outputs: &[Vec<f64>], shares: &Shares) {
+    for (output, share) in outputs.iter().zip(shares) {
+        values.iter_mut().zip(output).for_each(|(x, q)| *x += share * q);
     }
 }
 
