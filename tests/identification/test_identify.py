@@ -112,8 +112,8 @@ def test_an_offset_of_the_sensor_is_found() -> None:
     assert fit.offset == pytest.approx(3e-6, abs=5e-9)
     assert max(off(fit).values()) < 0.001
     straight = pt.identify(log, "dahl", fixed=HELD, bounds=BOX, seed=1, runs=1)
-    # The refinement ends within a hundredth of the offset's standard deviation, 97 nm / sqrt(n).
-    close = 0.01 * fit.cost / np.sqrt(len(log))
+    # The refinement ends within a twentieth of the offset's standard deviation.
+    close = 0.05 * fit.cost / np.sqrt(len(log))
     assert fit.offset - straight.offset == pytest.approx(3e-6, abs=close)
     assert straight.offset == pytest.approx(0.0, abs=5e-9)
     # Without it the parameters have to bend, and the cost shows it.

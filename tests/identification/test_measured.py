@@ -15,7 +15,7 @@ HEADLINE = {
     # fitted, the rest of that record, another record
     "dahl": (0.49, 0.81, 1.24),
     "bouc-wen": (0.71, 0.82, 1.19),
-    "asymmetric-bouc-wen": (0.43, 0.59, 1.33),
+    "asymmetric-bouc-wen": (0.41, 0.55, 1.30),
     "prandtl-ishlinskii": (0.27, 0.28, 0.38),
     "first-order-dahl": (0.72, 0.83, 0.745),
     "parallel-dahl": (0.70, 0.74, 0.73),

@@ -43,6 +43,14 @@ def test_a_cost_is_the_deviation_of_the_public_simulation() -> None:
         assert cost(place) == pytest.approx([expected], abs=5e-10)
 
 
+def test_descents_follow_a_valley_that_bends() -> None:
+    """Of Levenberg-Marquardt alone all but one are still in the valley after 60 iterations."""
+    log = pt.datasets.dbo_training()[3.0:23.0]
+    cost = pt.identification.Objective(log, "asymmetric-bouc-wen", history="settled")
+    _, costs, _ = cost.descend(places(16, cost))
+    assert np.sum(costs < 1.002 * costs.min()) >= 14
+
+
 def test_a_place_goes_through_the_bounds() -> None:
     cost = objective(bounds={"stiffness": (2e4, 3e4)}, scales={"stiffness": "linear"})
     assert cost.ranges["stiffness"] == (2e4, 3e4)

@@ -16,9 +16,10 @@ class Descents:
 
     Each round draws random points in the box of the free parameters, simulates them, and descends
     from the best of them that are not beside a better one, by the method of Levenberg and
-    Marquardt: Marquardt 1963, doi 10.1137/0111030. Rounds follow each other until enough
-    independent descents have ended at the lowest cost. Multistart with a reduced sample: Boender,
-    Rinnooy Kan, Timmer and Stougie 1982, doi 10.1007/BF01581046.
+    Marquardt (Marquardt 1963, doi 10.1137/0111030) with geodesic acceleration, which follows
+    valleys that bend (Transtrum and Sethna 2012, doi 10.48550/arXiv.1201.5885). Rounds follow
+    each other until enough independent descents have ended at the lowest cost. Multistart with a
+    reduced sample: Boender, Rinnooy Kan, Timmer and Stougie 1982, doi 10.1007/BF01581046.
 
     Parameters
     ----------

@@ -138,7 +138,7 @@ class Objective:
         return np.array(self._core.costs(_rows(places)))
 
     def descend(self, places: ArrayLike) -> tuple[Array, Array, NDArray[np.int64]]:
-        """Descend from places of the unit box by the method of Levenberg and Marquardt.
+        """Descend from places of the unit box, as `Descents` does.
 
         Parameters
         ----------
