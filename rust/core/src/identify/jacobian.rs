@@ -32,13 +32,14 @@ impl Evaluator<'_> {
         if found.iter().any(|one| one.reading.is_empty()) {
             return None;
         }
-        let [base, ends @ ..] = &found[..] else { return None };
-        let columns = ends.chunks_exact(2).zip(pairs).map(|(ends, (low, high))| {
-            let scale = 1.0 / (high - low);
-            let (above, below) = (&ends[1].reading, &ends[0].reading);
-            above.iter().zip(below).map(|(x, below)| (x - below) * scale).collect()
+        let mut found = found.into_iter();
+        let base = found.next()?;
+        let columns = pairs.into_iter().filter_map(|(low, high)| {
+            let (below, above) = (found.next()?, found.next()?);
+            Some(slope(above.reading, &below.reading, 1.0 / (high - low)))
         });
-        Some(self.block(columns.collect(), base, with_creep(base, &shares), shares, stride))
+        let columns = columns.collect();
+        Some(self.block(columns, with_creep(base, &shares), shares, stride))
     }
 
     /// By one-sided differences, at each of some places.
@@ -55,22 +56,22 @@ impl Evaluator<'_> {
             [self.at(place)].into_iter().chain(moved).collect::<Vec<_>>()
         };
         let all: Vec<Candidate> = places.iter().flat_map(neighbours).collect();
-        let found = self.simulated(&all, stride, stop);
-        let block = |(i, (place, shares)): (usize, &(Vec<f64>, Shares))| {
-            let each = 1 + place.len();
-            let own = found.get(i * each..(i + 1) * each)?;
+        let mut found = self.simulated(&all, stride, stop).into_iter();
+        let own = places.iter().map(|(place, _)| found.by_ref().take(1 + place.len()).collect());
+        let own: Vec<Vec<Simulated>> = own.collect();
+        let block = |(own, (place, shares)): (Vec<Simulated>, &(Vec<f64>, Shares))| {
             if own.iter().any(|one| one.reading.is_empty()) {
                 return None;
             }
-            let read = with_creep(&own[0], shares);
-            let columns = place.iter().zip(&own[1..]).map(|(z, one)| {
-                let scale = 1.0 / change(*z);
-                one.reading.iter().zip(&read).map(|(x, base)| (x - base) * scale).collect()
-            });
-            let columns: Vec<Vec<f64>> = columns.collect();
-            Some(self.block(columns, &own[0], read, *shares, stride))
+            let mut own = own.into_iter();
+            let base = with_creep(own.next()?, shares);
+            let columns = place.iter().zip(own);
+            let columns =
+                columns.map(|(z, one)| slope(one.reading, &base.reading, 1.0 / change(*z)));
+            let columns = columns.collect();
+            Some(self.block(columns, base, *shares, stride))
         };
-        places.par_iter().enumerate().map(block).collect()
+        own.into_par_iter().zip(places).map(block).collect()
     }
 
     /// Samples of the window to a row of the normal equations.
@@ -93,12 +94,11 @@ impl Evaluator<'_> {
     fn block(
         &self,
         mut columns: Vec<Vec<f64>>,
-        base: &Simulated,
-        read: Vec<f64>,
+        base: Simulated,
         shares: Shares,
         stride: usize,
     ) -> Block {
-        let directions = directions(&shares);
+        let (read, directions) = (base.reading, directions(&shares));
         for direction in &directions {
             let mut column = vec![0.0; read.len()];
             add_creep(&mut column, &base.outputs, direction);
@@ -151,11 +151,18 @@ impl Evaluator<'_> {
     }
 }
 
-/// What is read of a candidate whose creep was read apart, with these shares.
-fn with_creep(base: &Simulated, shares: &Shares) -> Vec<f64> {
-    let mut read = base.reading.clone();
-    add_creep(&mut read, &base.outputs, shares);
+/// Change of what is read with a coordinate, from one place to another.
+fn slope(mut read: Vec<f64>, from: &[f64], scale: f64) -> Vec<f64> {
+    for (x, from) in read.iter_mut().zip(from) {
+        *x = (*x - from) * scale;
+    }
     read
+}
+
+/// A candidate whose creep was read apart, with these shares.
+fn with_creep(mut base: Simulated, shares: &Shares) -> Simulated {
+    add_creep(&mut base.reading, &base.outputs, shares);
+    base
 }
 
 /// A place with another value of one coordinate.
