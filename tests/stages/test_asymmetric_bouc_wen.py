@@ -172,8 +172,8 @@ def test_on_a_measured_log() -> None:
     other = datasets.dbo_tracking()[3.0:]
     compared = pt.compare(log, ["bouc-wen", "asymmetric-bouc-wen"], train=(3.0, 23.0), test=other)
     even, uneven = compared.rows
-    assert uneven.train.rms_percent == pytest.approx(0.43, abs=0.01)
+    assert uneven.train.rms_percent == pytest.approx(0.41, abs=0.01)
     assert uneven.train.rms_percent < 0.65 * even.train.rms_percent
-    assert uneven.test.rms_percent == pytest.approx(1.33, abs=0.02)
+    assert uneven.test.rms_percent == pytest.approx(1.30, abs=0.02)
     rest = log[23.0:]
     assert uneven.fit.score(rest).rms_percent < 0.8 * even.fit.score(rest).rms_percent
