@@ -18,7 +18,7 @@ use super::history::visited;
 use super::motion::motion;
 use super::problem::Problem;
 use super::record::Record;
-use super::residual_sums::{Costs, Delayed, Direct, ResidualSums, Residuals, Simulated};
+use super::residual_sums::{Costs, Delayed, Direct, ResidualSums, Residuals, Simulated, add_creep};
 use super::step_size;
 use crate::integrator::{
     FeedbackState, Kernel, MOST_PARAMETERS, Mechanics, Stepping, SteppingLoop, halvings,
@@ -116,9 +116,7 @@ impl<'a> Evaluator<'a> {
             .map(|&time| relaxed(time, dt, None, [&x, &v]))
             .map(|[q, slopes]| read(&q, &slopes))
             .collect();
-        for (output, share) in outputs?.iter().zip(shares) {
-            total.iter_mut().zip(output).for_each(|(x, q)| *x += *share * q);
-        }
+        add_creep(&mut total, &outputs?, shares);
         Some(total)
     }
 
