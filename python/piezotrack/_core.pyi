@@ -74,7 +74,7 @@ def identify(
     runs: int,
     threads: int,
     callback: Callable[[int, int, int, float, list[float]], bool] | None,
-    progress: Callable[[int, int, int, float, list[float]], None] | None,
+    progress: Callable[[int, int, int, float, list[float], float], None] | None,
     checkpoint: Checkpoint | None,
 ) -> Search | None: ...
 

@@ -255,7 +255,6 @@ NO_EFFECT = {
     "identify log.csv --model prandtl-ishlinskii --threads 2": "--threads",
     "identify log.csv --model dahl --plays 5": "--plays",
     "identify log.csv --model dahl --model bouc-wen --asymmetry 2": "--asymmetry",
-    "identify log.csv --model dahl --drift fit": "--drift",
     "identify log.csv --stiffness 1e6 --plays 5": "--plays",
     "compare log.csv --model prandtl-ishlinskii --seed 1": "--seed",
     "reproduce --quick --seeds 3": "--seeds",

@@ -111,7 +111,5 @@ def test_refusals_name_the_option_or_the_log(options: tuple[str, ...], said: str
 
 def test_what_several_logs_cannot_have_is_refused() -> None:
     assert "--weight has no effect with 1 log" in refusal("identify", "a.csv", "--weight", "2")
-    said = refusal("identify", "a.csv", "b.csv", "--model", "dahl", "--drift", "fit")
-    assert "--drift has no effect with the model dahl" in said
     write("broken.csv", "time,drive\n1,2\n")
     assert refusal("identify", "a.csv", "broken.csv", "--model", "dahl").startswith("broken.csv")

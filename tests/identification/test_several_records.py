@@ -461,8 +461,13 @@ def still() -> pt.Dataset:
         ),
         (
             lambda: [slow(), quick()],
-            {"drift": [True, 1.0]},
-            "drift is True: expected none with the model 'dahl'",
+            {"drift": [None, True], "offset": [True, False]},
+            "record 2: drift is True: expected none with offset=False",
+        ),
+        (
+            lambda: [slow(), quick()],
+            {"drift": [True]},
+            "drift has 1 entries: expected 2, one for each record",
         ),
         (
             lambda: [slow(), quick()],

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    Updater = Callable[[int, int, int, float, list[float]], None]
+    Updater = Callable[[int, int, int, float, list[float], float], None]
 
 __all__ = ["ProgressBar", "console", "one_clock"]
 
@@ -97,8 +97,10 @@ class ProgressBar:
         """Callback for the core; None where nothing is shown."""
         return None if self._view is None else self._update
 
-    def _update(self, nit: int, most: int, nfev: int, cost: float, theta: list[float]) -> None:
-        del nfev, theta
+    def _update(
+        self, nit: int, most: int, nfev: int, cost: float, theta: list[float], delay: float
+    ) -> None:
+        del nfev, theta, delay
         self.step(nit, most, f"at most {most} iterations, best {1e6 * cost:.3g} um")
 
     def step(self, done: int, total: int, words: str) -> None:

@@ -258,9 +258,6 @@ class Kinds:
             refuse_without_effect(
                 context, OF_PLAYS, f"with the model {named}, whose parameters are searched"
             )
-            refuse_without_effect(
-                context, ("drift",), f"with the model {named}: least squares find a drift"
-            )
         if context.params["stiffness"] is not None and self.names == (AUTO,):
             refuse_without_effect(
                 context, OF_PLAYS, "with --stiffness, for which a search is needed"
@@ -271,7 +268,6 @@ class Kinds:
         arguments = {key: value for key, value in given.items() if value is not None}
         if not _of_plays(name):
             arguments.pop("least_squares", None)
-            arguments.pop("drift", None)
         elif not searched(name):
             # Its creep is a setting of the least squares.
             arguments.pop("creep", None)

@@ -36,7 +36,7 @@ SCHEMA_VERSION = 1
 OF_PARAMETERS = ("free", "fixed", "bounds", "scales", "ties", "constraints", "priors")
 OF_SEARCH = ("stiffness", "delay", "creep", "method", "swarm", "descents", "runs")
 OF_SWARM = (*OF_PARAMETERS, *OF_SEARCH)
-GIVEN = ("model", "offset", "history", "least_squares", *OF_SWARM)
+GIVEN = ("model", "offset", "history", "drift", "least_squares", *OF_SWARM)
 # And those that it has in another way.
 ELSEWHERE = {
     "seed": "expected it in seeds=",
@@ -192,6 +192,6 @@ def _check(kind: object, found: Mapping[str, Any]) -> None:
             )
         return
     of_swarm = {**dict.fromkeys((*OF_SWARM, "seed", "threads")), **found}
-    for name in ("model", "offset", "history", "least_squares"):
+    for name in ("model", "offset", "history", "drift", "least_squares"):
         of_swarm.pop(name, None)
     refuse_given(model_named(kind), of_swarm, found.get("least_squares"))

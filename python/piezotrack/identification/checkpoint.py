@@ -75,6 +75,7 @@ def _identity(records: Sequence[Asked], arguments: Mapping[str, object]) -> str:
             "offset": one.offset,
             "history": one.history,
             "delay": plain("delay", one.delay),
+            "drift": plain("drift", one.drift),
             "weight": one.weight,
         }
         for one in records

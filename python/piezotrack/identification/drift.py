@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from .. import _core
 from .._support.arguments import positive
 from .._support.json_text import object_of
+from .._support.messages import quoted
+from ..errors import ParameterError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..data.dataset import Dataset
+    from .asked import Asked
+
     Array = NDArray[np.float64]
 
-__all__ = ["Drift", "asked_drift", "drift_entry", "drift_of"]
+__all__ = ["Drift", "asked_drift", "drift_entry", "drift_of", "drift_of_asked"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,10 +50,21 @@ class Drift:
     begin: float
     end: float
 
+    @classmethod
+    def _falling(cls, fallen: float, time: float, data: Dataset) -> Self:
+        """Of a part of the reading that fades along the window of a record [m]."""
+        begin, end = float(data.t[0]), float(data.t[-1])
+        amplitude = fallen / -float(np.expm1((begin - end) / time))
+        return cls(amplitude=amplitude, time=time, begin=begin, end=end)
+
+    @property
+    def moved(self) -> float:
+        """Change of the reading along the window [m]."""
+        return self.amplitude * float(np.expm1((self.begin - self.end) / self.time))
+
     def __str__(self) -> str:
-        moved = self.amplitude * float(np.exp((self.begin - self.end) / self.time) - 1.0)
         return (
-            f"a drift of {1e6 * moved:.3g} um along the window fitted, "
+            f"a drift of {1e6 * self.moved:.3g} um along the window fitted, "
             f"time constant {self.time:.3g} s"
         )
 
@@ -115,6 +131,37 @@ def asked_drift(drift: object) -> float | None:
     if drift is None or drift is True or (isinstance(drift, str) and drift == "auto"):
         return None
     return 0.0 if drift is False else positive("drift", drift, "s")
+
+
+def drift_of_asked(one: Asked, *, searched: bool) -> float | None:
+    """Time constant of the drift of a record, as the core takes it.
+
+    Parameters
+    ----------
+    one : Asked
+        The record, and what is asked of it.
+    searched : bool
+        Whether the model is searched: such a one has no drift where nobody asks for it.
+
+    Returns
+    -------
+    float or None
+        As for `asked_drift`.
+
+    Raises
+    ------
+    ParameterError
+        The drift is none of what `identify` takes, or is asked for without an offset.
+    """
+    given = one.drift not in (None, False)
+    if given and not one.offset:
+        raise ParameterError(
+            f"drift is {quoted(one.drift)}: expected none with offset=False, a sensor that "
+            "shows what there is"
+        )
+    if not one.offset or (searched and not given):
+        return 0.0
+    return asked_drift(one.drift)
 
 
 def drift_entry(drift: Drift | None) -> dict[str, Any]:

@@ -153,10 +153,11 @@ def identify(
         each has a delay of its own in any case.
     drift : bool or float, or a list of these, optional
         Slow drift of the sensor along the record, ``d exp(-t/tau)``, its amplitude fitted: none
-        (False), with a time constant that the record shows (True), or with this one [s]. Where it
-        is not given: for models found by least squares what the record shows, for models that are
-        searched none. A list has an entry for each of several records; each has a drift of its own
-        in any case.
+        (False), with a time constant that the record shows (True), or with this one [s]. A record
+        whose drive turns fewer than six times shows none: a loop that is not closed would look the
+        same. Where it is not given: for models found by least squares what the record shows, for
+        models that are searched none. A list has an entry for each of several records; each has a
+        drift of its own in any case.
     history : {"virgin", "settled", "fit"}, or a list of these or None, optional
         What the stage went through before the record, whose first sample finds it in equilibrium:
         nothing (``"virgin"``), the drive of the record once or more until the hysteresis repeats

@@ -46,8 +46,8 @@ class FittedRecord:
     stroke : float
         Stroke in its window [m].
     parameters : dict of str to Estimate
-        The delay and the voltage before the record, where they are searched or not 0. Empty of a
-        model that was read from a file.
+        The delay, the voltage before the record and the time constant of the drift, where they are
+        searched or not 0. Empty of a model that was read from a file.
     origin : mapping
         Entries of the model file on the record: source, window, fingerprint, drive.
     """

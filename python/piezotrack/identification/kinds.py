@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .asked import Asked
     from .result import Identification
 
-__all__ = ["check_counts", "identify_kind", "identify_weights", "refuse_drift", "refuse_given"]
+__all__ = ["check_counts", "identify_kind", "identify_weights", "refuse_given"]
 
 # How a search is run, not what it finds.
 RUNNING = ("seed", "runs", "threads", "progress")
@@ -55,7 +55,6 @@ def identify_kind(
     """
     if not info.searched:
         return identify_weights((one,), info, of_swarm=of_swarm, least_squares=least_squares)
-    refuse_drift(info, one.drift)
     if one.history is not None:
         return search_records((one,), info, **of_swarm)
     return _as_shown(one, info, of_swarm)
@@ -101,33 +100,11 @@ def identify_weights(
         raise Interrupted("interrupted before the weights were found") from None
 
 
-def refuse_drift(info: ModelInfo, drift: object) -> None:
-    """Refuse a drift beside parameters that are searched.
-
-    Parameters
-    ----------
-    info : ModelInfo
-        The kind.
-    drift : object
-        What was asked for; None where nothing was.
-
-    Raises
-    ------
-    ParameterError
-        A drift was asked for.
-    """
-    if drift not in (None, False):
-        raise ParameterError(
-            f"drift is {quoted(drift)}: expected none with the model {info.name!r}, whose "
-            "parameters are searched; least squares find it"
-        )
-
-
 def _as_shown(one: Asked, info: ModelInfo, of_swarm: Mapping[str, Any]) -> Identification:
     """Search with the history that the record shows: more freedom has to lower the cost."""
     fit = virgin = search_records((replace(one, history="virgin"),), info, **of_swarm)
     asked = {name: value for name, value in of_swarm.items() if name not in OF_SEARCH}
-    asked["delay"] = one.delay
+    asked |= {"delay": one.delay, "drift": one.drift}
     for other in other_histories(one.data, info, fit, offset=one.offset, asked=asked):
         if other.share * virgin.cost < (1.0 - GAIN) * fit.cost:
             found = search_records((replace(one, history=other.history),), info, **of_swarm)

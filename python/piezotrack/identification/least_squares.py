@@ -12,7 +12,7 @@ from .._support.messages import quoted
 from ..errors import DataError, ParameterError
 from ..stages.registry import stage_class
 from .asked import of_record
-from .drift import Drift, asked_drift
+from .drift import Drift, drift_of_asked
 from .estimates import LagRange
 from .fitted_record import FittedRecord
 from .history import start_of_fit
@@ -251,12 +251,7 @@ def _asked(one: Asked) -> dict[str, Any]:
     """Return a record and what is asked of it, as the core takes it."""
     data = one.data
     with of_record(one.label):
-        delay, drift = delay_bounds(one.delay), asked_drift(one.drift)
-        if not one.offset and one.drift not in (None, False):
-            raise ParameterError(
-                f"drift is {quoted(one.drift)}: expected none with offset=False, a sensor that "
-                "shows what there is"
-            )
+        delay, drift = delay_bounds(one.delay), drift_of_asked(one, searched=False)
     return {
         "u": data.full.u,
         "y": data.full.y,
@@ -265,7 +260,7 @@ def _asked(one: Asked) -> dict[str, Any]:
         "start": data.warmup,
         "history": one.history,
         "offset": one.offset,
-        "drift": drift if one.offset else 0.0,
+        "drift": drift,
         "delay": delay,
         "label": one.label,
         "weight": one.weight,

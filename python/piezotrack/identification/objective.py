@@ -43,6 +43,8 @@ class Objective:
         Whether an offset of the sensor is fitted.
     history : {"virgin", "settled", "fit"}, optional
         What the stage went through before the record.
+    drift : bool or float, optional
+        Slow drift of the sensor along the record, as for `identify`; none where it is not given.
     threads : int, optional
         Up to 256; all cores where it is 0 or not given.
     free, fixed, initial, bounds, scales, ties, constraints, priors, stiffness, delay, \
@@ -71,6 +73,7 @@ class Objective:
         *,
         offset: bool = True,
         history: History = "virgin",
+        drift: bool | float | None = None,
         threads: int | None = None,
         free: Iterable[str] | None = None,
         fixed: Mapping[str, float] | None = None,
@@ -90,7 +93,7 @@ class Objective:
         if not info.searched:
             raise ParameterError(f"model is {model!r}: expected one that is searched")
         question = question_of(
-            Asked(data=data, offset=offset, history=history, delay=delay),
+            Asked(data=data, offset=offset, history=history, delay=delay, drift=drift),
             info,
             free=free,
             fixed=fixed,

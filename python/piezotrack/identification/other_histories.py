@@ -114,12 +114,13 @@ def _starts(objective: Objective, fit: Identification) -> Array:
 
 def _places(objective: Objective, fit: Identification) -> Array:
     """Places with the parameters of the fit: after each voltage of a grid where one is searched."""
-    place = [_coordinate(fit, *one) for one in objective.coordinates if one[0] != VOLTAGE]
-    if VOLTAGE not in objective.ranges:
+    names = list(objective.ranges)
+    place = [0.5 if one[0] == VOLTAGE else _coordinate(fit, *one) for one in objective.coordinates]
+    if VOLTAGE not in names:
         return np.array([place])
-    volts = (np.arange(GRID) + 0.5) / GRID
-    # After the parameters.
-    return np.column_stack([np.tile(place, (GRID, 1)), volts])
+    places = np.tile(place, (GRID, 1))
+    places[:, names.index(VOLTAGE)] = (np.arange(GRID) + 0.5) / GRID
+    return places
 
 
 def _coordinate(fit: Identification, name: str, low: float, high: float, scale: str) -> float:

@@ -11,6 +11,7 @@ from .._support.messages import quoted
 from ..data import diagnostics
 from ..errors import ParameterError
 from .asked import of_record
+from .drift import drift_of_asked
 from .parameter_arguments import ParameterArguments
 from .step_response import StepResult
 
@@ -61,6 +62,7 @@ def question_of(
     data = asked.data
     with of_record(asked.label):
         searched_delay = delay_bounds(asked.delay)
+        drift = drift_of_asked(asked, searched=True)
     creep_times = _creep_times(False if creep is None else creep)
     said = ParameterArguments.checked(scales, ties, constraints, priors)
     held = _held(initial, fixed, free, bounds, said.named)
@@ -81,6 +83,7 @@ def question_of(
         "stiffness": None if stiffness is None else _core.as_number("stiffness", stiffness),
         "offset": asked.offset,
         "delay": searched_delay,
+        "drift": drift,
         "history": asked.history or "virgin",
         "creep": creep_times,
         "label": asked.label,

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..data.dataset import Dataset
+    from .drift import Drift
     from .estimates import LagRange
     from .history import Start
 
@@ -26,6 +27,7 @@ __all__ = [
     "drive_rate",
     "first_samples",
     "fit_percent",
+    "of_drift",
     "of_lags",
     "of_start",
     "spread_of",
@@ -35,6 +37,8 @@ __all__ = [
 NOISY = 3.0
 # Share of the travel that a lag makes up from which a loop is due to it.
 VISCOUS = 0.02
+# Share of the stroke from which a drift is more than what a sensor shows besides.
+LARGE = 0.05
 # Share of the window that the first samples may be, and of the squared residual that they carry.
 FIRST, CARRIED = 0.1, 0.5
 # Margin of the drive's range, and factor of its rate, beyond which a model was not fitted.
@@ -110,6 +114,29 @@ all of the motion']
     return [
         f"the residual is {cost / noise:.2g} times the noise between samples, "
         f"{1e9 * noise:.3g} nm: no kind that was tried describes all of the motion"
+    ]
+
+
+def of_drift(drift: Drift | None, stroke: float) -> list[str]:
+    """Say that a drift is large for one.
+
+    Parameters
+    ----------
+    drift : Drift or None
+        Drift of a record.
+    stroke : float
+        Stroke of that record [m].
+
+    Returns
+    -------
+    list of str
+        One sentence, or none.
+    """
+    if drift is None or abs(drift.moved) <= LARGE * stroke:
+        return []
+    return [
+        f"{drift} is {100.0 * abs(drift.moved) / stroke:.2g} % of the stroke: expected less of a "
+        "sensor; it may stand for a part of the motion, such as the first cycles after rest"
     ]
 
 

@@ -234,6 +234,7 @@ class Identification(IdentifiedModel):
             notes += diagnostics.fit_warnings(
                 data, run.x, one.cost_percent, self.model.info.hysteresis, held
             )
+        notes += remarks.of_drift(one.drift, one.stroke)
         notes += self.model._notes(lambda: run)
         if self.trials:
             # A mode moves from sample to sample as noise does; what is left of it hardly does.

@@ -13,6 +13,7 @@ from .._support.units import of_drive
 from ..errors import Interrupted, ParameterError
 from ..stages.registry import stage_class
 from .descents import Descents
+from .drift import Drift
 from .estimates import Constraint, Estimate, LagRange, Progress, SwarmRun
 from .fitted_record import FittedRecord
 from .history import start_after
@@ -35,7 +36,7 @@ RUNS: dict[type, int] = {ParticleSwarm: 4, Descents: 1}
 METHODS: dict[type, str] = {ParticleSwarm: "swarm", Descents: "descents"}
 DEFAULT = "descents"
 # Unit and symbol of what is searched beside the parameters of a model.
-SENSOR = {"delay": ("s", "Td"), "voltage_before": ("V", "u0")}
+SENSOR = {"delay": ("s", "Td"), "voltage_before": ("V", "u0"), "drift_time": ("s", "tau")}
 
 
 def search_records(
@@ -129,9 +130,11 @@ def _reporting(info: ModelInfo, callback: Callable[[Progress], object]) -> Calla
     """Convert the core's plain numbers to a `Progress` for the callback."""
     names = [one.name for one in info.parameters if not one.is_list]
 
-    def report(nit: int, most: int, nfev: int, cost: float, theta: list[float]) -> bool:
+    def report(
+        nit: int, most: int, nfev: int, cost: float, theta: list[float], delay: float
+    ) -> bool:
         parameters = dict(zip(names, theta, strict=False))
-        return bool(callback(Progress(nit, most, nfev, cost, parameters, theta[-2])))
+        return bool(callback(Progress(nit, most, nfev, cost, parameters, delay)))
 
     return report
 
@@ -191,6 +194,7 @@ def _identification(
         delay=first.delay,
         offset=first.offset,
         offset_fitted=first.offset_fitted,
+        drift=first.drift,
         scale_assumed=found.scale_assumed,
         stroke=max(one.stroke for one in fitted),
         records=fitted,
@@ -232,11 +236,14 @@ def _fitted(
     """Return what a search found of a record alone."""
     data, history = asked.data, asked.history or "virgin"
     estimates = {name: _estimate(own[name], *facts[name]) for name in SENSOR}
-    delay, before = estimates["delay"], estimates["voltage_before"]
+    delay, before, time = (estimates[name] for name in SENSOR)
     if delay.value == 0.0 and not delay.free:
         del estimates["delay"]
     if history != "fit":
         del estimates["voltage_before"]
+    drift = Drift._falling(own["drift"], time.value, data) if time.value else None
+    if drift is None:
+        del estimates["drift_time"]
     voltage = before.value if history == "fit" else None
     return FittedRecord(
         data=data,
@@ -244,6 +251,7 @@ def _fitted(
         delay=delay.value,
         offset=own["offset"],
         offset_fitted=asked.offset,
+        drift=drift,
         start=start_after(model, data, history, voltage, creeps=False),
         cost=own["rms"],
         stroke=data.stroke,

@@ -103,7 +103,7 @@ def identify_best(
     """
     refuse_of_one_model(of_swarm)
     several, swarm = short_trials(of_swarm)
-    infos = kinds_tried(one.data, {**of_swarm, "drift": one.drift or None})
+    infos = kinds_tried(one.data, of_swarm)
     part, rest = two_parts(one.data)
     noise = sample_noise(rest.y)
     trial = several if rest is not part else swarm
@@ -239,8 +239,7 @@ def kinds_tried(data: Dataset, of_swarm: Mapping[str, Any]) -> list[ModelInfo]:
     names = OF_FORCE if data.drive_unit == "N" else OF_VOLTS
     infos = [model_named(name) for name in names]
     needs_swarm = any(of_swarm.get(name) is not None for name in OF_SWARM_ONLY)
-    drifts = of_swarm.get("drift") is not None
-    return [info for info in infos if not (drifts if info.searched else needs_swarm)]
+    return [info for info in infos if info.searched or not needs_swarm]
 
 
 def two_parts(data: Dataset) -> tuple[Dataset, Dataset]:

@@ -11,7 +11,7 @@ import numpy as np
 from .._support.statistics import sample_noise
 from ..errors import DataError, NumericalError
 from .history import GAIN
-from .kinds import identify_weights, refuse_drift
+from .kinds import identify_weights
 from .search import search_records
 from .selection import (
     AS_NOISE,
@@ -67,8 +67,6 @@ def identify_together(
     """
     if not info.searched:
         return identify_weights(records, info, of_swarm=of_search, least_squares=least_squares)
-    for one in records:
-        refuse_drift(info, one.drift)
     fit = search_records(records, info, **of_search)
     shown = [one if one.history else _with_shown(fit, one) for one in records]
     moved = [i for i, one in enumerate(shown) if (one.history, records[i].history) in SHOWN]
@@ -90,7 +88,14 @@ def _with_shown(fit: Identification, asked: Asked) -> Asked:
     """Give a record the history that it shows by the stage that never moved before any."""
     own = next(one for one in fit.records if one.data is asked.data)
     # As of another record: the one that was fitted begins as it was assumed to.
-    model = replace(fit, records=(), start=None, delay=own.delay, offset_fitted=own.offset_fitted)
+    model = replace(
+        fit,
+        records=(),
+        start=None,
+        delay=own.delay,
+        offset_fitted=own.offset_fitted,
+        drift=own.drift,
+    )
     return replace(asked, history=model.start_on(asked.data).history)
 
 
@@ -128,8 +133,7 @@ def best_together(
     found: list[tuple[Trial, ModelInfo]] = []
     refused: Exception | None = None
     fit: Identification | None = None
-    drifts = any(one.drift for one in records)
-    for info in kinds_tried(records[0].data, {**of_search, "drift": drifts or None}):
+    for info in kinds_tried(records[0].data, of_search):
         try:
             fit = identify_together(first, info, trial if apart else full, least_squares)
             left = [

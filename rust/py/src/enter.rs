@@ -195,7 +195,8 @@ fn tell(watchers: &Watchers, halt: &Halt, progress: &Progress, answers: &Sender<
         progress.iterations,
         progress.evaluations,
         progress.cost,
-        progress.theta.0.to_vec(),
+        progress.theta.parameters().to_vec(),
+        progress.theta.delay(),
     );
     halt.with_python(|py| {
         if let Some(bar) = &watchers.progress

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use numpy::PyArray1;
 use piezotrack_core::identify::{
-    BEFORE, Coordinate, DELAY, History, Identification, Journal, Method, Outcome, OwnResult, Plan,
-    Record, Relations, Spec, StopReason, identify_together, visited,
+    BEFORE, Coordinate, DELAY, DRIFT_TIME, History, ITS_OWN, Identification, Journal, Method,
+    Outcome, OwnResult, Plan, Record, Relations, Spec, StopReason, identify_together, visited,
 };
 use piezotrack_core::integrator::Order;
 use piezotrack_core::signal::Drive;
@@ -64,6 +64,9 @@ struct Own {
     offset: f64,
     delay: Estimate,
     voltage_before: Estimate,
+    drift_time: Estimate,
+    /// Part of the reading that fades along the window, m.
+    drift: f64,
 }
 
 /// What a search found, in plain numbers.
@@ -75,11 +78,11 @@ struct PySearch {
 
 #[pymethods]
 impl PySearch {
-    /// The parameters of the stage, the delay and the voltage that it came from, by their names.
+    /// The parameters of the stage, and what the first record has of its own, by their names.
     #[getter]
     fn estimates(&self) -> Vec<Estimate> {
         let names = self.found.problem.model.scalars().iter().map(|info| info.name);
-        let places = names.enumerate().chain([(DELAY, "delay"), (BEFORE, "voltage_before")]);
+        let places = names.enumerate().chain(ITS_OWN);
         places.filter_map(|(place, name)| self.estimate(0, place, name)).collect()
     }
 
@@ -90,7 +93,9 @@ impl PySearch {
             let (rms, offset) = (one.costs.rms, one.costs.offset);
             let delay = self.estimate(r, DELAY, "delay")?;
             let voltage_before = self.estimate(r, BEFORE, "voltage_before")?;
-            Some(Own { rms, offset, delay, voltage_before })
+            let drift_time = self.estimate(r, DRIFT_TIME, "drift_time")?;
+            let drift = one.costs.drift;
+            Some(Own { rms, offset, delay, voltage_before, drift_time, drift })
         };
         self.found.records.iter().enumerate().filter_map(own).collect()
     }

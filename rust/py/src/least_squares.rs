@@ -1,8 +1,8 @@
 //! Identification of a stage's weights by least squares.
 
 use piezotrack_core::identify::{
-    CreepKind, DriftKind, DynamicsKind, LeastSquaresFit, PlacesKind, Record, RecordFit,
-    WeightsRecord, WeightsSettings, identify_weights, resonances,
+    CreepKind, DynamicsKind, LeastSquaresFit, PlacesKind, Record, RecordFit, WeightsRecord,
+    WeightsSettings, identify_weights, resonances,
 };
 use piezotrack_core::math::{FREE, NOT_NEGATIVE, Rows};
 use piezotrack_core::models::Model;
@@ -15,7 +15,7 @@ use crate::enter::enter;
 use crate::errors::raise;
 use crate::identify::{history_name, history_named};
 use crate::models::{Named, named};
-use crate::question::delay_between;
+use crate::question::{delay_between, drift_with};
 use crate::stage::hold;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -125,11 +125,7 @@ impl Asked<'_> {
             record.map_err(|error| error.of(&self.label))?.among(&self.label, self.weight)?;
         let history = self.history.as_deref().map(history_named).transpose()?;
         let Self { start, offset, .. } = *self;
-        let drift = match self.drift {
-            None => DriftKind::Auto,
-            Some(0.0) => DriftKind::None,
-            Some(time) => DriftKind::Time(time),
-        };
+        let drift = drift_with(self.drift);
         let one =
             WeightsRecord { history, offset, drift, weight, ..WeightsRecord::of(drive, y, start) };
         one.delayed(delay_between(self.delay)).map_err(|error| error.of(&self.label))

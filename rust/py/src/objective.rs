@@ -1,7 +1,7 @@
 //! The cost that an identification minimises, for optimisers of the caller's.
 
 use piezotrack_core::identify::{
-    Coordinate, DELAY, Evaluator, LocalRefinement, Point, Problem, Records, Scale,
+    Coordinate, Evaluator, ITS_OWN, LocalRefinement, Point, Problem, Records, Scale,
 };
 use piezotrack_core::integrator::Stepping;
 use piezotrack_core::signal::Stop;
@@ -48,9 +48,8 @@ impl PyObjective {
     fn coordinates(&self) -> Vec<(&'static str, f64, f64, &'static str)> {
         let infos = self.problem.model.scalars();
         let name = |place: usize| {
-            infos
-                .get(place)
-                .map_or(if place == DELAY { "delay" } else { "voltage_before" }, |one| one.name)
+            let own = ITS_OWN.iter().find(|own| own.0 == place).map_or("", |own| own.1);
+            infos.get(place).map_or(own, |one| one.name)
         };
         let searched =
             self.problem.free().filter_map(|place| match self.problem.coordinates[place] {
@@ -83,8 +82,8 @@ impl PyObjective {
         })
     }
 
-    /// The parameters at a place of the unit box, SI, in the order of the model; then the delay and
-    /// the voltage before.
+    /// The parameters at a place of the unit box, SI, in the order of the model; then what the
+    /// record has of its own.
     fn parameters(&self, place: Vec<f64>) -> PyResult<Vec<f64>> {
         self.check(std::slice::from_ref(&place)).map_err(|error| raise(&error))?;
         Ok(self.problem.theta(&place).0.to_vec())

@@ -1,7 +1,7 @@
 //! What is asked of a record: the kind of stage, what is searched, and between which bounds.
 
 use piezotrack_core::Result;
-use piezotrack_core::identify::{Delay, Record, Spec, creep_times};
+use piezotrack_core::identify::{Delay, DriftKind, Record, Spec, creep_times};
 use piezotrack_core::models::Model;
 use piezotrack_core::signal::Hold;
 use pyo3::prelude::*;
@@ -31,6 +31,7 @@ pub struct Question<'py> {
     stiffness: Option<f64>,
     offset: bool,
     delay: Option<(f64, f64)>,
+    drift: Option<f64>,
     history: String,
     creep: Option<Vec<f64>>,
     label: String,
@@ -61,6 +62,15 @@ pub fn delay_between(bounds: Option<(f64, f64)>) -> Delay {
     }
 }
 
+/// The drift with a time constant, s: none where it is 0, what the record shows where there is none.
+pub fn drift_with(time: Option<f64>) -> DriftKind {
+    match time {
+        None => DriftKind::Auto,
+        Some(0.0) => DriftKind::None,
+        Some(time) => DriftKind::Time(time),
+    }
+}
+
 impl Question<'_> {
     /// Takes the numbers out of Python.
     pub fn asked(self) -> PyResult<Asked> {
@@ -79,6 +89,7 @@ impl Question<'_> {
             stiffness: self.stiffness,
             offset: self.offset,
             delay,
+            drift: drift_with(self.drift),
             history,
             ..Spec::of(model)
         };

@@ -85,11 +85,15 @@ impl Records<'_> {
             let candidates: Vec<Candidate> = steps.iter().map(candidate).collect();
             let stride = one.evaluator.stride(FEW_ROWS);
             let found = one.evaluator.simulated(&candidates, stride, stop);
-            steps.par_iter_mut().zip(found).for_each(|(along, simulated)| {
+            let each = steps.par_iter_mut().zip(found).zip(&candidates);
+            each.for_each(|((along, mut simulated), candidate)| {
                 let Some(near) = &local[along.spot] else { return };
                 let Neighbourhood { blocks, extended, .. } = near;
                 let (block, slots) = (&blocks[r], extended.slots_of(one));
                 let scale = extended.scale_of(one, block);
+                let time = candidate.theta.drift_time();
+                let read = &mut simulated.reading;
+                one.evaluator.change_drift(read, block.drift, time, block.stride);
                 let bends = curvature(block, &slots, &along.change, &simulated);
                 for (&slot, bend) in slots.iter().zip(bends.iter()) {
                     along.bend[slot] += scale * bend;

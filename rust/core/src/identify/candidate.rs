@@ -1,10 +1,11 @@
-//! A point of the search: the parameters of a stage, the delay of its sensor, and where it came from.
+//! A point of the search: the parameters of a stage, the delay and the drift of its sensor, and where it
+//! came from.
 
 use super::creep_shares::Shares;
 use crate::integrator::{MOST_PARAMETERS, Parameters};
 
-/// Places of a [`Theta`]: the parameters of a model, the delay and the voltage before the record.
-pub const PLACES: usize = MOST_PARAMETERS + 2;
+/// Places of a [`Theta`]: the parameters of a model, and what [`ITS_OWN`] has.
+pub const PLACES: usize = MOST_PARAMETERS + ITS_OWN.len();
 
 /// Place of the delay in a [`Theta`].
 pub const DELAY: usize = MOST_PARAMETERS;
@@ -12,8 +13,15 @@ pub const DELAY: usize = MOST_PARAMETERS;
 /// Place of the voltage that the stage came from, in a [`Theta`].
 pub const BEFORE: usize = MOST_PARAMETERS + 1;
 
+/// Place of the drift's time constant in a [`Theta`].
+pub const DRIFT_TIME: usize = MOST_PARAMETERS + 2;
+
+/// Places that each record has of its own, with their names.
+pub const ITS_OWN: [(usize, &str); 3] =
+    [(DELAY, "delay"), (BEFORE, "voltage_before"), (DRIFT_TIME, "drift_time")];
+
 /// Scalar parameters in the order of the model, 0 for those that it does not have, and after them
-/// the delay, s, and the voltage that the stage came from, V.
+/// the delay, s, the voltage that the stage came from, V, and the time constant of the drift, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Theta(pub [f64; PLACES]);
 
@@ -34,6 +42,12 @@ impl Theta {
     #[must_use]
     pub fn before(&self) -> f64 {
         self.0[BEFORE]
+    }
+
+    /// Time constant of the drift, s; `None` for no drift.
+    #[must_use]
+    pub fn drift_time(&self) -> Option<f64> {
+        Some(self.0[DRIFT_TIME]).filter(|&time| time > 0.0)
     }
 }
 

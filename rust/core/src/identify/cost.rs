@@ -13,12 +13,13 @@ use piezotrack_control::Number;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::candidate::{BEFORE, Candidate, Theta};
-use super::creep_shares::{ShareCost, ShareSums, Shares};
+use super::creep_shares::Shares;
 use super::history::visited;
 use super::motion::motion;
 use super::problem::Problem;
 use super::record::Record;
 use super::residual_sums::{Costs, Delayed, Direct, ResidualSums, Residuals, Simulated, add_creep};
+use super::share_sums::{ShareCost, ShareSums};
 use super::step_size;
 use crate::integrator::{
     FeedbackState, Kernel, MOST_PARAMETERS, Mechanics, Stepping, SteppingLoop, halvings,
@@ -60,7 +61,8 @@ impl<'a> Evaluator<'a> {
         let halvings = halvings(rate, record.drive.dt / index(stepping.substeps));
         let (held, arch) = (problem.held(), Arch::new());
         let creep_times = &problem.creep_times;
-        let residuals = Residuals { record, offset: problem.offset, centre, creep_times };
+        let (offset, drifts) = (problem.offset, problem.has_drift());
+        let residuals = Residuals { record, offset, centre, creep_times, drifts };
         let visited = visited(&record.drive, problem.history, f64::NAN);
         Self { residuals, problem, held, arch, stepping, halvings, visited }
     }

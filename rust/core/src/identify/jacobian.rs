@@ -3,9 +3,10 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::candidate::Candidate;
+use super::candidate::{Candidate, Theta};
 use super::cost::Evaluator;
 use super::creep_shares::{Shares, directions};
+use super::drift::{Drift, Fading};
 use super::normal::Block;
 use super::residual_sums::{Simulated, add_creep};
 use crate::signal::{Stop, index};
@@ -32,14 +33,16 @@ impl Evaluator<'_> {
         if found.iter().any(|one| one.reading.is_empty()) {
             return None;
         }
-        let mut found = found.into_iter();
-        let base = found.next()?;
+        let mut found = candidates.iter().zip(found);
+        let base = self.base(found.next()?, &shares, stride);
+        let mut moved =
+            found.map(|(one, found)| self.read_beside(&base, &one.theta, found.reading));
         let columns = pairs.into_iter().filter_map(|(low, high)| {
-            let (below, above) = (found.next()?, found.next()?);
-            Some(slope(above.reading, &below.reading, 1.0 / (high - low)))
+            let (below, above) = (moved.next()?, moved.next()?);
+            Some(slope(above, &below, 1.0 / (high - low)))
         });
         let columns = columns.collect();
-        Some(self.block(columns, with_creep(base, &shares), shares, stride))
+        Some(base.block(columns, &shares))
     }
 
     /// By one-sided differences, at each of some places.
@@ -56,20 +59,21 @@ impl Evaluator<'_> {
             [self.at(place)].into_iter().chain(moved).collect::<Vec<_>>()
         };
         let all: Vec<Candidate> = places.iter().flat_map(neighbours).collect();
-        let mut found = self.simulated(&all, stride, stop).into_iter();
+        let mut found = all.iter().zip(self.simulated(&all, stride, stop));
         let own = places.iter().map(|(place, _)| found.by_ref().take(1 + place.len()).collect());
-        let own: Vec<Vec<Simulated>> = own.collect();
-        let block = |(own, (place, shares)): (Vec<Simulated>, &(Vec<f64>, Shares))| {
-            if own.iter().any(|one| one.reading.is_empty()) {
+        let own: Vec<Vec<(&Candidate, Simulated)>> = own.collect();
+        let block = |(own, (place, shares)): (Vec<_>, &(Vec<f64>, Shares))| {
+            if own.iter().any(|(_, one): &(&Candidate, Simulated)| one.reading.is_empty()) {
                 return None;
             }
             let mut own = own.into_iter();
-            let base = with_creep(own.next()?, shares);
-            let columns = place.iter().zip(own);
-            let columns =
-                columns.map(|(z, one)| slope(one.reading, &base.reading, 1.0 / change(*z)));
+            let base = self.base(own.next()?, shares, stride);
+            let columns = place.iter().zip(own).map(|(z, (one, found))| {
+                let moved = self.read_beside(&base, &one.theta, found.reading);
+                slope(moved, &base.read, 1.0 / change(*z))
+            });
             let columns = columns.collect();
-            Some(self.block(columns, base, *shares, stride))
+            Some(base.block(columns, shares))
         };
         own.into_par_iter().zip(places).map(block).collect()
     }
@@ -89,28 +93,103 @@ impl Evaluator<'_> {
         Candidate { shares: Some(shares), ..self.at(place) }
     }
 
-    /// The normal equations of the columns of a Jacobian, and of the directions in which the shares
-    /// can move, with what is read at their place.
-    fn block(
-        &self,
-        mut columns: Vec<Vec<f64>>,
-        base: Simulated,
-        shares: Shares,
-        stride: usize,
-    ) -> Block {
-        let (read, directions) = (base.reading, directions(&shares));
-        for direction in &directions {
-            let mut column = vec![0.0; read.len()];
-            add_creep(&mut column, &base.outputs, direction);
-            columns.push(column);
-        }
-        for column in &mut columns {
-            self.centre(column);
-        }
+    /// What is read at a place, simulated with its creep apart, and what is left of the record.
+    fn base(&self, (at, found): (&Candidate, Simulated), shares: &Shares, stride: usize) -> Base {
+        let Simulated { reading: mut read, outputs, .. } = found;
+        add_creep(&mut read, &outputs, shares);
         let record = self.record();
         let measured = record.y[record.window.clone()].iter().step_by(stride);
         let mut residual: Vec<f64> = measured.zip(&read).map(|(y, x)| y - x).collect();
-        self.centre(&mut residual);
+        let level = self.level(at.theta.drift_time(), stride);
+        let drift = level.fallen(&residual);
+        level.take_off(&mut residual);
+        Base { stride, read, outputs, residual, level, drift }
+    }
+
+    /// What is read beside a place: with the drift that suits the place, and its own time constant.
+    fn read_beside(&self, base: &Base, theta: &Theta, mut reading: Vec<f64>) -> Vec<f64> {
+        self.change_drift(&mut reading, base.drift, theta.drift_time(), base.stride);
+        reading
+    }
+
+    /// Adds what a drift changes by with another time constant.
+    pub(super) fn change_drift(
+        &self,
+        reading: &mut [f64],
+        drift: Option<Drift>,
+        time: Option<f64>,
+        stride: usize,
+    ) {
+        let (Some(drift), Some(time)) = (drift, time) else { return };
+        if (time - drift.time).abs() > 0.0 {
+            let ends = self.faded(time, stride).into_iter().zip(self.faded(drift.time, stride));
+            for (x, (to, from)) in reading.iter_mut().zip(ends) {
+                *x += drift.fallen * (to - from);
+            }
+        }
+    }
+
+    /// A drift of 1 with this time constant, at every `stride`-th sample of the window.
+    fn faded(&self, time: f64, stride: usize) -> Vec<f64> {
+        let samples = self.record().window.len();
+        Fading::new(time, self.record().drive.dt, samples).shape(samples, stride)
+    }
+
+    /// What the sensor adds to a displacement: an offset, and a drift with this time constant.
+    fn level(&self, time: Option<f64>, stride: usize) -> Level {
+        let offset = self.problem().offset;
+        let drift = time.map(|time| {
+            let mut shape = self.faded(time, stride);
+            centre(&mut shape);
+            (time, product(&shape, &shape), shape)
+        });
+        Level { offset, drift }
+    }
+
+    /// Measured less simulated at a place with its shares of the creep, less what the sensor adds.
+    pub(super) fn residual(
+        &self,
+        place: &[f64],
+        shares: &Shares,
+        stop: Stop<'_>,
+    ) -> Option<Vec<f64>> {
+        let (record, theta) = (self.record(), self.problem().theta(place));
+        let mut residual = self.reading(&theta, shares, stop)?;
+        let measured = &record.y[record.window.clone()];
+        residual.iter_mut().zip(measured).for_each(|(x, y)| *x = y - *x);
+        self.level(theta.drift_time(), 1).take_off(&mut residual);
+        Some(residual)
+    }
+}
+
+/// A place that was simulated.
+struct Base {
+    /// Samples of the window to a row.
+    stride: usize,
+    read: Vec<f64>,
+    /// What is read of each relaxation of the creep.
+    outputs: Vec<Vec<f64>>,
+    /// What is left of the record.
+    residual: Vec<f64>,
+    level: Level,
+    /// The drift that suits the place best.
+    drift: Option<Drift>,
+}
+
+impl Base {
+    /// The normal equations of the columns of a Jacobian, and of the directions in which the shares
+    /// can move, with what is read at their place.
+    fn block(self, mut columns: Vec<Vec<f64>>, shares: &Shares) -> Block {
+        let Self { stride, read, outputs, residual, level, drift } = self;
+        let directions = directions(shares);
+        for direction in &directions {
+            let mut column = vec![0.0; read.len()];
+            add_creep(&mut column, &outputs, direction);
+            columns.push(column);
+        }
+        for column in &mut columns {
+            level.take_off(column);
+        }
         let count = columns.len();
         let mut square = DMatrix::zeros(count, count);
         for i in 0..count {
@@ -121,33 +200,46 @@ impl Evaluator<'_> {
         }
         let slope = DVector::from_fn(count, |i, _| product(&columns[i], &residual));
         let squares = product(&residual, &residual);
-        Block { square, slope, columns, read, directions: directions.len(), squares }
+        let directions = directions.len();
+        Block { square, slope, columns, read, drift, stride, directions, squares }
     }
+}
 
-    /// Measured less simulated at a place with its shares of the creep, the mean taken off where an
-    /// offset is fitted.
-    pub(super) fn residual(
-        &self,
-        place: &[f64],
-        shares: &Shares,
-        stop: Stop<'_>,
-    ) -> Option<Vec<f64>> {
-        let record = self.record();
-        let mut residual = self.reading(&self.problem().theta(place), shares, stop)?;
-        let measured = &record.y[record.window.clone()];
-        residual.iter_mut().zip(measured).for_each(|(x, y)| *x = y - *x);
-        self.centre(&mut residual);
-        Some(residual)
-    }
+/// What a sensor adds to a displacement, of the size that suits best.
+struct Level {
+    /// Whether an offset is fitted; with a drift always.
+    offset: bool,
+    /// Time constant of a drift, s, the sum of the squares of a drift of 1, and its values, about
+    /// their mean.
+    drift: Option<(f64, f64, Vec<f64>)>,
+}
 
-    /// Takes the mean off where an offset is fitted.
-    fn centre(&self, values: &mut [f64]) {
-        if self.problem().offset {
-            let mean = mean(values);
-            for value in values {
-                *value -= mean;
+impl Level {
+    /// Takes it off a column.
+    fn take_off(&self, values: &mut [f64]) {
+        if self.offset {
+            centre(values);
+        }
+        if let Some((_, square, shape)) = &self.drift {
+            let part = product(shape, values) / square;
+            for (value, g) in values.iter_mut().zip(shape) {
+                *value -= part * g;
             }
         }
+    }
+
+    /// The drift that suits a residual best.
+    fn fallen(&self, residual: &[f64]) -> Option<Drift> {
+        let (time, square, shape) = self.drift.as_ref()?;
+        Some(Drift { time: *time, fallen: product(shape, residual) / square })
+    }
+}
+
+/// Takes the mean off.
+fn centre(values: &mut [f64]) {
+    let mean = mean(values);
+    for value in values {
+        *value -= mean;
     }
 }
 
@@ -157,12 +249,6 @@ fn slope(mut read: Vec<f64>, from: &[f64], scale: f64) -> Vec<f64> {
         *x = (*x - from) * scale;
     }
     read
-}
-
-/// A candidate whose creep was read apart, with these shares.
-fn with_creep(mut base: Simulated, shares: &Shares) -> Simulated {
-    add_creep(&mut base.reading, &base.outputs, shares);
-    base
 }
 
 /// A place with another value of one coordinate.

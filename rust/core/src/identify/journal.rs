@@ -57,16 +57,17 @@ pub(super) fn remembered<T: Answer>(
 
 impl Answer for Costs {
     fn length(_coordinates: usize) -> usize {
-        2 + MOST_SHARES
+        3 + MOST_SHARES
     }
 
     fn write(&self, numbers: &mut Vec<f64>, _coordinates: usize) {
-        numbers.extend([self.rms, self.offset]);
+        numbers.extend([self.rms, self.offset, self.drift]);
         numbers.extend(self.shares);
     }
 
     fn read(numbers: &[f64], _coordinates: usize) -> Self {
         let at = |i: usize| numbers.get(i).copied().unwrap_or(f64::NAN);
-        Self { rms: at(0), offset: at(1), shares: core::array::from_fn(|i| at(2 + i)) }
+        let shares = core::array::from_fn(|i| at(3 + i));
+        Self { rms: at(0), offset: at(1), drift: at(2), shares }
     }
 }

@@ -128,9 +128,10 @@ impl LocalRefinement<'_> {
         found
     }
 
-    /// Samples less what was fitted to them, with an offset of each record.
+    /// Samples less what was fitted to them, with an offset of each record, and the size of its drift.
     fn freedom(&self, count: usize) -> f64 {
-        let fitted = count + self.records.members().len();
+        let drifts = self.records.problems().filter(|problem| problem.has_drift()).count();
+        let fitted = count + self.records.members().len() + drifts;
         index(self.records.samples().saturating_sub(fitted).max(1))
     }
 

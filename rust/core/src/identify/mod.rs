@@ -11,6 +11,7 @@ mod cross_talk;
 mod damped_step;
 mod delay;
 mod descents;
+mod drift;
 mod history;
 mod identification;
 mod inertia;
@@ -34,13 +35,14 @@ mod residual_sums;
 mod resonances;
 mod search;
 mod sensor_noise;
+mod share_sums;
 mod step_response;
 mod step_ringing;
 mod step_size;
 mod swarm;
 mod tie;
 
-pub use candidate::{BEFORE, Candidate, DELAY, PLACES, Point, Theta};
+pub use candidate::{BEFORE, Candidate, DELAY, DRIFT_TIME, ITS_OWN, PLACES, Point, Theta};
 pub use constraint::Constraint;
 pub use coordinate::{Coordinate, Scale};
 pub use cost::Evaluator;
@@ -48,13 +50,14 @@ pub use creep_shares::{MOST_CREEP, MOST_SHARES, Shares, creep_times};
 pub use cross_talk::{CrossTalk, cross_talk};
 pub use delay::Delay;
 pub use descents::DescentSettings;
+pub use drift::DriftKind;
 pub use history::{History, visited};
 pub use identification::{Identification, OwnResult, identify, identify_together};
 pub use journal::Journal;
 pub use lag::LagRange;
 pub use least_squares::{
-    CreepKind, DriftKind, DynamicsKind, LeastSquaresFit, PlacesKind, RecordFit,
-    Settings as WeightsSettings, WeightsDelay, WeightsRecord, identify_weights,
+    CreepKind, DynamicsKind, LeastSquaresFit, PlacesKind, RecordFit, Settings as WeightsSettings,
+    WeightsDelay, WeightsRecord, identify_weights,
 };
 pub use levenberg_marquardt::{LocalRefinement, Polished, Sensitivity};
 pub use plan::{Method, Plan};

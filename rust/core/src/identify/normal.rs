@@ -6,6 +6,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::creep_shares::{LEAST_PIVOT, Shares};
+use super::drift::Drift;
 use super::journal::Answer;
 use super::records::Member;
 use crate::signal::index;
@@ -85,10 +86,14 @@ impl Answer for Option<Normal> {
 pub(super) struct Block {
     pub square: DMatrix<f64>,
     pub slope: DVector<f64>,
-    /// The Jacobian, column by column, with its means taken off where an offset is fitted.
+    /// The Jacobian, column by column, less what offset and drift can take of it.
     pub columns: Vec<Vec<f64>>,
-    /// What is read at the place.
+    /// What is read at the place, without drift.
     pub read: Vec<f64>,
+    /// The drift that suits the place best.
+    pub drift: Option<Drift>,
+    /// Samples of the window to a row.
+    pub stride: usize,
     /// Columns that are of shares.
     pub directions: usize,
     /// Sum of r^2.

@@ -1,11 +1,12 @@
 //! The search problem: the parameters held, and the free ones with their bounds.
 
 use super::bounds;
-use super::candidate::{BEFORE, DELAY, PLACES, Theta};
+use super::candidate::{BEFORE, DELAY, DRIFT_TIME, PLACES, Theta};
 use super::constraint::Constraint;
 use super::coordinate::{Coordinate, Scale};
 use super::creep_shares::check_times;
 use super::delay::Delay;
+use super::drift::DriftKind;
 use super::history::{History, came_from};
 use super::record::Record;
 use super::relations::Relations;
@@ -32,6 +33,8 @@ pub struct Spec {
     pub offset: bool,
     /// Delay of the displacement, s.
     pub delay: Delay,
+    /// Drift of the sensor along the record.
+    pub drift: DriftKind,
     /// What the stage went through before the record.
     pub history: History,
     /// Time constants of the creep whose shares are fitted, s; none for no creep.
@@ -47,7 +50,7 @@ pub struct Spec {
 }
 
 impl Spec {
-    /// All that is not held by default is searched; no offset, no delay.
+    /// All that is not held by default is searched; no offset, delay or drift.
     #[must_use]
     pub fn of(model: Model) -> Self {
         Self {
@@ -58,6 +61,7 @@ impl Spec {
             stiffness: None,
             offset: false,
             delay: Delay::default(),
+            drift: DriftKind::None,
             history: History::Virgin,
             creep_times: Vec::new(),
             scales: Vec::new(),
@@ -117,7 +121,7 @@ impl Problem {
     /// The same for each of several records of one stage, with what is asked of it: the parameters
     /// of the stage have the same coordinates in all, between bounds that suit every record.
     ///
-    /// Delay, history and offset are a record's own; what is asked besides is that of the first.
+    /// Delay, drift, history and offset are a record's own; what is asked besides is that of the first.
     ///
     /// # Errors
     /// As [`Self::new`]; where one record is meant, with its label. [`Error::Parameter`] where there
@@ -228,6 +232,7 @@ impl Problem {
     fn on(&self, record: &Record<'_>, spec: &Spec) -> Result<Self> {
         let mut problem = Self { offset: spec.offset, history: spec.history, ..self.clone() };
         problem.coordinates[DELAY] = spec.delay.coordinate(record)?;
+        problem.coordinates[DRIFT_TIME] = spec.drift.coordinate(record, spec.offset)?;
         if spec.history == History::Fitted {
             let (low, high) = came_from(&record.drive);
             problem.coordinates[BEFORE] = Coordinate::between("the voltage before", low, high)?;
@@ -294,6 +299,12 @@ impl Problem {
     #[must_use]
     pub fn has_delay(&self) -> bool {
         self.coordinates[DELAY] != Coordinate::Fixed(0.0)
+    }
+
+    /// Whether candidates have a drift.
+    #[must_use]
+    pub fn has_drift(&self) -> bool {
+        self.coordinates[DRIFT_TIME] != Coordinate::Fixed(0.0)
     }
 
     /// The longest delay of any candidate, s.

@@ -7,16 +7,17 @@
 //! with the weight, the samples and the RMS deviation of each record: with equal weights the RMS
 //! deviation of all samples. Each record is simulated from a beginning of its own. A place of the
 //! unit box has the coordinates of the stage's parameters and then, record by record, those of the
-//! delay and the voltage before.
+//! delay, the voltage before and the drift.
 
 use std::sync::Arc;
 
 use super::candidate::{Candidate, DELAY, Point, Theta};
 use super::cost::Evaluator;
-use super::creep_shares::{ShareCost, ShareSums, Shares};
+use super::creep_shares::Shares;
 use super::journal::{Journal, remembered};
 use super::problem::Problem;
 use super::residual_sums::{Costs, Simulated};
+use super::share_sums::{ShareCost, ShareSums};
 use crate::signal::{NEVER, Stop, index};
 
 /// Records with one problem, and what computes their costs.

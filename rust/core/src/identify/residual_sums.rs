@@ -6,8 +6,10 @@ use piezotrack_control::cubic_motion::between;
 use pulp::Simd;
 
 use super::candidate::Candidate;
-use super::creep_shares::{MOST_CREEP, MOST_SHARES, SLACK, ShareSums, Shares};
+use super::creep_shares::{MOST_CREEP, MOST_SHARES, SLACK, Shares};
+use super::drift::{DriftSums, Drifting, Fading};
 use super::record::Record;
+use super::share_sums::ShareSums;
 use crate::integrator::{FeedbackState, Observer};
 use crate::math::Lanes;
 use crate::signal::{FractionalDelay, Stop, index};
@@ -21,6 +23,8 @@ pub struct Costs {
     pub rms: f64,
     /// Offset added to the simulated displacement, m.
     pub offset: f64,
+    /// Part of the reading that fades along the window, m.
+    pub drift: f64,
     /// Shares of the creep.
     pub shares: Shares,
 }
@@ -28,7 +32,7 @@ pub struct Costs {
 impl Costs {
     /// What a candidate costs that could not be simulated.
     pub(super) const FAILED: Self =
-        Self { rms: f64::INFINITY, offset: 0.0, shares: [0.0; MOST_SHARES] };
+        Self { rms: f64::INFINITY, offset: 0.0, drift: 0.0, shares: [0.0; MOST_SHARES] };
 }
 
 /// A record whose deviations are summed.
@@ -42,6 +46,8 @@ pub(super) struct Residuals<'a> {
     pub centre: f64,
     /// Time constants of the creep whose shares are fitted, s.
     pub creep_times: &'a [f64],
+    /// Whether candidates have a drift, with time constants of their own.
+    pub drifts: bool,
 }
 
 impl Residuals<'_> {
@@ -56,8 +62,11 @@ impl Residuals<'_> {
     ) -> Costs {
         let [sum, squares] = sums.deviation;
         let count = self.creep_times.len();
-        if count == 0 {
+        if count == 0 && sums.drift.is_none() {
             return self.conclude(sum, squares, samples);
+        }
+        if bound && !sums.tell_drift(samples) {
+            return Costs { rms: 0.0, ..Costs::FAILED };
         }
         let cost = sums.cost(samples, self.offset);
         let shares = given.unwrap_or_else(|| cost.best(count));
@@ -67,10 +76,10 @@ impl Residuals<'_> {
         let rms = if bound { (rms - MOST_CREEP * SLACK * cost.size()).max(0.0) } else { rms };
         let total: f64 = shares.iter().sum();
         // The outputs were taken from the centre too.
-        let mean = sums.mean(samples, &shares);
+        let [mean, drift] = sums.offset_and_drift(samples, &shares);
         let offset = if self.offset { mean + self.centre - self.centre * total } else { 0.0 };
         if rms.is_finite() && offset.is_finite() && square.is_finite() {
-            Costs { rms, offset, shares }
+            Costs { rms, offset, drift, shares }
         } else {
             Costs::FAILED
         }
@@ -144,6 +153,7 @@ pub(super) struct ResidualSums<'a, const V: usize, S: Simd, R> {
     /// Displacement and scaled velocity at the last sample.
     last: [Lanes<S, V>; 2],
     creep: Vec<Relaxing<Lanes<S, V>, R>>,
+    drift: Option<Drifting<Lanes<S, V>>>,
     /// Costs of the candidates that are settled before the end.
     verdicts: Vec<Option<Costs>>,
     /// Every so many samples of the window what is read is kept; 0 for never.
@@ -196,6 +206,15 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
             products: [zero; MOST_SHARES],
         };
         let creep = of.creep_times.iter().map(relaxing).collect();
+        let drift = of.drifts.then(|| {
+            let fading = |lane: usize| {
+                let time = candidates.get(lane).or(candidates.last())?.theta.drift_time()?;
+                Some(Fading::new(time, of.record.drive.dt, of.record.window.len()))
+            };
+            let of_lane =
+                |number: fn(Fading) -> f64| zero.each(|lane| fading(lane).map_or(f64::NAN, number));
+            Drifting::new(of_lane(|fading| fading.keep), of_lane(|fading| fading.less))
+        });
         let (last, reading) = ([zero; 2], reading());
         let kept = if stride > 0 { of.record.window.len().div_ceil(stride) } else { 0 };
         let kept = Vec::with_capacity(kept * (1 + of.creep_times.len()));
@@ -210,6 +229,7 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
             substeps,
             last,
             creep,
+            drift,
             verdicts,
             stride,
             next,
@@ -227,6 +247,11 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
             sums.cross[j] = at(&one.cross);
             sums.products[j] = one.products.each_ref().map(at);
         }
+        sums.drift = self.drift.as_ref().map(|drift| {
+            let DriftSums { shape, deviation, outputs } = &drift.sums;
+            let (shape, outputs) = (shape.each_ref().map(at), outputs.each_ref().map(at));
+            DriftSums { shape, deviation: at(deviation), outputs }
+        });
         sums
     }
 
@@ -375,6 +400,9 @@ impl<const V: usize, S: Simd, M, R: Reading<Lanes<S, V>>> Observer<Lanes<S, V>, 
             self.squares = deviation.mul_add(deviation, self.squares);
             if !self.creep.is_empty() {
                 self.add_creep(deviation);
+            }
+            if let Some(drift) = &mut self.drift {
+                drift.add(deviation, self.creep.iter().map(|one| one.output));
             }
         }
     }

@@ -21,6 +21,7 @@ mod record_path;
 mod slow_parts;
 
 use super::delay::Delay;
+use super::drift::DriftKind;
 use super::history::History;
 use crate::error::{Error, Result, positive, shown};
 use crate::models::{
@@ -111,18 +112,6 @@ pub struct WeightsRecord<'a> {
     pub delay: WeightsDelay,
     /// How much a sample counts beside those of other records.
     pub weight: f64,
-}
-
-/// Slow drift of what a sensor shows: a part `d exp(-t / tau)` of the reading that has nothing to
-/// do with the drive, t from the first sample that counts.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum DriftKind {
-    /// None.
-    None,
-    /// With this time constant, s.
-    Time(f64),
-    /// What the record shows.
-    Auto,
 }
 
 /// Delay of a reading in a fit.

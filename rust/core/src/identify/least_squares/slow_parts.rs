@@ -5,9 +5,10 @@ use super::fit::{Fit, known_drift};
 use super::form::Form;
 use super::gauss_newton::STEPS;
 use super::places::split;
-use super::{CreepKind, DriftKind, DynamicsKind, Settings, WeightsRecord};
+use super::{CreepKind, DynamicsKind, Settings};
+use crate::identify::drift::{DRIFT_TIMES, DriftKind, repeats};
 use crate::math::least;
-use crate::signal::{index, range, turns};
+use crate::signal::index;
 
 /// Shares of the deviation that each has to take away.
 const CREEP_GAIN: f64 = 0.015;
@@ -18,13 +19,6 @@ const SLOWER: f64 = 0.5;
 
 /// Longest lag that is as likely as creep, in samples: a reading may come late.
 const LATE: f64 = 3.0;
-
-/// Reversals of which size, as a share of the drive's range, that tell a drift.
-const REVERSALS: usize = 6;
-const LARGE_TURN: f64 = 0.1;
-
-/// Range of the time constant of a drift, as shares of the record.
-const DRIFTS: (f64, f64) = (0.1, 10.0);
 
 /// Time constants of the creep that a record may ask for, s: slower than the drive, whose phase a
 /// faster one would turn as a lag does.
@@ -97,18 +91,14 @@ fn foretold(fit: &Fit<'_>) -> Option<f64> {
     Some(early.deviation())
 }
 
-/// Whether the drive comes back often enough for a drift to be told from a loop that is not closed.
-fn repeats(record: &WeightsRecord<'_>) -> bool {
-    let u = &record.drive.u[record.start..];
-    let (low, high) = range(u);
-    turns(u, LARGE_TURN * (high - low)).len() >= REVERSALS
-}
-
 /// The drift of each record of which nothing is said, where it explains enough.
 fn choose_drifts(fit: &mut Fit<'_>) -> Option<()> {
     for r in 0..fit.common.records.len() {
         let record = &fit.common.records[r];
-        if record.drift != DriftKind::Auto || fit.drifts[r].is_some() || !repeats(record) {
+        if record.drift != DriftKind::Auto
+            || fit.drifts[r].is_some()
+            || !repeats(&record.drive.u[record.start..])
+        {
             continue;
         }
         let mut best = with_drift(fit, r)?;
@@ -152,7 +142,7 @@ fn with_drift<'a>(fit: &Fit<'a>, r: usize) -> Option<Fit<'a>> {
         }
         Some(rms)
     };
-    least((DRIFTS.0 * length, DRIFTS.1 * length), 0.02, tried)?;
+    least((DRIFT_TIMES.0 * length, DRIFT_TIMES.1 * length), 0.02, tried)?;
     best
 }
 

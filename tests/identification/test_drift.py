@@ -1,0 +1,243 @@
+"""Drift of a sensor beside parameters that are searched."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import piezotrack as pt
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+STAGE = pt.DahlStage.xu_li_2010()
+HELD = {"mass": 0.1828, "a1": 121.9874, "a2": 1.1773e6, "b1": 1.8485e6}
+DT = 5e-3
+NOISE = 10e-9
+
+
+def record(
+    *,
+    drift: tuple[float, float] = (0.0, 1.0),
+    offset: float = 1.2e-6,
+    seconds: float = 40.0,
+    seed: int = 3,
+    stage: Any = STAGE,
+) -> pt.Dataset:
+    """Waves from rest, with a drift (amplitude [m], time constant [s]) and an offset."""
+    t = DT * np.arange(round(seconds / DT))
+    u = 30.0 * (1.0 - np.cos(np.pi * t)) * (0.6 + 0.4 * np.cos(0.1 * np.pi * t))
+    size, time = drift
+    noise = NOISE * np.random.default_rng(seed).standard_normal(t.size)
+    y = stage.simulate(u, DT).x + offset + size * np.exp(-t / time) + noise
+    return pt.Dataset(u=u, y=y, dt=DT)
+
+
+def found(data: Any, **given: Any) -> pt.identification.Identification:
+    asked: dict[str, Any] = {"fixed": HELD, "history": "virgin", "drift": True}
+    return pt.identify(data, "dahl", **asked | given)
+
+
+@cache
+def drifting() -> pt.identification.Identification:
+    return found(record(drift=(6e-7, 12.0)))
+
+
+def fading(t: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+    left: NDArray[np.float64] = np.exp(-t / time) - np.exp(-t[-1] / time)
+    return left
+
+
+def test_finds_the_drift_and_the_stage() -> None:
+    fit = drifting()
+    assert fit.drift is not None
+    assert fit.drift.amplitude == pytest.approx(6e-7, rel=0.01)
+    assert fit.drift.time == pytest.approx(12.0, rel=0.02)
+    # What the sensor shows in the end.
+    assert fit.offset == pytest.approx(1.2e-6 + 6e-7 * np.exp(-40.0 / 12.0), abs=3e-9)
+    assert fit.model.stiffness == pytest.approx(STAGE.stiffness, rel=1e-3)
+    assert fit.cost == pytest.approx(NOISE, rel=0.03)
+    assert fit.fitted.rms == pytest.approx(fit.cost, rel=2e-3)
+    still = found(fit.data, drift=False)
+    assert still.drift is None
+    assert still.cost > 5.0 * fit.cost
+
+
+def test_the_time_constant_has_a_standard_deviation() -> None:
+    """Of twelve records with other noise the time constants spread by it."""
+    fits = [found(record(drift=(6e-7, 12.0), seed=seed)) for seed in range(12)]
+    estimates = [fit.parameters["drift_time"] for fit in fits]
+    away = [(one.value - 12.0) / one.deviation for one in estimates if one.deviation]
+    assert len(away) == 12
+    # The mean of twelve squares of normal deviates: 0.4 to 2.1 with a probability of 99 %.
+    assert 0.3 < float(np.mean(np.square(away))) < 2.4
+    assert not any(one.at_bound for one in estimates)
+
+
+@pytest.mark.parametrize("creep", [False, (0.4, 6.0)])
+def test_the_cost_is_that_of_linear_least_squares(creep: Any) -> None:
+    """Offset, drift and shares of the creep by SciPy, on candidates beside the best one."""
+    nnls = pytest.importorskip("scipy.optimize").nnls
+    stage = replace(STAGE, creep_weights=(0.02, 0.03), creep_times=(0.4, 6.0)) if creep else STAGE
+    data = record(drift=(6e-7, 12.0), stage=stage)
+    asked = pt.identification.Objective(
+        data, "dahl", fixed=HELD, drift=True, history="virgin", creep=creep
+    )
+    assert list(asked.ranges)[-1] == "drift_time"
+    draws, count = np.random.default_rng(5), len(asked.ranges)
+    ends, costs, _ = asked.descend(draws.uniform(0.3, 0.7, (12, count)))
+    places = ends[np.argmin(costs)] + draws.uniform(-2e-3, 2e-3, (6, count))
+    places[:, -1] = draws.uniform(0.0, 1.0, 6)
+    low, high = asked.ranges["drift_time"]
+    for place, cost in zip(places, asked(places), strict=True):
+        time = low * (high / low) ** place[-1]
+        values: dict[str, Any] = asked.parameters(place)
+        model = pt.DahlStage(**values)
+        x = model.simulate(data.u, DT).x
+        crept = [
+            replace(model, creep_weights=(1.0,), creep_times=(one,)).simulate(data.u, DT).x - x
+            for one in creep or ()
+        ]
+        # Offset and drift of either sign.
+        level = [
+            1e-6 * sign * g for g in (np.ones(x.size), fading(data.t, time)) for sign in (1, -1)
+        ]
+        shares, left = nnls(np.column_stack(crept + level), data.y - x)
+        # The most that counts as creep.
+        assert sum(shares[: len(crept)]) < 0.5
+        assert cost == pytest.approx(left / np.sqrt(x.size), rel=2e-5)
+
+
+def test_the_search_ends_at_the_best_time_constant() -> None:
+    """A time constant held a little aside, the rest fitted again, makes the cost larger."""
+    fit = drifting()
+    assert fit.drift is not None
+    for factor in (0.97, 1.03):
+        beside = found(fit.data, drift=factor * fit.drift.time)
+        assert beside.drift is not None
+        assert beside.drift.time == pytest.approx(factor * fit.drift.time)
+        assert beside.cost > fit.cost
+    known = found(fit.data, drift=12.0)
+    assert known.cost == pytest.approx(fit.cost, rel=1e-4)
+    # A swarm finds the same.
+    swarm = found(fit.data, swarm=pt.ParticleSwarm(iterations=60, particles=24))
+    assert swarm.cost == pytest.approx(fit.cost, rel=1e-6)
+
+
+def test_each_record_has_a_drift_of_its_own() -> None:
+    fades = record(drift=(6e-7, 12.0))
+    rises = record(drift=(-3e-7, 6.0), seconds=30.0, offset=-4e-7, seed=4)
+    still = record(seed=5, seconds=30.0)
+    fit = found([fades, rises, still], drift=[True, 6.0, False])
+    first, second, third = fit.records
+    assert first.drift is not None
+    assert second.drift is not None
+    assert third.drift is None
+    assert first.drift.time == pytest.approx(12.0, rel=0.02)
+    assert first.drift.amplitude == pytest.approx(6e-7, rel=0.01)
+    assert second.drift.time == 6.0
+    assert second.drift.amplitude == pytest.approx(-3e-7, rel=0.02)
+    assert third.offset == pytest.approx(1.2e-6, abs=3e-9)
+    for one, score in zip(fit.records, fit.scores, strict=True):
+        assert one.cost == pytest.approx(NOISE, rel=0.05)
+        assert score.rms == pytest.approx(one.cost, rel=5e-3)
+    assert "a drift of -0.5" in fit.summary()
+
+
+def test_creep_and_drift_of_several_records() -> None:
+    """One creep for all of them, a drift for each."""
+    stage = replace(STAGE, creep_weights=(0.02, 0.03), creep_times=(0.4, 6.0))
+    data = [
+        record(drift=(6e-7, 12.0), stage=stage),
+        record(drift=(-4e-7, 8.0), stage=stage, seconds=30.0, seed=8),
+    ]
+    fit = found(data, creep=(0.4, 6.0))
+    assert fit.model.creep_weights == pytest.approx((0.02, 0.03), rel=0.03)
+    assert fit.cost == pytest.approx(NOISE, rel=0.05)
+    for one, size in zip(fit.records, (6e-7, -4e-7), strict=True):
+        assert one.drift is not None
+        assert one.drift.amplitude == pytest.approx(size, rel=0.1)
+
+
+def test_it_goes_on_in_the_file_and_on_other_records(tmp_path: Path) -> None:
+    whole = record(drift=(6e-7, 12.0))
+    part, rest = whole[0.0:24.0], whole[24.0:]
+    fit = found(part)
+    kept = pt.load(fit.save(tmp_path / "stage.json"))
+    assert kept.drift == fit.drift
+    assert kept.score(rest, offset=kept.offset).rms == pytest.approx(NOISE, rel=0.2)
+    other = record(drift=(-5e-7, 12.0), seed=9)
+    assert kept.score(other).rms == pytest.approx(NOISE, rel=0.1)
+    still = found(part, drift=False)
+    assert still.score(rest, offset=still.offset).rms > 2.0 * NOISE
+
+
+@pytest.mark.parametrize("history", [None, "fit"])
+def test_beside_a_history(history: Any) -> None:
+    # One wave and a rest.
+    before = 30.0 * (1.0 - np.cos(np.pi * np.minimum(DT * np.arange(800), 2.0)))
+    data = record(drift=(6e-7, 12.0))
+    moved = STAGE.simulate(np.concatenate([before, data.u]), DT).x[before.size :]
+    alone = STAGE.simulate(data.u, DT).x
+    data = pt.Dataset(u=data.u, y=data.y - alone + moved, dt=DT)
+    fit = found(data, history=history)
+    assert fit.drift is not None
+    assert fit.cost < 1.6 * NOISE
+    assert fit.drift.amplitude == pytest.approx(6e-7, rel=0.2)
+
+
+def test_a_loop_that_is_not_closed_is_no_drift() -> None:
+    """Fewer than six reversals: none, unless its time constant is given."""
+    data = record(seconds=4.0)
+    assert found(data).drift is None
+    assert found(data, drift=5.0).drift is not None
+
+
+def test_a_drift_that_is_a_part_of_the_motion_is_said() -> None:
+    large = record(drift=(4e-5, 12.0))
+    fit = found(large)
+    assert any("a drift of -38" in note and "% of the stroke" in note for note in fit.notes)
+    assert not any("a drift" in note for note in drifting().notes)
+
+
+def test_auto_tries_the_kinds_that_are_searched_too() -> None:
+    fit = pt.identify(record(drift=(6e-7, 12.0)), drift=True)
+    assert {one.model for one in fit.trials} >= {"prandtl-ishlinskii", "first-order-dahl"}
+
+
+def test_a_checkpoint_is_of_one_drift(tmp_path: Path) -> None:
+    data, path = record(drift=(6e-7, 12.0)), tmp_path / "search"
+    first = found(data, checkpoint=path)
+    again = found(data, checkpoint=path)
+    assert (again.cost, again.drift, again.offset) == (first.cost, first.drift, first.offset)
+    with pytest.raises(pt.DataError, match="is that of another search"):
+        found(data, drift=12.0, checkpoint=path)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_the_bits_do_not_depend_on_threads(threads: int) -> None:
+    fit = found(drifting().data, threads=threads)
+    assert (fit.cost, fit.drift, fit.offset) == (
+        drifting().cost,
+        drifting().drift,
+        drifting().offset,
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"drift": 0.0}, "drift is 0: expected a finite number above 0, in s"),
+        ({"drift": "yes"}, "drift is 'yes'"),
+        ({"drift": True, "offset": False}, "drift is True: expected none with offset=False"),
+    ],
+)
+def test_wrong_input_gets_one_sentence(given: dict[str, Any], said: str) -> None:
+    with pytest.raises(pt.ParameterError, match=f"^{said}"):
+        found(record(seconds=10.0), **given)
