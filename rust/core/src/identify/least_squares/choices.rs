@@ -9,6 +9,7 @@ use super::gauss_newton::STEPS;
 use super::modes::{drop_modes, first_mode};
 use super::places::{add_once, choose_places, few_or_many, spread};
 use super::slow_parts::{choose_slow, creeps, drop_drifts, without_creep};
+use super::trials::{side_by_side, with_each};
 use super::{CreepKind, DynamicsKind, PlacesKind, Settings, WeightsRecord};
 use crate::identify::history::History;
 use crate::math::least;
@@ -58,22 +59,19 @@ const LAG_SAME: f64 = 1.003;
 /// Share of a fitted creep to start from.
 pub(super) const FIRST_SHARE: f64 = 0.005;
 
-/// A fit, and the range of lags that explain the record as well.
-type Found<'a> = (Fit<'a>, Option<(f64, f64)>);
-
-/// The best stage, and the lags that explain the record as well; `None` where stopped.
-pub(super) fn search<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Found<'a>> {
+/// The best stage; `None` where stopped.
+pub(super) fn search<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
     let kept: Vec<Thinned> =
         common.records.iter().map(|one| Thinned::of(one, thinning(one))).collect();
     let few = common.thinned(&kept);
-    let (chosen, lags) = choose(&few, settings)?;
-    common.evaluations.set(common.evaluations.get() + few.evaluations.get());
+    let chosen = choose(&few, settings)?;
+    common.count(few.evaluations());
     let mut fit = chosen.on(common);
     fit.settle(1e-4)?;
     fit.exact = true;
     fit.settle(1e-8)?;
     drop_modes(&mut fit)?;
-    Some((fit, lags))
+    Some(fit)
 }
 
 /// Every how many samples the choices are made on: where the drive is slow all the time, as many as
@@ -87,7 +85,7 @@ fn thinning(record: &WeightsRecord<'_>) -> usize {
 }
 
 /// The structure, on records that may be thinned.
-fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Found<'a>> {
+fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
     let places = match &settings.places {
         PlacesKind::Given(places) => places.clone(),
         PlacesKind::Spread(count) => spread(common, (*count, 1.0), false),
@@ -116,22 +114,11 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Found<'a>> 
         fit.settle(ROUGH)?;
     }
     choose_slow(&mut fit, settings)?;
-    let still = fit.clone();
-    let mut lags = choose_dynamics(&mut fit, settings, mode)?;
-    if let (Some(gain), CreepKind::Auto, false) =
-        (common.of.creep_gain(), &settings.creep, fit.times.is_empty())
-    {
-        // Creep was chosen before a lag, for some of which it stood.
-        let mut bare = without_creep(still)?;
-        let range = choose_dynamics(&mut bare, settings, mode)?;
-        if (1.0 - gain) * bare.rms <= fit.rms {
-            (fit, lags) = (bare, range);
-        }
-    }
+    choose_dynamics_and_creep(&mut fit, settings, mode)?;
     choose_places(&mut fit, settings)?;
     drop_drifts(&mut fit)?;
     replace_corners(&mut fit)?;
-    Some((fit, lags))
+    Some(fit)
 }
 
 /// Spreads the dead zones over what comes out of the plays in the windows.
@@ -280,12 +267,21 @@ fn choose_history(fit: &mut Fit<'_>, settings: &Settings, r: usize) -> Option<()
             with_once(fit)?;
         }
         None => {
-            let mut virgin = fit.clone();
-            with_once(&mut virgin)?;
-            let mut fitted = fitted_history(fit, r)?;
-            with_once(&mut fitted)?;
+            let [virgin, fitted, settled] = side_by_side([
+                &|| {
+                    let mut virgin = fit.clone();
+                    with_once(&mut virgin)?;
+                    Some(virgin)
+                },
+                &|| {
+                    let mut fitted = fitted_history(fit, r)?;
+                    with_once(&mut fitted)?;
+                    Some(fitted)
+                },
+                &|| with_history(fit, r, (History::Settled, 0.0), STEPS),
+            ])?;
             let other = if virgin.rms < fitted.rms { virgin } else { fitted };
-            for trial in [with_history(fit, r, (History::Settled, 0.0), STEPS)?, other] {
+            for trial in [settled, other] {
                 let enough = (1.0 - HISTORY_GAIN) * fit.deviation_of(r);
                 if trial.rms < fit.rms && trial.deviation_of(r) < enough {
                     *fit = trial;
@@ -296,47 +292,57 @@ fn choose_history(fit: &mut Fit<'_>, settings: &Settings, r: usize) -> Option<()
     Some(())
 }
 
+/// Dynamics, and creep anew beside them, which was chosen before a lag for some of which it stood.
+fn choose_dynamics_and_creep(fit: &mut Fit<'_>, settings: &Settings, mode: bool) -> Option<()> {
+    let still = &*fit;
+    let moving = || {
+        let mut moving = still.clone();
+        choose_dynamics(&mut moving, settings, mode)?;
+        Some(moving)
+    };
+    let (Some(gain), CreepKind::Auto, false) =
+        (fit.common.of.creep_gain(), &settings.creep, fit.times.is_empty())
+    else {
+        *fit = moving()?;
+        return Some(());
+    };
+    let bare = || {
+        let mut bare = without_creep(still.clone())?;
+        choose_dynamics(&mut bare, settings, mode)?;
+        Some(bare)
+    };
+    let [creeping, bare] = side_by_side([&moving, &bare])?;
+    *fit = if (1.0 - gain) * bare.rms <= creeping.rms { bare } else { creeping };
+    Some(())
+}
+
 /// Mode or lag where they are not set, and the lags that explain the record as well.
-#[expect(clippy::option_option, reason = "stopped, or no lag to tell of")]
-fn choose_dynamics(
-    fit: &mut Fit<'_>,
-    settings: &Settings,
-    mode: bool,
-) -> Option<Option<(f64, f64)>> {
+fn choose_dynamics(fit: &mut Fit<'_>, settings: &Settings, mode: bool) -> Option<()> {
     match settings.dynamics {
-        DynamicsKind::None => Some(None),
-        DynamicsKind::First => {
-            *fit = best_lag(fit)?;
-            Some(None)
-        }
-        DynamicsKind::Second => {
-            if !mode {
-                *fit = unseen_mode(fit)?;
-            }
-            Some(None)
-        }
+        DynamicsKind::None => {}
+        DynamicsKind::First => *fit = best_lag(fit)?,
+        DynamicsKind::Second if mode => {}
+        DynamicsKind::Second => *fit = unseen_mode(fit)?,
         DynamicsKind::Auto => {
             let mut still = fit.clone();
             if mode {
                 still.set_poles(Form::None, &[]);
                 still.settle(ROUGH)?;
-            }
-            let lagging = best_lag(&still)?;
-            if mode && fit.rms < (1.0 - MODE_GAIN) * lagging.rms {
-                return Some(None);
-            }
-            if !mode {
-                let hidden = unseen_mode(&still)?;
-                if is_mode(&hidden) && hidden.rms < (1.0 - UNSEEN_GAIN) * lagging.rms {
-                    *fit = hidden;
-                    return Some(None);
+                let lagging = best_lag(&still)?;
+                if fit.rms >= (1.0 - MODE_GAIN) * lagging.rms {
+                    *fit = smallest_lag(still, &lagging)?;
                 }
+                return Some(());
             }
-            let (chosen, lags) = smallest_lag(still, &lagging)?;
-            *fit = chosen;
-            Some(Some(lags))
+            let [lagging, hidden] = side_by_side([&|| best_lag(&still), &|| unseen_mode(&still)])?;
+            if is_mode(&hidden) && hidden.rms < (1.0 - UNSEEN_GAIN) * lagging.rms {
+                *fit = hidden;
+            } else {
+                *fit = smallest_lag(still, &lagging)?;
+            }
         }
     }
+    Some(())
 }
 
 /// The fit with the lag that explains most: the best of some, and from there on with the lag as one
@@ -370,7 +376,7 @@ fn at_lag<'a>(fit: &Fit<'a>, time: f64, steps: usize) -> Option<Fit<'a>> {
 }
 
 /// The smallest lag that explains the record as well as the best one, and the range of such lags.
-fn smallest_lag<'a>(still: Fit<'a>, best: &Fit<'a>) -> Option<(Fit<'a>, (f64, f64))> {
+fn smallest_lag<'a>(mut still: Fit<'a>, best: &Fit<'a>) -> Option<Fit<'a>> {
     let time = libm::exp(best.x[best.layout().poles().start]);
     let enough = SAME * f64::min(best.rms, still.rms);
     let as_good = |time: f64| Some(at_lag(best, time, STEPS)?.rms <= enough);
@@ -395,12 +401,14 @@ fn smallest_lag<'a>(still: Fit<'a>, best: &Fit<'a>) -> Option<(Fit<'a>, (f64, f6
     let low = if still.rms <= enough { 0.0 } else { shortest(enough)? };
     let least = LAG_SAME / SAME * enough;
     if still.rms <= least {
-        return Some((still, (low, high)));
+        still.lags = Some((low, high));
+        return Some(still);
     }
     let mut chosen = at_lag(best, shortest(least)?, STEPS)?;
     chosen.held = true;
     chosen.settle(ROUGH)?;
-    Some((chosen, (low, high)))
+    chosen.lags = Some((low, high));
+    Some(chosen)
 }
 
 /// Whether what was found as a mode is one: far above the drive, where it does not stand for
@@ -415,17 +423,16 @@ fn is_mode(fit: &Fit<'_>) -> bool {
 /// A mode that the record does not show: as high and as little damped as the record allows.
 fn unseen_mode<'a>(fit: &Fit<'a>) -> Option<Fit<'a>> {
     let dt = fit.common.shortest_interval();
-    let mut best: Option<Fit<'a>> = None;
-    for (frequency, damping_ratio) in [(0.4, 0.1), (0.4, 1.0), (0.1, 0.1), (0.1, 1.0), (0.02, 1.0)]
-    {
+    let beginnings = [(0.4, 0.1), (0.4, 1.0), (0.1, 0.1), (0.1, 1.0), (0.02, 1.0)];
+    let trials = with_each(&beginnings, |(frequency, damping_ratio)| {
         let mut trial = fit.clone();
-        trial.set_poles(Form::Modes(1), &[libm::log(frequency / dt), libm::log(damping_ratio)]);
+        trial.set_poles(Form::Modes(1), &[libm::log(frequency / dt), libm::log(*damping_ratio)]);
         trial.settle_rigid(STEPS)?;
-        if best.as_ref().is_none_or(|best| SAME * trial.rms < best.rms) {
-            best = Some(trial);
-        }
-    }
-    let mut best = best?;
+        Some(trial)
+    })?;
+    let better =
+        |best: Fit<'a>, trial: Fit<'a>| if SAME * trial.rms < best.rms { trial } else { best };
+    let mut best = trials.into_iter().reduce(better)?;
     best.settle(ROUGH)?;
     Some(best)
 }

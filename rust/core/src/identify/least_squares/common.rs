@@ -1,6 +1,6 @@
 //! What all fits of some records share.
 
-use core::cell::Cell;
+use core::sync::atomic::{AtomicUsize, Ordering};
 
 use super::WeightsRecord;
 use crate::models::{AnySuperposition, Model};
@@ -23,7 +23,8 @@ pub(super) struct Common<'a> {
     pub drive: (f64, f64),
     /// Largest range of the displacement in a window, m.
     pub stroke: f64,
-    pub evaluations: Cell<usize>,
+    /// Simulations so far.
+    evaluations: AtomicUsize,
 }
 
 impl<'a> Common<'a> {
@@ -37,7 +38,18 @@ impl<'a> Common<'a> {
         let stroke = records.iter().map(span).map(|(low, high)| high - low).fold(0.0, f64::max);
         let drive = ends(records.iter().map(|one| range(&one.drive.u[one.start..])));
         let weights = records.iter().map(|one| one.weight).collect();
-        Self { model, of, records, weights, falls, stop, drive, stroke, evaluations: Cell::new(0) }
+        let evaluations = AtomicUsize::new(0);
+        Self { model, of, records, weights, falls, stop, drive, stroke, evaluations }
+    }
+
+    /// Counts simulations.
+    pub fn count(&self, simulations: usize) {
+        self.evaluations.fetch_add(simulations, Ordering::Relaxed);
+    }
+
+    /// Simulations that were counted.
+    pub fn evaluations(&self) -> usize {
+        self.evaluations.load(Ordering::Relaxed)
     }
 
     /// The same records with every so many of the samples of each.

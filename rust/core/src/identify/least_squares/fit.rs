@@ -1,8 +1,7 @@
 //! A stage of weighted signals on its way to the records, and how far it is from them.
 
-use core::cell::OnceCell;
 use core::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use super::common::Common;
 use super::form::Form;
@@ -23,7 +22,7 @@ pub(super) struct Beginning {
 }
 
 /// Signals of all samples of a record, one sample after the other.
-pub(super) type Kept = OnceCell<Arc<[f64]>>;
+pub(super) type Kept = OnceLock<Arc<[f64]>>;
 
 /// A stage on its way to the best one of its structure.
 #[derive(Clone)]
@@ -58,6 +57,8 @@ pub(super) struct Fit<'a> {
     /// The unknowns: those of the stage, see [`Layout`], then those of each record, see [`Own`].
     pub x: Vec<f64>,
     pub rms: f64,
+    /// Lags that explain the records as well, s, where one was looked for.
+    pub lags: Option<(f64, f64)>,
 }
 
 impl<'a> Fit<'a> {
@@ -86,6 +87,7 @@ impl<'a> Fit<'a> {
             every: vec![1; common.records.len()],
             x: Vec::new(),
             rms: f64::INFINITY,
+            lags: None,
         };
         fit.x = vec![0.0; fit.unknowns()];
         for r in 0..common.records.len() {
@@ -115,6 +117,7 @@ impl<'a> Fit<'a> {
             drifts: self.drifts,
             exact: false,
             rms: f64::INFINITY,
+            lags: self.lags,
         }
     }
 
@@ -320,7 +323,7 @@ impl<'a> Fit<'a> {
 
     /// RMS deviation in the windows, m.
     pub fn deviation(&self) -> f64 {
-        self.common.evaluations.set(self.common.evaluations.get() + 1);
+        self.common.count(1);
         let (mut sum, mut count) = (0.0, 0.0);
         for r in 0..self.common.records.len() {
             let Ok((squares, samples)) = self.squares(r) else { return f64::INFINITY };
@@ -397,10 +400,10 @@ impl<'a> Fit<'a> {
         Ok(LeastSquaresFit {
             values,
             rms: self.rms,
-            evaluations: self.common.evaluations.get(),
+            evaluations: self.common.evaluations(),
             at_bound: self.layout().at_bound(&self.x, self.form, &self.pole_ranges()),
             records: records?,
-            lag_range: None,
+            lag_range: self.lags,
         })
     }
 

@@ -131,7 +131,7 @@ impl Fit<'_> {
 
     /// The rows of the linearised problem, and the RMS deviation, m.
     fn linearised(&self) -> Result<(Rows, f64)> {
-        self.common.evaluations.set(self.common.evaluations.get() + 1);
+        self.common.count(1);
         let mut rows = Rows::new(self.unknowns());
         let mut squares = 0.0;
         for r in 0..self.common.records.len() {

@@ -19,6 +19,7 @@ mod modes;
 mod places;
 mod record_path;
 mod slow_parts;
+mod trials;
 
 use super::delay::Delay;
 use super::drift::DriftKind;
@@ -273,7 +274,7 @@ pub fn identify_weights(
         seen.map(|(one, (u, y))| WeightsRecord { drive: Drive { u, ..one.drive }, y, ..*one });
     let common = Common::new((model, of), records.collect(), falls, stop);
     let found = choices::search(&common, settings);
-    found.map(|(fit, lag_range)| Ok(LeastSquaresFit { lag_range, ..fit.result()? })).transpose()
+    found.map(|fit| fit.result()).transpose()
 }
 
 /// Refuses a number of places with which no stage exists.

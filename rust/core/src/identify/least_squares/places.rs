@@ -7,6 +7,7 @@ use super::common::Common;
 use super::fit::Fit;
 use super::gauss_newton::STEPS;
 use super::{PlacesKind, Settings};
+use crate::math::on_all_threads;
 use crate::models::{MOST_PLAYS, Places};
 use crate::signal::index;
 
@@ -121,20 +122,24 @@ pub(super) fn choose_places(fit: &mut Fit<'_>, settings: &Settings) -> Option<()
         trial.windows.clone_from(&later);
         trial.deviation()
     };
-    let mut least = (1.0 - PLAYS_GAIN) * foretold(&here);
-    let mut best = None;
-    for &(count, power) in tried(fit.common.of.places()) {
+    let once = has_once(fit);
+    let trials = |&(count, power): &(usize, f64)| {
         let mut trial = here.clone();
-        let thresholds = spread(trial.common, (count, power), has_once(fit));
+        let thresholds = spread(trial.common, (count, power), once);
         trial.restructure(|trial| trial.places = thresholds);
         trial.settle_rigid(STEPS)?;
         let few = if count == MANY_PLAYS { gathered(&trial)? } else { None };
-        for trial in [Some(trial), few].into_iter().flatten() {
-            let rms = foretold(&trial);
-            if rms < least {
-                least = (1.0 - PLAYS_GAIN) * rms;
-                best = Some(trial.places);
-            }
+        let both = [Some(trial), few].into_iter().flatten();
+        Some(both.map(|trial| (foretold(&trial), trial.places)).collect::<Vec<_>>())
+    };
+    let found: Option<Vec<_>> =
+        on_all_threads(tried(fit.common.of.places()), &trials).into_iter().collect();
+    let mut least = (1.0 - PLAYS_GAIN) * foretold(&here);
+    let mut best = None;
+    for (rms, places) in found?.into_iter().flatten() {
+        if rms < least {
+            least = (1.0 - PLAYS_GAIN) * rms;
+            best = Some(places);
         }
     }
     if let Some(thresholds) = best {

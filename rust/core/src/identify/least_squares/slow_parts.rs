@@ -5,9 +5,10 @@ use super::fit::{Fit, known_drift};
 use super::form::Form;
 use super::gauss_newton::STEPS;
 use super::places::split;
+use super::trials::{side_by_side, with_each};
 use super::{CreepKind, DynamicsKind, Settings};
 use crate::identify::drift::{DRIFT_TIMES, DriftKind, repeats};
-use crate::math::least;
+use crate::math::{least, on_all_threads};
 use crate::signal::index;
 
 /// Shares of the deviation that each has to take away.
@@ -38,31 +39,45 @@ pub(super) fn creeps(fit: &Fit<'_>) -> Vec<Vec<f64>> {
 /// Creep and drift where they are not set: none, one of the two, or both where each explains
 /// enough.
 pub(super) fn choose_slow(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
-    let mut crept = fit.clone();
-    choose_creep(&mut crept, settings)?;
+    let from = &*fit;
+    let creeping = || {
+        let mut crept = from.clone();
+        choose_creep(&mut crept, settings)?;
+        Some(crept)
+    };
     if fit.common.records.iter().all(|one| one.drift != DriftKind::Auto) {
-        *fit = crept;
+        *fit = creeping()?;
         return Some(());
     }
-    let mut drifted = fit.clone();
-    if settings.creep == CreepKind::Auto {
-        drifted.restructure(|fit| fit.times = Vec::new());
-        drifted.settle(ROUGH)?;
-    }
-    choose_drifts(&mut drifted)?;
-    let mut found = vec![drifted];
-    if found[0].drifts != fit.drifts {
-        let mut both = found[0].clone();
-        choose_creep(&mut both, settings)?;
-        found.push(both);
-    }
-    let without = crept.clone();
-    choose_drifts(&mut crept)?;
-    found.extend([crept, without]);
+    let drifting = || {
+        let mut drifted = from.clone();
+        if settings.creep == CreepKind::Auto {
+            drifted.restructure(|fit| fit.times = Vec::new());
+            drifted.settle(ROUGH)?;
+        }
+        choose_drifts(&mut drifted)?;
+        Some(drifted)
+    };
+    let [drifted, crept] = side_by_side([&drifting, &creeping])?;
+    let with_creep = || {
+        let mut both = drifted.clone();
+        if drifted.drifts != from.drifts {
+            choose_creep(&mut both, settings)?;
+        }
+        Some(both)
+    };
+    let with_drift = || {
+        let mut both = crept.clone();
+        choose_drifts(&mut both)?;
+        Some(both)
+    };
+    let [drifted_first, crept_first] = side_by_side([&with_creep, &with_drift])?;
+    let found = [drifted, drifted_first, crept_first, crept];
     // One explains a record as well as the other, but goes on otherwise.
     let mut least = f64::INFINITY;
-    for one in found {
-        let later = foretold(&one)?;
+    let later = on_all_threads(&found, &|one| foretold(one));
+    for (one, later) in found.into_iter().zip(later) {
+        let later = later?;
         if later < least {
             (least, *fit) = (later, one);
         }
@@ -147,25 +162,24 @@ fn with_drift<'a>(fit: &Fit<'a>, r: usize) -> Option<Fit<'a>> {
 }
 
 /// Creep where it was not set: none, or the two relaxations that explain most.
-fn choose_creep(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
+fn choose_creep<'a>(fit: &mut Fit<'a>, settings: &Settings) -> Option<()> {
     if settings.creep != CreepKind::Auto {
         return Some(());
     }
     let mut none = fit.clone();
     none.restructure(|none| none.times = Vec::new());
     none.settle(ROUGH)?;
-    let mut best: Option<Fit<'_>> = None;
-    for times in creeps(fit) {
+    let trials = with_each(&creeps(fit), |times| {
         let mut trial = none.clone();
-        trial.restructure(|trial| trial.times = times);
+        trial.restructure(|trial| trial.times.clone_from(times));
         for share in trial.layout().shares() {
             trial.x[share] = FIRST_SHARE;
         }
         trial.settle_rigid(STEPS)?;
-        if best.as_ref().is_none_or(|best| trial.rms < best.rms) {
-            best = Some(trial);
-        }
-    }
+        Some(trial)
+    })?;
+    let least = |best: Fit<'a>, trial: Fit<'a>| if trial.rms < best.rms { trial } else { best };
+    let mut best = trials.into_iter().reduce(least);
     if let Some(best) = &mut best {
         best.settle(ROUGH)?;
     }
