@@ -518,6 +518,7 @@ def identify_weights(
     zones: int,
     creep_times: Sequence[float] | None,
     dynamics: str,
+    threads: int,
 ) -> LeastSquaresFit: ...
 def resonances(
     *, u: ArrayLike, y: ArrayLike, dt: float, hold_name: str, start: int, most: int

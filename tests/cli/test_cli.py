@@ -252,7 +252,6 @@ def test_help_names_every_option(command: str) -> None:
 NO_EFFECT = {
     "identify log.csv --model prandtl-ishlinskii --seed 1": "--seed",
     "identify log.csv --model prandtl-ishlinskii --runs 4": "--runs",
-    "identify log.csv --model prandtl-ishlinskii --threads 2": "--threads",
     "identify log.csv --model dahl --plays 5": "--plays",
     "identify log.csv --model dahl --model bouc-wen --asymmetry 2": "--asymmetry",
     "identify log.csv --stiffness 1e6 --plays 5": "--plays",

@@ -218,8 +218,8 @@ Swarm = Annotated[
     ),
 ]
 
-# How a search is run.
-RUNNING = ("seed", "runs", "threads")
+# How a search alone is run.
+RUNNING = ("seed", "runs")
 # Options of least squares.
 OF_PLAYS = ("plays", "asymmetry", "dynamics")
 # The library's words for the dynamics.

@@ -187,8 +187,8 @@ def identify(
         Settings of the least squares: ``pt.identification.LeastSquares``.
     seed : int, optional
         0 or above, 0 where not given. The same seed gives the same bits, for any number of
-        threads. Least squares, which need neither, take `seed`, `runs`, `threads` and `progress`
-        too, for calls in a loop over models.
+        threads. Least squares, which have no random numbers, take `seed` and `runs` too, for calls
+        in a loop over models.
     runs : int, optional
         Number of independent searches, each with its own random numbers: 1 by descents, 4 by a
         swarm, where not given. Different final costs show that there are several local minima; a

@@ -93,9 +93,11 @@ def identify_weights(
         raise ParameterError(
             f"least_squares is {quoted(settings)}: expected a pt.identification.LeastSquares"
         )
+    threads = of_swarm["threads"]
+    count = 0 if threads is None else _core.as_count("threads", threads)
     try:
         with ProgressBar(of_swarm["progress"], f"identify: {info.name}, least squares"):
-            return solve_least_squares(records, info, settings)
+            return solve_least_squares(records, info, settings, count)
     except KeyboardInterrupt:
         raise Interrupted("interrupted before the weights were found") from None
 
@@ -116,7 +118,7 @@ def refuse_given(info: ModelInfo, of_swarm: Mapping[str, object], least_squares:
     """Refuse arguments that do not apply to a kind.
 
     How a search is run may be said of every kind, for calls in a loop over kinds: least squares
-    give the same answer from any seed and on any number of threads.
+    give the same answer from any seed.
 
     Parameters
     ----------

@@ -170,7 +170,7 @@ class LeastSquares:
 
 
 def solve_least_squares(
-    records: Sequence[Asked], info: ModelInfo, settings: LeastSquares
+    records: Sequence[Asked], info: ModelInfo, settings: LeastSquares, threads: int = 0
 ) -> Identification:
     """Identify a stage by least squares.
 
@@ -183,6 +183,8 @@ def solve_least_squares(
         The model.
     settings : LeastSquares
         Settings.
+    threads : int, optional
+        All cores where it is 0.
 
     Returns
     -------
@@ -207,6 +209,7 @@ def solve_least_squares(
         zones=settings._zones(info),
         creep_times=settings._times(longest),
         dynamics=settings.dynamics or "none",
+        threads=threads,
     )
     model = stage_class(info)
     both = zip(records, found.records, strict=True)

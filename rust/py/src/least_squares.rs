@@ -6,12 +6,12 @@ use piezotrack_core::identify::{
 };
 use piezotrack_core::math::{FREE, NOT_NEGATIVE, Rows};
 use piezotrack_core::models::Model;
-use piezotrack_core::signal::Drive;
+use piezotrack_core::signal::{Drive, Stop};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
 use crate::arrays::samples;
-use crate::enter::enter;
+use crate::enter::{enter, enter_quiet_pool};
 use crate::errors::raise;
 use crate::identify::{history_name, history_named};
 use crate::models::{Named, named};
@@ -148,7 +148,7 @@ fn dynamics_named(name: &str) -> Result<DynamicsKind> {
 /// Identifies a stage of a model from records; what is None is chosen.
 #[pyfunction]
 #[pyo3(name = "identify_weights", signature = (records, *, model, count, thresholds, zones,
-    creep_times, dynamics))]
+    creep_times, dynamics, threads))]
 #[expect(clippy::too_many_arguments, reason = "keyword-only, called from one place")]
 #[expect(clippy::needless_pass_by_value, reason = "from Python")]
 fn fit_weights(
@@ -160,6 +160,7 @@ fn fit_weights(
     zones: usize,
     creep_times: Option<Vec<f64>>,
     dynamics: &str,
+    threads: usize,
 ) -> PyResult<PyLeastSquaresFit> {
     let numbers: Vec<Samples> = records.iter().map(Asked::samples).collect::<PyResult<_>>()?;
     let checked = || -> Result<_> {
@@ -175,8 +176,9 @@ fn fit_weights(
         Ok((Model::named(model)?, records?, WeightsSettings { places, zones, creep, dynamics }))
     };
     let (model, asked, settings) = checked().map_err(|error| raise(&error))?;
-    let fit = enter(py, |stop| identify_weights(model, &asked, &settings, stop))?;
-    // None means stopped, for which `enter` has raised.
+    let job = |stop: Stop<'_>| identify_weights(model, &asked, &settings, stop);
+    let fit = enter_quiet_pool(py, threads, job)?;
+    // None means stopped, for which that has raised.
     fit.map(PyLeastSquaresFit)
         .ok_or_else(|| raise(&Error::Numerical("the search was stopped".into())))
 }

@@ -78,6 +78,11 @@ impl Evaluator<'_> {
         own.into_par_iter().zip(places).map(block).collect()
     }
 
+    /// Rows of the normal equations of one of many descents.
+    pub(super) fn rows(&self) -> usize {
+        self.record().window.len().div_ceil(self.stride(FEW_ROWS))
+    }
+
     /// Samples of the window to a row of the normal equations.
     pub(super) fn stride(&self, most: usize) -> usize {
         self.record().window.len().div_ceil(most)

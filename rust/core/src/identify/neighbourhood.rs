@@ -8,6 +8,13 @@ use super::normal::{Block, Extended, Normal, STEPS, Spot};
 use super::records::{Member, Records};
 use crate::signal::{Stop, index};
 
+/// Rows of the Jacobians that are in memory at a time, of places whose Jacobians are.
+const MOST_TOGETHER: usize = 400_000;
+
+/// Places whose Jacobians are computed together however long a record is: their simulations fill the
+/// threads.
+const FEWEST_TOGETHER: usize = 4;
+
 impl Records<'_> {
     /// Normal equations at a place with its shares of the creep, by central differences, with the
     /// priors, for which the mean square of the deviations times `samples_over_freedom` is the
@@ -32,7 +39,10 @@ impl Records<'_> {
     /// steps from it, all simulated side by side; `None` for one where a neighbour cannot be simulated.
     pub(super) fn normals(&self, spots: &[Spot], stop: Stop<'_>) -> Vec<Option<Normal>> {
         let questions = (spots.len(), self.coordinates().len());
-        remembered(self.journal(), questions, stop, || self.differentiated(spots, stop))
+        let rows = self.members().iter().map(|one| one.evaluator.rows()).max().unwrap_or(1);
+        let together = (MOST_TOGETHER / rows.max(1)).max(FEWEST_TOGETHER);
+        let parts = || spots.chunks(together).flat_map(|part| self.differentiated(part, stop));
+        remembered(self.journal(), questions, stop, || parts().collect())
     }
 
     fn differentiated(&self, spots: &[Spot], stop: Stop<'_>) -> Vec<Option<Normal>> {
