@@ -29,6 +29,7 @@ def ends_well(call: str, seconds: float) -> None:
     assert ended.returncode == 0, (call, seconds, ended.returncode, ended.stderr[-500:])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seconds", [0.1, 0.3])
 @pytest.mark.parametrize("call", CALLS)
 def test_a_daemon_thread_ends_with_the_process(call: str, seconds: float) -> None:

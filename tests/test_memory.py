@@ -53,6 +53,7 @@ NONE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NONE)
 def test_no_memory_is_an_exception_and_the_process_goes_on(name: str) -> None:
     ended = child(PREPARED.format(call=NONE[name]), room=600_000_000)

@@ -48,6 +48,13 @@ def blocks(page: Path) -> list[Block]:
 TYPED = [page for page in PAGES if any(b.language in ("python", "console") for b in blocks(page))]
 
 
+# Pages whose blocks compute for seconds.
+LONG = ("hardware.md", "paper.md", "tuning.md", "xy.md", "learning.md")
+MARKED = [
+    pytest.param(page, marks=pytest.mark.slow) if page.name in LONG else page for page in TYPED
+]
+
+
 FITS: dict[str, Any] = {}
 
 
@@ -64,7 +71,7 @@ def fitted_once(data: Any, *arguments: Any, **options: Any) -> Any:
     return FITS[key]
 
 
-@pytest.mark.parametrize("page", TYPED, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", MARKED, ids=lambda page: page.name)
 def test_what_a_page_shows_runs(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -113,6 +113,7 @@ def test_what_a_killed_run_has_not_renamed_is_listed_and_renamed_by_the_next(
     assert content(tmp_path) == dict.fromkeys(NAMES, "new") | more
 
 
+@pytest.mark.slow
 @POSIX
 @pytest.mark.parametrize("count", range(5))
 def test_a_run_that_is_killed_while_it_finishes_another_is_finished(

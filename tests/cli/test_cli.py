@@ -169,6 +169,7 @@ def test_by_default_the_kind_that_suits_the_log_is_found() -> None:
     assert Path("results", f"{fit.model.info.name}.json").read_bytes() == expected
 
 
+@pytest.mark.slow
 def test_pictures_of_several_kinds_do_not_collide() -> None:
     models = ("--model", "prandtl-ishlinskii", "--model", "dahl")
     second = ("--validate", "log.csv", "--runs", "1")
@@ -197,6 +198,7 @@ def test_simulate_writes_the_displacement() -> None:
     assert found is not None
 
 
+@pytest.mark.slow
 def test_the_demonstration_of_the_paper_tells_the_whole_story() -> None:
     printed = ran("demo", "--paper")
     pictures = [f"dahl_{picture}" for picture in PICTURES]
@@ -294,6 +296,7 @@ def test_the_installed_command_works_and_repeats_itself() -> None:
         assert Path("out1", name).read_bytes() == Path("out2", name).read_bytes(), name
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C in another way")
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_keeps_the_best_so_far(number: signal.Signals, code: int) -> None:

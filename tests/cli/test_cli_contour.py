@@ -123,6 +123,7 @@ def test_a_path_may_have_the_name_of_a_formula() -> None:
     assert written == ["contour.csv", "contour.json", "contour.png", "contour.svg"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_no_pictures_at_all")
 def test_table_2_is_one_command() -> None:
     printed = ran("contour", "--table-2")

@@ -62,6 +62,7 @@ def errors_of(lines: list[str]) -> list[float]:
     return [float(line.split()[1]) for line in lines if line.split()[:1][0].isdecimal()]
 
 
+@pytest.mark.slow
 def test_a_loop_that_fails_says_where_its_beginning_is(monkeypatch: pytest.MonkeyPatch) -> None:
     """In the first period of the reference, of which nothing would count in a whole run."""
     loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.from_um(kp=0.02, ti=0.06))
@@ -137,6 +138,7 @@ def test_a_controller_in_another_process_learns_the_same() -> None:
     assert one[-1] < 0.1 * one[0]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C in another way")
 @pytest.mark.parametrize(
     ("number", "code", "word"),

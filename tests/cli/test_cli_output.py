@@ -184,6 +184,7 @@ def test_nothing_is_told_of_what_takes_no_time(monkeypatch: pytest.MonkeyPatch) 
 # Completion, and readers that leave.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_shells_complete_commands_options_and_kinds(shell: str) -> None:
     def completed(*words: str) -> str:

@@ -45,6 +45,7 @@ BEGUN = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("after", [0.0, 0.002, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8])
 @pytest.mark.parametrize(
     ("number", "code", "word"),
@@ -77,6 +78,7 @@ main()
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("after", [0.0, 0.03, 0.08, 0.13, 0.18])
 def test_sigterm_while_results_are_put_in_place_leaves_them_whole(after: float) -> None:
     write_model()

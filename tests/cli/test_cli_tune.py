@@ -97,6 +97,7 @@ def test_margins_alone_give_gains_without_a_reference() -> None:
     assert late.high.sensitivity <= 1.4 * 1.01
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_no_pictures")
 def test_spreads_add_plants_and_margins_in_degrees_are_kept() -> None:
     spread = "--mode-spread 10 --gain-spread 20 --delay-spread 0.002 --phase-margin 60"

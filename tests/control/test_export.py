@@ -55,6 +55,7 @@ def test_doubles_give_the_bits_of_rust(name: str, tmp_path: Path) -> None:
     assert "NAME" not in source
 
 
+@pytest.mark.slow
 @needs_gcc
 @pytest.mark.parametrize("name", PARTS)
 def test_floats_stay_within_the_bound_that_is_stated(name: str, tmp_path: Path) -> None:

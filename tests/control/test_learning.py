@@ -305,6 +305,7 @@ def test_the_largest_singular_value_of_many_that_crowd_together(count: int) -> N
     assert frequency > 0.4 / DT
 
 
+@pytest.mark.slow
 def test_a_long_lifted_trial_of_a_model_without_a_mode_converges() -> None:
     static = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(5.0,), weights=(2e-7,))
     line = pt.triangle(frequency=2.0, low=20e-6, high=60e-6, duration=1.0, rounding=0.2)

@@ -279,6 +279,7 @@ class Hanging(VirtualDevice):
         VirtualDevice.exchange(self, volts)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_short")
 @pytest.mark.parametrize(
     ("pause", "each", "words"),
@@ -324,6 +325,7 @@ ENDS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_short")
 @pytest.mark.parametrize("fault", list(ENDS))
 def test_an_instrument_that_misbehaves_ends_safe(fault: str) -> None:

@@ -47,6 +47,7 @@ def errors(controller: pt.Controller, reference: pt.Reference) -> Any:
     )
 
 
+@pytest.mark.slow
 def test_better_in_the_sum_and_nowhere_worse_than_the_noise_explains() -> None:
     """On noise that the search has not seen, each motion from its own gains on."""
     sums = np.zeros(2)

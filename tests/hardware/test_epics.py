@@ -203,6 +203,7 @@ def test_a_prefix_whose_names_epics_cannot_hold_is_refused() -> None:
     assert "52 letters: expected 51 at most" in said
 
 
+@pytest.mark.slow
 def test_the_longest_prefix_is_served() -> None:
     with serving(environment(), "A" * 51) as (_, line):
         assert f"{'A' * 51}:Position" in line
@@ -233,6 +234,7 @@ print(json.dumps(found))
 """
 
 
+@pytest.mark.slow
 def test_a_device_that_fails_is_an_alarm_with_its_first_sentence() -> None:
     here = environment()
     pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
@@ -264,6 +266,7 @@ print(json.dumps(asyncio.run(main())))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C in another way")
 @pytest.mark.parametrize(
     ("number", "code", "word"),

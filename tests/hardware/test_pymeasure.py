@@ -63,6 +63,7 @@ def test_an_instrument_of_pymeasure_is_a_device(amplifier: Amplifier) -> None:
     assert "round trip" in record.notes[0]
 
 
+@pytest.mark.slow
 def test_joined_is_one_line_and_apart_two(
     there: pt.hardware.VirtualScpi,
     amplifier: Amplifier,

@@ -254,6 +254,7 @@ def test_not_a_number_is_no_reading_and_the_rest_goes_on() -> None:
         device.close()
 
 
+@pytest.mark.slow
 def test_faults_that_the_adapter_cannot_see_do_what_they_should() -> None:
     """They are for the guard of a loop: here only that the imitation has them."""
     readings = {}

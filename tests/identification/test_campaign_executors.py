@@ -48,6 +48,7 @@ def missing(folder: Path, seeds: range = SEEDS) -> int:
 # Processes.
 
 
+@pytest.mark.slow
 def test_a_process_that_is_killed_loses_no_result(tmp_path: Path, serial: dict[str, bytes]) -> None:
     # Not forked: there are threads in this process.
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
@@ -85,6 +86,7 @@ def cluster() -> Iterator[Any]:
         yield cluster
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_a_dask_worker_that_is_killed_changes_no_bit(
     tmp_path: Path, serial: dict[str, bytes], cluster: Any
@@ -127,6 +129,7 @@ def test_the_command_takes_the_address_of_a_scheduler(
     assert results(tmp_path / "there") == results(tmp_path / "here")
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_a_dask_client_that_is_closed_loses_no_result(
     tmp_path: Path, serial: dict[str, bytes], cluster: Any

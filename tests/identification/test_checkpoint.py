@@ -78,6 +78,7 @@ def test_a_search_goes_on_to_the_same_bits(settings: dict[str, Any], tmp_path: P
     assert path.read_bytes() == content
 
 
+@pytest.mark.slow
 def test_fifty_interruptions_change_nothing(tmp_path: Path) -> None:
     settings: dict[str, Any] = {"model": "dahl", "method": "swarm", "runs": 2}
     expected = found(pt.identify(record(), **settings))

@@ -198,6 +198,7 @@ def test_the_cost_of_several_records_is_that_of_the_stage() -> None:
     assert fit.cost == pytest.approx(np.sqrt(counts @ squares / counts.sum()), rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["descents", "swarm"])
 def test_candidates_that_diverge_are_no_best_ones(method: Any) -> None:
     """Measured records, on which the bounds hold stages that do not stay finite."""

@@ -69,6 +69,7 @@ def test_finds_the_drift_and_the_stage() -> None:
     assert still.cost > 5.0 * fit.cost
 
 
+@pytest.mark.slow
 def test_the_time_constant_has_a_standard_deviation() -> None:
     """Of twelve records with other noise the time constants spread by it."""
     fits = [found(record(drift=(6e-7, 12.0), seed=seed)) for seed in range(12)]
@@ -206,6 +207,7 @@ def test_a_drift_that_is_a_part_of_the_motion_is_said() -> None:
     assert not any("a drift" in note for note in drifting().notes)
 
 
+@pytest.mark.slow
 def test_auto_tries_the_kinds_that_are_searched_too() -> None:
     fit = pt.identify(record(drift=(6e-7, 12.0)), drift=True)
     assert {one.model for one in fit.trials} >= {"prandtl-ishlinskii", "first-order-dahl"}

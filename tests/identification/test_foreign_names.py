@@ -74,7 +74,10 @@ def path(name: str, folder: Path) -> Figure:
     return pt.contour(stage, (one, one), circle, beyond_reach=True).plot()
 
 
-@pytest.mark.parametrize("picture", [compared, loop, step, path])
+SLOW = [pytest.param(picture, marks=pytest.mark.slow) for picture in (compared, step, path)]
+
+
+@pytest.mark.parametrize("picture", [loop, *SLOW])
 @pytest.mark.parametrize("name", NAMES)
 def test_a_name_is_shown_as_it_is(picture: object, name: str, tmp_path: Path) -> None:
     assert callable(picture)

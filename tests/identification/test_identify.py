@@ -74,6 +74,7 @@ def test_the_papers_search_finds_what_scipy_simulated(drive: str, seed: int) -> 
     assert fit.cost < 1.3 * NOISE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("update", ["hypersphere", "hypersphere-radial"])
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_spso_2011_finds_it_and_the_descent_sharpens_it(update: Any, seed: int) -> None:

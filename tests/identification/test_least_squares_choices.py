@@ -41,6 +41,7 @@ def fitted(u: NDArray[np.float64], y: NDArray[np.float64], **given: Any) -> Any:
         "zones": 0,
         "creep_times": [],
         "dynamics": "none",
+        "threads": 0,
     }
     for name, value in given.items():
         (asked if name in asked else settings)[name] = value

@@ -112,6 +112,7 @@ def test_a_softer_damper_repairs_the_printed_set_as_well() -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hold", ["foh", "zoh"])
 @pytest.mark.parametrize("stage", [CORRECTED, LIGHT], ids=["published", "light"])
 @pytest.mark.parametrize("shape", [sine, triangle, multisine])

@@ -37,6 +37,7 @@ def drive(count: int = 2001) -> Array:
     return u
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SEARCHED)
 def test_follows_its_equation(name: str) -> None:
     stage, u = creeping(name), drive()

@@ -166,6 +166,7 @@ def test_benchmark_multisine_is_converged() -> None:
     assert np.abs(x - converged).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_benchmark_sweep_is_converged() -> None:
     """Through the resonance: 20 to 50 Hz in 180 s, of which the part that matters."""
 
@@ -191,6 +192,7 @@ def noisy_benchmark() -> pt.Dataset:
     return log[SAMPLES / COARSE :]
 
 
+@pytest.mark.slow
 def test_benchmark_parameters_are_recovered() -> None:
     """Every one within 1 %, from the noisy record, with bounds from the record alone."""
     log = noisy_benchmark().interpolate(2)

@@ -31,6 +31,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_against_scipy(name: str) -> None:
     parameters, dt, u = CASES[name]
@@ -119,6 +120,7 @@ def test_runge_kutta_is_refused(method: str) -> None:
         stage.simulate(np.zeros(3), 0.02, method=method)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_b0_is_found() -> None:
     parameters = replace(TABLE_1, b0=120.0)
     dt = 2e-3

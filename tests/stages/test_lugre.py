@@ -89,6 +89,7 @@ def reference(stage: pt.LuGreStage, u: Array, dt: float, hold: str) -> tuple[Arr
     return np.array(x), np.array(forces)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hold", ["foh", "zoh"])
 @pytest.mark.parametrize("stage", [STAGE, LIGHT], ids=["heavy", "light"])
 def test_against_a_stiff_solver(stage: pt.LuGreStage, hold: Literal["foh", "zoh"]) -> None:

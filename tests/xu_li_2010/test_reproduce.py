@@ -165,6 +165,7 @@ def test_the_tally_counts_by_use() -> None:
     assert "gives 2.83" in ratios
 
 
+@pytest.mark.slow
 def test_the_summary_says_what_is_not_predicted(files: tuple[Path, ...]) -> None:
     found = quick()
     text = " ".join(found.summary().split())
@@ -414,6 +415,7 @@ def opened(page: Path, width: int, folder: Path) -> tuple[str, str]:
 in_a_browser = pytest.mark.skipif(CHROMIUM is None, reason="no chromium to open the report in")
 
 
+@pytest.mark.slow
 @in_a_browser
 @pytest.mark.parametrize("width", [1280, 390])
 def test_a_browser_draws_every_figure(files: tuple[Path, ...], width: int, tmp_path: Path) -> None:
