@@ -73,7 +73,7 @@ def identify(
     seed: int,
     runs: int,
     threads: int,
-    callback: Callable[[int, int, int, float, list[float]], bool] | None,
+    callback: Callable[[int, int, int, float, list[float], float], bool] | None,
     progress: Callable[[int, int, int, float, list[float], float], None] | None,
     checkpoint: Checkpoint | None,
 ) -> Search | None: ...

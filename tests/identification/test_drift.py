@@ -193,6 +193,30 @@ def test_beside_a_history(history: Any) -> None:
     assert fit.drift.amplitude == pytest.approx(6e-7, rel=0.2)
 
 
+def test_its_values_are_counted() -> None:
+    """Size and time constant; the size alone where the time constant is known."""
+    none = found(drifting().data, drift=False).free_count
+    assert none is not None
+    assert drifting().free_count == none + 2
+    assert found(drifting().data, drift=12.0).free_count == none + 1
+
+
+@pytest.mark.parametrize("time", [1e-3, 1.0, 30.0, 1e6, 1e18])
+def test_a_drift_is_what_is_left_of_an_exponential(time: float) -> None:
+    """At the beginning all of it, at the end nothing; a straight line where it is slow."""
+    data = record()
+    drift = pt.identification.drift.Drift._fading(6e-7, time, data, time_fitted=False)
+    x = drift.at(data.t)
+    assert x[0] == pytest.approx(6e-7)
+    assert x[-1] == pytest.approx(0.0, abs=1e-20)
+    assert drift.moved == pytest.approx(-6e-7)
+    assert np.all(np.diff(x) <= 0.0)
+    if time > 1e3:
+        assert x == pytest.approx(6e-7 * (1.0 - data.t / data.t[-1]), abs=1e-11)
+    # Nothing is known of it before.
+    assert drift.at(data.t - 100.0)[0] == x[0]
+
+
 def test_a_loop_that_is_not_closed_is_no_drift() -> None:
     """Fewer than six reversals: none, unless its time constant is given."""
     data = record(seconds=4.0)
@@ -203,8 +227,8 @@ def test_a_loop_that_is_not_closed_is_no_drift() -> None:
 def test_a_drift_that_is_a_part_of_the_motion_is_said() -> None:
     large = record(drift=(4e-5, 12.0))
     fit = found(large)
-    assert any("a drift of -38" in note and "% of the stroke" in note for note in fit.notes)
-    assert not any("a drift" in note for note in drifting().notes)
+    assert any("the drift of -38" in note and "% of the stroke" in note for note in fit.notes)
+    assert not any("drift" in note for note in drifting().notes)
 
 
 @pytest.mark.slow

@@ -472,7 +472,7 @@ def still() -> pt.Dataset:
         (
             lambda: [slow(), quick()],
             {"drift": [None, -2.0]},
-            "drift is -2: expected a finite number above 0, in s",
+            "record 2: drift is -2: expected a finite number above 0, in s",
         ),
     ],
 )

@@ -136,7 +136,6 @@ except KeyboardInterrupt as stopped:
 """
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C in another way")
 @pytest.mark.parametrize(
     ("watched", "samples", "particles"),

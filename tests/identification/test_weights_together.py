@@ -158,6 +158,24 @@ def test_a_mode_far_above_the_drive_is_no_lag() -> None:
     assert fit.cost == pytest.approx(NOISE, rel=0.1)
 
 
+@pytest.mark.parametrize("kind", ["prandtl-ishlinskii", "preisach"])
+def test_the_bits_do_not_depend_on_threads(kind: str) -> None:
+    log = record(0.5, 35.0, 0.005, drift=(6e-7, 12.0))
+    one, two = (pt.identify(log, kind, threads=count) for count in (1, 2))
+    assert one.model == two.model
+    assert (one.cost, one.offset, one.drift, one.nfev) == (
+        two.cost,
+        two.offset,
+        two.drift,
+        two.nfev,
+    )
+
+
+def test_too_many_threads_are_refused() -> None:
+    with pytest.raises(pt.ParameterError, match="threads is 300: expected 0 for all cores"):
+        pt.identify(record(0.5, 35.0, 0.005), KIND, threads=300)
+
+
 def test_a_record_without_a_drift_gets_none() -> None:
     fit = pt.identify(record(0.5, 35.0, 0.005), KIND, history="virgin", least_squares=PLAYS)
     assert fit.drift is None

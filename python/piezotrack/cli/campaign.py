@@ -17,6 +17,7 @@ from .fit_options import (
     Constrain,
     Creep,
     Delay,
+    Drift,
     Dynamics,
     Fix,
     Free,
@@ -29,6 +30,7 @@ from .fit_options import (
     Scales,
     Swarm,
     Ties,
+    drift_asked,
     fit_options,
     searched,
 )
@@ -109,6 +111,7 @@ def campaign_command(
     ] = None,
     offset: Annotated[bool, typer.Option(help="Fit a constant sensor offset.")] = True,
     delay: Delay = None,
+    drift: Drift = None,
     history: History = None,
     creep: Creep = None,
     plays: Plays = None,
@@ -153,6 +156,7 @@ def campaign_command(
         swarm=swarm,
     )
     given |= {"stiffness": stiffness, "offset": offset, "history": history, "runs": runs}
+    given["drift"] = None if drift is None else drift_asked(drift)
     models = {kind: {"model": kind, **kinds.arguments_of(kind, given)} for kind in kinds.names}
     numbers = _seeds(seeds)
     columns = Columns(time, drive, displacement, unit, dt)

@@ -81,7 +81,7 @@ def compare_command(
     searched = {one.name for one in MODELS if one.searched}
     if model and searched.isdisjoint(model):
         refuse_without_effect(
-            context, ("seed", "runs", "threads"), f"with {', '.join(model)}: none is searched"
+            context, ("seed", "runs"), f"with {', '.join(model)}: none is searched"
         )
 
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)

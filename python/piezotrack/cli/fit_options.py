@@ -124,6 +124,14 @@ Delays = Annotated[
         "once for each of several logs.",
     ),
 ]
+Drift = Annotated[
+    str | None,
+    typer.Option(
+        metavar="none|fit|S",
+        help="Slow drift of the sensor: none, fit it, or its time constant in s; default none for "
+        "models that are searched, what the log shows for the others.",
+    ),
+]
 Drifts = Annotated[
     list[str] | None,
     typer.Option(
@@ -379,7 +387,7 @@ def of_each_log(
     if weight and count == 1:
         raise ParameterError("--weight has no effect with 1 log: expected it left out")
     delays = [_delay(text) for text in delay or []]
-    drifts = [_drift(text) for text in drift or []]
+    drifts = [drift_asked(text) for text in drift or []]
     return {
         "delay": delays if len(delays) > 1 else next(iter(delays), None),
         "drift": drifts if len(drifts) > 1 else next(iter(drifts), None),
@@ -411,7 +419,8 @@ def _delay(text: str | None) -> bool | float | tuple[float, float] | None:
     return number_range("--delay", text) if ":" in text else number("--delay", text)
 
 
-def _drift(text: str) -> bool | float:
+def drift_asked(text: str) -> bool | float:
+    """Parse what is asked of the drift of a log."""
     return text == "fit" if text in ("fit", "none") else number("--drift", text)
 
 

@@ -198,7 +198,7 @@ def _files(
 
     names = [name for name in kinds.names if name != AUTO]
     if AUTO in kinds.names:
-        names += [kind.name for kind in kinds_tried(logs[0], {**given, "drift": None})]
+        names += [kind.name for kind in kinds_tried(logs[0], given)]
     for name in dict.fromkeys(names):
         yield from identification_files(name, searched=searched(name), records=len(logs))
         if validated:

@@ -108,6 +108,7 @@ class TaskResult:
             "stroke_um": 1e6 * self._number("stroke", "value"),
             "offset_um": 1e6 * self._number("offset", "value"),
             "delay_s": self._number("delay", "value"),
+            "drift_um": 1e6 * self._number("drift", "amplitude", "value"),
             "notes": len(self.notes),
             "error": self.error,
             "task": self.task,

@@ -15,10 +15,12 @@ from .._support.messages import listed, quoted
 from ..errors import ExecutorError, ParameterError, PiezotrackError
 from ..stages.registry import model_named
 from .descents import Descents
+from .drift import drift_of_asked
 from .fit import identify
 from .keys import exact, key_of, plain, record_key
 from .kinds import refuse_given
 from .least_squares import LeastSquares
+from .question import delay_bounds
 from .selection import AUTO
 from .swarm import ParticleSwarm
 
@@ -34,9 +36,10 @@ FAILURE = "piezotrack-campaign-failure"
 SCHEMA_VERSION = 1
 # Arguments of `identify` that a model of a campaign may have.
 OF_PARAMETERS = ("free", "fixed", "bounds", "scales", "ties", "constraints", "priors")
-OF_SEARCH = ("stiffness", "delay", "creep", "method", "swarm", "descents", "runs")
+OF_SEARCH = ("stiffness", "creep", "method", "swarm", "descents", "runs")
 OF_SWARM = (*OF_PARAMETERS, *OF_SEARCH)
-GIVEN = ("model", "offset", "history", "drift", "least_squares", *OF_SWARM)
+OF_RECORDS = ("offset", "history", "delay", "drift")
+GIVEN = ("model", *OF_RECORDS, "least_squares", *OF_SWARM)
 # And those that it has in another way.
 ELSEWHERE = {
     "seed": "expected it in seeds=",
@@ -182,6 +185,8 @@ def _check(kind: object, found: Mapping[str, Any]) -> None:
     for name, expected in SETTINGS.items():
         if name in found and not isinstance(found[name], expected):
             raise ParameterError(f"{name} is {quoted(found[name])}: expected {expected.__name__}")
+    delay_bounds(found.get("delay"))
+    drift_of_asked(found.get("drift"), offset=found.get("offset", True) is True, searched=False)
     if "runs" in found:
         _core.as_count("runs", found["runs"])
     if kind == AUTO:
@@ -192,6 +197,6 @@ def _check(kind: object, found: Mapping[str, Any]) -> None:
             )
         return
     of_swarm = {**dict.fromkeys((*OF_SWARM, "seed", "threads")), **found}
-    for name in ("model", "offset", "history", "drift", "least_squares"):
+    for name in ("model", *OF_RECORDS, "least_squares"):
         of_swarm.pop(name, None)
     refuse_given(model_named(kind), of_swarm, found.get("least_squares"))

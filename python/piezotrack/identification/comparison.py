@@ -264,7 +264,9 @@ def compare(
         `train`.
     history : {"virgin", "settled", "fit"}, optional
         What the stage went through before the record, as for `identify`.
-    seed, runs, threads, progress : optional
+    threads, progress : optional
+        As for `identify`.
+    seed, runs : optional
         As for `identify`, for the models that are searched.
 
     Returns

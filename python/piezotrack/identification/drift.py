@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..data.dataset import Dataset
-    from .asked import Asked
 
     Array = NDArray[np.float64]
 
@@ -43,19 +42,22 @@ class Drift:
         Time constant [s]. Where it is much longer than the record, the drift is a straight line.
     begin, end : float
         First and last instant of the window that was fitted, on the record's own time axis [s].
+    time_fitted : bool
+        Whether the time constant was fitted too.
     """
 
     amplitude: float
     time: float
     begin: float
     end: float
+    time_fitted: bool = True
 
     @classmethod
-    def _falling(cls, fallen: float, time: float, data: Dataset) -> Self:
-        """Of a part of the reading that fades along the window of a record [m]."""
+    def _fading(cls, part: float, time: float, data: Dataset, *, time_fitted: bool) -> Self:
+        """Of a part of the reading [m] that fades along the window of a record."""
         begin, end = float(data.t[0]), float(data.t[-1])
-        amplitude = fallen / -float(np.expm1((begin - end) / time))
-        return cls(amplitude=amplitude, time=time, begin=begin, end=end)
+        amplitude = part / -float(np.expm1((begin - end) / time))
+        return cls(amplitude=amplitude, time=time, begin=begin, end=end, time_fitted=time_fitted)
 
     @property
     def moved(self) -> float:
@@ -69,7 +71,7 @@ class Drift:
         )
 
     def at(self, t: Array) -> Array:
-        """Value at some instants of the record.
+        """Value at some instants of the record; before `begin` that at `begin`.
 
         Parameters
         ----------
@@ -81,9 +83,39 @@ class Drift:
         ndarray, shape (n,)
             Part of the reading [m].
         """
-        last = np.exp((self.begin - self.end) / self.time)
-        x: Array = self.amplitude * (np.exp((self.begin - np.asarray(t)) / self.time) - last)
+        x: Array = self.amplitude * self._shape(np.maximum(t, self.begin), self.begin, self.end)
         return x
+
+    def _shape(self, t: Array, begin: float, end: float) -> Array:
+        """Return a drift of 1 at `begin`, less its value at `end`."""
+        last = np.exp((begin - end) / self.time)
+        slow = end - begin < self.time
+        # The difference of two numbers near 1 would be rounding.
+        shape: Array = (
+            last * np.expm1((end - t) / self.time)
+            if slow
+            else np.exp((begin - t) / self.time) - last
+        )
+        return shape
+
+    def left_of(self, t: Array, rest: Array) -> Array:
+        """Take the best drift with this time constant, and an offset, off a residual.
+
+        Parameters
+        ----------
+        t : ndarray, shape (n,)
+            Times of a record [s].
+        rest : ndarray, shape (n,)
+            What the stage leaves of its readings [m].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            What is left [m].
+        """
+        left = rest - self.of_another(t, rest, centred=True)
+        left -= left.mean()
+        return left
 
     def of_another(self, t: Array, rest: Array, *, centred: bool) -> Array:
         """Drift of another record of the same sensor, by least squares with this time constant.
@@ -102,7 +134,7 @@ class Drift:
         ndarray, shape (n,)
             Part of its readings [m].
         """
-        fading = np.exp((t[0] - t) / self.time) - np.exp((t[0] - t[-1]) / self.time)
+        fading = self._shape(t, float(t[0]), float(t[-1]))
         shape = fading - fading.mean() if centred else fading
         size = float(shape @ shape)
         found: Array = fading * (float(shape @ rest) / size if size > 0.0 else 0.0)
@@ -128,18 +160,22 @@ def asked_drift(drift: object) -> float | None:
     ParameterError
         It is none of these.
     """
-    if drift is None or drift is True or (isinstance(drift, str) and drift == "auto"):
+    if isinstance(drift, (bool, np.bool_)):
+        return None if drift else 0.0
+    if drift is None or (isinstance(drift, str) and drift == "auto"):
         return None
-    return 0.0 if drift is False else positive("drift", drift, "s")
+    return positive("drift", drift, "s")
 
 
-def drift_of_asked(one: Asked, *, searched: bool) -> float | None:
+def drift_of_asked(drift: object, *, offset: bool, searched: bool) -> float | None:
     """Time constant of the drift of a record, as the core takes it.
 
     Parameters
     ----------
-    one : Asked
-        The record, and what is asked of it.
+    drift : object
+        As for `asked_drift`.
+    offset : bool
+        Whether an offset of the record is fitted.
     searched : bool
         Whether the model is searched: such a one has no drift where nobody asks for it.
 
@@ -153,15 +189,12 @@ def drift_of_asked(one: Asked, *, searched: bool) -> float | None:
     ParameterError
         The drift is none of what `identify` takes, or is asked for without an offset.
     """
-    given = one.drift not in (None, False)
-    if given and not one.offset:
-        raise ParameterError(
-            f"drift is {quoted(one.drift)}: expected none with offset=False, a sensor that "
-            "shows what there is"
-        )
-    if not one.offset or (searched and not given):
+    time = asked_drift(drift)
+    if drift is None and (searched or not offset):
         return 0.0
-    return asked_drift(one.drift)
+    if not offset and time != 0.0:
+        raise ParameterError(f"drift is {quoted(drift)}: expected none with offset=False")
+    return time
 
 
 def drift_entry(drift: Drift | None) -> dict[str, Any]:
@@ -182,7 +215,7 @@ def drift_entry(drift: Drift | None) -> dict[str, Any]:
     return {
         "drift": {
             "amplitude": {"value": drift.amplitude, "unit": "m"},
-            "time": {"value": drift.time, "unit": "s"},
+            "time": {"value": drift.time, "unit": "s", "free": drift.time_fitted},
             "begin": {"value": drift.begin, "unit": "s"},
             "end": {"value": drift.end, "unit": "s"},
         }
@@ -214,5 +247,10 @@ def drift_of(entry: Any) -> Drift | None:
         name: _core.as_number(f"drift: {name}", object_of(f"drift: {name}", found[name])["value"])
         for name in ("amplitude", "begin", "end")
     }
-    time = object_of("drift: time", found["time"])["value"]
-    return Drift(time=positive("drift: time", time, "s"), **values)
+    time = object_of("drift: time", found["time"])
+    return Drift(
+        time=positive("drift: time", time["value"], "s"),
+        # Files of before have no such entry.
+        time_fitted=time.get("free", True) is True,
+        **values,
+    )

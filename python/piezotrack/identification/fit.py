@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal
 
 from ..stages.registry import model_named
-from .asked import Own, asked_of
+from .asked import Own, asked_of, of_record
 from .checkpoint import checkpoint_of
 from .drift import asked_drift
 from .kinds import identify_kind, refuse_given
@@ -269,7 +269,8 @@ def identify(
     if info is not None:
         refuse_given(info, of_swarm, least_squares)
     for one in records:
-        asked_drift(one.drift)
+        with of_record(one.label):
+            asked_drift(one.drift)
     said = {**of_swarm, "model": model, "least_squares": least_squares}
     with checkpoint_of(checkpoint, records, said) as kept:
         of_swarm["checkpoint"] = kept

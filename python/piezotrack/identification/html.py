@@ -31,6 +31,8 @@ def identification_html(fit: Identification) -> str:
         ]
         if fit.delay:
             rows.append(("delay", f"{1e3 * fit.delay:.4g} ms"))
+        if fit.drift:
+            rows.append(("drift", str(fit.drift)))
     rows += [("constraint", _constraint(one)) for one in fit.constraints]
     rows += [("note", note) for note in fit.notes]
     tables = [html_table(f"Identification: {fit.model.info.title}", rows)]

@@ -136,8 +136,8 @@ class IdentifiedModel:
         free = [name for name in names if found.get(name, {}).get("free", False)]
         delay = bool(self.details.get("delay", {}).get("free", False))
         offsets = int(self.offset_fitted) + sum(one.offset_fitted for one in self.records[1:])
-        drifting = int(self.drift is not None) + sum(bool(one.drift) for one in self.records[1:])
-        own = delay + offsets + 2 * drifting
+        drifts = [one for one in (self.drift, *(one.drift for one in self.records[1:])) if one]
+        own = delay + offsets + sum(1 + one.time_fitted for one in drifts)
         return sum(_count(getattr(self.model, name)) for name in free) + own
 
     def beyond_fit(self, u: ArrayLike, dt: float | None = None) -> list[str]:

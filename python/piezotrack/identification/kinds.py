@@ -106,7 +106,8 @@ def _as_shown(one: Asked, info: ModelInfo, of_swarm: Mapping[str, Any]) -> Ident
     """Search with the history that the record shows: more freedom has to lower the cost."""
     fit = virgin = search_records((replace(one, history="virgin"),), info, **of_swarm)
     asked = {name: value for name, value in of_swarm.items() if name not in OF_SEARCH}
-    asked |= {"delay": one.delay, "drift": one.drift}
+    # A part of the record may show a drift where the whole of it does not.
+    asked |= {"delay": one.delay, "drift": one.drift if fit.drift else False}
     for other in other_histories(one.data, info, fit, offset=one.offset, asked=asked):
         if other.share * virgin.cost < (1.0 - GAIN) * fit.cost:
             found = search_records((replace(one, history=other.history),), info, **of_swarm)

@@ -12,7 +12,7 @@ from .._support.messages import quoted
 from ..errors import DataError, ParameterError
 from ..stages.registry import stage_class
 from .asked import of_record
-from .drift import Drift, drift_of_asked
+from .drift import Drift, asked_drift, drift_of_asked
 from .estimates import LagRange
 from .fitted_record import FittedRecord
 from .history import start_of_fit
@@ -254,7 +254,8 @@ def _asked(one: Asked) -> dict[str, Any]:
     """Return a record and what is asked of it, as the core takes it."""
     data = one.data
     with of_record(one.label):
-        delay, drift = delay_bounds(one.delay), drift_of_asked(one, searched=False)
+        delay = delay_bounds(one.delay)
+        drift = drift_of_asked(one.drift, offset=one.offset, searched=False)
     return {
         "u": data.full.u,
         "y": data.full.y,
@@ -282,7 +283,8 @@ def _fitted(model: Any, info: ModelInfo, one: Asked, own: Mapping[str, Any]) -> 
     if own["drift"] is not None:
         amplitude, time = own["drift"]
         begin, end = float(data.t[0]), float(data.t[-1])
-        drift = Drift(amplitude=amplitude, time=time, begin=begin, end=end)
+        fitted = asked_drift(one.drift) is None
+        drift = Drift(amplitude=amplitude, time=time, begin=begin, end=end, time_fitted=fitted)
         # What the sensor shows at rest at the end of the window.
         offset += amplitude * math.exp((begin - end) / time)
     return FittedRecord(

@@ -124,9 +124,11 @@ class _Beginning:
         )
 
     def residual(self, model: IdentifiedModel) -> Array:
-        """Measured less simulated displacement, without its mean where an offset was fitted [m]."""
+        """Measured less simulated displacement, without offset and drift if fitted [m]."""
         run = model.simulate(self.data, offset=0.0, **self.how)
         rest = self.data.y - run.x
+        if model.drift:
+            return model.drift.left_of(self.data.t, rest)
         return np.asarray(rest - rest.mean() if model.offset_fitted else rest)
 
     def sensitivity(self, value: _Value) -> Array:

@@ -62,7 +62,7 @@ def question_of(
     data = asked.data
     with of_record(asked.label):
         searched_delay = delay_bounds(asked.delay)
-        drift = drift_of_asked(asked, searched=True)
+        drift = drift_of_asked(asked.drift, offset=asked.offset, searched=True)
     creep_times = _creep_times(False if creep is None else creep)
     said = ParameterArguments.checked(scales, ties, constraints, priors)
     held = _held(initial, fixed, free, bounds, said.named)

@@ -37,7 +37,7 @@ __all__ = [
 NOISY = 3.0
 # Share of the travel that a lag makes up from which a loop is due to it.
 VISCOUS = 0.02
-# Share of the stroke from which a drift is more than what a sensor shows besides.
+# Share of the stroke from which a drift is too large for that of a sensor.
 LARGE = 0.05
 # Share of the window that the first samples may be, and of the squared residual that they carry.
 FIRST, CARRIED = 0.1, 0.5
@@ -135,8 +135,9 @@ def of_drift(drift: Drift | None, stroke: float) -> list[str]:
     if drift is None or abs(drift.moved) <= LARGE * stroke:
         return []
     return [
-        f"{drift} is {100.0 * abs(drift.moved) / stroke:.2g} % of the stroke: expected less of a "
-        "sensor; it may stand for a part of the motion, such as the first cycles after rest"
+        f"the drift of {1e6 * drift.moved:.3g} um, time constant {drift.time:.3g} s, is "
+        f"{100.0 * abs(drift.moved) / stroke:.2g} % of the stroke: more than a sensor should have; "
+        "it may stand for a part of the motion, such as the first cycles after rest"
     ]
 
 

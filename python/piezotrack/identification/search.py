@@ -150,11 +150,7 @@ def _identification(
     drive_unit = records[0].data.drive_unit
     facts = {one.name: (one.unit, one.symbol) for one in info.parameters} | SENSOR
     facts = {name: (of_drive(unit, drive_unit), sign) for name, (unit, sign) in facts.items()}
-    parameters = {
-        one["name"]: _estimate(one, *facts[one["name"]])
-        for one in found.estimates
-        if one["name"] not in SENSOR
-    }
+    parameters = {one["name"]: _estimate(one, *facts[one["name"]]) for one in found.estimates}
     values = {name: [estimate.value] for name, estimate in parameters.items()}
     values["creep_weights"], values["creep_times"] = found.creep
     model = stage_class(info)._from(values.items())
@@ -241,8 +237,10 @@ def _fitted(
         del estimates["delay"]
     if history != "fit":
         del estimates["voltage_before"]
-    drift = Drift._falling(own["drift"], time.value, data) if time.value else None
-    if drift is None:
+    drift = None
+    if time.value:
+        drift = Drift._fading(own["drift"], time.value, data, time_fitted=time.free)
+    else:
         del estimates["drift_time"]
     voltage = before.value if history == "fit" else None
     return FittedRecord(

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use numpy::PyArray1;
 use piezotrack_core::identify::{
-    BEFORE, Coordinate, DELAY, DRIFT_TIME, History, ITS_OWN, Identification, Journal, Method,
-    Outcome, OwnResult, Plan, Record, Relations, Spec, StopReason, identify_together, visited,
+    BEFORE, Coordinate, DELAY, DRIFT_TIME, History, Identification, Journal, Method, Outcome,
+    OwnResult, Plan, Record, Relations, Spec, StopReason, identify_together, visited,
 };
 use piezotrack_core::integrator::Order;
 use piezotrack_core::signal::Drive;
@@ -78,12 +78,11 @@ struct PySearch {
 
 #[pymethods]
 impl PySearch {
-    /// The parameters of the stage, and what the first record has of its own, by their names.
+    /// The parameters of the stage, by their names.
     #[getter]
     fn estimates(&self) -> Vec<Estimate> {
         let names = self.found.problem.model.scalars().iter().map(|info| info.name);
-        let places = names.enumerate().chain(ITS_OWN);
-        places.filter_map(|(place, name)| self.estimate(0, place, name)).collect()
+        names.enumerate().filter_map(|(place, name)| self.estimate(0, place, name)).collect()
     }
 
     /// What each record has of its own, in their order.

@@ -178,7 +178,7 @@ fn fit_weights(
     let (model, asked, settings) = checked().map_err(|error| raise(&error))?;
     let job = |stop: Stop<'_>| identify_weights(model, &asked, &settings, stop);
     let fit = enter_quiet_pool(py, threads, job)?;
-    // None means stopped, for which that has raised.
+    // None means stopped, for which `enter_quiet_pool` has raised.
     fit.map(PyLeastSquaresFit)
         .ok_or_else(|| raise(&Error::Numerical("the search was stopped".into())))
 }

@@ -6,7 +6,7 @@
 //!
 //! Xu and Li 2010, equation (16), doi 10.1115/1.4001712. Where an offset is fitted, its best
 //! value for each candidate is the mean of the deviation, so the swarm does not search it; nor does
-//! it search the shares of the creep.
+//! it search the size of a drift, or the shares of the creep.
 //! Particles run in lockstep lanes, and no trajectory is stored.
 
 use piezotrack_control::Number;
@@ -96,7 +96,7 @@ impl<'a> Evaluator<'a> {
         Evaluator { residuals, problem, held: problem.held(), arch, stepping, halvings, visited }
     }
 
-    /// Displacement as it is read in the window, with these shares of the creep but without offset,
+    /// Displacement as it is read in the window, with these shares of the creep but without offset and drift,
     /// stepped as a cost is; `None` where it is not finite.
     pub(super) fn reading(
         &self,

@@ -2,11 +2,11 @@
 //! the drive.
 //!
 //! ```text
-//! y = x + offset + d g,   g = (exp(-t/tau) - exp(-T/tau)) / (1 - exp(-T/tau))
+//! y = x + offset + c g,   g = (exp(-t/tau) - exp(-T/tau)) / (1 - exp(-T/tau))
 //! ```
 //!
 //! over a window of T seconds: g falls from 1 to 0, and is a straight line where tau is long. The
-//! reading is linear in d, whose best value follows for each candidate as that of the offset does:
+//! reading is linear in c, whose best value follows for each candidate as that of the offset does:
 //! variable projection, Golub and Pereyra 1973, doi 10.1137/0710036.
 
 use piezotrack_control::Number;
@@ -28,11 +28,13 @@ pub enum DriftKind {
     Auto,
 }
 
-/// Reversals of which size, as a share of the drive's range, that tell a drift.
+/// Fewest reversals of the drive that tell a drift.
 const REVERSALS: usize = 6;
+
+/// Smallest reversal that counts, as a share of the drive's range.
 const LARGE_TURN: f64 = 0.1;
 
-/// Range of the time constant of a drift, as shares of the record.
+/// Range of the time constant of a drift, as shares of the window.
 pub(super) const DRIFT_TIMES: (f64, f64) = (0.1, 10.0);
 
 /// Windows that a time constant lasts at most: beyond, the drift is a straight line.
@@ -42,11 +44,12 @@ impl DriftKind {
     /// The time constant in a search; 0 for no drift.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a time constant that is none, and for a drift without an offset.
+    /// [`Error::Parameter`] for a time constant that is not above 0 and finite, and for a drift without
+    /// an offset.
     pub(super) fn coordinate(self, record: &Record<'_>, offset: bool) -> Result<Coordinate> {
         let none = Coordinate::Fixed(0.0);
         if self != Self::None && !offset {
-            let expected = "none without an offset: a sensor that shows what there is";
+            let expected = "none without an offset";
             return Err(Error::parameter("drift", "given", expected));
         }
         match self {

@@ -44,11 +44,11 @@ pub struct Identification {
 /// What one of the records has in the best run.
 #[derive(Clone, Debug)]
 pub struct OwnResult {
-    /// What was held and free, with its own delay and voltage before.
+    /// What was held and free, with its own delay, voltage before and drift.
     pub problem: Problem,
-    /// The parameters, its delay and its voltage before.
+    /// The parameters, and what [`super::ITS_OWN`] has.
     pub theta: Theta,
-    /// Its RMS deviation, m, without priors, and its offset.
+    /// Its RMS deviation, m, without priors, its offset and its drift.
     pub costs: Costs,
 }
 
@@ -68,7 +68,7 @@ pub fn identify(
     identify_together(&[(record, spec)], plan, monitor, stop)
 }
 
-/// Identifies one stage from several records, each with its own offset, delay, history and weight,
+/// Identifies one stage from several records, each with its own offset, delay, drift, history and weight,
 /// as [`Problem::of_records`] and [`Records`] say: no state goes from one record to the next. The
 /// creep has the same shares in all.
 ///

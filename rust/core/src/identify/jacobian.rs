@@ -1,4 +1,7 @@
 //! Jacobian of a record about a candidate, by central or one-sided differences.
+//!
+//! Offset and drift are eliminated: their part is taken off every column (Kaufman 1975, doi
+//! 10.1007/BF01932995).
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;

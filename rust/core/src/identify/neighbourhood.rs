@@ -8,7 +8,7 @@ use super::normal::{Block, Extended, Normal, STEPS, Spot};
 use super::records::{Member, Records};
 use crate::signal::{Stop, index};
 
-/// Rows of the Jacobians that are in memory at a time, of places whose Jacobians are.
+/// Most rows of Jacobians in memory at a time.
 const MOST_TOGETHER: usize = 400_000;
 
 /// Places whose Jacobians are computed together however long a record is: their simulations fill the
@@ -39,7 +39,7 @@ impl Records<'_> {
     /// steps from it, all simulated side by side; `None` for one where a neighbour cannot be simulated.
     pub(super) fn normals(&self, spots: &[Spot], stop: Stop<'_>) -> Vec<Option<Normal>> {
         let questions = (spots.len(), self.coordinates().len());
-        let rows = self.members().iter().map(|one| one.evaluator.rows()).max().unwrap_or(1);
+        let rows = self.members().iter().map(|one| one.evaluator.rows()).sum::<usize>();
         let together = (MOST_TOGETHER / rows.max(1)).max(FEWEST_TOGETHER);
         let parts = || spots.chunks(together).flat_map(|part| self.differentiated(part, stop));
         remembered(self.journal(), questions, stop, || parts().collect())

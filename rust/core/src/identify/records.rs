@@ -143,7 +143,7 @@ impl<'a> Records<'a> {
         self.first().theta(place)
     }
 
-    /// Costs at places, in their order; where there are priors, with their factors. Offset and
+    /// Costs at places, in their order; where there are priors, with their factors. Offset, drift and
     /// shares are those of the first record.
     ///
     /// Those that were not finished when `stop` said so are infinite.

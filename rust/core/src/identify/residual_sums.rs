@@ -14,7 +14,7 @@ use crate::integrator::{FeedbackState, Observer};
 use crate::math::Lanes;
 use crate::signal::{FractionalDelay, Stop, index};
 
-/// Cost and offset of a candidate.
+/// Cost, offset, drift and shares of the creep of a candidate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Costs {
     /// RMS deviation, m, times the factor of the priors where there are any; infinite where the
@@ -170,7 +170,7 @@ pub(super) struct Simulated {
     pub costs: Costs,
     /// Sums over the whole window; `None` where it was not simulated to its end.
     pub sums: Option<ShareSums>,
-    /// What is read at the samples that were asked for, without offset, m: with the creep where the
+    /// What is read at the samples that were asked for, without offset and drift, m: with the creep where the
     /// candidate has its shares given, else of the mechanics alone.
     pub reading: Vec<f64>,
     /// What is read there of each relaxation of the creep, where no shares are given, m.

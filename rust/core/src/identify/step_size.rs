@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::candidate::Theta;
+use super::candidate::{DELAY, Theta};
 use super::history::History;
 use super::motion::motion;
 use super::problem::Problem;
@@ -100,9 +100,13 @@ fn representatives(problem: &Problem) -> Vec<Theta> {
 /// The corners of the box of free parameters, and its middle.
 pub(super) fn corners(problem: &Problem) -> Vec<Theta> {
     let count = problem.free().count();
-    let mut places: Vec<Vec<f64>> = (0..1_usize << count)
-        .map(|bits| (0..count).map(|d| f64::from(u8::from(bits >> d & 1 == 1))).collect())
-        .collect();
+    // What a record has of its own does not move the stage.
+    let moving = problem.free().filter(|&parameter| parameter < DELAY).count();
+    let corner = |bits: usize| {
+        let end = |d: usize| if d < moving { f64::from(u8::from(bits >> d & 1 == 1)) } else { 0.5 };
+        (0..count).map(end).collect()
+    };
+    let mut places: Vec<Vec<f64>> = (0..1_usize << moving).map(corner).collect();
     places.push(vec![0.5; count]);
     // Ties may leave corners without a stage, never the middle.
     let all = places.iter().map(|place| problem.theta(place));

@@ -316,7 +316,8 @@ fn choose_dynamics_and_creep(fit: &mut Fit<'_>, settings: &Settings, mode: bool)
     Some(())
 }
 
-/// Mode or lag where they are not set, and the lags that explain the record as well.
+/// Mode or lag where they are not set; the lags that explain the record as well are then in
+/// [`Fit::lags`].
 fn choose_dynamics(fit: &mut Fit<'_>, settings: &Settings, mode: bool) -> Option<()> {
     match settings.dynamics {
         DynamicsKind::None => {}
@@ -375,7 +376,8 @@ fn at_lag<'a>(fit: &Fit<'a>, time: f64, steps: usize) -> Option<Fit<'a>> {
     Some(trial)
 }
 
-/// The smallest lag that explains the record as well as the best one, and the range of such lags.
+/// The fit with the smallest lag that explains the record as well as the best one, and with the range
+/// of such lags.
 fn smallest_lag<'a>(mut still: Fit<'a>, best: &Fit<'a>) -> Option<Fit<'a>> {
     let time = libm::exp(best.x[best.layout().poles().start]);
     let enough = SAME * f64::min(best.rms, still.rms);

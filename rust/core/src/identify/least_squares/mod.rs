@@ -222,7 +222,7 @@ pub struct RecordFit {
 }
 
 /// Identifies a stage of a model from one or several records; `None` where `stop` said so
-/// meanwhile.
+/// meanwhile. Trials go side by side on the threads of the present pool.
 ///
 /// # Errors
 /// [`Error`] where the model, the settings or a record cannot be used.

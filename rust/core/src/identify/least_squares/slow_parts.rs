@@ -59,19 +59,19 @@ pub(super) fn choose_slow(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> 
         Some(drifted)
     };
     let [drifted, crept] = side_by_side([&drifting, &creeping])?;
-    let with_creep = || {
+    let then_creeping = || {
         let mut both = drifted.clone();
         if drifted.drifts != from.drifts {
             choose_creep(&mut both, settings)?;
         }
         Some(both)
     };
-    let with_drift = || {
+    let then_drifting = || {
         let mut both = crept.clone();
         choose_drifts(&mut both)?;
         Some(both)
     };
-    let [drifted_first, crept_first] = side_by_side([&with_creep, &with_drift])?;
+    let [drifted_first, crept_first] = side_by_side([&then_creeping, &then_drifting])?;
     let found = [drifted, drifted_first, crept_first, crept];
     // One explains a record as well as the other, but goes on otherwise.
     let mut least = f64::INFINITY;
