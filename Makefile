@@ -41,7 +41,7 @@ fuzz: $(VENV)/installed $(VENV)/tools ## The fuzzers, with their table of tries 
 
 lint: $(VENV)/installed $(VENV)/tools ## Formatting, clippy, ruff, types, layers, stubs
 	cargo fmt --all --check
-	cargo clippy --workspace --all-targets --locked -- -D warnings
+	cargo clippy --release --workspace --all-targets --locked -- -D warnings
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
 	$(BIN)/mypy

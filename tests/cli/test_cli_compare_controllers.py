@@ -19,6 +19,7 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     Path("dahl.json").write_text(model_text(), encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_controllers_are_compared_and_written() -> None:
     words = ran(*COMPARE, "--controllers", "inverse, PID", "--rates", "0.5,1,2", "--seeds", "2")
     assert "true error in nm rms at 50 Hz, mean of 2 draws of the noise" in words

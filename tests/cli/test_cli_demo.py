@@ -22,6 +22,7 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     return folder, str(done.stdout)
 
 
+@pytest.mark.slow
 def test_the_files_are_there_and_listed(printed: tuple[Path, str]) -> None:
     folder, text = printed
     pictures = [

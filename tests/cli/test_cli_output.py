@@ -50,6 +50,7 @@ WRITES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", WRITES)
 def test_results_are_replaced_only_where_that_is_asked_for(command: str) -> None:
     first = Path(WRITES[command])

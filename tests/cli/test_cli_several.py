@@ -83,6 +83,7 @@ def test_several_logs_share_the_creep_of_a_model_that_is_searched() -> None:
     assert max(found["parameters"]["creep_weights"]["value"]) < 1e-3
 
 
+@pytest.mark.slow
 def test_a_model_of_several_logs_is_used_like_any_other() -> None:
     ran("identify", "a.csv", "b.csv", *KINDS, *FIXED, "--delay", "0", "--delay", "0.02")
     ran("simulate", "results/dahl.json", "b.csv", "--out", "simulated.csv")

@@ -110,6 +110,7 @@ def test_the_working_folder_may_be_gone(tmp_path: Path) -> None:
     assert names(str(tmp_path / "o")) == WRITTEN
 
 
+@pytest.mark.slow
 @POSIX
 @pytest.mark.parametrize(
     "arguments",

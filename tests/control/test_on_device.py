@@ -233,6 +233,7 @@ def _broken(_: float) -> float:
     raise pt.DeviceError("the connection was lost")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_short")
 @pytest.mark.parametrize(
     ("answer", "words"),

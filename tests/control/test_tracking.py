@@ -229,6 +229,7 @@ COURSES: dict[str, Callable[[], pt.Reference]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COURSES)
 def test_every_reference_has_figures_words_and_pictures(name: str) -> None:
     run = pt.track(STAGE, loop(feedback=PID), COURSES[name]())

@@ -151,6 +151,7 @@ def ask(program: str, surroundings: dict[str, str]) -> Any:
     return json.loads(done.stdout.splitlines()[-1])
 
 
+@pytest.mark.slow
 def test_prepare_kickoff_complete_are_a_play(surroundings: dict[str, str]) -> None:
     found = ask(CLIENT.format(body=PLAY), surroundings)
     volts = 30.0 - 30.0 * np.cos(np.arange(400) / 60.0)
@@ -292,6 +293,7 @@ def test_a_model_is_served_within_its_limits_until_a_signal(
         assert child.stderr.read().splitlines()[-1] == f"piezotrack: {word}"
 
 
+@pytest.mark.slow
 def test_a_device_is_published_in_the_place_of_the_virtual_stage() -> None:
     here = environment()
     with (

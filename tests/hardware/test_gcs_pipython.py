@@ -124,6 +124,7 @@ found["stop"] = refused(pi.StopAll), refused(pi.STP), refused(pi.HLT)
 WAVE = 20.0 - 20.0 * np.cos(2.0 * np.pi * np.arange(200) / 200.0)
 
 
+@pytest.mark.slow
 def test_it_plays_a_wave_table_and_reads_the_data_recorder() -> None:
     words = json.dumps([round(float(value), 6) for value in WAVE])
     found = asked(f"""
@@ -162,6 +163,7 @@ found["position"], found["volts"] = data
     np.testing.assert_allclose(found["position"], 1e6 * record.displacement, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_it_defines_waves_and_records_a_step() -> None:
     found = asked(
         """

@@ -207,6 +207,7 @@ def test_several_records_go_on_too(tmp_path: Path) -> None:
         pt.identify(logs[::-1], "dahl", checkpoint=path)
 
 
+@pytest.mark.slow
 def test_the_command_goes_on(tmp_path: Path) -> None:
     log, path = tmp_path / "log.csv", tmp_path / "search.checkpoint"
     write_log(record(), log)

@@ -144,6 +144,7 @@ def test_several_records_have_the_same_weights(method: Any) -> None:
     assert fit.cost < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weights", [(1.0, 1.0), (1.0, 20.0)])
 @pytest.mark.parametrize("offset", [True, False, [True, False]])
 def test_the_weights_are_those_of_least_squares_of_all_records(

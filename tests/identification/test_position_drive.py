@@ -164,6 +164,7 @@ def test_auto_takes_it() -> None:
     assert "V" not in result.stdout
 
 
+@pytest.mark.slow
 def test_closed_loops_take_it() -> None:
     """Limits in um, gains in um/um: the same loop as with the same numbers in volts."""
     write_log()

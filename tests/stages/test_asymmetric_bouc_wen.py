@@ -131,6 +131,7 @@ def test_the_inverse_leads_the_stage_along_the_reference() -> None:
     assert np.abs(error).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_identification_finds_the_parameters(tmp_path: Path) -> None:
     dt = 2e-3
     t = np.arange(4001) * dt

@@ -155,6 +155,7 @@ def test_an_equilibrium_is_that_of_a_slow_drive() -> None:
     assert there.x == pytest.approx(x, abs=2e-9)
 
 
+@pytest.mark.slow
 def test_identification_finds_the_motion(tmp_path: Path) -> None:
     dt = 2e-3
     t = np.arange(1500) * dt
