@@ -180,10 +180,17 @@ impl<N: Number> LuGre<N> {
         // No closure, as of `map`: it would not be compiled for the vector instructions of its caller.
         let [a0, a1] = [acceleration(velocity, zero), acceleration(velocity, first)];
         let [a2, a3] = [acceleration(velocity, second), acceleration(velocity, one)];
-        let there = Leg::new(direction, [x0, turning], [start, still], [a0, a1]);
-        let back = Leg::new(-direction, [turning, coming], [still, late], [a1, a2]);
-        let on = Leg::new(direction, [coming, x1], [late, end], [a2, a3]);
-        self.leg(self.leg(self.leg(z, &there, rate), &back, rate), &on, rate)
+        let legs = [
+            Leg::new(direction, [x0, turning], [start, still], [a0, a1]),
+            Leg::new(-direction, [turning, coming], [still, late], [a1, a2]),
+            Leg::new(direction, [coming, x1], [late, end], [a2, a3]),
+        ];
+        // In a loop, so that what a leg is, which is long, is compiled once for all three.
+        let mut z = z;
+        for leg in &legs {
+            z = self.leg(z, leg, rate);
+        }
+        z
     }
 
     /// The deflection after a leg.

@@ -174,7 +174,9 @@ pub(super) fn advance_operator<N: Number, O: Operator<N>>(
     let velocity = CubicVelocity::along(sign(from.w), [from.x, from.w], [x, w]);
     // A lane that turns does not go back besides; each lane takes its own way, whatever the others.
     let dips = turned.where_negative(x.like(1.0), velocity.dips());
-    if dips.any_negative() {
+    // The legs of a step that reverses are gone through in a loop: the operator's code, which is
+    // long, would otherwise be compiled for each of them.
+    let (ends, directions, legs) = if dips.any_negative() {
         // Lanes without a leg go to its end before; it then has length 0.
         // No closure, as of `map`: it would not be compiled for the vector instructions of its caller.
         let [first, second] = velocity.dip();
@@ -183,18 +185,25 @@ pub(super) fn advance_operator<N: Number, O: Operator<N>>(
         let first = dips.where_negative(first, x);
         let first = turned.where_negative(turning_point(from, x, w), first);
         let second = dips.where_negative(second, x);
-        let there = operator.along(branch, first - from.x);
         let back = dips.where_negative(-velocity.direction, sign(w));
-        let there = operator.along(&operator.branch(&there, back), second - first);
         let on = dips.where_negative(velocity.direction, sign(w));
-        operator.along(&operator.branch(&there, on), x - second)
+        ([first, second, x], [back, on], 3)
     } else if turned.any_negative() {
         // Lanes that did not turn go to the end on the first leg; their second has length 0.
         let turning = turned.where_negative(turning_point(from, x, w), x);
-        let there = operator.along(branch, turning - from.x);
-        operator.along(&operator.branch(&there, sign(w)), x - turning)
+        ([turning, x, x], [sign(w); 2], 2)
     } else {
-        operator.along(branch, x - from.x)
+        return operator.along(branch, x - from.x);
+    };
+    let (mut at, mut leg, mut branch) = (from.x, 0, *branch);
+    loop {
+        let memory = operator.along(&branch, ends[leg] - at);
+        if leg + 1 == legs {
+            return memory;
+        }
+        branch = operator.branch(&memory, directions[leg]);
+        at = ends[leg];
+        leg += 1;
     }
 }
 

@@ -76,14 +76,18 @@ impl<N: Number> Coupling<N> for LuGreCoupling<N> {
         let ahead = begin(zero);
         let (mut x, mut w) = (ahead.x, ahead.w);
         let direction = sign(heading(state, &ahead));
-        for _ in 0..CORRECTIONS {
+        let mut correction = 0;
+        loop {
+            let deflection = self.deflection(state, direction, x, w);
+            if correction == CORRECTIONS {
+                let memory = LuGreMemory { deflection, velocity: w * self.rate };
+                return FeedbackState { x, w, memory };
+            }
+            correction += 1;
             let velocity = CubicVelocity::along(drive.like(1.0), [state.x, state.w], [x, w]);
             let ahead = begin(velocity.b);
-            let arrived = self.deflection(state, direction, x, w);
-            let end = self.force(arrived, w, velocity.a + velocity.a + velocity.b);
+            let end = self.force(deflection, w, velocity.a + velocity.a + velocity.b);
             (x, w) = conclude_with(&self.linear, &ahead, end);
         }
-        let deflection = self.deflection(state, direction, x, w);
-        FeedbackState { x, w, memory: LuGreMemory { deflection, velocity: w * self.rate } }
     }
 }

@@ -37,8 +37,15 @@ impl<N: Number, O: NonsmoothOperator<N>> Coupling<N> for NonsmoothCoupling<N, O>
         let from = FeedbackState { memory, ..*state };
         let ahead = predict(linear, operator, &from, drive, rise);
         let branch = operator.branch(&from.memory, sign(heading(&from, &ahead)));
-        let arrived = advance_operator(operator, &from, &branch, ahead.x, ahead.w);
-        let (x, w) = conclude(linear, &ahead, operator.output(&arrived));
-        FeedbackState { x, w, memory: advance_operator(operator, &from, &branch, x, w) }
+        let (mut x, mut w) = (ahead.x, ahead.w);
+        let mut corrected = false;
+        loop {
+            let memory = advance_operator(operator, &from, &branch, x, w);
+            if corrected {
+                return FeedbackState { x, w, memory };
+            }
+            (x, w) = conclude(linear, &ahead, operator.output(&memory));
+            corrected = true;
+        }
     }
 }

@@ -114,9 +114,13 @@ impl<'a, P: Plant> Apparatus<'a, P> {
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 1e7")]
         let steps = wanted as usize;
-        let step = duration / wanted;
+        Ok(self.equal_steps(steps, duration / wanted))
+    }
+
+    /// All that so many steps of `step` seconds decide.
+    pub(super) fn equal_steps(&self, steps: usize, step: f64) -> Stretch<P::Flow> {
         let (plant, amplifier) = (self.plant.flow(step), self.amplifier.flow(step));
-        Ok(Stretch { steps, plant, amplifier })
+        Stretch { steps, plant, amplifier }
     }
 
     /// Simulates a stretch of time in which the command is linear from one voltage to another;
@@ -133,7 +137,7 @@ impl<'a, P: Plant> Apparatus<'a, P> {
         loop {
             let steps = done + 1..=stretch.steps.min(done + BLOCK);
             done = *steps.end();
-            dispatch_fused(DriveStretch { apparatus: self, stretch, state, command, steps });
+            self.drive_steps(stretch, state, command, steps);
             if done == stretch.steps {
                 return true;
             }
@@ -141,6 +145,28 @@ impl<'a, P: Plant> Apparatus<'a, P> {
                 return false;
             }
         }
+    }
+
+    /// The same to its end, whatever happens meanwhile.
+    pub(super) fn drive_on(
+        &self,
+        stretch: &Stretch<P::Flow>,
+        state: &mut ApparatusState<P::State>,
+        command: [f64; 2],
+    ) {
+        self.drive_steps(stretch, state, command, 1..=stretch.steps);
+    }
+
+    /// Some of the steps. Compiled once, with every model in it.
+    #[inline(never)]
+    fn drive_steps(
+        &self,
+        stretch: &Stretch<P::Flow>,
+        state: &mut ApparatusState<P::State>,
+        command: [f64; 2],
+        steps: RangeInclusive<usize>,
+    ) {
+        dispatch_fused(DriveStretch { apparatus: self, stretch, state, command, steps });
     }
 }
 

@@ -19,7 +19,7 @@ use crate::models::{
     Creep, Dynamics, FoundBy, InputStage, MOST_PLAYS, MOST_RELAXATIONS, MOST_ZONES, Plant,
     PlayHysteresis, Plays, Relaxation, Settling, Stage, StageState,
 };
-use crate::signal::{Drive, Stop};
+use crate::signal::{Drive, Stop, index};
 
 /// Cycles before an experiment, so that it starts on the settled loop, with the sensor at 0 there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -216,8 +216,7 @@ impl VirtualStage {
         let apparatus = self.apparatus();
         let mut state = apparatus.rest();
         if let Some(Preconditioning { swing, rest }) = self.preconditioning {
-            self.cycle(&mut state.plant, swing);
-            self.wait(&mut state.plant, rest);
+            state.plant = self.preconditioned(swing, rest);
             apparatus.sensor.set_zero(&mut state.sensor, self.stage.displacement(&state.plant));
         }
         state
@@ -261,10 +260,12 @@ impl VirtualStage {
         self.stage.model().found_by() == FoundBy::LeastSquares
     }
 
-    /// Full cycles between 0 V and the swing, each `(1 - cos) / 2`.
-    fn cycle(&self, state: &mut StageState, swing: f64) {
+    /// The stage after full cycles between 0 V and the swing, each `(1 - cos) / 2`, and a rest at 0 V.
+    fn preconditioned(&self, swing: f64, rest: f64) -> StageState {
         let step = if self.has_plays() { CYCLE_STEP } else { self.step.min(CYCLE_STEP) };
-        let flow = self.stage.flow(step);
+        let apparatus = Apparatus::ideal(&self.stage, step);
+        let mut state = apparatus.rest();
+        let stretch = apparatus.equal_steps(1, step);
         let turn = CYCLE_FREQUENCY * step;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
         let steps = (f64::from(CYCLES) / turn).round() as u32;
@@ -272,23 +273,18 @@ impl VirtualStage {
         for k in 1..=steps {
             let phase = (f64::from(k) * turn).fract();
             let after = 0.5 * swing * (1.0 - libm::cos(core::f64::consts::TAU * phase));
-            self.stage.advance(&flow, state, before, after);
+            apparatus.drive_on(&stretch, &mut state, [before, after]);
             before = after;
         }
-    }
-
-    /// Rest at 0 V; of plays at the input in one exact step.
-    fn wait(&self, state: &mut StageState, rest: f64) {
-        if rest <= 0.0 {
-            return;
+        if rest > 0.0 {
+            // Of plays at the input in one exact step.
+            let steps = (rest / self.step).ceil().clamp(1.0, REST_STEPS);
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 1e6")]
+            let steps = if self.has_plays() { 1 } else { steps as usize };
+            let stretch = apparatus.equal_steps(steps, rest / index(steps));
+            apparatus.drive_on(&stretch, &mut state, [0.0; 2]);
         }
-        let steps = (rest / self.step).ceil().clamp(1.0, REST_STEPS);
-        let steps = if self.has_plays() { 1.0 } else { steps };
-        let flow = self.stage.flow(rest / steps);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 1e6")]
-        for _ in 0..steps as u32 {
-            self.stage.advance(&flow, state, 0.0, 0.0);
-        }
+        state.plant
     }
 }
 
