@@ -1,6 +1,6 @@
 # What a person types. Needs a Rust toolchain and Python 3.11 or newer; all else is put in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo reproduce benchmark test soak fuzz lint rust-test no-std python-test bench docs reference refused c-library c-header c-header-test clean
+.PHONY: help demo reproduce benchmark test soak fuzz lint lint-rust lint-python rust-test no-std python-test rust-checks other-checks bench docs reference refused c-library c-header c-header-test clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -30,7 +30,22 @@ benchmark: $(VENV)/installed ## Every model on every record, and the page of it
 	$(BIN)/piezotrack benchmark --out benchmark --overwrite
 	$(BIN)/python docs/make_benchmark.py benchmark
 
-test: lint rust-test no-std c-header-test python-test ## Everything that must hold before a change lands
+# What takes one core goes beside what cargo compiles, which takes one of its folders for itself.
+test: $(VENV)/pip ## Everything that must hold before a change lands
+	@$(MAKE) --no-print-directory -j2 $(WHEELS)/built $(VENV)/tools
+	@$(MAKE) --no-print-directory $(VENV)/installed
+	@$(MAKE) --no-print-directory -j2 rust-checks other-checks
+	@$(MAKE) --no-print-directory python-test
+
+rust-checks:
+	@$(MAKE) --no-print-directory lint-rust
+	@$(MAKE) --no-print-directory rust-test
+	@$(MAKE) --no-print-directory c-library
+
+other-checks:
+	@$(MAKE) --no-print-directory lint-python
+	@$(MAKE) --no-print-directory no-std
+	@$(MAKE) --no-print-directory c-header-test
 
 soak: fuzz ## The tests that take long: fuzzers, properties, examples, searches with full budgets
 	PROPTEST_CASES=$(CASES) PROPTEST_RNG_SEED=$(SEED) cargo test --locked --release -p piezotrack-core --test properties
@@ -39,9 +54,13 @@ soak: fuzz ## The tests that take long: fuzzers, properties, examples, searches 
 fuzz: $(VENV)/installed $(VENV)/tools ## The fuzzers, with their table of tries and failures: SEED=7 CALLS=1000000 FILES=100000
 	$(BIN)/pytest -n auto --dist worksteal -m slow tests/soak --soak-seed=$(SEED) --soak-calls=$(CALLS) --soak-files=$(FILES) --soak-table=$(TABLE) --soak-loop=$(LOOP)
 
-lint: $(VENV)/installed $(VENV)/tools ## Formatting, clippy, ruff, types, layers, stubs
+lint: lint-rust lint-python ## Formatting, clippy, ruff, types, layers, stubs
+
+lint-rust:
 	cargo fmt --all --check
 	cargo clippy --release --workspace --all-targets --locked -- -D warnings
+
+lint-python: $(VENV)/installed $(VENV)/tools
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
 	$(BIN)/mypy
@@ -98,10 +117,13 @@ $(VENV)/pip:
 	@touch $@
 
 # A release wheel, as a user would install it; the package in python/ is never imported.
-$(VENV)/installed: $(VENV)/pip $(SOURCES)
+$(WHEELS)/built: $(VENV)/pip $(SOURCES)
 	@echo "Compiling: two to five minutes, with one line of output for most of it; less after a change."
 	@rm -rf $(WHEELS)
 	$(BIN)/maturin build --release --locked --out $(WHEELS) --interpreter $(BIN)/python
+	@touch $@
+
+$(VENV)/installed: $(WHEELS)/built
 	$(BIN)/python -m pip install --quiet --force-reinstall --no-deps $(WHEELS)/*.whl
 	$(BIN)/python -m pip install --quiet $(WHEELS)/*.whl
 	@touch $@

@@ -31,11 +31,16 @@ MODULES = sorted(
     }
 )
 
+LONG = {"piezotrack.xu_li_2010.reproduction"}
+
 
 # Examples.
 
 
-@pytest.mark.parametrize("name", MODULES)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] if name in LONG else []) for name in MODULES],
+)
 def test_the_examples_in_docstrings_run(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -150,7 +155,8 @@ def test_every_field_of_a_class_is_documented(name: str) -> None:
 # Those that search with full budgets.
 SLOW = {
     *("bouc_wen_benchmark.py", "calibrate_virtual_stage.py", "hundred_cycles.py"),
-    *("compare_models.py", "track_virtual_stage.py"),
+    *("compare_models.py", "track_virtual_stage.py", "trace_circle.py", "learn_raster.py"),
+    "tune_gains.py",
 }
 
 

@@ -277,6 +277,7 @@ def test_an_option_without_effect_is_refused_by_name(command: str) -> None:
     assert refusal(*command.split()).startswith(f"{NO_EFFECT[command]} has no effect with")
 
 
+@pytest.mark.slow
 def test_the_installed_command_works_and_repeats_itself() -> None:
     script = Path(sys.executable).with_name("piezotrack")
     command = [str(script)] if script.exists() else COMMAND
@@ -371,6 +372,7 @@ def through(environment: dict[str, str], *arguments: str, **options: Any) -> tup
     return done.returncode, without_progress(done.stderr)
 
 
+@pytest.mark.slow
 def test_a_name_that_the_terminal_cannot_show_is_no_reason_to_fail() -> None:
     write("\N{GREEK SMALL LETTER MU}.csv", log_text())
     ascii_only = {"PYTHONIOENCODING": "ascii"}

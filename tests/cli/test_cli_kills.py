@@ -131,6 +131,7 @@ def kill_often(work: list[str], tries: int) -> None:
         assert found in (old, new)
 
 
+@pytest.mark.slow
 def test_a_killed_command_leaves_no_torn_or_mixed_results() -> None:
     kill_often(WORK["track"], 4)
 

@@ -123,6 +123,7 @@ def test_quiet_prints_errors_only() -> None:
     assert "exists" in refusal("identify", "log.csv", *PAPER, "--quiet")
 
 
+@pytest.mark.slow
 def test_settings_of_least_squares_reach_the_fit() -> None:
     options = "--plays 5 --asymmetry 1 --dynamics lag --creep 0.5,2"
     ran("identify", "log.csv", "--model", "prandtl-ishlinskii", *options.split(), "--quiet")
@@ -154,6 +155,7 @@ def test_creep_reaches_what_auto_tries() -> None:
 # Progress where there is no terminal.
 
 
+@pytest.mark.slow
 def test_progress_is_told_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(progress_bar, "FIRST", 0.0)
     monkeypatch.setattr(progress_bar, "EVERY", 0.01)

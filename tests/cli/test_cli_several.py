@@ -64,6 +64,7 @@ def test_several_logs_give_one_model() -> None:
     assert all(f"  {Path('results', name)}\n" in printed for name in written)
 
 
+@pytest.mark.slow
 def test_an_option_given_once_is_for_all_logs() -> None:
     given = ("--delay", "fit", "--window", "1:", "--json")
     document = json.loads(ran("identify", "a.csv", "b.csv", *KINDS, *FIXED, *given))

@@ -62,6 +62,7 @@ def test_better_in_the_sum_and_nowhere_worse_than_the_noise_explains() -> None:
     assert sums[1] < 0.95 * sums[0]
 
 
+@pytest.mark.slow
 def test_the_table_is_that_of_the_runs() -> None:
     table = found().errors
     assert table.shape == (2, 2, 2)

@@ -71,6 +71,7 @@ def test_the_report_is_that_of_the_exact_check_and_of_a_full_simulation() -> Non
     assert "what binds" in str(report)
 
 
+@pytest.mark.slow
 def test_a_spread_is_kept_at_its_ends() -> None:
     stage = published_stage()
     spread = pt.Spread(delay=(0.0, 1e-3), mode=0.1, gain=0.2)

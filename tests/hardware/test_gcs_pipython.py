@@ -65,6 +65,7 @@ def asked(body: str, speed: float = 20.0) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.slow
 def test_it_takes_the_controller_for_one_of_gcs_2() -> None:
     found = asked("""
 found["kind"] = type(pi.gcsdevice).__name__

@@ -283,6 +283,7 @@ def test_a_drive_above_half_the_rate_is_refused(text: str) -> None:
     assert np.ptp(drive.sample(1.0 / 1000.0)) > 5.0
 
 
+@pytest.mark.slow
 def test_dead_zones_that_were_placed_too_early_are_placed_anew() -> None:
     """With this noise they moved, before the creep was known, and did not come back."""
     used = VirtualDevice(pt.VirtualStage.xu_li_2010(seed=11))

@@ -130,6 +130,7 @@ def test_fifteen_lines_have_the_figures_of_other_people_s_runs() -> None:
 # Records.
 
 
+@pytest.mark.slow
 def test_the_bouc_wen_benchmark_has_the_published_signals() -> None:
     one = RECORDS["bouc-wen-benchmark"]()
     u = multisine(3)

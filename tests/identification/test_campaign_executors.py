@@ -115,6 +115,7 @@ def test_a_dask_worker_that_is_killed_changes_no_bit(
     assert missing(tmp_path) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_the_command_takes_the_address_of_a_scheduler(
     tmp_path: Path, cluster: Any, monkeypatch: pytest.MonkeyPatch

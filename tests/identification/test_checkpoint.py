@@ -120,7 +120,8 @@ def killed(arguments: list[str], after: float) -> str:
         return process.stdout.read()
 
 
-@pytest.mark.parametrize("kills", [3, pytest.param(50, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kills", [3, 50])
 def test_a_killed_search_goes_on(kills: int, tmp_path: Path) -> None:
     # Long enough that it is killed within.
     log = record(count=4_000 if kills < 10 else 10_000)

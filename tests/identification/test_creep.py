@@ -176,6 +176,7 @@ def test_the_weights_are_those_of_least_squares_of_all_records(
     assert fit.cost == pytest.approx(left / np.sqrt(counts), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_the_search_of_several_records_ends_at_a_minimum() -> None:
     """A parameter held a little aside, the rest fitted again, makes the cost larger."""
     records = two_records(noise=1e-7)

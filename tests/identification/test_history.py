@@ -96,6 +96,7 @@ def test_a_record_is_searched_again_only_for_a_history_that_it_shows(
     assert asked[-1] == searched[-1]
 
 
+@pytest.mark.slow
 def test_a_long_record_is_asked_at_its_beginning(monkeypatch: pytest.MonkeyPatch) -> None:
     log = record([75.0])
     expected = pt.identify(log, "first-order-dahl").cost

@@ -139,8 +139,13 @@ except KeyboardInterrupt as stopped:
 @pytest.mark.skipif(os.name == "nt", reason="Windows sends Ctrl-C in another way")
 @pytest.mark.parametrize(
     ("watched", "samples", "particles"),
-    [("alone", 20_001, 100), ("callback", 20_001, 100), ("alone", 1_000_001, 50_000)],
-    ids=["alone", "callback", "before the first cost"],
+    [
+        pytest.param("alone", 20_001, 100, id="alone"),
+        pytest.param("callback", 20_001, 100, id="callback", marks=pytest.mark.slow),
+        pytest.param(
+            "alone", 1_000_001, 50_000, id="before the first cost", marks=pytest.mark.slow
+        ),
+    ],
 )
 def test_ctrl_c_stops_at_once_and_keeps_the_best(
     watched: str, samples: int, particles: int

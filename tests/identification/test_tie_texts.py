@@ -11,6 +11,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
@@ -158,6 +159,7 @@ def test_what_is_no_expression_is_refused(text: str) -> None:
 TOKENS = st.sampled_from([*OTHERS, *FUNCTIONS, *"()+-*/.e_,;=<>[]'\"\\\n\0", "**", "1e9", "2", " "])
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(
     text=st.one_of(

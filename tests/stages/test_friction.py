@@ -79,6 +79,7 @@ def test_carries_on_also_while_it_sticks(cut: int) -> None:
     assert np.abs(second.x - whole.x[cut:]).max() <= 1e-10
 
 
+@pytest.mark.slow
 def test_without_b1_the_operator_is_remembered() -> None:
     parameters = replace(TABLE_1, b1=0.0, b0=100.0)
     u = sine(1500, 1e-3, 1.0)

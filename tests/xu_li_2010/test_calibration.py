@@ -14,6 +14,7 @@ from piezotrack.xu_li_2010.free_parameters import FREE, Free, apparatus_at
 from piezotrack.xu_li_2010.published import observables
 
 
+@pytest.mark.slow
 def test_the_file_is_what_the_calibration_gives() -> None:
     document = calibration_file()
     theta = {one["name"]: one["value"] for one in document["free"]}
