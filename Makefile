@@ -1,6 +1,6 @@
 # What a person types. Needs a Rust toolchain and Python 3.11 or newer; all else is put in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo reproduce benchmark test soak fuzz lint lint-rust lint-python rust-test no-std python-test rust-checks other-checks bench docs reference refused c-library c-header c-header-test clean
+.PHONY: help demo reproduce benchmark test soak fuzz lint lint-rust lint-python rust-test no-std python-test rust-checks bench docs reference refused c-library c-header c-header-test clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -31,21 +31,17 @@ benchmark: $(VENV)/installed ## Every model on every record, and the page of it
 	$(BIN)/python docs/make_benchmark.py benchmark
 
 # What takes one core goes beside what cargo compiles, which takes one of its folders for itself.
+# Not by -j: cargo would ask make for leave to use the cores.
+BESIDE = sh -c '$$1 & first=$$!; $$2; second=$$?; wait $$first && exit $$second' beside
+SUB = $(MAKE) --no-print-directory
+
 test: $(VENV)/pip ## Everything that must hold before a change lands
-	@$(MAKE) --no-print-directory -j2 $(WHEELS)/built $(VENV)/tools
-	@$(MAKE) --no-print-directory $(VENV)/installed
-	@$(MAKE) --no-print-directory -j2 rust-checks other-checks
-	@$(MAKE) --no-print-directory python-test
+	@$(BESIDE) '$(SUB) $(WHEELS)/built' '$(SUB) $(VENV)/tools'
+	@$(SUB) $(VENV)/installed
+	@$(BESIDE) '$(SUB) rust-checks' '$(SUB) lint-python no-std c-header-test'
+	@$(SUB) python-test
 
-rust-checks:
-	@$(MAKE) --no-print-directory lint-rust
-	@$(MAKE) --no-print-directory rust-test
-	@$(MAKE) --no-print-directory c-library
-
-other-checks:
-	@$(MAKE) --no-print-directory lint-python
-	@$(MAKE) --no-print-directory no-std
-	@$(MAKE) --no-print-directory c-header-test
+rust-checks: lint-rust rust-test c-library
 
 soak: fuzz ## The tests that take long: fuzzers, properties, examples, searches with full budgets
 	PROPTEST_CASES=$(CASES) PROPTEST_RNG_SEED=$(SEED) cargo test --locked --release -p piezotrack-core --test properties

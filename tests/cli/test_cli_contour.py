@@ -88,6 +88,7 @@ def test_each_axis_may_have_its_own_gain() -> None:
     )
 
 
+@pytest.mark.usefixtures("_no_pictures")
 def test_the_options_reach_the_stage_and_the_loops() -> None:
     options = (
         "--path lissajous:0.5/1Hz,5/5um --lag 0.04 --cross-talk 0.1:-0.08 --decouple --kp 0.1 "
@@ -200,6 +201,7 @@ def test_what_cannot_be_done_is_refused_in_one_sentence() -> None:
     assert not Path("results").exists()
 
 
+@pytest.mark.usefixtures("_no_pictures")
 def test_a_path_of_two_columns_needs_an_interval() -> None:
     t = np.arange(201) / 20.0
     rows = np.column_stack([50.0 + 10.0 * np.cos(t), 50.0 + 10.0 * np.sin(t)])

@@ -172,6 +172,7 @@ def test_progress_is_told_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (quiet.exit_code, quiet.stderr) == (0, "")
 
 
+@pytest.mark.usefixtures("_no_pictures")
 def test_least_squares_tell_their_progress_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(progress_bar, "FIRST", 0.0)
     monkeypatch.setattr(progress_bar, "EVERY", 0.01)
@@ -179,6 +180,7 @@ def test_least_squares_tell_their_progress_too(monkeypatch: pytest.MonkeyPatch) 
     assert re.match(r"identify: prandtl-ishlinskii, least squares, 0 s\n", result.stderr)
 
 
+@pytest.mark.usefixtures("_no_pictures")
 def test_nothing_is_told_of_what_takes_no_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(progress_bar, "FIRST", 3600.0)
     assert run("identify", "log.csv", *PAPER).stderr == ""

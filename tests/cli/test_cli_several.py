@@ -74,6 +74,7 @@ def test_an_option_given_once_is_for_all_logs() -> None:
     assert [one["data"]["window_s"][0] for one in found["records"]] == [1.0, 1.0]
 
 
+@pytest.mark.usefixtures("_no_pictures")
 def test_several_logs_share_the_creep_of_a_model_that_is_searched() -> None:
     document = json.loads(
         ran("identify", "a.csv", "b.csv", *KINDS, *FIXED, "--creep", "1,5", "--json")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from typer.testing import CliRunner
+from typer import testing
 
 import piezotrack as pt
 from piezotrack.cli.advice import as_options, options_named
@@ -43,9 +43,13 @@ def log_text() -> str:
     return text
 
 
+# The runner builds all commands anew for each call, which takes longer than most of the calls.
+testing._get_command = cache(testing._get_command)  # type: ignore[attr-defined]
+
+
 def run(*arguments: str) -> Any:
     """Call the command inside this process."""
-    return CliRunner().invoke(app, arguments)
+    return testing.CliRunner().invoke(app, arguments)
 
 
 def without_progress(errors: str) -> str:
