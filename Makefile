@@ -114,7 +114,7 @@ $(VENV)/pip:
 
 # A release wheel, as a user would install it; the package in python/ is never imported.
 $(WHEELS)/built: $(VENV)/pip $(SOURCES)
-	@echo "Compiling: two to five minutes, with one line of output for most of it; less after a change."
+	@echo "Compiling: two to three minutes, with one line of output for most of it; less after a change."
 	@rm -rf $(WHEELS)
 	$(BIN)/maturin build --release --locked --out $(WHEELS) --interpreter $(BIN)/python
 	@touch $@
