@@ -31,14 +31,15 @@ benchmark: $(VENV)/installed ## Every model on every record, and the page of it
 	$(BIN)/python docs/make_benchmark.py benchmark
 
 # What takes one core goes beside what cargo compiles, which takes one of its folders for itself.
-# Not by -j: cargo would ask make for leave to use the cores.
-BESIDE = sh -c '$$1 & first=$$!; $$2; second=$$?; wait $$first && exit $$second' beside
+# Not by -j: cargo would ask make for leave to use the cores. What runs in the background does not
+# hear Ctrl-C, and is ended.
+BESIDE = sh -c '$$1 & first=$$!; trap "kill $$first; exit 130" INT TERM; $$2; second=$$?; wait $$first && exit $$second' beside
 SUB = $(MAKE) --no-print-directory
 
 test: $(VENV)/pip ## Everything that must hold before a change lands
-	@$(BESIDE) '$(SUB) $(WHEELS)/built' '$(SUB) $(VENV)/tools'
+	@$(BESIDE) '$(SUB) $(VENV)/tools' '$(SUB) $(WHEELS)/built'
 	@$(SUB) $(VENV)/installed
-	@$(BESIDE) '$(SUB) rust-checks' '$(SUB) lint-python no-std c-header-test'
+	@$(BESIDE) '$(SUB) lint-python no-std c-header-test' '$(SUB) rust-checks'
 	@$(SUB) python-test
 
 rust-checks: lint-rust rust-test c-library
