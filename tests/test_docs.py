@@ -31,7 +31,13 @@ MODULES = sorted(
     }
 )
 
-LONG = {"piezotrack.xu_li_2010.reproduction"}
+# Modules and scripts whose examples search with full budgets.
+SLOW = {
+    "piezotrack.xu_li_2010.reproduction",
+    *("bouc_wen_benchmark.py", "calibrate_virtual_stage.py", "hundred_cycles.py"),
+    *("compare_models.py", "track_virtual_stage.py", "trace_circle.py", "learn_raster.py"),
+    "tune_gains.py",
+}
 
 
 # Examples.
@@ -39,7 +45,7 @@ LONG = {"piezotrack.xu_li_2010.reproduction"}
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=[pytest.mark.slow] if name in LONG else []) for name in MODULES],
+    [pytest.param(name, marks=[pytest.mark.slow] if name in SLOW else []) for name in MODULES],
 )
 def test_the_examples_in_docstrings_run(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -150,14 +156,6 @@ def test_every_field_of_a_class_is_documented(name: str) -> None:
             explained |= documented(base, "Parameters", "Attributes")
     assert fields <= explained, fields - explained
     assert documented(value, "Parameters", "Attributes") <= fields | {"partial"}
-
-
-# Those that search with full budgets.
-SLOW = {
-    *("bouc_wen_benchmark.py", "calibrate_virtual_stage.py", "hundred_cycles.py"),
-    *("compare_models.py", "track_virtual_stage.py", "trace_circle.py", "learn_raster.py"),
-    "tune_gains.py",
-}
 
 
 @pytest.mark.parametrize(

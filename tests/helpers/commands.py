@@ -34,6 +34,9 @@ HEADING = (
 )
 COMMAND = [sys.executable, "-c", f"{HEADING}; main()"]
 
+# The runner builds all commands anew for each call, which takes longer than most of the calls.
+testing._get_command = cache(testing._get_command)  # type: ignore[attr-defined]
+
 
 @cache
 def log_text() -> str:
@@ -41,10 +44,6 @@ def log_text() -> str:
     text = path.read_text(encoding="utf-8")
     path.unlink()
     return text
-
-
-# The runner builds all commands anew for each call, which takes longer than most of the calls.
-testing._get_command = cache(testing._get_command)  # type: ignore[attr-defined]
 
 
 def run(*arguments: str) -> Any:

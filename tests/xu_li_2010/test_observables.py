@@ -23,10 +23,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def by_key() -> dict[str, Observable]:
-    return {one.key: one for one in observables()}
-
-
 def test_the_published_numbers_are_those_of_the_paper() -> None:
     # Typed again from the paper, not read from the package.
     expected = {
@@ -43,7 +39,7 @@ def test_the_published_numbers_are_those_of_the_paper() -> None:
         "circle.20um.0.2Hz.sd": 0.480e-6,
         "circle.40um.0.5Hz.max": 7.048e-6,
     }
-    known = by_key()
+    known = {one.key: one for one in observables()}
     for key, value in expected.items():
         assert known[key].published == pytest.approx(value, rel=1e-12), key
     assert known["step.zeta"].published == pytest.approx(1.5759 / (2 * 12.0806), rel=1e-4)

@@ -76,6 +76,7 @@ impl<N: Number> Coupling<N> for LuGreCoupling<N> {
         let ahead = begin(zero);
         let (mut x, mut w) = (ahead.x, ahead.w);
         let direction = sign(heading(state, &ahead));
+        // The deflection is computed in one place of a loop: its code is long.
         let mut correction = 0;
         loop {
             let deflection = self.deflection(state, direction, x, w);

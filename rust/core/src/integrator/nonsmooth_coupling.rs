@@ -38,6 +38,7 @@ impl<N: Number, O: NonsmoothOperator<N>> Coupling<N> for NonsmoothCoupling<N, O>
         let ahead = predict(linear, operator, &from, drive, rise);
         let branch = operator.branch(&from.memory, sign(heading(&from, &ahead)));
         let (mut x, mut w) = (ahead.x, ahead.w);
+        // In a loop, as the legs of a step are: the operator's code is long.
         let mut corrected = false;
         loop {
             let memory = advance_operator(operator, &from, &branch, x, w);

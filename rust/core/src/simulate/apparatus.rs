@@ -137,7 +137,7 @@ impl<'a, P: Plant> Apparatus<'a, P> {
         loop {
             let steps = done + 1..=stretch.steps.min(done + BLOCK);
             done = *steps.end();
-            self.drive_steps(stretch, state, command, steps);
+            dispatch_fused(DriveStretch { apparatus: self, stretch, state, command, steps });
             if done == stretch.steps {
                 return true;
             }
@@ -145,28 +145,6 @@ impl<'a, P: Plant> Apparatus<'a, P> {
                 return false;
             }
         }
-    }
-
-    /// The same to its end, whatever happens meanwhile.
-    pub(super) fn drive_on(
-        &self,
-        stretch: &Stretch<P::Flow>,
-        state: &mut ApparatusState<P::State>,
-        command: [f64; 2],
-    ) {
-        self.drive_steps(stretch, state, command, 1..=stretch.steps);
-    }
-
-    /// Some of the steps. Compiled once, with every model in it.
-    #[inline(never)]
-    fn drive_steps(
-        &self,
-        stretch: &Stretch<P::Flow>,
-        state: &mut ApparatusState<P::State>,
-        command: [f64; 2],
-        steps: RangeInclusive<usize>,
-    ) {
-        dispatch_fused(DriveStretch { apparatus: self, stretch, state, command, steps });
     }
 }
 

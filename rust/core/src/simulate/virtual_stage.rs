@@ -19,7 +19,7 @@ use crate::models::{
     Creep, Dynamics, FoundBy, InputStage, MOST_PLAYS, MOST_RELAXATIONS, MOST_ZONES, Plant,
     PlayHysteresis, Plays, Relaxation, Settling, Stage, StageState,
 };
-use crate::signal::{Drive, Stop, index};
+use crate::signal::{Drive, NEVER, Stop, index};
 
 /// Cycles before an experiment, so that it starts on the settled loop, with the sensor at 0 there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -273,7 +273,7 @@ impl VirtualStage {
         for k in 1..=steps {
             let phase = (f64::from(k) * turn).fract();
             let after = 0.5 * swing * (1.0 - libm::cos(core::f64::consts::TAU * phase));
-            apparatus.drive_on(&stretch, &mut state, [before, after]);
+            let _ = apparatus.drive(&stretch, &mut state, [before, after], NEVER);
             before = after;
         }
         if rest > 0.0 {
@@ -282,7 +282,7 @@ impl VirtualStage {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 1e6")]
             let steps = if self.has_plays() { 1 } else { steps as usize };
             let stretch = apparatus.equal_steps(steps, rest / index(steps));
-            apparatus.drive_on(&stretch, &mut state, [0.0; 2]);
+            let _ = apparatus.drive(&stretch, &mut state, [0.0; 2], NEVER);
         }
         state.plant
     }
