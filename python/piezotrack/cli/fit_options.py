@@ -416,15 +416,20 @@ def check_count(option: str, given: Sequence[object] | None, count: int) -> None
 def _delay(text: str | None) -> bool | float | tuple[float, float] | None:
     if text is None or text == "fit":
         return None if text is None else True
-    return number_range("--delay", text) if ":" in text else number("--delay", text)
+    if ":" in text:
+        return number_range("--delay", text)
+    return number("--delay", text, "fit, a number of seconds, or bounds as LOW:HIGH")
 
 
 def drift_asked(text: str) -> bool | float:
     """Parse what is asked of the drift of a log."""
-    return text == "fit" if text in ("fit", "none") else number("--drift", text)
+    if text in ("fit", "none"):
+        return text == "fit"
+    return number("--drift", text, "none, fit, or a number of seconds, the time constant")
 
 
 def _creep(text: str | None) -> bool | list[float] | None:
     if text is None or text in ("fit", "none"):
         return None if text is None else text == "fit"
-    return [number("--creep", part) for part in text.split(",")]
+    expected = "none, fit, or numbers of seconds, the time constants, as 0.2,2"
+    return [number("--creep", part, expected) for part in text.split(",")]

@@ -239,12 +239,12 @@ def pairs(option: str, given: list[str] | None) -> list[tuple[str, str]]:
     return pairs
 
 
-def number(option: str, text: str) -> float:
-    """Parse a number."""
+def number(option: str, text: str, expected: str = "a number") -> float:
+    """Parse a number; `expected` says what else the option takes."""
     try:
         return float(text)
     except ValueError:
-        raise ParameterError(f"{option} has '{text}': expected a number") from None
+        raise ParameterError(f"{option} has '{text}': expected {expected}") from None
 
 
 def number_range(option: str, text: str) -> tuple[float, float]:
