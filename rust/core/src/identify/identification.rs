@@ -1,18 +1,18 @@
 //! Identification of a stage from a record: bounds, search, local refinement, standard deviations.
 
-use super::candidate::Theta;
-use super::cost::Evaluator;
-use super::descents::{as_low_as, descend};
-use super::inertia::with_mass;
-use super::lag::{LagRange, lag_range};
-use super::levenberg_marquardt::{LocalRefinement, Sensitivity};
-use super::plan::{Method, Plan};
+use super::cost::evaluator::Evaluator;
+use super::cost::residual_sums::Costs;
+use super::cost::several_records::Records;
+use super::descent::lag::{LagRange, lag_range};
+use super::descent::levenberg_marquardt::{LocalRefinement, Sensitivity};
+use super::parameters::candidate::Theta;
 use super::problem::{Problem, Spec};
-use super::progress::{Monitor, Outcome, StopReason};
-use super::record::Record;
-use super::records::Records;
-use super::residual_sums::Costs;
-use super::search::search;
+use super::records::record::Record;
+use super::search::descents::{as_low_as, descend};
+use super::search::inertia::with_mass;
+use super::search::plan::{Method, Plan};
+use super::search::progress::{Monitor, Outcome, StopReason};
+use super::search::swarms::search;
 use crate::error::Result;
 use crate::integrator::Stepping;
 use crate::math::available;
@@ -46,7 +46,7 @@ pub struct Identification {
 pub struct OwnResult {
     /// What was held and free, with its own delay, voltage before and drift.
     pub problem: Problem,
-    /// The parameters, and what [`super::ITS_OWN`] has.
+    /// The parameters, and what [`super::parameters::candidate::ITS_OWN`] has.
     pub theta: Theta,
     /// Its RMS deviation, m, without priors, its offset and its drift.
     pub costs: Costs,

@@ -1,76 +1,50 @@
 //! Identification: parameters searched, cost of a candidate, particle swarm, local refinement.
 
-mod acceleration;
-pub mod bounds;
-mod candidate;
-mod constraint;
-mod coordinate;
 mod cost;
-mod creep_shares;
-mod cross_talk;
-mod damped_step;
-mod delay;
-mod descents;
-mod drift;
-mod history;
+mod descent;
+mod experiments;
 mod identification;
-mod inertia;
-mod information;
-mod jacobian;
-mod journal;
-mod lag;
 mod least_squares;
-mod levenberg_marquardt;
-mod motion;
-mod neighbourhood;
-mod normal;
-mod plan;
-mod prior;
+mod parameters;
 mod problem;
-mod progress;
-mod record;
 mod records;
-mod relations;
-mod residual_sums;
-mod resonances;
 mod search;
-mod sensor_noise;
-mod share_sums;
-mod step_response;
-mod step_ringing;
-mod step_size;
 mod swarm;
-mod tie;
 
-pub use candidate::{BEFORE, Candidate, DELAY, DRIFT_TIME, ITS_OWN, PLACES, Point, Theta};
-pub use constraint::Constraint;
-pub use coordinate::{Coordinate, Scale};
-pub use cost::Evaluator;
-pub use creep_shares::{MOST_CREEP, MOST_SHARES, Shares, creep_times};
-pub use cross_talk::{CrossTalk, cross_talk};
-pub use delay::Delay;
-pub use descents::DescentSettings;
-pub use drift::DriftKind;
-pub use history::{History, visited};
+pub use cost::evaluator::Evaluator;
+pub use cost::journal::Journal;
+pub use cost::residual_sums::Costs;
+pub use cost::several_records::Records;
+pub use descent::lag::LagRange;
+pub use descent::levenberg_marquardt::{LocalRefinement, Polished, Sensitivity};
+pub use experiments::cross_talk::{CrossTalk, cross_talk};
+pub use experiments::sensor_noise::{Noise, noise_at_rest};
+pub use experiments::step_response::{
+    Conventional, StepReadings, StepResponse, read_step, separate,
+};
 pub use identification::{Identification, OwnResult, identify, identify_together};
-pub use journal::Journal;
-pub use lag::LagRange;
 pub use least_squares::{
     CreepKind, DynamicsKind, LeastSquaresFit, PlacesKind, RecordFit, Settings as WeightsSettings,
     WeightsDelay, WeightsRecord, identify_weights,
 };
-pub use levenberg_marquardt::{LocalRefinement, Polished, Sensitivity};
-pub use plan::{Method, Plan};
-pub use prior::Prior;
+pub use parameters::bounds;
+pub use parameters::candidate::{
+    BEFORE, Candidate, DELAY, DRIFT_TIME, ITS_OWN, PLACES, Point, Theta,
+};
+pub use parameters::constraint::Constraint;
+pub use parameters::coordinate::{Coordinate, Scale};
+pub use parameters::delay::Delay;
+pub use parameters::drift::DriftKind;
+pub use parameters::prior::Prior;
+pub use parameters::relations::Relations;
+pub use parameters::tie::Tie;
 pub use problem::{Problem, Spec};
-pub use progress::{Monitor, Outcome, Progress, StopReason};
-pub use record::Record;
-pub use records::Records;
-pub use relations::Relations;
-pub use residual_sums::Costs;
-pub use resonances::{Resonance, resonances};
-pub use search::search;
-pub use sensor_noise::{Noise, noise_at_rest};
-pub use step_response::{Conventional, StepReadings, StepResponse, read_step, separate};
+pub use records::creep_shares::{MOST_CREEP, MOST_SHARES, Shares, creep_times};
+pub use records::history::{History, visited};
+pub use records::record::Record;
+pub use records::resonances::{Resonance, resonances};
+pub use search::descents::DescentSettings;
+pub use search::plan::{Method, Plan};
+pub use search::progress::{Monitor, Outcome, Progress, StopReason};
+pub use search::swarms::search;
 pub use swarm::{Boundary, Swarm, SwarmSettings, Topology, Update};
-pub use tie::Tie;

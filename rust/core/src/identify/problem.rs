@@ -1,16 +1,16 @@
 //! The search problem: the parameters held, and the free ones with their bounds.
 
-use super::bounds;
-use super::candidate::{BEFORE, DELAY, DRIFT_TIME, PLACES, Theta};
-use super::constraint::Constraint;
-use super::coordinate::{Coordinate, Scale};
-use super::creep_shares::check_times;
-use super::delay::Delay;
-use super::drift::DriftKind;
-use super::history::{History, came_from};
-use super::record::Record;
-use super::relations::Relations;
-use super::tie::shown_text;
+use super::parameters::bounds;
+use super::parameters::candidate::{BEFORE, DELAY, DRIFT_TIME, PLACES, Theta};
+use super::parameters::constraint::Constraint;
+use super::parameters::coordinate::{Coordinate, Scale};
+use super::parameters::delay::Delay;
+use super::parameters::drift::DriftKind;
+use super::parameters::relations::Relations;
+use super::parameters::tie::shown_text;
+use super::records::creep_shares::check_times;
+use super::records::history::{History, came_from};
+use super::records::record::Record;
 use crate::error::{Error, Result, positive};
 use crate::integrator::MOST_PARAMETERS;
 use crate::models::{FoundBy, Held, Measures, Model, NOMINAL_STIFFNESS, position};

@@ -13,12 +13,12 @@ use piezotrack_control::CreepingInverse;
 use piezotrack_control::creep::{Creep, CubicLag, Lag, advance, output};
 
 use super::creep::{Dynamics, MOST_RELAXATIONS, Relaxation};
+use super::parameters::search_ranges::{Measures, Ranges};
+use super::parameters::values::{Held, ParameterInfo, Values};
 use super::plant::{Plant, Settling};
-use super::search_ranges::{Measures, Ranges};
 use super::traits::{
     Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
 };
-use super::values::{Held, ParameterInfo, Values};
 use crate::design::LoopPlant;
 use crate::error::{Error, Result};
 use crate::integrator::Order;

@@ -1,6 +1,6 @@
 //! Plants in lanes: one stage under several voltages at once, as a search for gains simulates it.
 //!
-//! The steps are those of [`Plant`](super::Plant), with the same bits in every lane.
+//! The steps are those of [`Plant`](super::plant::Plant), with the same bits in every lane.
 
 use core::f64::consts::TAU;
 
@@ -11,9 +11,9 @@ use piezotrack_control::hysteresis::PlayState;
 use super::creep::{MOST_RELAXATIONS, Relaxation, RelaxationFlow, RelaxationState};
 use super::creeping::Creeping;
 use super::dahl::{FrictionKernel, SmoothKernel};
-use super::input_stage::InputStageState;
+use super::input::input_stage::InputStageState;
 use super::plant::KernelModel;
-use super::prandtl_ishlinskii::{MOST_PLAYS, PrandtlIshlinskiiStage};
+use super::plays::prandtl_ishlinskii::{MOST_PLAYS, PrandtlIshlinskiiStage};
 use super::registry::{Stage, StageState};
 use crate::integrator::{
     Coupling, FeedbackState, Kernel, LumpedStage, Mechanics, Memory, TERMS, halvings,

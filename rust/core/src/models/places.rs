@@ -1,8 +1,8 @@
 //! Which places the signals of a model may have.
 
-use super::everett::Everett;
-use super::prandtl_ishlinskii::PlayHysteresis;
-use super::superposition::Places;
+use super::input::superposition::Places;
+use super::plays::prandtl_ishlinskii::PlayHysteresis;
+use super::relays::everett::Everett;
 use crate::error::{Error, Result};
 
 /// Refuses places with which no stage exists.

@@ -5,9 +5,9 @@ use core::fmt;
 use piezotrack_control::Snapshot;
 use piezotrack_control::inverse::Inverse;
 
+use super::parameters::search_ranges::{Measures, Ranges};
+use super::parameters::values::{Held, ParameterInfo, Values};
 use super::plant::{KernelModel, Plant};
-use super::search_ranges::{Measures, Ranges};
-use super::values::{Held, ParameterInfo, Values};
 use crate::design::LoopPlant;
 use crate::error::{Error, Result, shown};
 use crate::integrator::{Instant, Kernel, Motion, Order};

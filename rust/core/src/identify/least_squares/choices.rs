@@ -11,7 +11,7 @@ use super::places::{add_once, choose_places, few_or_many, spread};
 use super::slow_parts::{choose_slow, creeps, drop_drifts, without_creep};
 use super::trials::{side_by_side, with_each};
 use super::{CreepKind, DynamicsKind, PlacesKind, Settings, WeightsRecord};
-use crate::identify::history::History;
+use crate::identify::records::history::History;
 use crate::math::least;
 use crate::signal::{index, range};
 

@@ -8,8 +8,8 @@ use super::form::Form;
 use super::layout::{Layout, Own};
 use super::{LeastSquaresFit, RecordFit, WeightsDelay, WeightsRecord};
 use crate::error::{Error, Result};
-use crate::identify::drift::DriftKind;
-use crate::identify::history::History;
+use crate::identify::parameters::drift::DriftKind;
+use crate::identify::records::history::History;
 use crate::models::{Dynamics, FittedWeights, Relaxation, Signals, SignalsOf, Values};
 use crate::signal::index;
 

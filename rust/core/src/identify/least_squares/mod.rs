@@ -21,9 +21,9 @@ mod record_path;
 mod slow_parts;
 mod trials;
 
-use super::delay::Delay;
-use super::drift::DriftKind;
-use super::history::History;
+use super::parameters::delay::Delay;
+use super::parameters::drift::DriftKind;
+use super::records::history::History;
 use crate::error::{Error, Result, positive, shown};
 use crate::models::{
     AnySuperposition, Dynamics, MOST_LEVELS, Measures, Model, Places, PlayHysteresis, Relaxation,

@@ -4,7 +4,7 @@ use super::choices::{MODE_GAIN, ROUGH};
 use super::fit::Fit;
 use super::form::Form;
 use super::{DynamicsKind, Settings, WeightsRecord};
-use crate::identify::resonances::{Resonance, resonances};
+use crate::identify::records::resonances::{Resonance, resonances};
 
 /// Modes that are looked for.
 const MOST_SHOWN: usize = 2;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::fit::Fit;
 use super::follower::Follower;
 use crate::error::Result;
-use crate::identify::history::{History, visited};
+use crate::identify::records::history::{History, visited};
 use crate::models::{Dynamics, Experiment, Relaxation, Rest, Values};
 use crate::signal::{FractionalDelay, index};
 

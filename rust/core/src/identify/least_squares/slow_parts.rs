@@ -7,7 +7,7 @@ use super::gauss_newton::STEPS;
 use super::places::split;
 use super::trials::{side_by_side, with_each};
 use super::{CreepKind, DynamicsKind, Settings};
-use crate::identify::drift::{DRIFT_TIMES, DriftKind, repeats};
+use crate::identify::parameters::drift::{DRIFT_TIMES, DriftKind, repeats};
 use crate::math::{least, on_all_threads};
 use crate::signal::index;
 

@@ -8,7 +8,7 @@ use crate::integrator::{
     Coupling, FeedbackCoupling, FeedbackState, FrictionCoupling, FrictionMemory,
     FrictionParameters, Kernel, Parameters, TERMS, equilibrium, halvings, linear,
 };
-use crate::models::{Plant, Settling};
+use crate::models::plant::{Plant, Settling};
 
 /// Without dry friction: `T` terms of the operator's series, to second or fourth order.
 #[derive(Clone, Copy, Debug)]

@@ -14,14 +14,14 @@ mod virgin_branch;
 use piezotrack_control::hysteresis::DahlState;
 use piezotrack_control::inverse::{DahlInverse, InverseState, SampledDahlInverse};
 
-use super::mechanics_parameters::{DAMPING, MASS, PIEZO_COEFFICIENT, STIFFNESS, V, X};
+use super::parameters::mechanics_parameters::{DAMPING, MASS, PIEZO_COEFFICIENT, STIFFNESS, V, X};
+use super::parameters::search_ranges::{Measures, Ranges};
+use super::parameters::values::{Held, ParameterInfo, Values};
 use super::plant::Settling;
-use super::search_ranges::{Measures, Ranges};
 use super::traits::{
     Experiment, Invertible, KernelVisitor, Method, ModelInfo, Response, Searchable, StageModel,
     finite_state, from_rest_only,
 };
-use super::values::{Held, ParameterInfo, Values};
 use crate::design::LoopPlant;
 use crate::error::{Error, Result, finite, not_negative, not_zero, positive};
 use crate::integrator::{

@@ -10,8 +10,8 @@ use piezotrack_control::hysteresis::DahlState;
 use super::{DahlStage, DahlStageState, STATE};
 use crate::error::{Error, Result};
 use crate::integrator::{MOST_SUBSTEPS, columns, first_substeps, out_of_reach};
+use crate::models::parameters::values::Values;
 use crate::models::traits::{Experiment, Method, Response};
-use crate::models::values::Values;
 use crate::signal::{Drive, Stop, index, largest_difference};
 
 /// x, x', Fh, dFh/dx.

@@ -1,0 +1,67 @@
+//! How a problem is searched: by which method, from which seed, how often.
+
+use super::descents::DescentSettings;
+use crate::error::{Error, Result};
+use crate::identify::swarm::SwarmSettings;
+use crate::math::available;
+
+/// How a problem is searched.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// What searches.
+    pub method: Method,
+    /// Seed of the random numbers.
+    pub seed: u64,
+    /// Searches apart from each other.
+    pub runs: usize,
+}
+
+/// What searches.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Method {
+    /// A particle swarm.
+    Swarm(SwarmSettings),
+    /// Descents from random points.
+    Descents(DescentSettings),
+}
+
+impl Plan {
+    /// Checks the settings and the number of runs.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming what cannot be used.
+    pub fn validate(&self) -> Result<()> {
+        let each = match &self.method {
+            Method::Swarm(settings) => {
+                settings.validate()?;
+                settings.particles
+            }
+            Method::Descents(settings) => {
+                settings.validate()?;
+                settings.samples
+            }
+        };
+        if self.runs == 0 || self.runs > MOST_RUNS {
+            let expected = format!("1 or more, {MOST_RUNS} at most");
+            return Err(Error::parameter("runs", self.runs, expected));
+        }
+        let particles = self.runs * each;
+        if particles > MOST_PARTICLES {
+            let expected = format!(
+                "{} at most with {each} particles in each: {MOST_PARTICLES} together",
+                (MOST_PARTICLES / each).max(1)
+            );
+            return Err(Error::parameter("runs", self.runs, expected));
+        }
+        available("the particles of the search", particles, PARTICLE)
+    }
+}
+
+/// Most swarms of a search.
+const MOST_RUNS: usize = 10_000;
+
+/// Most particles of all swarms together.
+const MOST_PARTICLES: usize = 1_000_000;
+
+/// Bytes that a particle takes at most, with what is asked about it.
+const PARTICLE: usize = 2000;
