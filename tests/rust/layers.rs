@@ -1,5 +1,5 @@
-//! The modules of the two crates are layers: each imports only those below it, and the files of a
-//! layer import each other without circles.
+//! The modules of the crates are layers, and so are the rooms inside the two largest: each imports
+//! only those below it. No files import each other in a circle, whatever folders they are in.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,6 +11,38 @@ use std::slice::from_ref;
 /// From the bottom up.
 const CORE: [&str; 9] =
     ["error", "math", "signal", "integrator", "design", "models", "simulate", "identify", "tune"];
+
+/// The rooms of `identify`, from the bottom up.
+const IDENTIFY: [&str; 10] = [
+    "swarm",
+    "records",
+    "parameters",
+    "problem",
+    "least_squares",
+    "cost",
+    "descent",
+    "search",
+    "experiments",
+    "identification",
+];
+
+/// The rooms of `models`, from the bottom up.
+const MODELS: [&str; 14] = [
+    "plant",
+    "creep",
+    "parameters",
+    "traits",
+    "creeping",
+    "dahl",
+    "feedback",
+    "input",
+    "plays",
+    "relays",
+    "places",
+    "registry",
+    "lanes",
+    "any_inverse",
+];
 
 /// From the bottom up.
 const CONTROL: [&str; 27] = [
@@ -57,9 +89,25 @@ impl Source {
         Self { file: file.into(), module: module.map(Into::into).collect(), text: text.into() }
     }
 
-    /// A file that only declares and re-exports those beside and below it.
+    /// A file that declares and re-exports those beside and below it.
     fn is_face(&self) -> bool {
         self.file.ends_with("lib.rs") || self.file.ends_with("mod.rs")
+    }
+
+    /// A face that does nothing else.
+    fn only_declares(&self) -> bool {
+        let code = code(&self.text);
+        let makes = |line: &str| {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let item = |word: &&&str| {
+                matches!(
+                    **word,
+                    "fn" | "struct" | "enum" | "trait" | "impl" | "const" | "macro_rules!"
+                )
+            };
+            words.iter().take(3).find(item).is_some()
+        };
+        self.is_face() && !code.lines().any(makes)
     }
 }
 
@@ -170,6 +218,27 @@ fn arrows(source: &Source) -> Vec<Arrow> {
     found
 }
 
+/// The uses of modules below a face that does more than declare them, which need no `super`.
+fn downward(source: &Source) -> Vec<Arrow> {
+    if !source.is_face() || source.only_declares() {
+        return Vec::new();
+    }
+    let code = code(&source.text);
+    let mut found = Vec::new();
+    // What it re-exports it does not use.
+    for (at, _) in code.match_indices("\nuse ") {
+        for (path, end) in paths(&code, at + 5).0 {
+            if !matches!(path[0].as_str(), "crate" | "super") {
+                let line = 1 + code[..end].matches('\n').count();
+                let place = format!("{}:{line}", source.file);
+                let from = source.module.clone();
+                found.push(Arrow { place, to: [&from[..], &path].concat(), from });
+            }
+        }
+    }
+    found
+}
+
 /// What each face re-exports: the path of the item there, and the file that it comes from.
 fn faces(files: &[Source]) -> BTreeMap<Vec<String>, Vec<String>> {
     let mut found = BTreeMap::new();
@@ -179,9 +248,9 @@ fn faces(files: &[Source]) -> BTreeMap<Vec<String>, Vec<String>> {
             for (path, _) in paths(&code, at + 4).0 {
                 if let [child, .., item] = &path[..] {
                     // A function may have the name of its file.
-                    if child != item {
+                    if child != item && !matches!(child.as_str(), "crate" | "super") {
                         let here = [&face.module[..], from_ref(item)].concat();
-                        found.insert(here, [&face.module[..], from_ref(child)].concat());
+                        found.insert(here, [&face.module[..], &path[..path.len() - 1]].concat());
                     }
                 }
             }
@@ -195,23 +264,27 @@ fn all_arrows(files: &[Source]) -> Vec<Arrow> {
     let faces = faces(files);
     let mut all = Vec::new();
     for mut arrow in files.iter().flat_map(arrows) {
-        // Through the face of the root, and that of a layer.
-        for _ in 0..2 {
-            let file = (1..=arrow.to.len()).rev().find_map(|n| faces.get(&arrow.to[..n]));
-            arrow.to = file.cloned().unwrap_or(arrow.to);
+        // Through the faces of the root, of a layer and of a room.
+        while let Some(file) = (1..=arrow.to.len()).rev().find_map(|n| faces.get(&arrow.to[..n])) {
+            arrow.to.clone_from(file);
         }
         all.push(arrow);
     }
     all
 }
 
-/// The arrows that point up in `order`, or out of it.
-fn upward(files: &[Source], order: &[&str]) -> Vec<String> {
+/// The arrows inside `room`, the root where it is empty, that point up in `order` or out of it.
+fn upward(files: &[Source], room: &[&str], order: &[&str]) -> Vec<String> {
     let rank = |module: &[String]| {
-        let layer = module.first()?;
+        let layer = module.get(room.len())?;
         order.iter().position(|other| other == layer)
     };
-    let all = all_arrows(files).into_iter().filter(|arrow| !arrow.from.is_empty());
+    let inside = |module: &[String]| {
+        module.len() > room.len() && module.iter().zip(room).all(|(name, other)| name == other)
+    };
+    let all = all_arrows(files).into_iter().filter(|arrow| inside(&arrow.from));
+    // The root has nothing outside.
+    let all = all.filter(|arrow| room.is_empty() || inside(&arrow.to));
     let wrong = all.filter(|arrow| match (rank(&arrow.from), rank(&arrow.to)) {
         (Some(from), Some(to)) => to > from,
         _ => true,
@@ -219,14 +292,21 @@ fn upward(files: &[Source], order: &[&str]) -> Vec<String> {
     wrong.map(|arrow| arrow.to_string()).collect()
 }
 
-/// A circle of files in each layer that has one, as the arrows that close it.
+/// The module that a path is in.
+fn within<'p>(modules: &BTreeSet<&[String]>, path: &'p [String]) -> Option<&'p [String]> {
+    (1..=path.len()).rev().map(|n| &path[..n]).find(|part| modules.contains(part))
+}
+
+/// The circles of files, as the arrows that close them. A face that only declares and re-exports is
+/// no file here: what is taken through it is followed to where it comes from.
 fn circles(files: &[Source]) -> Vec<String> {
+    let modules: BTreeSet<&[String]> =
+        files.iter().filter(|file| !file.only_declares()).map(|file| &file.module[..]).collect();
     let mut links: BTreeMap<Vec<String>, BTreeMap<Vec<String>, String>> = BTreeMap::new();
-    for arrow in all_arrows(files) {
-        // A folder in a layer counts as one file; the face of a layer as none.
-        let (from, to) =
-            (&arrow.from[..arrow.from.len().min(2)], &arrow.to[..arrow.to.len().min(2)]);
-        if from.len() == 2 && to.len() == 2 && from != to && from[0] == to[0] {
+    for arrow in all_arrows(files).into_iter().chain(files.iter().flat_map(downward)) {
+        if let (Some(from), Some(to)) = (within(&modules, &arrow.from), within(&modules, &arrow.to))
+            && from != to
+        {
             let at = links.entry(from.to_vec()).or_default();
             at.entry(to.to_vec()).or_insert_with(|| arrow.to_string());
         }
@@ -247,35 +327,46 @@ fn circles(files: &[Source]) -> Vec<String> {
     }
 }
 
-fn crates() -> [(Vec<Source>, &'static [&'static str]); 2] {
+fn files_of(name: &str) -> Vec<Source> {
     let core = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let control = core.parent().unwrap().join("control");
-    [(sources(&core.join("src")), &CORE), (sources(&control.join("src")), &CONTROL)]
+    sources(&core.parent().unwrap().join(name).join("src"))
+}
+
+/// Files of a crate, a room of it or its root, and the order of what is there.
+fn ordered() -> [(Vec<Source>, &'static [&'static str], &'static [&'static str]); 4] {
+    [
+        (files_of("core"), &[], &CORE),
+        (files_of("core"), &["identify"], &IDENTIFY),
+        (files_of("core"), &["models"], &MODELS),
+        (files_of("control"), &[], &CONTROL),
+    ]
 }
 
 #[test]
 fn each_module_has_its_place_in_the_order() {
-    for (files, order) in crates() {
-        let found: BTreeSet<&str> =
-            files.iter().filter_map(|file| file.module.first()).map(String::as_str).collect();
+    for (files, room, order) in ordered() {
+        let inside = files.iter().filter(|file| {
+            file.module.len() > room.len() && file.module.iter().zip(room).all(|(a, b)| a == b)
+        });
+        let found: BTreeSet<&str> = inside.map(|file| file.module[room.len()].as_str()).collect();
         assert_eq!(found, order.iter().copied().collect());
     }
 }
 
 #[test]
 fn no_use_points_upward() {
-    for (files, order) in crates() {
+    for (files, room, order) in ordered() {
         // The reader of the sources finds what is there.
         assert!(all_arrows(&files).len() > 20);
-        let wrong = upward(&files, order);
+        let wrong = upward(&files, room, order);
         assert!(wrong.is_empty(), "upward:\n{}", wrong.join("\n"));
     }
 }
 
 #[test]
-fn no_files_of_a_layer_import_each_other_in_a_circle() {
-    for (files, _) in crates() {
-        let wrong = circles(&files);
+fn no_files_import_each_other_in_a_circle() {
+    for name in ["core", "control", "py", "capi"] {
+        let wrong = circles(&files_of(name));
         assert!(wrong.is_empty(), "in circles:\n{}", wrong.join("\n"));
     }
 }
@@ -305,9 +396,10 @@ fn f() {
         "signal/made_up.rs:11: signal::made_up -> simulate::track",
         "signal/made_up.rs:12: signal::made_up -> nowhere::g",
     ];
-    assert_eq!(upward(&files, &CORE), expected);
+    assert_eq!(upward(&files, &[], &CORE), expected);
     assert!(
-        upward(&[Source::new("identify/made_up.rs", "use crate::models::A;")], &CORE).is_empty()
+        upward(&[Source::new("identify/made_up.rs", "use crate::models::A;")], &[], &CORE)
+            .is_empty()
     );
 }
 
@@ -317,7 +409,19 @@ fn an_upward_use_of_what_the_root_re_exports_is_found() {
         Source::new("lib.rs", "pub use models::{DahlStage, Model};"),
         Source::new("signal/made_up.rs", "use crate::DahlStage;"),
     ];
-    assert_eq!(upward(&files, &CORE), ["signal/made_up.rs:1: signal::made_up -> models"]);
+    assert_eq!(upward(&files, &[], &CORE), ["signal/made_up.rs:1: signal::made_up -> models"]);
+}
+
+#[test]
+fn an_upward_use_between_rooms_is_found() {
+    let files = [
+        Source::new("identify/mod.rs", "mod cost;\npub use cost::evaluator::Evaluator;"),
+        Source::new("identify/records/made_up.rs", "use crate::identify::Evaluator;"),
+        Source::new("identify/cost/evaluator.rs", "use crate::tune::T;"),
+    ];
+    let expected =
+        ["identify/records/made_up.rs:1: identify::records::made_up -> identify::cost::evaluator"];
+    assert_eq!(upward(&files, &["identify"], &IDENTIFY), expected);
 }
 
 #[test]
@@ -333,4 +437,14 @@ fn a_circle_of_files_is_found() {
         ["signal/a.rs:1: signal::a -> signal::b::B", "signal/b.rs:1: signal::b -> signal::a"];
     assert_eq!(circles(&files), expected);
     assert!(circles(&files[1..2]).is_empty());
+    // In a folder, through a file above that holds more than declarations.
+    let files = [
+        Source::new("signal/room/mod.rs", "mod a;\nuse a::A;\npub struct B;"),
+        Source::new("signal/room/a.rs", "use super::B;"),
+    ];
+    let found = circles(&files);
+    assert!(
+        found.iter().any(|arrow| arrow.contains("signal::room::a -> signal::room")),
+        "{found:?}"
+    );
 }

@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use numpy::PyArray1;
+use piezotrack_core::Result;
 use piezotrack_core::identify::{
     BEFORE, Coordinate, DELAY, DRIFT_TIME, History, Identification, Journal, Method, Outcome,
     OwnResult, Plan, Record, Relations, Spec, StopReason, identify_together, visited,
 };
 use piezotrack_core::integrator::Order;
 use piezotrack_core::signal::Drive;
-use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
 use crate::arrays::{array, samples};
@@ -236,28 +236,6 @@ impl PySearch {
     }
 }
 
-/// The name of a history.
-pub fn history_name(history: History) -> &'static str {
-    match history {
-        History::Virgin => "virgin",
-        History::Settled => "settled",
-        History::Fitted => "fit",
-    }
-}
-
-/// What a stage went through before a record, by its name.
-pub fn history_named(name: &str) -> Result<History> {
-    match name {
-        "virgin" => Ok(History::Virgin),
-        "settled" => Ok(History::Settled),
-        "fit" => Ok(History::Fitted),
-        other => {
-            let expected = "'virgin', 'settled' or 'fit'";
-            Err(Error::parameter("history", format!("'{other}'"), expected))
-        }
-    }
-}
-
 /// The voltages that a stage visits slowly before the drive of a record.
 #[pyfunction]
 #[pyo3(name = "visited")]
@@ -272,7 +250,7 @@ fn voltages_before<'py>(
     let u = samples("u", u)?;
     let voltages = || {
         let drive = Drive::new(&u, dt, hold(hold_name)?)?;
-        Ok(visited(&drive, history_named(history)?, before))
+        Ok(visited(&drive, History::named(history)?, before))
     };
     array(py, voltages().map_err(|error| raise(&error))?.into_iter())
 }

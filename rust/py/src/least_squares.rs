@@ -1,8 +1,8 @@
 //! Identification of a stage's weights by least squares.
 
 use piezotrack_core::identify::{
-    CreepKind, DynamicsKind, LeastSquaresFit, PlacesKind, Record, RecordFit, WeightsRecord,
-    WeightsSettings, identify_weights, resonances,
+    CreepKind, DynamicsKind, History, LeastSquaresFit, PlacesKind, Record, RecordFit,
+    WeightsRecord, WeightsSettings, identify_weights, resonances,
 };
 use piezotrack_core::math::{FREE, NOT_NEGATIVE, Rows};
 use piezotrack_core::models::Model;
@@ -13,7 +13,6 @@ use pyo3::prelude::*;
 use crate::arrays::samples;
 use crate::enter::{enter, enter_quiet_pool};
 use crate::errors::raise;
-use crate::identify::{history_name, history_named};
 use crate::models::{Named, named};
 use crate::question::{delay_between, drift_with};
 use crate::stage::hold;
@@ -85,7 +84,7 @@ struct Own {
 impl Own {
     fn of(found: &RecordFit) -> Self {
         let RecordFit { offset, drift, delay, rms, history, ref start } = *found;
-        Self { rms, offset, drift, delay, history: history_name(history), start: named(start) }
+        Self { rms, offset, drift, delay, history: history.name(), start: named(start) }
     }
 }
 
@@ -123,7 +122,7 @@ impl Asked<'_> {
         let record = Record::new(&of.u, &of.y, self.dt, hold(&self.hold_name)?, self.start);
         let Record { drive, y, weight, .. } =
             record.map_err(|error| error.of(&self.label))?.among(&self.label, self.weight)?;
-        let history = self.history.as_deref().map(history_named).transpose()?;
+        let history = self.history.as_deref().map(History::named).transpose()?;
         let Self { start, offset, .. } = *self;
         let drift = drift_with(self.drift);
         let one =

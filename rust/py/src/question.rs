@@ -1,14 +1,13 @@
 //! What is asked of a record: the kind of stage, what is searched, and between which bounds.
 
 use piezotrack_core::Result;
-use piezotrack_core::identify::{Delay, DriftKind, Record, Spec, creep_times};
+use piezotrack_core::identify::{Delay, DriftKind, History, Record, Spec, creep_times};
 use piezotrack_core::models::Model;
 use piezotrack_core::signal::Hold;
 use pyo3::prelude::*;
 
 use crate::arrays::samples;
 use crate::errors::raise;
-use crate::identify::history_named;
 use crate::stage::hold;
 
 /// A record and what is asked of it, from a dict of Python.
@@ -76,7 +75,7 @@ impl Question<'_> {
     pub fn asked(self) -> PyResult<Asked> {
         let (u, y) = (samples("u", &self.u)?, samples("y", &self.y)?);
         let delay = delay_between(self.delay);
-        let named = || Ok((Model::named(&self.model)?, history_named(&self.history)?));
+        let named = || Ok((Model::named(&self.model)?, History::named(&self.history)?));
         let (model, history) = named().map_err(|error| raise(&error))?;
         let spec = Spec {
             free: self.free,

@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicUsize, Ordering};
 
-use super::WeightsRecord;
+use super::weights_record::WeightsRecord;
 use crate::models::{AnySuperposition, Model};
 use crate::signal::{Drive, Stop, index, range};
 

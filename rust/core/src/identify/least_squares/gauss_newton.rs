@@ -3,11 +3,11 @@
 use core::ops::Range;
 use std::collections::VecDeque;
 
-use super::choices::ROUGH;
 use super::columns::Columns;
 use super::fit::Fit;
 use super::record_path::Late;
-use super::{WeightsDelay, WeightsRecord};
+use super::settings::{ROUGH, STEPS};
+use super::weights_record::{WeightsDelay, WeightsRecord};
 use crate::error::Result;
 use crate::math::Rows;
 
@@ -16,9 +16,6 @@ const STIFF: f64 = 1e4;
 
 /// RMS deviation that a difference of two weights that are to be alike counts as, relative to it.
 const ALIKE: f64 = 1e-4;
-
-/// Most steps.
-pub(super) const STEPS: usize = 60;
 
 /// Where a step goes.
 struct Goal {

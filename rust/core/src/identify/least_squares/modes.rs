@@ -1,9 +1,9 @@
 //! Which modes a fit has.
 
-use super::choices::{MODE_GAIN, ROUGH};
 use super::fit::Fit;
 use super::form::Form;
-use super::{DynamicsKind, Settings, WeightsRecord};
+use super::settings::{DynamicsKind, MODE_GAIN, ROUGH, Settings};
+use super::weights_record::WeightsRecord;
 use crate::identify::records::resonances::{Resonance, resonances};
 
 /// Modes that are looked for.

@@ -1,12 +1,10 @@
 //! The places of a fit: thresholds of plays, or levels; how many, and where.
 
-use super::choices::ROUGH;
 use core::ops::Range;
 
 use super::common::Common;
 use super::fit::Fit;
-use super::gauss_newton::STEPS;
-use super::{PlacesKind, Settings};
+use super::settings::{PlacesKind, ROUGH, STEPS, Settings};
 use crate::math::on_all_threads;
 use crate::models::{MOST_PLAYS, Places};
 use crate::signal::index;

@@ -1,12 +1,11 @@
 //! Which slow parts a record shows: creep of the stage, drift of the sensor.
 
-use super::choices::{FIRST_SHARE, ROUGH, SAME, best_lag};
 use super::fit::{Fit, known_drift};
 use super::form::Form;
-use super::gauss_newton::STEPS;
+use super::lag::best_lag;
 use super::places::split;
+use super::settings::{CreepKind, DynamicsKind, FIRST_SHARE, ROUGH, SAME, STEPS, Settings};
 use super::trials::{side_by_side, with_each};
-use super::{CreepKind, DynamicsKind, Settings};
 use crate::identify::parameters::drift::{DRIFT_TIMES, DriftKind, repeats};
 use crate::math::{least, on_all_threads};
 use crate::signal::index;

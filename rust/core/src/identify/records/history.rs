@@ -4,6 +4,7 @@
 //! there decides the memory of its hysteresis. A record does not show the drive before it, so the
 //! history is assumed, or found with the parameters.
 
+use crate::error::{Error, Result};
 use crate::signal::{Drive, Hold, range, turns};
 
 /// What is assumed of the drive before a record.
@@ -15,6 +16,29 @@ pub enum History {
     Settled,
     /// The stage came from a voltage that is found with the parameters.
     Fitted,
+}
+
+impl History {
+    /// A history by its name.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a name that none has.
+    pub fn named(name: &str) -> Result<Self> {
+        let all = [Self::Virgin, Self::Settled, Self::Fitted];
+        all.into_iter().find(|history| history.name() == name).ok_or_else(|| {
+            Error::parameter("history", format!("'{name}'"), "'virgin', 'settled' or 'fit'")
+        })
+    }
+
+    /// Its name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Virgin => "virgin",
+            Self::Settled => "settled",
+            Self::Fitted => "fit",
+        }
+    }
 }
 
 /// Smallest reversal that settles anything, as a share of the drive's range.

@@ -1,6 +1,7 @@
 //! Topology: whose best position attracts a particle besides its own.
 
-use super::{Best, Particle, Topology};
+use super::particle::{Best, Particle};
+use super::settings::Topology;
 use crate::math::Draws;
 
 /// Particles that one informs, itself aside: K of Clerc 2012, hal-00764996.

@@ -1,6 +1,7 @@
 //! Update of a particle's velocity and position.
 
-use super::{Best, Boundary, Particle, SwarmSettings, Update};
+use super::particle::{Best, Particle};
+use super::settings::{Boundary, SwarmSettings, Update};
 use crate::math::Draws;
 
 impl Particle {

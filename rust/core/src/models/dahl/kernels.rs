@@ -3,7 +3,7 @@
 use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{Dahl, DahlState, Operator};
 
-use super::{DahlStage, DahlStageState};
+use super::stage::{DahlStage, DahlStageState};
 use crate::integrator::{
     Coupling, FeedbackCoupling, FeedbackState, FrictionCoupling, FrictionMemory,
     FrictionParameters, Kernel, Parameters, TERMS, equilibrium, halvings, linear,

@@ -7,7 +7,7 @@
 
 use piezotrack_control::hysteresis::DahlState;
 
-use super::{DahlStage, DahlStageState, STATE};
+use super::stage::{DahlStage, DahlStageState, STATE};
 use crate::error::{Error, Result};
 use crate::integrator::{MOST_SUBSTEPS, columns, first_substeps, out_of_reach};
 use crate::models::parameters::values::Values;

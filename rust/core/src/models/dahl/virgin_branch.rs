@@ -2,7 +2,7 @@
 
 use core::ops::RangeInclusive;
 
-use super::DahlStage;
+use super::stage::DahlStage;
 use crate::design::LoopPlant;
 use crate::error::{Error, Result, finite};
 use crate::integrator::Mechanics;

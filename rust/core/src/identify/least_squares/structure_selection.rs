@@ -5,12 +5,15 @@
 use super::common::{Common, Thinned};
 use super::fit::{Beginning, Fit};
 use super::form::Form;
-use super::gauss_newton::STEPS;
+use super::lag::{best_lag, smallest_lag};
 use super::modes::{drop_modes, first_mode};
 use super::places::{add_once, choose_places, few_or_many, spread};
+use super::settings::{
+    CreepKind, DynamicsKind, FIRST_SHARE, MODE_GAIN, PlacesKind, ROUGH, SAME, STEPS, Settings,
+};
 use super::slow_parts::{choose_slow, creeps, drop_drifts, without_creep};
 use super::trials::{side_by_side, with_each};
-use super::{CreepKind, DynamicsKind, PlacesKind, Settings, WeightsRecord};
+use super::weights_record::WeightsRecord;
 use crate::identify::records::history::History;
 use crate::math::least;
 use crate::signal::{index, range};
@@ -24,18 +27,10 @@ const SHAPE_GAIN: f64 = 0.1;
 
 /// Shares of the deviation that histories and modes have to take away.
 const HISTORY_GAIN: f64 = 0.02;
-pub(super) const MODE_GAIN: f64 = 0.02;
-
 /// Share of the deviation that a mode has to take away whose resonance no record shows, and how far
 /// it is above the drive: it would also explain some of the creep, or of what the plays do not.
 const UNSEEN_GAIN: f64 = 0.15;
 const ABOVE_DRIVE: f64 = 10.0;
-
-/// Deviations that differ by less than this share tell nothing.
-pub(super) const SAME: f64 = 1.01;
-
-/// Gain of a step below which a choice is settled.
-pub(super) const ROUGH: f64 = 1e-3;
 
 /// Share of the deviation that dead zones in other places have to take away.
 const CORNER_GAIN: f64 = 0.02;
@@ -49,15 +44,6 @@ const LONGEST_PHASE: f64 = 0.06;
 
 /// Steps of a trial among many: the best one is settled.
 const FEW_STEPS: usize = 2;
-
-/// Ratio of neighbouring lags that are tried.
-const LAG_SPREAD: f64 = 2.5;
-
-/// Deviation of the lag that is taken, relative to the least.
-const LAG_SAME: f64 = 1.003;
-
-/// Share of a fitted creep to start from.
-pub(super) const FIRST_SHARE: f64 = 0.005;
 
 /// The best stage; `None` where stopped.
 pub(super) fn search<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
@@ -344,73 +330,6 @@ fn choose_dynamics(fit: &mut Fit<'_>, settings: &Settings, mode: bool) -> Option
         }
     }
     Some(())
-}
-
-/// The fit with the lag that explains most: the best of some, and from there on with the lag as one
-/// of the unknowns.
-pub(super) fn best_lag<'a>(fit: &Fit<'a>) -> Option<Fit<'a>> {
-    let ranges = Form::First.ranges(fit.common.longest().length(), fit.common.shortest_interval());
-    let (mut time, longest) = (libm::exp(ranges[0].0), libm::exp(ranges[0].1));
-    let mut trial = fit.clone();
-    let mut best: Option<Fit<'a>> = None;
-    while time < longest {
-        // Each from the one before: their weights differ little.
-        trial = at_lag(&trial, time, 1)?;
-        if best.as_ref().is_none_or(|best| trial.rms < best.rms) {
-            best = Some(trial.clone());
-        }
-        time *= LAG_SPREAD;
-    }
-    let mut best = best?;
-    best.settle(1e-5)?;
-    Some(best)
-}
-
-/// The fit with a lag of so many seconds, which is held, after so many steps at most.
-fn at_lag<'a>(fit: &Fit<'a>, time: f64, steps: usize) -> Option<Fit<'a>> {
-    let mut trial = fit.clone();
-    trial.set_poles(Form::First, &[libm::log(time)]);
-    trial.held = true;
-    trial.settle_rigid(steps)?;
-    trial.held = false;
-    Some(trial)
-}
-
-/// The fit with the smallest lag that explains the record as well as the best one, and with the range
-/// of such lags.
-fn smallest_lag<'a>(mut still: Fit<'a>, best: &Fit<'a>) -> Option<Fit<'a>> {
-    let time = libm::exp(best.x[best.layout().poles().start]);
-    let enough = SAME * f64::min(best.rms, still.rms);
-    let as_good = |time: f64| Some(at_lag(best, time, STEPS)?.rms <= enough);
-    let longest = libm::exp(best.pole_ranges()[0].1);
-    let mut high = time;
-    while high < longest && as_good(1.5 * high)? {
-        high *= 1.5;
-    }
-    let mut beyond = 1.5 * high;
-    for _ in 0..4 {
-        let middle = 0.5 * (high + beyond);
-        if as_good(middle)? { high = middle } else { beyond = middle }
-    }
-    let shortest = |enough: f64| {
-        let (mut low, mut short) = (time, 0.0);
-        for _ in 0..6 {
-            let middle = 0.5 * (low + short);
-            if at_lag(best, middle, STEPS)?.rms <= enough { low = middle } else { short = middle }
-        }
-        Some(low)
-    };
-    let low = if still.rms <= enough { 0.0 } else { shortest(enough)? };
-    let least = LAG_SAME / SAME * enough;
-    if still.rms <= least {
-        still.lags = Some((low, high));
-        return Some(still);
-    }
-    let mut chosen = at_lag(best, shortest(least)?, STEPS)?;
-    chosen.held = true;
-    chosen.settle(ROUGH)?;
-    chosen.lags = Some((low, high));
-    Some(chosen)
 }
 
 /// Whether what was found as a mode is one: far above the drive, where it does not stand for

@@ -1,0 +1,72 @@
+//! Settings of an identification by least squares, and the constants that its steps share.
+
+/// What is to be found of the stage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Thresholds of plays, or levels.
+    pub places: PlacesKind,
+    /// Number of dead zones.
+    pub zones: usize,
+    /// Which creep.
+    pub creep: CreepKind,
+    /// Which dynamics.
+    pub dynamics: DynamicsKind,
+}
+
+/// Thresholds of plays, or levels of a grid.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PlacesKind {
+    /// These, V, ascending.
+    Given(Vec<f64>),
+    /// So many plays, spread evenly up to half of the drive's range; so many intervals between
+    /// levels.
+    Spread(usize),
+    /// As many as foretell best what they were not fitted to.
+    Auto,
+}
+
+/// Creep of a fit.
+#[derive(Clone, Debug, PartialEq)]
+pub enum CreepKind {
+    /// Relaxations of these time constants, s; none where empty.
+    Times(Vec<f64>),
+    /// What the record shows.
+    Auto,
+}
+
+impl CreepKind {
+    /// Those given.
+    pub(super) fn times(&self) -> &[f64] {
+        match self {
+            Self::Times(times) => times,
+            Self::Auto => &[],
+        }
+    }
+}
+
+/// Linear dynamics that can be searched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DynamicsKind {
+    /// None.
+    None,
+    /// A first-order lag.
+    First,
+    /// A mode.
+    Second,
+    /// What the record shows: a mode, the smallest lag that explains it, or none.
+    Auto,
+}
+
+/// Gain of a step below which a choice is settled.
+pub(super) const ROUGH: f64 = 1e-3;
+
+/// Most steps.
+pub(super) const STEPS: usize = 60;
+
+/// Deviations that differ by less than this share tell nothing.
+pub(super) const SAME: f64 = 1.01;
+
+/// Share of a fitted creep to start from.
+pub(super) const FIRST_SHARE: f64 = 0.005;
+
+pub(super) const MODE_GAIN: f64 = 0.02;

@@ -1,0 +1,101 @@
+//! A record as least squares take it.
+
+use crate::error::{Error, Result, shown};
+use crate::identify::parameters::delay::Delay;
+use crate::identify::parameters::drift::DriftKind;
+use crate::identify::records::history::History;
+use crate::models::Measures;
+use crate::signal::{Drive, Hold, index};
+
+/// A record: the displacement under a drive, judged from sample `start` on, and what is asked of
+/// it alone.
+#[derive(Clone, Copy, Debug)]
+pub struct WeightsRecord<'a> {
+    /// Drive, V.
+    pub drive: Drive<'a>,
+    /// Displacement, m.
+    pub y: &'a [f64],
+    /// First sample that counts; those before are warm-up.
+    pub start: usize,
+    /// What went before the record; `None` chooses.
+    pub history: Option<History>,
+    /// Whether the sensor shows something where the stage is at rest.
+    pub offset: bool,
+    /// Whether what it shows drifts.
+    pub drift: DriftKind,
+    /// Delay of the reading.
+    pub delay: WeightsDelay,
+    /// How much a sample counts beside those of other records.
+    pub weight: f64,
+}
+
+/// Delay of a reading in a fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum WeightsDelay {
+    /// Known, s; 0 for none.
+    Known(f64),
+    /// To be found between two bounds, s.
+    Fitted(f64, f64),
+}
+
+impl<'a> WeightsRecord<'a> {
+    /// A record that begins as it shows, with an offset, without drift or delay.
+    #[must_use]
+    pub fn of(drive: Drive<'a>, y: &'a [f64], start: usize) -> Self {
+        let delay = WeightsDelay::Known(0.0);
+        Self {
+            drive,
+            y,
+            start,
+            history: None,
+            offset: true,
+            drift: DriftKind::None,
+            delay,
+            weight: 1.0,
+        }
+    }
+
+    /// The same with a delay of its reading.
+    ///
+    /// # Errors
+    /// Names `delay` where it is out of its range.
+    pub fn delayed(self, delay: Delay) -> Result<Self> {
+        let length = self.drive.dt * index(self.drive.u.len());
+        let ends = delay.ends(length, || self.measures().longest_delay())?;
+        let delay = match delay {
+            Delay::Fixed(value) => WeightsDelay::Known(value),
+            Delay::Between(low, high) if low > high => {
+                let found = format!("({}, {}) s", shown(low), shown(high));
+                return Err(Error::parameter("delay", found, "the lower bound first"));
+            }
+            _ if ends.0 < ends.1 => WeightsDelay::Fitted(ends.0, ends.1),
+            _ => WeightsDelay::Known(ends.0),
+        };
+        Ok(Self { delay, ..self })
+    }
+
+    /// Measures of the samples that count.
+    pub(super) fn measures(&self) -> Measures {
+        Measures::of(&self.drive, self.y, self.start..self.y.len())
+    }
+
+    /// Seconds within which the drive comes to a sample: none where it is held and jumps.
+    pub(super) fn step(&self, k: usize) -> f64 {
+        if k > 0 && self.drive.hold == Hold::First { self.drive.dt } else { f64::INFINITY }
+    }
+
+    /// Samples that count.
+    pub(super) fn samples(&self) -> usize {
+        self.y.len().saturating_sub(self.start)
+    }
+
+    /// Seconds that count.
+    pub(super) fn length(&self) -> f64 {
+        self.drive.dt * index(self.samples())
+    }
+
+    /// Whether readings are late.
+    pub(super) fn is_delayed(&self) -> bool {
+        self.delay != WeightsDelay::Known(0.0)
+    }
+}
