@@ -16,7 +16,7 @@ from typing import Any
 import matplotlib as mpl
 
 import piezotrack as pt
-from piezotrack.control.comparing.comparison_table import grids
+from piezotrack.control.views.comparison_table import grids
 
 mpl.use("Agg")
 

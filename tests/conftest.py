@@ -28,7 +28,7 @@ def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     # Before its name is replaced, which the import would otherwise copy for good.
     import matplotlib.pyplot as plt
 
-    import piezotrack.identification.report  # noqa: F401
+    import piezotrack.identification.views.report  # noqa: F401
 
     def none(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
         del figures, folder

@@ -74,7 +74,7 @@ class DeviceError(PiezotrackError, RuntimeError):
 
     Attributes
     ----------
-    partial : piezotrack.control.tracking.Tracking or piezotrack.control.Learning or None
+    partial : piezotrack.control.loop.tracking.Tracking or piezotrack.control.Learning or None
         Of a loop that was closed on it, the run up to then; of a learning, what was learnt.
     """
 

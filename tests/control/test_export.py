@@ -26,8 +26,8 @@ from c_exports import (
     needs_gxx,
 )
 from folders import ROOT
-from piezotrack.control.export.vectors import rows_of
 from piezotrack.errors import ParameterError
+from piezotrack.export.vectors import rows_of
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -11,7 +11,7 @@ import pytest
 
 import piezotrack as pt
 from c_exports import DAHL, PARTS, PI, checked, compiled, needs_gcc
-from piezotrack.control.export.vectors import Row, vectors_text
+from piezotrack.export.vectors import Row, vectors_text
 
 if TYPE_CHECKING:
     from pathlib import Path

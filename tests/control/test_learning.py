@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from piezotrack.control.learning_plants import learning_plants
-from piezotrack.control.learning_rules import _largest
+from piezotrack.control.learning.plants import learning_plants
+from piezotrack.control.learning.rules import _largest
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -11,7 +11,7 @@ import pytest
 
 import piezotrack as pt
 from piezotrack.control import train_network
-from piezotrack.control.neural_network import _motion, _Network
+from piezotrack.control.laws.neural_network import _motion, _Network
 
 DT = 2e-3
 LIMITS = (0.0, 75.0)

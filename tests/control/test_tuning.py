@@ -18,7 +18,7 @@ from piezotrack.control import Kept
 from piezotrack.control.tuning import search
 
 if TYPE_CHECKING:
-    from piezotrack.control.tracking import Tracking
+    from piezotrack.control.loop.tracking import Tracking
 
 LIMITS = (0.0, 75.0)
 QUICK: dict[str, Any] = {"particles": 24, "iterations": 25}

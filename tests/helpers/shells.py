@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import piezotrack as pt
 from commands import run
 from mutants import changed_document, log
-from piezotrack.control.controller_file import document_of
+from piezotrack.control.controller.controller_file import document_of
 from soak import LONGEST_MESSAGE, bad_message, judged
 
 NUMBERS = ["0.02", "0", "-1", "nan", "inf", "1e-9", "1e9", "1e300", "x", "", "\u0663", "1_0"]

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
+from piezotrack.benchmarking.contenders import contenders_named, listed_contenders
+from piezotrack.benchmarking.discrete_backlash import identify_backlash, last_cycle
+from piezotrack.benchmarking.plain_models import contender_of
+from piezotrack.benchmarking.records import RECORDS, made_up, records_named
+from piezotrack.benchmarking.records.bouc_wen_benchmark import multisine
+from piezotrack.benchmarking.scoring import result_of
 from piezotrack.data import datasets
 from piezotrack.errors import DataError, ParameterError
-from piezotrack.identification.benchmarking.contenders import contenders_named, listed_contenders
-from piezotrack.identification.benchmarking.discrete_backlash import identify_backlash, last_cycle
-from piezotrack.identification.benchmarking.plain_models import contender_of
-from piezotrack.identification.benchmarking.records import RECORDS, made_up, records_named
-from piezotrack.identification.benchmarking.records.bouc_wen_benchmark import multisine
-from piezotrack.identification.benchmarking.scoring import result_of
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -21,9 +21,9 @@ from matplotlib.figure import Figure
 
 import piezotrack as pt
 from campaigns import PLAYS, QUICK, Serial, contents, flat, log, results
-from piezotrack.identification import campaign_task
-from piezotrack.identification.campaign_task import Task, settings
-from piezotrack.identification.campaigns import campaign
+from piezotrack.identification.campaigns import task as campaign_task
+from piezotrack.identification.campaigns.campaign import campaign
+from piezotrack.identification.campaigns.task import Task, settings
 
 
 def run(
@@ -242,7 +242,7 @@ def test_a_result_that_cannot_be_written_says_how_far_it_came(
             raise pt.DataError(f"{path.name} cannot be written: no space left on device")
         return write_document(path, document)
 
-    monkeypatch.setattr("piezotrack.identification.campaign_folder.write_document", full)
+    monkeypatch.setattr("piezotrack.identification.campaigns.folder.write_document", full)
     with pytest.raises(pt.DataError, match=r"no space left on device; 2 of 4 results are in"):
         campaign([log()], {"quick": QUICK}, range(4), Serial(), folder=tmp_path)
 
@@ -292,7 +292,7 @@ def test_the_name_of_a_task_is_that_of_what_its_result_depends_on() -> None:
 def test_the_name_of_a_task_is_the_same_in_another_process() -> None:
     code = (
         "import sys; sys.path.insert(0, sys.argv[1]); from campaigns import *; "
-        "from piezotrack.identification.campaign_task import Task, settings; "
+        "from piezotrack.identification.campaigns.task import Task, settings; "
         "given = settings('dahl', {'free': {'mass', 'damping', 'a1', 'a2'}}); "
         "print(Task(record=log(), settings=given, seed=3).name)"
     )

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
+from piezotrack.identification.fitted.drift import Drift
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -205,7 +206,7 @@ def test_its_values_are_counted() -> None:
 def test_a_drift_is_what_is_left_of_an_exponential(time: float) -> None:
     """At the beginning all of it, at the end nothing; a straight line where it is slow."""
     data = record()
-    drift = pt.identification.drift.Drift._fading(6e-7, time, data, time_fitted=False)
+    drift = Drift._fading(6e-7, time, data, time_fitted=False)
     x = drift.at(data.t)
     assert x[0] == pytest.approx(6e-7)
     assert x[-1] == pytest.approx(0.0, abs=1e-20)

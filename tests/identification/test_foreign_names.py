@@ -12,7 +12,7 @@ import pytest
 
 import piezotrack as pt
 from piezotrack._support.files import save_figures
-from piezotrack.identification.plot import plot_loop
+from piezotrack.identification.views.plot import plot_loop
 from records import published, quick
 
 if TYPE_CHECKING:

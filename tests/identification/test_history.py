@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from piezotrack.identification.search import search_records
+from piezotrack.identification.solve.search import search_records
 
 DT = 1e-3
 NOISE = 10e-9
@@ -90,7 +90,7 @@ def test_a_record_is_searched_again_only_for_a_history_that_it_shows(
         asked.append(records[0].history)
         return search_records(records, *arguments, **settings)
 
-    monkeypatch.setattr("piezotrack.identification.kinds.search_records", search)
+    monkeypatch.setattr("piezotrack.identification.solve.one_model.search_records", search)
     pt.identify(record(visited), "first-order-dahl")
     assert set(asked) <= set(searched)
     assert asked[-1] == searched[-1]
@@ -100,10 +100,10 @@ def test_a_record_is_searched_again_only_for_a_history_that_it_shows(
 def test_a_long_record_is_asked_at_its_beginning(monkeypatch: pytest.MonkeyPatch) -> None:
     log = record([75.0])
     expected = pt.identify(log, "first-order-dahl").cost
-    monkeypatch.setattr("piezotrack.identification.other_histories.BEGINNING", 1500)
+    monkeypatch.setattr("piezotrack.identification.solve.earlier_motion.BEGINNING", 1500)
     assert pt.identify(log, "first-order-dahl").cost == expected
     # Without a reversal in its beginning, all of it.
-    monkeypatch.setattr("piezotrack.identification.other_histories.BEGINNING", 20)
+    monkeypatch.setattr("piezotrack.identification.solve.earlier_motion.BEGINNING", 20)
     assert pt.identify(log, "first-order-dahl").cost == expected
 
 

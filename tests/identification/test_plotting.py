@@ -13,14 +13,14 @@ import pytest
 
 import piezotrack as pt
 from piezotrack._support.files import save_figures
-from piezotrack.identification.plot import (
+from piezotrack.identification.views.plot import (
     plot_convergence,
     plot_identification,
     plot_loop,
     plot_response,
     plot_time,
 )
-from piezotrack.identification.report import save_identification
+from piezotrack.identification.views.report import save_identification
 from records import quick, quick_fit
 
 if TYPE_CHECKING:

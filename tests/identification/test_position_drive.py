@@ -12,7 +12,7 @@ import pytest
 
 import piezotrack as pt
 from commands import names, ran, refusal, run
-from piezotrack.identification.plot import plot_loop
+from piezotrack.identification.views.plot import plot_loop
 
 GAIN = 0.9
 THRESHOLDS, WEIGHTS = (2e-6, 6e-6), (0.2, 0.1)

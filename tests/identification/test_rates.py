@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from piezotrack.identification import remarks
+from piezotrack.identification.fitted import notes as remarks
 
 STAGE = pt.VirtualStage.xu_li_2010(seed=3)
 QUICK = pt.ParticleSwarm(iterations=30)

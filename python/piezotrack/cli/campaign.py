@@ -128,8 +128,8 @@ def campaign_command(
 ) -> None:
     """Identify models of many logs; run again for the rest."""
     from .._support.files import save_figures
-    from ..identification.campaign_result import check_parquet
-    from ..identification.campaigns import campaign
+    from ..identification.campaigns.campaign import campaign
+    from ..identification.campaigns.result import check_parquet
 
     kinds = Kinds.checked(model)
     kinds.refuse_without_effect(context)

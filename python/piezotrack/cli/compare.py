@@ -75,7 +75,7 @@ def compare_command(
     quiet: Quiet = False,
 ) -> None:
     """Fit several models to a log and validate them."""
-    from ..identification.comparison import compare, comparison_files
+    from ..identification.comparison.compare import compare, comparison_files
     from ..stages.registry import MODELS
 
     searched = {one.name for one in MODELS if one.searched}

@@ -46,9 +46,9 @@ from .output import Output
 from .xy_stages import OwnStage, PaperStage
 
 if TYPE_CHECKING:
-    from ..control.contouring import Contour
-    from ..control.controller import Controller
-    from ..identification.cross_talk import CrossTalk
+    from ..control.controller.controller import Controller
+    from ..control.loop.contouring import Contour
+    from ..identification.experiments.cross_talk import CrossTalk
     from ..references.xy_reference import XYReference
     from ..stages.xy import XYStage
     from ..xu_li_2010.table_2 import Published, Table2
@@ -135,7 +135,7 @@ def contour_command(
     quiet: Quiet = False,
 ) -> None:
     """Simulate contouring of a path with an XY stage."""
-    from ..control.contouring import contour
+    from ..control.loop.contouring import contour
     from ..xu_li_2010.table_2 import run_table_2
 
     own = _is_own(stage, models, table_2)
@@ -259,7 +259,7 @@ def _cross_talk(stage: XYStage, loops: tuple[Controller, Controller]) -> CrossTa
     """Identify the cross-talk from records with one axis driven at a time between its limits."""
     import numpy as np
 
-    from ..identification.cross_talk import identify_cross_talk
+    from ..identification.experiments.cross_talk import identify_cross_talk
 
     t = np.arange(8000) / 1000.0
     lows, highs = zip(*(loop.limits for loop in loops), strict=True)

@@ -15,7 +15,7 @@ from .output import Output
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from ..control.tracking import Tracking
+    from ..control.loop.tracking import Tracking
 
 __all__ = ["demo_command"]
 
@@ -45,11 +45,11 @@ def demo_command(
 def _measured(result: Output, seed: int) -> None:
     """Run the demonstration on the two measured logs of the package."""
     from .._support.files import make_folder, picture_files, save_figures, together
-    from ..control.demo import run_demo
-    from ..control.demo_plot import plot_before_and_after
     from ..data.log_file import write_log
-    from ..identification.plot import plot_loop, plot_time, what_was_not_fitted
-    from ..identification.report import identification_files, save_identification
+    from ..identification.views.plot import plot_loop, plot_time, what_was_not_fitted
+    from ..identification.views.report import identification_files, save_identification
+    from .demonstration import run_demo
+    from .demonstration_plot import plot_before_and_after
 
     # The logs are known, and so is the kind of model that suits them.
     model = identification_files("prandtl-ishlinskii", searched=False)
@@ -97,7 +97,7 @@ def _measured(result: Output, seed: int) -> None:
 
 def _commands(out: Path) -> list[str]:
     """Return what to type next."""
-    from ..control.demo import FEEDBACK, NOISE, REFERENCE, WINDOW
+    from .demonstration import FEEDBACK, NOISE, REFERENCE, WINDOW
 
     log, other, model = (out / name for name in ("log.csv", "other.csv", "prandtl-ishlinskii.json"))
     window = "{:g}:{:g}".format(*WINDOW)
@@ -114,7 +114,7 @@ def _paper(result: Output, seed: int) -> None:
     """Run the demonstration of the paper: its stage, simulated, and its model."""
     from .._support.files import make_folder, picture_files, save_figures, together
     from ..data.log_file import write_log
-    from ..identification.report import identification_files, save_identification
+    from ..identification.views.report import identification_files, save_identification
     from ..xu_li_2010.demo import demo_log, identify_demo, track_demo
 
     tracked = picture_files(*(f"track_{name}" for name in RUNS))

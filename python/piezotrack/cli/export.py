@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ..control.export.write import Exported
+    from ..export.write import Exported
 
 __all__ = ["export_command"]
 
@@ -80,8 +80,8 @@ def export_command(
     quiet: Quiet = False,
 ) -> None:
     """Write a controller as C, coefficients or FMU."""
-    from ..control.controller_file import load_controller
-    from ..control.export.write import export_controller, export_files
+    from ..control.controller.controller_file import load_controller
+    from ..export.write import export_controller, export_files
 
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     chosen = controller.stem.replace("-", "_") if name is None else name

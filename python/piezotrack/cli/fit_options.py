@@ -15,7 +15,7 @@ from .options import number, number_range, pairs, refuse_without_effect
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from ..identification.swarm import ParticleSwarm
+    from ..identification.methods.particle_swarm import ParticleSwarm
 
 __all__ = [
     "AUTO",
@@ -333,7 +333,7 @@ def fit_options(
 def _least_squares(
     plays: int | None, asymmetry: int | None, dynamics: str | None, creep: bool | list[float] | None
 ) -> Any:
-    from ..identification.least_squares import LeastSquares
+    from ..identification.solve.weights import LeastSquares
 
     settings: dict[str, Any] = {}
     if plays is not None:
@@ -348,7 +348,7 @@ def _least_squares(
 
 
 def _swarm(name: str | None) -> ParticleSwarm | None:
-    from ..identification.swarm import ParticleSwarm
+    from ..identification.methods.particle_swarm import ParticleSwarm
 
     known = {
         "default": ParticleSwarm(),

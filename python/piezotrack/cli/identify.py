@@ -63,8 +63,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from ..data.dataset import Dataset
-    from ..identification.result import Identification
-    from ..identification.score import Score
+    from ..identification.fitted.identification import Identification
+    from ..identification.fitted.score import Score
 
 __all__ = ["identify_command"]
 
@@ -193,8 +193,8 @@ def _files(
 ) -> Iterator[str]:
     """Names of all files that the command may write."""
     from .._support.files import picture_files
-    from ..identification.report import identification_files
-    from ..identification.selection import kinds_tried
+    from ..identification.solve.selection import kinds_tried
+    from ..identification.views.report import identification_files
 
     names = [name for name in kinds.names if name != AUTO]
     if AUTO in kinds.names:
@@ -245,8 +245,8 @@ def _judged(fit: Identification, second: Dataset | None) -> tuple[Identification
 def _write(fit: Identification, out: Path, second: Dataset | None) -> list[Path]:
     """Write the model and the pictures, those of a second log too."""
     from .._support.files import make_folder, save_figures, together
-    from ..identification.plot import plot_loop, plot_time, what_was_not_fitted
-    from ..identification.report import save_identification
+    from ..identification.views.plot import plot_loop, plot_time, what_was_not_fitted
+    from ..identification.views.report import save_identification
 
     name = fit.model.info.name
     figures = {}

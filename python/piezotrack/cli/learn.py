@@ -48,10 +48,10 @@ from .track import BeyondReach, parsed_reference
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
-    from ..control.iterative_learning import IterativeLearning
-    from ..control.learning import Learning
+    from ..control.learning.iterative_learning import IterativeLearning
+    from ..control.learning.learn import Learning
     from ..hardware.device import Device
-    from ..identification.identified import IdentifiedModel
+    from ..identification.fitted.identified_model import IdentifiedModel
     from ..stages.virtual import VirtualStage
 
 __all__ = ["learn_command"]
@@ -128,9 +128,9 @@ def learn_command(
 ) -> None:
     """Learn the voltage of a repeated motion."""
     from .._support.files import picture_files
-    from ..control.controller import Controller
-    from ..control.learning import learn
-    from ..identification.identified import load
+    from ..control.controller.controller import Controller
+    from ..control.learning.learn import learn
+    from ..identification.fitted.identified_model import load
 
     own = stage != PAPER
     settings = Loop(own, dt, limits, feedback, kp, ti, td)
@@ -232,7 +232,7 @@ def _kept(learnt: Learning, out: Path, picture: bool) -> str:
 
 def _show(learner: IterativeLearning) -> None:
     """Print the convergence before the first trial, and the errors of each."""
-    from ..control.learning import heading, trial_line
+    from ..control.learning.learn import heading, trial_line
 
     made = len(learner.trials)
     line = trial_line(made - 1, learner.trials[-1]) if made else heading(learner)

@@ -15,10 +15,10 @@ from .options import number_range, refuse_without_effect
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from ..control.components import Pid, Repetitive
-    from ..control.stability import LoopCheck
-    from ..control.tracking import Tracking
-    from ..identification.identified import IdentifiedModel
+    from ..control.laws.components import Pid, Repetitive
+    from ..control.loop.stability import LoopCheck
+    from ..control.loop.tracking import Tracking
+    from ..identification.fitted.identified_model import IdentifiedModel
     from ..references.reference import Reference
     from ..stages.virtual import VirtualStage
 
@@ -189,7 +189,7 @@ class Loop:
 
     def pid(self, model: IdentifiedModel | None) -> Pid | None:
         """Make the feedback; the paper's gains are for its own stage only."""
-        from ..control.components import Pid
+        from ..control.laws.components import Pid
 
         if not self.has_feedback:
             return None
@@ -231,7 +231,7 @@ class Loop:
         self, model: IdentifiedModel, reference: Reference, kq: float | None, tq: float | None
     ) -> Repetitive:
         """Make the repetitive part; on one's own stage half of an error is learnt in a period."""
-        from ..control.components import Repetitive
+        from ..control.laws.components import Repetitive
         from ..control.plant import linearised_plants, plant_of
 
         period = reference.period
@@ -308,7 +308,7 @@ def simulated(
     """Make the stage of `StageFile`, with the noise [m] of a sensor and a bandwidth [Hz]."""
     from pathlib import Path
 
-    from ..identification.identified import load
+    from ..identification.fitted.identified_model import load
     from ..stages.virtual import VirtualStage
 
     if stage == PAPER:

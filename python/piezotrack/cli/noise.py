@@ -25,7 +25,7 @@ from .options import (
 from .output import Output
 
 if TYPE_CHECKING:
-    from ..identification.sensor_noise import Noise
+    from ..identification.experiments.sensor_noise import Noise
 
 __all__ = ["noise_command"]
 
@@ -60,7 +60,7 @@ def noise_command(
         write_document,
     )
     from ..data.reader import read_displacement
-    from ..identification.sensor_noise import identify_noise
+    from ..identification.experiments.sensor_noise import identify_noise
 
     columns = Columns(time, None, displacement, unit, dt)
     log = read_displacement(

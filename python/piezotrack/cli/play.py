@@ -42,9 +42,9 @@ def play_command(
 ) -> None:
     """Play a feedforward as a table on a device."""
     from .._support.files import picture_files
-    from ..control.controller_file import load_controller
+    from ..control.controller.controller_file import load_controller
     from ..control.on_device.playing import play
-    from ..identification.identified import load
+    from ..identification.fitted.identified_model import load
 
     forward = load_controller(file) if rate is None else load(file).inverse()
     desired = parsed_reference(reference, duration, period)

@@ -51,8 +51,8 @@ def simulate_command(
         write_columns,
     )
     from .._support.units import drive_word, shown_unit
-    from ..identification.identified import load
-    from ..identification.plot import plot_response
+    from ..identification.fitted.identified_model import load
+    from ..identification.views.plot import plot_response
 
     known = load(model)
     columns = Columns(time, drive, None, unit, dt)

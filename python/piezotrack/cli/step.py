@@ -30,7 +30,7 @@ from .options import (
 from .output import Output
 
 if TYPE_CHECKING:
-    from ..identification.step_response import StepResult
+    from ..identification.experiments.step_response import StepResult
 
 __all__ = ["step_command"]
 
@@ -76,7 +76,7 @@ def step_command(
         together,
         write_document,
     )
-    from ..identification.step_response import identify_step
+    from ..identification.experiments.step_response import identify_step
 
     log = Columns(time, drive, displacement, unit, dt).read(file, hold, resample)
     log = windowed(log, file, "--window", window)

@@ -51,9 +51,9 @@ from .options import (
 from .output import Output
 
 if TYPE_CHECKING:
-    from ..control.controller import Controller
-    from ..control.tracking import Tracking
-    from ..identification.identified import IdentifiedModel
+    from ..control.controller.controller import Controller
+    from ..control.loop.tracking import Tracking
+    from ..identification.fitted.identified_model import IdentifiedModel
     from ..references.reference import Reference
 
 __all__ = [
@@ -155,10 +155,10 @@ def track_command(
 ) -> None:
     """Track a reference in closed loop."""
     from .._support.files import picture_files
-    from ..control.controller import Controller
-    from ..control.stability import check_loop
-    from ..control.tracking import track
-    from ..identification.identified import load
+    from ..control.controller.controller import Controller
+    from ..control.loop.stability import check_loop
+    from ..control.loop.tracking import track
+    from ..identification.fitted.identified_model import load
 
     if device is not None:
         refuse_without_effect(context, SIMULATED, "with --device")
@@ -227,8 +227,8 @@ def _on_device(
 ) -> None:
     """Close the loop of a controller file on a device; what was tracked before a fault is kept."""
     from .._support.files import picture_files
-    from ..control.controller_file import load_controller
-    from ..control.tracking import track
+    from ..control.controller.controller_file import load_controller
+    from ..control.loop.tracking import track
 
     loop = load_controller(file)
     result.will_write(["tracking.csv", "tracking.json", *picture_files("tracking")])
@@ -279,10 +279,10 @@ def feedforward_command(
     """Compute the feedforward voltage for a reference."""
     from .._support.files import make_folder, picture_files, save_figures, together, write_columns
     from .._support.units import drive_word, shown_unit
-    from ..control.checks import check_within_reach
+    from ..control.loop.preconditions import check_within_reach
     from ..control.plant import plant_of
-    from ..control.tracking_plot import plot_feedforward
-    from ..identification.identified import load
+    from ..control.views.tracking_plot import plot_feedforward
+    from ..identification.fitted.identified_model import load
 
     known = load(model)
     desired = parsed_reference(reference, duration, period)

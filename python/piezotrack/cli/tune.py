@@ -89,7 +89,7 @@ def tune_command(
     from .._support.files import picture_files
     from ..control.tuning.margins import Margins, Spread
     from ..control.tuning.tune import tune
-    from ..identification.identified import load
+    from ..identification.fitted.identified_model import load
     from ..stages.virtual import VirtualStage
 
     _within("--gain-margin", gain_margin, 1.0, math.inf, "a factor above 1")
@@ -179,7 +179,7 @@ def _document(tuned: Tuned) -> dict[str, Any]:
 def _write(tuned: Tuned, document: dict[str, Any], out: Path) -> list[Path]:
     """Write report and controller as JSON, and a picture of the loop along each reference."""
     from .._support.files import make_folder, save_figures, together, write_document
-    from ..control.controller_file import save_controller
+    from ..control.controller.controller_file import save_controller
 
     with together(make_folder(out)) as folder:
         pictures = {_name(i): run.plot() for i, run in enumerate(tuned.report.runs)}

@@ -12,7 +12,7 @@ import numpy as np
 from .. import _core
 from .._support.arguments import one_or_more_numbers
 from ..errors import ParameterError
-from ..identification.identified import IdentifiedModel
+from ..identification.fitted.identified_model import IdentifiedModel
 from ..stages.base import Stage
 from ..stages.virtual import VirtualStage
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .controller import Controller
+    from .controller.controller import Controller
 
     Array = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from .dataset_arguments import (
     interpolation_factor,
     window_samples,
 )
-from .dataset_text import as_line, as_table
+from .views.dataset_text import as_line, as_table
 
 if TYPE_CHECKING:
     import os
@@ -476,7 +476,7 @@ class Dataset:
         >>> [ax.get_ylabel() for ax in figure.axes]
         ['drive [V]', 'displacement [um]', 'displacement [um]']
         """
-        from .dataset_plot import plot_dataset
+        from .views.dataset_plot import plot_dataset
 
         return plot_dataset(self, fig)
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal
 
 from ..stages.registry import model_named
-from .asked import Own, asked_of, of_record
-from .checkpoint import checkpoint_of
-from .drift import asked_drift
-from .kinds import identify_kind, refuse_given
-from .selection import AUTO, identify_best
-from .together import best_together, identify_together
+from .fitted.drift import asked_drift
+from .problem.checkpoint import checkpoint_of
+from .problem.records import Own, asked_of, of_record
+from .solve.one_model import identify_kind, refuse_given
+from .solve.selection import AUTO, identify_best
+from .solve.several_records import best_together, identify_together
 
 if TYPE_CHECKING:
     import os
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
     from ..data.dataset import Dataset
     from ..stages.model_info import ModelInfo
-    from .asked import Asked
-    from .descents import Descents
-    from .estimates import Progress
-    from .history import History
-    from .least_squares import LeastSquares
-    from .result import Identification
-    from .step_response import StepResult
-    from .swarm import ParticleSwarm
+    from .experiments.step_response import StepResult
+    from .fitted.estimates import Progress
+    from .fitted.identification import Identification
+    from .fitted.start import History
+    from .methods.descents import Descents
+    from .methods.particle_swarm import ParticleSwarm
+    from .problem.records import Asked
+    from .solve.weights import LeastSquares
 
     Delay = bool | float | tuple[float, float] | None
     Drift = bool | float | None

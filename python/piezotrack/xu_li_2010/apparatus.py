@@ -7,7 +7,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from .._support.json_text import parse_json
-from ..control.controller import Controller
+from ..control.controller.controller import Controller
 from ..stages.apparatus import Amplifier, Preconditioning, Sensor
 from ..stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
 from ..stages.virtual import VirtualStage

@@ -11,10 +11,10 @@ import numpy as np
 
 from .. import _core
 from .._support.two_threads import one_by_one, two_threads
-from ..control.checks import check_stable
+from ..control.loop.preconditions import check_stable
 from ..errors import PiezotrackError
 from ..identification.fit import identify
-from ..identification.swarm import ParticleSwarm
+from ..identification.methods.particle_swarm import ParticleSwarm
 from ..stages.dahl import DahlStage
 from . import fig_04_step_test, fig_06_identification, fig_12_14_tracking, fig_15_circles
 from .apparatus import loop

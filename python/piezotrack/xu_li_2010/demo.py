@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..control.components import Pid, Repetitive
-from ..control.controller import Controller
-from ..control.tracking import Tracking, track
+from ..control.controller.controller import Controller
+from ..control.laws.components import Pid, Repetitive
+from ..control.loop.tracking import Tracking, track
 from ..identification.fit import identify
 from ..references.waveforms import sine
 from ..stages.dahl import DahlStage
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from ..data.dataset import Dataset
-    from ..identification.estimates import Progress
-    from ..identification.result import Identification
+    from ..identification.fitted.estimates import Progress
+    from ..identification.fitted.identification import Identification
 
 __all__ = ["demo_log", "identify_demo", "track_demo"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from ..control.components import Lag, LowPass, Notch, Pid, Repetitive, ZeroPhase
-from ..control.tracking import Tracking, track
+from ..control.laws.components import Lag, LowPass, Notch, Pid, Repetitive, ZeroPhase
+from ..control.loop.tracking import Tracking, track
 from ..data.dataset import Dataset
 from ..errors import NumericalError, ParameterError
 from ..identification.fit import identify
@@ -19,7 +19,7 @@ from .section import Section
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from ..control.controller import Controller
+    from ..control.controller.controller import Controller
     from ..references.reference import Reference
     from ..stages.inverse import Inverse
     from .apparatus import Apparatus

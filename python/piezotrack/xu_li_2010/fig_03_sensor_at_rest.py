@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..identification.sensor_noise import Noise, identify_noise
+from ..identification.experiments.sensor_noise import Noise, identify_noise
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..identification.step_response import StepResult, identify_step
+from ..identification.experiments.step_response import StepResult, identify_step
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

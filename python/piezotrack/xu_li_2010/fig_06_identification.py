@@ -8,14 +8,14 @@ import numpy as np
 
 from ..data.dataset import Dataset
 from ..identification.fit import identify
-from ..identification.swarm import ParticleSwarm
+from ..identification.methods.particle_swarm import ParticleSwarm
 from ..stages.dahl import DahlStage
 from .procedure import FITTED_SECONDS, SEARCH_BOX
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..identification.result import Identification
+    from ..identification.fitted.identification import Identification
     from .apparatus import Apparatus
 
 __all__ = ["draw", "observe", "record", "search", "thinned"]
@@ -71,7 +71,7 @@ def observe(fit: Identification) -> dict[str, float]:
 def draw(fit: Identification) -> Figure:
     """Draw the convergence of the swarm."""
     from .._support.plot_style import panels, whole
-    from ..identification.plot import plot_convergence
+    from ..identification.views.plot import plot_convergence
 
     figure = panels(None, (11.0, 4.2))
     plot_convergence(fit, figure.add_subplot())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..identification.comparison import Comparison, compare
+from ..identification.comparison.compare import Comparison, compare
 from ..identification.fit import identify
 from ..stages.bouc_wen import BoucWenStage
 from .fig_06_identification import thinned
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..data.dataset import Dataset
-    from ..identification.result import Identification
+    from ..identification.fitted.identification import Identification
 
 __all__ = ["draw", "judge", "largest", "observe"]
 

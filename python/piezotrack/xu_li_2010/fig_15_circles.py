@@ -13,7 +13,7 @@ from .table_2 import Table2, run_table_2
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..control.tracking import Tracking
+    from ..control.loop.tracking import Tracking
     from ..stages.inverse import Inverse
     from ..stages.xy import XYStage
     from .apparatus import Apparatus

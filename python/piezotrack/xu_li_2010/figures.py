@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..control.tracking import Tracking
+    from ..control.loop.tracking import Tracking
     from .fig_12_14_tracking import Runs
     from .measured_log import Drives
     from .run import Experiments
@@ -129,7 +129,7 @@ def _grid(runs: Runs, names: dict[str, str], columns: tuple[str, ...]) -> Figure
     """Draw each run in a row."""
     from .._support.plot_style import legend_inside, whole
     from .._support.plot_style import panels as sheet
-    from ..control.tracking_plot import plot_effort, plot_error, plot_following, plot_motion
+    from ..control.views.tracking_plot import plot_effort, plot_error, plot_following, plot_motion
 
     panels: dict[str, Callable[[Tracking, Axes], Axes]] = {
         "motion": plot_motion,

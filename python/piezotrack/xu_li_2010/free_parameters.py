@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..identification.step_readings import StepReadings
+from ..identification.experiments.step_readings import StepReadings
 from ..stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
 from ..stages.virtual import VirtualStage
 from ..stages.xy import XYStage

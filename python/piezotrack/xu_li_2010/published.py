@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from .._support.json_text import parse_json
-from ..identification.step_readings import StepReadings
+from ..identification.experiments.step_readings import StepReadings
 from ..stages.dahl import DahlStage
 from .table_2 import PUBLISHED, Published
 

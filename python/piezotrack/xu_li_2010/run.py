@@ -15,10 +15,10 @@ from . import (
 )
 
 if TYPE_CHECKING:
-    from ..identification.comparison import Comparison
-    from ..identification.result import Identification
-    from ..identification.sensor_noise import Noise
-    from ..identification.step_response import StepResult
+    from ..identification.comparison.compare import Comparison
+    from ..identification.experiments.sensor_noise import Noise
+    from ..identification.experiments.step_response import StepResult
+    from ..identification.fitted.identification import Identification
     from ..stages.xy import XYStage
     from .apparatus import Apparatus
     from .fig_12_14_tracking import Runs

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from ..control.contouring import Contour, contour
+from ..control.loop.contouring import Contour, contour
 from ..references.paths import circle
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import ArrayLike
 
-    from ..control.controller import Controller
+    from ..control.controller.controller import Controller
     from ..stages.xy import XYStage
 
 __all__ = ["PUBLISHED", "Table2", "run_table_2"]

@@ -12,14 +12,14 @@ from ..._support.arguments import not_negative
 from ..._support.arrays import check_dt
 from ..._support.messages import quoted
 from ...errors import ParameterError, PiezotrackError
-from ...identification.identified import IdentifiedModel
+from ...identification.fitted.identified_model import IdentifiedModel
 from ...references.reference import Reference
 from ...stages.base import Stage
-from ..checks import check_delay
-from ..controller import number_pair
-from ..laws import chatter_of
+from ..controller.controller import number_pair
+from ..laws.laws import chatter_of
+from ..loop.preconditions import check_delay
+from ..loop.tracking import can_be_learnt, feedforward_of, first_counted
 from ..plant import plant_of, run_closed_loop, stepped, voltages_before
-from ..tracking import can_be_learnt, feedforward_of, first_counted
 from ..tuning.margins import Margins, Spread, plants_of
 from .comparison import Cell, ControllerComparison, Row
 from .contenders import CONTENDERS, Entry, Task
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from ...data.dataset import Dataset
     from ...stages.virtual import VirtualStage
-    from ..controller import Controller
+    from ..controller.controller import Controller
     from ..plant import Plant
 
     Array = NDArray[np.float64]

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from statistics import fmean, median, stdev
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from .comparison_table import comparison_html, comparison_text
+from ..views.comparison_table import comparison_html, comparison_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from matplotlib.figure import Figure, SubFigure
 
-    from ..controller import Controller
+    from ..controller.controller import Controller
     from ..tuning.margins import Margins
 
 __all__ = ["Cell", "ControllerComparison", "Row"]
@@ -222,7 +222,7 @@ class ControllerComparison:
         matplotlib.figure.Figure
             The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
         """
-        from .comparison_plot import plot_controllers
+        from ..views.comparison_plot import plot_controllers
 
         return plot_controllers(self, fig)
 

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ... import _core
 from ...errors import ParameterError
 from ...stages.dahl import DahlStage
-from ..components import Pid
-from ..controller import Controller
-from ..h_infinity import mixed_sensitivity
-from ..hysteresis_observer import HysteresisObserver
-from ..learning import learn
-from ..neural_network import train_network
-from ..tracking import can_be_learnt
+from ..controller.controller import Controller
+from ..laws.components import Pid
+from ..laws.hysteresis_observer import HysteresisObserver
+from ..laws.neural_network import train_network
+from ..learning.learn import learn
+from ..loop.tracking import can_be_learnt
+from ..tuning.h_infinity import mixed_sensitivity
 from ..tuning.margins import Margins, Spread, plants_of
 from ..tuning.schedule import schedule
 from ..tuning.tune import tune
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...data.dataset import Dataset
-    from ...identification.identified import IdentifiedModel
+    from ...identification.fitted.identified_model import IdentifiedModel
     from ...references.reference import Reference
     from ...stages.base import Stage
     from ...stages.inverse import Inverse

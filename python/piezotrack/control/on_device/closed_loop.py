@@ -13,8 +13,8 @@ import numpy as np
 from ...errors import DeviceError, Interrupted, ParameterError
 from ...hardware.measuring import rest_of
 from ...hardware.safe_end import lead, terminated
-from ..checks import check_period, check_stable, check_within_reach
-from ..tracking import Tracking, feedforward_of
+from ..loop.preconditions import check_period, check_stable, check_within_reach
+from ..loop.tracking import Tracking, feedforward_of
 from .guard import Guard
 from .latency import (
     check_exchanging,
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from ...hardware.device import Device, Exchanging
     from ...references.reference import Reference, SampledReference
-    from ..controller import Controller
+    from ..controller.controller import Controller
     from .latency import Latency
 
     Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ...errors import DeviceError
 
 if TYPE_CHECKING:
-    from ..session import RefusedReadings, Session
+    from ..controller.session import RefusedReadings, Session
 
 __all__ = ["Guard"]
 

@@ -22,8 +22,8 @@ from ...hardware.measuring import (
 from ...hardware.safe_end import led_back
 from ...references.reference import Reference
 from ...stages.inverse import Inverse
-from ..controller import Controller
-from ..tracking import Tracking, feedforward_of
+from ..controller.controller import Controller
+from ..loop.tracking import Tracking, feedforward_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

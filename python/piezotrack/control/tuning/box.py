@@ -10,7 +10,7 @@ import numpy as np
 
 from ..._support.messages import quoted
 from ...errors import ParameterError
-from ..components import LowPass, Notch, Repetitive, ZeroPhase
+from ..laws.components import LowPass, Notch, Repetitive, ZeroPhase
 from .structures import SLIDING, Nominal, law_of, law_ranges, nominal_of
 
 if TYPE_CHECKING:

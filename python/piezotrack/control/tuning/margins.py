@@ -15,7 +15,7 @@ from ...errors import ParameterError
 from ..plant import linearised_plants, plant_of
 
 if TYPE_CHECKING:
-    from ...identification.identified import IdentifiedModel
+    from ...identification.fitted.identified_model import IdentifiedModel
     from ..plant import Plant
 
 __all__ = ["Margins", "NamedPlant", "Spread", "plants_of"]

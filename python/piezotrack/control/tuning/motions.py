@@ -10,9 +10,9 @@ import numpy as np
 from ... import _core
 from ...errors import ParameterError
 from ...references.xy_reference import XYReference
-from ..checks import check_drive_unit, check_within_reach
+from ..loop.preconditions import check_drive_unit, check_within_reach
+from ..loop.tracking import feedforward_of, first_counted
 from ..plant import plant_of, stepped
-from ..tracking import feedforward_of, first_counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from ...references.reference import Reference, SampledReference
     from ...stages.virtual import VirtualStage
-    from ..controller import Controller
+    from ..controller.controller import Controller
     from .question import Axis, Question
 
     Array = NDArray[np.float64]

@@ -11,15 +11,15 @@ from ..._support.arguments import not_negative
 from ..._support.arrays import check_dt
 from ..._support.messages import quoted
 from ...errors import ParameterError
-from ...identification.identified import IdentifiedModel
+from ...identification.fitted.identified_model import IdentifiedModel
 from ...references.reference import Reference
 from ...references.xy_reference import XYReference
 from ...stages.base import Stage
 from ...stages.inverse import Inverse
 from ...stages.xy import XYStage
-from ..checks import check_delay
-from ..components import LowPass, Notch
-from ..controller import number_pair
+from ..controller.controller import number_pair
+from ..laws.components import LowPass, Notch
+from ..loop.preconditions import check_delay
 from ..plant import Plant, plant_of, voltages_before
 from .box import parts_named
 from .margins import Margins, Spread

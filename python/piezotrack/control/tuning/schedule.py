@@ -16,10 +16,10 @@ from ...references.reference import Reference
 from ...references.waveforms import sine
 from ...references.xy_reference import XYReference
 from ...stages.xy import XYStage
-from ..components import Pid
-from ..contouring import contour
-from ..scheduled_pid import ScheduledPid
-from ..tracking import track
+from ..laws.components import Pid
+from ..laws.scheduled_pid import ScheduledPid
+from ..loop.contouring import contour
+from ..loop.tracking import track
 from .margins import Margins, Spread, plants_of
 from .tune import tune
 from .tuned import Tuned, TunedPair
@@ -27,8 +27,8 @@ from .tuned import Tuned, TunedPair
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ...identification.identified import IdentifiedModel
-    from ..controller import Controller
+    from ...identification.fitted.identified_model import IdentifiedModel
+    from ..controller.controller import Controller
     from ..plant import Plant
 
     Array = NDArray[np.float64]

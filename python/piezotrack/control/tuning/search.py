@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ... import _core
 from ...errors import ParameterError
 from ...references.xy_reference import XYReference
-from ..controller import Controller
-from ..tracking import can_be_learnt
+from ..controller.controller import Controller
+from ..loop.tracking import can_be_learnt
 from .box import Box, box_of, resonance
 from .margins import NamedPlant, plants_of
 from .motions import tasks_of

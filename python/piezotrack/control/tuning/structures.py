@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ..components import Pid
-from ..laws import DisturbanceObserver, LeadLag, PerturbationEstimator, SlidingMode
+from ..laws.components import Pid
+from ..laws.laws import DisturbanceObserver, LeadLag, PerturbationEstimator, SlidingMode
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 
 from ...errors import ParameterError
-from ..contouring import contour
-from ..tracking import track
+from ..loop.contouring import contour
+from ..loop.tracking import track
 from .question import FIGURES, Question, asked
 from .refusal import refusal
 from .search import Answer, searched
@@ -16,12 +16,12 @@ from .tuned import Tuned, TunedPair, TuningReport
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ...identification.identified import IdentifiedModel
+    from ...identification.fitted.identified_model import IdentifiedModel
     from ...references.reference import Reference
     from ...references.xy_reference import XYReference
     from ...stages.inverse import Inverse
     from ...stages.xy import XYStage
-    from ..components import LowPass, Notch
+    from ..laws.components import LowPass, Notch
     from ..plant import Plant
     from .margins import Margins, Spread
     from .options import TuneOptions

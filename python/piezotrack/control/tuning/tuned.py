@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..._support.units import shown_unit
-from ..components import Pid
-from ..contouring import Contour
+from ..laws.components import Pid
+from ..loop.contouring import Contour
 
 if TYPE_CHECKING:
-    from ..components import LowPass, Notch, Repetitive
-    from ..controller import Controller
-    from ..tracking import Tracking
+    from ..controller.controller import Controller
+    from ..laws.components import LowPass, Notch, Repetitive
+    from ..loop.tracking import Tracking
     from .margins import Margins
 
 __all__ = ["Kept", "Tuned", "TunedPair", "TuningReport", "parts_text"]

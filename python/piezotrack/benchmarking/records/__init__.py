@@ -1,0 +1,61 @@
+"""The records of the benchmark by name; each is made when it is first used."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..._support.messages import quoted
+from ...errors import ParameterError
+from ..record import BenchmarkRecord
+from . import bouc_wen_benchmark, made_up, measured
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+__all__ = ["RECORDS", "records_named"]
+
+RECORDS: dict[str, Callable[[], BenchmarkRecord]] = {
+    **measured.RECORDS,
+    **bouc_wen_benchmark.RECORDS,
+    **made_up.RECORDS,
+}
+
+
+def records_named(records: Iterable[str | BenchmarkRecord] | None) -> list[BenchmarkRecord]:
+    """Find records by name.
+
+    Parameters
+    ----------
+    records : iterable of str or BenchmarkRecord, or None
+        Names, and records as they are; None for all of the package.
+
+    Returns
+    -------
+    list of BenchmarkRecord
+        In this order.
+
+    Raises
+    ------
+    ParameterError
+        There is no such record, or two have one name.
+    """
+    wanted = list(RECORDS) if records is None else records
+    if isinstance(wanted, (str, BenchmarkRecord)):
+        wanted = [wanted]
+    found: dict[str, BenchmarkRecord] = {}
+    for one in wanted:
+        if isinstance(one, BenchmarkRecord):
+            record = one
+        elif one in RECORDS:
+            record = RECORDS[one]()
+        else:
+            raise ParameterError(
+                f"records has {quoted(one)}: expected some of "
+                f"{', '.join(map(repr, RECORDS))}, or a pt.BenchmarkRecord"
+            )
+        if record.name in found:
+            raise ParameterError(f"records has {record.name} twice: expected each name once")
+        found[record.name] = record
+    if not found:
+        raise ParameterError("records is empty: expected one or more")
+    return list(found.values())

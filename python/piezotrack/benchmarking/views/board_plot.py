@@ -1,0 +1,122 @@
+"""Picture of a benchmark: one panel a record, one line a model, on a logarithmic scale."""
+
+from __future__ import annotations
+
+import math
+from itertools import cycle
+from typing import TYPE_CHECKING, Any
+
+from ..._support.plot_style import LEVEL, folded, literal, panels, whole
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+    from ..board import Benchmark, BenchmarkResult
+
+__all__ = ["plot_board"]
+
+# Records side by side, and letters of a name in a line.
+COLUMNS, LABEL = 2, 34
+FITTED: dict[str, Any] = {"marker": "|", "color": "0.35", "markersize": 11, "markeredgewidth": 1.6}
+CARRIED: dict[str, Any] = {"marker": "o", "color": "#d98200", "markersize": 6}
+# Other records, in their order; from the fifth on again.
+OTHERS: tuple[dict[str, Any], ...] = (
+    {"marker": "D", "color": "#1b6ca8", "markersize": 6},
+    {"marker": "s", "color": "#7a3b8f", "markersize": 6},
+    {"marker": "^", "color": "#2e7d32", "markersize": 7},
+    {"marker": "v", "color": "#a3333d", "markersize": 7},
+)
+
+
+def plot_board(board: Benchmark, fig: Figure | SubFigure | None = None) -> Figure:
+    """Draw the rms of each model on each part of each record.
+
+    Parameters
+    ----------
+    board : Benchmark
+        The results.
+    fig : matplotlib.figure.Figure or SubFigure, optional
+        Where to draw; a new figure where not given.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure drawn in.
+    """
+    tables = [[row for row in board.of(name) if row.parts] for name in board.records]
+    tables = [rows for rows in tables if rows]
+    columns = min(COLUMNS, max(1, len(tables)))
+    lines = [tables[i : i + columns] for i in range(0, len(tables), columns)]
+    heights = [max(len(rows) for rows in line) + 3.2 for line in lines] or [4.0]
+    figure = panels(fig, (7.2 * columns, max(3.4, 0.27 * sum(heights))))
+    grid = figure.add_gridspec(len(heights), columns, height_ratios=heights)
+    for i, line in enumerate(lines):
+        for k, rows in enumerate(line):
+            _record(figure.add_subplot(grid[i, k]), rows)
+    return whole(figure)
+
+
+def _record(ax: Axes, rows: list[BenchmarkResult]) -> None:
+    """Draw the models of a record, the best at the top."""
+    styles = {part.part: style for part, style in zip(rows[0].parts, _styles(rows), strict=True)}
+    places = range(len(rows))
+    for place, row in zip(places, rows, strict=True):
+        shown = [max(part.rms_percent, 1e-6) for part in row.parts]
+        ax.plot([min(shown), max(shown)], [place, place], color="0.8", linewidth=1.0, zorder=0)
+    for i, (part, style) in enumerate(styles.items()):
+        values = [max(row.parts[i].rms_percent, 1e-6) for row in rows]
+        ax.plot(values, list(places), linestyle="none", label=literal(part), **style)
+    noise = 100.0 * rows[0].noise / rows[0].stroke
+    if math.isfinite(noise):
+        ax.axvline(noise, **LEVEL, label="noise")
+    ax.set_xscale("log")
+    _plain_ticks(ax)
+    ax.set_yticks(list(places), [folded(literal(_name(row)), LABEL) for row in rows])
+    ax.tick_params(axis="y", labelsize="small")
+    ax.set_ylim(len(rows) - 0.4, -0.6)
+    ax.set_xlabel("rms error [% of stroke fitted]", fontsize="small")
+    ax.grid(axis="x", color="0.92", linewidth=0.8)
+    ax.set_axisbelow(True)
+    ax.set_title(literal(rows[0].record_title), fontsize="medium", loc="left", pad=18)
+    ax.legend(
+        loc="lower left",
+        bbox_to_anchor=(-0.02, 0.99),
+        ncols=6,
+        fontsize="small",
+        frameon=False,
+        borderaxespad=0.1,
+        columnspacing=1.0,
+        handletextpad=0.3,
+    )
+
+
+def _plain_ticks(ax: Axes) -> None:
+    """Label a logarithmic axis with plain numbers, few enough not to touch."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    low, high = ax.get_xlim()
+    if high < 15.0 * low:
+        subs: tuple[float, ...] = (1.0, 2.0, 3.0, 4.0, 5.0, 7.0)
+    else:
+        subs = (1.0, 2.0, 5.0) if high < 300.0 * low else (1.0,)
+    ax.xaxis.set_major_locator(LogLocator(subs=subs, numticks=12))
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.12g}"))
+    ax.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _styles(rows: list[BenchmarkResult]) -> list[dict[str, Any]]:
+    """Give each part its mark: what was fitted, the rest of the record, and other records."""
+    others, found = cycle(OTHERS), []
+    for part in rows[0].parts:
+        if part.part == "fitted":
+            found.append(FITTED)
+        elif part.part == "rest":
+            found.append(CARRIED)
+        else:
+            found.append(next(others))
+    return found
+
+
+def _name(row: BenchmarkResult) -> str:
+    return f"{row.title}: {row.chosen}" if row.chosen else row.title

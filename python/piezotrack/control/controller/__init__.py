@@ -1,0 +1,1 @@
+"""Controllers: their parts, their session, their file."""

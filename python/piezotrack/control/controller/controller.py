@@ -1,0 +1,352 @@
+"""Controllers of feedforward, feedback and repetitive control."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
+
+from ... import _core
+from ..._support.arguments import TOO_FAR, finite
+from ..._support.arrays import check_dt
+from ...errors import NumericalError, ParameterError
+from ...identification.fitted.identified_model import IdentifiedModel
+from ...stages.inverse import Inverse
+from ..laws.components import LowPass, Notch, Pid, Repetitive, StateSpace
+from ..laws.hysteresis_observer import HysteresisObserver
+from ..laws.laws import NAMED_LAWS, DisturbanceObserver, LeadLag, PerturbationEstimator, SlidingMode
+from ..laws.scheduled_pid import ScheduledPid
+from ..plant import reach
+from .description import controller_text
+from .session import Session
+
+if TYPE_CHECKING:
+    import os
+    from pathlib import Path
+
+    from ..loop.stability import LoopReport
+    from ..tuning.tuned import Tuned, TuningReport
+
+__all__ = ["Controller", "number_pair"]
+
+# The feedback laws.
+Feedback: TypeAlias = (
+    Pid
+    | StateSpace
+    | LeadLag
+    | SlidingMode
+    | PerturbationEstimator
+    | DisturbanceObserver
+    | ScheduledPid
+    | HysteresisObserver
+)
+# Sampling interval for the reach of a stage [s]: its drive takes seconds.
+REACH_STEP = 0.05
+DRIVE_UNITS = ("V", "m", "N")
+# Readings are valid up to this distance from 0 where nothing is known of the stage [m].
+WIDEST = 0.01
+
+
+@dataclass(frozen=True, kw_only=True)
+class Controller:
+    """Feedforward, feedback and repetitive part, clipped to the limits of the amplifier.
+
+    ``u = uFB + uFF + uRC``, and the command is ``v = clip(u)``.
+
+    Parameters
+    ----------
+    dt : float
+        Sampling interval [s].
+    limits : (float, float)
+        Lowest and highest voltage [V].
+    feedforward : Inverse, optional
+        From ``fit.inverse()`` or ``stage.inverse()``.
+    feedback : Pid, StateSpace or another law of `piezotrack.control`
+        The feedback law, optional.
+    repetitive : Repetitive, optional
+        Repetitive control, for a reference that repeats.
+    filters : sequence of LowPass or Notch, optional
+        Up to two, on the measurement, one after the other.
+    span : (float, float), optional
+        Lowest and highest displacement that the sensor can show [m], at most a metre from 0. A
+        reading outside is no measurement and is treated as NaN: instruments report overload as
+        9.9e37. By default what the stage of `feedforward` reaches between the limits, with as much
+        again at each end; without feedforward -10 to 10 mm.
+    max_jump : float, optional
+        Largest displacement in a sampling interval [m]. A reading further from the last valid one
+        is no measurement either; the distance allowed grows with each sample without one. The first
+        reading is believed.
+    drive_unit : {"V", "m", "N"}, optional
+        Unit of limits and commands, for what is printed: ``"m"`` where a position is commanded, as
+        the height of a piezo. Gains are then in m/m.
+
+    Raises
+    ------
+    ParameterError
+        A number is out of its range; `kp` or `kq` is so large or small that its unit must be wrong.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> loop = pt.Controller(
+    ...     dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.from_um(kp=0.120, ti=0.009, td=0.044)
+    ... )
+    >>> session = loop.start()
+    >>> print(f"{session.step(1e-6, 0.0):.3f} V")
+    0.267 V
+    """
+
+    dt: float
+    limits: tuple[float, float]
+    feedforward: Inverse | None = None
+    feedback: Feedback | None = None
+    repetitive: Repetitive | None = None
+    filters: Sequence[LowPass | Notch] = ()
+    span: tuple[float, float] | None = None
+    max_jump: float | None = None
+    drive_unit: str = "V"
+    # Readings that are valid [m], also where `span` is not given.
+    _valid: tuple[float, float] = field(init=False, repr=False, compare=False)
+    _core: _core.Controller = field(init=False, repr=False, compare=False)
+    _provenance: Mapping[str, Any] | None = field(
+        default=None, init=False, repr=False, compare=False
+    )
+
+    def __post_init__(self) -> None:
+        dt = check_dt(self.dt)
+        if self.drive_unit not in DRIVE_UNITS:
+            raise ParameterError(f"drive_unit is {self.drive_unit!r}: expected 'V', 'm' or 'N'")
+        low, high = number_pair("limits", self.limits, self.drive_unit)
+        object.__setattr__(self, "limits", (low, high))
+        _check_part("feedforward", self.feedforward, Inverse, "pt.Inverse")
+        _check_part(
+            "feedback",
+            self.feedback,
+            (Pid, StateSpace, *NAMED_LAWS),
+            "pt.Pid, pt.control.StateSpace or another law of pt.control",
+        )
+        _check_part("repetitive", self.repetitive, Repetitive, "pt.Repetitive")
+        if not isinstance(self.filters, Sequence):
+            raise ParameterError(f"filters is {self.filters!r}: expected a list of filters")
+        for one in self.filters:
+            if not isinstance(one, (LowPass, Notch)):
+                raise ParameterError(f"filters has {one!r}: expected pt.LowPass or pt.Notch")
+        if isinstance(self.feedback, Pid):
+            _check_unit("kp", self.feedback.kp, high - low, "Pid", self.drive_unit)
+        if isinstance(self.feedback, (DisturbanceObserver, HysteresisObserver)):
+            _check_unit("kp", self.feedback.pid.kp, high - low, "Pid", self.drive_unit)
+        if isinstance(self.repetitive, Repetitive):
+            _check_unit("kq", self.repetitive.kq, high - low, "Repetitive", self.drive_unit)
+        span = self._span(low, high)
+        core = _core.Controller(
+            dt=dt,
+            limits=(low, high),
+            span=span,
+            max_jump=None if self.max_jump is None else _core.as_number("max_jump", self.max_jump),
+            law=None if self.feedback is None else self.feedback._settings,
+            repetitive=None if self.repetitive is None else self.repetitive._settings,
+            filters=[one._settings for one in self.filters],
+        )
+        object.__setattr__(self, "_core", core)
+        object.__setattr__(self, "_valid", span or (-WIDEST, WIDEST))
+
+    @classmethod
+    def of(
+        cls,
+        model: IdentifiedModel,
+        *,
+        dt: float | None = None,
+        limits: tuple[float, float] | None = None,
+        playback: Literal["table", "online"] = "table",
+        feedback: Feedback | None = None,
+        repetitive: Repetitive | None = None,
+        filters: Sequence[LowPass | Notch] = (),
+        span: tuple[float, float] | None = None,
+        max_jump: float | None = None,
+    ) -> Controller:
+        """Make a controller with the feedforward of an identified model, for its stage.
+
+        Parameters
+        ----------
+        model : IdentifiedModel
+            What ``pt.identify`` or ``pt.load`` returns.
+        dt : float, optional
+            Sampling interval [s]; default that of the record identified.
+        limits : (float, float), optional
+            Lowest and highest voltage [V]; default the range of the drive of that record.
+        playback : {"table", "online"}, optional
+            As in `Inverse`.
+        feedback, repetitive, filters, span, max_jump : optional
+            As in the class.
+
+        Returns
+        -------
+        Controller
+            With these parts.
+
+        Raises
+        ------
+        ParameterError
+            The file of the model has no record, and `dt` or `limits` is not given.
+
+        Examples
+        --------
+        >>> import piezotrack as pt
+        >>> fit = pt.identify(pt.datasets.dbo_training()[3.0:23.0], "prandtl-ishlinskii")
+        >>> loop = pt.Controller.of(fit)
+        >>> loop.dt, loop.limits
+        (0.005, (0.0, 3.6))
+        """
+        if not isinstance(model, IdentifiedModel):
+            raise ParameterError(
+                f"model is {type(model).__name__}: expected what pt.identify or pt.load returns"
+            )
+        return cls(
+            dt=_of_record("dt", dt, model.dt),
+            limits=_of_record("limits", limits, model.drive_range),
+            feedforward=model.inverse(playback=playback),
+            feedback=feedback,
+            repetitive=repetitive,
+            filters=filters,
+            span=span,
+            max_jump=max_jump,
+            drive_unit=model.drive_unit,
+        )
+
+    def __repr__(self) -> str:
+        return controller_text(self)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # The core's controller is made again.
+        given = {one.name: getattr(self, one.name) for one in fields(self) if one.init}
+        return _made, (type(self), given)
+
+    def _span(self, low: float, high: float) -> tuple[float, float] | None:
+        """Range of valid readings [m] for limits [V]; None for that of the core."""
+        if self.span is not None:
+            return number_pair("span", self.span, "m")
+        if self.feedforward is None:
+            return None
+        try:
+            bottom, top = reach(self.feedforward.stage, (low, high), REACH_STEP)
+        except NumericalError:
+            return None
+        bottom, top = bottom + self.feedforward.offset, top + self.feedforward.offset
+        wide = top - bottom
+        span = max(bottom - wide, -TOO_FAR), min(top + wide, TOO_FAR)
+        return span if span[0] < span[1] else None
+
+    def start(self, *, present: float | None = None) -> Session:
+        """Start a session with its own state.
+
+        Parameters
+        ----------
+        present : float, optional
+            Voltage at the stage now [V], for a bumpless start of the feedback. By default it begins
+            at 0 V. Without feedback the first command is the feedforward, whatever is there.
+
+        Returns
+        -------
+        Session
+            To be stepped once in each sampling interval.
+        """
+        return Session(self, present)
+
+    @property
+    def provenance(self) -> Mapping[str, Any] | None:
+        """Where the file came from that the controller was read from; None without a file."""
+        return self._provenance
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        report: LoopReport | TuningReport | Tuned | None = None,
+    ) -> Path:
+        """Write the controller as JSON, for `load_controller` and for ``piezotrack export``.
+
+        Settings have their units in their names. The file says by which version it was written, the
+        hash of the stage of the feedforward, and the margins at design where `report` is given. It
+        is written to a temporary file and renamed.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+        report : LoopReport, TuningReport or Tuned, optional
+            What `check_loop` or `tune` has returned for this controller. Without one the margins
+            of the file that the controller was read from are kept.
+
+        Returns
+        -------
+        pathlib.Path
+            The file.
+
+        Raises
+        ------
+        ParameterError
+            `report` is of another controller.
+        DataError
+            The file cannot be written.
+
+        Examples
+        --------
+        >>> import piezotrack as pt
+        >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+        >>> margins = pt.check_loop(pt.VirtualStage.xu_li_2010(), loop)
+        >>> loop.save("loop.json", report=margins).name
+        'loop.json'
+        """
+        from .controller_file import save_controller
+
+        return save_controller(self, path, report)
+
+
+T = TypeVar("T")
+
+
+def _of_record(name: str, given: T | None, known: T | None) -> T:
+    """Take what is given, or what the record of a model has."""
+    if given is not None:
+        return given
+    if known is None:
+        raise ParameterError(f"{name} is not in the file of this model: expected {name}=")
+    return known
+
+
+def _check_part(name: str, part: object, kinds: type | tuple[type, ...], expected: str) -> None:
+    if part is not None and not isinstance(part, kinds):
+        raise ParameterError(f"{name} is {type(part).__name__}: expected {expected}")
+
+
+def _made(kind: type[Controller], settings: dict[str, Any]) -> Controller:
+    return kind(**settings)
+
+
+def number_pair(name: str, ends: object, unit: str) -> tuple[float, float]:
+    """Take two finite numbers, the lower one first."""
+    # An array is accepted too.
+    listed = ends.tolist() if hasattr(ends, "tolist") else ends
+    pair = list(listed) if isinstance(listed, Sequence) and not isinstance(listed, str) else []
+    if len(pair) != 2:
+        raise ParameterError(f"{name} are {ends!r}: expected (low, high) in {unit}")
+    low, high = (finite(f"{name}[{i}]", value, unit) for i, value in enumerate(pair))
+    if not low < high:
+        raise ParameterError(f"{name} are ({low:g}, {high:g}) {unit}: expected the lower one first")
+    return low, high
+
+
+def _check_unit(name: str, gain: float, span: float, owner: str, unit: str) -> None:
+    """Refuse a gain that no nanopositioner can have: full span for 10 nm, or a trace for 1 mm."""
+    if abs(gain) * 1e-8 > span:
+        raise ParameterError(
+            f"{name} is {gain:g} {unit}/m: expected a gain with which 10 nm of error asks for less "
+            f"than the whole range of {span:g} {unit}; {1e-6 * gain:g} {unit}/m is "
+            f"{1e-12 * gain:g} {unit}/um"
+        )
+    if 0.0 < abs(gain) * 1e-3 < 1e-3 * span:
+        raise ParameterError(
+            f"{name} is {gain:g} {unit}/m: expected a gain with which 1 mm of error asks for more "
+            f"than a thousandth of the range; if it is in {unit}/um, write "
+            f"pt.{owner}.from_um({name}={gain:g}, ...)"
+        )

@@ -1,0 +1,1 @@
+"""Feedback laws, repetitive control, filters, and their form in a file."""

@@ -1,0 +1,105 @@
+"""Observer of the hysteresis, whose estimate compensates it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..._support.arguments import finite, positive
+from ...errors import ParameterError
+from ...stages.bouc_wen import BoucWenStage
+from ...stages.dahl import DahlStage
+from .components import Pid
+
+__all__ = ["HysteresisObserver"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class HysteresisObserver:
+    r"""Luenberger observer of the hysteresis around a PID.
+
+    .. math::
+
+        T \dot x + x = g\,(u - w), \qquad u_{FB} = u_{PID} + \hat w
+
+    The hysteresis :math:`w`, as a voltage, is an operator of the stage: along the estimated
+    displacement for a `DahlStage`, along the applied voltage for a `BoucWenStage`. Displacement and
+    hysteresis are corrected by the measurement; the estimate is added on top of the PID. After
+    Luenberger 1971, doi 10.1109/TAC.1971.1099826; hysteresis of Xu and Li 2010, doi
+    10.1115/1.4001712. Mass, dry friction and creep of the stage are not in the observer.
+
+    The compensation takes the place of a feedforward by the inverse of the hysteresis, which would
+    compensate it twice. Give no feedforward, or a linear one: `Session.step` with ``r/g``.
+
+    `check_loop` and `to_control` linearise the law at the largest slope that the operator has up to
+    `stroke`: 0 at its smallest, where only the correction is left, which `correction` alone
+    decides. Each voltage of hysteresis per voltage, slope times g, has to stay below 1.
+
+    Parameters
+    ----------
+    stage : DahlStage or BoucWenStage
+        The stage whose hysteresis is observed, without dry friction (`b0` 0).
+    pid : Pid
+        The controller inside.
+    correction : float, optional
+        Share L of the difference to the measurement that corrects the estimate in a sample, 0 to 1.
+        With 0 the model runs beside the stage; with 1 all that the linear part does not explain is
+        taken for hysteresis, noise too.
+    stroke : float, optional
+        Largest displacement [m] for which the largest slope of a Dahl hysteresis is computed.
+
+    Raises
+    ------
+    ParameterError
+        `stage` or `pid` is of another type, or a number is out of its range.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> stage = pt.DahlStage.xu_li_2010()
+    >>> pid = pt.Pid.from_um(kp=0.02, ti=0.05)
+    >>> law = pt.control.HysteresisObserver(stage=stage, pid=pid)
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=law)
+    >>> pt.check_loop(stage, loop).stable
+    True
+    """
+
+    stage: DahlStage | BoucWenStage
+    pid: Pid
+    correction: float = 0.1
+    stroke: float = 100e-6
+    title: ClassVar[str] = "PID with hysteresis observer"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.stage, (DahlStage, BoucWenStage)):
+            raise ParameterError(
+                f"stage is {type(self.stage).__name__}: expected pt.DahlStage or pt.BoucWenStage"
+            )
+        if isinstance(self.stage, DahlStage) and self.stage.b0 != 0.0:
+            raise ParameterError(
+                f"stage has b0 = {self.stage.b0:g} N/m: expected 0, as dry friction is not observed"
+            )
+        if not isinstance(self.pid, Pid):
+            raise ParameterError(f"pid is {type(self.pid).__name__}: expected pt.Pid")
+        if not 0.0 <= finite("correction", self.correction, "") <= 1.0:
+            raise ParameterError(f"correction is {self.correction}: expected a share from 0 to 1")
+        positive("stroke", self.stroke, "m")
+
+    @property
+    def _settings(self) -> tuple[str, list[float]]:
+        """The name and the numbers as the core takes them; NaN for the default of tt."""
+        pid, stage = self.pid, self.stage
+        tt = math.nan if pid.tt is None else pid.tt
+        time = stage.damping / stage.stiffness
+        gain = stage.piezo_coefficient
+        if isinstance(stage, DahlStage):
+            name, static = "Dahl observer", gain / stage.stiffness
+            operator = [stage.a1, stage.a2, stage.b1 * stage.up / gain]
+        else:
+            name, static = "Bouc-Wen observer", gain
+            # The output in volts, h/d, has its own unit in beta and gamma.
+            scale = abs(gain) ** (stage.exponent - 1.0)
+            operator = [stage.alpha, stage.beta * scale, stage.gamma * scale, stage.exponent]
+        numbers = pid.kp, pid.ti, pid.td, tt, static, time, self.correction, self.stroke, *operator
+        return name, [float(number) for number in numbers]

@@ -1,0 +1,422 @@
+"""Learning on a stage: trials are simulated until the error is noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ... import _core
+from ..._support.arguments import not_negative
+from ..._support.files import write_columns
+from ..._support.units import drive_word, shown_unit
+from ...errors import DataError, DeviceError, Interrupted, ParameterError
+from ...hardware.device import Device
+from ...hardware.measuring import rest_of
+from ..controller.controller import Controller
+from ..loop.preconditions import check_drive_unit, check_stable, check_within_reach
+from ..on_device.playing import check_playable
+from ..plant import plant_of, voltages_before
+from .iterative_learning import IterativeLearning
+from .trials import PlayedTrials, SimulatedTrials
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Callable, Sequence
+
+    from matplotlib.figure import Figure, SubFigure
+    from numpy.typing import NDArray
+
+    from ...identification.fitted.identified_model import IdentifiedModel
+    from ...references.reference import Reference
+    from ..loop.tracking import Tracking
+    from ..plant import Plant
+    from .iterative_learning import LearningTrial, Method
+    from .rules import Convergence
+    from .trials import Trials
+
+    Array = NDArray[np.float64]
+
+__all__ = ["Learning", "heading", "learn", "trial_line"]
+
+MOST_TRIALS = 10_000
+WHY = {
+    "noise": "what repeats in the error is not distinguishable from the noise",
+    "no change": "the error falls no further",
+    "grows": "the error grows",
+    "trials": "all trials were made",
+    "interrupted": "it was interrupted, or the device failed",
+}
+
+
+def heading(learner: IterativeLearning) -> str:
+    """Write what is known before the first trial, and the titles of the table of trials."""
+    kind = {"frequency": "settled period", "lifted": "whole motion from rest"}
+    return (
+        f"{learner.reference!r}, {kind[learner.method]}, cutoff {learner.cutoff:.4g} Hz\n"
+        f"{learner.convergence}\n{'trial':>5}  {'rms nm':>9}  {'max nm':>9}  {'noise nm':>9}"
+    )
+
+
+def trial_line(place: int, trial: LearningTrial) -> str:
+    """Write a line of the table of trials."""
+    noise = "" if trial.noise is None else f"{1e9 * trial.noise:.4g}"
+    rms, most = 1e9 * trial.rms_error, 1e9 * trial.max_error
+    return f"{place:>5}  {rms:>9.4g}  {most:>9.4g}  {noise:>9}"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Learning:
+    """A voltage table that was learnt.
+
+    Attributes
+    ----------
+    learner : IterativeLearning
+        The learning: its `update` goes on from here with records of your own.
+    trials : tuple of LearningTrial
+        Errors, trial by trial.
+    tables : ndarray, shape (trials, n)
+        Table of each trial [V].
+    best : int
+        Place of the trial with the smallest rms error.
+    stopped : str
+        "noise", "no change", "grows" or "trials"; "interrupted" of what an error has as `partial`.
+    first, final : Tracking
+        The runs of the first trial and of the best.
+    """
+
+    learner: IterativeLearning
+    trials: tuple[LearningTrial, ...]
+    tables: Array
+    best: int
+    stopped: str
+    first: Tracking
+    final: Tracking
+
+    def __repr__(self) -> str:
+        before, after = self.trials[0], self.trials[self.best]
+        return (
+            f"<Learning in {len(self.trials)} trials: rms {1e9 * before.rms_error:.4g} to "
+            f"{1e9 * after.rms_error:.4g} nm>"
+        )
+
+    @property
+    def table(self) -> Array:
+        """Table of the best trial [V], shape (n,)."""
+        table: Array = self.tables[self.best].copy()
+        return table
+
+    @property
+    def errors(self) -> Array:
+        """Rms error of each trial [m]."""
+        return np.array([one.rms_error for one in self.trials])
+
+    @property
+    def convergence(self) -> Convergence:
+        """What a trial leaves of the distance to the final table, on each of the models."""
+        return self.learner.convergence
+
+    def summary(self) -> str:
+        """Table of the trials.
+
+        Returns
+        -------
+        str
+            Several lines.
+        """
+        lines = [heading(self.learner)]
+        for i, one in enumerate(self.trials):
+            lines.append(trial_line(i, one) + (" *" if i == self.best else ""))
+        return "\n".join([*lines, *self.outcome()])
+
+    def outcome(self) -> list[str]:
+        """Say why it ended, and whether the table is at a limit.
+
+        Returns
+        -------
+        list of str
+            Lines.
+        """
+        clipped = self.trials[self.best].clipped
+        limited = f"the table is at a limit in {100.0 * clipped:.1f} % of its samples"
+        return [*([limited] if clipped > 0.0 else []), f"ended: {WHY[self.stopped]}"]
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the best table as a CSV file: time, desired displacement, voltage.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+
+        Returns
+        -------
+        pathlib.Path
+            The file.
+
+        Raises
+        ------
+        DataError
+            It cannot be written.
+        """
+        unit, scale = shown_unit(self.learner.controller.drive_unit)
+        word = drive_word(self.learner.controller.drive_unit)
+        return write_columns(
+            Path(path),
+            {
+                "time_s": self.learner.t,
+                "desired_um": 1e6 * self.learner.desired,
+                f"{word}_{unit}": scale * self.table,
+                f"feedforward_{unit}": scale * self.learner.feedforward,
+            },
+        )
+
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
+        """Errors of the first and the best trial, their tables, and the rms error of all trials.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
+        """
+        from ..views.learning_plot import plot_learning
+
+        return plot_learning(self, fig)
+
+
+def learn(
+    stage: Plant | IdentifiedModel | Device,
+    reference: Reference,
+    controller: Controller,
+    *,
+    model: Plant | IdentifiedModel | None = None,
+    trials: int = 30,
+    settle: int = 2,
+    repeats: int = 2,
+    method: Method = "frequency",
+    models: Sequence[Plant | IdentifiedModel] = (),
+    delay: float = 0.0,
+    more_delays: float | Sequence[float] | None = None,
+    mode_scales: float | Sequence[float] = (0.9, 1.0, 1.1),
+    gain: float = 0.7,
+    cutoff: float | None = None,
+    forgetting_factor: float = 1.0,
+    change_weight: float = 0.01,
+    noise: float | None = None,
+    visited: float | Sequence[float] = (),
+    rest: float | None = None,
+    beyond_reach: bool = False,
+    progress: Callable[[IterativeLearning], None] | None = None,
+) -> Learning:
+    r"""Learn the voltage with which a stage follows a reference, from trial to trial.
+
+    A trial plays the feedforward of the controller's inverse with what was learnt added to it,
+    beside the feedback if there is any; the record of its errors gives the next table. Before the
+    first is played, monotone convergence is tested on a set of models. It ends where what repeats
+    in the error is not distinguishable from what does not, or where the error falls no further.
+    For a stage of your own: a device (`hardware.Device`), which plays each trial as a table, or
+    `control.IterativeLearning`, which this runs.
+
+    Parameters
+    ----------
+    stage : Stage, VirtualStage, IdentifiedModel or Device
+        The plant. Each trial begins where its experiments begin, with noise of its own; on a device
+        it begins and ends at `rest`, and the controller has no feedback.
+    reference : Reference
+        The reference; of one that repeats, a settled period is learnt, however long it lasts.
+    controller : Controller
+        As of `control.IterativeLearning`.
+    model : Stage, VirtualStage or IdentifiedModel, optional
+        The model to learn with; default that of the controller's feedforward, or else the stage;
+        a device needs one of them.
+    trials : int, optional
+        Trials at most, the one without learning included.
+    settle : int, optional
+        Periods before the recorded ones, after the smooth start and the first period of the table.
+    repeats : int, optional
+        Records of each trial: periods, or runs of method ``"lifted"``. Two show what is noise.
+    method, models, delay, more_delays, mode_scales, gain, cutoff : optional
+        As of `control.IterativeLearning`.
+    forgetting_factor, change_weight, noise : optional
+        As there.
+    visited, beyond_reach : optional
+        As of `track`; a device has been where it has been.
+    rest : float, optional
+        Voltage of a device before and after each trial [V]; default 0 V, or the limit nearest to
+        it.
+    progress : callable, optional
+        Called with the learner before the first trial and after each.
+
+    Returns
+    -------
+    Learning
+        Tables, errors, and the runs before and after.
+
+    Raises
+    ------
+    ParameterError
+        As of `control.IterativeLearning` and `track`.
+    NumericalError
+        The loop diverges.
+    DeviceError, DataError
+        The device failed, or did not read enough; the output is at `rest`, or the message says
+        where it may be. `partial` is what was learnt up to then.
+    Interrupted
+        Ctrl-C or SIGTERM came; the output of a device is at `rest`. `partial` is what was learnt.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> plays = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(5.0,), weights=(5e-7,))
+    >>> stage = pt.VirtualStage.of(plays, noise=5e-9, mode=(160.0, 0.065))
+    >>> loop = pt.Controller(dt=1e-3, limits=(0.0, 75.0), feedforward=plays.inverse())
+    >>> reference = pt.triangle(frequency=10.0, low=10e-6, high=50e-6, duration=0.5)
+    >>> found = pt.learn(stage, reference, loop, model=stage, mode_scales=1.0)
+    >>> found.errors[found.best] < 0.1 * found.errors[0]
+    np.True_
+    """
+    known = _model_of(stage, controller) if model is None else model
+    home = _rest_on(stage, controller, rest, visited)
+    # What is behind a device is what its model says.
+    behind = known if isinstance(stage, Device) else stage
+    plant = plant_of(behind)
+    learner = IterativeLearning(
+        known,
+        reference,
+        controller,
+        method=method,
+        models=models,
+        delay=delay,
+        more_delays=more_delays,
+        mode_scales=mode_scales,
+        gain=gain,
+        cutoff=cutoff,
+        forgetting_factor=forgetting_factor,
+        change_weight=change_weight,
+        noise=noise,
+    )
+    check_drive_unit(behind, controller)
+    check_stable(plant, controller, delay)
+    if not _core.as_truth("beyond_reach", beyond_reach):
+        samples = reference.sample(controller.dt)
+        check_within_reach(plant, controller.limits, samples, controller.drive_unit)
+    most = _counted("trials", trials, MOST_TRIALS)
+    late = not_negative("delay", delay, "s")
+    periods = {
+        "settle": _counted("settle", settle, 1000),
+        "repeats": _counted("repeats", repeats, 1000),
+    }
+    runs: Trials
+    if isinstance(stage, Device):
+        runs = PlayedTrials(device=stage, rest=home, learner=learner, **periods)
+    else:
+        before = voltages_before(plant, visited, controller.limits)
+        runs = SimulatedTrials(plant=plant, learner=learner, delay=late, before=before, **periods)
+    return _learnt(runs, most, progress or _unseen)
+
+
+def _unseen(_: IterativeLearning) -> None:
+    """Show nothing."""
+
+
+class _Done(NamedTuple):
+    """Trials that are complete: how many, the best of them, the runs of the first and the best."""
+
+    trials: int
+    best: int
+    first: Tracking
+    final: Tracking
+
+
+def _learnt(runs: Trials, most: int, progress: Callable[[IterativeLearning], None]) -> Learning:
+    """Play and learn until it ends; what ends it early has what was learnt."""
+    learner, done = runs.learner, None
+    try:
+        progress(learner)
+        while True:
+            run, best = _played(runs), learner.best
+            count = len(learner.trials)
+            first, final = (done.first, done.final) if done else (run, run)
+            done = _Done(count, best, first, run if best == count - 1 else final)
+            progress(learner)
+            stopped = learner.stopped or ("trials" if count >= most else None)
+            if stopped is not None:
+                return _learning(learner, done, stopped)
+    except (DeviceError, DataError) as error:
+        error.partial = _learning(learner, done, "interrupted") if done else None
+        raise
+    except KeyboardInterrupt as error:
+        part = _learning(learner, done, "interrupted") if done else None
+        raise Interrupted(str(error) or "the learning was interrupted", part) from None
+
+
+def _played(runs: Trials) -> Tracking:
+    """Play the table of a trial and learn from it; return the run, the first of several."""
+    learner = runs.learner
+    trial = len(learner.trials)
+    made = [runs.run(learner.table, trial)]
+    if learner.method == "lifted":
+        made += [runs.run(learner.table, trial, i) for i in range(1, runs.repeats)]
+    learner.update(np.concatenate([runs.record(one) for one in made]))
+    return made[0]
+
+
+def _learning(learner: IterativeLearning, done: _Done, stopped: str) -> Learning:
+    return Learning(
+        learner=learner,
+        trials=learner.trials[: done.trials],
+        tables=learner.tables[: done.trials],
+        best=done.best,
+        stopped=stopped,
+        first=done.first,
+        final=done.final,
+    )
+
+
+def _model_of(
+    stage: Plant | IdentifiedModel | Device, controller: Controller
+) -> Plant | IdentifiedModel:
+    """Return the model of the controller's feedforward with its delay, or else the stage."""
+    from ...stages.virtual import VirtualStage
+
+    if not isinstance(controller, Controller) or controller.feedforward is None:
+        if isinstance(stage, Device):
+            raise ParameterError(
+                "model is not given, and the controller has no feedforward: expected a model of "
+                "the stage behind the device, as pt.identify gives it"
+            )
+        return stage
+    return VirtualStage.of(controller.feedforward.stage, delay=controller.feedforward.delay)
+
+
+def _rest_on(
+    stage: Plant | IdentifiedModel | Device,
+    controller: Controller,
+    rest: float | None,
+    visited: float | Sequence[float],
+) -> float:
+    """Return the voltage at which a device rests [V], after what it needs is checked."""
+    if not isinstance(stage, Device):
+        if rest is not None:
+            raise ParameterError(f"rest is {rest!r}: expected none, as the stage is simulated")
+        return 0.0
+    check_playable(stage, controller)
+    if visited != ():
+        raise ParameterError(
+            f"visited is {visited!r}: expected none on a device, which has been where it has been"
+        )
+    return rest_of(stage, rest)
+
+
+def _counted(name: str, value: object, most: int) -> int:
+    count = _core.as_count(name, value)
+    if not 1 <= count <= most:
+        raise ParameterError(f"{name} is {count}: expected 1 to {most}")
+    return count

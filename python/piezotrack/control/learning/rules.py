@@ -1,0 +1,416 @@
+"""Updates of iterative learning control, and whether they converge on a set of models."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+import numpy as np
+
+from ...errors import ParameterError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from .plants import LearningPlant
+
+    Array = NDArray[np.float64]
+    Complex = NDArray[np.complex128]
+
+__all__ = ["Convergence", "FrequencyRule", "LiftedRule", "Rule", "frequency_rule", "lifted_rule"]
+
+# Order of the low-pass Q: 6 halves the band between passing 0.9 and passing 0.1.
+ORDER = 3
+# Where a cutoff or a weight is chosen, this share of an error may remain after a trial.
+TARGET = 0.9
+# Nothing is learnt at frequencies where the feedback leaves less than this of the largest response.
+NOTHING = 1e-5
+# Longest trial of the lifted form [samples]: its matrices grow with the square of it.
+LONGEST_LIFTED = 2000
+# Steps of the search for a largest singular value: it ends where the square, which is found from
+# below, has grown by this part in a few.
+MOST_STEPS, FEW_STEPS, GROWTH = 200, 8, 1e-5
+# Cutoffs of the lifted form, in parts of the sampling rate: below them its equations are ill
+# conditioned, and none is above half of it.
+LOWEST_EDGE, HIGHEST_EDGE = 0.002, 0.5
+# The highest that is chosen, in the same parts: beyond it a sample more or less is half a turn.
+HIGHEST_CHOSEN = 0.25
+
+
+@dataclass(frozen=True, kw_only=True)
+class Convergence:
+    """What remains, after a trial, of the distance to the table that learning ends at.
+
+    Attributes
+    ----------
+    factor : float
+        The largest share over models and frequencies; the distance falls monotonically, from the
+        first trial on, where it is below 1.
+    model : str
+        The model of that share.
+    frequency : float
+        Its frequency [Hz].
+    cases : tuple of (str, float, float)
+        The same of each model: name, share, frequency [Hz].
+    """
+
+    factor: float
+    model: str
+    frequency: float
+    cases: tuple[tuple[str, float, float], ...]
+
+    @property
+    def monotone(self) -> bool:
+        """Whether the distance falls on every model."""
+        return self.factor < 1.0
+
+    def __str__(self) -> str:
+        verb = "falls" if self.monotone else "GROWS"
+        return (
+            f"the distance to the final table {verb} to {self.factor:.3g} times in a trial at "
+            f"worst, at {self.frequency:.3g} Hz on {self.model}; {len(self.cases)} models"
+        )
+
+    @classmethod
+    def _worst(cls, cases: Sequence[tuple[str, float, float]]) -> Convergence:
+        name, factor, frequency = max(cases, key=lambda one: one[1])
+        return cls(factor=factor, model=name, frequency=frequency, cases=tuple(cases))
+
+
+class Rule(Protocol):
+    """An update between trials."""
+
+    @property
+    def convergence(self) -> Convergence:
+        """On the models that it was made for."""
+        ...
+
+    @property
+    def cutoff(self) -> float:
+        """Frequency at which Q is a half [Hz]."""
+        ...
+
+    def after(self, learnt: Array, error: Array) -> Array:
+        """Return the next learnt voltage [V] from the last one and its error [m]."""
+        ...
+
+
+R = TypeVar("R", bound=Rule)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FrequencyRule:
+    r"""Update in the frequency domain, of a trial that is one settled period.
+
+    .. math:: U_{j+1} = Q (\varphi U_j + \gamma \hat G^{-1} E_j)
+
+    Attributes
+    ----------
+    frequency : ndarray, shape (m,)
+        Harmonics of the period, from 0 on [Hz].
+    learning : ndarray of complex, shape (m,)
+        Learning filter, gain and inverse of the model [V/m].
+    smoothing : ndarray, shape (m,)
+        Q, without phase.
+    forgetting_factor : float
+        Share of what was learnt that is kept.
+    cutoff : float
+        Frequency at which Q is a half [Hz].
+    samples : int
+        Samples of the period.
+    convergence : Convergence
+        On the models.
+    """
+
+    frequency: Array
+    learning: Complex
+    smoothing: Array
+    forgetting_factor: float
+    cutoff: float
+    samples: int
+    convergence: Convergence
+
+    def after(self, learnt: Array, error: Array) -> Array:
+        """Return the next learnt voltage from the last one and its error.
+
+        Parameters
+        ----------
+        learnt : ndarray, shape (n,)
+            What the last trial had above the feedforward [V].
+        error : ndarray, shape (n,)
+            Desired less measured displacement [m].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            For the next trial [V], before the limits.
+        """
+        before, wrong = np.fft.rfft(learnt), np.fft.rfft(error)
+        return np.fft.irfft(
+            self.smoothing * (self.forgetting_factor * before + self.learning * wrong), self.samples
+        )
+
+    def taps(self, half: int) -> tuple[Array, Array]:
+        """Return filters without FFT, as the crate's `IterativeLearning` takes them.
+
+        Parameters
+        ----------
+        half : int
+            Taps on each side of the middle one.
+
+        Returns
+        -------
+        learning : ndarray, shape (2 half + 1,)
+            From the error to the voltage [V/m], Q in it; the middle one is of the same sample.
+        smoothing : ndarray, shape (2 half + 1,)
+            Symmetric.
+        """
+        if not 1 <= half <= (self.samples - 1) // 2:
+            raise ParameterError(
+                f"half is {half}: expected 1 to {(self.samples - 1) // 2}, less than half a period"
+            )
+        window = np.cos(0.5 * np.pi * np.arange(-half, half + 1) / (half + 1)) ** 2
+        filters = (self.smoothing * self.learning, self.smoothing * self.forgetting_factor)
+        wanted = (np.fft.irfft(one, self.samples) for one in filters)
+        learning, smoothing = (
+            window * np.concatenate([one[-half:], one[: half + 1]]) for one in wanted
+        )
+        # The window took from a constant too, of which Q must keep what it kept.
+        smoothing *= float(filters[1][0].real) / smoothing.sum() if filters[1][0] else 1.0
+        return learning, smoothing
+
+
+def frequency_rule(
+    nominal: LearningPlant,
+    plants: Sequence[LearningPlant],
+    samples: int,
+    *,
+    gain: float,
+    cutoff: float | None,
+    forgetting_factor: float,
+) -> FrequencyRule:
+    """Make the update in the frequency domain; `cutoff` None for the highest that converges."""
+    dt = nominal.controller.dt
+    frequency = np.arange(samples // 2 + 1) / (samples * dt)
+    model = nominal.response(frequency)
+    heard = np.abs(model) > NOTHING * np.abs(model).max()
+    learning = np.where(heard, gain / np.where(heard, model, 1.0), 0.0)
+    left = [np.abs(forgetting_factor - learning * one.response(frequency)) for one in plants]
+
+    def made(edge: float) -> FrequencyRule:
+        smoothing = np.where(heard, 1.0 / (1.0 + (frequency / edge) ** (2 * ORDER)), 0.0)
+        cases = []
+        for one, share in zip(plants, left, strict=True):
+            remains = smoothing * share
+            k = int(np.argmax(remains))
+            cases.append((one.name, float(remains[k]), float(frequency[k])))
+        return FrequencyRule(
+            frequency=frequency,
+            learning=learning,
+            smoothing=smoothing,
+            forgetting_factor=forgetting_factor,
+            cutoff=edge,
+            samples=samples,
+            convergence=Convergence._worst(cases),
+        )
+
+    if cutoff is not None and (asked := made(cutoff)).convergence.monotone:
+        return asked
+    edge = _highest(made, 0.5 * frequency[1], HIGHEST_CHOSEN / dt, 1.01)
+    return _converging(made(edge), None if cutoff is None else asked)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LiftedRule:
+    r"""Update by regularised least squares, of a whole trial that begins at rest.
+
+    .. math:: u_{j+1} = Q (\varphi u_j + \gamma (G^T G + r)^{-1} G^T e_j)
+
+    The step minimises :math:`|e_j - G \Delta|^2 + r |\Delta|^2`. Q is a smoothing spline: where it
+    is far from the ends, the same low-pass as that of `FrequencyRule`.
+
+    Attributes
+    ----------
+    keeping, learning : ndarray, shape (m, m)
+        Matrices on the learnt voltage, and on the error [V/m].
+    late : int
+        Samples from a voltage to the first reading that shows it.
+    cutoff : float
+        Frequency at which Q is a half [Hz].
+    convergence : Convergence
+        On the models.
+    """
+
+    keeping: Array
+    learning: Array
+    late: int
+    cutoff: float
+    convergence: Convergence
+
+    def after(self, learnt: Array, error: Array) -> Array:
+        """Return the next learnt voltage from the last one and its error.
+
+        Parameters
+        ----------
+        learnt : ndarray, shape (n,)
+            What the last trial had above the feedforward [V].
+        error : ndarray, shape (n,)
+            Desired less measured displacement [m].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            For the next trial [V], before the limits.
+        """
+        count = learnt.size - self.late
+        following = self.keeping @ learnt[:count] + self.learning @ error[self.late :]
+        # The last voltages show in no reading.
+        return np.concatenate([following, np.full(self.late, following[-1])])
+
+
+def lifted_rule(
+    nominal: LearningPlant,
+    plants: Sequence[LearningPlant],
+    samples: int,
+    *,
+    gain: float,
+    cutoff: float | None,
+    change_weight: float,
+    forgetting_factor: float,
+) -> LiftedRule:
+    """Make the lifted update; `cutoff` None for the highest that converges."""
+    from scipy.linalg import toeplitz
+
+    if samples > LONGEST_LIFTED:
+        raise ParameterError(
+            f"reference has {samples} samples: expected {LONGEST_LIFTED} at most for method "
+            "'lifted'; take a longer dt, or method 'frequency' for one that repeats"
+        )
+    dt, pulse = nominal.controller.dt, nominal.impulse(samples)
+    late = int(np.argmax(np.abs(pulse) > NOTHING * np.abs(pulse).max()))
+    count = samples - late
+    if count < 8:
+        raise ParameterError(
+            f"reference has {samples} samples: expected 8 more than the {late} of the delay"
+        )
+
+    def lifted(one: Array) -> Array:
+        whole: Array = toeplitz(one, np.zeros(samples))
+        return whole[late:, :count]
+
+    model = lifted(pulse)
+    # An integrator in the feedback leaves no static gain.
+    unit = max(float(np.abs(nominal.response(np.zeros(1))[0])) ** 2, float(pulse @ pulse))
+    squared = model.T @ model + change_weight * unit * np.eye(count)
+    step = np.asarray(gain * np.linalg.solve(squared, model.T), dtype=np.float64)
+    still = forgetting_factor * np.eye(count)
+    left = [still - step @ lifted(one.impulse(samples)) for one in plants]
+
+    def made(edge: float) -> LiftedRule:
+        cases = [
+            (one.name, *_largest(_smoothed(rest, edge * dt), dt))
+            for one, rest in zip(plants, left, strict=True)
+        ]
+        return LiftedRule(
+            keeping=_smoothed(still, edge * dt),
+            learning=_smoothed(step, edge * dt),
+            late=late,
+            cutoff=edge,
+            convergence=Convergence._worst(cases),
+        )
+
+    if cutoff is not None and (asked := made(cutoff)).convergence.monotone:
+        return asked
+    edge = _highest(made, LOWEST_EDGE / dt, HIGHEST_CHOSEN / dt, 1.1)
+    return _converging(made(edge), None if cutoff is None else asked)
+
+
+def _smoothed(columns: NDArray[np.floating[Any]], edge: float) -> Array:
+    """Smooth columns: Q is a half at `edge`, in parts of the sampling rate.
+
+    Whittaker 1922: the least squares of the columns and of their third differences.
+    """
+    from scipy.linalg import solveh_banded
+
+    count = columns.shape[0]
+    rows = np.zeros((ORDER + 1, count))
+    rows[ORDER] = 1.0
+    weight = (2.0 * np.sin(np.pi * min(edge, HIGHEST_EDGE))) ** (-2 * ORDER)
+    taps = np.array([-1.0, 3.0, -3.0, 1.0])
+    for i, one in enumerate(taps):
+        for j in range(i, taps.size):
+            # Upper diagonals as solveh_banded keeps them, by the column.
+            rows[ORDER - (j - i), j : count - ORDER + j] += weight * one * taps[j]
+    smooth: Array = solveh_banded(rows, columns)
+    return smooth
+
+
+def _largest(matrix: Array, dt: float) -> tuple[float, float]:
+    """Return the largest singular value, and the frequency of its input [Hz].
+
+    Lanczos 1950, with all vectors kept orthogonal. Of matrices that are nearly Toeplitz the largest
+    singular values crowd together: the vector of one of them is never found, its size soon is.
+    """
+    vectors = np.empty((min(MOST_STEPS, matrix.shape[1]), matrix.shape[1]))
+    following = np.random.default_rng(0).standard_normal(matrix.shape[1])
+    diagonal, beside, sizes = [], [], [0.0]
+    for k in range(len(vectors)):
+        length = float(np.linalg.norm(following))
+        if k and length <= 1e-12 * sizes[-1]:
+            break
+        beside += [length] if k else []
+        vectors[k] = following / length
+        following = (matrix @ vectors[k]) @ matrix
+        diagonal.append(float(vectors[k] @ following))
+        for _ in range(2):
+            following -= (vectors[: k + 1] @ following) @ vectors[: k + 1]
+        values, ritz = np.linalg.eigh(np.diag(diagonal) + np.diag(beside, -1), UPLO="L")
+        sizes.append(float(values[-1]))
+        if k >= FEW_STEPS and sizes[-1] - sizes[-FEW_STEPS] <= GROWTH * sizes[-1]:
+            break
+    spectrum = np.abs(np.fft.rfft(ritz[:, -1] @ vectors[: len(diagonal)]))
+    frequency = float(np.argmax(spectrum) / (matrix.shape[1] * dt))
+    return float(np.sqrt(max(sizes[-1], 0.0))), frequency
+
+
+def _highest(made: Callable[[float], Rule], low: float, high: float, closely: float) -> float:
+    """Find the highest cutoff with which little remains: what remains rises with the cutoff."""
+    least = made(low).convergence.factor
+    # A stage of small gain learns slowly at any cutoff: a tenth more is what the cutoff may cost.
+    most = max(TARGET, least + (1.0 - TARGET) * (1.0 - least))
+    if least >= 1.0:
+        return low
+    if made(high).convergence.factor <= most:
+        return high
+    while high > closely * low:
+        middle = float(np.sqrt(low * high))
+        if made(middle).convergence.factor <= most:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def _converging(best: R, asked: R | None) -> R:
+    """Return the best update, or refuse that which was asked for, or both.
+
+    Parameters
+    ----------
+    best : FrequencyRule or LiftedRule
+        That of the highest cutoff that converges, if any does.
+    asked : FrequencyRule or LiftedRule or None
+        That of a cutoff that was given, which does not.
+    """
+    if asked is None and best.convergence.monotone:
+        return best
+    rule = best if asked is None else asked
+    remedy = "a smaller learning gain, or models less far apart"
+    if best.convergence.monotone:
+        remedy = f"a cutoff of {best.cutoff:.3g} Hz in place of {rule.cutoff:.3g}, or {remedy}"
+    found = rule.convergence
+    raise ParameterError(
+        f"learning does not converge on {found.model}: at {found.frequency:.4g} Hz a trial leaves "
+        f"{found.factor:.4g} times the distance to the final table: expected below 1, with {remedy}"
+    )

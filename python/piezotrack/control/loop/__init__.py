@@ -1,0 +1,1 @@
+"""Closed loops: tracking, contouring, stability, and what is checked before."""

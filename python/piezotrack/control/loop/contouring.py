@@ -1,0 +1,393 @@
+"""Contouring: closed-loop simulation of an XY stage along a path, and its contour error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ... import _core
+from ..._support.arguments import not_negative
+from ..._support.frames import frame_of
+from ..._support.statistics import ErrorStatistics
+from ..._support.units import drive_word, shown_unit
+from ...errors import ParameterError
+from ...references.xy_reference import XYReference, square_matrix
+from ...stages.xy import XYStage
+from ..controller.controller import Controller, number_pair
+from ..plant import reach, resting, voltages_before
+from .preconditions import check_period, check_stable, check_within_reach
+from .tracking import Tracking, collected, feedforward_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.figure import Figure, SubFigure
+    from numpy.typing import ArrayLike, NDArray
+
+    Array = NDArray[np.float64]
+
+__all__ = ["Contour", "Workspace", "contour", "workspace"]
+
+# Distance of the path's start from the stage that is noted, as a part of the path's size.
+JUMP = 0.05
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Contour:
+    """A contouring run.
+
+    Attributes
+    ----------
+    path : XYReference
+        The path.
+    x, y : Tracking
+        Each axis as of `track`, with its own metrics: desired, measured and true
+        displacement, voltage and its parts. Both sensors are read at the instants ``t``.
+    """
+
+    path: XYReference
+    x: Tracking
+    y: Tracking
+
+    def __repr__(self) -> str:
+        return f"<Contour of {self.path!r}: {_words(self.metrics)}>"
+
+    @property
+    def t(self) -> Array:
+        """Time of the control samples of x [s], shape (n,)."""
+        return self.x.t
+
+    @property
+    def settled(self) -> float:
+        """Time from which `metrics` are computed [s].
+
+        As for `Tracking`, but never before the path itself begins: the smooth start has no path
+        to compare with.
+        """
+        ramp = max(self.path.x.ramp, self.path.y.ramp)
+        begin = ramp if ramp < self.t[-1] - 1e-9 else 0.0
+        return max(self.x.settled, begin)
+
+    @cached_property
+    def error(self) -> Array:
+        """Contour error of the measured positions [m], shape (n,): see `XYReference.errors`."""
+        return self.path.errors(self.x.measured, self.y.measured)
+
+    @cached_property
+    def fine_error(self) -> Array:
+        """Contour error of the true positions between the samples too [m], at ``x.fine_t``."""
+        return self.path.errors(self.x.fine_displacement, self.y.fine_displacement)
+
+    @cached_property
+    def metrics(self) -> ErrorStatistics:
+        """Statistics of the measured contour error, from `settled` on."""
+        return self.score()
+
+    def score(
+        self, start: float | None = None, stop: float | None = None, *, true: bool = False
+    ) -> ErrorStatistics:
+        """Statistics of the contour error in a part of the run.
+
+        Parameters
+        ----------
+        start, stop : float, optional
+            The part [s]; default from `settled` to the end.
+        true : bool, optional
+            Whether to use the true positions, between the samples too and without noise and
+            quantisation of the sensors.
+
+        Returns
+        -------
+        ErrorStatistics
+            Table 2 of Xu and Li 2010 has `peak_to_peak`, `mean_error` and `sd_error`.
+
+        Raises
+        ------
+        ParameterError
+            It has fewer than two samples.
+        """
+        t, errors = (self.x.fine_t, self.fine_error) if true else (self.t, self.error)
+        first = self.settled if start is None else start
+        return ErrorStatistics.of(_core.spread(errors[self.x.part(t, first, stop)]))
+
+    @property
+    def table(self) -> dict[str, Array]:
+        """Columns of the run at the control samples, with their units in the names."""
+        table = {"time_s": self.t}
+        for name, axis in (("x", self.x), ("y", self.y)):
+            unit, scale = shown_unit(axis.controller.drive_unit)
+            command = drive_word(axis.controller.drive_unit)
+            table |= {
+                f"desired_{name}_um": 1e6 * axis.desired,
+                f"measured_{name}_um": 1e6 * axis.measured,
+                f"{command}_{name}_{unit}": scale * axis.voltage,
+            }
+        return table | {"contour_error_um": 1e6 * self.error}
+
+    def to_frame(self) -> Any:
+        """Return the run as a data frame of pandas.
+
+        Returns
+        -------
+        pandas.DataFrame
+            With the columns of `table`.
+
+        Raises
+        ------
+        ParameterError
+            pandas is not installed.
+        """
+        return frame_of(self.table)
+
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
+        """Plot path and positions, the error magnified along the path, and the errors over time.
+
+        One panel alone, in axes of your own: `plot_path`, `plot_magnified`, `plot_contour_error`.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
+        """
+        from ..views.contouring_plot import plot_contour
+
+        return plot_contour(self, fig)
+
+    @property
+    def notes(self) -> list[str]:
+        """Notes on the run, such as a path that begins away from the stage."""
+        jump = float(np.hypot(self.x.error[0], self.y.error[0]))
+        reach = max(float(np.ptp(axis.desired)) for axis in (self.x, self.y))
+        if jump <= JUMP * reach:
+            return []
+        return [
+            f"the path begins {1e6 * jump:.3g} um from the stage, which has to jump "
+            "there: let the path begin at the origin, (0, 0), or with a smooth start"
+        ]
+
+    def summary(self) -> str:
+        """Table of the run: contour error, and each axis.
+
+        Returns
+        -------
+        str
+            Several lines.
+        """
+        since = f"from {self.settled:g} s on" if self.settled else "all of it"
+        return "\n".join(
+            [
+                f"{self.path!r} at {1.0 / self.x.controller.dt:g} Hz; {self.x.note}",
+                *(f"note  {note}" for note in self.notes),
+                f"contour error {since}, signed, positive to the left of the path",
+                f"  measured: {_words(self.metrics)}",
+                f"  true, between the samples too: {_words(self.score(true=True))}",
+                f"x: {self.x.metrics}",
+                f"y: {self.y.metrics}",
+            ]
+        )
+
+
+def _words(spread: ErrorStatistics) -> str:
+    return (
+        f"peak to peak {1e6 * spread.peak_to_peak:.3f} um, mean {1e6 * spread.mean_error:.3f} um, "
+        f"SD {1e6 * spread.sd_error:.3f} um"
+    )
+
+
+def contour(
+    stage: XYStage,
+    controllers: Sequence[Controller],
+    path: XYReference,
+    *,
+    decoupling: ArrayLike | None = None,
+    delay: float = 0.0,
+    jitter: float = 0.0,
+    substeps: int = 10,
+    visited: Sequence[float] = (),
+    beyond_reach: bool = False,
+    unstable: bool = False,
+) -> Contour:
+    """Simulate closed-loop contouring of a path with an XY stage.
+
+    Both axes move in continuous time. At each sampling instant x is read and its voltage applied;
+    after the lag of the stage the same is done for y, with the same point of the path. Cross-talk
+    couples the loops through their sensors.
+
+    Parameters
+    ----------
+    stage : XYStage
+        The plant.
+    controllers : (Controller, Controller)
+        Of x and y, with the same sampling interval.
+    path : XYReference
+        The path, as ``pt.circle(...)``.
+    decoupling : array_like, shape (2, 2), optional
+        Cross-talk as of `identification.identify_cross_talk`: the feedforward follows the path
+        times its inverse, which cancels the cross-talk.
+    delay : float, optional
+        Time from a reading to the effect of its voltage [s], in addition to the hold.
+    jitter : float, optional
+        Mean sampling jitter [s], as for `track`: drawn for each axis separately, but the same for
+        two models, whose sensors have no seed.
+    substeps : int, optional
+        Instants kept in each sampling interval.
+    visited : sequence of float, optional
+        Voltages that both stages visit slowly before the run, as for `track`.
+    beyond_reach, unstable : bool, optional
+        As for `track`.
+
+    Returns
+    -------
+    Contour
+        The motion and its metrics.
+
+    Raises
+    ------
+    ParameterError
+        A number is out of its range, the path exceeds the reach of a stage, or a loop is unstable.
+    NumericalError
+        A loop diverges.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> loop = pt.Controller(
+    ...     dt=0.02,
+    ...     limits=(0.0, 75.0),
+    ...     feedforward=pt.DahlStage.xu_li_2010().inverse(),
+    ...     feedback=pt.Pid.xu_li_2010(),
+    ... )
+    >>> path = pt.circle(frequency=0.1, radius=10e-6)
+    >>> run = pt.contour(pt.XYStage.xu_li_2010(seed=1), (loop, loop), path)
+    >>> run.metrics.peak_to_peak < 1.5e-6
+    True
+    """
+    if not isinstance(stage, XYStage):
+        raise ParameterError(f"stage is {type(stage).__name__}: expected pt.XYStage")
+    if not isinstance(path, XYReference):
+        raise ParameterError(f"path is {type(path).__name__}: expected pt.XYReference")
+    both = _two(controllers)
+    delay = not_negative("delay", delay, "s")
+    jitter = not_negative("jitter", jitter, "s")
+    substeps = _core.as_count("substeps", substeps)
+    offsets = stage.x.sensor.offset, stage.y.sensor.offset
+    forward = path if decoupling is None else path.transformed(_inverse(decoupling), offsets)
+    free = (_core.as_truth("unstable", unstable), _core.as_truth("beyond_reach", beyond_reach))
+    samples, voltages, before = [], [], []
+    parts = zip("xy", (stage.x, stage.y), both, path.axes, forward.axes, strict=True)
+    for name, axis, controller, reference, ahead in parts:
+        samples.append(reference.sample(controller.dt))
+        try:
+            check_period(controller, reference)
+            if not free[0]:
+                check_stable(axis, controller, delay)
+            if not free[1]:
+                check_within_reach(axis, controller.limits, samples[-1], controller.drive_unit)
+        except ParameterError as error:
+            raise ParameterError(f"{name}: {error}") from None
+        along = samples[-1] if ahead is reference else ahead.sample(controller.dt)
+        voltages.append(feedforward_of(controller, ahead, along))
+        before.append(voltages_before(axis, visited, controller.limits))
+    runs = stage._core.track(
+        (both[0]._core, both[1]._core),
+        (samples[0].x, samples[1].x),
+        (voltages[0][0], voltages[1][0]),
+        (delay, jitter, substeps),
+        (before[0], before[1]),
+    )
+    x, y = (
+        collected(run, controller, reference, sampled, note, substeps)
+        for run, controller, reference, sampled, (_, note) in zip(
+            runs, both, path.axes, samples, voltages, strict=True
+        )
+    )
+    return Contour(path=path, x=x, y=y)
+
+
+class Workspace(NamedTuple):
+    """What an XY stage reaches.
+
+    Attributes
+    ----------
+    x, y : (float, float)
+        Lowest and highest displacement along each axis [m].
+    rest : (float, float)
+        Position in which a run begins [m], for the `origin` of a path.
+    """
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+    rest: tuple[float, float]
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        """The middle [m], for the `centre` of a path."""
+        return 0.5 * sum(self.x), 0.5 * sum(self.y)
+
+
+def workspace(
+    stage: XYStage, limits: tuple[float, float] | Sequence[tuple[float, float]]
+) -> Workspace:
+    """Find what an XY stage reaches between voltage limits.
+
+    Parameters
+    ----------
+    stage : XYStage
+        The stage.
+    limits : (float, float) or two of them
+        Lowest and highest voltage of both axes [V], or of x and of y.
+
+    Returns
+    -------
+    Workspace
+        Without cross-talk.
+
+    Raises
+    ------
+    ParameterError
+        `stage` is no XY stage, or `limits` are none.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> stage = pt.XYStage(x=pt.DahlStage.xu_li_2010(), y=pt.DahlStage.xu_li_2010())
+    >>> middle = pt.control.workspace(stage, (0.0, 75.0)).centre
+    >>> print(f"{1e6 * middle[0]:.0f} um")
+    60 um
+    """
+    if not isinstance(stage, XYStage):
+        raise ParameterError(f"stage is {type(stage).__name__}: expected pt.XYStage")
+    alone = np.ndim(limits[0]) == 0
+    pairs = [number_pair("limits", one, "V") for one in ([limits] * 2 if alone else limits)]
+    axes = list(zip((stage.x, stage.y), pairs, strict=True))
+    x, y = (reach(one, pair, 1e-3) for one, pair in axes)
+    at_x, at_y = (resting(one, voltages_before(one, (), pair)) for one, pair in axes)
+    return Workspace(x, y, (at_x, at_y))
+
+
+def _two(controllers: Sequence[Controller]) -> tuple[Controller, Controller]:
+    """Return the controllers of x and y, checked to have the same interval."""
+    given = list(controllers) if isinstance(controllers, (tuple, list)) else []
+    both = [one for one in given if isinstance(one, Controller)]
+    if not len(given) == len(both) == 2:
+        kinds = ", ".join(type(one).__name__ for one in given) or type(controllers).__name__
+        raise ParameterError(f"controllers are {kinds}: expected two pt.Controller, for x and y")
+    x, y = both
+    if x.dt != y.dt:
+        raise ParameterError(f"dt of y is {y.dt:g} s: expected that of x, {x.dt:g} s")
+    return x, y
+
+
+def _inverse(matrix: ArrayLike) -> Array:
+    rows = square_matrix("decoupling", matrix)
+    if abs(float(np.linalg.det(rows))) < 1e-3:
+        raise ParameterError(f"decoupling is {rows.tolist()}: expected a matrix near unity")
+    return np.asarray(np.linalg.inv(rows), dtype=np.float64)

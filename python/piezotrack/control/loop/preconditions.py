@@ -1,0 +1,140 @@
+"""What a closed-loop run is refused for, before it is simulated.
+
+A drive in another unit than the controller's, a repetitive part of another period, an unstable
+loop, and a reference beyond the stage's reach.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..._support.units import shown_unit
+from ...errors import ParameterError
+from ...identification.fitted.identified_model import IdentifiedModel
+from ..laws.components import Pid
+from ..plant import reach, settled_bottom
+from .stability import check_loop
+
+if TYPE_CHECKING:
+    from ...references.reference import Reference, SampledReference
+    from ...stages.virtual import VirtualStage
+    from ..controller.controller import Controller
+
+__all__ = ["check_delay", "check_drive_unit", "check_period", "check_stable", "check_within_reach"]
+
+
+# Control intervals that a loop of a search keeps on their way to the stage.
+MOST_INTERVALS = 100_000
+
+
+def check_delay(stage: VirtualStage, delay: float, dt: float) -> None:
+    """Refuse a delay [s], that of the sensor included, beyond the memory of a search."""
+    whole, most = delay + stage.sensor.delay, MOST_INTERVALS * dt
+    if whole > most:
+        raise ParameterError(
+            f"delay is {whole:.6g} s in all: expected {most:.6g} s at most, "
+            f"{MOST_INTERVALS} control intervals"
+        )
+
+
+def check_drive_unit(stage: object, controller: Controller) -> None:
+    """Refuse a model that is driven by a position under a controller of volts, or the reverse."""
+    if not isinstance(stage, IdentifiedModel):
+        return
+    one, other = stage.drive_unit, controller.drive_unit
+    if "m" in (one, other) and one != other:
+        raise ParameterError(
+            f"controller has the drive_unit {other!r}: expected that of the model, {one!r}, as "
+            "pt.Controller.of gives it"
+        )
+
+
+def check_period(controller: Controller, reference: Reference) -> None:
+    """Refuse a repetitive part whose period is not that of the reference."""
+    if controller.repetitive is None:
+        return
+    if reference.period is None:
+        raise ParameterError(
+            f"reference ({reference.name}) does not repeat: expected one that does, for the "
+            "repetitive part"
+        )
+    check_turns(controller, reference.period, f"reference ({reference.name})")
+
+
+def check_turns(controller: Controller, period: float, whose: str) -> None:
+    """Refuse a repetitive part whose period [s] is not that of something, or a multiple."""
+    if controller.repetitive is None:
+        return
+    turns = controller.repetitive.period / period
+    if abs(turns - max(1, round(turns))) > 1e-6 * turns:
+        raise ParameterError(
+            f"repetitive has a period of {controller.repetitive.period:g} s: expected that of the "
+            f"{whose}, {period:g} s, or a multiple"
+        )
+
+
+def check_stable(stage: VirtualStage, controller: Controller, delay: float) -> None:
+    """Refuse a loop that is unstable at the middle gain of the stage."""
+    if controller.feedback is None and controller.repetitive is None:
+        return
+    report = check_loop(stage, controller, delay=delay)
+    if report.stable:
+        return
+    one = report.middle
+    found = f"the loop is unstable on this stage, {one.gain_text}"
+    law = controller.feedback
+    without = one.gain_margin is not None and one.gain_margin < 1.0
+    if without and one.stable_gains is not None and one.stable_gains[1] < 1.0:
+        low, share = one.stable_gains
+        if isinstance(law, Pid):
+            unit, scale = shown_unit(controller.drive_unit)
+            kp = 1e-6 * scale * law.kp
+            gains = f"{share * kp:.3g} {unit}/um in place of {kp:.3g}"
+            found += f"; at the limit kp would be {gains}"
+            found += ", and half of that has a gain margin of 2" if low < 0.5 * share else ""
+        else:
+            found += f"; at the limit the gain would be {share:.3g} times as large"
+    elif without:
+        found += f"; at the limit the feedback's gain would be {one.gain_margin:.3g} times as large"
+    elif controller.repetitive is not None:
+        found += "; without the repetitive part it is stable, so lower kq or take another filter"
+    hint = f" ({one.hint})" if one.hint else ""
+    raise ParameterError(f"{found}{hint}: expected a stable one, or unstable=True")
+
+
+def check_within_reach(
+    stage: VirtualStage,
+    limits: tuple[float, float],
+    samples: SampledReference,
+    drive_unit: str = "V",
+) -> None:
+    """Refuse a reference that exceeds the reach of the stage between two voltages [V]."""
+    low, high = limits
+    unit, scale = shown_unit(drive_unit)
+    bottom, top = reach(stage, (low, high), 1e-3)
+    slack = 0.01 * (top - bottom)
+    for value, past, edge in (
+        (samples.x.max(), samples.x.max() - top, top),
+        (samples.x.min(), bottom - samples.x.min(), bottom),
+    ):
+        if past > slack:
+            k = int(np.flatnonzero(samples.x == value)[0])
+            raise ParameterError(
+                f"reference is {1e6 * value:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} um "
+                f"beyond {1e6 * edge:.4g} um: expected {1e6 * bottom:.4g} to {1e6 * top:.4g} um "
+                f"on the sensor, which this stage reaches from {scale * low:g} to "
+                f"{scale * high:g} {unit}, or beyond_reach=True"
+            )
+    # The loop stays above the curve from rest: once up, the stage no longer comes all the way down.
+    k = int(np.argmax(samples.x))
+    k += int(np.argmin(samples.x[k:]))
+    lowest = settled_bottom(stage, (low, high), float(samples.x.max()), 1e-3)
+    if (past := lowest - samples.x[k]) > slack:
+        raise ParameterError(
+            f"reference is {1e6 * samples.x[k]:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} "
+            f"um below {1e6 * lowest:.4g} um: expected what the stage reaches at {scale * low:g} "
+            f"{unit} on the settled loop, from {1e6 * samples.x.max():.4g} um down, or "
+            "beyond_reach=True"
+        )

@@ -1,0 +1,302 @@
+"""Stability and margins of the sampled loop of a controller and a stage."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ... import _core
+from ..._support.arguments import not_negative
+from ..._support.units import shown_unit
+from ...errors import ParameterError
+from ..plant import linearised_plants, plant_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure, SubFigure
+    from numpy.typing import NDArray
+
+    from ...identification.fitted.identified_model import IdentifiedModel
+    from ..controller.controller import Controller
+    from ..plant import Plant
+
+    Array = NDArray[np.float64]
+
+__all__ = ["LoopCheck", "LoopReport", "LoopResponse", "check_loop"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopCheck:
+    """Stability of the loop at one gain of the stage.
+
+    Attributes
+    ----------
+    gain : float
+        Static gain of the stage for small motions [m/V].
+    stable : bool
+        Whether the loop is stable.
+    exact : bool
+        Whether that was decided by counting roots; for periods above 10 000 samples it is decided
+        by the small-gain bound, which is sufficient but not necessary.
+    gain_margin : float or None
+        Factor on the gain at the stability limit of the feedback without the repetitive part;
+        below 1 where the feedback is unstable; None where there is no such gain.
+    stable_gains : tuple of (float, float) or None
+        Factors on the gain of the stage between which the whole loop is stable, the upper one
+        `inf` where there is none; for an unstable loop the nearest such range. None where no
+        gain makes it stable, and with a repetitive part of more than 10 000 samples.
+    phase_margin : float or None
+        Phase margin of the feedback without the repetitive part [rad]; None where its gain is
+        never 1.
+    delay_margin : float or None
+        Delay that makes the feedback unstable [s], in whole samples. A fraction of a sample also
+        shifts the samples along the ringing of a fast mode, which can destabilise the loop much
+        sooner: use `check_loop` with that delay.
+    crossover : float or None
+        Highest frequency at which its gain is 1 [Hz].
+    sensitivity : float
+        Ms, the largest amplification of a disturbance.
+    slowest_root : float or None
+        Largest radius of a root of the whole loop.
+    periods : float or None
+        Periods after which 1/e of an error remains; None without a repetitive part.
+    small_gain : float or None
+        Largest share of an error that remains after a period, by the small-gain bound: below 1 is
+        sufficient for stability at any period, but not necessary.
+    hidden_roots : int
+        Roots at exactly 1 that are not observable in the error: uRC and uFB drift against each
+        other.
+    hint : str or None
+        What may be wrong with the gain.
+    drive_unit : str
+        Unit of the drive, for what is printed.
+    """
+
+    gain: float
+    stable: bool
+    exact: bool
+    gain_margin: float | None
+    stable_gains: tuple[float, float] | None
+    phase_margin: float | None
+    delay_margin: float | None
+    crossover: float | None
+    sensitivity: float
+    slowest_root: float | None
+    periods: float | None
+    small_gain: float | None
+    hidden_roots: int
+    hint: str | None
+    drive_unit: str = "V"
+
+    @property
+    def gain_text(self) -> str:
+        """The gain with its unit, such as 1.5 um/V."""
+        unit, scale = shown_unit(self.drive_unit)
+        return f"{1e6 * self.gain / scale:.3g} um/{unit}"
+
+    def __str__(self) -> str:
+        text = f"{self.gain_text}: {'stable' if self.stable else 'UNSTABLE'}"
+        text += self._gains()
+        # With a repetitive part these are margins of another loop: of the feedback alone.
+        of = "" if self.small_gain is None else " of the feedback"
+        if self.stable and self.phase_margin is not None:
+            text += f", phase margin{of} {self.phase_margin:.2g} rad"
+        if self.stable:
+            text += f", Ms{of} {self.sensitivity:.3g}"
+        if self.periods is not None:
+            text += f", learns in {self.periods:.2g} periods"
+        return text
+
+    def _gains(self) -> str:
+        """Describe where the whole loop is stable."""
+        if self.stable_gains is None:
+            return ", at any gain" if self.exact and not self.stable else ""
+        low, high = self.stable_gains
+        if low > 1.0:
+            return f", stable from {low:.3g} times the gain on"
+        return f", gain margin {high:.3g}" if math.isfinite(high) else ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopResponse:
+    """Frequency response of the loop.
+
+    Attributes
+    ----------
+    frequency : ndarray, shape (n,)
+        Frequencies [Hz].
+    open_loop, sensitivity, complementary : ndarray of complex, shape (n,)
+        L, 1/(1 + L) and L/(1 + L) of the whole loop.
+    learning : ndarray, shape (n,)
+        Share of an error that remains after a period; 0 without a repetitive part.
+    """
+
+    frequency: Array
+    open_loop: NDArray[np.complex128]
+    sensitivity: NDArray[np.complex128]
+    complementary: NDArray[np.complex128]
+    learning: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LoopReport:
+    """Stability of the loop at the lowest, a middle and the highest small-signal gain of a stage.
+
+    With hysteresis the gain depends on the path: it is least just after a reversal.
+
+    Attributes
+    ----------
+    controller : Controller
+        The controller.
+    low, middle, high : LoopCheck
+        Stability at these gains.
+    plant : LoopPlant
+        The stage linearised at the middle gain, as an object of the core.
+    """
+
+    controller: Controller
+    low: LoopCheck
+    middle: LoopCheck
+    high: LoopCheck
+    plant: _core.LoopPlant
+
+    @property
+    def stable(self) -> bool:
+        """Whether the loop is stable at the middle gain."""
+        return self.middle.stable
+
+    @property
+    def everywhere(self) -> bool:
+        """Whether it is stable at all three."""
+        return self.low.stable and self.middle.stable and self.high.stable
+
+    def __repr__(self) -> str:
+        elsewhere = "" if self.everywhere == self.stable else "; not at every gain of the stage"
+        return f"<LoopReport at {self.middle}{elsewhere}>"
+
+    def __str__(self) -> str:
+        lines = [f"{name:<7} {one}" for name, one in self._cases]
+        if self.middle.hint:
+            lines.append(f"hint: {self.middle.hint}")
+        return "\n".join(lines)
+
+    @property
+    def _cases(self) -> tuple[tuple[str, LoopCheck], ...]:
+        return ("low", self.low), ("middle", self.middle), ("high", self.high)
+
+    def response(self, count: int = 400) -> LoopResponse:
+        """Frequency response at the middle gain, up to half the sampling rate.
+
+        Parameters
+        ----------
+        count : int, optional
+            Frequencies, evenly spaced in their logarithm.
+
+        Returns
+        -------
+        LoopResponse
+            The curves.
+        """
+        highest = 0.499 / self.controller.dt
+        count = max(2, _core.as_count("count", count))
+        if count > 100_000:
+            raise ParameterError(f"count is {count}: expected 100000 at most")
+        frequency = np.geomspace(1e-3 * highest, highest, count)
+        curves = _core.loop_response(self.controller._core, self.plant, frequency.tolist())
+        *pairs, learning = curves
+        loop, sensitivity, complementary = (
+            np.asarray(pair) @ np.array([1.0, 1.0j]) for pair in pairs
+        )
+        return LoopResponse(
+            frequency=frequency,
+            open_loop=loop,
+            sensitivity=sensitivity,
+            complementary=complementary,
+            learning=np.asarray(learning),
+        )
+
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
+        """Plot open loop, sensitivity and, with a repetitive part, the error left by a period.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
+        """
+        from ..views.stability_plot import plot_loop_report
+
+        return plot_loop_report(self, fig)
+
+
+def check_loop(
+    stage: Plant | IdentifiedModel,
+    controller: Controller,
+    *,
+    delay: float = 0.0,
+) -> LoopReport:
+    """Stability and margins of a controller on a stage.
+
+    The stage is linearised for small motions: one with hysteresis in feedback with the slope of
+    the hysteresis force as a spring; one with hysteresis at the input with the slope of its output
+    on the settled loop between the limits, without creep. Bandwidth of the amplifier and delay of
+    the sensor of a virtual stage are included. The voltage is held between samples, and the
+    repetitive part is that of the implementation, with all its taps.
+
+    Parameters
+    ----------
+    stage : Stage, VirtualStage or IdentifiedModel
+        The plant: any stage of ``pt.stages``, a `VirtualStage` or an `IdentifiedModel`, whose
+        delay is included.
+    controller : Controller
+        The controller.
+    delay : float, optional
+        Time from a reading to the effect of its voltage [s], besides the hold.
+
+    Returns
+    -------
+    LoopReport
+        At the lowest, a middle and the highest gain of the stage.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+    >>> report = pt.check_loop(pt.VirtualStage.xu_li_2010(), loop)
+    >>> report.stable
+    True
+    """
+    more = not_negative("delay", delay, "s")
+    plants = linearised_plants(plant_of(stage), controller.limits, more)
+    cases = [_check(controller, linear) for linear in plants]
+    return LoopReport(
+        controller=controller, low=cases[0], middle=cases[1], high=cases[2], plant=plants[1]
+    )
+
+
+def _check(controller: Controller, plant: _core.LoopPlant) -> LoopCheck:
+    found = _core.check_loop(controller._core, plant)
+    slowest, margin = found["slowest"], found["gain_margin"]
+    return LoopCheck(
+        gain=plant.static_gain,
+        stable=found["stable"],
+        exact=found["exact"],
+        gain_margin=None if margin is None or math.isinf(margin) else margin,
+        stable_gains=found["gains"],
+        phase_margin=found["phase_margin"],
+        delay_margin=found["delay_margin"],
+        crossover=found["crossover"],
+        sensitivity=found["sensitivity"],
+        slowest_root=None if slowest is None else slowest[0],
+        periods=found["periods"],
+        small_gain=found["small_gain"],
+        hidden_roots=found["hidden"],
+        hint=found["hint"],
+        drive_unit=controller.drive_unit,
+    )

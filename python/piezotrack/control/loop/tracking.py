@@ -1,0 +1,470 @@
+"""Tracking: closed-loop simulation of a stage along a reference, and its metrics."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ... import _core
+from ..._support.arguments import not_negative
+from ..._support.frames import frame_of
+from ..._support.statistics import FIGURES, ErrorStatistics
+from ..._support.units import drive_word, shown_unit
+from ...errors import ParameterError
+from ...hardware.device import Device
+from ...references.reference import Reference, SampledReference
+from ...stages.inverse import PlayedVoltage
+from ..controller.controller import Controller
+from ..plant import plant_of, run_closed_loop, voltages_before
+from .preconditions import check_drive_unit, check_period, check_stable, check_within_reach
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.figure import Figure, SubFigure
+    from numpy.typing import NDArray
+
+    from ...identification.fitted.identified_model import IdentifiedModel
+    from ..plant import Plant
+
+    Array = NDArray[np.float64]
+
+__all__ = ["Metrics", "Tracking", "track"]
+
+# Periods after which what learns has learnt.
+LEARNT = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Metrics(ErrorStatistics):
+    """Metrics of a tracked motion; errors are desired less actual.
+
+    Attributes
+    ----------
+    phase_lag : float or None
+        Phase lag of the fundamental [rad]; None where the reference does not repeat.
+    widest_loop : float or None
+        Widest loop of actual against desired, as a part of the travel; None where the reference
+        never reverses.
+    """
+
+    phase_lag: float | None
+    widest_loop: float | None
+
+    def __str__(self) -> str:
+        text = f"max {1e6 * self.max_error:.3f} um, rms {1e6 * self.rms_error:.3f} um"
+        if self.phase_lag is not None:
+            text += f", phase lag {self.phase_lag:.4f} rad"
+        if self.widest_loop is not None:
+            text += f", widest loop {100.0 * self.widest_loop:.2f} % of travel"
+        return text
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Tracking:
+    """A tracked motion.
+
+    Attributes
+    ----------
+    reference : Reference
+        The reference.
+    controller : Controller
+        The controller.
+    t : ndarray, shape (n,)
+        Time of the control samples [s].
+    desired, measured, displacement : ndarray, shape (n,)
+        Reference, sensor reading and true displacement [m]; the voltage of a sample is computed
+        from the reading of the same sample.
+    loop_error : ndarray, shape (n,)
+        Last error computed by the controller [m], from its filtered reading. For an axis that is
+        sampled after the other it belongs to the point of the path of that sample, and is 0
+        before the first.
+    voltage : ndarray, shape (n,)
+        Command to the amplifier [V].
+    feedforward, feedback, repetitive : ndarray, shape (n,)
+        Its parts before it was clipped [V].
+    saturated : ndarray of bool, shape (n,)
+        Whether the command was clipped.
+    fine_t, fine_displacement, fine_voltage : ndarray, shape (m,)
+        Time [s], true displacement [m] and applied voltage [V] between the samples too.
+    note : str
+        Description of the feedforward.
+    """
+
+    reference: Reference
+    controller: Controller
+    t: Array
+    desired: Array
+    measured: Array
+    displacement: Array
+    loop_error: Array
+    voltage: Array
+    feedforward: Array
+    feedback: Array
+    repetitive: Array
+    saturated: NDArray[np.bool_]
+    fine_t: Array
+    fine_displacement: Array
+    fine_voltage: Array
+    note: str
+
+    def __repr__(self) -> str:
+        return f"<Tracking of {self.reference!r}: {self.metrics}>"
+
+    @property
+    def error(self) -> Array:
+        """Desired less measured [m]."""
+        return self.desired - self.measured
+
+    @property
+    def settled(self) -> float:
+        """Time from which `metrics` are computed [s].
+
+        After the smooth start; of a reference that repeats, from the first whole period after it
+        if there is one. 0 where the smooth start lasts to the end.
+        """
+        first = settled_from(self.reference, float(self.t[-1]))
+        # A run that was ended before counts as a whole.
+        return first if first < self.t[-1] - 1e-9 else 0.0
+
+    @cached_property
+    def metrics(self) -> Metrics:
+        """Metrics of the measured motion, from `settled` on."""
+        return self.score()
+
+    def score(
+        self, start: float | None = None, stop: float | None = None, *, true: bool = False
+    ) -> Metrics:
+        """Metrics of a part of the run.
+
+        Parameters
+        ----------
+        start, stop : float, optional
+            The part [s]; default from `settled` to the end.
+        true : bool, optional
+            Whether to use the true displacement, without noise and quantisation of the sensor.
+
+        Returns
+        -------
+        Metrics
+            Of that part.
+        """
+        part = self.part(self.t, start, stop)
+        actual = self.displacement if true else self.measured
+        # A device may have no reading at a sample.
+        read = part & np.isfinite(actual)
+        whole = bool(read.sum() == part.sum())
+        part = read if read.sum() >= 2 else part
+        dt, period = self.controller.dt, self.reference.period
+        # A phase needs a whole period, and more than two samples of it.
+        frequency = None if period is None else 1.0 / period
+        if frequency and not (
+            whole and part.sum() * dt * frequency >= 0.999 and frequency * dt < 0.5
+        ):
+            frequency = None
+        return _metrics(_core.tracking_metrics(self.desired[part], actual[part], dt, frequency))
+
+    def part(self, t: Array, start: float | None, stop: float | None) -> NDArray[np.bool_]:
+        """Return which instants lie in a part of the run.
+
+        Parameters
+        ----------
+        t : ndarray, shape (n,)
+            Instants [s].
+        start, stop : float or None
+            As in `score`.
+
+        Returns
+        -------
+        ndarray of bool, shape (n,)
+            True for two instants at least.
+
+        Raises
+        ------
+        ParameterError
+            There are fewer.
+        """
+        first = self.settled if start is None else not_negative("start", start, "s")
+        last = math.inf if stop is None else _core.as_number("stop", stop)
+        part: NDArray[np.bool_] = (t >= first - 1e-9) & (t < last - 1e-9)
+        if part.sum() < 2:
+            raise ParameterError(
+                f"start and stop are {first:g} and {last:g} s: expected a part of the run, 0 to "
+                f"{t[-1]:g} s, with two samples"
+            )
+        return part
+
+    @cached_property
+    def periods(self) -> list[Metrics]:
+        """Metrics of each whole period, the first including the smooth start.
+
+        Empty where the reference does not repeat, ends within its first period, or has fewer
+        than four samples in one.
+        """
+        dt, period = self.controller.dt, self.reference.period
+        if period is None or not 4.0 <= period / dt <= self.t.size + 0.01:
+            return []
+        found = _core.period_metrics(self.desired, self.measured, dt, period)
+        return [_metrics(figures) for figures in found]
+
+    @property
+    def table(self) -> dict[str, Array]:
+        """Columns of the run at the control samples, with their units in the names."""
+        unit, scale = shown_unit(self.controller.drive_unit)
+        command = drive_word(self.controller.drive_unit)
+        return {
+            "time_s": self.t,
+            "desired_um": 1e6 * self.desired,
+            "measured_um": 1e6 * self.measured,
+            f"{command}_{unit}": scale * self.voltage,
+            f"feedforward_{unit}": scale * self.feedforward,
+            f"feedback_{unit}": scale * self.feedback,
+            f"repetitive_{unit}": scale * self.repetitive,
+        }
+
+    def to_frame(self) -> Any:
+        """Return the run as a data frame of pandas.
+
+        Returns
+        -------
+        pandas.DataFrame
+            With the columns of `table`.
+
+        Raises
+        ------
+        ParameterError
+            pandas is not installed.
+        """
+        return frame_of(self.table)
+
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
+        """Desired and actual motion, error, actual against desired, and the parts of the voltage.
+
+        One panel alone, in axes of your own: `plot_motion`, `plot_error`, `plot_following`,
+        `plot_effort`.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
+        """
+        from ..views.tracking_plot import plot_tracking
+
+        return plot_tracking(self, fig)
+
+    def summary(self) -> str:
+        """Table of the run: all of it, and period by period.
+
+        Returns
+        -------
+        str
+            Several lines.
+        """
+        lines = [f"{self.reference!r} at {1.0 / self.controller.dt:g} Hz; {self.note}"]
+        since = f"from {self.settled:g} s on" if self.settled else "all of it"
+        lines.append(f"{since}: {self.metrics}")
+        if self.saturated.any():
+            lines.append(f"clipped in {100.0 * self.saturated.mean():.1f} % of the samples")
+        if self.periods:
+            lines.append("period  max um  rms um  mean um")
+            lines += [
+                f"{i:>6}  {1e6 * one.max_error:>6.3f}  {1e6 * one.rms_error:>6.3f}  "
+                f"{1e6 * one.mean_error:>7.3f}"
+                for i, one in enumerate(self.periods, 1)
+            ]
+        return "\n".join(lines)
+
+
+def _metrics(
+    figures: tuple[float, float, float, float, float, float | None, float | None],
+) -> Metrics:
+    *errors, lag, loop = figures
+    return Metrics(**dict(zip(FIGURES, errors, strict=True)), phase_lag=lag, widest_loop=loop)
+
+
+def track(
+    stage: Plant | IdentifiedModel | Device,
+    controller: Controller,
+    reference: Reference,
+    *,
+    delay: float = 0.0,
+    jitter: float = 0.0,
+    substeps: int = 10,
+    visited: float | Sequence[float] = (),
+    beyond_reach: bool = False,
+    unstable: bool = False,
+    safe: float | None = None,
+) -> Tracking:
+    """Track a reference in closed loop, on a simulated stage or on a device.
+
+    A simulated stage moves in continuous time; at each sampling instant the sensor is read, and the
+    voltage computed from the reading is applied and held until the next. On a device this computer
+    closes the loop, in real time: see `control.DeviceTracking`.
+
+    Parameters
+    ----------
+    stage : Stage, VirtualStage, IdentifiedModel or Device
+        The plant: any stage of ``pt.stages``, a `VirtualStage` or an `IdentifiedModel`, or a
+        `hardware.Device` with `exchange`. A stage
+        model has no noise and no amplifier (``VirtualStage.of`` gives it both), and starts at rest;
+        offset and delay of an `IdentifiedModel` are included in the displacement.
+    controller : Controller
+        The controller.
+    reference : Reference
+        The reference, as ``pt.sine(...)``.
+    delay : float, optional
+        Time from a reading to the effect of its voltage [s], in addition to the hold.
+    jitter : float, optional
+        Mean sampling jitter [s], as on a computer without real-time scheduling: the delay of each
+        sample is drawn from an exponential distribution, truncated at nine tenths of the sampling
+        interval. The draws depend on the seed of the stage's sensor.
+    substeps : int, optional
+        Instants kept in each sampling interval, for plots; up to 100000.
+    visited : float or sequence of float, optional
+        Voltages that the stage visits slowly before the run, in turn [V]: it begins in equilibrium
+        at the last, with the memory of the others, as ``(75.0, 0.0)``. By default it never moved
+        before; where 0 V is not between the limits, it begins at the limit nearest to 0 V. Not with
+        a virtual stage that is preconditioned.
+    beyond_reach : bool, optional
+        Whether the reference may exceed the reach of the stage within the voltage limits, as to
+        study saturation.
+    unstable : bool, optional
+        Whether a loop may be unstable for small motions.
+    safe : float, optional
+        Of a device: voltage before and after [V]; default 0 V, or the limit nearest to it. `delay`,
+        `jitter`, `substeps` and `visited` are those of a simulation.
+
+    Returns
+    -------
+    Tracking
+        The motion and its metrics; of a device a `control.DeviceTracking`.
+
+    Raises
+    ------
+    ParameterError
+        A number is out of its range, the reference exceeds the reach of the stage, the loop is
+        unstable, or a device is too slow for the interval.
+    NumericalError
+        The loop diverges.
+    DeviceError, Interrupted
+        A device failed, or the loop was interrupted: the output is at `safe`, and `partial` is the
+        run up to then.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+    >>> reference = pt.sine(frequency=0.2, low=0.0, high=100e-6, duration=10.0)
+    >>> run = pt.track(pt.VirtualStage.xu_li_2010(seed=1), loop, reference)
+    >>> print(f"{run.metrics.phase_lag:.2f} rad")
+    0.06 rad
+    """
+    for name, value, kind in (
+        ("controller", controller, Controller),
+        ("reference", reference, Reference),
+    ):
+        if not isinstance(value, kind):
+            raise ParameterError(f"{name} is {type(value).__name__}: expected pt.{kind.__name__}")
+    if isinstance(stage, Device):
+        if (delay, jitter, substeps, visited) != (0.0, 0.0, 10, ()):
+            raise ParameterError(
+                "delay, jitter, substeps or visited is given: expected none of them on a device, "
+                "which has its own"
+            )
+        from ..on_device.closed_loop import track_on
+
+        return track_on(
+            stage, controller, reference, safe=safe, beyond_reach=beyond_reach, unstable=unstable
+        )
+    if safe is not None:
+        raise ParameterError(f"safe is {safe!r}: expected none, as the stage is simulated")
+    plant = plant_of(stage)
+    check_drive_unit(stage, controller)
+    delay = not_negative("delay", delay, "s")
+    substeps = _core.as_count("substeps", substeps)
+    samples = reference.sample(controller.dt)
+    check_period(controller, reference)
+    if not _core.as_truth("unstable", unstable):
+        check_stable(plant, controller, delay)
+    if not _core.as_truth("beyond_reach", beyond_reach):
+        check_within_reach(plant, controller.limits, samples, controller.drive_unit)
+    voltage, note = feedforward_of(controller, reference, samples)
+    sampling = (delay, not_negative("jitter", jitter, "s"), substeps)
+    before = voltages_before(plant, visited, controller.limits)
+    run = run_closed_loop(plant, controller, samples.x, voltage, sampling, before)
+    return collected(run, controller, reference, samples, note, substeps)
+
+
+def settled_from(reference: Reference, end: float) -> float:
+    """Time from which a run along a reference counts as settled [s]; it ends at `end`."""
+    period = reference.period
+    if period is None:
+        return reference.ramp if reference.ramp < end - 1e-9 else 0.0
+    start = math.ceil(reference.ramp / period - 1e-9) * period
+    return start if start + period <= reference.duration * (1 + 1e-9) else 0.0
+
+
+def can_be_learnt(reference: Reference) -> bool:
+    """Whether a reference repeats so often that something can learn it, and one period counts."""
+    period = reference.period
+    return period is not None and reference.duration > (LEARNT + 1) * period
+
+
+def first_counted(reference: Reference, samples: SampledReference, *, learns: bool) -> int:
+    """Return the first sample that counts: settled and, where something learns, learnt."""
+    end, dt = float(samples.t[-1]), samples.dt
+    start = settled_from(reference, end)
+    if learns and reference.period is not None:
+        learnt = start + LEARNT * reference.period
+        start = learnt if learnt + reference.period <= end + dt else start
+    return math.ceil(start / dt - 1e-9)
+
+
+def feedforward_of(
+    controller: Controller, reference: Reference, samples: SampledReference
+) -> PlayedVoltage:
+    """Compute the feedforward of a whole run [V], and a note of how."""
+    if controller.feedforward is None:
+        return PlayedVoltage(np.zeros(len(samples)), "no feedforward")
+    return controller.feedforward.played(
+        reference, controller.dt, samples=samples, limits=controller.limits
+    )
+
+
+def collected(
+    run: _core.TrackingRun,
+    controller: Controller,
+    reference: Reference,
+    samples: SampledReference,
+    note: str,
+    substeps: int,
+) -> Tracking:
+    """Collect the results of one axis."""
+    fine_t, fine_displacement, fine_voltage = run.motion()
+    return Tracking(
+        reference=reference,
+        controller=controller,
+        t=samples.t,
+        desired=samples.x,
+        measured=run.measured,
+        displacement=fine_displacement[::substeps],
+        loop_error=run.part("error"),
+        voltage=run.part("volts"),
+        feedforward=run.part("feedforward"),
+        feedback=run.part("feedback"),
+        repetitive=run.part("repetitive"),
+        saturated=run.saturated,
+        fine_t=fine_t,
+        fine_displacement=fine_displacement,
+        fine_voltage=fine_voltage,
+        note=note,
+    )

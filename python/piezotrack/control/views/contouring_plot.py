@@ -1,0 +1,247 @@
+"""Pictures of a contouring run."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..._support.plot_style import (
+    ACTUAL,
+    DESIRED,
+    ERROR,
+    GUIDE,
+    LEVEL,
+    QUIET,
+    axes_or_new,
+    few_ticks,
+    legend_inside,
+    literal,
+    panels,
+    whole,
+)
+from ..controller.description import parts_text
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+    from numpy.typing import NDArray
+
+    from ..loop.contouring import Contour
+
+    Array = NDArray[np.float64]
+
+__all__ = [
+    "last_turn",
+    "plot_contour",
+    "plot_contour_error",
+    "plot_magnified",
+    "plot_path",
+]
+
+# Size of the largest error in the picture, as a part of the path's smaller side.
+SHOWN = 0.12
+
+
+def plot_path(run: Contour, ax: Axes | None = None) -> Axes:
+    """Plot the path and the measured positions in the plane, with the smooth start.
+
+    Parameters
+    ----------
+    run : Contour
+        The run.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in; default a new figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        With the picture.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> import piezotrack as pt
+    >>> stage = pt.XYStage.xu_li_2010(seed=1)
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+    >>> run = pt.contour(stage, (loop, loop), pt.circle(frequency=0.5, radius=10e-6))
+    >>> ax = pt.control.plot_path(run, ax=Figure().subplots())
+    >>> ax.get_ylabel()
+    'y [um]'
+    """
+    (ax,) = axes_or_new(ax, 1)
+    start, part = run.t < run.settled, last_turn(run)
+    if start.any():
+        mark = {**QUIET, "label": "approach"}
+        ax.plot(1e6 * run.x.measured[start], 1e6 * run.y.measured[start], **mark)
+    ax.plot(1e6 * run.x.measured[part], 1e6 * run.y.measured[part], **ACTUAL)
+    x, y = run.path.outline
+    ax.plot(1e6 * x, 1e6 * y, **DESIRED)
+    _plane(ax, run)
+    return ax
+
+
+def plot_magnified(run: Contour, ax: Axes | None = None, factor: float | None = None) -> Axes:
+    """Plot the contour error, magnified, along the path.
+
+    Parameters
+    ----------
+    run : Contour
+        The run.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in; default a new figure.
+    factor : float, optional
+        Magnification; default a round number that keeps the errors readable.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        With the picture.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> import piezotrack as pt
+    >>> stage = pt.XYStage.xu_li_2010(seed=1)
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+    >>> run = pt.contour(stage, (loop, loop), pt.circle(frequency=0.5, radius=10e-6))
+    >>> ax = pt.control.plot_magnified(run, ax=Figure().subplots())
+    >>> ax.get_ylabel()
+    'y [um]'
+    """
+    (ax,) = axes_or_new(ax, 1)
+    part = last_turn(run)
+    if factor is None:
+        side = min(float(np.ptp(axis)) for axis in run.path.outline)
+        factor = _round_down(SHOWN * side / run.metrics.max_error)
+    x, y = run.path.outline
+    ax.plot(1e6 * x, 1e6 * y, **{**DESIRED, "label": "path"})
+    # The point of the path where the motion should be, and the normal to the left.
+    (px, vx, _), (py, vy, _) = (axis.at(run.t[part]) for axis in run.path.axes)
+    speed = np.maximum(np.hypot(vx, vy), 1e-30)
+    off = factor * run.error[part]
+    ax.plot(
+        1e6 * (px - off * vy / speed),
+        1e6 * (py + off * vx / speed),
+        **{**ERROR, "label": f"contour error \N{MULTIPLICATION SIGN} {factor:g}"},
+    )
+    _plane(ax, run)
+    return ax
+
+
+def plot_contour_error(run: Contour, ax: Axes | None = None) -> Axes:
+    """Plot the measured contour error over the last turn, with mean and standard deviation.
+
+    Parameters
+    ----------
+    run : Contour
+        The run.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in; default a new figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        With the picture.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> import piezotrack as pt
+    >>> stage = pt.XYStage.xu_li_2010(seed=1)
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+    >>> run = pt.contour(stage, (loop, loop), pt.circle(frequency=0.5, radius=10e-6))
+    >>> ax = pt.control.plot_contour_error(run, ax=Figure().subplots())
+    >>> ax.get_ylabel()
+    'contour error [um]'
+    """
+    (ax,) = axes_or_new(ax, 1)
+    part = last_turn(run)
+    found = run.metrics
+    mean, sd = 1e6 * found.mean_error, 1e6 * found.sd_error
+    ax.plot(run.t[part], 1e6 * run.error[part], **{**ERROR, "label": "contour error"})
+    ax.axhline(mean, **{**LEVEL, "label": "mean"})
+    ax.axhspan(mean - sd, mean + sd, color="0.9", zorder=0, label="mean \N{PLUS-MINUS SIGN} SD")
+    ax.set(xlabel="time [s]", ylabel="contour error [um]")
+    ax.margins(x=0)
+    legend_inside(ax, ncols=3)
+    return ax
+
+
+def plot_contour(run: Contour, fig: Figure | SubFigure | None = None) -> Figure:
+    """Plot all four: path, magnified error, errors of the axes and contour error, in the last turn.
+
+    Parameters
+    ----------
+    run : Contour
+        The run.
+    fig : matplotlib.figure.Figure or SubFigure, optional
+        Figure to draw in; default a new one.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure drawn in.
+    """
+    figure = panels(fig, (11.0, 8.4))
+    grid = figure.add_gridspec(2, 2, height_ratios=[1.6, 1.0])
+    plot_path(run, figure.add_subplot(grid[0, 0]))
+    plot_magnified(run, figure.add_subplot(grid[0, 1]))
+    part, shared = last_turn(run), None
+    inner = grid[1, 0].subgridspec(2, 1, hspace=0.1)
+    for row, (name, axis) in enumerate((("x", run.x), ("y", run.y))):
+        ax = figure.add_subplot(inner[row], sharex=shared, sharey=shared)
+        ax.plot(run.t[part], 1e6 * axis.error[part], **ERROR)
+        ax.axhline(0.0, **GUIDE)
+        ax.set(xlabel="time [s]" if row else "", ylabel=f"error of {name} [um]")
+        ax.tick_params(labelbottom=bool(row))
+        ax.locator_params(axis="y", nbins=4, prune="both")
+        ax.margins(x=0)
+        shared = shared or ax
+    contour = figure.add_subplot(grid[1, 1])
+    plot_contour_error(run, contour)
+    found = run.metrics
+    figure.suptitle(
+        f"{literal(run.path.name)}: {_parts(run)} at {1.0 / run.x.controller.dt:.6g} Hz\n"
+        f"contour error {1e6 * found.peak_to_peak:.3f} um peak to peak, "
+        f"mean {1e6 * found.mean_error:.3f} um, SD {1e6 * found.sd_error:.3f} um",
+        fontsize="medium",
+    )
+    return whole(figure)
+
+
+def _parts(run: Contour) -> str:
+    """Name the parts of the controllers, once where those of both axes are the same."""
+    x, y = parts_text(run.x.controller), parts_text(run.y.controller)
+    return x if x == y else f"x {x}, y {y}"
+
+
+def last_turn(run: Contour) -> NDArray[np.bool_]:
+    """Return the samples of the last turn; all settled ones where the path is run once."""
+    turn = run.path.period
+    start = run.settled
+    if turn is not None:
+        start = max(start, run.t[-1] + run.x.controller.dt - turn)
+    last: NDArray[np.bool_] = run.t >= start - 1e-9
+    return last
+
+
+def _plane(ax: Axes, run: Contour) -> None:
+    """Label a picture in the plane, and crop most of the smooth start."""
+    ax.set(xlabel="x [um]", ylabel="y [um]", aspect="equal")
+    edges = [(1e6 * float(axis.min()), 1e6 * float(axis.max())) for axis in run.path.outline]
+    room = 0.2 * max(high - low for low, high in edges)
+    ax.set(
+        xlim=(edges[0][0] - room, edges[0][1] + room),
+        ylim=(edges[1][0] - room, edges[1][1] + room),
+    )
+    few_ticks(ax, "both")
+    legend_inside(ax, ncols=3)
+
+
+def _round_down(value: float) -> float:
+    """Return the largest of 1, 2, 5, 10, ... that is not above `value`, 1 at least."""
+    if not value > 1.0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value))

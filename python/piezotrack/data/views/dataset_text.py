@@ -1,0 +1,43 @@
+"""A record in one line, and as a table of a notebook."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..._support.html_table import html_table
+from ..._support.units import best_length_unit
+
+if TYPE_CHECKING:
+    from ..dataset import Dataset
+
+__all__ = ["as_line", "as_table"]
+
+
+def as_line(data: Dataset) -> str:
+    """Write a record in one line."""
+    unit, scale = best_length_unit(data.stroke)
+    parts = [
+        f"{len(data)} samples",
+        f"{data.duration:.6g} s at {1.0 / data.dt:.6g} Hz",
+        f"stroke {data.stroke * scale:.3g} {unit}",
+    ]
+    if data.warmup:
+        parts.append(f"warm-up {data.warmup} samples")
+    return f"Dataset({', '.join(parts)})"
+
+
+def as_table(data: Dataset) -> str:
+    """Write a record as a table in HTML."""
+    unit, scale = best_length_unit(data.stroke)
+    low, high = scale * data.y.min(), scale * data.y.max()
+    rows = [
+        ("samples", f"{len(data)}, {data.duration:.6g} s at {1.0 / data.dt:.6g} Hz"),
+        ("time", f"{data.t[0]:.6g} to {data.t[-1]:.6g} s"),
+        ("drive", f"{data.u.min():.4g} to {data.u.max():.4g} {data.drive_unit}, {data.hold}"),
+        ("displacement", f"{low:.4g} to {high:.4g} {unit}"),
+        ("stroke", f"{scale * data.stroke:.4g} {unit}"),
+        ("warm-up", f"{data.warmup} samples"),
+    ]
+    rows += [(name, data.column_units.get(name, "")) for name in data.columns]
+    rows += [("note", note) for note in data.notes]
+    return html_table(f"Dataset {data.source or ''}".rstrip(), rows)

@@ -1,0 +1,196 @@
+"""Export of a controller: C99, calls of the C library, coefficients in JSON, FMI 2.0."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from .._support.files import make_folder, replacing, together, write_document
+from .._support.messages import quoted
+from ..control.controller.controller import Controller
+from ..errors import ParameterError
+from ..references.reference import Reference
+from .c99 import c_sources, checked_name
+from .c_parts import feedforward_table
+from .fmu import compiler, fmu_bytes
+from .json_form import coefficients_document
+from .library import library_sources
+
+if TYPE_CHECKING:
+    import os
+    from pathlib import Path
+
+    from numpy.typing import ArrayLike
+
+__all__ = ["Exported", "export_controller", "export_files"]
+
+To = Literal["c99", "library", "json", "fmu"]
+FORMS = ("c99", "library", "json", "fmu")
+LEFT_OUT = (
+    "without the feedforward, whose inverse is no filter: reference= or table= writes it as a table"
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Exported:
+    """What an export has written.
+
+    Attributes
+    ----------
+    files : tuple of pathlib.Path
+        The files.
+    to : {"c99", "library", "json", "fmu"}
+        The form.
+    state_bytes : int or None
+        Bytes of the state in C; None for coefficients and for calls of the library.
+    additions, multiplications, divisions : int or None
+        Floating-point operations of a step that does not saturate; None as above.
+    bound : float or None
+        Largest difference to the Rust controller that ``check.c`` accepts, in the unit of the
+        drive: 0 for doubles. None for coefficients.
+    note : str
+        What a person should know; empty for nothing.
+    """
+
+    files: tuple[Path, ...]
+    to: To
+    state_bytes: int | None = None
+    additions: int | None = None
+    multiplications: int | None = None
+    divisions: int | None = None
+    bound: float | None = None
+    note: str = ""
+
+    def __str__(self) -> str:
+        if self.state_bytes is None:
+            text = "coefficients" if self.to == "json" else "calls libpiezotrack"
+            return f"{text}; {self.note}" if self.note else text
+        text = f"state {self.state_bytes} bytes; a step has {self.additions} additions, "
+        text += f"{self.multiplications} multiplications, {self.divisions} divisions"
+        return text + ("" if self.bound == 0.0 else f"; within {self.bound:.3g} of the doubles")
+
+
+def export_files(to: To, name: str) -> list[str]:
+    """Return the names of the files that an export writes."""
+    checked_name(name)
+    names = {
+        "c99": [f"{name}.h", f"{name}.c", "check.c", "vectors.csv"],
+        "library": [f"{name}.h", f"{name}.c", "check.c", "vectors.csv"],
+        "json": [f"{name}.json"],
+        "fmu": [f"{name}.fmu"],
+    }
+    if to not in names:
+        raise ParameterError(f"to is {quoted(to)}: expected one of {', '.join(map(repr, FORMS))}")
+    return names[to]
+
+
+def export_controller(
+    controller: Controller,
+    folder: str | os.PathLike[str],
+    *,
+    to: To = "c99",
+    name: str = "controller",
+    single: bool = False,
+    reference: Reference | None = None,
+    table: ArrayLike | None = None,
+) -> Exported:
+    """Write a controller for firmware or for another program.
+
+    ``"c99"`` writes NAME.h and NAME.c, which allocate nothing and call no library, with test
+    vectors and a program that checks them: doubles give the same bits as `Controller`.
+    ``"library"`` writes the same functions for a program that is linked with libpiezotrack: every
+    controller has this form, with the inverse of any stage sample by sample. ``"json"`` writes the
+    linear parts as coefficients. ``"fmu"`` compiles the C into a unit for co-simulation (FMI 2.0,
+    Linux x86-64), with its sources.
+
+    Parameters
+    ----------
+    controller : Controller
+        The controller.
+    folder : path-like
+        Folder of the files; files of the same names are replaced.
+    to : {"c99", "library", "json", "fmu"}, optional
+        The form.
+    name : str, optional
+        Of the files and functions: an identifier of C.
+    single : bool, optional
+        Numbers are floats, not doubles.
+    reference : Reference, optional
+        Motion that repeats: the feedforward is then played from a table of one settled period.
+        C99 and FMU need it for every feedforward other than that of a Dahl stage.
+    table : array_like, shape (n,), optional
+        One period of a feedforward of your own, as `Learning.table`, in the unit of the drive: a
+        sample for each interval of the controller. It takes the place of the controller's own.
+
+    Returns
+    -------
+    Exported
+        The files, bytes of the state, operations of a step.
+
+    Raises
+    ------
+    ParameterError
+        A part of the controller has no such form; the message names it. A unit is asked for
+        where there is no C compiler, or not on Linux, x86-64.
+    DataError
+        A file cannot be written; `table` has a voltage that is not finite or beyond the limits.
+    ShapeError
+        `table` is no table.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+    >>> print(pt.control.export_controller(loop, "firmware", name="axis"))
+    state 120 bytes; a step has 10 additions, 4 multiplications, 0 divisions
+    """
+    if not isinstance(controller, Controller):
+        raise ParameterError(f"controller is {type(controller).__name__}: expected pt.Controller")
+    if reference is not None and not isinstance(reference, Reference):
+        raise ParameterError(
+            f"reference is {type(reference).__name__}: expected a Reference, as pt.sine(...)"
+        )
+    names = export_files(to, name)
+    played = feedforward_table(controller, reference, table)
+    if to == "json":
+        if single:
+            raise ParameterError("single is True with to='json': expected False, JSON has doubles")
+        document = coefficients_document(controller, played)
+        path = write_document(make_folder(folder) / names[0], document)
+        left_out = controller.feedforward is not None and played is None
+        return Exported(files=(path,), to=to, note=LEFT_OUT if left_out else "")
+    if to == "library":
+        if single:
+            raise ParameterError(
+                "single is True with to='library': expected False, the library has doubles"
+            )
+        texts = library_sources(controller, name, table=played, reference=reference)
+        paths = _written({key: text.encode() for key, text in texts.items()}, folder)
+        return Exported(files=paths, to=to, bound=0.0)
+    if to == "fmu":
+        compiler()
+    sources = c_sources(controller, name, single=single, table=played, reference=reference)
+    files = {key: text.encode() for key, text in sources.files.items()}
+    if to == "fmu":
+        files = {names[0]: fmu_bytes(controller, sources)}
+    additions, multiplications, divisions = sources.operations
+    return Exported(
+        files=_written(files, folder),
+        to=to,
+        state_bytes=sources.state_bytes,
+        additions=additions,
+        multiplications=multiplications,
+        divisions=divisions,
+        bound=sources.bound,
+    )
+
+
+def _written(files: dict[str, bytes], folder: str | os.PathLike[str]) -> tuple[Path, ...]:
+    """Write the files in one go."""
+    paths = []
+    with together(make_folder(folder)) as there:
+        for key, content in files.items():
+            with replacing(there / key) as temporary:
+                temporary.write_bytes(content)
+            paths.append(there / key)
+    return tuple(paths)

@@ -1,0 +1,1 @@
+"""Identifications of many records, by an executor."""

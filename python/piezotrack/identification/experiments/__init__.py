@@ -1,0 +1,1 @@
+"""Experiments that are read directly: steps, a sensor at rest, cross-talk."""

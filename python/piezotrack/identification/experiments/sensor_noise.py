@@ -1,0 +1,244 @@
+"""Noise of a sensor, from a record at rest."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ... import _core
+from ..._support.statistics import ErrorStatistics
+from ...data.dataset import Dataset
+from ...errors import DataError, ParameterError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure, SubFigure
+    from numpy.typing import NDArray
+
+    from ...stages.virtual import VirtualStage
+
+    Array = NDArray[np.float64]
+
+__all__ = ["Noise", "identify_noise"]
+
+# Correlation of displacement and drive above which a record is not one at rest.
+FOLLOWS = 0.5
+# Smallest product of bandwidth and duration for which the fluctuations count as noise.
+SLOWEST = 10.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Noise:
+    r"""Noise of a sensor at rest, and a model of it.
+
+    The model is white noise through a first-order low-pass, quantised: the one-sided spectral
+    density at interval dt, with :math:`r = e^{-2 \pi f_b \, dt}`, is
+
+    .. math:: S(f) = 2 \, dt \left(\sigma^2 \frac{1 - r^2}{1 + r^2 - 2 r \cos 2 \pi f \, dt}
+        + \frac{q^2}{12}\right)
+
+    Attributes
+    ----------
+    data : Dataset
+        The record.
+    spread : ErrorStatistics
+        Statistics of the record about its drift [m]; its `sd_error` is what Xu and Li 2010 call
+        the rms of the noise.
+    drift : float
+        Range of the cubic that is removed as creep and drift [m].
+    resolution : float
+        Quantisation step q of the readings [m]; 0 if none is found.
+    levels : int
+        Number of distinct readings.
+    noise, bandwidth : float
+        Sigma before quantisation [m rms], and bandwidth [Hz], infinite for white noise.
+    bandwidth_sd : float or None
+        Standard deviation of the bandwidth [Hz]; None for white noise.
+    """
+
+    data: Dataset
+    spread: ErrorStatistics
+    drift: float
+    resolution: float
+    levels: int
+    noise: float
+    bandwidth: float
+    bandwidth_sd: float | None
+
+    def __repr__(self) -> str:
+        return f"<Noise of {self.data!r}: {1e6 * self.rms:.4g} um rms>"
+
+    @property
+    def rms(self) -> float:
+        """Rms of the record about its drift [m], quantisation included."""
+        return self.spread.sd_error
+
+    def of_stage(self, stage: VirtualStage) -> VirtualStage:
+        """Return a virtual stage with this sensor.
+
+        Parameters
+        ----------
+        stage : VirtualStage
+            The stage.
+
+        Returns
+        -------
+        VirtualStage
+            The same with this noise, bandwidth and resolution.
+        """
+        sensor = replace(
+            stage.sensor,
+            noise=self.noise,
+            noise_bandwidth=self.bandwidth,
+            resolution=self.resolution,
+        )
+        return replace(stage, sensor=sensor)
+
+    def spectrum(self) -> tuple[Array, Array]:
+        """Amplitude spectral density of the record by Welch's method.
+
+        Returns
+        -------
+        frequency : ndarray, shape (m,)
+            Frequencies [Hz], without 0.
+        density : ndarray, shape (m,)
+            One-sided [m/sqrt(Hz)]; Hann windows, half overlapping, about 16 of them.
+        """
+        from scipy.signal import welch
+
+        y = self.data.y
+        f, power = welch(
+            y, 1.0 / self.data.dt, nperseg=min(y.size, max(64, y.size // 8)), detrend="linear"
+        )
+        return f[1:], np.sqrt(power[1:])
+
+    def density(self, frequency: Array) -> Array:
+        """Amplitude spectral density of the model.
+
+        Parameters
+        ----------
+        frequency : ndarray, shape (m,)
+            Frequencies, up to half the sampling rate [Hz].
+
+        Returns
+        -------
+        ndarray, shape (m,)
+            One-sided [m/sqrt(Hz)].
+        """
+        dt = self.data.dt
+        r = math.exp(-math.tau * self.bandwidth * dt)
+        shape = (1.0 - r * r) / (1.0 + r * r - 2.0 * r * np.cos(math.tau * frequency * dt))
+        power = 2.0 * dt * (self.noise**2 * shape + self.resolution**2 / 12.0)
+        return np.asarray(np.sqrt(power))
+
+    @property
+    def notes(self) -> list[str]:
+        """Warnings about the record, one sentence each."""
+        if self.bandwidth_sd is None or self.bandwidth * self.data.duration >= SLOWEST:
+            return []
+        return [
+            f"the fluctuations are slower than sensor noise, {self.bandwidth:.3g} Hz in a record "
+            f"of {self.data.duration:.4g} s: was the stage at rest?"
+        ]
+
+    def summary(self) -> str:
+        """Table of the figures.
+
+        Returns
+        -------
+        str
+            Several lines.
+        """
+        data = self.data
+        steps = f"{1e6 * self.resolution:.5g} um, {self.levels} levels seen"
+        colour = "white, as far as this sampling rate shows"
+        if self.bandwidth_sd is not None:
+            colour = f"low-pass of {self.bandwidth:.4g} +- {self.bandwidth_sd:.2g} Hz"
+        return "\n".join(
+            [
+                f"at rest: {data.source or 'a record'}, {len(data)} samples, "
+                f"{data.duration:.4g} s at {1.0 / data.dt:.6g} Hz",
+                *(f"note  {note}" for note in self.notes),
+                f"rms           {1e6 * self.rms:.5g} um about the drift",
+                f"peak to peak  {1e6 * self.spread.peak_to_peak:.5g} um",
+                f"drift         {1e6 * self.drift:.4g} um over the record",
+                f"steps         {steps if self.resolution else 'none found'}",
+                f"noise model   {1e6 * self.noise:.5g} um rms before the steps, {colour}",
+            ]
+        )
+
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
+        """Record in time, and its spectrum with that of the model.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
+        """
+        from ..views.sensor_noise_plot import plot_noise
+
+        return plot_noise(self, fig)
+
+
+def identify_noise(log: Dataset) -> Noise:
+    """Identify the noise of a sensor from a record at rest.
+
+    A cubic in time is removed as creep and drift. The quantisation step is the largest of which all
+    differences of readings are whole multiples; its rounding error is white and adds
+    ``step^2 / 12`` to the variance (Widrow 1956, doi 10.1109/TCT.1956.1086334), which holds for a
+    noise above half a step. The bandwidth follows from the autocorrelation of the rest.
+
+    Parameters
+    ----------
+    log : Dataset
+        A record at rest, of 100 samples or more; its window is used.
+
+    Returns
+    -------
+    Noise
+        Figures, a model, and pictures.
+
+    Raises
+    ------
+    ParameterError
+        `log` is not a Dataset.
+    ShapeError, DataError
+        The record is too short, or shows no noise.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import piezotrack as pt
+    >>> stage = pt.VirtualStage.xu_li_2010(seed=1)
+    >>> found = pt.identification.identify_noise(stage.record(np.zeros(20000), 1 / 5000.0))
+    >>> print(f"{1e6 * found.rms:.3f} um rms in steps of {1e6 * found.resolution:.3f} um")
+    0.097 um rms in steps of 0.038 um
+    """
+    if not isinstance(log, Dataset):
+        raise ParameterError(f"log is {type(log).__name__}: expected pt.Dataset")
+    if np.ptp(log.u) > 0.0 and np.ptp(log.y) > 0.0:
+        alike = float(np.corrcoef(log.u, log.y)[0, 1])
+        if abs(alike) > FOLLOWS:
+            raise DataError(
+                f"the displacement follows the drive, which goes from {log.u.min():.4g} to "
+                f"{log.u.max():.4g} {log.drive_unit} (correlation {alike:.2f}): expected a record "
+                "of a stage at rest"
+            )
+    figures, drift, resolution, levels, noise, bandwidth, sd = _core.sensor_noise(log.y, log.dt)
+    return Noise(
+        data=log,
+        spread=ErrorStatistics.of(figures),
+        drift=drift,
+        resolution=resolution,
+        levels=levels,
+        noise=noise,
+        bandwidth=bandwidth,
+        bandwidth_sd=sd,
+    )

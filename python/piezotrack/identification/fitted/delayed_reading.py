@@ -1,0 +1,46 @@
+"""Displacement as a sensor shows it whose readings come late."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ... import _core
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ...stages.base import Response
+    from ...stages.model_info import ModelInfo
+
+    Array = NDArray[np.float64]
+
+__all__ = ["late_reading"]
+
+
+def late_reading(info: ModelInfo, run: Response, delay: float) -> Array:
+    """Displacement of a stage as it is read a delay later.
+
+    Parameters
+    ----------
+    info : ModelInfo
+        Model of the stage.
+    run : Response
+        Its motion.
+    delay : float
+        Delay [s].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Displacement [m]; between samples on the cubic through displacements and velocities, of a
+        model found by least squares on straight lines, as in its fit: without modes it has no
+        velocity.
+    """
+    if not delay:
+        return run.x
+    if not info.searched:
+        late: Array = np.interp(run.t - delay, run.t, run.x)
+        return late
+    return _core.delayed(run.x, run.v, float(run.t[1]) if run.t.size > 1 else 1.0, delay)

@@ -1,0 +1,256 @@
+"""Slow drift of a sensor's reading along one record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from ... import _core
+from ..._support.arguments import positive
+from ..._support.json_text import object_of
+from ..._support.messages import quoted
+from ...errors import ParameterError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ...data.dataset import Dataset
+
+    Array = NDArray[np.float64]
+
+__all__ = ["Drift", "asked_drift", "drift_entry", "drift_of", "drift_of_asked"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drift:
+    """A part of a reading that decays along a record and has nothing to do with its drive.
+
+    As what is left of the creep under an earlier drive, or of the warmth of an amplifier, it
+    belongs to the record, not to the stage::
+
+        y = x + offset + amplitude (exp(-(t - begin) / time) - exp(-(end - begin) / time))
+
+    It is 0 at the end of the window, so that the offset is what the sensor showed at rest last.
+
+    Attributes
+    ----------
+    amplitude : float
+        Of the part that decays, at `begin` [m].
+    time : float
+        Time constant [s]. Where it is much longer than the record, the drift is a straight line.
+    begin, end : float
+        First and last instant of the window that was fitted, on the record's own time axis [s].
+    time_fitted : bool
+        Whether the time constant was fitted too.
+    """
+
+    amplitude: float
+    time: float
+    begin: float
+    end: float
+    time_fitted: bool = True
+
+    @classmethod
+    def _fading(cls, part: float, time: float, data: Dataset, *, time_fitted: bool) -> Self:
+        """Of a part of the reading [m] that fades along the window of a record."""
+        begin, end = float(data.t[0]), float(data.t[-1])
+        amplitude = part / -float(np.expm1((begin - end) / time))
+        return cls(amplitude=amplitude, time=time, begin=begin, end=end, time_fitted=time_fitted)
+
+    @property
+    def moved(self) -> float:
+        """Change of the reading along the window [m]."""
+        return self.amplitude * float(np.expm1((self.begin - self.end) / self.time))
+
+    def __str__(self) -> str:
+        return (
+            f"a drift of {1e6 * self.moved:.3g} um along the window fitted, "
+            f"time constant {self.time:.3g} s"
+        )
+
+    def at(self, t: Array) -> Array:
+        """Value at some instants of the record; before `begin` that at `begin`.
+
+        Parameters
+        ----------
+        t : ndarray, shape (n,)
+            Times of the record [s].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Part of the reading [m].
+        """
+        x: Array = self.amplitude * self._shape(np.maximum(t, self.begin), self.begin, self.end)
+        return x
+
+    def _shape(self, t: Array, begin: float, end: float) -> Array:
+        """Return a drift of 1 at `begin`, less its value at `end`."""
+        last = np.exp((begin - end) / self.time)
+        slow = end - begin < self.time
+        # The difference of two numbers near 1 would be rounding.
+        shape: Array = (
+            last * np.expm1((end - t) / self.time)
+            if slow
+            else np.exp((begin - t) / self.time) - last
+        )
+        return shape
+
+    def left_of(self, t: Array, rest: Array) -> Array:
+        """Take the best drift with this time constant, and an offset, off a residual.
+
+        Parameters
+        ----------
+        t : ndarray, shape (n,)
+            Times of a record [s].
+        rest : ndarray, shape (n,)
+            What the stage leaves of its readings [m].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            What is left [m].
+        """
+        left = rest - self.of_another(t, rest, centred=True)
+        left -= left.mean()
+        return left
+
+    def of_another(self, t: Array, rest: Array, *, centred: bool) -> Array:
+        """Drift of another record of the same sensor, by least squares with this time constant.
+
+        Parameters
+        ----------
+        t : ndarray, shape (n,)
+            Times of that record [s].
+        rest : ndarray, shape (n,)
+            What the stage leaves of its readings [m].
+        centred : bool
+            Whether an offset is taken off besides.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Part of its readings [m].
+        """
+        fading = self._shape(t, float(t[0]), float(t[-1]))
+        shape = fading - fading.mean() if centred else fading
+        size = float(shape @ shape)
+        found: Array = fading * (float(shape @ rest) / size if size > 0.0 else 0.0)
+        return found
+
+
+def asked_drift(drift: object) -> float | None:
+    """Check what is asked of the drift of a record.
+
+    Parameters
+    ----------
+    drift : object
+        Argument of the caller: True or ``"auto"`` for what the record shows, False for none, or
+        a time constant [s].
+
+    Returns
+    -------
+    float or None
+        The time constant [s]; 0 for none, None for what the record shows.
+
+    Raises
+    ------
+    ParameterError
+        It is none of these.
+    """
+    if isinstance(drift, (bool, np.bool_)):
+        return None if drift else 0.0
+    if drift is None or (isinstance(drift, str) and drift == "auto"):
+        return None
+    return positive("drift", drift, "s")
+
+
+def drift_of_asked(drift: object, *, offset: bool, searched: bool) -> float | None:
+    """Time constant of the drift of a record, as the core takes it.
+
+    Parameters
+    ----------
+    drift : object
+        As for `asked_drift`.
+    offset : bool
+        Whether an offset of the record is fitted.
+    searched : bool
+        Whether the model is searched: such a one has no drift where nobody asks for it.
+
+    Returns
+    -------
+    float or None
+        As for `asked_drift`.
+
+    Raises
+    ------
+    ParameterError
+        The drift is none of what `identify` takes, or is asked for without an offset.
+    """
+    time = asked_drift(drift)
+    if drift is None and (searched or not offset):
+        return 0.0
+    if not offset and time != 0.0:
+        raise ParameterError(f"drift is {quoted(drift)}: expected none with offset=False")
+    return time
+
+
+def drift_entry(drift: Drift | None) -> dict[str, Any]:
+    """Entry of a drift in a file; none where there is no drift.
+
+    Parameters
+    ----------
+    drift : Drift or None
+        The drift.
+
+    Returns
+    -------
+    dict
+        Of numbers and texts only.
+    """
+    if drift is None:
+        return {}
+    return {
+        "drift": {
+            "amplitude": {"value": drift.amplitude, "unit": "m"},
+            "time": {"value": drift.time, "unit": "s", "free": drift.time_fitted},
+            "begin": {"value": drift.begin, "unit": "s"},
+            "end": {"value": drift.end, "unit": "s"},
+        }
+    }
+
+
+def drift_of(entry: Any) -> Drift | None:
+    """Read a drift from a file.
+
+    Parameters
+    ----------
+    entry : Any
+        Its entry; None where there is none.
+
+    Returns
+    -------
+    Drift or None
+        The drift.
+
+    Raises
+    ------
+    ParameterError
+        The entry is not that of a drift.
+    """
+    if entry is None:
+        return None
+    found = object_of("drift", entry)
+    values = {
+        name: _core.as_number(f"drift: {name}", object_of(f"drift: {name}", found[name])["value"])
+        for name in ("amplitude", "begin", "end")
+    }
+    time = object_of("drift: time", found["time"])
+    return Drift(
+        time=positive("drift: time", time["value"], "s"),
+        # Files of before have no such entry.
+        time_fitted=time.get("free", True) is True,
+        **values,
+    )

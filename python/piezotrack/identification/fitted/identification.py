@@ -1,0 +1,305 @@
+"""The result of an identification: model, record, cost and settings."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..._support.statistics import sample_noise
+from ...data import diagnostics
+from . import notes as remarks
+from .fitted_record import FittedRecord
+from .identified_model import IdentifiedModel
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from matplotlib.figure import Figure, SubFigure
+    from numpy.typing import NDArray
+
+    from ...data.dataset import Dataset
+    from ...stages.base import Response
+    from ..methods.descents import Descents
+    from ..methods.particle_swarm import ParticleSwarm
+    from ..solve.selection import Trial
+    from ..solve.weights import LeastSquares
+    from .estimates import Constraint, Estimate, LagRange, StopReason, SwarmRun
+    from .score import Score
+
+    Array = NDArray[np.float64]
+
+__all__ = ["Identification"]
+
+# Ratio of the rates of two records from which on a lag that fits both holds at more than one rate.
+OTHER = 1.5
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Identification(IdentifiedModel):
+    """Result of an identification; see `IdentifiedModel` for its use.
+
+    After a search all attributes but `least_squares` and `at_bound` are set; after a fit by
+    least squares these two, and the first four.
+
+    Attributes
+    ----------
+    data : Dataset
+        The record; the first of several.
+    records : tuple of FittedRecord
+        The records, each with its weight, delay, offset, start and cost. `data`, `delay`,
+        `offset`, `start` and `fitted` are those of the first, and `stroke` is the largest.
+    cost : float
+        RMS deviation in the window [m], equation (16) of Xu and Li 2010; of several records see
+        `identify`.
+    nfev : int
+        Simulations of the record, of all runs.
+    stop_reason : {"agreed", "converged", "stalled", "iterations", "interrupted", "solved"}
+        Why the fit ended; ``"solved"`` after least squares.
+    parameters : dict of str to Estimate
+        The parameters with units, bounds and standard deviations; and the delay where it
+        was fitted. Empty after least squares.
+    constraints : tuple of Constraint
+        The inequalities that were given, each with whether it decides the result.
+    scales : dict of str to str
+        The scales that were given.
+    cost_with_priors : float or None
+        What was minimised where there were priors [m]: `cost` times the factor of the priors, see
+        `identify`. `history` and the costs of `runs` have it too.
+    history : ndarray, shape (nit + 1,)
+        Best cost after each iteration of the best run [m].
+    nit : int
+        Iterations of the swarm, or of the descent, that found the best candidate.
+    nfail : int
+        Simulations that diverged.
+    npolish : int
+        Simulations of the local refinement after that run, which `history` does not include.
+    runs : tuple of SwarmRun
+        The independent restarts of a swarm, or the descents; the other attributes are those of
+        the best one.
+    substeps, order : int
+        Steps of the integrator in each sampling interval and their order, fixed for the search.
+    seed : int or None
+        Seed of the random numbers.
+    agreeing : int
+        Number of runs that ended within 0.1 % of the lowest cost; of descents before the local
+        refinement of the best one. Costs below 0.001 % of the stroke count as equal.
+    swarm : ParticleSwarm or None
+        Settings of the swarm, where one searched.
+    descents : Descents or None
+        Settings of the descents, where they searched.
+    least_squares : LeastSquares or None
+        Settings of the least squares.
+    lags : LagRange or None
+        Lags that fit as well, where the drive is too slow to tell them from hysteresis and creep.
+    trials : tuple of Trial
+        The kinds that were tried, the best first, where ``model="auto"`` chose one of them.
+    fitted_until : float or None
+        End of the part of the window that these were fitted to [s]; they were judged on the rest.
+        None where the window is too short for two parts.
+    at_bound : bool
+        Whether a time constant or a frequency lies on a bound of its range.
+    """
+
+    data: Dataset
+    cost: float
+    nfev: int
+    stop_reason: StopReason
+    parameters: Mapping[str, Estimate] = field(default_factory=dict)
+    constraints: tuple[Constraint, ...] = ()
+    scales: Mapping[str, str] = field(default_factory=dict)
+    cost_with_priors: float | None = None
+    history: Array = field(default_factory=lambda: np.empty(0))
+    nit: int = 0
+    nfail: int = 0
+    npolish: int = 0
+    runs: tuple[SwarmRun, ...] = ()
+    substeps: int = 1
+    order: int = 0
+    seed: int | None = None
+    agreeing: int = 0
+    swarm: ParticleSwarm | None = None
+    descents: Descents | None = None
+    least_squares: LeastSquares | None = None
+    lags: LagRange | None = None
+    trials: tuple[Trial, ...] = ()
+    fitted_until: float | None = None
+    at_bound: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.records:
+            # One record, whose own are those of the result.
+            own = FittedRecord(
+                data=self.data,
+                delay=self.delay,
+                offset=self.offset,
+                offset_fitted=self.offset_fitted,
+                drift=self.drift,
+                start=self.start,
+                cost=self.cost,
+                stroke=self.stroke,
+                origin=self._record,
+            )
+            object.__setattr__(self, "records", (own,))
+
+    def __repr__(self) -> str:
+        return (
+            f"<Identification, {self.model.info.title}: {self.cost_um:.4g} um rms, "
+            f"{self.cost_percent:.3g} % of stroke; see summary()>"
+        )
+
+    def _repr_html_(self) -> str:
+        from ..views.html import identification_html
+
+        return identification_html(self)
+
+    @property
+    def fun(self) -> float:
+        """The cost [m], under SciPy's name."""
+        return self.cost
+
+    @property
+    def cost_um(self) -> float:
+        """The cost [um]."""
+        return 1e6 * self.cost
+
+    @property
+    def cost_percent(self) -> float:
+        """The cost in per cent of the stroke."""
+        return 100.0 * self.cost / self.stroke
+
+    @property
+    def fit_percent(self) -> float:
+        """Share of the motion that the model explains, as `Score.fit_percent`."""
+        spread = remarks.spread_of([(data, one.weight) for data, one in self._fitted])
+        return remarks.fit_percent(self.cost, spread)
+
+    @property
+    def fitted(self) -> Score:
+        """Score on the record that was identified, simulated with converged sub-steps."""
+        return self.scores[0]
+
+    @cached_property
+    def scores(self) -> tuple[Score, ...]:
+        """Score on each record that was identified, with its own offset, delay and start."""
+        return tuple(self.score(data, offset=one.offset) for data, one in self._fitted)
+
+    @property
+    def _fitted(self) -> list[tuple[Dataset, FittedRecord]]:
+        """The records, those of a result being there."""
+        return [(one.data, one) for one in self.records if one.data is not None]
+
+    @cached_property
+    def _responses(self) -> list[Response]:
+        """Motion of the model on each record."""
+        return [self.simulate(data, offset=one.offset) for data, one in self._fitted]
+
+    @property
+    def notes(self) -> list[str]:
+        """Warnings about the record and the fit, one sentence each."""
+        info, unit = self.model.info, self.data.drive_unit
+        notes: list[str] = []
+        several = len(self.records) > 1
+        for i, ((data, one), run) in enumerate(zip(self._fitted, self._responses, strict=True)):
+            source = f" ({data.source})" if data.source else ""
+            which = f"record {i + 1}{source}: " if several else ""
+            notes += [which + note for note in self._notes_on(data, one, run)]
+        if info.drive_unit == "N" and unit != "N":
+            notes.append(f"the drive is in {unit}: forces are in {unit} too, not in N")
+        rates = [_frequency(data) for data, _ in self._fitted]
+        if self.lags is not None and (self.lags.from_zero or max(rates) < OTHER * min(rates)):
+            notes += remarks.of_lags(self.lags, 2.0 * math.pi * rates[0])
+        if self.at_bound:
+            notes.append(
+                "the record does not determine the dynamics: time constant or mode lies on a bound"
+            )
+        if len(self.runs) > 1 and self.agreeing == 1:
+            what = "restart" if self.swarm is not None else "descent"
+            notes.append(f"no other {what} ended in the minimum of the best one: increase runs=")
+        return notes
+
+    def _notes_on(self, data: Dataset, one: FittedRecord, run: Response) -> list[str]:
+        """Warnings about one of the records and the fit there."""
+        notes, rest = diagnostics.record_warnings(data), data.y - run.x
+        if one.cost_percent > 5.0:
+            notes.append(
+                "the model does not fit this record: the residual is "
+                f"{one.cost_percent:.3g} % of stroke"
+            )
+        if one.cost_percent > diagnostics.REMAINS:
+            held = [name for name, estimate in self.parameters.items() if not estimate.free]
+            notes += diagnostics.fit_warnings(
+                data, run.x, one.cost_percent, self.model.info.hysteresis, held
+            )
+        notes += remarks.of_drift(one.drift, one.stroke)
+        notes += self.model._notes(lambda: run)
+        if self.trials:
+            # A mode moves from sample to sample as noise does; what is left of it hardly does.
+            notes += remarks.above_noise(one.cost, min(sample_noise(data.y), sample_noise(rest)))
+        return notes + remarks.first_samples(rest, data)
+
+    @property
+    def success(self) -> bool:
+        """Whether the fit was not interrupted."""
+        return self.stop_reason != "interrupted"
+
+    @property
+    def message(self) -> str:
+        """Why the fit ended, in words."""
+        if self.stop_reason == "stalled" and self.swarm is not None:
+            return (
+                f"{self.swarm.stall_iterations} iterations in a row improved the cost by less than "
+                f"{1e6 * self.swarm.min_improvement:g} um"
+            )
+        if self.stop_reason == "iterations" and self.swarm is not None:
+            return f"all {self.swarm.iterations} iterations were done"
+        if self.stop_reason == "agreed":
+            return "independent descents agree"
+        if self.stop_reason == "iterations" and self.descents is not None:
+            return f"all {self.descents.rounds} rounds were done"
+        return self.stop_reason
+
+    def summary(self) -> str:
+        """Table of the result.
+
+        Returns
+        -------
+        str
+            Several lines: the cost, the ratios that the data determine, the parameters.
+        """
+        from ..views.report import summary_text
+
+        return summary_text(self)
+
+    def plot(self, data: Dataset | None = None, *, fig: Figure | SubFigure | None = None) -> Figure:
+        """Loop, displacement with its error over time, and convergence of the search.
+
+        Of several records loop and displacement of each, one below the other.
+
+        One panel alone, in axes of your own: `plot_loop`, `plot_time`, `plot_convergence`.
+
+        Parameters
+        ----------
+        data : Dataset, optional
+            Another record, on which the model is shown; or one of several that were identified.
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
+        """
+        from ..views.plot import plot_identification
+
+        return plot_identification(self, data, fig)
+
+
+def _frequency(data: Dataset) -> float:
+    """Frequency of a drive: that of a sine [Hz]."""
+    size = float(np.std(data.u))
+    rate = float(np.sqrt(np.mean(np.diff(data.u) ** 2))) / data.dt
+    return rate / size / (2.0 * math.pi) if size else 0.0

@@ -1,0 +1,500 @@
+"""Identified models: a stage with the offset and delay of its sensor, on records and in files."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from ... import _core
+from ..._support.arrays import check_dt, signal_of
+from ..._support.files import write_document
+from ...data.dataset import Dataset
+from ...errors import ParameterError, ShapeError
+from .delayed_reading import late_reading
+from .fitted_record import record_of
+from .model_file import document_of, drive_unit_of, read_model, sensor_number
+from .notes import beyond_fit
+from .score import Score
+from .start import begin, checked_history, same_beginning
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from ...data.dataset import Hold
+    from ...stages.base import Response, StageState
+    from ...stages.inverse import Inverse
+    from .drift import Drift
+    from .fitted_record import FittedRecord
+    from .start import History, Start
+
+    Array = NDArray[np.float64]
+
+__all__ = ["IdentifiedModel", "load"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class IdentifiedModel:
+    """An identified stage, with the offset and delay of its sensor.
+
+    Attributes
+    ----------
+    model : Stage
+        The stage.
+    offset : float
+        Reading of the sensor at rest without drive [m].
+    offset_fitted : bool
+        Whether the offset was fitted; another record then gets an offset of its own.
+    stroke : float
+        Stroke of the record identified [m]; percentages refer to it.
+    scale_assumed : bool
+        Whether the stiffness is nominal: then only ratios of the parameters with the dimension of
+        force are known.
+    delay : float
+        Delay of the displacement, in the amplifier or the reading of the sensor [s].
+    start : Start or None
+        Where the record identified begins: what the stage went through before, and its state at
+        the first sample. None in files of older versions.
+    drift : Drift or None
+        Drift of the sensor along the record identified, which is in the displacement on that record
+        alone.
+    records : tuple of FittedRecord
+        What each of several records identified has of its own; `offset`, `delay` and `start` are
+        those of the first, and `stroke` is the largest. Of one record: a result has it alone, a
+        model from a file has none.
+    details : mapping
+        Other entries of the model file: fit, provenance.
+    """
+
+    # A stage of any model: each has its own parameters.
+    model: Any
+    offset: float
+    offset_fitted: bool
+    stroke: float
+    scale_assumed: bool = False
+    delay: float = 0.0
+    start: Start | None = None
+    drift: Drift | None = None
+    records: tuple[FittedRecord, ...] = ()
+    details: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    def __repr__(self) -> str:
+        return f"<IdentifiedModel, stroke {1e6 * self.stroke:.4g} um: {self.model!r}>"
+
+    @property
+    def drive_range(self) -> tuple[float, float] | None:
+        """Lowest and highest drive of the records identified; None if the file has none."""
+        found = [one["drive_range"] for one in self._origins if one.get("drive_range")]
+        if not found:
+            return None
+        return float(min(low for low, _ in found)), float(max(high for _, high in found))
+
+    @property
+    def drive_unit(self) -> str:
+        """Unit of the drive, SI: ``"V"``, ``"N"``, or ``"m"`` where the drive is a position."""
+        return drive_unit_of(self.details, self.model.info)
+
+    @property
+    def dt(self) -> float | None:
+        """Sampling interval of the record identified [s]; None if the file has none."""
+        found = self._record.get("dt_s")
+        return None if found is None else float(found)
+
+    @property
+    def _record(self) -> Mapping[str, Any]:
+        """Entries of the file on the record identified."""
+        origin: Mapping[str, Any] = self.details.get("provenance") or {}
+        return origin.get("data") or {}
+
+    @property
+    def _origins(self) -> list[Mapping[str, Any]]:
+        """Entries of the file on each record identified."""
+        several = len(self.records) > 1
+        return [one.origin for one in self.records] if several else [self._record]
+
+    def _own(self, data: Dataset) -> FittedRecord | None:
+        """Which of several records identified a record is, or is a window of."""
+        return record_of(self.records, data) if len(self.records) > 1 else None
+
+    @property
+    def free_count(self) -> int | None:
+        """Number of values fitted, offset and drift included; None if the file does not have it.
+
+        Thresholds and time constants chosen beforehand are not counted; a weight that was found
+        to be 0 is.
+        """
+        found = self.details.get("parameters", {})
+        if not any("free" in entry for entry in found.values()):
+            return None
+        names = self.model.parameter_names()
+        free = [name for name in names if found.get(name, {}).get("free", False)]
+        delay = bool(self.details.get("delay", {}).get("free", False))
+        offsets = int(self.offset_fitted) + sum(one.offset_fitted for one in self.records[1:])
+        drifts = [one for one in (self.drift, *(one.drift for one in self.records[1:])) if one]
+        own = delay + offsets + sum(1 + one.time_fitted for one in drifts)
+        return sum(_count(getattr(self.model, name)) for name in free) + own
+
+    def beyond_fit(self, u: ArrayLike, dt: float | None = None) -> list[str]:
+        """Remarks on a drive that goes beyond the range or the rate of the record identified.
+
+        Parameters
+        ----------
+        u : array_like, shape (n,)
+            Drive [V].
+        dt : float, optional
+            Sampling interval [s]; without it the rate is not judged.
+
+        Returns
+        -------
+        list of str
+            One sentence for each; none for a model without a record.
+
+        Raises
+        ------
+        DataError, ShapeError, ParameterError
+            If `u` is no sequence of finite numbers, or `dt` no interval.
+        """
+        rates = [one["drive_rate"] for one in self._origins if one.get("drive_rate") is not None]
+        drive = signal_of("u", u)
+        interval = None if dt is None else check_dt(dt)
+        if not drive.size:
+            raise ShapeError("u has no samples: expected at least one")
+        most = float(max(rates)) if rates else None
+        return beyond_fit(drive, interval, self.drive_range, most, self.drive_unit)
+
+    def fitted_on(self, data: Dataset) -> bool:
+        """Return whether a record is the one identified, sample by sample.
+
+        Parameters
+        ----------
+        data : Dataset
+            The record.
+
+        Returns
+        -------
+        bool
+            Whether window, warm-up and all numbers are the same.
+        """
+        return any(one.get("sha256") == data.sha256 for one in self._origins)
+
+    def window_on(self, data: Dataset) -> tuple[float, float] | None:
+        """Return which window of a record was fitted, judged by the name of its file.
+
+        Parameters
+        ----------
+        data : Dataset
+            The record.
+
+        Returns
+        -------
+        (float, float) or None
+            The window [s] if it overlaps `data`; None otherwise.
+        """
+        for one in self._origins:
+            window = one.get("window_s")
+            same = data.source is not None and one.get("source") == data.source
+            if same and window and window[0] <= data.t[-1] and window[1] >= data.t[0]:
+                return float(window[0]), float(window[1])
+        return None
+
+    def inverse(
+        self,
+        *,
+        playback: Literal["table", "online"] = "table",
+        settle: int = 1,
+        initial: StageState | None = None,
+    ) -> Inverse:
+        """Feedforward with the offset and the delay of this model, as `Inverse` describes.
+
+        Parameters
+        ----------
+        playback : {"table", "online"}, optional
+            Whether one settled period is repeated from a table, or the whole run is computed.
+        settle : int, optional
+            Periods before the one of the table.
+        initial : StageState, optional
+            State of the stage before the reference begins, as for `Inverse`.
+
+        Returns
+        -------
+        Inverse
+            For `Controller` or on its own. ``model.inverse()`` has no offset and no delay.
+        """
+        inverse: Inverse = self.model.inverse(playback=playback, settle=settle, initial=initial)
+        return replace(inverse, offset=self.offset, delay=self.delay)
+
+    def displacement(
+        self, u: ArrayLike, dt: float, *, hold: Hold = "foh", initial: StageState | None = None
+    ) -> Array:
+        """Sensor reading under a drive, from rest.
+
+        Parameters
+        ----------
+        u : array_like, shape (n,)
+            Drive [V].
+        dt : float
+            Sampling interval [s].
+        hold : {"foh", "zoh"}, optional
+            As for `simulate` of the stage.
+        initial : StageState, optional
+            State at the first sample, as ``model.equilibrium(u[0])``; by default never driven.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Displacement with offset and delay [m].
+        """
+        run = self.model.simulate(u, dt, hold=hold, initial=initial)
+        return late_reading(self.model.info, run, self.delay) + self.offset
+
+    def _delay_on(self, data: Dataset) -> float:
+        """Delay of the sensor on a record [s]: its own where it is one of those identified."""
+        return (self._own(data) or self).delay
+
+    def _drift_on(self, data: Dataset) -> Array | float:
+        """Drift of the sensor on a record [m]: that of the one identified, else none yet."""
+        own = self._own(data) or self
+        return own.drift.at(data.t) if own.drift and same_beginning(own.start, data) else 0.0
+
+    def simulate(
+        self,
+        data: Dataset,
+        *,
+        offset: float | Literal["own"] = "own",
+        history: History | None = None,
+        initial: StageState | None = None,
+    ) -> Response:
+        """Response of the model to the drive of a record.
+
+        Parameters
+        ----------
+        data : Dataset
+            The record. Its warm-up is simulated too.
+        offset : float or "own", optional
+            Added to the displacement [m]. ``"own"``: if an offset was fitted, the one that fits
+            this record's window best, otherwise none; and if a drift was fitted, on another record
+            one of its own with the same time constant.
+        history : {"virgin", "settled", "fit"}, optional
+            What the stage went through before the record; see `identify`. Where it is not given:
+            of a record identified as it was there, of another one what that record shows.
+        initial : StageState, optional
+            State at the first sample of the record and its warm-up, such as the `final` of the
+            record before it, in place of a history.
+
+        Returns
+        -------
+        Response
+            Motion in the window; offset and delay are in its displacement, the rest is the
+            stage's own. The delay is that of the record where it is one of those identified.
+        """
+        run = self._run(data, history, initial)
+        drift, shift = self._added(data, run.x, offset)
+        return replace(run, x=run.x + drift + shift)
+
+    def _run(self, data: Dataset, history: History | None, initial: StageState | None) -> Response:
+        """Response in the window of a record, as it is read but for an offset."""
+        if not isinstance(data, Dataset):
+            raise ParameterError(f"data is {type(data).__name__}: expected a Dataset")
+        if data.drive_unit != (unit := self.drive_unit) and "m" in (unit, data.drive_unit):
+            raise ParameterError(
+                f"the drive of the record is in {data.drive_unit}: expected {unit}, as that of the "
+                "record identified"
+            )
+        state = self._begins(data, history, initial)
+        start = data.warmup
+        run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
+        x = late_reading(self.model.info, run, self._delay_on(data))[start:] + self._drift_on(data)
+        signals = {
+            one.name: value[start:]
+            for one in fields(run)
+            if isinstance(value := getattr(run, one.name), np.ndarray)
+        }
+        signals |= {"t": data.t, "u": data.u, "x": x}
+        windowed: Response = replace(run, **signals)
+        return windowed
+
+    def _added(
+        self, data: Dataset, x: Array, offset: float | Literal["own"]
+    ) -> tuple[Array | float, float]:
+        """Drift and offset to add to the displacement that is simulated of a record [m]."""
+        drift: Array | float = 0.0
+        known = [self.start, *(one.start for one in self.records)]
+        if self.drift and offset == "own" and not any(same_beginning(one, data) for one in known):
+            drift = self.drift.of_another(data.t, data.y - x, centred=self._fits_offset(data))
+        return drift, self._shift(data, x + drift, offset)
+
+    def score(
+        self,
+        data: Dataset,
+        *,
+        offset: float | Literal["own"] = "own",
+        history: History | None = None,
+        initial: StageState | None = None,
+    ) -> Score:
+        """Deviation of the model from a record, in the record's window.
+
+        Parameters
+        ----------
+        data : Dataset
+            The record, e.g. one that was not fitted.
+        offset : float or "own", optional
+            As in `simulate`.
+        history : {"virgin", "settled", "fit"}, optional
+            As in `simulate`.
+        initial : StageState, optional
+            As in `simulate`.
+
+        Returns
+        -------
+        Score
+            Percentages refer to the stroke of the record identified: of one of several to its
+            own, of another record to the largest.
+        """
+        x = self._run(data, history, initial).x
+        drift, shift = self._added(data, x, offset)
+        error = data.y - x - drift - shift
+        own = self._own(data)
+        return Score(
+            rms=float(np.sqrt(np.mean(error**2))),
+            max_error=float(np.abs(error).max()),
+            stroke=self.stroke if own is None else own.stroke,
+            offset=shift,
+            spread=float(np.std(data.y)),
+            notes=tuple(self.beyond_fit(data.u, data.dt)),
+        )
+
+    def start_on(self, data: Dataset, *, history: History | None = None) -> Start:
+        """Where a record begins: the state of the stage at its first sample.
+
+        Parameters
+        ----------
+        data : Dataset
+            The record.
+        history : {"virgin", "settled", "fit"}, optional
+            As in `simulate`.
+
+        Returns
+        -------
+        Start
+            Its `state` is in equilibrium under the first sample of the drive.
+        """
+        history = checked_history(history)
+        own = self._own(data)
+        known = self.start if own is None else own.start
+        if known and same_beginning(known, data) and history in (None, known.history):
+            return known
+        return begin(self.model, data, history, self._residual, offset=self._fits_offset(data))
+
+    def _residual(self, data: Dataset, state: StageState) -> Array:
+        """Measured less simulated displacement in the window, without offset [m]."""
+        run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
+        x = late_reading(self.model.info, run, self._delay_on(data))[
+            data.warmup :
+        ] + self._drift_on(data)
+        rest: Array = data.y - x - self._added(data, x, "own")[0]
+        return rest
+
+    def _fits_offset(self, data: Dataset) -> bool:
+        """Whether a record gets an offset."""
+        return (self._own(data) or self).offset_fitted
+
+    def _begins(
+        self, data: Dataset, history: History | None, initial: StageState | None
+    ) -> StageState:
+        """State at the first sample of a record."""
+        if initial is None:
+            return self.start_on(data, history=history).state
+        if history is not None:
+            raise ParameterError(
+                f"history is {history!r} beside an initial state: expected one of the two"
+            )
+        return initial
+
+    def _shift(self, data: Dataset, x: Array, offset: float | Literal["own"]) -> float:
+        """Offset to add to a simulated displacement [m]."""
+        if offset != "own":
+            shift = _core.as_number("offset", offset)
+            if not math.isfinite(shift):
+                raise ParameterError(f"offset is {shift}: expected a finite number or 'own'")
+            return shift
+        return float(np.mean(data.y - x)) if self._fits_offset(data) else 0.0
+
+    def document(self) -> dict[str, Any]:
+        """Content of the JSON file.
+
+        Returns
+        -------
+        dict
+            Of numbers, texts, lists and dicts only.
+        """
+        return document_of(self)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the model to a JSON file that `load` reads back bit for bit.
+
+        Parameters
+        ----------
+        path : path-like
+            The file. A temporary file is written and renamed, so that an existing file is replaced
+            only when the new one is complete.
+
+        Returns
+        -------
+        pathlib.Path
+            The file written.
+
+        Raises
+        ------
+        DataError
+            The file cannot be written.
+        ParameterError
+            Offset, stroke or delay are not finite numbers, or beyond what a stage can have.
+        """
+        # Refuse now what `load` would refuse, while the fit still exists.
+        for name in ("offset", "stroke", "delay"):
+            sensor_number(name, getattr(self, name))
+        return write_document(path, self.document())
+
+
+def load(path: str | os.PathLike[str]) -> IdentifiedModel:
+    """Read a model file.
+
+    Parameters
+    ----------
+    path : path-like
+        A file that `save` of an identified model wrote, with this version of piezotrack or an
+        older one.
+
+    Returns
+    -------
+    IdentifiedModel
+        The model, its numbers as they were saved, bit for bit.
+
+    Raises
+    ------
+    DataError
+        The file is missing, is not a model file, or was written by a newer version.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> model = pt.identification.IdentifiedModel(
+    ...     model=pt.DahlStage.xu_li_2010(), offset=0.0, offset_fitted=False, stroke=119e-6
+    ... )
+    >>> import os, tempfile
+    >>> path = model.save(os.path.join(tempfile.mkdtemp(), "dahl.json"))
+    >>> pt.load(path).model == model.model
+    True
+    """
+    return IdentifiedModel(**read_model(path))
+
+
+def _count(value: object) -> int:
+    """Return how many numbers a parameter has: several for a list, 0 for one that is None."""
+    return len(value) if isinstance(value, tuple) else int(value is not None)

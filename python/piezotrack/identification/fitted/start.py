@@ -1,0 +1,395 @@
+"""Where a record begins: the state of a stage at the first sample."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import asdict, dataclass, fields, replace
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+
+from ... import _core
+from ..._support.arguments import as_numbers
+from ..._support.json_text import object_of, text_of
+from ..._support.messages import quoted
+from ...errors import ParameterError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from ...data.dataset import Dataset
+    from ...stages.base import Stage, StageState
+
+    Array = NDArray[np.float64]
+
+__all__ = [
+    "History",
+    "Start",
+    "begin",
+    "checked_history",
+    "same_beginning",
+    "start_after",
+    "start_entry",
+    "start_of",
+    "state_entry",
+    "state_of",
+]
+
+History = Literal["virgin", "settled", "fit"]
+
+# A history with more freedom has to lower the rms of the residual by this share.
+GAIN = 0.02
+# Where the virgin and the settled stage differ by less than this share of the residual, the record
+# does not show its history.
+SHOWS = 0.1
+# Samples by which a beginning is known, and by which histories are compared.
+KNOWN_BY, COMPARED = 16, 20_000
+# Voltages tried before a record: a grid, then parts of a golden section.
+GRID, SECTIONS = 17, 10
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """State of a stage at the first sample of a record, and what it is due to.
+
+    Attributes
+    ----------
+    history : {"virgin", "settled", "fit"}
+        What the stage went through before the record: nothing, the drive of the record, or a
+        voltage that was fitted.
+    state : StageState
+        State at the first sample: in equilibrium.
+    voltage : float or None
+        The voltage that was fitted [V].
+    record : str
+        Fingerprint of the beginning of the record.
+    """
+
+    history: History
+    state: StageState
+    voltage: float | None
+    record: str
+
+
+def checked_history(history: object) -> History | None:
+    """Check the name of a history.
+
+    Parameters
+    ----------
+    history : object
+        Argument of the caller.
+
+    Returns
+    -------
+    {"virgin", "settled", "fit"} or None
+        The history; None where the record is to show it.
+
+    Raises
+    ------
+    ParameterError
+        There is no such history.
+    """
+    if history is None or history in get_args(History):
+        return history  # type: ignore[return-value]
+    raise ParameterError(
+        f"history is {quoted(history)}: expected 'virgin', 'settled', 'fit', or None for what the "
+        "record shows"
+    )
+
+
+def start_entry(start: Start | None, unit: str) -> dict[str, Any] | None:
+    """Entry of a start in the file of a model.
+
+    Parameters
+    ----------
+    start : Start or None
+        The start.
+    unit : str
+        Unit of the drive.
+
+    Returns
+    -------
+    dict or None
+        Of numbers, texts and lists only.
+    """
+    if start is None:
+        return None
+    return {
+        "history": start.history,
+        "voltage": {"value": start.voltage, "unit": unit},
+        "state": state_entry(start.state),
+        "record": start.record,
+    }
+
+
+def state_entry(state: StageState) -> dict[str, Any]:
+    """Entry of the state of a stage in a file: numbers and lists of them, in SI units."""
+    return {key: list(one) if isinstance(one, tuple) else one for key, one in asdict(state).items()}
+
+
+def state_of(place: str, entry: Any, state: type[StageState]) -> StageState:
+    """Read the state of a stage from a file.
+
+    Parameters
+    ----------
+    place : str
+        Where the entry is, for messages.
+    entry : Any
+        The entry.
+    state : type
+        State of the model.
+
+    Returns
+    -------
+    StageState
+        The state.
+
+    Raises
+    ------
+    ParameterError
+        The entry is not that of such a state.
+    """
+    numbers: dict[str, Any] = {
+        name: tuple(as_numbers(name, value))
+        if isinstance(value, list)
+        else _core.as_number(name, value)
+        for name, value in object_of(place, entry).items()
+    }
+    known = {one.name for one in fields(state)}
+    if extra := set(numbers) - known:
+        raise ParameterError(f"{place} has {quoted(min(extra))}: expected {sorted(known)}")
+    return state(**numbers)
+
+
+def start_of(entry: Any, state: type[StageState]) -> Start | None:
+    """Read a start from the file of a model.
+
+    Parameters
+    ----------
+    entry : Any
+        Its entry; None in files of older versions.
+    state : type
+        State of the model.
+
+    Returns
+    -------
+    Start or None
+        The start.
+
+    Raises
+    ------
+    ParameterError
+        The entry is not that of a start.
+    """
+    found = object_of("start", entry)
+    if not found:
+        return None
+    begun = state_of("start: state", found["state"], state)
+    history = checked_history(found["history"])
+    if history is None:
+        raise ParameterError("start: history is None: expected 'virgin', 'settled' or 'fit'")
+    volts = found["voltage"]["value"]
+    return Start(
+        history=history,
+        state=begun,
+        voltage=None if volts is None else _core.as_number("start: voltage", volts),
+        record=text_of("start: record", found["record"]) or "",
+    )
+
+
+def fingerprint(data: Dataset) -> str:
+    """Fingerprint of the beginning of a record, the same for all windows with warm-up."""
+    digest = hashlib.sha256()
+    for part in (data.dt, data.full.u[:KNOWN_BY], data.full.y[:KNOWN_BY]):
+        digest.update(np.asarray(part, dtype="<f8").tobytes())
+    return digest.hexdigest()
+
+
+def same_beginning(start: Start | None, data: Dataset) -> bool:
+    """Return whether a start is that of a record, or of another window of the same record."""
+    return start is not None and start.record == fingerprint(data)
+
+
+def start_of_fit(data: Dataset, history: History, state: StageState) -> Start:
+    """Start of a record whose state was fitted with the rest.
+
+    Parameters
+    ----------
+    data : Dataset
+        The record.
+    history : {"virgin", "settled", "fit"}
+        What the stage went through before.
+    state : StageState
+        State at the first sample.
+
+    Returns
+    -------
+    Start
+        The start, known by the beginning of the record.
+    """
+    return Start(history=history, state=state, voltage=None, record=fingerprint(data))
+
+
+def start_after(
+    model: Stage,
+    data: Dataset,
+    history: History,
+    voltage: float | None = None,
+    *,
+    creeps: bool = True,
+) -> Start:
+    """State of a stage at the first sample of a record after a history.
+
+    Parameters
+    ----------
+    model : Stage
+        The stage.
+    data : Dataset
+        The record.
+    history : {"virgin", "settled", "fit"}
+        What it went through before.
+    voltage : float, optional
+        The voltage that it came from, for ``"fit"`` [V].
+    creeps : bool, optional
+        Whether the creep of a settled stage repeats, as its hysteresis does; else it is complete.
+
+    Returns
+    -------
+    Start
+        In equilibrium under the first sample of the drive.
+    """
+    full = data.full
+    before = 0.0 if voltage is None else voltage
+    visited = _core.visited(full.u, data.dt, data.hold, history, before)
+    state = model.equilibrium(visited.tolist())
+    if creeps and history == "settled" and len(getattr(state, "creep", ())):
+        state = _repeating(model, data, state)
+    return Start(history=history, state=state, voltage=voltage, record=fingerprint(data))
+
+
+def _repeating(model: Any, data: Dataset, state: Any) -> StageState:
+    """Set the creep to where the drive of the record, repeated without end, would take it."""
+    full = data.full
+    times, weights = np.array(model.creep_times), np.array(model.creep_weights)
+    end = model.simulate(full.u, data.dt, hold=data.hold, initial=state).final
+    kept = np.exp(-data.dt * len(full) / times)
+    begun, reached = np.array(state.creep), np.array(end.creep)
+    return _moved(state, weights, (reached - kept * begun) / (1.0 - kept) - begun)
+
+
+def _moved(state: Any, weights: Array, moved: Array) -> StageState:
+    """Move the creep of a state, and the displacement with it."""
+    creep = tuple((np.array(state.creep) + moved).tolist())
+    found: StageState = replace(state, creep=creep, x=state.x + float(weights @ moved))
+    return found
+
+
+def begin(
+    model: Stage,
+    data: Dataset,
+    history: History | None,
+    residual: Callable[[Dataset, StageState], Array],
+    *,
+    offset: bool,
+) -> Start:
+    """State of a stage at the first sample of a record, as the record shows it.
+
+    Parameters
+    ----------
+    model : Stage
+        The stage.
+    data : Dataset
+        The record.
+    history : {"virgin", "settled", "fit"} or None
+        What the stage went through before; None where the record is to show it.
+    residual : callable
+        Measured less simulated displacement in the window of a record [m], from a state at its
+        first sample.
+    offset : bool
+        Whether a constant part of the residual is taken off.
+
+    Returns
+    -------
+    Start
+        The start; without more freedom than the record needs.
+    """
+    search = _Search(model, _beginning(data), residual, offset)
+    if history == "fit":
+        return replace(search.fitted(), record=fingerprint(data))
+    if history is not None:
+        return start_after(model, data, history)
+    virgin, settled = (start_after(model, search.data, one) for one in ("virgin", "settled"))
+    best, rms = virgin, search.rms(virgin.state)
+    if not search.differ(virgin, settled, rms):
+        return start_after(model, data, "virgin")
+    if (other := search.rms(settled.state)) < (1.0 - GAIN) * rms:
+        best, rms = settled, other
+    fitted = search.fitted()
+    if search.rms(fitted.state) < (1.0 - GAIN) * rms:
+        best = fitted
+    if best.history == "fit":
+        return replace(best, record=fingerprint(data))
+    return start_after(model, data, best.history)
+
+
+def _beginning(data: Dataset) -> Dataset:
+    """First part of a long record, with its window."""
+    if len(data) <= COMPARED:
+        return data
+    return data[data.t[0] : data.t[COMPARED]]
+
+
+@dataclass(frozen=True)
+class _Search:
+    """Search for the voltage that a stage came from."""
+
+    model: Any
+    data: Dataset
+    residual: Callable[[Dataset, StageState], Array]
+    offset: bool
+
+    def rms(self, state: StageState) -> float:
+        rest = self.residual(self.data, state)
+        return float(np.std(rest) if self.offset else np.sqrt(np.mean(rest**2)))
+
+    def differ(self, one: Start, other: Start, rms: float) -> bool:
+        """Whether two starts differ by what the record shows."""
+        gap = self.residual(self.data, one.state) - self.residual(self.data, other.state)
+        return float(np.std(gap)) > SHOWS * rms
+
+    def fitted(self) -> Start:
+        """Start from the voltage that fits the record best."""
+        low, high = float(self.data.full.u.min()), float(self.data.full.u.max())
+        reach = 0.5 * (high - low)
+        grid = np.linspace(low - reach, high + reach, GRID)
+        costs = [self.from_voltage(volts)[1] for volts in grid]
+        best = int(np.argmin(costs))
+        left, right = grid[max(best - 1, 0)], grid[min(best + 1, GRID - 1)]
+        share = (np.sqrt(5.0) - 1.0) / 2.0
+        for _ in range(SECTIONS):
+            inner = (right - share * (right - left), left + share * (right - left))
+            first, second = (self.from_voltage(volts)[1] for volts in inner)
+            left, right = (left, inner[1]) if first < second else (inner[0], right)
+        return self.from_voltage(0.5 * (left + right))[0]
+
+    def from_voltage(self, volts: float) -> tuple[Start, float]:
+        """Start from a voltage, its creep where it fits best, and the rms of the residual."""
+        start = start_after(self.model, self.data, "fit", float(volts))
+        rest = self.residual(self.data, start.state)
+        weights = np.array(getattr(self.model, "creep_weights", ()))
+        used = weights > 0.0
+        columns = [np.ones(rest.size)] if self.offset else []
+        if used.any():
+            t = self.data.dt * np.arange(len(self.data.full))[self.data.warmup :]
+            columns += [np.exp(-t / time) for time in np.array(self.model.creep_times)[used]]
+        if columns:
+            basis = np.stack(columns, axis=1)
+            found = np.linalg.lstsq(basis, rest, rcond=1e-10)[0]
+            rest = rest - basis @ found
+            if used.any():
+                moved = np.zeros(weights.size)
+                moved[used] = found[-int(used.sum()) :] / weights[used]
+                start = replace(start, state=_moved(start.state, weights, moved))
+        return start, float(np.sqrt(np.mean(rest**2)))

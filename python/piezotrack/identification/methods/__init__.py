@@ -1,0 +1,1 @@
+"""Methods of a search, as settings."""

@@ -1,0 +1,1 @@
+"""Problem of an identification: records, parameters, objective, checkpoint."""

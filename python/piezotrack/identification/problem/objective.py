@@ -1,0 +1,202 @@
+"""The cost that an identification minimises, for optimisers of the caller's."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from ... import _core
+from ...data.dataset import Dataset
+from ...errors import ParameterError
+from ...stages.registry import model_named
+from .problem import question_of
+from .records import Asked
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from ..experiments.step_response import StepResult
+    from ..fitted.start import History
+
+    Array = NDArray[np.float64]
+
+__all__ = ["Objective"]
+
+
+class Objective:
+    """The RMS deviation of a model from a record, over the unit box of its free parameters.
+
+    What `identify` minimises, equation (16) of Xu and Li 2010, doi 10.1115/1.4001712, for
+    optimisers of your own: many candidates are simulated side by side, in the processor's SIMD
+    lanes and on all cores.
+
+    Parameters
+    ----------
+    data : Dataset
+        The record.
+    model : str
+        Name of a model that is searched, as for `identify`.
+    offset : bool, optional
+        Whether an offset of the sensor is fitted.
+    history : {"virgin", "settled", "fit"}, optional
+        What the stage went through before the record.
+    drift : bool or float, optional
+        Slow drift of the sensor along the record, as for `identify`; none where it is not given.
+    threads : int, optional
+        Up to 256; all cores where it is 0 or not given.
+    free, fixed, initial, bounds, scales, ties, constraints, priors, stiffness, delay, \
+    creep : optional
+        As for `identify`.
+
+    Raises
+    ------
+    ParameterError, DataError
+        As for `identify`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import piezotrack as pt
+    >>> log = pt.datasets.dbo_training()[3.0:5.0]
+    >>> cost = pt.identification.Objective(log, "dahl")
+    >>> len(cost.ranges), cost(np.full((3, len(cost.ranges)), 0.5)).shape
+    (5, (3,))
+    """
+
+    def __init__(
+        self,
+        data: Dataset,
+        model: str,
+        *,
+        offset: bool = True,
+        history: History = "virgin",
+        drift: bool | float | None = None,
+        threads: int | None = None,
+        free: Iterable[str] | None = None,
+        fixed: Mapping[str, float] | None = None,
+        initial: StepResult | None = None,
+        bounds: Mapping[str, tuple[float, float]] | None = None,
+        scales: Mapping[str, Literal["linear", "log"]] | None = None,
+        ties: Mapping[str, str] | None = None,
+        constraints: Iterable[str] | None = None,
+        priors: Mapping[str, tuple[float, float]] | None = None,
+        stiffness: float | None = None,
+        delay: bool | float | tuple[float, float] | None = None,
+        creep: bool | Iterable[float] | None = None,
+    ) -> None:
+        if not isinstance(data, Dataset):
+            raise ParameterError(f"data is {type(data).__name__}: expected a Dataset, one record")
+        info = model_named(model)
+        if not info.searched:
+            raise ParameterError(f"model is {model!r}: expected one that is searched")
+        question = question_of(
+            Asked(data=data, offset=offset, history=history, delay=delay, drift=drift),
+            info,
+            free=free,
+            fixed=fixed,
+            initial=initial,
+            bounds=bounds,
+            scales=scales,
+            ties=ties,
+            constraints=constraints,
+            priors=priors,
+            stiffness=stiffness,
+            creep=creep,
+        )
+        count = 0 if threads is None else _core.as_count("threads", threads)
+        self._core = _core.Objective(question, count)
+        self._scalars = [one.name for one in info.parameters if not one.is_list]
+
+    @property
+    def coordinates(self) -> list[tuple[str, float, float, str]]:
+        """Name, bounds in SI and scale, ``"linear"`` or ``"log"``, of each coordinate."""
+        return list(self._core.coordinates)
+
+    @property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Bounds of the free parameters, SI: 0 and 1 in the unit box, a coordinate each."""
+        return {name: (low, high) for name, low, high, _ in self._core.coordinates}
+
+    def __call__(self, places: ArrayLike) -> Array:
+        """Return the costs at places of the unit box.
+
+        Parameters
+        ----------
+        places : array_like, shape (n, d) or (d,)
+            Coordinates from 0 to 1, in the order of `ranges`.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Costs [m], of one place too; infinite where the simulation diverged.
+
+        Raises
+        ------
+        ParameterError
+            A place has another number of coordinates, or is outside of the box.
+        """
+        return np.array(self._core.costs(_rows(places)))
+
+    def descend(self, places: ArrayLike) -> tuple[Array, Array, NDArray[np.int64]]:
+        """Descend from places of the unit box, as `Descents` does.
+
+        Parameters
+        ----------
+        places : array_like, shape (n, d) or (d,)
+            Where the descents start.
+
+        Returns
+        -------
+        places : ndarray, shape (n, d)
+            Where they end.
+        costs : ndarray, shape (n,)
+            Costs there [m].
+        nfev : ndarray, shape (n,)
+            Simulations of each.
+
+        Raises
+        ------
+        ParameterError
+            As for a call.
+        """
+        found = self._core.descend(_rows(places))
+        return (
+            np.array([place for place, _, _ in found]),
+            np.array([cost for _, cost, _ in found]),
+            np.array([nfev for _, _, nfev in found]),
+        )
+
+    def parameters(self, place: ArrayLike) -> dict[str, float]:
+        """Return the parameters of the stage at a place of the unit box, SI.
+
+        Parameters
+        ----------
+        place : array_like, shape (d,)
+            Coordinates from 0 to 1.
+
+        Returns
+        -------
+        dict of str to float
+            All parameters of the model, those that are held too.
+
+        Raises
+        ------
+        ParameterError
+            As for a call.
+        """
+        (row,) = _rows(place)
+        return dict(zip(self._scalars, self._core.parameters(row), strict=False))
+
+
+def _rows(places: ArrayLike) -> list[list[float]]:
+    """Return places as rows of numbers."""
+    rows = np.atleast_2d(np.asarray(places, dtype=np.float64))
+    if rows.ndim > 2:
+        raise ParameterError(
+            f"places have {rows.ndim} dimensions: expected one row of coordinates for each place"
+        )
+    listed: list[list[float]] = rows.tolist()
+    return listed

@@ -1,0 +1,1 @@
+"""Solution of a problem: searches, least squares, choice of the model."""

@@ -1,0 +1,131 @@
+"""Whether a record shows that its stage had moved before: what a kind gains by other histories."""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ...errors import DataError
+from ..fitted.start import GAIN
+from ..problem.objective import Objective
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from ...data.dataset import Dataset
+    from ...stages.model_info import ModelInfo
+    from ..fitted.identification import Identification
+    from ..fitted.start import History
+
+    Array = NDArray[np.float64]
+
+__all__ = ["Gaining", "other_histories"]
+
+# Samples of a long record that are asked: the history shows at its beginning.
+BEGINNING = 200_000
+# Share of the cost by which the voltages before a record change it where it shows its history.
+UNSEEN = 1e-3
+# Voltages tried before the record, from the best of which a descent starts.
+GRID = 15
+VOLTAGE = "voltage_before"
+
+
+class Gaining(NamedTuple):
+    """A history that suits a record better than that of a stage that never moved.
+
+    Attributes
+    ----------
+    history : {"settled", "fit"}
+        The history.
+    share : float
+        Cost of the minimum with it that is next to the one without it, relative to that one.
+    """
+
+    history: History
+    share: float
+
+
+def other_histories(
+    data: Dataset,
+    info: ModelInfo,
+    fit: Identification,
+    *,
+    offset: bool,
+    asked: Mapping[str, Any],
+) -> list[Gaining]:
+    """Find the histories that lower the cost next to a minimum without one.
+
+    Parameters
+    ----------
+    data : Dataset
+        The record.
+    info : ModelInfo
+        The kind.
+    fit : Identification
+        Its fit as of a stage that never moved before the record.
+    offset : bool
+        Whether an offset of the sensor is fitted.
+    asked : mapping
+        Further arguments of `Objective`.
+
+    Returns
+    -------
+    list of Gaining
+        Those by which the cost falls enough, the one with less freedom first; not that one where
+        the cost falls as much again by the other.
+    """
+
+    def objective_of(part: Dataset, history: History) -> Objective:
+        return Objective(part, info.name, offset=offset, history=history, **asked)
+
+    def lowest(objective: Objective) -> float:
+        return float(objective.descend(_starts(objective, fit))[1].min())
+
+    part, cost = data, fit.cost
+    if len(data) > BEGINNING:
+        # Where that shows no reversal, the whole record has to be asked.
+        with suppress(DataError):
+            beginning = data[float(data.t[0]) : float(data.t[BEGINNING])]
+            part, cost = beginning, lowest(objective_of(beginning, "virgin"))
+    fitted = objective_of(part, "fit")
+    costs = fitted(_places(fitted, fit))
+    # Where the window does not show the voltage before, it shows no history.
+    if cost <= 0.0 or float(np.ptp(costs)) < UNSEEN * cost:
+        return []
+    objectives: dict[History, Objective] = {
+        "settled": objective_of(part, "settled"),
+        "fit": fitted,
+    }
+    settled, before = (Gaining(name, lowest(one) / cost) for name, one in objectives.items())
+    gaining = [before] if before.share < (1.0 - GAIN) * settled.share else [settled, before]
+    return [one for one in gaining if one.share < 1.0 - GAIN]
+
+
+def _starts(objective: Objective, fit: Identification) -> Array:
+    """Where the descent starts: at the parameters of the fit, after the best voltage of a grid."""
+    places = _places(objective, fit)
+    return places[[int(np.argmin(objective(places)))]]
+
+
+def _places(objective: Objective, fit: Identification) -> Array:
+    """Places with the parameters of the fit: after each voltage of a grid where one is searched."""
+    names = list(objective.ranges)
+    place = [0.5 if one[0] == VOLTAGE else _coordinate(fit, *one) for one in objective.coordinates]
+    if VOLTAGE not in names:
+        return np.array([place])
+    places = np.tile(place, (GRID, 1))
+    places[:, names.index(VOLTAGE)] = (np.arange(GRID) + 0.5) / GRID
+    return places
+
+
+def _coordinate(fit: Identification, name: str, low: float, high: float, scale: str) -> float:
+    """Coordinate of a parameter in the unit box."""
+    value = fit.parameters[name].value
+    if scale == "log" and value > 0.0:
+        low, high, value = math.log(low), math.log(high), math.log(value)
+    return min(max((value - low) / (high - low), 0.0), 1.0)

@@ -1,0 +1,273 @@
+"""Identification of a stage model by a particle swarm."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from ... import _core
+from ..._support.messages import quoted
+from ..._support.progress_bar import ProgressBar
+from ..._support.units import of_drive
+from ...errors import Interrupted, ParameterError
+from ...stages.registry import stage_class
+from ..fitted.drift import Drift
+from ..fitted.estimates import Constraint, Estimate, LagRange, Progress, SwarmRun
+from ..fitted.fitted_record import FittedRecord
+from ..fitted.identification import Identification
+from ..fitted.model_file import constraint_entries, fit_entry, origin_of, provenance
+from ..fitted.notes import spread_of
+from ..fitted.start import start_after
+from ..methods.descents import Descents
+from ..methods.particle_swarm import ParticleSwarm
+from ..problem.problem import question_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from ...stages.model_info import ModelInfo
+    from ..problem.records import Asked
+
+__all__ = ["search_records"]
+
+# Searches by default, and their names: a swarm has to be restarted to tell whether it converged.
+RUNS: dict[type, int] = {ParticleSwarm: 4, Descents: 1}
+METHODS: dict[type, str] = {ParticleSwarm: "swarm", Descents: "descents"}
+DEFAULT = "descents"
+# Unit and symbol of what is searched beside the parameters of a model.
+SENSOR = {"delay": ("s", "Td"), "voltage_before": ("V", "u0"), "drift_time": ("s", "tau")}
+
+
+def search_records(
+    records: Sequence[Asked],
+    info: ModelInfo,
+    *,
+    method: object = None,
+    swarm: object = None,
+    descents: object = None,
+    seed: object = None,
+    runs: object = None,
+    threads: object = None,
+    progress: bool | None = None,
+    callback: object = None,
+    checkpoint: _core.Checkpoint | None = None,
+    **asked: object,
+) -> Identification:
+    """Search the parameters of a model on one record or several, by descents or with a swarm.
+
+    Parameters
+    ----------
+    records : sequence of Asked
+        The records, each with what is asked of it alone.
+    info : ModelInfo
+        The model.
+    method, swarm, descents, seed, runs, threads, progress, callback
+        As for `identify`, not yet checked; None stands for the default.
+    checkpoint : _core.Checkpoint or None
+        What the search keeps its simulations in.
+    **asked
+        As for `question_of`.
+
+    Returns
+    -------
+    Identification
+        Result with the best candidate.
+
+    Raises
+    ------
+    ParameterError, DataError, NumericalError, Interrupted
+        As for `identify`.
+    """
+    settings = _settings(method, swarm, descents)
+    if callback is not None and not callable(callback):
+        raise ParameterError(f"callback is {quoted(callback)}: expected a function, or None")
+    seed = 0 if seed is None else _core.as_count("seed", seed)
+    questions = [question_of(one, info, **asked) for one in records]
+    with ProgressBar(progress, f"identify: {info.name}") as bar:
+        found = _core.identify(
+            questions,
+            method=settings._core,
+            seed=seed,
+            runs=RUNS[type(settings)] if runs is None else _core.as_count("runs", runs),
+            threads=0 if threads is None else _core.as_count("threads", threads),
+            callback=None if callback is None else _reporting(info, callback),
+            progress=bar.update,
+            checkpoint=checkpoint,
+        )
+    if found is None:
+        raise Interrupted("interrupted before the first cost was computed")
+    fit = _identification(info, found, records, settings, seed, dict(questions[0]["scales"]))
+    if not fit.success:
+        raise Interrupted(
+            f"interrupted after {fit.nfev} simulations, best cost {fit.cost_um:.4g} um", fit
+        )
+    return fit
+
+
+def _settings(method: object, swarm: object, descents: object) -> ParticleSwarm | Descents:
+    """Return the settings of the method that is asked for, by its name or by its settings."""
+    given = {"swarm": swarm, "descents": descents}
+    named = [name for name, value in given.items() if value is not None]
+    method = method if method is not None else named[0] if named else DEFAULT
+    if method not in given:
+        raise ParameterError(f"method is {quoted(method)}: expected 'descents' or 'swarm'")
+    for name in named:
+        if name != method:
+            raise ParameterError(
+                f"{name} is {quoted(given[name])}: expected none, as the method is {method!r}"
+            )
+    kind = ParticleSwarm if method == "swarm" else Descents
+    settings = given[str(method)]
+    if settings is not None and not isinstance(settings, kind):
+        raise ParameterError(
+            f"{method} is {quoted(settings)}: expected pt.{kind.__name__}, as pt.{kind.__name__}()"
+        )
+    return kind() if settings is None else settings
+
+
+def _reporting(info: ModelInfo, callback: Callable[[Progress], object]) -> Callable[..., bool]:
+    """Convert the core's plain numbers to a `Progress` for the callback."""
+    names = [one.name for one in info.parameters if not one.is_list]
+
+    def report(
+        nit: int, most: int, nfev: int, cost: float, theta: list[float], delay: float
+    ) -> bool:
+        parameters = dict(zip(names, theta, strict=False))
+        return bool(callback(Progress(nit, most, nfev, cost, parameters, delay)))
+
+    return report
+
+
+def _identification(
+    info: ModelInfo,
+    found: _core.Search,
+    records: Sequence[Asked],
+    settings: ParticleSwarm | Descents,
+    seed: int,
+    scales: Mapping[str, str],
+) -> Identification:
+    drive_unit = records[0].data.drive_unit
+    facts = {one.name: (one.unit, one.symbol) for one in info.parameters} | SENSOR
+    facts = {name: (of_drive(unit, drive_unit), sign) for name, (unit, sign) in facts.items()}
+    parameters = {one["name"]: _estimate(one, *facts[one["name"]]) for one in found.estimates}
+    values = {name: [estimate.value] for name, estimate in parameters.items()}
+    values["creep_weights"], values["creep_times"] = found.creep
+    model = stage_class(info)._from(values.items())
+    fitted = tuple(
+        _fitted(model, one, own, facts) for one, own in zip(records, found.records, strict=True)
+    )
+    first, data = fitted[0], records[0].data
+    parameters |= first.parameters
+    spread = spread_of([(one.data, one.weight) for one in records])
+    constraints = tuple(Constraint(*one) for one in found.constraints)
+    details: dict[str, Any] = {
+        "parameters": {
+            one.name: _details(parameters[one.name])
+            for one in info.parameters
+            if one.name in parameters
+        }
+        | {"creep_weights": {"free": True}, "creep_times": {"free": False}},
+        "delay": _details(parameters["delay"]) if "delay" in parameters else {},
+        **constraint_entries(constraints),
+        "fit": {
+            **fit_entry(found.rms, data, found.rms_with_priors, spread),
+            "iterations": found.iterations,
+            "simulations": sum(nfev for _, _, nfev, _ in found.runs),
+            "polish_simulations": found.polish_evaluations,
+            "failed_simulations": found.failures,
+            "stop_reason": found.stop_reason,
+            "runs": [{"cost": cost, "stop_reason": reason} for cost, _, _, reason in found.runs],
+            "substeps": found.substeps,
+            "order": found.order,
+        },
+        "provenance": provenance(data, seed=seed, **{METHODS[type(settings)]: asdict(settings)}),
+    }
+    return Identification(
+        lags=None if found.lags is None else LagRange(*found.lags),
+        model=model,
+        start=first.start,
+        delay=first.delay,
+        offset=first.offset,
+        offset_fitted=first.offset_fitted,
+        drift=first.drift,
+        scale_assumed=found.scale_assumed,
+        stroke=max(one.stroke for one in fitted),
+        records=fitted,
+        details=details,
+        data=data,
+        parameters=parameters,
+        constraints=constraints,
+        scales=scales,
+        cost=found.rms,
+        cost_with_priors=found.rms_with_priors,
+        history=found.history,
+        nit=found.iterations,
+        nfev=sum(nfev for _, _, nfev, _ in found.runs),
+        nfail=found.failures,
+        npolish=found.polish_evaluations,
+        stop_reason=found.stop_reason,
+        runs=tuple(SwarmRun(*run) for run in found.runs),
+        substeps=found.substeps,
+        order=found.order,
+        seed=seed,
+        agreeing=found.agreeing,
+        swarm=settings if isinstance(settings, ParticleSwarm) else None,
+        descents=settings if isinstance(settings, Descents) else None,
+    )
+
+
+def _estimate(found: Mapping[str, Any], unit: str, symbol: str) -> Estimate:
+    """Return what a search found of a parameter."""
+    bounds, deviation, at_bound = found["bounds"], found["deviation"], found["at_bound"]
+    known = {name: found[name] for name in ("scale", "tie", "prior")}
+    value = found["value"]
+    free = bounds is not None
+    return Estimate(value, unit, symbol, free, bounds, deviation, at_bound, **known)
+
+
+def _fitted(
+    model: Any, asked: Asked, own: Mapping[str, Any], facts: Mapping[str, tuple[str, str]]
+) -> FittedRecord:
+    """Return what a search found of a record alone."""
+    data, history = asked.data, asked.history or "virgin"
+    estimates = {name: _estimate(own[name], *facts[name]) for name in SENSOR}
+    delay, before, time = (estimates[name] for name in SENSOR)
+    if delay.value == 0.0 and not delay.free:
+        del estimates["delay"]
+    if history != "fit":
+        del estimates["voltage_before"]
+    drift = None
+    if time.value:
+        drift = Drift._fading(own["drift"], time.value, data, time_fitted=time.free)
+    else:
+        del estimates["drift_time"]
+    voltage = before.value if history == "fit" else None
+    return FittedRecord(
+        data=data,
+        weight=asked.weight,
+        delay=delay.value,
+        offset=own["offset"],
+        offset_fitted=asked.offset,
+        drift=drift,
+        start=start_after(model, data, history, voltage, creeps=False),
+        cost=own["rms"],
+        stroke=data.stroke,
+        parameters=estimates,
+        origin=origin_of(data),
+    )
+
+
+def _details(estimate: Estimate) -> dict[str, Any]:
+    """Entries of the file for a parameter; JSON has no infinity."""
+    known = estimate.deviation is not None and math.isfinite(estimate.deviation)
+    return {
+        "free": estimate.free,
+        "bounds": estimate.bounds,
+        "standard_deviation": estimate.deviation if known else None,
+        "at_bound": estimate.at_bound,
+    } | {
+        name: value
+        for name in ("scale", "tie", "prior")
+        if (value := getattr(estimate, name)) is not None
+    }

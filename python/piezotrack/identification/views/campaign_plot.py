@@ -1,0 +1,158 @@
+"""Picture of a campaign: the cost of every task by record, and how far seeds are apart."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._support.plot_style import GUIDE, MODELS, few_ticks, folded, heading, literal, panels, whole
+from .campaign_report import size_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+    from ..campaigns.result import Campaign
+
+__all__ = ["plot_campaign"]
+
+MARKERS = "osD^vP"
+# Records that are named beside their lines; more are numbered.
+NAMED = 40
+# Letters of a name.
+LABEL = 28
+# A cost this far above the lowest is drawn, in per cent; a seed without a difference is put here.
+EQUAL = 1e-3
+
+
+def plot_campaign(campaign: Campaign, fig: Figure | SubFigure | None = None) -> Figure:
+    """Draw the costs of a campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        The results.
+    fig : matplotlib.figure.Figure or SubFigure, optional
+        Where to draw; a new figure where not given.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure drawn in.
+    """
+    several = any(len(group) > 1 for group in campaign.groups.values())
+    height = 2.3 + min(0.35 * len(campaign.records), 9.0)
+    figure = panels(fig, (11.0 if several else 7.5, height))
+    axes = figure.subplots(1, 2 if several else 1, sharey=True, squeeze=False)[0]
+    _costs(campaign, axes[0])
+    if several:
+        _apart(campaign, axes[1])
+    _records(campaign, axes[0])
+    figure.suptitle(size_of(campaign), fontsize="large")
+    handles, labels = axes[0].get_legend_handles_labels()
+    if handles:
+        figure.legend(
+            handles, labels, loc="outside lower center", ncols=3, fontsize="small", frameon=False
+        )
+    return whole(figure)
+
+
+def _places(campaign: Campaign) -> dict[tuple[str, str], float]:
+    """Height at which the tasks of each record and model are drawn."""
+    records = {title: i for i, title in enumerate(campaign.records, start=1)}
+    models = {title: i for i, title in enumerate(campaign.models)}
+    apart = 0.7 / len(models)
+    return {
+        key: records[key[0]] + apart * (models[key[1]] - 0.5 * (len(models) - 1))
+        for key in campaign.groups
+    }
+
+
+def _style(campaign: Campaign, model: str) -> dict[str, Any]:
+    i = campaign.models.index(model)
+    return {
+        "color": MODELS[i % len(MODELS)]["color"],
+        "marker": MARKERS[i % len(MARKERS)],
+        "linestyle": "none",
+        "markersize": 5.0,
+        "markerfacecolor": "none",
+    }
+
+
+def _costs(campaign: Campaign, ax: Axes) -> None:
+    """Draw the rms of every task, and a cross at the edge where no model was found."""
+    places, groups = _places(campaign), campaign.groups
+    costs = [one.rms_percent for one in campaign if one.error is None]
+    for model in campaign.models:
+        x, y = [], []
+        for (record, title), group in groups.items():
+            found = [one.rms_percent for one in group if one.error is None]
+            if title == model:
+                x += found
+                y += [places[record, title]] * len(found)
+        ax.plot(x, y, label=literal(model), **_style(campaign, model))
+    low, high = (min(costs), max(costs)) if costs else (0.0, 1.0)
+    if low > 0.0 and high > 10.0 * low:
+        ax.set_xscale("log")
+        _plain_numbers(ax)
+    else:
+        # Room for the crosses at the edge.
+        ax.set_xlim(0.0, 1.1 * high)
+        few_ticks(ax)
+    if campaign.failed:
+        ax.plot(
+            [0.985] * len(campaign.failed),
+            [places[one.record, one.model] for one in campaign.failed],
+            transform=ax.get_yaxis_transform(),
+            color="black",
+            marker="x",
+            linestyle="none",
+            label="no model found",
+        )
+    ax.set_xlabel("rms on what was fitted [% of stroke]")
+    heading(ax, "Cost of each task")
+
+
+def _apart(campaign: Campaign, ax: Axes) -> None:
+    """Draw how far the cost of each seed is above the lowest of its record and model."""
+    places = _places(campaign)
+    for model in campaign.models:
+        x, y = [], []
+        for (record, title), group in campaign.groups.items():
+            found = [one.rms for one in group if one.error is None]
+            if title == model and len(found) > 1:
+                above = 100.0 * (np.array(found) / (min(found) or 1.0) - 1.0)
+                x += list(np.maximum(above, EQUAL))
+                y += [places[record, title]] * len(found)
+        ax.plot(x, y, **_style(campaign, model))
+    ax.set_xscale("log")
+    ax.set_xlim(left=0.5 * EQUAL)
+    _plain_numbers(ax)
+    ax.axvline(0.1, **{**GUIDE, "color": "0.3", "linestyle": "--"})
+    ax.text(0.1, 0.02, " 0.1 %", transform=ax.get_xaxis_transform(), fontsize="small", color="0.3")
+    ax.set_xlabel(f"above the lowest of the seeds [%]; {EQUAL:g} and less at {EQUAL:g}")
+    heading(ax, "Seeds left of the dashed line agree within 0.1 %")
+
+
+def _plain_numbers(ax: Axes) -> None:
+    """Write 0.1 in place of a power of ten."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.6g}"))
+    ax.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _records(campaign: Campaign, ax: Axes) -> None:
+    """Name the records, or number many of them."""
+    records = campaign.records
+    count = len(records)
+    ax.set_ylim(count + 0.5, 0.5)
+    if count <= NAMED:
+        ax.set_yticks(range(1, count + 1), [literal(folded(title, LABEL)) for title in records])
+    else:
+        ax.set_ylabel("record, in the order given")
+    for place in np.arange(1.5, count) if count <= NAMED else []:
+        ax.axhline(place, **GUIDE)
+        if len(ax.figure.axes) > 1:
+            ax.figure.axes[1].axhline(place, **GUIDE)

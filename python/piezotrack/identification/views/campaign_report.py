@@ -1,0 +1,106 @@
+"""The table of a campaign, as text and as a notebook shows it."""
+
+from __future__ import annotations
+
+from statistics import median
+from typing import TYPE_CHECKING
+
+from ..._support.html_table import html_table
+
+if TYPE_CHECKING:
+    from ..campaigns.result import Campaign, TaskResult
+
+__all__ = ["campaign_html", "campaign_text", "size_of"]
+
+# Lines of the table, and of tasks without a model.
+MOST_ROWS, MOST_FAILED = 60, 20
+HEADS = ("record", "model", "seeds", "lowest", "median", "highest", "agree", "found")
+NOTES = """\
+rms on what was fitted, in % of the stroke, of the seeds; agree: seeds within 0.1 % of the lowest.
+More parameters always fit better: to choose a model, judge it on what was not fitted (compare)."""
+
+
+def campaign_text(campaign: Campaign) -> str:
+    """Write a campaign as a table.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        The results.
+
+    Returns
+    -------
+    str
+        Several lines.
+    """
+    rows = [_row(*key, group) for key, group in campaign.groups.items()]
+    shown = [HEADS, *rows[:MOST_ROWS]]
+    widths = [max(len(row[i]) for row in shown) for i in range(len(HEADS))]
+    lines = [_heading(campaign), ""]
+    for row in shown:
+        words = [row[i].ljust(widths[i]) for i in (0, 1)]
+        figures = [row[i].rjust(widths[i] + 1) for i in range(2, 7)]
+        lines.append("  ".join(["", *words, *figures, row[7]]).rstrip())
+    if (more := len(rows) - MOST_ROWS) > 0:
+        lines.append(f"  and {more} more: to_frame() has them all")
+    failed = _failed(campaign)
+    lines += ["", *(f"failed  {name}: {error}" for name, error in failed[:MOST_FAILED])]
+    if (more := len(failed) - MOST_FAILED) > 0:
+        lines.append(f"failed  {more} more")
+    if failed:
+        lines += ["The same call tries them again.", ""]
+    if noted := sum(bool(one.notes) for one in campaign):
+        lines.append(f"note  {noted} of {len(campaign)} results have notes, see its .notes")
+    return "\n".join([*lines, NOTES])
+
+
+def campaign_html(campaign: Campaign) -> str:
+    """Write a campaign as a table of HTML, with the tasks without a model below."""
+    rows = [_row(*key, group) for key, group in campaign.groups.items()]
+    tables = [html_table(_heading(campaign), rows[:MOST_ROWS], HEADS)]
+    if failed := _failed(campaign):
+        tables.append(html_table("Tasks without a model", failed[:MOST_FAILED]))
+    return "".join(tables)
+
+
+def _agreeing(group: list[TaskResult]) -> int:
+    """Count the seeds within 0.1 % of the lowest cost; those below 0.001 % of stroke are equal."""
+    costs = [one.rms_percent for one in group if one.error is None]
+    return sum(cost <= max(1.001 * min(costs), 1e-3) for cost in costs)
+
+
+def size_of(campaign: Campaign) -> str:
+    """Count records, models and tasks in words."""
+    counts = {"record": len(campaign.records), "model": len(campaign.models), "task": len(campaign)}
+    words = [f"{n} {word}" if n == 1 else f"{n} {word}s" for word, n in counts.items()]
+    failed = [f"{len(campaign.failed)} without a model"] if campaign.failed else []
+    return ", ".join([*words, *failed])
+
+
+def _heading(campaign: Campaign) -> str:
+    return f"campaign in {campaign.folder}: {size_of(campaign)}"
+
+
+def _row(record: str, model: str, group: list[TaskResult]) -> tuple[str, ...]:
+    """Write the seeds of one record and model."""
+    found = [one for one in group if one.error is None]
+    count = "-" if group[0].seed is None else str(len(group))
+    if not found:
+        return record, model, count, "-", "-", "-", "0", "no model"
+    costs = [one.rms_percent for one in found]
+    kinds = ", ".join(sorted({one.kind or "" for one in found}))
+    figures = (f"{value:.4g}" for value in (min(costs), median(costs), max(costs)))
+    return record, model, count, *figures, str(_agreeing(group)), kinds
+
+
+def _failed(campaign: Campaign) -> list[tuple[str, str]]:
+    """Name the tasks without a model, and say why; seeds that failed alike in one line."""
+    seeds: dict[tuple[str, str, str], list[str]] = {}
+    for one in campaign.failed:
+        alike = seeds.setdefault((one.record, one.model, one.error or ""), [])
+        if one.seed is not None:
+            alike.append(str(one.seed))
+    return [
+        (f"{record}, {model}" + (f", seed {', '.join(some)}" if some else ""), error)
+        for (record, model, error), some in seeds.items()
+    ]

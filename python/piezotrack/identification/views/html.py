@@ -1,0 +1,117 @@
+"""A fit and a comparison as tables, as a notebook shows them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from ..._support.html_table import html_table
+from .report import said_of
+
+if TYPE_CHECKING:
+    from ...data.dataset import Dataset
+    from ..comparison.compare import Comparison
+    from ..fitted.estimates import Constraint, Estimate
+    from ..fitted.identification import Identification
+
+__all__ = ["comparison_html", "identification_html"]
+
+
+def identification_html(fit: Identification) -> str:
+    """Write model, record, errors, parameters and warnings of a fit."""
+    rows = [
+        *(_record(one.data) for one in fit.records if one.data is not None),
+        ("model", repr(fit.model)),
+        ("rms error", f"{fit.cost_um:.4g} um, {fit.cost_percent:.3g} % of stroke"),
+    ]
+    if len(fit.records) == 1:
+        rows += [
+            ("largest error", f"{1e6 * fit.fitted.max_error:.4g} um"),
+            ("offset", f"{1e6 * fit.offset:.4g} um"),
+        ]
+        if fit.delay:
+            rows.append(("delay", f"{1e3 * fit.delay:.4g} ms"))
+        if fit.drift:
+            rows.append(("drift", str(fit.drift)))
+    rows += [("constraint", _constraint(one)) for one in fit.constraints]
+    rows += [("note", note) for note in fit.notes]
+    tables = [html_table(f"Identification: {fit.model.info.title}", rows)]
+    if len(fit.records) > 1:
+        tables.append(_records(fit))
+    if fit.parameters:
+        found = [_estimate(fit, name, one) for name, one in fit.parameters.items()]
+        heads = ("parameter", "symbol", "value", "unit", "standard deviation")
+        tables.append(html_table("Parameters", found, heads))
+    return "".join(tables)
+
+
+def _record(data: Dataset) -> tuple[str, str]:
+    return "record", f"{data.source or 'unnamed'}: {data!r}"
+
+
+def _records(fit: Identification) -> str:
+    """Write what each of several records has of its own."""
+    heads = (
+        "record",
+        "weight",
+        "rms error [um]",
+        "% of its stroke",
+        "largest [um]",
+        "offset [um]",
+        "delay [ms]",
+        "begins",
+    )
+    rows = [
+        (
+            f"{i + 1}",
+            f"{one.weight:g}",
+            f"{1e6 * one.cost:.4g}",
+            f"{one.cost_percent:.3g}",
+            f"{1e6 * score.max_error:.4g}",
+            f"{1e6 * one.offset:.4g}",
+            f"{1e3 * one.delay:.4g}",
+            one.start.history if one.start else "",
+        )
+        for i, (one, score) in enumerate(zip(fit.records, fit.scores, strict=True))
+    ]
+    return html_table("Records", rows, heads)
+
+
+def _estimate(fit: Identification, name: str, one: Estimate) -> tuple[str, ...]:
+    if not one.free and one.tie is None:
+        deviation = "held"
+    elif one.deviation is None:
+        deviation = "unknown"
+    else:
+        deviation = f"{one.deviation:.2g}" if math.isfinite(one.deviation) else "no effect"
+    return name, one.symbol, f"{one.value:.6g}", one.unit, deviation + said_of(fit, name)
+
+
+def _constraint(one: Constraint) -> str:
+    return one.text + (", active" if one.active else "")
+
+
+def comparison_html(comparison: Comparison) -> str:
+    """Write the errors of each model; the best on what was not fitted in bold."""
+    rows = [
+        (
+            row.title,
+            *(
+                cell
+                for score in (row.train, row.test)
+                for cell in (
+                    f"{1e6 * score.rms:.4g}",
+                    f"{score.rms_percent:.3g}",
+                    f"{1e6 * score.max_error:.4g}",
+                )
+            ),
+        )
+        for row in comparison.rows
+    ]
+    heads = (
+        "model",
+        *(f"{part}: {what}" for part in ("fitted", "not fitted")
+          for what in ("rms [um]", "rms [% of stroke]", "largest [um]")),
+    )  # fmt: skip
+    best = comparison.rows.index(comparison.best)
+    return html_table("Comparison", rows, heads, bold=best)

@@ -1,0 +1,377 @@
+"""Reports of an identification: the table, and the files with their pictures."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from ..._support.files import make_folder, picture_files, save_figures, together
+from ..._support.units import of_drive, shown_unit
+from ..fitted.notes import of_start
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterable
+    from pathlib import Path
+
+    from ...data.dataset import Dataset
+    from ...stages.model_info import Parameter
+    from ..fitted.estimates import Estimate
+    from ..fitted.identification import Identification
+
+__all__ = ["identification_files", "said_of", "save_identification", "summary_text"]
+
+# Units of values that a stage gives in um, and the factor for a drive in metres.
+PER_METRE = {"um/V": ("um/um", 1e-6), "1/V": ("1/um", 1e-6)}
+
+
+def summary_text(fit: Identification) -> str:
+    """Write a result as a table.
+
+    Parameters
+    ----------
+    fit : Identification
+        Result of an identification.
+
+    Returns
+    -------
+    str
+        Several lines.
+    """
+    lines = _of_several(fit) if len(fit.records) > 1 else _of_one(fit)
+    if fit.cost_with_priors is not None:
+        lines.append(f"      {1e6 * fit.cost_with_priors:.4g} um with the priors was minimised")
+    searched = fit.model.info.searched
+    if searched:
+        iterations = f"{fit.nit} iterations, " if fit.swarm is not None else ""
+        how = f"{iterations}{fit.nfev} simulations, seed {fit.seed}: {fit.message}"
+        lines += [f"      {how}", *_runs(fit)]
+    else:
+        lines.append(f"      least squares, {fit.nfev} simulations")
+    lines += _trials(fit)
+    lines += [*(f"note  {note}" for note in fit.notes), ""]
+    return "\n".join(
+        [*lines, *(_estimates(fit) if searched else _values(fit, fit.model.info.parameters))]
+    )
+
+
+def _of_one(fit: Identification) -> list[str]:
+    """Say from which record, and what is left of it."""
+    data = fit.data
+    lines = [
+        f"{fit.model.info.title}: stage identified from {data.source or 'a record'}, {_size(data)}",
+        f"cost  {fit.cost_um:.4g} um rms = {fit.cost_percent:.3g} % of stroke, "
+        f"fit {fit.fit_percent:.4g} %"
+        + (f", offset {1e6 * fit.offset:.5g} um fitted" if fit.offset_fitted else ""),
+    ]
+    if fit.drift:
+        lines.append(f"      {fit.drift}")
+    if fit.delay and "delay" not in fit.parameters:
+        lines.append(f"      delay {1e3 * fit.delay:.4g} ms")
+    if begun := of_start(fit.start, data):
+        lines.append(f"      the record begins {begun}")
+    return lines
+
+
+def _of_several(fit: Identification) -> list[str]:
+    """Say from which records, what is left of each, and what each has of its own."""
+    lines = [
+        f"{fit.model.info.title}: stage identified from {len(fit.records)} records",
+        f"cost  {fit.cost_um:.4g} um rms of all = {fit.cost_percent:.3g} % of the largest stroke, "
+        f"fit {fit.fit_percent:.4g} %",
+    ]
+    for i, one in enumerate(fit.records):
+        if one.data is None:
+            continue
+        said = f"{1e6 * one.cost:.4g} um rms = {one.cost_percent:.3g} % of its stroke"
+        said += "" if one.weight == 1.0 else f", weight {one.weight:g}"
+        said += f", offset {1e6 * one.offset:.5g} um fitted" if one.offset_fitted else ""
+        if "delay" in one.parameters:
+            said += f", delay {1e3 * one.delay:.4g} ms" + _spread(one.parameters["delay"])
+        elif one.delay:
+            said += f", delay {1e3 * one.delay:.4g} ms"
+        lines += [
+            f"  {i + 1:>2}  {one.data.source or 'unnamed'}, {_size(one.data)}",
+            f"      {said}",
+        ]
+        if one.drift:
+            lines.append(f"      {one.drift}")
+        if begun := of_start(one.start, one.data):
+            lines.append(f"      it begins {begun}")
+    return lines
+
+
+def _spread(delay: Estimate) -> str:
+    """Write the standard deviation of a delay, where it is known."""
+    if delay.deviation is None or not math.isfinite(delay.deviation):
+        return ""
+    return f" +- {1e3 * delay.deviation:.2g} ms"
+
+
+def _size(data: Dataset) -> str:
+    """Write the size of a record."""
+    return (
+        f"{len(data)} samples, {data.duration:.4g} s at {1 / data.dt:.6g} Hz, "
+        f"stroke {1e6 * data.stroke:.4g} um"
+    )
+
+
+def _trials(fit: Identification) -> list[str]:
+    """Say which kinds were tried, and on what they were judged."""
+    if not fit.trials:
+        return []
+    scores = ", ".join(f"{one.title} {100 * one.rms / fit.stroke:.3g} %" for one in fit.trials)
+    where = (
+        "on the part fitted, as the window is too short for another"
+        if fit.fitted_until is None
+        else f"after {fit.fitted_until:.4g} s, fitted before that"
+    )
+    return [f"      chosen by the rms {where}: {scores}"]
+
+
+def _estimates(fit: Identification) -> list[str]:
+    """List what the data determine, and every parameter with its standard deviation."""
+    lines = [*_known(fit), ""]
+    if fit.scale_assumed:
+        lines += [
+            "parameters, scale assumed: a log of drive and displacement determines no force, so",
+            f"K = {fit.model.stiffness:g} N/m was assumed. {fit.model.info.force_symbols} scale "
+            "with it; for real values give stiffness=.",
+        ]
+    else:
+        lines.append("parameters")
+    width = 1 + max(3, *(len(estimate.symbol) for estimate in fit.parameters.values()))
+    lines.append(f"  {'':<18}{'':<{width}}{'value':>13}  {'':<9}{'standard deviation'}")
+    lines += [_row(fit, name, estimate, width) for name, estimate in fit.parameters.items()]
+    lines += _values(fit, [one for one in fit.model.info.parameters if one.is_list])[1:-1]
+    lines += _constraints(fit)
+    which = "this record" if len(fit.records) == 1 else "these records"
+    if unclear := [n for n, e in fit.parameters.items() if not (e.identified or e.from_prior)]:
+        lines += ["", f"Not determined by {which}: " + ", ".join(unclear) + "."]
+    if known := [n for n, e in fit.parameters.items() if e.from_prior]:
+        lines += ["", f"Known by their priors, not by {which}: " + ", ".join(known) + "."]
+    if fit.nfail:
+        lines += ["", f"{fit.nfail} simulations diverged; their cost counted as infinite."]
+    return lines
+
+
+def _values(fit: Identification, parameters: Iterable[Parameter]) -> list[str]:
+    """List the values of the parameters, lists of one length side by side in pairs."""
+    lines, parts = ["parameters"], list(parameters)
+    while parts:
+        one = parts.pop(0)
+        value = getattr(fit.model, one.name)
+        if value is None or value == ():
+            continue
+        if not one.is_list:
+            unit, scale = _shown(fit, one)
+            row = f"  {one.name:<22}{one.symbol:<6}{scale * value:>12.6g}  {unit}"
+            lines.append(row.rstrip())
+            continue
+        columns = [one]
+        if parts and parts[0].is_list and len(getattr(fit.model, parts[0].name)) == len(value):
+            columns.append(parts.pop(0))
+        lines += ["", "  " + "".join(f"{_heading(fit, column):>32}" for column in columns)]
+        for row_values in zip(*(_scaled(fit, column) for column in columns), strict=True):
+            lines.append("  " + "".join(f"{number:>32.6g}" for number in row_values))
+        lines.append("")
+    return lines
+
+
+def _shown(fit: Identification, one: Parameter) -> tuple[str, float]:
+    """Return the unit in which a parameter is shown, and the factor from SI."""
+    return shown_unit(of_drive(one.unit, fit.data.drive_unit))
+
+
+def _heading(fit: Identification, one: Parameter) -> str:
+    unit, _ = _shown(fit, one)
+    return f"{one.name} {one.symbol}" + (f" [{unit}]" if unit else "")
+
+
+def _scaled(fit: Identification, one: Parameter) -> list[float]:
+    _, scale = _shown(fit, one)
+    return [scale * number for number in getattr(fit.model, one.name)]
+
+
+def _runs(fit: Identification) -> list[str]:
+    """Say whether several runs agree, and what the others found."""
+    costs = sorted(1e6 * run.cost for run in fit.runs)
+    if fit.descents is not None:
+        text = f"{fit.agreeing} of {len(costs)} descents end within 0.1 % of the lowest cost"
+        others = costs[fit.agreeing :]
+        if others and others[0] < math.inf:
+            most = max(cost for cost in others if cost < math.inf)
+            text += f", the others at {others[0]:.4g} to {most:.4g} um"
+        return [f"      {text}"]
+    if len(costs) == 1:
+        return ["      one run: runs=4 would show whether there are other local minima"]
+    more = ", ..." if len(costs) > 4 else ""
+    verdict = f"{fit.agreeing} of {len(costs)} runs end within 0.1 % of the best"
+    return [f"      {verdict}: {', '.join(f'{cost:.4g}' for cost in costs[:4])}{more} um"]
+
+
+def _known(fit: Identification) -> list[str]:
+    """List the quantities that the data determine at any scale of the forces, and the others."""
+    ratios = _ratios(fit)
+    if "delay" in fit.parameters:
+        ratios.append(("delay", "delay", 1e3 * fit.delay, "ms"))
+    # A ratio to a stiffness that was searched is determined where both are; a stiffness on its
+    # bound makes the others uncertain.
+    whole = fit.parameters["stiffness"]
+    known: list[tuple[str, str]] = []
+    unknown: list[tuple[str, str]] = []
+    for name, symbol, value, unit in ratios:
+        estimate = fit.parameters[name]
+        no_ratio = "/" not in symbol
+        moves = estimate.free or (estimate.tie is not None and estimate.deviation != 0.0)
+        held = not moves and (not whole.free or no_ratio)
+        sure = estimate.identified and (whole.precise or no_ratio)
+        if not held:
+            (known if sure else unknown).append((symbol, f"{value:>12.6g}  {unit}"))
+    lines = ["determined by the data" if known else "the data determine no parameter"]
+    lines += [f"  {symbol:<10} {text}".rstrip() for symbol, text in known]
+    if unknown:
+        lines.append("not determined: " + ", ".join(symbol for symbol, _ in unknown))
+    return lines
+
+
+def _ratios(fit: Identification) -> list[tuple[str, str, float, str]]:
+    """Parameter, symbol, value and unit of what does not depend on the scale of the forces."""
+    ratios = fit.model.force_ratios()
+    if fit.data.drive_unit == "m":
+        per_metre = [PER_METRE.get(unit, (unit, 1.0)) for *_, unit in ratios]
+        ratios = [(*r[:2], s * r[2], unit) for r, (unit, s) in zip(ratios, per_metre, strict=True)]
+    # Friction that is 0 and was not searched is left out.
+    return [r for r in ratios if r[0] != "b0" or fit.parameters["b0"].free or r[2]]
+
+
+def _constraints(fit: Identification) -> list[str]:
+    """List the inequalities, and which of them decide the result."""
+    if not fit.constraints:
+        return []
+    wide = max(len(one.text) for one in fit.constraints)
+    states = {True: "active: the two are equal", False: "not active"}
+    rows = [f"  {one.text:<{wide}}  {states[one.active]}" for one in fit.constraints]
+    return ["", "constraints", *rows]
+
+
+def said_of(fit: Identification, name: str) -> str:
+    """Write what a caller said of a parameter besides value and bounds, and what it met.
+
+    Parameters
+    ----------
+    fit : Identification
+        Result of an identification.
+    name : str
+        The parameter.
+
+    Returns
+    -------
+    str
+        Behind a standard deviation, beginning with a comma; empty where there is nothing.
+    """
+    estimate, said = fit.parameters[name], []
+    if estimate.at_bound:
+        on = any(one.active and name in (one.lower, one.upper) for one in fit.constraints)
+        said.append("on a constraint" if on else "on a bound")
+    if name in fit.scales:
+        said.append(f"{fit.scales[name]} scale")
+    if estimate.tie is not None:
+        said.append(f"tied: {estimate.tie}")
+    if estimate.prior is not None:
+        mean, width = estimate.prior
+        said.append(f"prior {mean:.6g} +- {width:.4g} {estimate.unit}".rstrip())
+    return "".join(f", {one}" for one in said)
+
+
+def _row(fit: Identification, name: str, estimate: Estimate, width: int) -> str:
+    if not estimate.free and estimate.tie is None:
+        note = "held" if estimate.deviation is None else "held: no effect on the data"
+    elif estimate.deviation == 0.0:
+        note = "held"
+    elif estimate.deviation is None:
+        note = "unknown"
+    elif not math.isfinite(estimate.deviation):
+        note = "no effect on the data"
+    else:
+        share = 100 * estimate.deviation / abs(estimate.value) if estimate.value else math.inf
+        digits = f"{share:.2g}" if share < 10 else f"{share:.0f}"
+        note = f"{digits} %" if share < 100 else "larger than the value"
+    note += said_of(fit, name)
+    return (
+        f"  {name:<18}{estimate.symbol:<{width}}{estimate.value:>13.6g}  {estimate.unit:<9}{note}"
+    ).rstrip()
+
+
+def identification_files(name: str, *, searched: bool, records: int = 1) -> list[str]:
+    """Return the names of the files that `save_identification` writes.
+
+    Parameters
+    ----------
+    name : str
+        Beginning of the file names.
+    searched : bool
+        Whether the model is searched.
+    records : int, optional
+        Number of records.
+
+    Returns
+    -------
+    list of str
+        The model and its pictures.
+    """
+    pictures = [f"{panel}{_nth(i)}" for i in range(records) for panel in ("loop", "time")]
+    pictures += ["convergence"] if searched else []
+    return [f"{name}.json", *picture_files(*(f"{name}_{picture}" for picture in pictures))]
+
+
+def _nth(i: int) -> str:
+    """End of the names of a record's pictures: nothing for the first."""
+    return f"_{i + 1}" if i else ""
+
+
+def save_identification(
+    fit: Identification,
+    folder: str | os.PathLike[str],
+    *,
+    name: str | None = None,
+    shown: Dataset | None = None,
+) -> list[Path]:
+    """Write the model and its pictures.
+
+    Parameters
+    ----------
+    fit : Identification
+        Result of an identification.
+    folder : path-like
+        Folder to write to; created if it does not exist.
+    name : str, optional
+        Beginning of the file names; by default the name of the model.
+    shown : Dataset, optional
+        A longer record that the pictures show, with the end of the fit marked; of a fit of one
+        record.
+
+    Returns
+    -------
+    list of pathlib.Path
+        ``{name}.json``, and as PNG and SVG ``{name}_loop``, ``{name}_time`` and, after a
+        search, ``{name}_convergence``; of a second record ``{name}_loop_2`` and ``{name}_time_2``.
+    """
+    from .plot import named, plot_convergence, plot_loop, plot_time, what_was_fitted
+
+    name = fit.model.info.name if name is None else name
+    until = None if shown is None else float(fit.data.t[-1])
+    figures = {}
+    for i, one in enumerate(fit.records):
+        record = one.data if shown is None else shown
+        if record is None:
+            continue
+        run = fit.simulate(record, offset=one.offset)
+        title = what_was_fitted(fit, one)
+        above, _ = plot_time(record, run, stroke=one.stroke, fitted_until=until, title=title)
+        figures[f"{name}_loop{_nth(i)}"] = plot_loop(record, run, title=title).figure
+        figures[f"{name}_time{_nth(i)}"] = above.figure
+    if fit.model.info.searched:
+        figures[f"{name}_convergence"] = plot_convergence(fit, title=named(fit, fit.data)).figure
+    with together(make_folder(folder)) as path:
+        return [fit.save(path / f"{name}.json"), *save_figures(figures, path)]  # type: ignore[arg-type]

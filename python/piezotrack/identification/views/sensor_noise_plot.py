@@ -1,0 +1,68 @@
+"""Picture of a sensor at rest."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..._support.plot_style import (
+    RECORDED,
+    SIMULATED,
+    heading,
+    legend_inside,
+    literal,
+    panels,
+    plain_log_ticks,
+    whole,
+)
+from ..._support.units import best_length_unit
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure, SubFigure
+
+    from ..experiments.sensor_noise import Noise
+
+__all__ = ["plot_noise"]
+
+
+def plot_noise(noise: Noise, fig: Figure | SubFigure | None = None) -> Figure:
+    """Plot a record at rest: the beginning of it with its steps, and its spectrum.
+
+    Parameters
+    ----------
+    noise : Noise
+        What was found.
+    fig : matplotlib.figure.Figure or SubFigure, optional
+        Where to draw; a new figure where not given.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure drawn in.
+    """
+    figure = panels(fig, (11.0, 4.4))
+    left, right = figure.subplots(1, 2)
+    data = noise.data
+    unit, scale = best_length_unit(noise.spread.peak_to_peak)
+    # Long enough for the trend, short enough to resolve the steps.
+    shown = slice(0, min(len(data), 400))
+    time = data.t[shown] - data.t[0]
+    left.step(1e3 * time, scale * (data.y[shown] - data.y[shown].mean()), where="post", **RECORDED)
+    left.set(xlabel="time [ms]", ylabel=f"displacement from the mean [{unit}]")
+    resolution = noise.resolution
+    steps = f", steps of {scale * resolution:.4g} {unit}" if resolution else ""
+    source = f" in {literal(data.source)}" if data.source else ""
+    heading(left, f"Sensor at rest{source}: {scale * noise.rms:.4g} {unit} rms{steps}")
+    left.margins(x=0)
+    f, density = noise.spectrum()
+    right.loglog(f, 1e9 * density, **{**RECORDED, "color": "0.6"})
+    colour = "white" if np.isinf(noise.bandwidth) else f"low-pass {noise.bandwidth:.4g} Hz"
+    model = {**SIMULATED, "linewidth": 1.6, "linestyle": "--"}
+    model["label"] = f"model: {scale * noise.noise:.4g} {unit} rms, {colour}"
+    right.loglog(f, 1e9 * noise.density(f), **model)
+    heading(right, "Noise spectrum")
+    right.set(xlabel="frequency [Hz]", ylabel="amplitude spectral density [nm/\N{SQUARE ROOT}Hz]")
+    legend_inside(right, ncols=2)
+    plain_log_ticks(right)
+    return whole(figure)
