@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from .. import _core
 from .._support.files import (
@@ -19,6 +19,7 @@ from .._support.files import (
 )
 from .._support.messages import quoted
 from .._support.progress_bar import ProgressBar
+from .._support.result import Result
 from ..errors import ParameterError
 from .board_files import BoardFolder
 from .contenders import contenders_named
@@ -28,8 +29,6 @@ from .scoring import result_of
 if TYPE_CHECKING:
     import os
     from collections.abc import Iterable, Mapping
-
-    from matplotlib.figure import Figure, SubFigure
 
     from .contender import Contender
     from .record import BenchmarkRecord
@@ -138,7 +137,7 @@ class BenchmarkResult:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Benchmark:
+class Benchmark(Result):
     """Results of a benchmark; printed, a table for each record.
 
     Attributes
@@ -147,13 +146,16 @@ class Benchmark:
         Record by record.
     """
 
+    views: ClassVar[Mapping[str, str]] = {
+        "summary": "benchmarking.views.board_table:board_text",
+        "markdown": "benchmarking.views.board_table:board_markdown",
+        "plot": "benchmarking.views.board_plot:plot_board",
+    }
+
     results: tuple[BenchmarkResult, ...]
 
     def __repr__(self) -> str:
         return f"<Benchmark of {len(self.results)} results; see summary()>"
-
-    def __str__(self) -> str:
-        return self.summary()
 
     def of(self, record: str) -> list[BenchmarkResult]:
         """Return the results of a record, the best on its last part first.
@@ -184,46 +186,16 @@ class Benchmark:
         """Names of the records, in their order."""
         return list(dict.fromkeys(one.record for one in self.results))
 
-    def summary(self) -> str:
-        """Table for each record, the best model first.
-
-        Returns
-        -------
-        str
-            Several lines.
-        """
-        from .views.board_table import board_text
-
-        return board_text(self)
-
     def markdown(self) -> str:
-        """Return the same tables for a page.
+        """Return the tables for a page.
 
         Returns
         -------
         str
             Markdown.
         """
-        from .views.board_table import board_markdown
-
-        return board_markdown(self)
-
-    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
-        """Rms of each model on each record, on what was fitted and what was not.
-
-        Parameters
-        ----------
-        fig : matplotlib.figure.Figure or SubFigure, optional
-            Where to draw; a new figure of pyplot where not given.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The figure drawn in.
-        """
-        from .views.board_plot import plot_board
-
-        return plot_board(self, fig)
+        text: str = self.view("markdown")(self)
+        return text
 
     def document(self) -> dict[str, Any]:
         """Content of the JSON file.

@@ -1,0 +1,75 @@
+"""Base of all results: text, picture and table, by methods of the same names."""
+
+from __future__ import annotations
+
+from html import escape
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, ClassVar
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from matplotlib.figure import Figure, SubFigure
+
+__all__ = ["Result"]
+
+
+class Result:
+    """Result of a computation: its text, its picture, and its content as plain data.
+
+    The functions that write and draw it are listed in `views` by name, and are imported when they
+    are used: pictures import results, results import no picture. ``document`` and ``save`` are of
+    the class itself.
+
+    Attributes
+    ----------
+    views : mapping of str to str
+        ``module:function`` below ``piezotrack`` for ``summary`` and ``plot``, for ``html`` where a
+        notebook shows more than the text, and for the panels of the class.
+    """
+
+    views: ClassVar[Mapping[str, str]]
+
+    @classmethod
+    def view(cls, name: str) -> Callable[..., Any]:
+        """Import a function of `views`, whose first argument is the result."""
+        module, _, function = cls.views[name].partition(":")
+        imported = import_module(f"piezotrack.{module}")
+        view: Callable[..., Any] = getattr(imported, function)
+        return view
+
+    def summary(self) -> str:
+        """Write the result as text.
+
+        Returns
+        -------
+        str
+            Several lines, which ``print(result)`` shows too.
+        """
+        text: str = self.view("summary")(self)
+        return text
+
+    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
+        """Draw the result.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
+        """
+        figure: Figure = self.view("plot")(self, fig)
+        return figure
+
+    def __str__(self) -> str:
+        return self.summary()
+
+    def _repr_html_(self) -> str:
+        if "html" not in self.views:
+            return f"<pre>{escape(self.summary())}</pre>"
+        table: str = self.view("html")(self)
+        return table
