@@ -67,7 +67,7 @@ lint-python: $(VENV)/installed $(VENV)/tools
 # The Python module is named so that features, and with them the compiled crates, are those of the
 # wheel; it has no tests of its own.
 rust-test: $(VENV)/pip ## Tests of the crates, the control crate also without std
-	PYO3_PYTHON=$(abspath $(BIN)/python) cargo test --locked --release -p piezotrack-control -p piezotrack-core -p piezotrack-py
+	PYO3_PYTHON="$(CURDIR)/$(BIN)/python" cargo test --locked --release -p piezotrack-control -p piezotrack-core -p piezotrack-py
 	cargo test --locked --release -p piezotrack-control
 
 no-std: ## The control crate where there is no std and no allocator
@@ -84,7 +84,7 @@ python-test: $(VENV)/installed $(VENV)/tools c-library ## Tests of the package, 
 
 # Beside the Python module, so that the compiled crates are those of the wheel.
 c-library: $(VENV)/pip ## The C library: target/release/libpiezotrack.a and .so; header in rust/capi/include
-	PYO3_PYTHON=$(abspath $(BIN)/python) cargo build --locked --release -p piezotrack-capi -p piezotrack-py
+	PYO3_PYTHON="$(CURDIR)/$(BIN)/python" cargo build --locked --release -p piezotrack-capi -p piezotrack-py
 
 c-header: ## Write rust/capi/include/piezotrack.h from the functions of the C library
 	WRITE=1 $(MAKE) --no-print-directory c-header-test
