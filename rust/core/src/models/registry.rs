@@ -313,21 +313,21 @@ macro_rules! models {
 }
 
 models! {
-    Dahl: Creeping<super::dahl::DahlStage>, swarm;
-    BoucWen: Creeping<super::input::bouc_wen::BoucWenStage>, swarm;
-    AsymmetricBoucWen: Creeping<super::input::asymmetric_bouc_wen::AsymmetricBoucWenStage>, swarm;
-    FirstOrderDahl: Creeping<super::feedback::first_order_dahl::FirstOrderDahlStage>, swarm;
-    ParallelDahl: Creeping<super::feedback::parallel_dahl::ParallelDahlStage>, swarm;
-    LuGre: Creeping<super::feedback::lugre::LuGreStage>, swarm;
-    BoucWenOscillator: Creeping<super::feedback::bouc_wen_oscillator::BoucWenOscillator>, swarm;
-    PrandtlIshlinskii: super::plays::prandtl_ishlinskii::PrandtlIshlinskiiStage, least_squares;
-    MaxwellSlip: super::plays::maxwell_slip::MaxwellSlipStage, least_squares;
-    GeneralisedPrandtlIshlinskii: super::plays::generalised_prandtl_ishlinskii::GeneralisedPrandtlIshlinskiiStage, least_squares;
-    RateDependentPrandtlIshlinskii: super::plays::rate_dependent_prandtl_ishlinskii::RateDependentPrandtlIshlinskiiStage, least_squares;
-    PolynomialPrandtlIshlinskii: super::plays::polynomial_prandtl_ishlinskii::PolynomialPrandtlIshlinskiiStage, least_squares;
-    AsymmetricPrandtlIshlinskii: super::plays::asymmetric_prandtl_ishlinskii::AsymmetricPrandtlIshlinskiiStage, least_squares;
-    Preisach: super::relays::preisach::PreisachStage, least_squares;
-    Duhem: super::relays::duhem::DuhemStage, least_squares;
+    Dahl: Creeping<super::DahlStage>, swarm;
+    BoucWen: Creeping<super::BoucWenStage>, swarm;
+    AsymmetricBoucWen: Creeping<super::AsymmetricBoucWenStage>, swarm;
+    FirstOrderDahl: Creeping<super::FirstOrderDahlStage>, swarm;
+    ParallelDahl: Creeping<super::ParallelDahlStage>, swarm;
+    LuGre: Creeping<super::LuGreStage>, swarm;
+    BoucWenOscillator: Creeping<super::BoucWenOscillator>, swarm;
+    PrandtlIshlinskii: super::PrandtlIshlinskiiStage, least_squares;
+    MaxwellSlip: super::MaxwellSlipStage, least_squares;
+    GeneralisedPrandtlIshlinskii: super::GeneralisedPrandtlIshlinskiiStage, least_squares;
+    RateDependentPrandtlIshlinskii: super::RateDependentPrandtlIshlinskiiStage, least_squares;
+    PolynomialPrandtlIshlinskii: super::PolynomialPrandtlIshlinskiiStage, least_squares;
+    AsymmetricPrandtlIshlinskii: super::AsymmetricPrandtlIshlinskiiStage, least_squares;
+    Preisach: super::PreisachStage, least_squares;
+    Duhem: super::DuhemStage, least_squares;
 }
 
 impl Model {
