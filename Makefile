@@ -1,6 +1,6 @@
 # What a person types. Needs a Rust toolchain and Python 3.11 or newer; all else is put in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo reproduce benchmark test soak fuzz lint lint-rust lint-python rust-test no-std python-test rust-checks bench docs reference refused c-library c-header c-header-test clean
+.PHONY: help demo reproduce benchmark test soak fuzz lint lint-rust lint-python rust-test no-std python-test rust-checks bench docs reference architecture refused c-library c-header c-header-test clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -100,6 +100,9 @@ docs: ## The crates' pages
 
 reference: $(VENV)/installed ## Write docs/reference from the commands and docstrings
 	$(BIN)/python docs/make_reference.py
+
+architecture: $(VENV)/installed ## Draw docs/architecture.svg and write the tree of its page, from the code
+	$(BIN)/python docs/make_architecture.py
 
 refused: $(VENV)/installed $(VENV)/tools ## Write docs/refused-logs.md: bad logs, and what is said of each
 	$(BIN)/python docs/make_refused_logs.py
