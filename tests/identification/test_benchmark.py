@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+import distributions
 import piezotrack as pt
 from piezotrack.benchmarking.contenders import contenders_named, listed_contenders
 from piezotrack.benchmarking.discrete_backlash import identify_backlash, last_cycle
@@ -322,15 +323,9 @@ def test_a_board_is_written_whole(tmp_path: Path) -> None:
 
 
 def install(folder: Path, code: str, *, name: str = "gain", module: str = "their_models") -> None:
-    """Put a distribution into a folder as an installer does."""
-    (folder / f"{module}.py").write_text(code, encoding="utf-8")
-    info = folder / f"{module}-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(
-        f"Metadata-Version: 2.1\nName: {module}\nVersion: 1.0\n", encoding="utf-8"
-    )
-    (info / "entry_points.txt").write_text(
-        f"[piezotrack.models]\n{name} = {module}:fit\n", encoding="utf-8"
+    """Put a distribution with one model into a folder."""
+    distributions.install(
+        folder, code, group="piezotrack.models", name=name, module=module, function="fit"
     )
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import sys
+from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Annotated, Any
 
 import matplotlib as mpl
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup
 
 from .. import __version__
 from .benchmark import benchmark_command
@@ -40,7 +41,31 @@ __all__ = ["app", "run"]
 # No window is ever opened.
 mpl.use("Agg")
 
+# Entry points of other packages: functions with options of Typer, as the commands here.
+GROUP = "piezotrack.commands"
+
+
+class Commands(TyperGroup):
+    """The commands of the package, and those that other packages declare."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names, those of other packages last."""
+        own = super().list_commands(ctx)
+        return [*own, *sorted(entry_points(group=GROUP).names - set(own))]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return a command; one of the package is never replaced."""
+        if (own := super().get_command(ctx, cmd_name)) is not None:
+            return own
+        for entry in entry_points(group=GROUP, name=cmd_name):
+            other = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
+            other.command(cmd_name, cls=Command)(entry.load())
+            return typer.main.get_command(other)
+        return None
+
+
 app = typer.Typer(
+    cls=Commands,
     help="Hysteresis identification and tracking control of piezo nanopositioners.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
