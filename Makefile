@@ -1,6 +1,6 @@
 # What a person types. Needs a Rust toolchain and Python 3.11 or newer; all else is put in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo reproduce benchmark test soak fuzz lint lint-rust lint-python rust-test no-std python-test rust-checks bench docs reference architecture refused c-library c-header c-header-test clean
+.PHONY: help demo reproduce benchmark test soak fuzz lint lint-rust lint-python rust-test no-std python-test rust-checks bench docs reference architecture refused notices c-library c-header c-header-test clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -106,6 +106,9 @@ architecture: $(VENV)/installed ## Draw docs/architecture.svg and write the tree
 
 refused: $(VENV)/installed $(VENV)/tools ## Write docs/refused-logs.md: bad logs, and what is said of each
 	$(BIN)/python docs/make_refused_logs.py
+
+notices: ## Write THIRD-PARTY.txt: the licences of the crates that are linked in
+	$(PYTHON) docs/make_notices.py
 
 clean: ## Remove what was built, not your results
 	rm -rf $(VENV) target demo report

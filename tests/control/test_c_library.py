@@ -197,10 +197,22 @@ def pid_settings(**other: Any) -> Settings:
     return Settings(**(known | other))
 
 
+PLAYS_LISTS = (Numbers * len(PLAYS._named))(*(numbers(name, *v) for name, v in PLAYS._named))
+PLAYS_GIVEN = {
+    "model": b"prandtl-ishlinskii",
+    "parameters": PLAYS_LISTS,
+    "parameter_count": len(PLAYS_LISTS),
+}
 REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "no interval": ({"dt": 0.0}, "dt is 0 s: expected"),
     "interval is NaN": ({"dt": math.nan}, "dt is NaN s: expected"),
     "limits the other way round": ({"low": 80.0}, "high"),
+    "limits whose sums overflow": (
+        {"low": -8e307, "high": 8e307},
+        "low is -8e307 V: expected a voltage",
+    ),
+    "an offset of no model": ({"offset": 1e-6}, "offset is 1e-6 m: expected 0, as model is NULL"),
+    "a delay of no model": ({"delay": math.nan}, "delay is NaN s: expected 0, as model is NULL"),
     "span the other way round": (
         {"span_low": 1e-6, "span_high": -1e-6},
         "span is -1e-6 m: expected an upper end",
@@ -269,6 +281,27 @@ def test_what_cannot_be_is_refused_in_a_sentence(library: ctypes.CDLL, case: str
     assert short.raw[:5] == message.raw[:4] + b"\0"
     assert short.raw[5:] == b"xxx"
     assert not library.piezotrack_new(ctypes.byref(pid_settings(**other)), None, 0)
+
+
+@needs_library
+@pytest.mark.parametrize("name", ["dt", "low", "high", "offset", "delay"])
+def test_the_library_refuses_what_python_refuses(library: ctypes.CDLL, name: str) -> None:
+    for size in (0.0, 1e-300, 1e-15, 1e-3, 1.0, 1e9, 1e12, 1e99, 1e150, 9e307, math.inf, math.nan):
+        for value in (size, -size):
+            given = {"dt": 0.02, "low": -1.0, "high": 75.0, "offset": 0.0, "delay": 0.0}
+            given[name] = value
+            settings = pid_settings(**given, **PLAYS_GIVEN)
+            settings.law = Numbers()
+            made = library.piezotrack_new(ctypes.byref(settings), None, 0)
+            library.piezotrack_free(made)
+            try:
+                inverse = pt.Inverse(stage=PLAYS, offset=given["offset"], delay=given["delay"])
+                limits = (given["low"], given["high"])
+                pt.Controller(dt=given["dt"], limits=limits, feedforward=inverse).start()
+            except pt.PiezotrackError:
+                assert not made, value
+            else:
+                assert made, value
 
 
 @needs_library

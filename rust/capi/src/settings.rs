@@ -104,7 +104,10 @@ pub unsafe fn parts(
             repetitive: named("repetitive", &settings.repetitive)?,
             filters: list("filters", settings.filters, settings.filter_count)?,
         };
-        let Some(model) = text("model", settings.model)? else { return Ok((parts, None)) };
+        let Some(model) = text("model", settings.model)? else {
+            no_model(settings)?;
+            return Ok((parts, None));
+        };
         let feedforward = FeedforwardParts {
             model,
             parameters: list("parameters", settings.parameters, settings.parameter_count)?,
@@ -114,6 +117,17 @@ pub unsafe fn parts(
         };
         Ok((parts, Some(feedforward)))
     }
+}
+
+/// Refuses what only an inverse has, where there is no model.
+fn no_model(settings: &Settings) -> Result<()> {
+    for (name, value, unit) in [("offset", settings.offset, "m"), ("delay", settings.delay, "s")] {
+        // Also NaN.
+        if value != 0.0 {
+            return Err(Error::parameter(name, format!("{value:?} {unit}"), "0, as model is NULL"));
+        }
+    }
+    Ok(())
 }
 
 /// A list of which each entry has a name.

@@ -1,6 +1,6 @@
 //! Saturation limits of the amplifier.
 
-use crate::error::{Result, check, finite};
+use crate::error::{Result, check, finite, usable};
 
 /// Voltage range of the actuator, for example 0 to 75 V for the stage of Xu and Li 2010.
 ///
@@ -23,12 +23,14 @@ impl Limits {
     /// Limits in V.
     ///
     /// # Errors
-    /// Names `low` or `high` where it is not finite, and `high` where it is not above `low`.
+    /// Names `low` or `high` where it is not finite or 1e100 V or more from 0, so that sums of
+    /// voltages soon overflow, and `high` where it is not above `low`.
     pub fn new(low: f64, high: f64) -> Result<Self> {
-        finite("low", low, "V")?;
-        finite("high", high, "V")?;
+        for (name, volts) in [("low", low), ("high", high)] {
+            finite(name, volts, "V")?;
+            check(name, volts, "V", usable(volts), "a voltage below 1e100 V")?;
+        }
         check("high", high, "V", low < high, "a voltage above low")?;
-        check("high", high, "V", (high - low).is_finite(), "a range that is finite")?;
         Ok(Self { low, high })
     }
 

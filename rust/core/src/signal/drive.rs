@@ -38,11 +38,7 @@ impl<'a> Drive<'a> {
     /// # Errors
     /// [`Error::Parameter`] where `dt` is not from 1 ps to 1e9 s, [`Error::Shape`] where `u` is empty.
     pub fn new(u: &'a [f64], dt: f64, hold: Hold) -> Result<Self> {
-        positive("dt", dt, "s")?;
-        if !(SHORTEST..=LONGEST).contains(&dt) {
-            let expected = format!("{SHORTEST:e} to {LONGEST:e} s");
-            return Err(Error::parameter("dt", format!("{dt:e} s"), expected));
-        }
+        sampling_interval(dt)?;
         if u.is_empty() {
             return Err(Error::Shape {
                 name: "u".into(),
@@ -60,6 +56,16 @@ impl<'a> Drive<'a> {
         let change = if self.hold == Hold::First { self.u[k + 1] - self.u[k] } else { 0.0 };
         (self.u[k], change)
     }
+}
+
+/// Refuses a sampling interval (s) that is not from 1 ps to 1e9 s.
+pub(crate) fn sampling_interval(dt: f64) -> Result<f64> {
+    positive("dt", dt, "s")?;
+    if (SHORTEST..=LONGEST).contains(&dt) {
+        return Ok(dt);
+    }
+    let expected = format!("{SHORTEST:e} to {LONGEST:e} s");
+    Err(Error::parameter("dt", format!("{dt:e} s"), expected))
 }
 
 /// Refuses a motion that does not stay finite.

@@ -14,5 +14,5 @@ pub use turning_points::turns;
 
 pub(crate) use delay::FractionalDelay;
 pub(crate) use detrend::without_drift;
-pub(crate) use drive::{all_finite, index, largest_difference, range};
+pub(crate) use drive::{all_finite, index, largest_difference, range, sampling_interval};
 pub(crate) use frequency_response::Spectrum;

@@ -19,7 +19,8 @@ use piezotrack_control::{
 };
 
 use super::tracking::Law;
-use crate::error::{Error, Result, positive};
+use crate::error::{Error, Result};
+use crate::signal::sampling_interval;
 
 /// A part by its name, with its numbers.
 pub type Named<'a> = (&'a str, &'a [f64]);
@@ -50,7 +51,7 @@ impl ControllerParts<'_> {
     /// [`Error::Parameter`] for a name that is unknown, another count of numbers, and a number out
     /// of its range.
     pub fn controller(&self) -> Result<Controller<Law>> {
-        let dt = positive("dt", self.dt, "s")?;
+        let dt = sampling_interval(self.dt)?;
         let law = match self.law {
             Some((name, numbers)) => Law::named(name, numbers, dt)?,
             None => Law::None,
