@@ -1,4 +1,4 @@
-"""Write THIRD-PARTY.txt: the licences of the crates that are linked into the wheel and the C library.
+"""Write THIRD-PARTY.txt: licences of the crates that are linked into the wheel and the C library.
 
 Type `make notices`. It needs cargo, which downloads the crates of other systems too.
 """
@@ -48,6 +48,7 @@ def linked(*where: str) -> set[Crate]:
 
 
 def cargo(*arguments: str) -> str:
+    """Return what cargo prints."""
     return subprocess.run(
         ["cargo", *arguments], cwd=ROOT, check=True, capture_output=True, text=True
     ).stdout
@@ -86,6 +87,7 @@ def licences(package: dict[str, Any]) -> list[str]:
 
 
 def tidied(path: Path) -> str:
+    """Return the text of a file without blanks at the ends of lines."""
     lines = path.read_text(encoding="utf-8").splitlines()
     return "\n".join(line.rstrip() for line in lines).strip("\n")
 

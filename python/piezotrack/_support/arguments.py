@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from itertools import islice
 from typing import TYPE_CHECKING, Any, TypeGuard
 
@@ -23,12 +23,15 @@ __all__ = [
     "bounds",
     "check_length",
     "check_reach",
+    "expect",
     "finite",
     "has_entries",
     "hertz",
     "in_range",
     "not_negative",
+    "number_pair",
     "numbers",
+    "one_of",
     "one_or_more_numbers",
     "plain",
     "positive",
@@ -40,6 +43,34 @@ TOO_FAR = 1.0
 SLOWEST, FASTEST = 1e-9, 1e12
 # Most entries of a list of settings.
 MOST_ENTRIES = 1_000_000
+
+
+def expect(name: str, value: object, kinds: type | tuple[type, ...], expected: str) -> None:
+    """Raise ParameterError where a value is of none of the classes `kinds`.
+
+    Examples
+    --------
+    >>> expect("data", 1.0, str, "a text")
+    Traceback (most recent call last):
+    piezotrack.errors.ParameterError: data is 1.0: expected a text
+    """
+    if not isinstance(value, kinds):
+        raise ParameterError(f"{name} is {quoted(value)}: expected {expected}")
+
+
+def one_of(name: str, value: object, words: Collection[str]) -> None:
+    """Raise ParameterError where a value is none of some words; it may be of any class.
+
+    Examples
+    --------
+    >>> one_of("hold", [0.0, 1.0], ("foh", "zoh"))
+    Traceback (most recent call last):
+    piezotrack.errors.ParameterError: hold is [0.0, 1.0]: expected 'foh' or 'zoh'
+    """
+    if not isinstance(value, str) or value not in words:
+        *first, last = map(repr, words)
+        expected = f"{', '.join(first)} or {last}" if first else last
+        raise ParameterError(f"{name} is {quoted(value)}: expected {expected}")
 
 
 def finite(name: str, value: object, unit: str) -> float:
@@ -193,6 +224,25 @@ def numbers(
                 f"{name} has {number:g}: expected finite numbers{limit}, in {unit}"
             )
     return array
+
+
+def number_pair(name: str, ends: object, unit: str) -> tuple[float, float]:
+    """Return two finite numbers, of which the first is the lower one.
+
+    Examples
+    --------
+    >>> number_pair("limits", [0, 75], "V")
+    (0.0, 75.0)
+    """
+    # An array is accepted too, and a column of a table.
+    several = isinstance(ends, Sequence) or hasattr(type(ends), "tolist")
+    pair = list(islice(ends, 3)) if several and has_entries(ends) else []
+    if len(pair) != 2:
+        raise ParameterError(f"{name} are {quoted(ends)}: expected (low, high) in {unit}")
+    low, high = (finite(f"{name}[{i}]", value, unit) for i, value in enumerate(pair))
+    if not low < high:
+        raise ParameterError(f"{name} are ({low:g}, {high:g}) {unit}: expected the lower one first")
+    return low, high
 
 
 def has_entries(value: object) -> TypeGuard[Iterable[Any]]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import DataError
+from .arguments import expect
 from .plot_style import without_glyph_warnings
 from .result_set import MARKER, current_set, finish_others, together
 from .temporary import create, forget
@@ -60,6 +61,7 @@ def replacing(path: str | os.PathLike[str], *, synced: bool = False) -> Iterator
     DataError
         The folder is missing, or the file cannot be written.
     """
+    expect("path", path, (str, os.PathLike), "the name of a file")
     file = Path(path)
     if file.name == MARKER:
         raise DataError(f"{file}: expected another name, as this one lists unfinished results")
@@ -144,6 +146,7 @@ def make_folder(folder: str | os.PathLike[str]) -> Path:
     DataError
         It cannot be made.
     """
+    expect("folder", folder, (str, os.PathLike), "the name of a folder")
     path = Path(folder)
     if not os.fspath(folder):
         raise DataError(

@@ -13,6 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import ParameterError
+from .arguments import expect, has_entries
+from .messages import quoted
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
@@ -126,7 +130,12 @@ def _new_figure(size: tuple[float, float]) -> Figure:
 
 def panels(given: Figure | SubFigure | None, size: tuple[float, float]) -> FigureBase:
     """Return the figure to draw in: the one given, or a new one of a size in inches."""
-    return _new_figure(size) if given is None else given
+    from matplotlib.figure import FigureBase
+
+    if given is None:
+        return _new_figure(size)
+    expect("fig", given, FigureBase, "a figure of Matplotlib, or a part of one")
+    return given
 
 
 def whole(drawn: FigureBase) -> Figure:
@@ -139,11 +148,18 @@ def whole(drawn: FigureBase) -> Figure:
 
 def axes_or_new(given: Axes | Sequence[Axes] | None, count: int) -> list[Axes]:
     """Return the axes given, or make a figure with new ones below each other."""
+    from matplotlib.axes import Axes
+
     if given is None:
         figure = _new_figure((6.4, 4.2) if count == 1 else (7.6, 5.4))
         made = figure.subplots(count, 1, sharex=True, squeeze=False)
         return [ax for row in made for ax in row]
-    return list(given) if isinstance(given, (list, tuple, np.ndarray)) else [given]  # type: ignore[list-item]
+    several = given if has_entries(given) else [given]
+    axes = [ax for ax in several if isinstance(ax, Axes)]
+    if len(axes) != count:
+        name, words = ("ax", "the axes") if count == 1 else ("axes", f"{count} axes")
+        raise ParameterError(f"{name} is {quoted(given)}: expected {words} of Matplotlib")
+    return axes
 
 
 def thinned(values: Array) -> NDArray[np.intp]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from .._support.arguments import positive
+from .._support.arguments import expect, positive
 from .._support.messages import quoted
 from ..data.dataset import Dataset
 from ..errors import ParameterError
@@ -161,6 +161,7 @@ class BenchmarkRecord:
         >>> record.fitted.duration, record.rest.duration
         (10.0, 12.0)
         """
+        expect("log", log, Dataset, "a Dataset")
         title = log.source or "log"
         plain = re.sub(r"[^a-z0-9._]+", "-", title.rpartition("/")[2].lower()).strip("-._")
         rest: Dataset | None = None

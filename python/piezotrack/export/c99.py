@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from .. import _core
+from .._support.arguments import expect
 from ..control.controller.description import controller_text
 from ..errors import ParameterError
 from .c_check import check_code
@@ -72,6 +73,7 @@ def checked_name(name: str) -> str:
     ParameterError
         It is no identifier of C, or one that the functions inside have.
     """
+    expect("name", name, str, "a text")
     if name in INSIDE:
         raise ParameterError(
             f"name is {name!r}, as functions inside of the C file begin: expected another name"

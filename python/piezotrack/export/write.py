@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+from .. import _core
+from .._support.arguments import expect, one_of
 from .._support.files import make_folder, replacing, together, write_document
-from .._support.messages import quoted
 from ..control.controller.controller import Controller
 from ..errors import ParameterError
 from ..references.reference import Reference
@@ -79,8 +80,7 @@ def export_files(to: To, name: str) -> list[str]:
         "json": [f"{name}.json"],
         "fmu": [f"{name}.fmu"],
     }
-    if to not in names:
-        raise ParameterError(f"to is {quoted(to)}: expected one of {', '.join(map(repr, FORMS))}")
+    one_of("to", to, FORMS)
     return names[to]
 
 
@@ -144,12 +144,9 @@ def export_controller(
     >>> print(pt.control.export_controller(loop, "firmware", name="axis"))
     state 120 bytes; a step has 10 additions, 4 multiplications, 0 divisions
     """
-    if not isinstance(controller, Controller):
-        raise ParameterError(f"controller is {type(controller).__name__}: expected pt.Controller")
-    if reference is not None and not isinstance(reference, Reference):
-        raise ParameterError(
-            f"reference is {type(reference).__name__}: expected a Reference, as pt.sine(...)"
-        )
+    expect("controller", controller, Controller, "pt.Controller")
+    expect("reference", reference, (Reference, type(None)), "a Reference, as pt.sine(...)")
+    single = _core.as_truth("single", single)
     names = export_files(to, name)
     played = feedforward_table(controller, reference, table)
     if to == "json":

@@ -264,7 +264,7 @@ def identify(
         "callback": callback,
         "checkpoint": checkpoint,
     }
-    info = None if model == AUTO else model_named(model)
+    info = None if isinstance(model, str) and model == AUTO else model_named(model)
     several = len(records) > 1
     if info is not None:
         refuse_given(info, of_swarm, least_squares)

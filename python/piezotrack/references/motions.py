@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from .._support.arrays import real_array
 from ..errors import ParameterError
 
 if TYPE_CHECKING:
@@ -110,6 +111,7 @@ class Cosines:
 
     def __call__(self, t: Array) -> tuple[Array, Array, Array]:
         """Return displacement, velocity and acceleration at the times `t`."""
+        t = real_array("t", t)
         x, v, a = np.full(t.shape, self.offset), np.zeros(t.shape), np.zeros(t.shape)
         for size, frequency, phase in zip(
             self.amplitudes, self.frequencies, self.phases, strict=True
@@ -134,6 +136,7 @@ class Chirp:
 
     def __call__(self, t: Array) -> tuple[Array, Array, Array]:
         """Return displacement, velocity and acceleration at the times `t`."""
+        t = real_array("t", t)
         sweep = math.tau * (self.stop - self.start) / self.duration
         rate = math.tau * self.start + sweep * t
         phase = (math.tau * self.start + 0.5 * sweep * t) * t
@@ -156,6 +159,7 @@ class Triangle:
 
     def __call__(self, t: Array) -> tuple[Array, Array, Array]:
         """Return displacement, velocity and acceleration at the times `t`."""
+        t = real_array("t", t)
         half = 0.5 * self.period
         # Half the duration of a corner, and the speed with which both ends are still reached.
         corner = 0.25 * self.rounding * self.period
@@ -192,6 +196,7 @@ class Steps:
 
     def __call__(self, t: Array) -> tuple[Array, Array, Array]:
         """Return displacement, velocity and acceleration at the times `t`."""
+        t = real_array("t", t)
         levels = np.asarray(self.levels)
         following = np.roll(levels, -1)
         step = self.dwell + self.rise
@@ -199,7 +204,9 @@ class Steps:
             t = np.mod(t, levels.size * step)
         else:
             following[-1] = levels[-1]
-        number = np.clip(np.floor(t / step), 0, levels.size - 1).astype(np.intp)
+        # What is no time has no level either.
+        place = np.where(np.isnan(t), 0.0, np.floor(t / step))
+        number = np.clip(place, 0, levels.size - 1).astype(np.intp)
         s, slope, curvature = s_curve((t - number * step - self.dwell) / self.rise)
         travel = (following - levels)[number]
         x = levels[number] + travel * s
@@ -231,6 +238,7 @@ class Spline:
 
     def __call__(self, t: Array) -> tuple[Array, Array, Array]:
         """Return displacement, velocity and acceleration at the times `t`."""
+        t = real_array("t", t)
         place = t / self.dt
         u = np.mod(place, self.x.size) if self.cyclic else np.minimum(place, self.x.size - 1)
         x, v, a = (spline(u) for spline in self._splines)
@@ -321,7 +329,10 @@ def schroeder_phases(amplitudes: Array) -> Array:
     >>> schroeder_phases(np.ones(2)).round(3)
     array([0.   , 3.142])
     """
-    powers = np.cumsum(amplitudes**2) / np.sum(amplitudes**2)
+    # By a power of two, which changes no digit, so that no square leaves float64.
+    _, exponent = np.frexp(amplitudes.max())
+    squares = np.ldexp(amplitudes, -exponent) ** 2
+    powers = np.cumsum(squares) / np.sum(squares)
     phases: Array = np.mod(-math.tau * np.append(0.0, np.cumsum(powers)[:-1]), math.tau)
     return phases
 

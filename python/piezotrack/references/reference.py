@@ -135,6 +135,8 @@ class Reference:
     interval: float | None = None
 
     def __post_init__(self) -> None:
+        if not callable(self.motion):
+            raise ParameterError(f"motion is {quoted(self.motion)}: expected a function of times")
         duration = positive("duration", self.duration, "s")
         numbers = {
             "duration": duration,

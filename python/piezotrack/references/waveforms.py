@@ -18,6 +18,7 @@ from .._support.arguments import (
     numbers,
     positive,
 )
+from .._support.arrays import check_dt
 from ..errors import ParameterError, ShapeError
 from .motions import Chirp, Cosines, Steps, Triangle, common_period, extremes, schroeder_phases
 from .reference import Reference
@@ -213,7 +214,7 @@ def staircase(
     Reference(staircase of 3 levels, 0 to 30 um, 3.4 s)
     """
     dwell = not_negative("dwell", dwell, "s")
-    rise = positive("rise", RISE * dwell if rise is None else rise, "s")
+    rise = check_dt(RISE * dwell if rise is None else rise, "rise")
     if (steps is None) == (levels is None):
         raise ParameterError(
             "steps and levels: expected exactly one of them, "

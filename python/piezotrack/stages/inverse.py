@@ -9,17 +9,16 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from .. import _core
-from .._support.arguments import finite, not_negative, positive
+from .._support.arguments import expect, finite, not_negative, number_pair, one_of
 from .._support.arrays import check_dt
 from .._support.messages import quoted
 from ..errors import ParameterError
 from ..references.motions import Spline
-from ..references.reference import Reference
+from ..references.reference import Reference, SampledReference
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..references.reference import SampledReference
     from .base import Stage, StageState
 
     Array = NDArray[np.float64]
@@ -28,6 +27,8 @@ __all__ = ["Inverse", "InverseSession", "PlayedVoltage"]
 
 Playback = Literal["table", "online"]
 Limits = tuple[float, float] | None
+# Periods that the smooth start of a reference with a table may have.
+MOST_TURNS = 1_000_000
 
 
 class PlayedVoltage(NamedTuple):
@@ -106,14 +107,11 @@ class Inverse:
     def __post_init__(self) -> None:
         if not isinstance(getattr(self.stage, "_core", None), _core.Stage):
             raise ParameterError(
-                f"stage is {type(self.stage).__name__}: expected a stage, as a pt.DahlStage"
+                f"stage is {quoted(self.stage)}: expected a stage, as a pt.DahlStage"
             )
         finite("offset", self.offset, "m")
         not_negative("delay", self.delay, "s")
-        if self.playback not in ("table", "online"):
-            raise ParameterError(
-                f"playback is {quoted(self.playback)}: expected 'table' or 'online'"
-            )
+        one_of("playback", self.playback, ("table", "online"))
         if not 1 <= _core.as_count("settle", self.settle) <= 1000:
             raise ParameterError(f"settle is {self.settle}: expected 1 period or more, up to 1000")
         # The core refuses a stage without an inverse, and a state of another model.
@@ -121,11 +119,14 @@ class Inverse:
 
     def _begun(self, dt: float, limits: Limits = None) -> _core.Inverse:
         """Return the inverse in the core, before its first sample."""
-        initial = None if self.initial is None else self.stage._checked(self.initial)._named
-        core = self.stage._core.inverse(dt, offset=self.offset, delay=self.delay, initial=initial)
+        core = self._inverse(dt)
         if limits is not None:
-            core.limit(*limits)
+            core.limit(*number_pair("limits", limits, "V"))
         return core
+
+    def _inverse(self, dt: float) -> _core.Inverse:
+        initial = None if self.initial is None else self.stage._checked(self.initial)._named
+        return self.stage._core.inverse(dt, offset=self.offset, delay=self.delay, initial=initial)
 
     def voltage(
         self,
@@ -163,6 +164,7 @@ class Inverse:
         """
         _check(reference)
         samples = reference.sample(dt) if samples is None else samples
+        expect("samples", samples, SampledReference, "reference.sample(dt)")
         t = samples.t + self.delay
         if self.delay == 0.0:
             x, v, a = samples.x, samples.v, samples.a
@@ -199,8 +201,8 @@ class Inverse:
         _check(reference)
         if reference.period is None:
             raise ParameterError(f"reference ({reference.name}) does not repeat: it has no table")
-        turn = reference.period / positive("dt", dt, "s")
-        if abs(turn - round(turn)) > 1e-6:
+        turn = reference.period / check_dt(dt)
+        if not (turn > 0.5 and abs(turn - np.round(turn)) <= 1e-6):
             raise ParameterError(
                 f"dt is {dt:g} s: expected a whole number of samples in the period, "
                 f"{reference.period:g} s; online playback takes any period"
@@ -240,6 +242,7 @@ class Inverse:
         PlayedVoltage
             Voltage at the samples [V], and how it was computed.
         """
+        dt = check_dt(dt)
         volts = self.voltage(reference, dt, samples=samples, limits=limits)
         period = reference.period
         before = 0 if period is None else self._settled(reference, period)
@@ -256,7 +259,13 @@ class Inverse:
 
     def _settled(self, reference: Reference, period: float) -> int:
         """Periods before the one of the table: `settle`, or those of the smooth start if more."""
-        return max(self.settle, math.ceil(reference.ramp / period - 1e-9))
+        turns = reference.ramp / period
+        if not turns <= MOST_TURNS:
+            raise ParameterError(
+                f"reference ({reference.name}) repeats after {period:g} s: expected {MOST_TURNS} "
+                f"periods at most in its smooth start, {reference.ramp:g} s"
+            )
+        return max(self.settle, math.ceil(turns - 1e-9))
 
     def start(self, dt: float, *, limits: Limits = None) -> InverseSession:
         """Start a session that computes the voltage sample by sample.
@@ -273,14 +282,11 @@ class Inverse:
         InverseSession
             With a state of its own; several sessions are independent.
         """
-        return InverseSession(self, check_dt(dt), limits)
+        return InverseSession(self, dt, limits)
 
 
 def _check(reference: object) -> None:
-    if not isinstance(reference, Reference):
-        raise ParameterError(
-            f"reference is {type(reference).__name__}: expected a Reference, as pt.sine(...)"
-        )
+    expect("reference", reference, Reference, "a Reference, as pt.sine(...)")
 
 
 def _continues(reference: Reference) -> bool:
@@ -311,8 +317,9 @@ class InverseSession:
     """
 
     def __init__(self, inverse: Inverse, dt: float, limits: Limits = None) -> None:
-        self._inverse, self._dt, self._limits = inverse, dt, limits
-        self._core = inverse._begun(dt, limits)
+        expect("inverse", inverse, Inverse, "pt.Inverse")
+        self._inverse, self._dt, self._limits = inverse, check_dt(dt), limits
+        self._core = inverse._begun(self._dt, limits)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _resumed, (self._inverse, self._dt, self._limits, self._core.save())

@@ -38,7 +38,7 @@ def model_named(name: object) -> ModelInfo:
         There is no such model. The message names the one that is probably meant.
     """
     for model in MODELS:
-        if model.name == name:
+        if isinstance(name, str) and model.name == name:
             return model
     expected = ", ".join(repr(model.name) for model in MODELS)
     hint = "" if (near := _meant(name)) is None else f". Did you mean {near!r}?"
@@ -98,6 +98,4 @@ def model_of(stage: object, argument: str = "model") -> ModelInfo:
     """
     if isinstance(stage, Stage):
         return stage.info
-    raise ParameterError(
-        f"{argument} is {type(stage).__name__}: expected a stage, as a pt.DahlStage"
-    )
+    raise ParameterError(f"{argument} is {quoted(stage)}: expected a stage, as a pt.DahlStage")

@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import _core
 from .._core import VirtualStage as CoreStage
-from .._support.arguments import one_or_more_numbers
+from .._support.arguments import expect, hertz, one_or_more_numbers
 from .._support.messages import quoted
 from ..data.dataset import Dataset
 from ..errors import ParameterError
@@ -121,8 +121,7 @@ class VirtualStage:
             ("preconditioning", (Preconditioning, type(None)), "pt.stages.Preconditioning"),
         ):
             value = getattr(self, name)
-            if not isinstance(value, kind):
-                raise ParameterError(f"{name} is {type(value).__name__}: expected {words}")
+            expect(name, value, kind, words)
         object.__setattr__(self, "step", _core.as_number("step", self.step))
         # The core checks the ranges.
         _ = self._core
@@ -357,9 +356,7 @@ def _ringing(stage: Stage, mode: tuple[float, float]) -> Stage:
         changes = {"time_constant": None, **alone}
         changes |= {"frequency": frequency, "damping_ratio": damping_ratio}
     elif {"mass", "damping", "stiffness"} <= set(names):
-        if not (math.isfinite(frequency) and frequency > 0.0):
-            raise ParameterError(f"mode has {frequency:g} Hz: expected a frequency above 0")
-        natural = 2.0 * math.pi * frequency
+        natural = 2.0 * math.pi * hertz("mode[0]", frequency)
         stiffness: float = getattr(stage, "stiffness")  # noqa: B009
         changes = {
             "mass": stiffness / natural**2,

@@ -7,7 +7,9 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from .._support.json_text import parse_json
+from .._support.messages import quoted
 from ..control.controller.controller import Controller
+from ..errors import ParameterError
 from ..stages.apparatus import Amplifier, Preconditioning, Sensor
 from ..stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
 from ..stages.virtual import VirtualStage
@@ -24,6 +26,7 @@ __all__ = ["DT", "LIMITS", "Apparatus", "loop"]
 DT, LIMITS = 0.02, (0.0, 75.0)
 # With the seed of x, y would have the same noise.
 Y_SEEDS = 1 << 32
+TICKS = ("missed_ticks", "most_behind")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,13 +112,23 @@ class Apparatus:
         -------
         Apparatus
             With seed 0.
+
+        Raises
+        ------
+        ParameterError
+            An entry is missing or cannot be used.
         """
-        x, y = (_axis(document[axis]) for axis in "xy")
-        # Documents written before ticks were missed have none.
-        ticks = {key: document[key] for key in ("missed_ticks", "most_behind") if key in document}
-        both = {key: document[key] for key in ("cross_talk", "lag")}
-        stage = XYStage(x=x, y=y, **both, **ticks)
-        return cls(stage=stage, delay=document["delay"], jitter=document["jitter"]).seeded(0)
+        try:
+            x, y = (_axis(document[axis]) for axis in "xy")
+            # Documents written before ticks were missed have none.
+            ticks = {key: document[key] for key in TICKS if key in document}
+            both = {key: document[key] for key in ("cross_talk", "lag")}
+            stage = XYStage(x=x, y=y, **both, **ticks)
+            return cls(stage=stage, delay=document["delay"], jitter=document["jitter"]).seeded(0)
+        except (KeyError, TypeError, IndexError):
+            raise ParameterError(
+                f"document is {quoted(document)}: expected what Apparatus.document returns"
+            ) from None
 
     @classmethod
     def calibrated(cls) -> Apparatus:

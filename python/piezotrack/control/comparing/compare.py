@@ -8,14 +8,12 @@ from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 from ... import _core
-from ..._support.arguments import not_negative
+from ..._support.arguments import not_negative, number_pair, one_of
 from ..._support.arrays import check_dt
-from ..._support.messages import quoted
 from ...errors import ParameterError, PiezotrackError
 from ...identification.fitted.identified_model import IdentifiedModel
 from ...references.reference import Reference
 from ...stages.base import Stage
-from ..controller.controller import number_pair
 from ..laws.laws import chatter_of
 from ..loop.preconditions import check_delay
 from ..loop.tracking import can_be_learnt, feedforward_of, first_counted
@@ -184,12 +182,8 @@ def _references(given: Sequence[Reference] | None) -> list[Reference]:
 
 def _names(controllers: Sequence[str] | None, task: Task) -> list[str]:
     if controllers is not None:
-        for one in controllers:
-            if one not in CONTENDERS:
-                raise ParameterError(
-                    f"controllers has {quoted(one)}: expected some of "
-                    f"{', '.join(map(repr, CONTENDERS))}"
-                )
+        for i, one in enumerate(controllers):
+            one_of(f"controllers[{i}]", one, CONTENDERS)
         if not controllers:
             raise ParameterError("controllers is empty: expected one or more")
         return list(controllers)

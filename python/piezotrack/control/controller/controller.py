@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
 
 from ... import _core
-from ..._support.arguments import TOO_FAR, finite
+from ..._support.arguments import TOO_FAR, expect, number_pair, one_of
 from ..._support.arrays import check_dt
 from ...errors import NumericalError, ParameterError
 from ...identification.fitted.identified_model import IdentifiedModel
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ..loop.stability import LoopReport
     from ..tuning.tuned import Tuned, TuningReport
 
-__all__ = ["Controller", "number_pair"]
+__all__ = ["Controller"]
 
 # The feedback laws.
 Feedback: TypeAlias = (
@@ -114,23 +114,21 @@ class Controller:
 
     def __post_init__(self) -> None:
         dt = check_dt(self.dt)
-        if self.drive_unit not in DRIVE_UNITS:
-            raise ParameterError(f"drive_unit is {self.drive_unit!r}: expected 'V', 'm' or 'N'")
+        one_of("drive_unit", self.drive_unit, DRIVE_UNITS)
         low, high = number_pair("limits", self.limits, self.drive_unit)
         object.__setattr__(self, "limits", (low, high))
-        _check_part("feedforward", self.feedforward, Inverse, "pt.Inverse")
-        _check_part(
+        nothing = type(None)
+        expect("feedforward", self.feedforward, (Inverse, nothing), "pt.Inverse")
+        expect(
             "feedback",
             self.feedback,
-            (Pid, StateSpace, *NAMED_LAWS),
+            (Pid, StateSpace, *NAMED_LAWS, nothing),
             "pt.Pid, pt.control.StateSpace or another law of pt.control",
         )
-        _check_part("repetitive", self.repetitive, Repetitive, "pt.Repetitive")
-        if not isinstance(self.filters, Sequence):
-            raise ParameterError(f"filters is {self.filters!r}: expected a list of filters")
-        for one in self.filters:
-            if not isinstance(one, (LowPass, Notch)):
-                raise ParameterError(f"filters has {one!r}: expected pt.LowPass or pt.Notch")
+        expect("repetitive", self.repetitive, (Repetitive, nothing), "pt.Repetitive")
+        expect("filters", self.filters, Sequence, "a list of filters")
+        for i, one in enumerate(self.filters):
+            expect(f"filters[{i}]", one, (LowPass, Notch), "pt.LowPass or pt.Notch")
         if isinstance(self.feedback, Pid):
             _check_unit("kp", self.feedback.kp, high - low, "Pid", self.drive_unit)
         if isinstance(self.feedback, (DisturbanceObserver, HysteresisObserver)):
@@ -197,10 +195,7 @@ class Controller:
         >>> loop.dt, loop.limits
         (0.005, (0.0, 3.6))
         """
-        if not isinstance(model, IdentifiedModel):
-            raise ParameterError(
-                f"model is {type(model).__name__}: expected what pt.identify or pt.load returns"
-            )
+        expect("model", model, IdentifiedModel, "what pt.identify or pt.load returns")
         return cls(
             dt=_of_record("dt", dt, model.dt),
             limits=_of_record("limits", limits, model.drive_range),
@@ -314,26 +309,8 @@ def _of_record(name: str, given: T | None, known: T | None) -> T:
     return known
 
 
-def _check_part(name: str, part: object, kinds: type | tuple[type, ...], expected: str) -> None:
-    if part is not None and not isinstance(part, kinds):
-        raise ParameterError(f"{name} is {type(part).__name__}: expected {expected}")
-
-
 def _made(kind: type[Controller], settings: dict[str, Any]) -> Controller:
     return kind(**settings)
-
-
-def number_pair(name: str, ends: object, unit: str) -> tuple[float, float]:
-    """Take two finite numbers, the lower one first."""
-    # An array is accepted too.
-    listed = ends.tolist() if hasattr(ends, "tolist") else ends
-    pair = list(listed) if isinstance(listed, Sequence) and not isinstance(listed, str) else []
-    if len(pair) != 2:
-        raise ParameterError(f"{name} are {ends!r}: expected (low, high) in {unit}")
-    low, high = (finite(f"{name}[{i}]", value, unit) for i, value in enumerate(pair))
-    if not low < high:
-        raise ParameterError(f"{name} are ({low:g}, {high:g}) {unit}: expected the lower one first")
-    return low, high
 
 
 def _check_unit(name: str, gain: float, span: float, owner: str, unit: str) -> None:

@@ -7,7 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ... import _core
-from ..._support.arguments import finite
+from ..._support.arguments import expect, finite
 from ..._support.units import shown_unit
 from ...errors import ParameterError
 
@@ -87,6 +87,9 @@ class Session:
     """
 
     def __init__(self, controller: Controller, present: float | None = None) -> None:
+        from .controller import Controller
+
+        expect("controller", controller, Controller, "pt.Controller")
         self._controller = controller
         self._core = controller._core.start(
             None if present is None else _core.as_number("present", present)

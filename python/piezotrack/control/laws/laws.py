@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 
 from ... import _core
-from ..._support.arguments import finite, not_negative, positive
+from ..._support.arguments import expect, finite, not_negative, one_of, positive
 from ...errors import ParameterError
 from .components import Pid
 from .hysteresis_observer import HysteresisObserver
@@ -76,8 +76,7 @@ class LeadLag:
         finite("kp", self.kp, "V/m")
         not_negative("lead", self.lead, "s")
         not_negative("lag", self.lag, "s")
-        if self.method not in ("tustin", "matched"):
-            raise ParameterError(f"method is {self.method!r}: expected 'tustin' or 'matched'")
+        one_of("method", self.method, ("tustin", "matched"))
 
     @property
     def _settings(self) -> tuple[str, list[float]]:
@@ -344,6 +343,9 @@ def chatter(run: Tracking, *, after: float = 0.0) -> Chatter:
     >>> pt.control.chatter(run, after=5.0).rms_change < 1.0
     True
     """
+    from ..loop.tracking import Tracking
+
+    expect("run", run, Tracking, "what pt.track returns")
     after = not_negative("after", after, "s")
     volts = np.asarray(run.voltage)[np.asarray(run.t) >= after]
     if volts.size < 16:

@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ... import _core
-from ..._support.arguments import in_range, not_negative
+from ..._support.arguments import expect, in_range, not_negative
+from ..._support.messages import quoted
 from ...data.dataset import Dataset
-from ...errors import DataError, NumericalError, ParameterError
+from ...errors import DataError, NumericalError, ParameterError, PiezotrackError
 from ...stages.inverse import Inverse
 from ...stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    from ...stages.inverse import Limits
 
     Array = NDArray[np.float64]
     Numbers = tuple[
@@ -80,7 +79,14 @@ class NetworkInverse(Inverse):
     def __post_init__(self) -> None:
         if self.initial is not None:
             raise ParameterError("initial is given: expected none, a network has no stage's state")
-        super().__post_init__()
+        try:
+            super().__post_init__()
+        except (TypeError, ValueError, OverflowError) as error:
+            if isinstance(error, PiezotrackError):
+                raise
+            raise ParameterError(
+                f"numbers is {quoted(self.numbers)}: expected {', '.join(NETWORK)} of a network"
+            ) from None
 
     def __repr__(self) -> str:
         _, _, thresholds, _, biases, *_ = self.numbers
@@ -89,11 +95,8 @@ class NetworkInverse(Inverse):
             f"{self.held_out:.4g} V rms in the part held out>"
         )
 
-    def _begun(self, dt: float, limits: Limits = None) -> _core.Inverse:
-        core = _core.Inverse.network(self.numbers, dt, self.offset, self.delay)
-        if limits is not None:
-            core.limit(*limits)
-        return core
+    def _inverse(self, dt: float) -> _core.Inverse:
+        return _core.Inverse.network(self.numbers, dt, self.offset, self.delay)
 
 
 def train_network(
@@ -151,8 +154,7 @@ def train_network(
     >>> network.held_out < 0.02 * 3.6
     True
     """
-    if not isinstance(record, Dataset):
-        raise ParameterError(f"record is {type(record).__name__}: expected a pt.Dataset")
+    expect("record", record, Dataset, "a pt.Dataset")
     count = _within("units", units, 1, MOST_UNITS)
     memory = _within("plays", plays, 0, MOST_PLAYS)
     share = in_range("held_out", held_out, 0.5, "parts of 1")
@@ -169,6 +171,10 @@ def train_network(
     line = np.polyfit(record.u, record.y, 1)
     offset = float(line[1])
     u, motion = full.u, _motion(full.y - offset, full.dt)
+    if not late < record.duration:
+        raise ParameterError(
+            f"delay is {late:g} s: expected less than the record lasts, {record.duration:g} s"
+        )
     if early := round(late / full.dt):
         # The reading now is the displacement of that much earlier.
         u, motion = u[:-early], motion[early:]

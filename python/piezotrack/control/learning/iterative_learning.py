@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ..._support.arguments import in_range, not_negative, positive
+from ..._support.arguments import in_range, not_negative, one_of, positive
 from ..._support.arrays import real_array
 from ..._support.messages import quoted
 from ...data.dataset import Dataset
@@ -147,8 +147,7 @@ class IterativeLearning:
         noise: float | None = None,
     ) -> None:
         _check_kinds(reference, controller, models)
-        if method not in ("frequency", "lifted"):
-            raise ParameterError(f"method is {quoted(method)}: expected 'frequency' or 'lifted'")
+        one_of("method", method, ("frequency", "lifted"))
         self._reference, self._controller = reference, controller
         self._method: Method = method
         self._noise = None if noise is None else not_negative("noise", noise, "m")

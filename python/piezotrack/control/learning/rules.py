@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 
-from ...errors import ParameterError
+from ... import _core
+from ..._support.arrays import signal_of
+from ...errors import ParameterError, ShapeError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from .plants import LearningPlant
 
@@ -100,6 +102,15 @@ class Rule(Protocol):
 R = TypeVar("R", bound=Rule)
 
 
+def _trial(learnt: ArrayLike, error: ArrayLike, samples: int) -> tuple[Array, Array]:
+    """Check a trial: as many voltages [V] and errors [m] as it has samples, all finite."""
+    trial = signal_of("learnt", learnt), signal_of("error", error)
+    for name, values in zip(("learnt", "error"), trial, strict=True):
+        if values.size != samples:
+            raise ShapeError(f"{name} has {values.size} samples: expected {samples}, as a trial")
+    return trial
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FrequencyRule:
     r"""Update in the frequency domain, of a trial that is one settled period.
@@ -146,7 +157,13 @@ class FrequencyRule:
         -------
         ndarray, shape (n,)
             For the next trial [V], before the limits.
+
+        Raises
+        ------
+        ShapeError, DataError
+            `learnt` or `error` is no trial of this length, or not finite.
         """
+        learnt, error = _trial(learnt, error, self.samples)
         before, wrong = np.fft.rfft(learnt), np.fft.rfft(error)
         return np.fft.irfft(
             self.smoothing * (self.forgetting_factor * before + self.learning * wrong), self.samples
@@ -167,6 +184,7 @@ class FrequencyRule:
         smoothing : ndarray, shape (2 half + 1,)
             Symmetric.
         """
+        half = _core.as_count("half", half)
         if not 1 <= half <= (self.samples - 1) // 2:
             raise ParameterError(
                 f"half is {half}: expected 1 to {(self.samples - 1) // 2}, less than half a period"
@@ -263,8 +281,14 @@ class LiftedRule:
         -------
         ndarray, shape (n,)
             For the next trial [V], before the limits.
+
+        Raises
+        ------
+        ShapeError, DataError
+            `learnt` or `error` is no trial of this length, or not finite.
         """
-        count = learnt.size - self.late
+        count = self.keeping.shape[0]
+        learnt, error = _trial(learnt, error, count + self.late)
         following = self.keeping @ learnt[:count] + self.learning @ error[self.late :]
         # The last voltages show in no reading.
         return np.concatenate([following, np.full(self.late, following[-1])])

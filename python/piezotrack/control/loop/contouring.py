@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ... import _core
-from ..._support.arguments import not_negative
+from ..._support.arguments import not_negative, number_pair
 from ..._support.frames import frame_of
 from ..._support.statistics import ErrorStatistics
 from ..._support.units import drive_word, shown_unit
 from ...errors import ParameterError
 from ...references.xy_reference import XYReference, square_matrix
 from ...stages.xy import XYStage
-from ..controller.controller import Controller, number_pair
+from ..controller.controller import Controller
 from ..plant import reach, resting, voltages_before
 from .preconditions import check_period, check_stable, check_within_reach
 from .tracking import Tracking, collected, feedforward_of
@@ -109,7 +109,9 @@ class Contour:
         ParameterError
             It has fewer than two samples.
         """
-        t, errors = (self.x.fine_t, self.fine_error) if true else (self.t, self.error)
+        t, errors = self.t, self.error
+        if _core.as_truth("true", true):
+            t, errors = self.x.fine_t, self.fine_error
         first = self.settled if start is None else start
         return ErrorStatistics.of(_core.spread(errors[self.x.part(t, first, stop)]))
 

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ... import _core
-from ..._support.arguments import not_negative
+from ..._support.arguments import expect, not_negative
 from ..._support.units import shown_unit
 from ...errors import ParameterError
+from ..controller.controller import Controller
 from ..plant import linearised_plants, plant_of
 
 if TYPE_CHECKING:
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...identification.fitted.identified_model import IdentifiedModel
-    from ..controller.controller import Controller
     from ..plant import Plant
 
     Array = NDArray[np.float64]
@@ -272,6 +272,7 @@ def check_loop(
     >>> report.stable
     True
     """
+    expect("controller", controller, Controller, "pt.Controller")
     more = not_negative("delay", delay, "s")
     plants = linearised_plants(plant_of(stage), controller.limits, more)
     cases = [_check(controller, linear) for linear in plants]

@@ -11,6 +11,7 @@ import numpy as np
 
 from ... import _core
 from ..._support.arguments import not_negative
+from ..._support.arrays import signal_of
 from ..._support.frames import frame_of
 from ..._support.statistics import FIGURES, ErrorStatistics
 from ..._support.units import drive_word, shown_unit
@@ -154,7 +155,7 @@ class Tracking:
             Of that part.
         """
         part = self.part(self.t, start, stop)
-        actual = self.displacement if true else self.measured
+        actual = self.displacement if _core.as_truth("true", true) else self.measured
         # A device may have no reading at a sample.
         read = part & np.isfinite(actual)
         whole = bool(read.sum() == part.sum())
@@ -190,11 +191,12 @@ class Tracking:
         """
         first = self.settled if start is None else not_negative("start", start, "s")
         last = math.inf if stop is None else _core.as_number("stop", stop)
+        t = signal_of("t", t)
         part: NDArray[np.bool_] = (t >= first - 1e-9) & (t < last - 1e-9)
         if part.sum() < 2:
             raise ParameterError(
                 f"start and stop are {first:g} and {last:g} s: expected a part of the run, 0 to "
-                f"{t[-1]:g} s, with two samples"
+                f"{self.t[-1]:g} s, with two samples"
             )
         return part
 

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ... import _core
-from ..._support.arguments import not_negative, positive
+from ..._support.arguments import not_negative, number_pair, positive
 from ..._support.arrays import check_dt
 from ...errors import NumericalError, ParameterError
 from ...identification.fitted.identified_model import IdentifiedModel
-from ..controller.controller import Controller, number_pair
+from ..controller.controller import Controller
 from ..laws.components import StateSpace
 from ..plant import linearised_plants, plant_of
 from .linear_systems import sampled

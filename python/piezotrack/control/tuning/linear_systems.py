@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ... import _core
-from ..._support.arguments import not_negative
+from ..._support.arguments import not_negative, number_pair, one_of
 from ..._support.arrays import check_dt
 from ...errors import ParameterError
 from ...identification.fitted.identified_model import IdentifiedModel
 from ...stages.base import Stage
 from ...stages.virtual import VirtualStage
-from ..controller.controller import Controller, Feedback, number_pair
+from ..controller.controller import Controller, Feedback
 from ..laws.components import Pid, StateSpace
 from ..laws.laws import NAMED_LAWS
 from ..plant import linearised_plants, plant_of
@@ -106,8 +106,7 @@ def _stage(
     if limits is None:
         raise ParameterError("limits are missing: expected (low, high) in V")
     low, high = number_pair("limits", limits, "V")
-    if gain not in CASES:
-        raise ParameterError(f"gain is {gain!r}: expected 'low', 'middle' or 'high'")
+    one_of("gain", gain, CASES)
     plant = plant_of(stage)
     linear = linearised_plants(plant, (low, high), delay)[CASES.index(gain)]
     rows, b, c, d, late = linear.matrices()

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from ... import _core
-from ..._support.arguments import not_negative
+from ..._support.arguments import not_negative, number_pair, one_of
 from ..._support.arrays import check_dt
 from ..._support.messages import quoted
 from ...errors import ParameterError
@@ -17,7 +17,6 @@ from ...references.xy_reference import XYReference
 from ...stages.base import Stage
 from ...stages.inverse import Inverse
 from ...stages.xy import XYStage
-from ..controller.controller import number_pair
 from ..laws.components import LowPass, Notch
 from ..loop.preconditions import check_delay
 from ..plant import Plant, plant_of, voltages_before
@@ -122,12 +121,12 @@ def asked(
     both = stage if isinstance(stage, XYStage) else None
     stages = [stage.x] if both else _stages(stage)
     references = _references(reference, XYReference if both else Reference)
-    _check_word("law", law, LAWS)
+    one_of("law", law, LAWS)
     _check_has_integral_part(law, references)
     _check_kind("margins", margins, Margins)
     _check_kind("spread", spread, Spread)
-    _check_word("figure", figure, tuple(FIGURES))
-    _check_word("error", error, ("measured", "true"))
+    one_of("figure", figure, tuple(FIGURES))
+    one_of("error", error, ("measured", "true"))
     model = stages[0] if isinstance(stages[0], IdentifiedModel) else None
     intervals = _intervals(dt, model)
     unit = model.drive_unit if model is not None else "V"
@@ -235,14 +234,6 @@ def _references(reference: Any, kind: type) -> list[Any]:
             "axis after the other"
         )
     return references
-
-
-def _check_word(name: str, value: Any, known: Collection[str]) -> None:
-    if value not in known:
-        between = ", " if len(known) > 2 else " or "
-        raise ParameterError(
-            f"{name} is {quoted(value)}: expected {between.join(map(repr, known))}"
-        )
 
 
 def _check_has_integral_part(law: str, references: list[Reference]) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, overload
 import numpy as np
 
 from ... import _core
+from ..._support.messages import quoted
 from ..._support.units import shown_unit
 from ...errors import ParameterError
 from ...references.paths import circle
@@ -195,7 +196,9 @@ def schedule(
     (2, (2, 1, 2))
     """
     both = isinstance(stage, XYStage)
-    make: Any = waveform or _waveform(both, centre)
+    make: Any = _waveform(both, centre) if waveform is None else waveform
+    if not callable(make):
+        raise ParameterError(f"waveform is {quoted(waveform)}: expected a function")
     nothing = Pid(kp=1.0, ti=1.0)
     # The grid is checked before anything is searched.
     grid = ScheduledPid(

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..._support.arguments import expect, positive
 from ..._support.plot_style import (
     ACTUAL,
     DESIRED,
@@ -21,13 +22,12 @@ from ..._support.plot_style import (
     whole,
 )
 from ..controller.description import parts_text
+from ..loop.contouring import Contour
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
-
-    from ..loop.contouring import Contour
 
     Array = NDArray[np.float64]
 
@@ -69,6 +69,7 @@ def plot_path(run: Contour, ax: Axes | None = None) -> Axes:
     >>> ax.get_ylabel()
     'y [um]'
     """
+    expect("run", run, Contour, "what pt.contour returns")
     (ax,) = axes_or_new(ax, 1)
     start, part = run.t < run.settled, last_turn(run)
     if start.any():
@@ -109,11 +110,13 @@ def plot_magnified(run: Contour, ax: Axes | None = None, factor: float | None = 
     >>> ax.get_ylabel()
     'y [um]'
     """
+    expect("run", run, Contour, "what pt.contour returns")
     (ax,) = axes_or_new(ax, 1)
     part = last_turn(run)
     if factor is None:
         side = min(float(np.ptp(axis)) for axis in run.path.outline)
         factor = _round_down(SHOWN * side / run.metrics.max_error)
+    factor = positive("factor", factor, "1")
     x, y = run.path.outline
     ax.plot(1e6 * x, 1e6 * y, **{**DESIRED, "label": "path"})
     # The point of the path where the motion should be, and the normal to the left.
@@ -155,6 +158,7 @@ def plot_contour_error(run: Contour, ax: Axes | None = None) -> Axes:
     >>> ax.get_ylabel()
     'contour error [um]'
     """
+    expect("run", run, Contour, "what pt.contour returns")
     (ax,) = axes_or_new(ax, 1)
     part = last_turn(run)
     found = run.metrics

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..._support.arguments import expect
 from ..._support.plot_style import (
     ACTUAL,
     CLIPPED,
@@ -29,13 +30,12 @@ from ..._support.plot_style import (
 )
 from ..._support.units import drive_word, shown_unit
 from ..controller.description import run_text
+from ..loop.tracking import Tracking
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
-
-    from ..loop.tracking import Tracking
 
     Array = NDArray[np.float64]
 
@@ -77,6 +77,7 @@ def plot_motion(run: Tracking, ax: Axes | None = None) -> Axes:
     >>> ax.get_ylabel()
     'displacement [um]'
     """
+    expect("run", run, Tracking, "what pt.track returns")
     (ax,) = axes_or_new(ax, 1)
     kept = thinned(run.fine_displacement)
     ax.plot(run.fine_t[kept], 1e6 * run.fine_displacement[kept], **ACTUAL)
@@ -112,6 +113,7 @@ def plot_error(run: Tracking, ax: Axes | None = None) -> Axes:
     >>> ax.get_ylabel()
     'tracking error [um]'
     """
+    expect("run", run, Tracking, "what pt.track returns")
     (ax,) = axes_or_new(ax, 1)
     ax.plot(run.t, 1e6 * run.error, **{**ERROR, "label": "desired - measured"})
     period = run.reference.period
@@ -154,6 +156,7 @@ def plot_following(run: Tracking, ax: Axes | None = None) -> Axes:
     >>> ax.get_ylabel()
     'measured displacement [um]'
     """
+    expect("run", run, Tracking, "what pt.track returns")
     (ax,) = axes_or_new(ax, 1)
     part = run.t >= run.settled
     ax.plot(1e6 * run.desired[part], 1e6 * run.measured[part], **{**ACTUAL, "label": "measured"})
@@ -191,6 +194,7 @@ def plot_effort(run: Tracking, ax: Axes | None = None) -> Axes:
     >>> ax.get_ylabel()
     'voltage [V]'
     """
+    expect("run", run, Tracking, "what pt.track returns")
     (ax,) = axes_or_new(ax, 1)
     unit, scale = shown_unit(run.controller.drive_unit)
     ax.step(run.t, scale * run.voltage, where="post", **COMMAND)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from ... import _core
-from ..._support.arguments import has_entries
+from ..._support.arguments import expect, has_entries, one_of
 from ..._support.files import picture_files, write_document
 from ...data.dataset import Dataset
 from ...errors import ParameterError
@@ -137,6 +137,8 @@ class Comparison:
         ndarray, shape (n,)
             Displacement with the offset, and the drift, that were scored [m].
         """
+        expect("row", row, ModelScore, "one of the rows")
+        one_of("part", part, ("train", "test"))
         data, score = (self.train, row.train) if part == "train" else (self.test, row.test)
         own = part == "test" and not self.carried
         x: Array = row.fit.simulate(data, offset="own" if own else score.offset).x

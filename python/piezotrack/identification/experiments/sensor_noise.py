@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ... import _core
+from ..._support.arguments import expect
+from ..._support.arrays import real_array
 from ..._support.statistics import ErrorStatistics
 from ...data.dataset import Dataset
 from ...errors import DataError, ParameterError
+from ...stages.virtual import VirtualStage
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
-
-    from ...stages.virtual import VirtualStage
 
     Array = NDArray[np.float64]
 
@@ -88,6 +89,7 @@ class Noise:
         VirtualStage
             The same with this noise, bandwidth and resolution.
         """
+        expect("stage", stage, VirtualStage, "pt.VirtualStage")
         sensor = replace(
             stage.sensor,
             noise=self.noise,
@@ -127,7 +129,7 @@ class Noise:
         ndarray, shape (m,)
             One-sided [m/sqrt(Hz)].
         """
-        dt = self.data.dt
+        frequency, dt = real_array("frequency", frequency), self.data.dt
         r = math.exp(-math.tau * self.bandwidth * dt)
         shape = (1.0 - r * r) / (1.0 + r * r - 2.0 * r * np.cos(math.tau * frequency * dt))
         power = 2.0 * dt * (self.noise**2 * shape + self.resolution**2 / 12.0)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ... import _core
+from ..._support.arguments import expect
 from ..._support.arrays import check_dt, signal_of
 from ..._support.files import write_document
 from ...data.dataset import Dataset
@@ -181,6 +182,7 @@ class IdentifiedModel:
         bool
             Whether window, warm-up and all numbers are the same.
         """
+        expect("data", data, Dataset, "a Dataset")
         return any(one.get("sha256") == data.sha256 for one in self._origins)
 
     def window_on(self, data: Dataset) -> tuple[float, float] | None:
@@ -196,6 +198,7 @@ class IdentifiedModel:
         (float, float) or None
             The window [s] if it overlaps `data`; None otherwise.
         """
+        expect("data", data, Dataset, "a Dataset")
         for one in self._origins:
             window = one.get("window_s")
             same = data.source is not None and one.get("source") == data.source
@@ -299,8 +302,7 @@ class IdentifiedModel:
 
     def _run(self, data: Dataset, history: History | None, initial: StageState | None) -> Response:
         """Response in the window of a record, as it is read but for an offset."""
-        if not isinstance(data, Dataset):
-            raise ParameterError(f"data is {type(data).__name__}: expected a Dataset")
+        expect("data", data, Dataset, "a Dataset")
         if data.drive_unit != (unit := self.drive_unit) and "m" in (unit, data.drive_unit):
             raise ParameterError(
                 f"the drive of the record is in {data.drive_unit}: expected {unit}, as that of the "
@@ -384,6 +386,7 @@ class IdentifiedModel:
         Start
             Its `state` is in equilibrium under the first sample of the drive.
         """
+        expect("data", data, Dataset, "a Dataset")
         history = checked_history(history)
         own = self._own(data)
         known = self.start if own is None else own.start
@@ -418,7 +421,7 @@ class IdentifiedModel:
 
     def _shift(self, data: Dataset, x: Array, offset: float | Literal["own"]) -> float:
         """Offset to add to a simulated displacement [m]."""
-        if offset != "own":
+        if not (isinstance(offset, str) and offset == "own"):
             shift = _core.as_number("offset", offset)
             if not math.isfinite(shift):
                 raise ParameterError(f"offset is {shift}: expected a finite number or 'own'")

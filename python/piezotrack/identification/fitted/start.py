@@ -91,7 +91,7 @@ def checked_history(history: object) -> History | None:
     ParameterError
         There is no such history.
     """
-    if history is None or history in get_args(History):
+    if history is None or (isinstance(history, str) and history in get_args(History)):
         return history  # type: ignore[return-value]
     raise ParameterError(
         f"history is {quoted(history)}: expected 'virgin', 'settled', 'fit', or None for what the "

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from ... import _core
+from ..._support.arguments import expect
 from ...data.dataset import Dataset
 from ...errors import ParameterError
 from ...stages.registry import model_named
+from ..fitted.start import checked_history
 from .problem import question_of
 from .records import Asked
 
@@ -87,13 +89,18 @@ class Objective:
         delay: bool | float | tuple[float, float] | None = None,
         creep: bool | Iterable[float] | None = None,
     ) -> None:
-        if not isinstance(data, Dataset):
-            raise ParameterError(f"data is {type(data).__name__}: expected a Dataset, one record")
+        expect("data", data, Dataset, "a Dataset, one record")
         info = model_named(model)
         if not info.searched:
             raise ParameterError(f"model is {model!r}: expected one that is searched")
         question = question_of(
-            Asked(data=data, offset=offset, history=history, delay=delay, drift=drift),
+            Asked(
+                data=data,
+                offset=_core.as_truth("offset", offset),
+                history=checked_history(history),
+                delay=delay,
+                drift=drift,
+            ),
             info,
             free=free,
             fixed=fixed,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..._support.arguments import expect, finite, positive
 from ..._support.plot_style import (
     ERROR,
     GUIDE,
@@ -26,6 +27,10 @@ from ..._support.plot_style import (
     whole,
 )
 from ..._support.units import best_length_unit, shown_unit
+from ...data.dataset import Dataset
+from ...errors import ParameterError, ShapeError
+from ...stages.base import Response
+from ..fitted.identification import Identification
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,10 +39,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
-    from ...data.dataset import Dataset
-    from ...stages.base import Response
     from ..fitted.fitted_record import FittedRecord
-    from ..fitted.identification import Identification
 
     Array = NDArray[np.float64]
 
@@ -51,6 +53,14 @@ __all__ = [
     "what_was_fitted",
     "what_was_not_fitted",
 ]
+
+
+def _check(data: Dataset, run: Response) -> None:
+    """Check a record and a response, which belong together."""
+    expect("data", data, Dataset, "a Dataset")
+    expect("run", run, Response, "what simulate returns")
+    if run.x.size != data.y.size:
+        raise ShapeError(f"run has {run.x.size} samples: expected {data.y.size}, as the record")
 
 
 def plot_loop(
@@ -85,6 +95,7 @@ def plot_loop(
     >>> ax.get_xlabel(), ax.get_ylabel()
     ('drive [V]', 'displacement [um]')
     """
+    _check(data, run)
     (ax,) = axes_or_new(ax, 1)
     unit, scale = best_length_unit(data.stroke)
     drive, times = shown_unit(data.drive_unit)
@@ -141,6 +152,8 @@ def plot_time(
     >>> below.get_ylabel()
     'error [nm]'
     """
+    _check(data, run)
+    stroke = data.stroke if stroke is None else positive("stroke", stroke, "m")
     above, below = axes_or_new(axes, 2)
     unit, scale = best_length_unit(data.stroke)
     error = data.y - run.x
@@ -152,6 +165,7 @@ def plot_time(
     heading(above, title, 84)
     if fitted_until is not None:
         mark = {**QUIET, "label": "fitted before, predicted after"}
+        fitted_until = finite("fitted_until", fitted_until, "s")
         above.axvline(fitted_until, **mark)
         below.axvline(fitted_until, **QUIET)
     above.margins(x=0.0, y=0.05)
@@ -164,7 +178,7 @@ def plot_time(
     heading(
         below,
         f"error = measured - simulated: rms {fine * rms:.3g} {small} "
-        f"({100 * rms / (stroke or data.stroke):.3g} % of stroke)",
+        f"({100 * rms / stroke:.3g} % of stroke)",
         84,
     )
     below.margins(x=0.0)
@@ -200,15 +214,18 @@ def plot_convergence(
     >>> ax.get_ylabel()
     'best cost, rms [um]'
     """
+    expect("fit", fit, Identification, "what pt.identify returns")
+    if not fit.history.size:
+        raise ParameterError("fit was found by least squares: expected one that was searched")
     (ax,) = axes_or_new(ax, 1)
     # A cost of 0 has no place on a logarithmic scale.
-    finite = np.isfinite(fit.history) & (fit.history > 0.0)
-    iterations = np.arange(fit.history.size)[finite]
+    shown = np.isfinite(fit.history) & (fit.history > 0.0)
+    iterations = np.arange(fit.history.size)[shown]
     one = "swarm" if fit.swarm is not None else "descent"
     best = f"best of {len(fit.runs)} {one}s" if len(fit.runs) > 1 else one
     ax.plot(
         iterations,
-        1e6 * fit.history[finite],
+        1e6 * fit.history[shown],
         color=SIMULATED["color"],
         linewidth=1.4,
         label=f"{best}: {1e6 * fit.history[-1]:.4g} um",
@@ -221,7 +238,7 @@ def plot_convergence(
     if fit.npolish and fit.cost > 0.0:
         least = fit.cost_um if fit.cost_with_priors is None else 1e6 * fit.cost_with_priors
         ax.plot(fit.nit, least, **{**MARKS, "label": f"refined: {least:.4g} um"})
-    if finite.any():
+    if shown.any():
         ax.set_yscale("log")
     ax.set(xlabel="iteration", ylabel="best cost, rms [um]")
     ax.margins(x=0.02)
@@ -230,7 +247,7 @@ def plot_convergence(
         f"{title}: {fit.nit} iterations, {fit.nfev} simulations",
     )
     legend_inside(ax, ncols=2)
-    if finite.any():
+    if shown.any():
         plain_log_ticks(ax)
     return ax
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..._support.arguments import expect
 from ..._support.plot_style import (
     LEVEL,
     MARKS,
@@ -18,12 +19,13 @@ from ..._support.plot_style import (
 )
 from ..._support.units import best_length_unit, drive_text, shown_unit
 from ...errors import ParameterError
+from ..experiments.step_response import StepResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-    from ..experiments.step_response import StepResult, StepTrace
+    from ..experiments.step_response import StepTrace
 
 __all__ = ["plot_spectrum", "plot_step", "plot_step_result"]
 
@@ -205,6 +207,7 @@ def plot_step_result(step: StepResult, fig: Figure | SubFigure | None = None) ->
 
 
 def _trace(step: StepResult) -> StepTrace:
+    expect("step", step, StepResult, "what pt.identify_step returns")
     if step.trace is None:
         raise ParameterError("the readings were entered by hand: expected a record to draw")
     return step.trace
