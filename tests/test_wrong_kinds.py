@@ -140,5 +140,5 @@ def test_a_reference_of_no_function_is_refused_when_it_is_made(motion: Any) -> N
 
 
 def test_a_refusal_quotes_the_value_and_cuts_it() -> None:
-    with pytest.raises(pt.ParameterError, match="controller is 'xxx.*expected pt.Controller"):
+    with pytest.raises(pt.ParameterError, match=r"controller is 'xxx.*expected pt.Controller"):
         pt.check_loop(PLAYS, "x" * 100_000)  # type: ignore[arg-type]

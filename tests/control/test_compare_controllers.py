@@ -203,7 +203,7 @@ def test_the_picture_has_a_mark_for_each_reference() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"controllers": ["pid"]}, "controllers has 'pid'"),
+        ({"controllers": ["pid"]}, r"controllers\[0\] is 'pid'"),
         ({"references": []}, "references is empty"),
         ({"controllers": []}, "controllers is empty"),
         ({"references": ["sine"]}, "references has str"),

@@ -370,14 +370,14 @@ NO_FORM: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
     "name inside": ({}, {"name": "pid"}, "name is 'pid', as functions inside"),
     "name of the harness": ({}, {"name": "check"}, "name is 'check', as a file or function beside"),
     "name of the library": ({}, {"name": "piezotrack"}, "name is 'piezotrack', as a file or"),
-    "form": ({}, {"to": "cobol"}, "to is 'cobol': expected one of 'c99', 'library', 'json', 'fmu'"),
+    "form": ({}, {"to": "cobol"}, "to is 'cobol': expected 'c99', 'library', 'json' or 'fmu'"),
     "float": (
         {"feedback": pt.control.StateSpace([[1e60]], [1.0], [1.0])},
         {"single": True},
         "LAW_A is 1e+60: expected a number that a float can have",
     ),
     "float in JSON": ({}, {"to": "json", "single": True}, "single is True with to='json'"),
-    "motion": ({}, {"reference": 3}, "reference is int: expected a Reference"),
+    "motion": ({}, {"reference": 3}, "reference is 3: expected a Reference"),
     "table and motion": (
         {"feedforward": PLAYS.inverse()},
         {"reference": SINE, "table": [1.0]},

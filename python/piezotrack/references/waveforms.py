@@ -18,7 +18,6 @@ from .._support.arguments import (
     numbers,
     positive,
 )
-from .._support.arrays import check_dt
 from ..errors import ParameterError, ShapeError
 from .motions import Chirp, Cosines, Steps, Triangle, common_period, extremes, schroeder_phases
 from .reference import Reference
@@ -37,6 +36,8 @@ START = 1.0 / 6.0
 MOST_AMPLITUDE = 1e9
 # The longest rise, as a share of the time at a level.
 RISE = 0.2
+# Longest of them [s]: the square of more leaves float64 soon.
+LONGEST_RISE = 1e9
 
 
 def sine(
@@ -214,7 +215,8 @@ def staircase(
     Reference(staircase of 3 levels, 0 to 30 um, 3.4 s)
     """
     dwell = not_negative("dwell", dwell, "s")
-    rise = check_dt(RISE * dwell if rise is None else rise, "rise")
+    rise = in_range("rise", RISE * dwell if rise is None else rise, LONGEST_RISE, "s")
+    rise = positive("rise", rise, "s")
     if (steps is None) == (levels is None):
         raise ParameterError(
             "steps and levels: expected exactly one of them, "
