@@ -42,7 +42,7 @@ def test_controllers_are_compared_and_written() -> None:
     [
         (["--rates", "1,2"], "--rates is '1,2'"),
         (["--rates", "3,2,1"], "in rising order"),
-        (["--controllers", "pid"], "has 'pid'"),
+        (["--controllers", "pid"], "is 'pid'"),
         (["--sensitivity", "0.5"], "is 0.5"),
         (["--seeds", "0"], "seeds is 0: expected 1 to 100"),
     ],

@@ -63,6 +63,12 @@ def test_each_feedback_keeps_the_margins_and_each_step_is_timed() -> None:
         assert 0.0 < row.step_time < 1e-4
 
 
+def test_the_same_comparison_gives_the_same_file() -> None:
+    first, second = (compared(controllers=["inverse", "PID"]).document() for _ in range(2))
+    assert json.dumps(first) == json.dumps(second)
+    assert first["schema_version"] == 1
+
+
 def test_a_loop_with_more_gain_is_worse_and_one_beyond_its_margin_is_unstable() -> None:
     found = compared(controllers=["inverse", "inverse + PID"])
     assert found.variants[:2] == ("as tuned for", "1.3 times the gain")

@@ -178,12 +178,12 @@ class ControllerComparison:
         return comparison_html(self)
 
     def document(self) -> dict[str, Any]:
-        """Content of a JSON file, SI.
+        """Content of a JSON file, SI; the same for the same comparison.
 
         Returns
         -------
         dict
-            Numbers, strings, lists and dicts only.
+            Numbers, strings, lists and dicts only; without the time of a step, which is measured.
         """
         return {
             "format": "piezotrack-controller-comparison",
@@ -192,13 +192,12 @@ class ControllerComparison:
             "references": list(self.references),
             "variants": list(self.variants),
             "seeds": self.seeds,
-            "unit": "errors in m, effort and chatter in V, times in s; null where a loop diverged",
+            "unit": "errors in m, effort and chatter in V; null where a loop diverged",
             "controllers": [
                 {
                     "name": row.name,
                     "sensitivity": row.sensitivity,
                     "gain_margin": _finite_or_none(row.gain_margin),
-                    "step_time": row.step_time,
                     "figures": [
                         [None if one is None else _figures_of(one) for one in variant]
                         for variant in row.cells
