@@ -18,7 +18,7 @@ import traceback
 import unicodedata
 import warnings
 from collections import Counter
-from pathlib import PurePath
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,8 +27,9 @@ import piezotrack as pt
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-    from pathlib import Path
 
+# The folders above it may have its name too, as a checkout often has.
+PACKAGE = Path(pt.__file__).parent
 LONGEST_MESSAGE = 500
 # Of one call [s]: it is asked to stop, has to have done so, and ends the process with a traceback.
 LONG, SLOW, HANG = 2.0, 12.0, 120.0
@@ -253,8 +254,8 @@ def bad_message(text: str) -> list[str]:
 def origin(error: BaseException) -> str:
     """The function of the package in which an exception came up."""
     frames = traceback.extract_tb(error.__traceback__)
-    ours = [f for f in frames if "piezotrack" in PurePath(f.filename).parts]
-    return f"in {PurePath(ours[-1].filename).name}:{ours[-1].name}" if ours else "outside"
+    ours = [f for f in frames if Path(f.filename).is_relative_to(PACKAGE)]
+    return f"in {Path(ours[-1].filename).name}:{ours[-1].name}" if ours else "outside"
 
 
 def not_finite(value: Any, path: str = "", depth: int = 0) -> Iterator[str]:

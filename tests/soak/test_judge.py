@@ -11,7 +11,18 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from soak import NAMES, REFUSED, Script, Tally, judged, literal, not_finite, repeated, table
+from soak import (
+    NAMES,
+    PACKAGE,
+    REFUSED,
+    Script,
+    Tally,
+    judged,
+    literal,
+    not_finite,
+    repeated,
+    table,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -42,6 +53,19 @@ class Panic(BaseException):
 )
 def test_a_fault_is_named(call: Callable[[], object], fault: str) -> None:
     assert judged(call)[0] == [fault]
+
+
+def test_a_fault_of_the_package_is_told_from_one_beside_it() -> None:
+    """Also where the checkout is in a folder of its name, as that of this code pretends to be."""
+    beside: dict[str, Any] = {}
+    exec(
+        compile("def fail(): raise TypeError('x')", "/piezotrack/tests/helpers/x.py", "exec"),
+        beside,
+    )
+    assert judged(beside["fail"])[0] == ["TypeError outside: x"]
+    source = str(PACKAGE / "control" / "controller.py")
+    exec(compile("def fail(): raise TypeError('x')", source, "exec"), beside)
+    assert judged(beside["fail"])[0] == ["TypeError in controller.py:fail: x"]
 
 
 def test_what_may_come_is_no_fault() -> None:
