@@ -22,14 +22,6 @@ def test_an_excerpt_is_in_its_file(path: str, code: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "path", sorted(set(re.findall(r"`((?:rust|python|tests)/[\w./]+)`", PAGE)))
-)
-def test_a_file_that_is_named_is_there(path: str) -> None:
-    if "NAME" not in path:
-        assert (ROOT / path).exists()
-
-
-@pytest.mark.parametrize(
     "trait", sorted(set(re.findall(r"^\| `([\w:]+)(?:<f64>)?` \|", PAGE, re.M)))
 )
 def test_a_trait_has_the_methods_that_the_page_lists(trait: str) -> None:

@@ -162,6 +162,28 @@ def test_the_pages_link_to_what_is_there(page: Path) -> None:
             assert anchor in anchors(there), target
 
 
+# Folders of the repository; what is built, as target/, is not in it.
+FOLDERS = ("benches", "docs", "python", "rust", "tests", ".ci", ".github")
+
+
+def named_paths(page: Path) -> list[str]:
+    """Paths of the repository that a page names in backticks; NAME in one stands for any name."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+    found = re.findall(rf"`((?:{'|'.join(map(re.escape, FOLDERS))})/[\w./*-]+)`", text)
+    return sorted({path.replace("NAME", "*") for path in found})
+
+
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "CONTRIBUTING.md"], ids=lambda page: page.name)
+def test_a_path_that_a_page_names_is_there(page: Path) -> None:
+    assert [path for path in named_paths(page) if not any(ROOT.glob(path.rstrip("/")))] == []
+
+
+def test_the_pages_name_paths(tmp_path: Path) -> None:
+    assert len({path for page in PAGES for path in named_paths(page)}) > 20
+    (tmp_path / "page.md").write_text("`rust/none.rs` and `python/NAME.py`\n```\n`tests/x`\n```\n")
+    assert named_paths(tmp_path / "page.md") == ["python/*.py", "rust/none.rs"]
+
+
 def test_every_page_is_reached_from_the_readme() -> None:
     found = [ROOT / "README.md"]
     for page in found:
