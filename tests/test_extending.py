@@ -7,6 +7,7 @@ import re
 import pytest
 
 from folders import ROOT
+from piezotrack.hardware.addresses import SCHEMES
 
 PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
 EXCERPTS = re.findall(r"^```(?:rust|py) (\S+)\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
@@ -36,3 +37,27 @@ def test_a_trait_has_the_methods_that_the_page_lists(trait: str) -> None:
     found = re.findall(r"^ {4}(?:const|fn) (\w+)", body[1], re.MULTILINE)
     assert re.findall(r"`(\w+)`", row[1]) == found
     assert sum(part.islower() for part in found) <= 4
+
+
+def named_in(section: str) -> str:
+    text = PAGE.partition(f"\n## {section}\n")[2].partition("\n## ")[0]
+    assert text
+    return text
+
+
+def test_the_page_names_the_file_where_a_law_is_a_variant() -> None:
+    section = named_in("A controller")
+    holding = [
+        path.relative_to(ROOT).as_posix()
+        for path in (ROOT / "rust").rglob("*.rs")
+        if re.search(r"^pub enum Law(State)? \{", path.read_text(encoding="utf-8"), re.MULTILINE)
+    ]
+    assert holding
+    assert all(f"`{path}`" in section for path in holding)
+
+
+def test_the_page_names_every_adapter() -> None:
+    section = named_in("A device")
+    for module in SCHEMES.values():
+        name = f"{module.partition('.')[0]}/" if "." in module else f"{module}.py"
+        assert f"`{name}`" in section

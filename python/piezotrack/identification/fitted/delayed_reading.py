@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ... import _core
+from ..._support.arrays import LARGEST
+from ...errors import NumericalError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,10 +36,19 @@ def late_reading(info: ModelInfo, run: Response, delay: float) -> Array:
     Returns
     -------
     ndarray, shape (n,)
-        Displacement [m]; between samples on the cubic through displacements and velocities, of a
-        model found by least squares on straight lines, as in its fit: without modes it has no
-        velocity.
+        Displacement [m], below 1e100 m, as the samples of records are; between samples on the
+        cubic through displacements and velocities, of a model found by least squares on straight
+        lines, as in its fit: without modes it has no velocity.
+
+    Raises
+    ------
+    NumericalError
+        The displacement is larger.
     """
+    if (largest := float(np.abs(run.x).max())) >= LARGEST:
+        raise NumericalError(
+            f"the simulated motion reaches {largest:g} m: check the parameters of the model, in SI"
+        )
     if not delay:
         return run.x
     if not info.searched:

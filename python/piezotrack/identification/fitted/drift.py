@@ -9,6 +9,7 @@ import numpy as np
 
 from ... import _core
 from ..._support.arguments import positive
+from ..._support.arrays import LARGEST, SHORTEST
 from ..._support.json_text import object_of
 from ..._support.messages import quoted
 from ...errors import ParameterError
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 __all__ = ["Drift", "asked_drift", "drift_entry", "drift_of", "drift_of_asked"]
+
+
+# Instants of a record, on any clock [s].
+LATEST = 1e15
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,7 +169,14 @@ def asked_drift(drift: object) -> float | None:
         return None if drift else 0.0
     if drift is None or (isinstance(drift, str) and drift == "auto"):
         return None
-    return positive("drift", drift, "s")
+    return _time_constant("drift", drift)
+
+
+def _time_constant(name: str, value: object) -> float:
+    time = positive(name, value, "s")
+    if time < SHORTEST:
+        raise ParameterError(f"{name} is {time:g} s: expected {SHORTEST:g} s or more")
+    return time
 
 
 def drift_of_asked(drift: object, *, offset: bool, searched: bool) -> float | None:
@@ -248,8 +260,18 @@ def drift_of(entry: Any) -> Drift | None:
         for name in ("amplitude", "begin", "end")
     }
     time = object_of("drift: time", found["time"])
+    for name, most in (("amplitude", LARGEST), ("begin", LATEST), ("end", LATEST)):
+        if not abs(values[name]) < most:
+            raise ParameterError(
+                f"drift: {name} is {values[name]:g}: expected a number below {most:g}"
+            )
+    if values["begin"] > values["end"]:
+        raise ParameterError(
+            f"drift: end is {values['end']:g} s: expected no instant before its begin, "
+            f"{values['begin']:g} s"
+        )
     return Drift(
-        time=positive("drift: time", time["value"], "s"),
+        time=_time_constant("drift: time", time["value"]),
         # Files of before have no such entry.
         time_fitted=time.get("free", True) is True,
         **values,

@@ -274,13 +274,19 @@ def _repeating(model: Any, data: Dataset, state: Any) -> StageState:
     full = data.full
     times, weights = np.array(model.creep_times), np.array(model.creep_weights)
     end = model.simulate(full.u, data.dt, hold=data.hold, initial=state).final
-    kept = np.exp(-data.dt * len(full) / times)
     begun, reached = np.array(state.creep), np.array(end.creep)
-    return _moved(state, weights, (reached - kept * begun) / (1.0 - kept) - begun)
+    with np.errstate(all="ignore"):
+        kept = np.exp(-data.dt * len(full) / times)
+        moved = (reached - kept * begun) / (1.0 - kept) - begun
+    return _moved(state, weights, moved)
 
 
 def _moved(state: Any, weights: Array, moved: Array) -> StageState:
-    """Move the creep of a state, and the displacement with it."""
+    """Move the creep of a state, and the displacement with it.
+
+    What is not finite stays: creep that is slower than the rounding of a record, or has no weight.
+    """
+    moved = np.where(np.isfinite(moved), moved, 0.0)
     creep = tuple((np.array(state.creep) + moved).tolist())
     found: StageState = replace(state, creep=creep, x=state.x + float(weights @ moved))
     return found
@@ -383,13 +389,15 @@ class _Search:
         columns = [np.ones(rest.size)] if self.offset else []
         if used.any():
             t = self.data.dt * np.arange(len(self.data.full))[self.data.warmup :]
-            columns += [np.exp(-t / time) for time in np.array(self.model.creep_times)[used]]
+            with np.errstate(over="ignore"):
+                columns += [np.exp(-t / time) for time in np.array(self.model.creep_times)[used]]
         if columns:
             basis = np.stack(columns, axis=1)
             found = np.linalg.lstsq(basis, rest, rcond=1e-10)[0]
             rest = rest - basis @ found
             if used.any():
                 moved = np.zeros(weights.size)
-                moved[used] = found[-int(used.sum()) :] / weights[used]
+                with np.errstate(over="ignore"):
+                    moved[used] = found[-int(used.sum()) :] / weights[used]
                 start = replace(start, state=_moved(start.state, weights, moved))
         return start, float(np.sqrt(np.mean(rest**2)))
