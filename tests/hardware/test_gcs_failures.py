@@ -98,6 +98,15 @@ def test_a_connection_that_is_closed() -> None:
         ("SPA? 1 0x0E000200", "\x00\xff\n", "expected a parameter above 0"),
         ("TNR?", "0\n", "'TNR?' has the answer '0': expected the number of tables"),
         ("TNR?", "two\n", "'TNR?' has the answer 'two': expected the number of tables"),
+        ("TNR?", "-1\n", "'TNR?' has the answer '-1': expected the number of tables"),
+        ("TNR?", "1_0\n", "expected the number of tables"),
+        ("TNR?", "9" * 1000 + "\n", "expected the number of tables"),
+        ("VMI? 1", "1=1_0\n", "'VMI? 1' has the answer '1=1_0': expected 1=NUMBER"),
+        ("VMI? 1", "1=nan\n", "expected two voltages"),
+        ("VMA? 1", "1=1e400\n", "expected two voltages"),
+        ("VMA? 1", "1=-5\n", "expected two voltages"),
+        ("SPA? 1 0x0E000200", "1 0x0E000200=5_0\n", "expected a parameter above 0"),
+        ("SPA? 1 0x0E000200", "1 0x0E000200=1e-320\n", "expected a parameter above 0"),
         ("PUN? 1", "1=INCH\n", "'PUN? 1' has the answer '1=INCH': expected um, nm or mm"),
     ],
 )
@@ -200,6 +209,7 @@ ROWS = "".join(f"{k} 5 \n" for k in range(9)) + "9 5\n"
         (GOOD + "1 2 \n3 4\n", "expected 2 columns of 10 samples"),
         (GOOD + "1 2 \n3\n", "expected 2 columns of 10 samples"),
         (GOOD + "1 x\n", "expected 2 columns of 10 samples"),
+        (GOOD + ROWS.replace("3 5", "3_0 5"), "expected 2 columns of 10 samples"),
         (GOOD.replace("0.001", "0.002") + ROWS, "says 0.002 s from sample to sample: expected"),
         (GOOD.replace("SAMPLE_TIME=0.00100000", "") + ROWS, "says nan s from sample to sample"),
     ],
@@ -208,6 +218,39 @@ def test_a_record_that_is_none(data: str, words: str) -> None:
     then: dict[str, Said] = {"DRL? 1": "1=10\n", "DRR? 1 10 1 2": data}
     with connected(then) as device, pytest.raises(pt.DeviceError, match=words):
         device.play(np.full(10, 5.0), 1000.0)
+
+
+@pytest.mark.parametrize("count", ["nan", "1_0", "1e400"])
+def test_a_number_of_samples_that_is_none(count: str) -> None:
+    with connected({"DRL? 1": f"1={count}\n"}) as device, pytest.raises(pt.DeviceError) as failure:
+        device.play(np.full(10, 5.0), 1000.0)
+    assert "recorder has nan samples" in str(failure.value) or "1=NUMBER" in str(failure.value)
+
+
+def test_a_code_of_many_digits_is_shortened() -> None:
+    with connected({"ERR?": "1" * 1000 + "\n"}) as device:
+        with pytest.raises(pt.DeviceError, match="expected a code") as failure:
+            device.hold(1.0)
+        assert len(str(failure.value)) < 300
+
+
+@pytest.mark.parametrize(("limit", "factor"), [(74.12345678912345, 1.0), (11.23456785, 7.3)])
+def test_a_voltage_at_a_limit_is_within_it_as_it_is_written(limit: float, factor: float) -> None:
+    sent: list[str] = []
+    there = greeted({})
+
+    def answer(line: str) -> Said:
+        sent.append(line)
+        return there(line)
+
+    with peer(answer) as port:
+        device = GcsDevice("127.0.0.1", port, limits=(-limit, limit), factor=factor, timeout=SOON)
+        for volts in (limit, -limit):
+            device.hold(volts)
+        device.close()
+    values = [float(line.split()[2]) for line in sent if line.startswith("SVA")]
+    assert values == pytest.approx([limit / factor, -limit / factor], rel=1e-8)
+    assert all(abs(value) * factor <= limit for value in values)
 
 
 def test_a_record_that_is_too_short() -> None:

@@ -162,7 +162,13 @@ QUICK = [
     ("scpi measure", "many lines"),
     ("scpi list", "escapes"),
 ]
-ALL = [(work, fault) for work in WORK for fault in FAULTS]
+# An instrument that answers without having read cannot be told from one that has.
+ALL = [
+    (work, fault)
+    for work in WORK
+    for fault in FAULTS
+    if not (work.startswith("scpi") and fault == "drips lines")
+]
 
 
 @pytest.fixture
@@ -181,7 +187,8 @@ def _short(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_it_ends_in_time_in_one_sentence_and_at_rest(work: str, fault: str) -> None:
     done, kind, begin, count = WORK[work]
     there = kind(FAULTS[fault], begin, count)
-    result, failure = None, None
+    result: Any = None
+    failure = None
     with peer(there) as port:
         begun = time.monotonic()
         try:

@@ -6,6 +6,7 @@ import os
 import re
 import socket
 import socketserver
+import struct
 import sys
 import threading
 import time
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-__all__ = ["Lines", "Server", "send"]
+__all__ = ["Lines", "Server"]
 
 # Clients at once; those that are one too many are hung up on.
 CLIENTS = 64
@@ -93,6 +94,7 @@ class Server(socketserver.TCPServer):
     def _serve(self, link: Any, client_address: Any) -> None:
         try:
             link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            link.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _span(PATIENCE))
             self._converse(link)
         except Exception:
             self.handle_error(link, client_address)
@@ -110,11 +112,11 @@ class Server(socketserver.TCPServer):
             super().handle_error(request, client_address)
 
 
-def send(link: socket.socket, answer: bytes) -> None:
-    """Send an answer; OSError where the client does not take it in time."""
-    link.settimeout(PATIENCE)
-    link.sendall(answer)
-    link.settimeout(None)
+def _span(seconds: float) -> bytes:
+    """Write a time as the system has it: an answer that does not leave in it is an OSError."""
+    if os.name == "posix":
+        return struct.pack("ll", int(seconds), 0)
+    return struct.pack("i", int(1e3 * seconds))
 
 
 class Lines:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import PiezotrackError
 from .listening import cannot_listen, checked_port
-from .serving import Lines, Server, send
+from .serving import Lines, Server
 
 if TYPE_CHECKING:
     import socket
@@ -124,7 +124,7 @@ class VirtualScpi:
                     with self._lock:
                         self._error = TOO_MUCH
                 elif (said := self.answer(line.decode("ascii", errors="replace"))) is not None:
-                    send(link, said.encode("ascii") + b"\n")
+                    link.sendall(said.encode("ascii") + b"\n")
 
     def _do(self, message: str) -> str | None:
         """Do one message."""

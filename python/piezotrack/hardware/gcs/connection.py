@@ -63,6 +63,8 @@ class Connection:
         # many have not come.
         self._limit, self._latest, self._due = timeout, 0.0, 0
         self._got = bytearray()
+        # Whether nothing was there a moment ago, so that the next command need not look again.
+        self._is_looked_at = False
         self._connect(timeout)
 
     def ready(self) -> int:
@@ -78,6 +80,7 @@ class Connection:
         if self._socket is None or self._due or not self._is_quiet(self._socket):
             self._drop()
             self._connect(min(self._timeout, UNPROVEN))
+        self._is_looked_at = True
         return self.number
 
     def send(self, *commands: str, samples: int = 0) -> None:
@@ -88,8 +91,9 @@ class Connection:
         DeviceError
             The connection is lost, or something came that was not asked for.
         """
-        link = self._socket
-        if link is None or self._due or not self._is_quiet(link):
+        link, looked_at = self._socket, self._is_looked_at
+        self._is_looked_at = False
+        if link is None or self._due or not (looked_at or self._is_quiet(link)):
             raise self._failed(commands, "cannot be sent: the connection was lost")
         self._due = sum(map(_is_query, commands))
         self._latest = time.monotonic() + self._limit + samples * SAMPLE_TIME

@@ -9,7 +9,7 @@ from ...errors import ParameterError
 from ...stages.virtual import VirtualStage
 from ..limits import ordered
 from ..listening import cannot_listen, checked_port
-from ..serving import Lines, Server, send
+from ..serving import Lines, Server
 from .arguments import Refusal
 from .controller import VirtualController
 from .protocol import ENCODING, GENERATOR, MOVING, READY, STOP, one_answer
@@ -25,6 +25,8 @@ SINGLE = (MOVING + READY + GENERATOR + STOP).encode(ENCODING)
 FASTEST = 1e4
 # Longest command [bytes].
 LONGEST = 65536
+# Characters of answers from which on they go out before the next command is looked at.
+TOGETHER = 65536
 
 
 class GcsServer:
@@ -123,9 +125,10 @@ class GcsServer:
         self.close()
 
     def _converse(self, link: socket.socket) -> None:
-        """Answer a client until it goes, each command before the next is looked at."""
+        """Answer a client until it goes; no more answers are kept than go out together."""
         lines, error = Lines(b"\r\n", LONGEST, SINGLE), 0
         while more := link.recv(65536):
+            answers = ""
             for line in lines.of(more):
                 if line is None:
                     error = 3
@@ -138,5 +141,9 @@ class GcsServer:
                         answer = self._controller.ask(command) or []
                     except Refusal as refusal:
                         answer, error = [], refusal.code
-                if answer:
-                    send(link, one_answer(answer).encode(ENCODING, errors="replace"))
+                answers += one_answer(answer) if answer else ""
+                if len(answers) > TOGETHER:
+                    link.sendall(answers.encode(ENCODING, errors="replace"))
+                    answers = ""
+            if answers:
+                link.sendall(answers.encode(ENCODING, errors="replace"))
