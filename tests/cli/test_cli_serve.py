@@ -37,7 +37,7 @@ def test_it_serves_until_a_signal_ends_it(number: signal.Signals, code: int, wor
         assert log.stroke == pytest.approx(117.76e-6, rel=0.02)
         process.send_signal(number)
         assert process.wait(60.0) == code
-        with pytest.raises(pt.DeviceError, match=r"closed the connection|cannot be sent"):
+        with pytest.raises(pt.DeviceError, match=r"connection|cannot be sent"):
             device.hold(1.0)
         device.close()
         assert process.communicate() == ("", f"piezotrack: {word}\n")

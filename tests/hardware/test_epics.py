@@ -8,7 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -342,3 +342,50 @@ def test_the_command_names_the_extra_where_softioc_is_not_installed(
         "serving EPICS needs softioc, which is not installed: expected pip install "
         "'piezotrack[epics]'"
     )
+
+
+def bound_by(process: int) -> set[tuple[str, str, int]]:
+    """The sockets that a process of Linux has bound: kind, address, port."""
+    folder = Path("/proc", str(process))
+    links = []
+    for one in (folder / "fd").iterdir():
+        with suppress(OSError):
+            links.append(str(one.readlink()))
+    found = set()
+    for kind in ("tcp", "udp", "tcp6", "udp6"):
+        for line in (folder / "net" / kind).read_text().splitlines()[1:]:
+            words = line.split()
+            address, port = words[1].split(":")
+            # Of TCP those that listen.
+            if f"socket:[{words[9]}]" in links and (kind[:3] == "udp" or words[3] == "0A"):
+                host = ".".join(str(one) for one in reversed(bytes.fromhex(address)))
+                found.add((kind, host, int(port, 16)))
+    return found
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+@pytest.mark.parametrize(
+    "given",
+    [
+        {},
+        {"EPICS_CAS_AUTO_BEACON_ADDR_LIST": "NO"},
+        {"EPICS_CAS_BEACON_ADDR_LIST": "127.0.0.1", "EPICS_CAS_INTF_ADDR_LIST": " "},
+    ],
+)
+def test_it_listens_on_this_computer_only_whatever_else_is_said(given: dict[str, str]) -> None:
+    here = environment()
+    # Where the beacons go says nothing on who may connect.
+    here = {name: value for name, value in here.items() if not name.startswith("EPICS_CAS_")}
+    with serving({**here, **given}, PREFIX) as (child, _):
+        bound = bound_by(child.pid)
+    port = int(here["EPICS_CA_SERVER_PORT"])
+    assert ("tcp", "127.0.0.1", port) in bound
+    assert {host for _, host, number in bound if number == port} == {"127.0.0.1"}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_it_listens_where_it_is_told_to() -> None:
+    here = {**environment(), "EPICS_CAS_INTF_ADDR_LIST": "0.0.0.0"}
+    with serving(here, PREFIX) as (child, _):
+        bound = bound_by(child.pid)
+    assert ("tcp", "0.0.0.0", int(here["EPICS_CA_SERVER_PORT"])) in bound

@@ -346,3 +346,52 @@ def test_an_address_says_everything() -> None:
 def test_addresses_that_are_refused(rest: str, sentence: str) -> None:
     with pytest.raises(pt.ParameterError, match=sentence):
         pt.hardware.connect(f"scpi:{rest}")
+
+
+# What a template writes.
+
+
+@pytest.mark.parametrize(
+    ("template", "volts", "is_refused"),
+    [
+        ("VOLT {volts:.0f};:MEAS?", 74.6, True),
+        ("VOLT {volts:.0f};:MEAS?", 74.4, False),
+        ("VOLT {volts:.0f};:MEAS?", 0.1 + 0.2, True),
+        ("VOLT {volts:.2e};:MEAS?", 74.6, False),
+        ("VOLT {volts:.1e};:MEAS?", 74.6, True),
+        ("VOLT {volts:.6f};:MEAS?", 74.6, False),
+        ("VOLT {volts};:MEAS?", 0.1 + 0.2, False),
+    ],
+)
+def test_a_voltage_is_within_the_limits_as_it_is_written(
+    template: str, volts: float, is_refused: bool
+) -> None:
+    with instrument(exchange=template, limits=(0.1 + 0.2, 74.6)) as (device, there):
+        before = there.device.held
+        for call in (device.exchange, device.hold):
+            if is_refused:
+                with pytest.raises(pt.DeviceError, match=re.escape(template[:12])):
+                    call(volts)
+                assert there.device.held == before
+            else:
+                call(volts)
+                assert 0.3 <= there.device.held <= 74.6
+
+
+def test_a_table_is_within_the_limits_as_it_is_written() -> None:
+    rough = {**LIST, "upload": "LIST:VOLT {table:.2f}", "append": "LIST:VOLT:APP {table:.0f}"}
+    buffer = pt.hardware.ScpiBuffer(**rough, chunk=10)
+    with instrument(buffer=buffer, limits=(0.0, 74.6)) as (device, there):
+        device.play(np.linspace(0.0, 74.0, 30), 100.0)
+        there.device.hold(1.0)
+        with pytest.raises(pt.DeviceError, match=r"75 V by 'LIST:VOLT:APP \{table:.0f\}'"):
+            device.play(np.linspace(0.0, 74.6, 30), 100.0)
+        # Nothing of it has been sent.
+        assert there.device.held == 1.0
+        assert device.play(np.full(3, 74.0), 100.0).lost == 0
+
+
+@pytest.mark.parametrize("template", ["VOLT {volts:.0%}", "VOLT {volts:_.1f} {volts:_>9.1f}"])
+def test_a_template_that_writes_no_number_is_refused(template: str) -> None:
+    with pytest.raises(pt.ParameterError, match="exchange is 'VOLT"):
+        pt.hardware.ScpiDevice("127.0.0.1", 1, unit="um", limits=(0.0, 1.0), exchange=template)

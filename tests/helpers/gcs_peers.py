@@ -5,13 +5,20 @@ from __future__ import annotations
 import re
 import socket
 import threading
-from contextlib import contextmanager
+import time
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 import piezotrack as pt
+from piezotrack.hardware.gcs.arguments import Refusal
+from piezotrack.hardware.gcs.controller import VirtualController
+from piezotrack.hardware.gcs.protocol import one_answer
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
+
+    # A whole answer, one in pieces, or None to hang up.
+    Said = str | Iterable[str] | None
 
 LIMITS = (0.0, 75.0)
 
@@ -60,46 +67,123 @@ GREETING = {
 
 
 @contextmanager
-def peer(answer: Callable[[str], str | None]) -> Iterator[int]:
-    """A server for one connection that answers each line by a function; None hangs up."""
+def peer(answer: Callable[[str], Said]) -> Iterator[int]:
+    """A server that answers each line by a function: pieces go out one by one, None hangs up."""
+    ends = threading.Event()
+    connected: list[socket.socket] = []
+    threads: list[threading.Thread] = []
+
+    def accept() -> None:
+        while not ends.is_set():
+            try:
+                connection, _ = listening.accept()
+            except OSError:
+                return
+            connected.append(connection)
+            threads.append(threading.Thread(target=_serve, args=(connection, answer)))
+            threads[-1].start()
+
     with socket.create_server(("127.0.0.1", 0)) as listening:
-        thread = threading.Thread(target=_serve, args=(listening, answer))
-        thread.start()
+        accepting = threading.Thread(target=accept)
+        accepting.start()
         try:
             yield int(listening.getsockname()[1])
         finally:
             # Whoever waits for a connection or for a line goes on.
+            ends.set()
             listening.shutdown(socket.SHUT_RDWR)
-            thread.join()
+            accepting.join()
+            for connection in connected:
+                with suppress(OSError):
+                    connection.shutdown(socket.SHUT_RDWR)
+            for thread in threads:
+                thread.join()
 
 
-def _serve(listening: socket.socket, answer: Callable[[str], str | None]) -> None:
-    try:
-        connection, _ = listening.accept()
-    except OSError:
-        return
-    with connection:
+def _serve(connection: socket.socket, answer: Callable[[str], Said]) -> None:
+    with connection, suppress(OSError):
         connection.settimeout(60.0)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         pending = ""
-        try:
-            while more := connection.recv(65536):
-                pending += more.decode("cp1252")
-                # The state of the generator is asked for by a byte without an end.
-                while found := re.match(r"\x09|[^\n]*\n", pending):
-                    pending = pending[found.end() :]
-                    said = answer(found[0].rstrip("\n"))
-                    if said is None:
-                        return
-                    connection.sendall(said.encode("cp1252"))
-        except OSError:
-            return
+        while more := connection.recv(65536):
+            pending += more.decode("cp1252")
+            # The state of the generator is asked for by a byte without an end.
+            while found := re.match(r"\x09|[^\n]*\n", pending):
+                pending = pending[found.end() :]
+                said = answer(found[0].rstrip("\n"))
+                if said is None:
+                    return
+                for piece in [said] if isinstance(said, str) else said:
+                    connection.sendall(piece.encode("cp1252"))
 
 
-def greeted(then: Mapping[str, str | None]) -> Callable[[str], str | None]:
+def dripping(text: str, pause: float = 0.1) -> Iterator[str]:
+    """Return a text byte by byte, without an end, with pauses [s] below any time limit."""
+    while True:
+        for byte in text:
+            yield byte
+            time.sleep(pause)
+
+
+def greeted(then: Mapping[str, Said]) -> Callable[[str], Said]:
     """Answer as a controller does that is fine, but for some commands."""
 
-    def answer(line: str) -> str | None:
-        known: dict[str, str | None] = {**GREETING, **then}
+    def answer(line: str) -> Said:
+        known: dict[str, Said] = {**GREETING, **then}
         return known.get(line, "0\n" if line == "ERR?" else "")
 
     return answer
+
+
+class Spoilt:
+    """A virtual controller that is well, on a line that is not: a function spoils answers of it.
+
+    Parameters
+    ----------
+    spoil : callable
+        Takes a command and its answer; returns what goes out, or None to hang up.
+    """
+
+    def __init__(self, spoil: Callable[[str, str], Said], speed: float = 100.0) -> None:
+        self.controller = VirtualController(quiet_stage(), LIMITS, speed=speed)
+        self.spoil, self.error = spoil, 0
+        self.lines: list[str] = []
+
+    def __call__(self, line: str) -> Said:
+        self.lines.append(line)
+        said = self._answer(line)
+        return self.spoil(line, said) if said else said
+
+    def _answer(self, line: str) -> str:
+        if line == "ERR?":
+            code, self.error = self.error, 0
+            return f"{code}\n"
+        try:
+            lines = self.controller.ask(line)
+        except Refusal as refusal:
+            self.error = refusal.code
+            return ""
+        return "" if lines is None else one_answer(lines)
+
+    @property
+    def voltage(self) -> float:
+        """Voltage at the output [V]."""
+        (answer,) = self.controller.ask("VOL? 1") or [""]
+        return float(answer.partition("=")[2])
+
+    @property
+    def runs(self) -> bool:
+        """Whether the wave generator runs."""
+        return self.controller.ask("\x09") != ["0x0"]
+
+
+def once(number: int, query: str, spoilt: Callable[[str], Said]) -> Callable[[str, str], Said]:
+    """Spoil the answer to a query when it is asked for the time `number`, which counts from 1."""
+    times = 0
+
+    def spoil(line: str, said: str) -> Said:
+        nonlocal times
+        times += line == query
+        return spoilt(said) if line == query and times == number else said
+
+    return spoil

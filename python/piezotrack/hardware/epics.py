@@ -110,8 +110,10 @@ def serve_epics(
     dispatcher = required_package(
         "softioc.asyncio_dispatcher", "epics", "serving EPICS"
     ).AsyncioDispatcher()
-    if not LOCAL.keys() & os.environ.keys():
-        os.environ.update(LOCAL)
+    for name, value in LOCAL.items():
+        # An empty one means all addresses too.
+        if not os.environ.get(name, "").strip():
+            os.environ[name] = value
     records = _Records(device, prefix, longest, builder, alarm)
     builder.LoadDatabase()
     ioc.iocInit(dispatcher, enable_pva=False)

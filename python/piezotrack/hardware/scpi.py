@@ -15,6 +15,7 @@ from .._support.arrays import signal_of
 from .._support.messages import quoted
 from .._support.units import require
 from ..errors import DeviceError, ParameterError
+from .answers import number, printable, shown
 from .device import Rates, Record
 from .limits import check_within, ordered
 from .options import Options
@@ -34,6 +35,8 @@ EXCHANGE, IDENTIFY = "VOLT {volts:.6f};:MEAS?", "*IDN?"
 # Rates of a play that the computer paces.
 PACED = Rates(lowest=1e-3, highest=1000.0)
 MEMORY, TIMEOUT = 1_000_000, 2.0
+# Share of the range by which a voltage may be beyond the limits as it is written.
+ROUNDING = 1e-9
 FORM = "scpi://HOST:PORT?unit=um&limits=0..75V[&exchange=VOLT {volts:.6f};:MEAS?][&timeout=2s]"
 
 
@@ -172,7 +175,7 @@ class ScpiDevice:
         self._link = Link(host, port, positive("timeout", timeout, "s"))
         self._open, self._voltage = True, math.nan
         try:
-            self._name = self._link.ask(identify) if identify else "instrument"
+            self._name = printable(self._link.ask(identify)) if identify else "instrument"
         except BaseException:
             self._link.close()
             raise
@@ -195,7 +198,7 @@ class ScpiDevice:
     @property
     def channels(self) -> tuple[str, ...]:
         """Name and place of the instrument."""
-        return (f"{self._name[:60]} at {self._link.where}",)
+        return (f"{self._name} at {self._link.where}",)
 
     @property
     def voltage(self) -> float:
@@ -208,7 +211,7 @@ class ScpiDevice:
         NaN where the instrument says overload (9.9e37) or not a number.
         """
         self._check(finite("volts", volts, "V"))
-        message = self._exchange.format(volts=volts)
+        message = self._setting(volts)
         self._voltage = float(volts)
         return self._number(message, self._link.ask(message))
 
@@ -249,8 +252,9 @@ class ScpiDevice:
     def hold(self, volts: float) -> None:
         """Put out a constant voltage [V] from now on; what the sensor says does not matter."""
         self._check(finite("volts", volts, "V"))
+        message = self._setting(volts)
         self._voltage = float(volts)
-        self._link.ask(self._exchange.format(volts=volts))
+        self._link.ask(message)
         self._check_errors()
 
     def close(self) -> None:
@@ -264,17 +268,21 @@ class ScpiDevice:
                 f"the table has {volts.size} samples with its lead-in: {self.channels[0]} holds "
                 f"{buffer.memory}"
             )
-        step = buffer.chunk or volts.size
+        step, messages = buffer.chunk or volts.size, []
         for first in range(0, volts.size, step):
             template = buffer.append if first and buffer.append else buffer.upload
-            self._link.tell(template.format(table=_Table(volts[first : first + step])))
+            table = _Written(volts[first : first + step], ".6f")
+            messages.append(template.format(table=table))
+            self._check_written(template, table)
+        for message in messages:
+            self._link.tell(message)
         self._check_errors()
         self._link.tell(buffer.start.format(rate=rate, dt=1.0 / rate, count=volts.size))
         done = self._link.ask(buffer.done, patience=volts.size / rate)
         if done.lstrip("+") != "1":
             raise self._unexpected(buffer.done, done, "1")
         message = buffer.fetch.format(count=volts.size)
-        answer = self._link.ask(message)
+        answer = self._link.ask(message, readings=volts.size)
         self._check_errors()
         found = answer.split(",")
         if len(found) != volts.size:
@@ -298,9 +306,28 @@ class ScpiDevice:
 
     def _unexpected(self, message: str, answer: str, expected: str) -> DeviceError:
         return DeviceError(
-            f"{self._link.where} answered {quoted(message)} with {quoted(answer)}: expected "
+            f"{self._link.where} answered {quoted(message)} with {shown(answer)}: expected "
             f"{expected}"
         )
+
+    def _setting(self, volts: float) -> str:
+        """Write the message that sets a voltage [V]."""
+        written = _Written(np.array([float(volts)]))
+        message = self._exchange.format(volts=written)
+        self._check_written(self._exchange, written)
+        return message
+
+    def _check_written(self, template: str, written: _Written) -> None:
+        """Refuse what a template rounds to beyond the limits."""
+        low, high = self._limits
+        room = ROUNDING * (high - low)
+        sent = np.array(written.written)
+        beyond = np.flatnonzero(~((sent >= low - room) & (sent <= high + room)))
+        if beyond.size:
+            raise DeviceError(
+                f"volts is written as {sent[beyond[0]]:g} V by {quoted(template)}: "
+                f"{self._link.where} puts out {low:g} to {high:g} V"
+            )
 
     def _check(self, volts: ArrayLike) -> None:
         if not self._open:
@@ -308,21 +335,29 @@ class ScpiDevice:
         check_within(volts, self._limits, self._link.where)
 
 
-class _Table:
-    """Voltages that a format writes one by one."""
+class _Written:
+    """Voltages [V] that a template writes one by one, and what it has written."""
 
-    def __init__(self, volts: Array) -> None:
-        self._volts = volts
+    def __init__(self, volts: Array, usual: str = "") -> None:
+        self._volts, self._usual = volts, usual
+        self.written: list[float] = []
 
     def __format__(self, spec: str) -> str:
-        return ",".join(format(one, spec or ".6f") for one in self._volts.tolist())
+        texts = [format(one, spec or self._usual) for one in self._volts.tolist()]
+        self.written += map(number, texts)
+        return ",".join(texts)
+
+    def __str__(self) -> str:
+        return format(self, "")
+
+    __repr__ = __str__
 
 
 def _check_template(name: str, template: str, *allowed: str, needed: str | None = None) -> None:
     """Refuse a template with a field that it cannot have, or without the one that it needs."""
     known = (*allowed, needed) if needed else allowed
     values: dict[str, object] = dict.fromkeys(known, 1.0)
-    values |= {"table": _Table(np.zeros(1)), "count": 1}
+    values |= {"volts": _Written(np.ones(1)), "table": _Written(np.ones(1), ".6f"), "count": 1}
     problem = ""
     try:
         fields = [field for _, field, _, _ in Formatter().parse(template) if field is not None]

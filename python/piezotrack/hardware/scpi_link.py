@@ -9,13 +9,12 @@ import time
 from .._support.messages import quoted
 from .._support.units import Unit, lookup
 from ..errors import DeviceError
+from .answers import number, shown
 
 __all__ = ["Link", "number_of"]
 
-# Longest answer [bytes]: a million numbers.
-LONGEST = 20_000_000
-# IEEE 488.2 and SCPI write infinity as 9.9e37 and not-a-number as 9.91e37.
-OVERLOAD = 9.9e37
+# Longest answer, and what readings add to it [bytes].
+LONGEST, READING = 1_000_000, 40
 NO_NUMBER = ("NAN", "INF", "+INF", "-INF", "NINF")
 _ANSWER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s.+-]*)")
 
@@ -47,8 +46,17 @@ class Link:
         """Send a message that has no answer."""
         self._send(self._ready(), message)
 
-    def ask(self, message: str, *, patience: float = 0.0) -> str:
+    def ask(self, message: str, *, patience: float = 0.0, readings: int = 0) -> str:
         """Send a message and return its answer, which is one line.
+
+        Parameters
+        ----------
+        message : str
+            The message.
+        patience : float, optional
+            How much longer than its time limit it may take [s].
+        readings : int, optional
+            How many readings the answer may have.
 
         Raises
         ------
@@ -58,13 +66,14 @@ class Link:
         link = self._ready()
         try:
             self._send(link, message)
-            return self._answer(link, message, self._timeout + patience)
+            longest = LONGEST + readings * READING
+            return self._answer(link, message, self._timeout + patience, longest)
         except KeyboardInterrupt:
             # Its answer may still come, and the output is to be led to a safe voltage.
             self.close()
             raise
 
-    def _answer(self, link: socket.socket, message: str, limit: float) -> str:
+    def _answer(self, link: socket.socket, message: str, limit: float, longest: int) -> str:
         parts: list[bytes] = []
         end, length = time.monotonic() + limit, 0
         while True:
@@ -81,14 +90,14 @@ class Link:
             length += len(part)
             if b"\n" in part:
                 break
-            if length > LONGEST:
-                raise self._failed(message, b"".join(parts), f"in {LONGEST} bytes")
+            if length > longest:
+                raise self._failed(message, b"".join(parts), f"in {longest} bytes")
         line, _, more = b"".join(parts).partition(b"\n")
         if more:
             self.close()
             raise DeviceError(
-                f"{self.where} answered {quoted(message)} with {quoted(_text(line))} and then "
-                f"{quoted(_text(more))}: expected one line"
+                f"{self.where} answered {quoted(message)} with {shown(_text(line))} and then "
+                f"{shown(_text(more))}: expected one line"
             )
         return _text(line).strip()
 
@@ -126,7 +135,7 @@ class Link:
         self.close()
         if unasked:
             raise DeviceError(
-                f"{self.where} sent {quoted(_text(unasked))} unasked: expected answers only"
+                f"{self.where} sent {shown(_text(unasked))} unasked: expected answers only"
             )
         # It closed the connection while nothing was asked.
         return self._open()
@@ -140,11 +149,15 @@ class Link:
             raise DeviceError(
                 f"{self.where} did not take {quoted(message)}: {error.strerror or error}"
             ) from None
+        except BaseException:
+            # Half a message may be out, to which the next one would be added.
+            self.close()
+            raise
 
     def _failed(self, message: str, got: bytes, why: str) -> DeviceError:
         self.close()
         if got:
-            said = f"answered {quoted(message)} with {quoted(_text(got))}, no end of line"
+            said = f"answered {quoted(message)} with {shown(_text(got))}, no end of line"
             return DeviceError(f"{self.where} {said} {why}: expected a whole line")
         return DeviceError(f"{self.where} did not answer {quoted(message)} {why}")
 
@@ -173,5 +186,4 @@ def number_of(answer: str, unit: Unit) -> float:
     match = _ANSWER.fullmatch(text)
     if match is None or (match[2] and lookup(match[2]) != unit):
         raise ValueError(answer)
-    number = float(match[1])
-    return float("nan") if abs(number) >= OVERLOAD else number * unit.factor / unit.divisor
+    return number(match[1]) * unit.factor / unit.divisor

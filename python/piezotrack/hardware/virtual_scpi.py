@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import socket
 import threading
 from typing import TYPE_CHECKING
 
@@ -11,17 +10,24 @@ import numpy as np
 
 from ..errors import PiezotrackError
 from .listening import cannot_listen, checked_port
+from .serving import Lines, Server
 
 if TYPE_CHECKING:
+    import socket
     from types import TracebackType
+
+    from numpy.typing import NDArray
 
     from .virtual import VirtualDevice
 
+    Array = NDArray[np.float64]
+
 __all__ = ["VirtualScpi"]
 
-# How often it looks whether it should end, and how long a long answer may take to leave [s].
-GLANCE, PATIENCE = 0.2, 10.0
+# Longest line [bytes] and list [voltages], most messages in a line, longest answer [bytes].
+LINE, LIST, MESSAGES, ANSWER = 1_000_000, 1_000_000, 1000, 20_000_000
 NO_ERROR, UNKNOWN, RANGE = '0,"No error"', '-113,"Undefined header"', '-222,"Data out of range"'
+TOO_MUCH, DEADLOCKED = '-223,"Too much data"', '-430,"Query DEADLOCKED"'
 
 
 class VirtualScpi:
@@ -29,7 +35,8 @@ class VirtualScpi:
 
     It knows ``*IDN?``, ``*OPC?``, ``SYST:ERR?``, ``VOLT 12.5``, ``VOLT?``, ``MEAS?`` [um],
     ``LIST:VOLT 0,1,2``, ``LIST:VOLT:APP 3,4``, ``LIST:RATE 1000``, ``INIT`` and ``FETC?`` [um];
-    several in a line are separated by ``;`` or ``;:``.
+    several in a line are separated by ``;`` or ``;:``. A line has up to 1 MB, a list a million
+    voltages, sent in parts; up to 64 clients may be connected.
 
     Parameters
     ----------
@@ -56,28 +63,25 @@ class VirtualScpi:
     def __init__(self, device: VirtualDevice, *, host: str = "127.0.0.1", port: int = 0) -> None:
         self.device = device
         self._place = host, checked_port(port)
-        self._list: list[float] = []
+        self._list: list[Array] = []
         self._rate, self._fetched, self._error = 1000.0, "", NO_ERROR
-        self._lock, self._ends = threading.Lock(), threading.Event()
-        self._listener: socket.socket | None = None
-        self._threads: list[threading.Thread] = []
+        self._lock = threading.Lock()
+        self._server: Server | None = None
 
     @property
     def address(self) -> tuple[str, int]:
         """Host and port."""
-        if self._listener is None:
+        if self._server is None:
             return self._place
-        host, port = self._listener.getsockname()[:2]
-        return host, port
+        host, port = self._server.server_address[:2]
+        return str(host), port
 
     def __enter__(self) -> VirtualScpi:
         """Listen, in the background."""
         try:
-            self._listener = socket.create_server(self._place)
+            self._server = Server(self._place, self._converse)
         except OSError as error:
             raise cannot_listen(*self._place, error) from None
-        self._listener.settimeout(GLANCE)
-        self._begin(threading.Thread(target=self._accept, args=(self._listener,), daemon=True))
         return self
 
     def __exit__(
@@ -87,58 +91,40 @@ class VirtualScpi:
         trace: TracebackType | None,
     ) -> None:
         """End all connections."""
-        self._ends.set()
-        for thread in self._threads:
-            thread.join()
-        if self._listener is not None:
-            self._listener.close()
-            self._listener = None
+        if self._server is not None:
+            self._server.end()
+            self._server = None
 
     def serve(self) -> None:
         """Listen until Ctrl-C."""
         with self:
-            self._ends.wait()
+            threading.Event().wait()
 
     def answer(self, line: str) -> str | None:
         """Do the messages of a line and return their answers, or None where there are none."""
+        messages = [one.strip().lstrip(":") for one in line.split(";") if one.strip()]
+        said: list[str] = []
         with self._lock:
-            answers = [self._do(one.strip().lstrip(":")) for one in line.split(";") if one.strip()]
-        said = [one for one in answers if one is not None]
+            if len(messages) > MESSAGES:
+                self._error = TOO_MUCH
+                return None
+            for message in messages:
+                if (answer := self._do(message)) is not None:
+                    said.append(answer)
+                if sum(map(len, said)) > ANSWER:
+                    self._error = DEADLOCKED
+                    return None
         return ";".join(said) if said else None
 
-    def _begin(self, thread: threading.Thread) -> None:
-        self._threads.append(thread)
-        thread.start()
-
-    def _accept(self, listener: socket.socket) -> None:
-        while not self._ends.is_set():
-            try:
-                link, _ = listener.accept()
-            except TimeoutError:
-                continue
-            self._begin(threading.Thread(target=self._converse, args=(link,), daemon=True))
-
     def _converse(self, link: socket.socket) -> None:
-        link.settimeout(GLANCE)
-        link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        rest = b""
-        with link:
-            while not self._ends.is_set():
-                try:
-                    part = link.recv(65536)
-                    if not part:
-                        return
-                    *lines, rest = (rest + part).split(b"\n")
-                    for line in lines:
-                        said = self.answer(line.decode("ascii", errors="replace"))
-                        if said is not None:
-                            link.settimeout(PATIENCE)
-                            link.sendall(said.encode("ascii") + b"\n")
-                            link.settimeout(GLANCE)
-                except TimeoutError:
-                    continue
-                except OSError:
-                    return
+        lines = Lines(b"\n", LINE)
+        while more := link.recv(65536):
+            for line in lines.of(more):
+                if line is None:
+                    with self._lock:
+                        self._error = TOO_MUCH
+                elif (said := self.answer(line.decode("ascii", errors="replace"))) is not None:
+                    link.sendall(said.encode("ascii") + b"\n")
 
     def _do(self, message: str) -> str | None:
         """Do one message."""
@@ -173,14 +159,17 @@ class VirtualScpi:
     def _command(self, head: str, rest: str) -> None:
         if head == "VOLT":
             self.device.hold(float(rest))
-        elif head == "LIST:VOLT":
-            self._list = [float(one) for one in rest.split(",")]
-        elif head == "LIST:VOLT:APP":
-            self._list += [float(one) for one in rest.split(",")]
+        elif head in ("LIST:VOLT", "LIST:VOLT:APP"):
+            before = self._list if head.endswith("APP") else []
+            part = np.array([float(one) for one in rest.split(",")])
+            if sum(one.size for one in before) + part.size > LIST:
+                self._error = TOO_MUCH
+            else:
+                self._list = [*before, part]
         elif head == "LIST:RATE":
             self._rate = float(rest)
         elif head == "INIT":
-            record = self.device.play(np.array(self._list), self._rate)
+            record = self.device.play(np.concatenate([np.empty(0), *self._list]), self._rate)
             self._fetched = ",".join(_micrometres(one) for one in record.displacement.tolist())
         elif head not in ("*RST", "*CLS"):
             self._error = UNKNOWN

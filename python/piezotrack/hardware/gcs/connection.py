@@ -1,13 +1,15 @@
-"""The line to a controller: commands over TCP, each wait with its limit."""
+"""The line to a controller: commands over TCP, each answer within its limits."""
 
 from __future__ import annotations
 
+import re
 import socket
 import time
 from typing import TYPE_CHECKING
 
 from ..._support.messages import quoted
 from ...errors import DeviceError
+from ..answers import shown
 from .protocol import ENCODING, STOP, is_last, words_of
 
 if TYPE_CHECKING:
@@ -16,16 +18,20 @@ if TYPE_CHECKING:
 __all__ = ["Connection"]
 
 CHUNK = 65536
-# Longest answer [bytes]: a whole data recorder is less.
-LONGEST = 64 * 1024 * 1024
-# Silence after which no answer is expected any more [s].
-QUIET = 0.2
+# Longest answer [bytes, lines], and what samples of a data recorder add to it [bytes, s]: a serial
+# line behind a converter takes some 2 ms for a sample.
+BYTES, LINES = 1_000_000, 10_000
+SAMPLE_BYTES, SAMPLE_TIME = 100, 2e-3
+# Longest wait on a connection that was made anew, until it has brought an answer [s].
+UNPROVEN = 2.0
+_CODE = re.compile(r"[+-]?[0-9]{1,9}")
 
 
 class Connection:
     """A connection to one controller.
 
-    After a failure it is closed: a late answer would be taken for the next one.
+    After a failure, or an interruption while an answer was due, it is given up: a late answer would
+    be taken for the next one. `ready` makes it anew.
 
     Parameters
     ----------
@@ -34,7 +40,12 @@ class Connection:
     port : int
         TCP port.
     timeout : float
-        Longest wait for a connection, and for each part of an answer [s].
+        Longest wait for a connection, and for a whole answer [s].
+
+    Attributes
+    ----------
+    number : int
+        How many times it was made.
 
     Raises
     ------
@@ -44,39 +55,76 @@ class Connection:
 
     def __init__(self, host: str, port: int, timeout: float) -> None:
         self.name = f"gcs://{host}:{port}"
-        self._timeout = timeout
+        self.number = 0
+        self._place, self._timeout = (host, port), timeout
+        self._socket: socket.socket | None = None
+        self._is_closed = False
+        # Longest wait for an answer at present, the latest moment of that which is due [s], and how
+        # many have not come.
+        self._limit, self._latest, self._due = timeout, 0.0, 0
         self._got = bytearray()
-        # Answers that have not come: the query was refused, or nobody waited to the end.
-        self._due = 0
-        self._lost = ""
-        try:
-            self._socket = socket.create_connection((host, port), timeout)
-            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        except OSError as error:
-            raise DeviceError(f"{self.name}: nobody answers: {_reason(error)}") from None
+        # Whether nothing was there a moment ago, so that the next command need not look again.
+        self._is_looked_at = False
+        self._connect(timeout)
 
-    def send(self, *commands: str) -> None:
-        """Send commands in one message, without a wait for anything."""
-        self._still_there(commands)
+    def ready(self) -> int:
+        """Make the connection anew where it was given up or ended; return its number.
+
+        Raises
+        ------
+        DeviceError
+            Nobody answers, something came that was not asked for, or it is closed.
+        """
+        if self._is_closed:
+            raise DeviceError(f"{self.name} is closed")
+        if self._socket is None or self._due or not self._is_quiet(self._socket):
+            self._drop()
+            self._connect(min(self._timeout, UNPROVEN))
+        self._is_looked_at = True
+        return self.number
+
+    def send(self, *commands: str, samples: int = 0) -> None:
+        """Send commands in one message, without a wait for anything.
+
+        Raises
+        ------
+        DeviceError
+            The connection is lost, or something came that was not asked for.
+        """
+        link, looked_at = self._socket, self._is_looked_at
+        self._is_looked_at = False
+        if link is None or self._due or not (looked_at or self._is_quiet(link)):
+            raise self._failed(commands, "cannot be sent: the connection was lost")
+        self._due = sum(map(_is_query, commands))
+        self._latest = time.monotonic() + self._limit + samples * SAMPLE_TIME
         try:
-            if self._due:
-                self._forget()
-            self._due = sum(map(_is_query, commands))
-            self._socket.sendall("".join(map(_line, commands)).encode(ENCODING))
+            link.settimeout(self._limit)
+            link.sendall("".join(map(_line, commands)).encode(ENCODING))
         except OSError as error:
             raise self._failed(commands, f"cannot be sent: {_reason(error)}") from None
+        except BaseException:
+            # Half a command may be out.
+            self._drop()
+            raise
 
-    def ask(self, command: str) -> list[str]:
+    def ask(self, command: str, *, samples: int = 0) -> list[str]:
         """Send a query and return the lines of its answer.
+
+        Parameters
+        ----------
+        command : str
+            The query.
+        samples : int, optional
+            How many samples of the data recorder the answer may have.
 
         Raises
         ------
         DeviceError
             The controller refuses it, answers half or not at all, or the connection is lost.
         """
-        self.send(command)
+        self.send(command, samples=samples)
         try:
-            return self.answer(command)
+            return self.answer(command, samples=samples)
         except _NoAnswerError:
             # A query that is refused has no answer. Why, ERR? says.
             self._due = 0
@@ -87,20 +135,21 @@ class Connection:
                 raise self._failed([command], str(error)) from None
             if code := _code(lines):
                 raise self._refused(command, code) from None
-            said = f"was not answered, and ERR? then with {quoted(' '.join(lines))}"
-            raise self._failed([command], said) from None
+            told = f"was not answered, and ERR? then with {shown(' '.join(lines))}"
+            raise self._failed([command], told) from None
 
-    def exchange(self, command: str, query: str) -> list[str]:
-        """Send a query, a command and ERR? in one message; return the answer to the query."""
-        self.send(query, command, "ERR?")
+    def exchange(self, query: str, *commands: str) -> list[str]:
+        """Send a query, commands and ERR? in one message; return the answer to the query."""
+        self.send(query, *commands, "ERR?")
         try:
             lines = self.answer(query)
             if len(lines) == 1 and "=" not in lines[0] and (code := _code(lines)):
                 # Only ERR? has answered: the query is refused.
+                self._due = 0
                 raise self._refused(query, code)
-            self._no_error(command)
+            self._no_error(commands)
         except _NoAnswerError as error:
-            raise self._failed([query, command], str(error)) from None
+            raise self._failed([query, *commands], str(error)) from None
         return lines
 
     def command(self, *commands: str) -> None:
@@ -113,103 +162,128 @@ class Connection:
         """
         self.send(*commands, "ERR?")
         try:
-            self._no_error("; ".join(commands))
+            self._no_error(commands)
         except _NoAnswerError as error:
             raise self._failed([*commands, "ERR?"], str(error)) from None
 
-    def answer(self, *asked: str) -> list[str]:
+    def answer(self, *asked: str, samples: int = 0) -> list[str]:
         """Return the lines of the next answer, without the spaces that join them."""
         lines: list[str] = []
-        size = 0
+        room, most = BYTES + samples * SAMPLE_BYTES, LINES + samples
         while not lines or not is_last(lines[-1]):
-            line = self._next_line(asked, len(lines))
-            size += len(line) + 1
-            if size > LONGEST:
-                raise self._failed(asked, f"has an answer of more than {LONGEST} bytes")
+            if len(lines) == most:
+                raise self._failed(asked, f"has an answer of more than {most} lines")
+            line = self._next_line(asked, len(lines), room)
+            room -= len(line) + 1
             lines.append(line)
         self._due -= 1
-        return [line.rstrip(" ") for line in lines]
+        lines = [line.rstrip(" ") for line in lines]
+        if self._got and not self._due:
+            told, more = shown("\n".join(lines[:3])), shown(self._rest())
+            raise self._failed(asked, f"has the answer {told} and then {more}: expected no more")
+        self._limit = self._timeout
+        return lines
 
     def unexpected(self, asked: str, lines: Sequence[str], expected: str) -> DeviceError:
-        """Return the error of an answer that is of another kind."""
-        shown = quoted("\n".join(lines))
-        return DeviceError(
-            f"{self.name}: {_shown(asked)} has the answer {shown}: expected {expected}"
-        )
+        """Return the error of an answer that is of another kind: that to another query, perhaps."""
+        told = shown("\n".join(lines[:3]))
+        return self._failed([asked], f"has the answer {told}: expected {expected}")
 
     def close(self) -> None:
-        """Close it."""
-        self._lost = self._lost or "it is closed"
-        self._socket.close()
+        """Close it for good."""
+        self._is_closed = True
+        self._drop()
 
-    def _forget(self) -> None:
-        """Leave out answers that still come, and end what may have been sent by half."""
-        self._socket.sendall(b"\nERR?\n")
-        self._socket.settimeout(QUIET)
+    def _connect(self, limit: float) -> None:
         try:
-            while self._socket.recv(CHUNK):
-                pass
-        except TimeoutError:
-            self._got.clear()
-        self._socket.settimeout(self._timeout)
+            self._socket = socket.create_connection(self._place, limit)
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        except OSError as error:
+            raise self._failed((), f"nobody answers: {_reason(error)}") from None
+        self.number += 1
+        self._limit, self._due = limit, 0
+        self._got.clear()
 
-    def _next_line(self, asked: Sequence[str], before: int) -> str:
-        latest = time.monotonic() + self._timeout
-        while (end := self._got.find(b"\n")) < 0:
-            left = latest - time.monotonic()
+    def _drop(self) -> None:
+        link, self._socket = self._socket, None
+        if link is not None:
+            link.close()
+
+    def _is_quiet(self, link: socket.socket) -> bool:
+        """Return whether a connection is there on which nothing has come; fail where it has."""
+        unasked = self._rest()
+        try:
+            link.setblocking(False)
+            unasked += link.recv(CHUNK).decode(ENCODING, errors="replace")
+        except BlockingIOError:
+            if not unasked:
+                return True
+        except OSError:
+            return False
+        if unasked:
+            raise self._failed((), f"sent {shown(unasked)} unasked: expected answers only")
+        return False
+
+    def _next_line(self, asked: Sequence[str], before: int, room: int) -> str:
+        link = self._socket
+        if link is None:
+            raise self._failed(asked, "has no answer: the connection was lost")
+        # For a long answer silence is the end too, well before its last moment.
+        searched, silent = 0, time.monotonic() + self._limit
+        while (end := self._got.find(b"\n", searched)) < 0:
+            searched = len(self._got)
+            if searched > room:
+                break
+            left = min(silent, self._latest) - time.monotonic()
             try:
-                self._socket.settimeout(max(left, 1e-3))
-                more = self._socket.recv(CHUNK)
+                link.settimeout(max(left, 1e-3))
+                more = link.recv(CHUNK)
             except TimeoutError:
-                more = b""
-                if left > 0.0:
-                    continue
+                self._check_whole(asked, before)
+                raise _NoAnswerError(f"was not answered in {self._limit:g} s") from None
             except OSError as error:
                 raise self._failed(asked, f"has no answer: {_reason(error)}") from None
-            else:
-                if not more:
-                    raise self._failed(asked, f"has no answer: {self._rest(before)}{HUNG_UP}")
             if not more:
-                if self._got or before:
-                    half = f"is answered by half, {self._rest(before)}and then by nothing in "
-                    raise self._failed(asked, f"{half}{self._timeout:g} s")
-                raise _NoAnswerError(f"was not answered in {self._timeout:g} s")
-            if len(self._got) > LONGEST:
-                raise self._failed(asked, f"has a line of more than {LONGEST} bytes")
-            # Each part that comes begins the wait anew.
-            latest = time.monotonic() + self._timeout
+                half = f"{self._half(before)}, " if self._got or before else ""
+                raise self._failed(asked, f"has no answer: {half}{HUNG_UP}")
             self._got += more
+            silent = time.monotonic() + self._limit
+            if left < 0.0 and b"\n" not in more:
+                self._check_whole(asked, before)
+        if not 0 <= end <= room:
+            raise self._failed(asked, "has an answer that is too long")
         line = bytes(self._got[:end])
         del self._got[: end + 1]
         return line.decode(ENCODING, errors="replace").rstrip("\r")
 
-    def _rest(self, before: int) -> str:
-        said = f"{before} lines and " if before else ""
-        rest = self._got.decode(ENCODING, errors="replace")
-        return f"{said}{quoted(rest)}, " if rest or before else ""
+    def _check_whole(self, asked: Sequence[str], before: int) -> None:
+        """Fail where a part of an answer has come in the time for the whole."""
+        if self._got or before:
+            half = f"is answered by half, {self._half(before)}, and by no more in time"
+            raise self._failed(asked, half) from None
 
-    def _no_error(self, asked: str) -> None:
+    def _rest(self) -> str:
+        return self._got.decode(ENCODING, errors="replace")
+
+    def _half(self, before: int) -> str:
+        lines = f"{before} lines and " if before else ""
+        return f"{lines}{shown(self._rest())}"
+
+    def _no_error(self, asked: Sequence[str]) -> None:
         lines = self.answer("ERR?")
         if (code := _code(lines)) is None:
-            raise self._failed(
-                ["ERR?"], f"has the answer {quoted(' '.join(lines))}: expected a code"
-            )
+            raise self.unexpected("ERR?", lines, "a code")
         if code:
-            raise self._refused(asked, code)
+            raise self._refused("; ".join(asked), code)
 
     def _refused(self, asked: str, code: int) -> DeviceError:
         return DeviceError(f"{self.name}: {_shown(asked)} is refused: {words_of(code)}")
 
-    def _still_there(self, asked: Sequence[str]) -> None:
-        if self._lost:
-            raise DeviceError(
-                f"{self.name}: {_shown(*asked)} cannot be sent: {self._lost}; connect again"
-            )
-
     def _failed(self, asked: Sequence[str], how: str) -> DeviceError:
-        self._lost = self._lost or "the connection was closed after an error"
-        self._socket.close()
-        return DeviceError(f"{self.name}: {_shown(*asked)} {how}")
+        """Give the connection up, and return the error that says why."""
+        self._drop()
+        what = f"{_shown(*asked)} " if asked else ""
+        return DeviceError(f"{self.name}: {what}{how}")
 
 
 HUNG_UP = "the controller has closed the connection"
@@ -233,11 +307,9 @@ def _is_query(command: str) -> bool:
 
 def _code(lines: Sequence[str]) -> int | None:
     """Return the code of an answer to ERR?, or None where it is none."""
-    try:
-        (line,) = lines
-        return int(line)
-    except ValueError:
+    if len(lines) != 1 or not _CODE.fullmatch(lines[0].strip()):
         return None
+    return int(lines[0])
 
 
 def _shown(*asked: str) -> str:

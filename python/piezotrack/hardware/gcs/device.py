@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from contextlib import suppress
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ from ..._support.arguments import finite, not_negative, plain, positive
 from ..._support.arrays import signal_of
 from ..._support.messages import quoted
 from ...errors import DeviceError, ParameterError
+from ..answers import number, printable
 from ..device import Rates, Record
 from ..limits import check_within, ordered
 from ..options import Options
@@ -35,12 +37,16 @@ NEEDED = ("POS?", "SVO", "SVA", "WAV", "WSL", "WGC", "WTR", "WGO", "DRC", "RTR",
 UNITS = {"um": 1e-6, "micron": 1e-6, "\u03bcm": 1e-6, "nm": 1e-9, "mm": 1e-3}
 # Longest command [characters], and commands after which errors are asked for.
 LINE, TOGETHER = 240, 50
+# Smallest parameter: no servo cycle is below it, and no memory above its inverse.
+LEAST = 1e-9
 # Slowest rate of a table [servo cycles].
 SLOWEST = 10_000
 # Waits between two looks at the generator [s].
 FIRST_LOOK, LONGEST_LOOK = 1e-3, 0.05
 # Largest share of the range by which the output may differ from the table without a note.
 NEAR = 1e-3
+# Answers that are whole numbers: of tables, and the state of the generators.
+_COUNT, _BITS = re.compile(r"[0-9]{1,6}"), re.compile(r"(0[xX])?[0-9a-fA-F]{1,16}")
 
 
 class GcsDevice:
@@ -96,19 +102,20 @@ class GcsDevice:
             raise ParameterError(f"axis is {quoted(axis)}: expected a number, as '1'")
         self._axis, self._factor = axis, positive("factor", factor, "V")
         self._open = True
-        self._servo_off = False
+        # The number of the connection on which the servo was switched off.
+        self._prepared = 0
         self._line = Connection(host, port, positive("timeout", timeout, "s"))
         try:
-            self._name = " ".join(self._line.ask("*IDN?"))
+            name = printable(" ".join(self._line.ask("*IDN?")))
             self._known = {words[0].upper() for line in self._line.ask("HLP?")
                            if (words := line.split())}  # fmt: skip
             missing = [name for name in NEEDED if name not in self._known]
             if missing:
                 raise DeviceError(
-                    f"{self._line.name}: {self._name} does not know {', '.join(missing)}: expected "
+                    f"{self._line.name}: {name} does not know {', '.join(missing)}: expected "
                     "a controller with wave generator and data recorder"
                 )
-            self._unit = self._metres()
+            self._unit, self._travel = self._metres(), self._ends()
             self._limits = ordered("limits", self._range() if limits is None else limits)
             clock = 1.0 / self._parameter(SERVO_CYCLE)
             self._rates = Rates(lowest=clock / SLOWEST, highest=clock, clock=clock)
@@ -140,18 +147,19 @@ class GcsDevice:
 
     @property
     def travel(self) -> tuple[float, float]:
-        """Lowest and highest position of the axis [m]."""
-        return self._unit * self._value("TMN?"), self._unit * self._value("TMX?")
+        """Lowest and highest position of the axis [m]; infinite where the controller says none."""
+        low, high = self._travel
+        return self._unit * low, self._unit * high
 
     @property
     def position(self) -> float:
-        """Reading of the sensor now [m]."""
-        return self._unit * self._value("POS?")
+        """Reading of the sensor now [m]; NaN where it is none, as of `exchange`."""
+        return self._unit * float(_near(self._value("POS?"), self._travel))
 
     @property
     def voltage(self) -> float:
-        """Voltage at the output now [V]."""
-        return self._value("VOL?")
+        """Voltage at the output now [V]; NaN where it is beyond the limits by more than a range."""
+        return float(_near(self._value("VOL?"), self._limits))
 
     def play(self, volts: Array, rate: float, *, lead_in: float = 0.0) -> Record:
         """Play a table by the wave generator and record; as `Device.play`.
@@ -189,7 +197,7 @@ class GcsDevice:
             self.hold(float(table[0]))
             time.sleep(lead_in)
             before = 0
-        self._open_loop()
+        self._tell()
         self._upload(np.concatenate([np.full(before, table[0]), table]), cycles)
         count = before + table.size
         try:
@@ -198,6 +206,7 @@ class GcsDevice:
             return self._record(table, before, rate)
         except BaseException:
             with suppress(DeviceError):
+                self._line.ready()
                 self._line.send(f"WGO {self._axis} 0")
             raise
 
@@ -212,7 +221,8 @@ class GcsDevice:
         Returns
         -------
         float
-            Displacement before it goes out [m].
+            Displacement before it goes out [m]; NaN where there is no reading: an overload, or
+            further beyond the travel than the travel is long.
 
         Raises
         ------
@@ -220,10 +230,10 @@ class GcsDevice:
             The controller refuses something, or does not answer.
         """
         self._check(finite("volts", volts, "V"))
-        self._open_loop()
-        query = f"POS? {self._axis}"
-        lines = self._line.exchange(f"SVA {self._axis} {self._control(volts)}", query)
-        return self._unit * self._number(query, lines)
+        before, query = self._preparation(), f"POS? {self._axis}"
+        lines = self._line.exchange(query, *before, f"SVA {self._axis} {self._control(volts)}")
+        self._prepared = self._line.number
+        return self._unit * float(_near(self._number(query, lines), self._travel))
 
     def hold(self, volts: float) -> None:
         """Put out a constant voltage from now on.
@@ -239,8 +249,7 @@ class GcsDevice:
             The controller refuses it, or does not answer.
         """
         self._check(finite("volts", volts, "V"))
-        self._open_loop()
-        self._line.command(f"SVA {self._axis} {self._control(volts)}")
+        self._tell(f"SVA {self._axis} {self._control(volts)}")
 
     def close(self) -> None:
         """Give the connection back; the output stays where it is."""
@@ -257,15 +266,27 @@ class GcsDevice:
             raise DeviceError(f"{self._line.name} is closed")
         check_within(volts, self._limits, self._line.name)
 
-    def _open_loop(self) -> None:
-        """Switch the servo off, once: whoever switches it on meanwhile gets its error."""
-        if not self._servo_off:
-            self._line.command(f"SVO {self._axis} 0")
-            self._servo_off = True
+    def _preparation(self) -> list[str]:
+        """Return what has to be sent before the first voltage of a connection.
+
+        Of what was on the last one nothing is known any more: a table may still go out.
+        """
+        number = self._line.ready()
+        if number == self._prepared:
+            return []
+        return [f"WGO {self._axis} 0"] * (number > 1) + [f"SVO {self._axis} 0"]
+
+    def _tell(self, *commands: str) -> None:
+        """Send commands for an axis that has its servo off; who switches it on gets its error."""
+        if commands := (*self._preparation(), *commands):
+            self._line.command(*commands)
+            self._prepared = self._line.number
 
     def _control(self, volts: float) -> str:
-        """Write a voltage [V] as a control value."""
-        return f"{volts / self._factor:.9g}"
+        """Write a voltage [V] as a control value that is within the limits as it is written."""
+        value, (low, high) = volts / self._factor, self._limits
+        text = f"{value:.9g}"
+        return text if low <= float(text) * self._factor <= high else f"{value:.17g}"
 
     def _upload(self, table: Array, cycles: int) -> None:
         """Write the wave table, and set up generator and recorder."""
@@ -307,11 +328,9 @@ class GcsDevice:
         pause = FIRST_LOOK
         while True:
             lines = self._line.ask(GENERATOR)
-            try:
-                running = int(lines[0], 16) & bit
-            except ValueError:
-                raise self._line.unexpected("#9", lines, "a hexadecimal number") from None
-            if not running:
+            if len(lines) != 1 or not _BITS.fullmatch(lines[0]):
+                raise self._line.unexpected(GENERATOR, lines, "a hexadecimal number")
+            if not int(lines[0], 16) & bit:
                 return
             if time.monotonic() > latest:
                 raise DeviceError(
@@ -326,29 +345,36 @@ class GcsDevice:
         count = before + table.size
         query = "DRL? 1"
         there = self._number(query, self._line.ask(query), "1")
-        if there < count:
+        if not there >= count:
             raise DeviceError(
                 f"{self._line.name}: the data recorder has {there:g} samples: expected {count}"
             )
         query = f"DRR? {before + 1} {table.size} 1 2"
-        lines = self._line.ask(query)
+        lines = self._line.ask(query, samples=table.size)
         data, interval = _array(lines)
         if data is None or data.shape != (table.size, 2):
-            shown = lines if data is None else [f"... {len(lines)} lines ..."]
-            raise self._line.unexpected(query, shown[:3], f"2 columns of {table.size} samples")
+            told = lines if data is None else [f"... {len(lines)} lines ..."]
+            raise self._line.unexpected(query, told, f"2 columns of {table.size} samples")
         if not math.isclose(interval, 1.0 / rate, rel_tol=1e-4):
             raise DeviceError(
                 f"{self._line.name}: the data recorder says {interval:g} s from sample to sample: "
                 f"expected {1.0 / rate:g} s"
             )
         low, high = self._limits
+        beyond = np.flatnonzero(np.isnan(_near(data[:, 1], self._limits)))
+        if beyond.size:
+            k = int(beyond[0])
+            raise DeviceError(
+                f"{self._line.name}: the data recorder says {data[k, 1]:g} V at sample {k}: "
+                f"expected {table[k]:g} V"
+            )
         other = float(np.max(np.abs(data[:, 1] - table)))
         notes = () if other <= NEAR * (high - low) else (
             f"output: up to {plain(other)} V other than the table, as the data recorder says",
         )  # fmt: skip
         return Record(
             volts=data[:, 1],
-            displacement=self._unit * data[:, 0],
+            displacement=self._unit * _near(data[:, 0], self._travel),
             rate=rate,
             channels=self.channels,
             notes=notes,
@@ -356,6 +382,7 @@ class GcsDevice:
 
     def _value(self, query: str) -> float:
         """Ask for a number of the axis."""
+        self._line.ready()
         command = f"{query} {self._axis}"
         return self._number(command, self._line.ask(command))
 
@@ -366,19 +393,19 @@ class GcsDevice:
         try:
             if len(lines) != 1 or not equals or name.strip() != wanted:
                 raise ValueError
-            return float(text)
+            return number(text)
         except ValueError:
-            raise self._line.unexpected(query, lines[:3], f"{wanted}=NUMBER") from None
+            raise self._line.unexpected(query, lines, f"{wanted}=NUMBER") from None
 
-    def _parameter(self, number: int) -> float:
-        query = f"SPA? {self._axis} 0x{number:08X}"
+    def _parameter(self, address: int) -> float:
+        query = f"SPA? {self._axis} 0x{address:08X}"
         lines = self._line.ask(query)
         try:
-            value = float(lines[0].partition("=")[2])
+            value = number(lines[0].partition("=")[2])
         except ValueError:
             value = math.nan
-        if not 0.0 < value < math.inf:
-            raise self._line.unexpected(query, lines[:3], "a parameter above 0")
+        if not LEAST < value < 1.0 / LEAST:
+            raise self._line.unexpected(query, lines, "a parameter above 0")
         return value
 
     def _metres(self) -> float:
@@ -389,7 +416,7 @@ class GcsDevice:
         lines = self._line.ask(query)
         unit = lines[0].partition("=")[2].strip().casefold()
         if unit not in UNITS:
-            raise self._line.unexpected(query, lines[:3], "um, nm or mm")
+            raise self._line.unexpected(query, lines, "um, nm or mm")
         return UNITS[unit]
 
     def _range(self) -> tuple[float, float]:
@@ -399,19 +426,37 @@ class GcsDevice:
                 f"limits are not given, and {self._line.name} does not say them: expected (low, "
                 "high) in V, in an address ?limits=0..100V"
             )
-        return self._value("VMI?"), self._value("VMA?")
+        low, high = self._value("VMI?"), self._value("VMA?")
+        if not low < high:
+            told = [f"{plain(low)} to {plain(high)}"]
+            raise self._line.unexpected("VMI?; VMA?", told, "two voltages, the lower one first")
+        return low, high
+
+    def _ends(self) -> tuple[float, float]:
+        """Return the travel in the controller's unit; infinite where it does not say one."""
+        if not {"TMN?", "TMX?"} <= self._known:
+            return -math.inf, math.inf
+        low, high = self._value("TMN?"), self._value("TMX?")
+        return (low, high) if low < high else (-math.inf, math.inf)
 
     def _points(self) -> int:
         """Return the samples that both a wave table and the recorder hold."""
         tables = self._line.ask("TNR?") if "TNR?" in self._known else ["1"]
-        try:
-            points = self._parameter(RECORD_POINTS) / int(tables[0])
-        except (ValueError, ZeroDivisionError):
-            raise self._line.unexpected("TNR?", tables[:3], "the number of tables") from None
+        if not _COUNT.fullmatch(tables[0]) or not int(tables[0]):
+            raise self._line.unexpected("TNR?", tables, "the number of tables")
+        points = self._parameter(RECORD_POINTS) / int(tables[0])
         # Not every controller says how long a wave may be; it refuses what is too long.
         with suppress(DeviceError):
             points = min(points, self._parameter(WAVE_POINTS))
         return int(points)
+
+
+def _near(values: ArrayLike, span: tuple[float, float]) -> Array:
+    """Return values, NaN where they are further beyond a span than it is long, or are infinite."""
+    low, high = span
+    y = np.asarray(values, dtype=np.float64)
+    length = high - low
+    return np.where((y >= low - length) & (y <= high + length) & np.isfinite(y), y, np.nan)
 
 
 def _array(lines: Sequence[str]) -> tuple[Array | None, float]:
@@ -422,8 +467,9 @@ def _array(lines: Sequence[str]) -> tuple[Array | None, float]:
         for line in lines[:end]:
             name, _, text = line.lstrip("# ").partition("=")
             if name.strip() == "SAMPLE_TIME":
-                interval = float(text)
-        rows = [line.split() for line in lines[end + 1 :]]
+                interval = number(text)
+        # NumPy would read 1_0 as 10.
+        rows = [line.replace("_", "?").split() for line in lines[end + 1 :]]
         return np.array(rows, dtype=np.float64), interval
     except (StopIteration, ValueError):
         return None, interval
