@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import os
+from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -9,15 +12,33 @@ from ..._support.messages import listed
 from .table import Channel, ChannelTable, Format
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from .source import Source
 
 __all__ = ["FORMAT"]
 
 
+class BoundedReader(io.BufferedReader):
+    """A file that does not ask for memory for more than is left of it."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        """Read so many bytes, or those that are left."""
+        if size is None or size < 0:
+            return super().read(size)
+        left = os.fstat(self.fileno()).st_size - self.tell()
+        return super().read(min(size, max(left, 0)))
+
+
 def _opens(source: Source) -> ChannelTable:
     nptdms = source.library("nptdms", "tdms")
-    with source.decoding("TDMS", "nptdms"):
-        file = nptdms.TdmsFile.read_metadata(source.path)
+    with _opened(source) as content:
+        try:
+            file = nptdms.TdmsFile.read_metadata(content)
+        except MemoryError:
+            raise source.error(
+                "is not a sound TDMS file: expected metadata that fit into memory"
+            ) from None
         status = file.file_status
         channels = [
             _channel(source, nptdms, channel)
@@ -32,6 +53,13 @@ def _opens(source: Source) -> ChannelTable:
         )
     _check_counts(source, file)
     return ChannelTable(source, channels)
+
+
+@contextmanager
+def _opened(source: Source) -> Iterator[BoundedReader]:
+    # Not by its name: an index beside it may be that of another file.
+    with source.decoding("TDMS", "nptdms"), BoundedReader(io.FileIO(source.path)) as content:
+        yield content
 
 
 def _check_counts(source: Source, file: Any) -> None:
@@ -63,7 +91,7 @@ def _channel(source: Source, nptdms: Any, channel: Any) -> Channel:
 
 
 def _read(source: Source, nptdms: Any, group: str, name: str) -> Any:
-    with source.decoding("TDMS", "nptdms"), nptdms.TdmsFile.open(source.path) as file:
+    with _opened(source) as content, nptdms.TdmsFile.open(content) as file:
         return file[group][name][:]
 
 
