@@ -30,6 +30,7 @@ __all__ = [
     "Format",
     "Table",
     "WrittenColumn",
+    "names_interval",
     "split_matrix",
     "stated_interval",
 ]
@@ -315,7 +316,8 @@ def _numbers(raw: Any) -> Array | None:
         values[lost] = np.nan
     if values.dtype.kind not in "biuf":
         return None
-    with np.errstate(over="ignore"):
+    # NaN in float32 may be one that signals.
+    with np.errstate(over="ignore", invalid="ignore"):
         return values.astype(np.float64, copy=False)
 
 
@@ -384,20 +386,39 @@ def _split(name: str) -> tuple[str, str]:
 def stated_interval(constants: Iterable[Channel]) -> float | None:
     """Find the sampling interval among the constants of a file [s]."""
     for channel in constants:
-        column = column_of(0, channel)
-        name = re.sub(r"[\s_-]+", " ", column.name).lower()
-        unit = column.unit.lower()
-        seconds = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}.get(unit)
-        if name.endswith((" hz", " khz")):
-            name, _, unit = name.rpartition(" ")
-        if not (name in INTERVALS and seconds) and not (name in RATES and unit in HERTZ):
+        if (scale := _interval_scale(channel)) is None:
             continue
         values = np.asarray(channel.read()).ravel()
         if values.size != 1 or values.dtype.kind not in "iuf" or not float(values[0]) > 0.0:
             continue
+        per_second, is_rate = scale
         value = float(values[0])
-        return value / seconds if seconds else 1.0 / (value * HERTZ[unit])
+        return 1.0 / (value * per_second) if is_rate else value / per_second
     return None
+
+
+def names_interval(name: str) -> bool:
+    """Whether a name is that of a sampling interval or of its inverse, with a unit.
+
+    Examples
+    --------
+    >>> names_interval("sample_rate_Hz"), names_interval("dt")
+    (True, False)
+    """
+    return _interval_scale(Channel(name, 1, list)) is not None
+
+
+def _interval_scale(channel: Channel) -> tuple[float, bool] | None:
+    """Return how many units there are in SI, and whether it is a rate; None where it is neither."""
+    column = column_of(0, channel)
+    name = re.sub(r"[\s_-]+", " ", column.name).lower()
+    unit = column.unit.lower()
+    seconds = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}.get(unit)
+    if name.endswith((" hz", " khz")):
+        name, _, unit = name.rpartition(" ")
+    if name in INTERVALS and seconds:
+        return seconds, False
+    return (HERTZ[unit], True) if name in RATES and unit in HERTZ else None
 
 
 def _first(mask: NDArray[np.bool_]) -> int | None:
