@@ -26,6 +26,8 @@ def _opens(source: Source) -> ChannelTable:
             with zipfile.ZipFile(source.path) as archive:
                 for info in archive.infolist():
                     source.check_size(f"member {info.filename!r}", info.file_size)
+                total = sum(info.file_size for info in archive.infolist())
+                source.check_size("the sum of the members", total)
         curves, uncalibrated = _curves(source, library)
         units = library.afm_data.column_units
         channels = [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -150,14 +150,13 @@ def _check(source: Source, dataset: Any) -> None:
 def _reader(
     source: Source, h5py: Any, path: str, parts: Sequence[str] | None = None
 ) -> Callable[[], Any]:
-    # Once for all columns of a dataset.
-    @cache
     def read() -> Any:
         with source.decoding("HDF5"), h5py.File(source.path, "r") as file:
             dataset = file[path]
             return np.asarray(dataset[()] if parts is None else dataset.fields(parts)[()])
 
-    return read
+    # Once for all columns of a dataset.
+    return partial(source.latest, path, read)
 
 
 def _part(read: Callable[[], Any], place: Any) -> Any:

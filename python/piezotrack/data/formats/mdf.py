@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections import Counter
 from contextlib import contextmanager, redirect_stdout
-from functools import cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..._support.messages import quoted
@@ -49,14 +49,18 @@ def _channels(source: Source, asammdf: Any, file: Any) -> Iterator[Channel]:
         size = int(part.channel_group.samples_byte_nr)
         source.check_size(f"channel group {number}", count * max(size, 1))
         source.check_size(f"channel group {number}", 8 * count)
-        read = _reader(source, asammdf, number)
+        # Opening a file is what takes long, so all channels of a group are read at once; channels
+        # may share their bytes.
+        at_once = 8 * count * len(part.channels) <= source.most
         for index, channel in enumerate(part.channels):
             _check_place(source, number, part.channel_group, channel)
             # A structure or an array is no column; the channels in a structure are their own.
             if not part.channel_dependencies[index]:
                 fault = _fault(file, number, index)
                 unit = file.get_channel_unit(group=number, index=index)
-                one = partial(_part, source, read, index, fault)
+                wanted = None if at_once else index
+                read = partial(_read, source, asammdf, number, wanted)
+                one = partial(_part, source, read, number, index, fault)
                 yield Channel(channel.name, count, one, group, unit or None)
 
 
@@ -137,24 +141,20 @@ def _close_halves(error: BaseException) -> None:
         _close_halves(error.__context__)
 
 
-def _reader(source: Source, asammdf: Any, group: int) -> Callable[[], dict[int, Any]]:
-    # Once for all channels of a group: opening a file is what takes long.
-    @cache
-    def read() -> dict[int, Any]:
-        with _opened(source, asammdf) as file:
-            sound = _disarm(file)
-            master = file.masters_db.get(group)
-            found = {}
-            for index in sound[group]:
-                if index == master:
-                    # Copied, as the file is closed.
-                    found[index] = file.get(group=group, index=index).timestamps.copy()
-                else:
-                    samples, _ = file.get(group=group, index=index, samples_only=True)
-                    found[index] = samples.copy()
-            return found
-
-    return read
+def _read(source: Source, asammdf: Any, group: int, wanted: int | None) -> dict[int, Any]:
+    """Read a channel of a group, or all of them."""
+    with _opened(source, asammdf) as file:
+        sound = _disarm(file)
+        master = file.masters_db.get(group)
+        found = {}
+        for index in sound[group] if wanted is None else [wanted]:
+            # Copied, as the file is closed.
+            if index == master:
+                found[index] = file.get(group=group, index=index).timestamps.copy()
+            else:
+                samples, _ = file.get(group=group, index=index, samples_only=True)
+                found[index] = samples.copy()
+        return found
 
 
 def _disarm(file: Any) -> list[list[int]]:
@@ -176,13 +176,17 @@ def _disarm(file: Any) -> list[list[int]]:
     return sound
 
 
-def _part(source: Source, read: Callable[[], dict[int, Any]], index: int, fault: str) -> Any:
+def _part(
+    source: Source, read: Callable[[], dict[int, Any]], group: int, index: int, fault: str
+) -> Any:
     if fault:
         raise source.error(
             f"{fault}: expected a linear or rational conversion, or a table, as others are not "
             "carried out"
         )
-    return read()[index]
+    # Of a group that is not read at once there is only this one.
+    found = source.latest(f"group {group}", read)
+    return (found if index in found else read())[index]
 
 
 FORMAT = Format(

@@ -14,7 +14,7 @@ from ...errors import DataError, ParameterError, PiezotrackError, ShapeError
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
 __all__ = ["Source"]
 
@@ -166,11 +166,38 @@ class Source:
                 f"{what} is said to have {declared} bytes: expected {stored} at most, in a file "
                 f"of {self.size} bytes"
             )
-        if declared > BACKED and declared > DENSEST * self.size:
+        if declared > self.most:
             raise self.error(
                 f"{what} is said to have {declared} bytes: expected {DENSEST * self.size} at most, "
                 f"as measured samples in a file of {self.size} bytes"
             )
+
+    @property
+    def most(self) -> int:
+        """Bytes of measured samples that the file can hold, compressed."""
+        return max(BACKED, DENSEST * self.size)
+
+    def latest(self, part: str, read: Callable[[], Any]) -> Any:
+        """Return what was read last, where that is the same part of the file, or read it.
+
+        Parameters
+        ----------
+        part : str
+            What is read: the columns of an array are asked for one after the other.
+        read : callable
+            Reads it.
+
+        Returns
+        -------
+        object
+            What `read` gives. Only one part is kept, as a file may have any number of them.
+        """
+        if self._latest is None or self._latest[0] != part:
+            self._latest = None
+            self._latest = part, read()
+        return self._latest[1]
+
+    _latest: tuple[str, Any] | None = None
 
     @contextmanager
     def _opening(self) -> Iterator[None]:

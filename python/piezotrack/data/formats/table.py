@@ -35,8 +35,9 @@ __all__ = [
     "stated_interval",
 ]
 
-# Most columns of a file.
+# Most columns of a file, and bytes of a sample in memory.
 MOST_COLUMNS = 10_000
+ITEM = 8
 # Names of a constant that is the sampling interval, or its inverse, and the units of the latter.
 INTERVALS = ("dt", "ts", "interval", "sample time", "sampling interval", "sample interval")
 RATES = ("fs", "rate", "sample rate", "sampling rate", "sampling frequency", "sample frequency")
@@ -262,6 +263,7 @@ class ChannelTable(Table):
                 )
         if count > MOST_SAMPLES:
             raise self.source.error(f"{first} has {count} samples: expected {MOST_SAMPLES} at most")
+        self.source.check_size("the sum of the columns", ITEM * count * len(main))
         table = {}
         for column in main:
             values = self.column(column)
@@ -271,12 +273,24 @@ class ChannelTable(Table):
                 )
             table[column.index] = values
         groups = {column.group for column in main}
-        for column in self.columns:
-            channel = self.channels[column.index]
-            if column.index not in table and channel.count == count and column.group in groups:
-                further = self._further(column, channel)
-                if further is not None and further.shape == (count,):
-                    table[column.index] = further
+        beside = [
+            column
+            for column in self.columns
+            if column.index not in table
+            and self.channels[column.index].count == count
+            and column.group in groups
+        ]
+        most = max(0, self.source.most // (ITEM * max(count, 1)) - len(table))
+        for column in beside[:most]:
+            further = self._further(column, self.channels[column.index])
+            if further is not None and further.shape == (count,):
+                table[column.index] = further
+        if len(beside) > most:
+            self.columns.notes.append(
+                f"{len(beside) - most} further columns are left out: all of them would have "
+                f"{ITEM * count * (len(main) + len(beside))} bytes, expected {self.source.most} at "
+                f"most, as measured samples in a file of {self.source.size} bytes"
+            )
         return table
 
     def _further(self, column: Column, channel: Channel) -> Array | None:
