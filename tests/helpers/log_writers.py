@@ -232,14 +232,21 @@ def parquet(path: Path, signals: Signals) -> Path:
     return path
 
 
-def mdf(path: Path, signals: Signals, **slow: tuple[NDArray[Any], str, NDArray[Any]]) -> Path:
+def mdf(
+    path: Path,
+    signals: Signals,
+    conversions: Mapping[str, dict[str, Any]] | None = None,
+    /,
+    **slow: tuple[NDArray[Any], str, NDArray[Any]],
+) -> Path:
     """MDF 4: a group of channels at the times ``time``, and one of each of `slow` at its own."""
+    converted = conversions or {}
     import asammdf
 
     times = signals["time"][0]
     with asammdf.MDF(version="4.10") as file:
         fast = [
-            asammdf.Signal(values, times, name=name, unit=unit)
+            asammdf.Signal(values, times, name=name, unit=unit, conversion=converted.get(name))
             for name, (values, unit) in signals.items()
             if name != "time"
         ]
