@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import struct
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -233,3 +234,25 @@ print(read, refused)
     assert read + refused == 3 * len(places)
     # What belongs to a text that is not needed does not matter.
     assert read > refused
+
+
+@pytest.mark.parametrize("version", ["earliest", "latest"])
+@pytest.mark.parametrize("block", [0, 512])
+def test_a_text_of_another_length_than_its_object_is_refused(
+    tmp_path: Path, version: str, block: int
+) -> None:
+    """libhdf5 asks for the memory that its length says, as 4 GB."""
+    path = tmp_path / "log.h5"
+    with h5py.File(path, "w", libver=version, userblock_size=block) as file:
+        for name, values, unit in (("time", T, "s"), ("u", U, "Volts"), ("x", Y, "micrometre")):
+            file[name] = values
+            file[name].attrs["units"] = unit
+    assert is_the_log(pt.read(path))
+    content = path.read_bytes()
+    heap = content.index(b"GCOL") - block
+    place = content.index(struct.pack("<IQ", 5, heap))
+    for length, where in ((250 << 24, heap), (6, heap), (4, heap), (250 << 24, 2**40)):
+        changed = bytearray(content)
+        struct.pack_into("<IQ", changed, place, length, where)
+        path.write_bytes(changed)
+        assert "the attribute 'units' at byte" in refusal(path)

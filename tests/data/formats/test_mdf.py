@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
+from children import child
 from format_logs import DT, TEMPERATURE, T, U, Y, is_the_log, refusal, survives
 
 if TYPE_CHECKING:
@@ -239,3 +240,17 @@ def test_what_asammdf_prints_is_not_shown(
     capsys.readouterr()
     assert is_the_log(pt.read(path))
     assert capsys.readouterr().out == ""
+
+
+def test_a_block_that_claims_terabytes_does_not_ask_for_them(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.mf4", compression=2)
+    content = bytearray(path.read_bytes())
+    # A compressed block: kinds, a parameter, the size of its samples, and its own.
+    place = content.index(b"##DZ") + 24 + 8 + 8
+    assert 0 < struct.unpack_from("<Q", content, place)[0] < len(content)
+    struct.pack_into("<Q", content, place, 2**42)
+    path.write_bytes(content)
+    code = f"try: print(pt.read({str(path)!r}))\nexcept pt.DataError as error: print(error)"
+    done = child("import asammdf\n" + code, room=1_000_000_000)
+    # What follows the compressed samples does not matter.
+    assert done.stdout.startswith(("Dataset(", "log.mf4: ")), done.stderr[-500:]

@@ -29,7 +29,7 @@ EXTRA = "hdf5"
 
 def _opens(source: Source) -> ChannelTable:
     h5py = source.library("h5py", EXTRA)
-    check_heaps(source)
+    check_heaps(source, UNIT_NAMES)
     with source.decoding("HDF5"), h5py.File(source.path, "r") as file:
         channels: list[Channel] = []
         for path, dataset in _datasets(h5py, file):
@@ -56,7 +56,7 @@ def open_matlab(source: Source) -> ChannelTable:
         the variables.
     """
     h5py = source.library("h5py", "mat")
-    check_heaps(source)
+    check_heaps(source, ())
     with source.decoding("MAT v7.3"), h5py.File(source.path, "r") as file:
         channels: list[Channel] = []
         numbers = {}
@@ -176,8 +176,12 @@ def _attribute(h5py: Any, attributes: Any, name: str) -> Any:
         return ""
     attribute = attributes.get_id(name)
     kind, h5t = attribute.get_type(), h5py.h5t
-    # A text of variable length too, but no sequence of it, nor of a kind that does not exist.
-    if kind.get_class() not in (h5t.INTEGER, h5t.FLOAT, h5t.STRING) or kind.get_size() > LONGEST:
+    what = kind.get_class()
+    if what not in (h5t.INTEGER, h5t.FLOAT, h5t.STRING) or kind.get_size() > LONGEST:
+        return ""
+    # A text of variable length only where its length has been checked; not a type from elsewhere.
+    unchecked = name not in UNIT_NAMES or kind.committed()
+    if what == h5t.STRING and kind.is_variable_str() and unchecked:
         return ""
     return attributes[name] if attribute.get_space().get_simple_extent_npoints() == 1 else ""
 

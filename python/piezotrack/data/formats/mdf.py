@@ -115,7 +115,7 @@ def _check_place(source: Source, number: int, group: Any, channel: Any) -> None:
 def _opened(source: Source, asammdf: Any) -> Iterator[Any]:
     # asammdf prints what it stumbles over.
     quiet = redirect_stdout(io.StringIO())
-    with source.decoding("MDF", "asammdf"), quiet, source.path.open("rb") as content:
+    with source.decoding("MDF", "asammdf"), quiet, source.opened() as content:
         try:
             # Frames of buses would be converted while the file is opened.
             file = asammdf.MDF(content, process_bus_logging=False)

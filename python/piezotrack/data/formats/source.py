@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import importlib
+import io
 import logging
+import os
 import warnings
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from ..._support.messages import quoted
 from ...errors import DataError, ParameterError, PiezotrackError, ShapeError
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Callable, Iterator
 
 __all__ = ["Source"]
@@ -23,6 +24,17 @@ HEAD = 1 << 16
 # Bytes from which samples have to be backed by the file, and how often they may be more than it:
 # noise compresses by a factor of two to ten.
 BACKED, DENSEST = 100_000_000, 200
+
+
+class _BoundedReader(io.BufferedReader):
+    """A file that does not ask for memory for more than is left of it."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        """Read so many bytes, or those that are left."""
+        if size is None or size < 0:
+            return super().read(size)
+        left = os.fstat(self.fileno()).st_size - self.tell()
+        return super().read(min(size, max(left, 0)))
 
 
 class Source:
@@ -74,6 +86,10 @@ class Source:
         """Return all bytes."""
         with self._opening(), self.path.open("rb") as opened:
             return opened.read()
+
+    def opened(self) -> BinaryIO:
+        """Open the file for a library that may ask for any number of bytes of it."""
+        return _BoundedReader(io.FileIO(self.path))
 
     def error(self, sentence: str, line: int | None = None) -> DataError:
         """Make an error about the content of the file."""

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import io
-import os
 from contextlib import contextmanager
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from ..._support.messages import listed
 from .table import Channel, ChannelTable, Format
@@ -17,17 +15,6 @@ if TYPE_CHECKING:
     from .source import Source
 
 __all__ = ["FORMAT"]
-
-
-class BoundedReader(io.BufferedReader):
-    """A file that does not ask for memory for more than is left of it."""
-
-    def read(self, size: int | None = -1, /) -> bytes:
-        """Read so many bytes, or those that are left."""
-        if size is None or size < 0:
-            return super().read(size)
-        left = os.fstat(self.fileno()).st_size - self.tell()
-        return super().read(min(size, max(left, 0)))
 
 
 def _opens(source: Source) -> ChannelTable:
@@ -56,9 +43,9 @@ def _opens(source: Source) -> ChannelTable:
 
 
 @contextmanager
-def _opened(source: Source) -> Iterator[BoundedReader]:
+def _opened(source: Source) -> Iterator[BinaryIO]:
     # Not by its name: an index beside it may be that of another file.
-    with source.decoding("TDMS", "nptdms"), BoundedReader(io.FileIO(source.path)) as content:
+    with source.decoding("TDMS", "nptdms"), source.opened() as content:
         yield content
 
 
