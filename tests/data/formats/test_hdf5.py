@@ -256,3 +256,12 @@ def test_a_text_of_another_length_than_its_object_is_refused(
         struct.pack_into("<IQ", changed, place, length, where)
         path.write_bytes(changed)
         assert "the attribute 'units' at byte" in refusal(path)
+    # The class of the type, and behind it its size and that of its letters.
+    kind = content.rindex(b"\x19", 0, place)
+    assert struct.unpack_from("<I4xI", content, kind + 4) == (16, 1)
+    for where in (4, 12):
+        for size in (0, 2, 250, 2**31):
+            changed = bytearray(content)
+            struct.pack_into("<I", changed, kind + where, size)
+            path.write_bytes(changed)
+            assert "the attribute 'units' at byte" in refusal(path)

@@ -254,3 +254,14 @@ def test_a_block_that_claims_terabytes_does_not_ask_for_them(tmp_path: Path) -> 
     done = child("import asammdf\n" + code, room=1_000_000_000)
     # What follows the compressed samples does not matter.
     assert done.stdout.startswith(("Dataset(", "log.mf4: ")), done.stderr[-500:]
+
+
+@pytest.mark.parametrize("block", [b"##CN", b"##CG", b"##DG"])
+def test_blocks_that_refer_to_themselves_are_refused(tmp_path: Path, block: bytes) -> None:
+    """asammdf follows them without end."""
+    path = write(tmp_path / "log.mf4")
+    content = bytearray(path.read_bytes())
+    place = content.index(block)
+    struct.pack_into("<Q", content, place + 24, place)
+    path.write_bytes(content)
+    refusal(path)

@@ -76,6 +76,13 @@ def _check_texts(
             first, last = place + parts[0], place + sum(parts)
             # The class of the type is 9 for a variable length.
             if last + 16 <= len(content) and content[first] & 0x0F == 9:
+                # Length, place and number of the object, of letters of one byte.
+                sizes = struct.unpack_from("<I4xI", content, first + 4)
+                if sizes != (struct.calcsize("<IQI"), 1):
+                    raise source.error(
+                        f"is not a sound HDF5 file: the attribute {name!r} at byte {place} is of a "
+                        f"type of {sizes[0]} bytes, with letters of {sizes[1]}: expected 16 and 1"
+                    )
                 count, address, number = struct.unpack_from("<IQI", content, last)
                 there = heaps.get(base + address, {}).get(number, min(count, source.size))
                 if count != there:

@@ -24,17 +24,25 @@ HEAD = 1 << 16
 # Bytes from which samples have to be backed by the file, and how often they may be more than it:
 # noise compresses by a factor of two to ten.
 BACKED, DENSEST = 100_000_000, 200
+# How often a file may be read besides once for each of its bytes.
+MOST_CALLS = 10_000
 
 
 class _BoundedReader(io.BufferedReader):
-    """A file that does not ask for memory for more than is left of it."""
+    """A file that does not ask for memory for more than is left of it, nor is read without end."""
+
+    calls = 0
 
     def read(self, size: int | None = -1, /) -> bytes:
         """Read so many bytes, or those that are left."""
+        length = os.fstat(self.fileno()).st_size
+        self.calls += 1
+        # A part has several bytes, and is read a few times; each may say where the next one is.
+        if self.calls > MOST_CALLS + length:
+            raise ValueError("its parts refer to each other in a circle")
         if size is None or size < 0:
             return super().read(size)
-        left = os.fstat(self.fileno()).st_size - self.tell()
-        return super().read(min(size, max(left, 0)))
+        return super().read(min(size, max(length - self.tell(), 0)))
 
 
 class Source:
