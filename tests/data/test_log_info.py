@@ -217,3 +217,46 @@ def test_the_measured_log_says_what_it_is() -> None:
     assert (found.drive.low, found.drive.high) == (0.0, 3.6)
     assert "one rate, 1 Hz" in said(found)
     assert "one amplitude, 3.6 V" in said(found)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("column", ["time_s", "voltage_V", "x_m"])
+@pytest.mark.parametrize("sample", [0, 7])
+@pytest.mark.parametrize("value", [-1e308, 1e200, 1e305])
+def test_a_sample_beyond_sense_is_a_problem_of_its_column(
+    tmp_path: Path, column: str, sample: int, value: float
+) -> None:
+    path = written(tmp_path, sine(1.0, 2.0))
+    with np.load(path) as file:
+        columns = {name: file[name].copy() for name in file}
+    columns[column][sample] = value
+    np.savez(path, **columns)
+    found = pt.data.info(path)
+    assert column in found.problem
+    assert "sample" in found.problem
+    assert found.drive is None
+    assert found.summary()
+    with pytest.raises(pt.DataError, match=column) as caught:
+        pt.read(path)
+    assert str(caught.value).startswith("log.npz: ")
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("step", [5e-324, 1e-300])
+def test_times_that_hardly_differ_are_described(tmp_path: Path, step: float) -> None:
+    u = sine(1.0, 1.0)
+    times = step * np.arange(u.size)
+    times[500:] += 1.0
+    found = pt.data.info(written(tmp_path, u, t=times))
+    assert found.problem
+    assert found.time is not None
+    assert found.time.gaps != ()
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_interval_beyond_sense_is_a_problem(tmp_path: Path) -> None:
+    path = tmp_path / "log.npz"
+    np.savez(path, voltage_V=sine(1.0, 1.0), x_m=sine(1.0, 1.0), dt_s=1e300)
+    found = pt.data.info(path)
+    assert "1e+300" in found.problem
+    assert found.time is None

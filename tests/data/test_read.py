@@ -472,3 +472,23 @@ def test_times_that_go_back_are_not_resampled(tmp_path: Path) -> None:
     text = with_line(4, "0.05,5.0,13.0")
     with pytest.raises(pt.DataError, match="expected increasing times"):
         pt.read(write(tmp_path, text), resample=0.01)
+
+
+@pytest.mark.parametrize("form", ["{:.6f}", "{:.4e}", "{!r}"])
+def test_a_log_that_is_cut_off_within_its_last_field_is_refused(tmp_path: Path, form: str) -> None:
+    y = 100.0 * np.cos(0.37 * np.arange(60)) / 7.0
+    rows = [f"{0.01 * k:.2f},{k % 7},{form.format(float(v))}" for k, v in enumerate(y)]
+    whole = "\n".join([HEADER, *rows])
+    assert pt.read(write(tmp_path, whole)).y.size == 60
+    # Of numbers with their shortest digits only one without any decimals is known to be cut off.
+    decimals = len(rows[-1].rpartition(".")[2])
+    for lost in range(1 if ":" in form else decimals, decimals + 2):
+        with pytest.raises(pt.DataError, match=r"stage\.csv:61: .*cut off"):
+            pt.read(write(tmp_path, whole[:-lost]))
+
+
+def test_a_whole_last_line_without_its_end_is_read(tmp_path: Path) -> None:
+    """Numbers of fixed decimals may become shorter: 10.02, 9.98."""
+    falling = [f"{0.01 * k:.2f},{k % 7},{10.5 - 0.05 * k:.2f}" for k in range(12)]
+    for rows in (falling, falling[:3]):
+        assert pt.read(write(tmp_path, "\n".join([HEADER, *rows]))).y.size == len(rows)

@@ -270,6 +270,12 @@ def _repeated(path: Path) -> None:
     write_table(table({"time_s": np.zeros(14_000_000)}), path, compression="zstd")
 
 
+def _together(path: Path) -> None:
+    """Three columns, of which none is beyond measure."""
+    zeros = write.npy_header("(5000000,)") + bytes(40_000_000)
+    write.archive(path, time_s=zeros, voltage_V=zeros, x_um=zeros)
+
+
 def _zeros(path: Path) -> None:
     """An archive of a hundred kilobytes that is 112 MB of zeros."""
     path.write_bytes(b"")
@@ -304,6 +310,10 @@ def _two_groups(path: Path) -> None:
 def _slow_channel(path: Path) -> None:
     slow = {"Position": (Y[::2], "um", T[::2])}
     write.mdf(path, {"time": (T, "s"), "Voltage": (U, "V")}, **slow)
+
+
+def _formula(path: Path) -> None:
+    write.mdf(path, LOG, {"voltage": {"formula": "pow(X, 2)"}})
 
 
 def _gcs(entry: str, value: str, path: Path) -> None:
@@ -359,6 +369,7 @@ OWN: dict[str, list[Case]] = {
     "NPZ": [
         Case("a shape that is not true", lambda path: write.archive(path, time_s=ROWS)),
         Case("an archive that expands beyond measure", _zeros),
+        Case("columns that expand beyond measure together", _together),
         Case("a member that is no array", lambda path: write.archive(path, time_s=b"no array")),
         Case("no member", write.archive),
     ],
@@ -398,6 +409,7 @@ OWN: dict[str, list[Case]] = {
     "Parquet": [Case("more rows than the file can hold", _repeated)],
     "MDF": [
         Case("channels of two rates", _slow_channel),
+        Case("a channel that is converted by a formula", _formula),
         Case("a file that was not finished", _changed("MDF", lambda one: b"UnFinMF " + one[8:])),
         Case(
             "more cycles than the file has",

@@ -25,7 +25,7 @@ WAVEFORMS = """#Digilent WaveForms Oscilloscope Acquisition
 #Serial Number: SN:000000000000
 #Date Time: 2024-03-12 10:00:00.000
 #Sample rate: {rate}
-#Samples: 400
+#Samples: {samples}
 #Trigger: Source: None at 0 s, Condition: Rising
 
 """
@@ -52,8 +52,11 @@ def text(path: Path, signals: Signals, *, above: str = "") -> Path:
     return path
 
 
-def waveforms(path: Path, signals: Signals, *, rate: str = "200Hz") -> Path:
-    above = WAVEFORMS.format(rate=rate)
+def waveforms(
+    path: Path, signals: Signals, *, rate: str = "200Hz", samples: int | None = None
+) -> Path:
+    count = max(values.size for values, _ in signals.values())
+    above = WAVEFORMS.format(rate=rate, samples=count if samples is None else samples)
     return text(path, signals, above=above if rate else above.replace("#Sample rate: \n", ""))
 
 
@@ -229,14 +232,21 @@ def parquet(path: Path, signals: Signals) -> Path:
     return path
 
 
-def mdf(path: Path, signals: Signals, **slow: tuple[NDArray[Any], str, NDArray[Any]]) -> Path:
+def mdf(
+    path: Path,
+    signals: Signals,
+    conversions: Mapping[str, dict[str, Any]] | None = None,
+    /,
+    **slow: tuple[NDArray[Any], str, NDArray[Any]],
+) -> Path:
     """MDF 4: a group of channels at the times ``time``, and one of each of `slow` at its own."""
+    converted = conversions or {}
     import asammdf
 
     times = signals["time"][0]
     with asammdf.MDF(version="4.10") as file:
         fast = [
-            asammdf.Signal(values, times, name=name, unit=unit)
+            asammdf.Signal(values, times, name=name, unit=unit, conversion=converted.get(name))
             for name, (values, unit) in signals.items()
             if name != "time"
         ]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
+from .._support.arrays import MOST_SAMPLES
 from .._support.statistics import sample_noise
 from .._support.units import best_length_unit, drive_text
 from .diagnostics import JUMP, TURN, runs
@@ -138,13 +139,18 @@ def time_features(t: Array) -> TimeFeatures:
     far = intervals > GAP * typical
     near = intervals[~far & (intervals > 0.0)]
     gaps = tuple(
-        (float(t[k]), float(t[k + 1]), max(1, round(float(intervals[k]) / typical) - 1))
+        (float(t[k]), float(t[k + 1]), _missing(float(intervals[k]) / typical))
         for k in np.flatnonzero(far)
         if typical > 0.0
     )
     jitter = float(np.sqrt(np.mean((near - typical) ** 2))) if near.size else 0.0
     backward = int(np.sum(intervals <= 0.0))
     return TimeFeatures(t.size, float(t[0]), float(t[-1]), typical, jitter, gaps, backward)
+
+
+def _missing(intervals: float) -> int:
+    """Return how many samples are missing in a gap of so many intervals."""
+    return max(1, round(min(intervals, MOST_SAMPLES)) - 1)
 
 
 def drive_features(t: Array, u: Array, y: Array | None, unit: str) -> DriveFeatures:
@@ -234,10 +240,11 @@ def _mode_limit(t: Array, y: Array | None, shares: Array, lasting: Array, jumps:
     if not shares.size or np.ptp(y) == 0.0:
         return 0.0
     noise = VISIBLE * sample_noise(y)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         motion = 0.5 * shares * float(np.ptp(y))
         limits = 0.5 / lasting * np.sqrt(motion / noise)
-    return min(HIGHEST * rate, float(np.nanmax(limits)))
+    known = limits[~np.isnan(limits)]
+    return min(HIGHEST * rate, float(known.max())) if known.size else 0.0
 
 
 def remarks(time: TimeFeatures, drive: DriveFeatures, stroke: float | None) -> list[str]:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._support.arrays import time_fault
+from .._support.arrays import check_dt, time_fault
 from .._support.messages import quoted
 from .._support.units import drive_text, drive_word, lookup
-from ..errors import DataError, PiezotrackError
+from ..errors import DataError, ParameterError, PiezotrackError
 from .drive_features import (
     DriveFeatures,
     TimeFeatures,
@@ -263,7 +263,10 @@ def info(
     if t is None and (u is not None or y is not None):
         count = (u if u is not None else y if y is not None else np.zeros(0)).size
         if (interval := dt or log.table.interval(list(roles.values()))) is not None:
-            t = interval * np.arange(count, dtype=np.float64)
+            try:
+                t = check_dt(interval) * np.arange(count, dtype=np.float64)
+            except ParameterError as error:
+                problems.append(str(error))
     times = time_features(t) if t is not None and t.size > 1 else None
     found, stroke = None, None if y is None else float(np.ptp(y))
     if t is not None and u is not None:
@@ -305,13 +308,10 @@ def _signals(
         return {}, []
     try:
         table = log.table.values(list(main.values()))
+        known = {role: c for role, c in main.items() if lookup(c.unit) is not None}
+        return {role: log.in_si(c, table[c.index]) for role, c in known.items()}, []
     except PiezotrackError as error:
         return {}, [_without_name(error, log.source.name)]
-    found = {}
-    for role, column in main.items():
-        if (unit := lookup(column.unit)) is not None:
-            found[role] = unit.to_si(table[column.index])
-    return found, []
 
 
 def _column(log: Log, column: Column) -> ColumnInfo:

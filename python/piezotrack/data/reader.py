@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .._support.arrays import UNEVEN, backward, check_dt, time_fault
+from .._support.arrays import LARGEST, UNEVEN, backward, check_dt, time_fault
 from .._support.units import lookup, require
 from ..errors import ParameterError
 from .dataset import Dataset
@@ -288,7 +288,7 @@ class Log:
                 times = even_times(t, resample)
             steps = {main["drive"].index} if hold == "zoh" and "drive" in main else set()
             table, t = _resampled(t, table, times, steps), times
-        signals = {role: require(c.unit).to_si(table[c.index]) for role, c in main.items()}
+        signals = {role: self.in_si(c, table[c.index]) for role, c in main.items()}
         columns, units = self._further(table, {column.index for column in roles.values()})
         # A drive alone is a record with an unused displacement, and vice versa.
         nothing = np.zeros(len(next(iter(table.values()))))
@@ -308,12 +308,39 @@ class Log:
 
     def _times(self, column: Column, table: Mapping[int, Array], resample: float | None) -> Array:
         """Convert the times [s], and refuse those that are not increasing or not even."""
-        t = require(column.unit).to_si(table[column.index])
+        t = self.in_si(column, table[column.index])
         check = partial(time_fault, resampling=USE_RESAMPLE) if resample is None else backward
         if (fault := check(t)) is not None:
             raise self.source.error(f"{column}: {fault[1]}", self.table.line(fault[0]))
         self._note_interval(column, t)
         return t
+
+    def in_si(self, column: Column, values: Array) -> Array:
+        """Convert samples to SI, and refuse those that cannot be any.
+
+        Parameters
+        ----------
+        column : Column
+            Where they are; its unit is known.
+        values : ndarray, shape (n,)
+            In its unit.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            In seconds, volts or metres.
+        """
+        with np.errstate(over="ignore"):
+            converted = require(column.unit).to_si(values)
+        beyond = ~(np.abs(converted) < LARGEST)
+        if beyond.any():
+            sample = int(np.argmax(beyond))
+            raise self.source.error(
+                f"{column} is {values[sample]:g} at sample {sample}: expected numbers below "
+                f"{LARGEST:g}",
+                self.table.line(sample),
+            )
+        return converted
 
     def _note_interval(self, column: Column, t: Array) -> None:
         """Say that a file states another interval than its times have."""

@@ -108,6 +108,23 @@ def test_an_archive_that_expands_beyond_measure_is_refused(tmp_path: Path) -> No
     assert "said to have 110000000 bytes" in refusal(path)
 
 
+def test_a_file_that_was_refused_is_read_when_it_is_whole(tmp_path: Path) -> None:
+    """As one that was read while it was still being copied; nothing of it stays open."""
+    from afmformats.formats.fmt_jpk.jpk_reader import ArchiveCache
+
+    whole = jpk(tmp_path / "whole.jpk-force")
+    path = tmp_path / "curve.jpk-force"
+    with zipfile.ZipFile(whole) as archive, zipfile.ZipFile(path, "w") as part:
+        for name in archive.namelist()[:3]:
+            part.writestr(name, archive.read(name))
+    refusal(path)
+    assert list(ArchiveCache.open_archives) == []
+    path.unlink()
+    whole.rename(path)
+    assert pt.read(path).u.size == T.size
+    assert list(ArchiveCache.open_archives) == []
+
+
 def test_a_file_that_is_none_is_refused(tmp_path: Path) -> None:
     for ending in (".jpk-force", ".ibw"):
         path = tmp_path / f"curve{ending}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import struct
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +11,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
+from children import child
 from format_logs import DT, TEMPERATURE, T, U, Y, is_the_log, refusal, survives
 
 if TYPE_CHECKING:
@@ -175,3 +178,90 @@ def test_the_first_bytes_count_more_than_the_ending(tmp_path: Path) -> None:
 @pytest.mark.parametrize("seed", [1, 2])
 def test_damaged_files_are_refused_in_a_sentence(tmp_path: Path, seed: int) -> None:
     assert survives(with_units(tmp_path / "log.h5"), seed) > 20
+
+
+def with_texts(path: Path) -> Path:
+    """A log with texts of variable length wherever HDF5 may have them."""
+    text = h5py.string_dtype()
+    rows = np.zeros(
+        T.size, dtype=[("time_s", "f8"), ("voltage_V", "f8"), ("x_um", "f8"), ("note", text)]
+    )
+    rows["time_s"], rows["voltage_V"], rows["x_um"], rows["note"] = T, U, Y, "none"
+    with h5py.File(path, "w") as file:
+        file["table"] = rows
+        file["table"].attrs["units"] = "one for each column"
+        file["table"].attrs["author"] = "me"
+        file["names"] = np.array(["a", "b"], dtype=text)
+        file.attrs["software"] = "any"
+        file.attrs.create("keys", ["a", "b"], dtype=text)
+        file.attrs["nothing"] = h5py.Empty("f8")
+        file.attrs["dt_s"] = h5py.Empty("f8")
+    return path
+
+
+def test_texts_of_variable_length_beside_numbers_do_not_matter(tmp_path: Path) -> None:
+    log = pt.read(with_texts(tmp_path / "log.h5"))
+    assert is_the_log(log)
+    assert log.notes == ()
+
+
+def test_a_text_of_a_kind_that_does_not_exist_is_not_read(tmp_path: Path) -> None:
+    """Reading it ends the process: libhdf5 calls a function that is not there."""
+    content = with_texts(tmp_path / "log.h5").read_bytes()
+    # The class 9 of types, variable length, and its kind, 1 for texts; padding and characters.
+    places = [one.start() + 1 for one in re.finditer(rb"\x19[\x01\x11][\x00\x01]\x00\x10", content)]
+    assert len(places) >= 6
+    for number, place in enumerate(places):
+        for kind in (0, 2, 250):
+            changed = content[:place] + bytes([kind]) + content[place + 1 :]
+            (tmp_path / f"log{number}_{kind}.h5").write_bytes(changed)
+    code = f"""
+import pathlib
+import piezotrack.data.reader
+read = refused = 0
+for path in sorted(pathlib.Path({str(tmp_path)!r}).glob("log*_*.h5")):
+    try:
+        pt.read(path)
+        read += 1
+    except pt.PiezotrackError as error:
+        assert str(error).startswith(path.name)
+        refused += 1
+print(read, refused)
+"""
+    done = child(code)
+    assert done.returncode == 0, done.stderr[-500:]
+    read, refused = map(int, done.stdout.split())
+    assert read + refused == 3 * len(places)
+    # What belongs to a text that is not needed does not matter.
+    assert read > refused
+
+
+@pytest.mark.parametrize("version", ["earliest", "latest"])
+@pytest.mark.parametrize("block", [0, 512])
+def test_a_text_of_another_length_than_its_object_is_refused(
+    tmp_path: Path, version: str, block: int
+) -> None:
+    """libhdf5 asks for the memory that its length says, as 4 GB."""
+    path = tmp_path / "log.h5"
+    with h5py.File(path, "w", libver=version, userblock_size=block) as file:
+        for name, values, unit in (("time", T, "s"), ("u", U, "Volts"), ("x", Y, "micrometre")):
+            file[name] = values
+            file[name].attrs["units"] = unit
+    assert is_the_log(pt.read(path))
+    content = path.read_bytes()
+    heap = content.index(b"GCOL") - block
+    place = content.index(struct.pack("<IQ", 5, heap))
+    for length, where in ((250 << 24, heap), (6, heap), (4, heap), (250 << 24, 2**40)):
+        changed = bytearray(content)
+        struct.pack_into("<IQ", changed, place, length, where)
+        path.write_bytes(changed)
+        assert "the attribute 'units' at byte" in refusal(path)
+    # The class of the type, and behind it its size and that of its letters.
+    kind = content.rindex(b"\x19", 0, place)
+    assert struct.unpack_from("<I4xI", content, kind + 4) == (16, 1)
+    for where in (4, 12):
+        for size in (0, 2, 250, 2**31):
+            changed = bytearray(content)
+            struct.pack_into("<I", changed, kind + where, size)
+            path.write_bytes(changed)
+            assert "the attribute 'units' at byte" in refusal(path)

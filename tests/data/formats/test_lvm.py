@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -75,6 +76,32 @@ def test_fewer_samples_than_the_header_says_are_refused(tmp_path: Path) -> None:
     text = lvm_header("One") + lvm_segment(SIGNALS, "One", samples=10**9)
     found = refusal(write(tmp_path / "log.lvm", text))
     assert "says 1000000000 samples and has 400: expected equally many" in found
+
+
+def test_more_samples_than_the_header_says_are_read_with_a_note(tmp_path: Path) -> None:
+    """LabVIEW writes one header before several blocks, where it is told to."""
+    text = lvm_header("No") + lvm_segment(SIGNALS, "No", samples=100)
+    log = pt.read(write(tmp_path / "log.lvm", text))
+    assert is_the_log(log, tolerance=1e-6)
+    (note,) = log.notes
+    assert "says 100 samples" in note
+    assert "400" in note
+    # Cut off behind that number, it is told by its last line.
+    cut = text.rstrip()[:-3]
+    assert "cut off" in refusal(write(tmp_path / "log.lvm", cut))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("columns", ["No", "One"])
+@pytest.mark.parametrize("delta", [math.inf, math.nan])
+def test_an_interval_that_is_none_is_not_stated(tmp_path: Path, columns: str, delta: float) -> None:
+    text = lvm_header(columns) + lvm_segment(SIGNALS, columns, delta=delta)
+    path = write(tmp_path / "log.lvm", text)
+    if columns == "No":
+        assert "sampling interval" in refusal(path)
+    else:
+        assert pt.read(path).dt == pytest.approx(DT)
+    assert pt.data.info(path).summary()
 
 
 def test_a_file_without_a_second_header_is_refused(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
+from children import child
 from format_logs import DT, TEMPERATURE, T, U, Y, is_the_log, refusal, survives
 from log_writers import tdms, waveform
 from piezotrack.data.diagnostics import record_warnings
@@ -147,3 +148,28 @@ def test_a_file_that_is_cut_off_is_refused(tmp_path: Path) -> None:
 
 def test_damaged_files_are_refused_in_a_sentence(tmp_path: Path) -> None:
     assert survives(measured(tmp_path / "log.tdms")) > 20
+
+
+def widths(count: int) -> bytes:
+    """A segment of DAQmx that says for how many cards samples are interleaved in it."""
+    index = struct.pack("<IIIQII", 0x1269, 0xFFFFFFFF, 1, 100, 0, count)
+    metadata = struct.pack("<II", 1, 8) + b"/'a'/'b'" + index + bytes(4)
+    # The table of contents: metadata, new objects, raw data, of DAQmx.
+    return b"TDSm" + struct.pack("<IIQQ", 0x8E, 4713, len(metadata), len(metadata)) + metadata
+
+
+@pytest.mark.parametrize("part", ["name", "value", "widths"])
+def test_metadata_do_not_ask_for_more_than_the_file_has(tmp_path: Path, part: str) -> None:
+    path = measured(tmp_path / "log.tdms")
+    content = path.read_bytes()
+    # Texts with their lengths before them: the name of a property, and its value.
+    texts = {"name": b"unit_string", "value": b"Volts"}
+    if part in texts:
+        text = struct.pack("<I", len(texts[part])) + texts[part]
+        assert text in content
+        path.write_bytes(content.replace(text, struct.pack("<I", 2**32 - 16) + texts[part]))
+    else:
+        path.write_bytes(widths(2**32 - 16))
+    code = f"try: pt.read({str(path)!r})\nexcept pt.DataError as error: print(error)"
+    done = child("import nptdms\n" + code, room=1_000_000_000)
+    assert done.stdout.startswith("log.tdms: is not a sound TDMS file"), done.stderr[-500:]

@@ -43,6 +43,18 @@ def test_a_rate_that_is_none_is_refused(tmp_path: Path) -> None:
     assert found == "log.csv:5: the sample rate is '0': expected hertz above 0"
 
 
+def test_fewer_samples_than_the_comment_says_are_refused(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv")
+    content = path.read_text(encoding="utf-8")
+    lines = content.splitlines(keepends=True)
+    path.write_text("".join(lines[:-1]), encoding="utf-8")
+    assert refusal(path, **GIVEN).startswith("log.csv:6: says 400 samples and has 399: ")
+    # Within a sample, whatever field it is.
+    for length in range(int(0.6 * len(content)), int(0.6 * len(content)) + 50):
+        path.write_text(content[:length], encoding="utf-8")
+        assert "cut off" in refusal(path, **GIVEN)
+
+
 def test_a_fault_is_named_by_its_line(tmp_path: Path) -> None:
     path = write(tmp_path / "log.csv")
     text = path.read_text(encoding="utf-8").replace("-0.995,", "-0.995,x")

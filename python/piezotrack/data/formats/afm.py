@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import zipfile
+from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,8 @@ import numpy as np
 from .table import Channel, ChannelTable, Format
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from .source import Source
 
 __all__ = ["FORMAT"]
@@ -21,11 +24,13 @@ ENDINGS = (".jpk-force", ".jpk-force-map", ".jpk-qi-data", ".jpk-qi-series", ".i
 
 def _opens(source: Source) -> ChannelTable:
     library = source.library("afmformats", "afm")
-    with source.decoding("AFM", "afmformats"):
+    with _opened(source):
         if zipfile.is_zipfile(source.path):
             with zipfile.ZipFile(source.path) as archive:
                 for info in archive.infolist():
                     source.check_size(f"member {info.filename!r}", info.file_size)
+                total = sum(info.file_size for info in archive.infolist())
+                source.check_size("the sum of the members", total)
         curves, uncalibrated = _curves(source, library)
         units = library.afm_data.column_units
         channels = [
@@ -41,7 +46,6 @@ def _opens(source: Source) -> ChannelTable:
             for name in curve.columns
             if name not in uncalibrated
         ]
-        _close(source)
     return ChannelTable(source, channels)
 
 
@@ -55,18 +59,21 @@ def _curves(source: Source, library: Any) -> tuple[Any, tuple[str, ...]]:
 
 
 def _read(source: Source, curve: Any, name: str) -> Any:
-    with source.decoding("AFM", "afmformats"):
-        values = np.asarray(curve[name])
-        _close(source)
-        return values
+    with _opened(source):
+        return np.asarray(curve[name])
 
 
-def _close(source: Source) -> None:
-    """Close the archive, which afmformats keeps open."""
+@contextmanager
+def _opened(source: Source) -> Iterator[None]:
+    """Close the archive behind reading, also where it fails: afmformats keeps it by its name."""
     reader = importlib.import_module("afmformats.formats.fmt_jpk.jpk_reader")
-    archive = reader.ArchiveCache.open_archives.pop(source.path, None)
-    if archive is not None:
-        archive.close()
+    try:
+        with source.decoding("AFM", "afmformats"):
+            yield
+    finally:
+        archive = reader.ArchiveCache.open_archives.pop(source.path, None)
+        if archive is not None:
+            archive.close()
 
 
 FORMAT = Format(

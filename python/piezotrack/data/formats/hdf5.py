@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from functools import cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .hdf5_heaps import check_heaps
-from .table import Channel, ChannelTable, Format, split_matrix, stated_interval
+from .table import Channel, ChannelTable, Format, names_interval, split_matrix, stated_interval
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Sequence
 
     from .source import Source
 
@@ -22,20 +22,22 @@ __all__ = ["FORMAT", "open_matlab"]
 UNIT_NAMES = ("units", "unit", "Units", "Unit", "UNITS", "unit_string")
 # Most objects that are looked at.
 MOST_OBJECTS = 100_000
+# Bytes of an attribute that is a number or a text of fixed length, at most.
+LONGEST = 10_000
 EXTRA = "hdf5"
 
 
 def _opens(source: Source) -> ChannelTable:
     h5py = source.library("h5py", EXTRA)
-    check_heaps(source)
+    check_heaps(source, UNIT_NAMES)
     with source.decoding("HDF5"), h5py.File(source.path, "r") as file:
         channels: list[Channel] = []
         for path, dataset in _datasets(h5py, file):
             group, _, name = path.rpartition("/")
-            unit = _unit(dataset.attrs)
+            unit = _unit(h5py, dataset.attrs)
             channels += _of_dataset(source, h5py, dataset, group, name, unit)
-            channels += _constants(dataset.attrs, group)
-        channels += _constants(file.attrs, "")
+            channels += _constants(h5py, dataset.attrs, group)
+        channels += _constants(h5py, file.attrs, "")
     return ChannelTable(source, channels)
 
 
@@ -54,13 +56,13 @@ def open_matlab(source: Source) -> ChannelTable:
         the variables.
     """
     h5py = source.library("h5py", "mat")
-    check_heaps(source)
+    check_heaps(source, ())
     with source.decoding("MAT v7.3"), h5py.File(source.path, "r") as file:
         channels: list[Channel] = []
         numbers = {}
         texts: dict[str, str] = {}
         for path, dataset in _datasets(h5py, file):
-            kind = _text(dataset.attrs.get("MATLAB_class", ""))
+            kind = _text(_attribute(h5py, dataset.attrs, "MATLAB_class"))
             if path.startswith("#") or "MATLAB_empty" in dataset.attrs:
                 continue
             if kind == "char" and dataset.size <= 1000 and dataset.dtype.kind in "ui":
@@ -93,21 +95,40 @@ def _of_dataset(
     source: Source, h5py: Any, dataset: Any, group: str, name: str, unit: str | None
 ) -> Iterator[Channel]:
     """Divide a dataset into channels; texts, references and samples in other files are none."""
-    if dataset.shape is None or dataset.is_virtual or dataset.external:
+    kind = dataset.id.get_type()
+    if dataset.shape is None or dataset.is_virtual or dataset.external or not _is_sound(h5py, kind):
         return
     _check(source, dataset)
-    read = _reader(source, h5py, dataset.name)
     names = dataset.dtype.names
     if names is not None:
         group = f"{group}/{name}" if group else name
-        for part in names:
-            inner = dataset.dtype[part]
-            if inner.kind in "biuf" and not inner.shape and len(dataset.shape) == 1:
-                yield Channel(part, dataset.shape[0], partial(_part, read, part), group)
+        inner = {part: dataset.dtype[part] for part in names}
+        columns = [one for one in names if inner[one].kind in "biuf" and not inner[one].shape]
+        read = _reader(source, h5py, dataset.name, columns)
+        for part in columns if len(dataset.shape) == 1 else ():
+            yield Channel(part, dataset.shape[0], partial(_part, read, part), group)
     elif dataset.dtype.kind in "biuf":
-        dt = _interval(dataset.attrs, group)
+        read = _reader(source, h5py, dataset.name)
+        dt = _interval(h5py, dataset.attrs, group)
         for column, place, count in split_matrix(name, dataset.shape):
             yield Channel(column, count, partial(_part, read, place), group, unit, dt)
+
+
+def _is_sound(h5py: Any, kind: Any, *, alone: bool = True) -> bool:
+    """Whether a type is made of numbers and texts: libhdf5 ends the process on a damaged one.
+
+    A text of variable length may be part of a row, and is not read then.
+    """
+    h5t = h5py.h5t
+    what = kind.get_class()
+    if what == h5t.COMPOUND:
+        parts = range(kind.get_nmembers())
+        return all(_is_sound(h5py, kind.get_member_type(k), alone=False) for k in parts)
+    if what in (h5t.ENUM, h5t.ARRAY):
+        return _is_sound(h5py, kind.get_super(), alone=False)
+    if what == h5t.STRING:
+        return not (alone and kind.is_variable_str())
+    return what in (h5t.INTEGER, h5t.FLOAT, h5t.BITFIELD, h5t.OPAQUE)
 
 
 def _check(source: Source, dataset: Any) -> None:
@@ -126,25 +147,43 @@ def _check(source: Source, dataset: Any) -> None:
         source.check_size(what, math.prod(dataset.chunks) * dataset.dtype.itemsize)
 
 
-def _reader(source: Source, h5py: Any, path: str) -> Callable[[], Any]:
-    # Once for all columns of a dataset.
-    @cache
+def _reader(
+    source: Source, h5py: Any, path: str, parts: Sequence[str] | None = None
+) -> Callable[[], Any]:
     def read() -> Any:
         with source.decoding("HDF5"), h5py.File(source.path, "r") as file:
-            return np.asarray(file[path][()])
+            dataset = file[path]
+            return np.asarray(dataset[()] if parts is None else dataset.fields(parts)[()])
 
-    return read
+    # Once for all columns of a dataset.
+    return partial(source.latest, path, read)
 
 
 def _part(read: Callable[[], Any], place: Any) -> Any:
     return read()[place]
 
 
-def _unit(attributes: Mapping[str, Any]) -> str | None:
+def _unit(h5py: Any, attributes: Any) -> str | None:
     for name in UNIT_NAMES:
         if name in attributes:
-            return _text(attributes[name])
+            return _text(_attribute(h5py, attributes, name))
     return None
+
+
+def _attribute(h5py: Any, attributes: Any, name: str) -> Any:
+    """Read an attribute that is one number or text; an empty text where it is none."""
+    if name not in attributes:
+        return ""
+    attribute = attributes.get_id(name)
+    kind, h5t = attribute.get_type(), h5py.h5t
+    what = kind.get_class()
+    if what not in (h5t.INTEGER, h5t.FLOAT, h5t.STRING) or kind.get_size() > LONGEST:
+        return ""
+    # A text of variable length only where its length has been checked; not a type from elsewhere.
+    unchecked = name not in UNIT_NAMES or kind.committed()
+    if what == h5t.STRING and kind.is_variable_str() and unchecked:
+        return ""
+    return attributes[name] if attribute.get_space().get_simple_extent_npoints() == 1 else ""
 
 
 def _text(value: Any) -> str:
@@ -156,16 +195,16 @@ def _text(value: Any) -> str:
     return one.decode("utf-8", "replace") if isinstance(one, bytes) else str(one)
 
 
-def _constants(attributes: Mapping[str, Any], group: str) -> Iterator[Channel]:
-    """Take numbers among the attributes as constants, as ``sample_rate_Hz``."""
+def _constants(h5py: Any, attributes: Any, group: str) -> Iterator[Channel]:
+    """Take attributes that may be the sampling interval, as ``sample_rate_Hz``, as constants."""
     for name in attributes:
-        value = attributes[name]
-        if np.asarray(value).dtype.kind in "iuf" and np.asarray(value).size == 1:
+        if names_interval(name):
+            value = _attribute(h5py, attributes, name)
             yield Channel(name, 1, partial(np.asarray, value), group)
 
 
-def _interval(attributes: Mapping[str, Any], group: str) -> float | None:
-    return stated_interval(_constants(attributes, group))
+def _interval(h5py: Any, attributes: Any, group: str) -> float | None:
+    return stated_interval(_constants(h5py, attributes, group))
 
 
 FORMAT = Format(

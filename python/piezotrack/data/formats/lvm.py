@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
@@ -44,14 +45,15 @@ def _opens(source: Source) -> ChannelTable:
     entries = _entries(lines[: ends[0]], None)
     separator = "," if entries.get("Separator", ["Tab"])[0].lower().startswith("comma") else "\t"
     segments = list(_segments(lines, ends, separator))
-    channels = [
-        channel
-        for number, segment in enumerate(segments, start=1)
-        for channel in _channels(
-            source, lines, segment, separator, f"segment {number}" if len(segments) > 1 else ""
-        )
-    ]
-    return ChannelTable(source, channels)
+    channels: list[Channel] = []
+    notes: list[str] = []
+    for number, segment in enumerate(segments, start=1):
+        group = f"segment {number}" if len(segments) > 1 else ""
+        table = _samples(source, lines, segment, separator)
+        if (note := _check_count(source, segment, table)) is not None:
+            notes.append(note)
+        channels += _channels(segment, table, group)
+    return ChannelTable(source, channels, notes=notes)
 
 
 def _without_special(lines: list[str]) -> list[str]:
@@ -91,32 +93,35 @@ def _segments(lines: list[str], ends: list[int], separator: str) -> Iterator[Seg
         yield Segment(_entries(lines[first:end], separator), end + 1, last)
 
 
-def _channels(
-    source: Source, lines: list[str], segment: Segment, separator: str, group: str
-) -> Iterator[Channel]:
-    """Divide a segment into channels with their units and intervals."""
-    if segment.titles >= len(lines):
-        raise source.error("ends behind a header: expected samples", segment.titles)
-    titles = [title.strip() for title in lines[segment.titles].split(separator)]
-    # Behind the last channel there may be comments.
-    used = titles.index("Comment") if "Comment" in titles else len(titles)
-    titles = titles[:used]
-    while titles and not titles[-1]:
-        titles.pop()
-    table = _samples(source, lines, segment, separator, titles)
-    said = number_of(segment.entries.get("Samples", [""])[0])
-    if table.count(table.columns[0]) < said:
+def _check_count(source: Source, segment: Segment, table: TextTable) -> str | None:
+    """Refuse fewer samples than the header says; return a note on more of them.
+
+    LabVIEW writes one header before several blocks of samples, where it is told to.
+    """
+    stated = number_of(segment.entries.get("Samples", [""])[0])
+    there = table.count(table.columns[0])
+    if there < stated:
         raise source.error(
-            f"says {said:.0f} samples and has {table.count(table.columns[0])}: expected equally "
-            "many; the log may have been cut off",
+            f"says {stated:.0f} samples and has {there}: expected equally many; the log may have "
+            "been cut off",
             segment.titles,
         )
+    if there > stated:
+        return (
+            f"the header before line {segment.titles + 1} says {stated:.0f} samples, and there are "
+            f"{there}: all are read"
+        )
+    return None
+
+
+def _channels(segment: Segment, table: TextTable, group: str) -> Iterator[Channel]:
+    """Divide a segment into channels with their units and intervals."""
     number = 0
     time: np.ndarray | None = None
     for column in table.columns:
         is_x = column.title == X
         delta = number_of(_entry(segment, "Delta_X", number).replace(",", "."))
-        interval = delta if delta > 0.0 else None
+        interval = delta if 0.0 < delta < math.inf else None
         seconds = _entry(segment, "X_Dimension", number) in ("Time", "")
         if is_x:
             values = table.column(column)
@@ -133,10 +138,16 @@ def _channels(
         number += 1
 
 
-def _samples(
-    source: Source, lines: list[str], segment: Segment, separator: str, titles: list[str]
-) -> TextTable:
+def _samples(source: Source, lines: list[str], segment: Segment, separator: str) -> TextTable:
     """Read the lines of a segment without their comments; blank X columns are NaN."""
+    if segment.titles >= len(lines):
+        raise source.error("ends behind a header: expected samples", segment.titles)
+    titles = [title.strip() for title in lines[segment.titles].split(separator)]
+    # Behind the last channel there may be comments.
+    used = titles.index("Comment") if "Comment" in titles else len(titles)
+    titles = titles[:used]
+    while titles and not titles[-1]:
+        titles.pop()
     rows = list(lines)
     for k in range(segment.titles + 1, segment.last):
         if lines[k].strip():

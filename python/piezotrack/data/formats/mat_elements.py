@@ -76,7 +76,7 @@ def read_variables(source: Source) -> list[Variable]:
     """
     data = memoryview(source.content())
     order = "<" if bytes(data[126:128]) == b"IM" else ">"
-    found, place = [], HEADER
+    found, place, total = [], HEADER, 0
     while place < len(data):
         if place + 8 > len(data):
             _unsound(source, "it ends within a tag")
@@ -84,7 +84,8 @@ def read_variables(source: Source) -> list[Variable]:
         source.check_size(f"the element at byte {place}", count, stored=len(data) - place - 8)
         body = data[place + 8 : place + 8 + count]
         if kind == COMPRESSED:
-            body = _expanded(source, body, order)
+            body = _expanded(source, body, order, total)
+            total += len(body)
         elif kind == MATRIX:
             count += -count % 8
         else:
@@ -98,8 +99,8 @@ def _unsound(source: Source, fault: str) -> NoReturn:
     raise source.error(f"is not a sound MAT file, or is cut off: {fault}")
 
 
-def _expanded(source: Source, body: memoryview, order: str) -> memoryview:
-    """Decompress a variable, whose tag says how long it is."""
+def _expanded(source: Source, body: memoryview, order: str, before: int) -> memoryview:
+    """Decompress a variable, whose tag says how long it is, behind `before` bytes of others."""
     expander = zlib.decompressobj()
     try:
         tag = expander.decompress(body, 8)
@@ -109,6 +110,7 @@ def _expanded(source: Source, body: memoryview, order: str) -> memoryview:
         if kind != MATRIX:
             _unsound(source, f"a compressed variable is of type {kind}")
         source.check_size("a compressed variable", count)
+        source.check_size("the sum of the compressed variables", before + count)
         content = expander.decompress(expander.unconsumed_tail, max(count, 1))
     except zlib.error as error:
         _unsound(source, f"{error}")

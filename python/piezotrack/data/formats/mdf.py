@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 from collections import Counter
-from contextlib import contextmanager
-from functools import cache, partial
+from contextlib import contextmanager, redirect_stdout
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from ..._support.messages import quoted
 from .table import Channel, ChannelTable, Format
 
 if TYPE_CHECKING:
@@ -15,6 +17,12 @@ if TYPE_CHECKING:
     from .source import Source
 
 __all__ = ["FORMAT"]
+
+# Kinds of conversions that are carried out, in MDF4 and MDF3: none, linear, rational, tables.
+# asammdf hands formulas to `eval`, or reads them raw.
+CONVERTED = {4: {0, 1, 2, 4, 5, 6, 7, 8}, 3: {65535, 0, 1, 2, 6, 9, 11, 12}}
+# Flag of a group whose times are those of another group.
+REMOTE_MASTER = 8
 
 
 def _opens(source: Source) -> ChannelTable:
@@ -41,11 +49,52 @@ def _channels(source: Source, asammdf: Any, file: Any) -> Iterator[Channel]:
         size = int(part.channel_group.samples_byte_nr)
         source.check_size(f"channel group {number}", count * max(size, 1))
         source.check_size(f"channel group {number}", 8 * count)
-        read = _reader(source, asammdf, number, len(part.channels), file.masters_db.get(number))
+        # Opening a file is what takes long, so all channels of a group are read at once; channels
+        # may share their bytes.
+        at_once = 8 * count * len(part.channels) <= source.most
         for index, channel in enumerate(part.channels):
             _check_place(source, number, part.channel_group, channel)
-            unit = file.get_channel_unit(group=number, index=index)
-            yield Channel(channel.name, count, partial(_part, read, index), group, unit or None)
+            # A structure or an array is no column; the channels in a structure are their own.
+            if not part.channel_dependencies[index]:
+                fault = _fault(file, number, index)
+                unit = file.get_channel_unit(group=number, index=index)
+                wanted = None if at_once else index
+                read = partial(_read, source, asammdf, number, wanted)
+                one = partial(_part, source, read, number, index, fault)
+                yield Channel(channel.name, count, one, group, unit or None)
+
+
+def _fault(file: Any, group: int, index: int) -> str:
+    """Say why a channel is not converted to its unit; return an empty text where it is."""
+    part = file.groups[group]
+    channel = part.channels[index]
+    if file.masters_db.get(group) == index and _flags(part) & REMOTE_MASTER:
+        return f"has the times {quoted(channel.name)} in a group that takes those of another one"
+    conversion = channel.conversion
+    if conversion is None and channel.conversion_addr:
+        return f"has a damaged conversion of {quoted(channel.name)}"
+    kinds = CONVERTED[4 if str(file.version) >= "4" else 3]
+    # Tables may refer to further conversions, and those to themselves.
+    waiting, known = [conversion], set[int]()
+    while waiting:
+        conversion = waiting.pop()
+        if isinstance(conversion, bytes) or conversion is None or id(conversion) in known:
+            continue
+        known.add(id(conversion))
+        waiting += (getattr(conversion, "referenced_blocks", None) or {}).values()
+        if conversion.conversion_type not in kinds:
+            formula = getattr(conversion, "formula", "")
+            by = (
+                f"the formula {quoted(formula)}"
+                if formula
+                else f"kind {conversion.conversion_type}"
+            )
+            return f"converts {quoted(channel.name)} by {by}"
+    return ""
+
+
+def _flags(part: Any) -> int:
+    return int(getattr(part.channel_group, "flags", 0))
 
 
 def _check_place(source: Source, number: int, group: Any, channel: Any) -> None:
@@ -64,9 +113,12 @@ def _check_place(source: Source, number: int, group: Any, channel: Any) -> None:
 
 @contextmanager
 def _opened(source: Source, asammdf: Any) -> Iterator[Any]:
-    with source.decoding("MDF", "asammdf"), source.path.open("rb") as content:
+    # asammdf prints what it stumbles over.
+    quiet = redirect_stdout(io.StringIO())
+    with source.decoding("MDF", "asammdf"), quiet, source.opened() as content:
         try:
-            file = asammdf.MDF(content)
+            # Frames of buses would be converted while the file is opened.
+            file = asammdf.MDF(content, process_bus_logging=False)
         except Exception as error:
             _close_halves(error)
             raise
@@ -89,25 +141,52 @@ def _close_halves(error: BaseException) -> None:
         _close_halves(error.__context__)
 
 
-def _reader(
-    source: Source, asammdf: Any, group: int, count: int, master: int | None
-) -> Callable[[], list[Any]]:
-    # Once for all channels of a group: opening a file is what takes long.
-    @cache
-    def read() -> list[Any]:
-        with _opened(source, asammdf) as file:
-            signals = [file.get(group=group, index=index) for index in range(count)]
+def _read(source: Source, asammdf: Any, group: int, wanted: int | None) -> dict[int, Any]:
+    """Read a channel of a group, or all of them."""
+    with _opened(source, asammdf) as file:
+        sound = _disarm(file)
+        master = file.masters_db.get(group)
+        found = {}
+        for index in sound[group] if wanted is None else [wanted]:
             # Copied, as the file is closed.
-            return [
-                (one.timestamps if index == master else one.samples).copy()
-                for index, one in enumerate(signals)
-            ]
+            if index == master:
+                found[index] = file.get(group=group, index=index).timestamps.copy()
+            else:
+                samples, _ = file.get(group=group, index=index, samples_only=True)
+                found[index] = samples.copy()
+        return found
 
-    return read
+
+def _disarm(file: Any) -> list[list[int]]:
+    """Take away what is not carried out from all channels of a file, and return the others.
+
+    asammdf converts times, and those of other groups, with whatever channel is read.
+    """
+    sound: list[list[int]] = []
+    for number, part in enumerate(file.groups):
+        sound.append([])
+        for index, channel in enumerate(part.channels):
+            if hasattr(channel, "attachment"):
+                # It may be any file of the machine.
+                channel.attachment = None
+            if _fault(file, number, index):
+                channel.conversion = None
+            elif not part.channel_dependencies[index]:
+                sound[-1].append(index)
+    return sound
 
 
-def _part(read: Callable[[], list[Any]], index: int) -> Any:
-    return read()[index]
+def _part(
+    source: Source, read: Callable[[], dict[int, Any]], group: int, index: int, fault: str
+) -> Any:
+    if fault:
+        raise source.error(
+            f"{fault}: expected a linear or rational conversion, or a table, as others are not "
+            "carried out"
+        )
+    # Of a group that is not read at once there is only this one.
+    found = source.latest(f"group {group}", read)
+    return (found if index in found else read())[index]
 
 
 FORMAT = Format(

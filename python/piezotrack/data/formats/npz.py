@@ -102,8 +102,6 @@ def _part(read: Callable[[], Any], place: Any) -> Any:
 
 
 def _reader(source: Source, member: str) -> Callable[[], Any]:
-    # Once for all columns of a matrix.
-    @cache
     def read() -> Any:
         with (
             source.decoding("NPZ"),
@@ -112,7 +110,8 @@ def _reader(source: Source, member: str) -> Callable[[], Any]:
         ):
             return np.lib.format.read_array(file, allow_pickle=False)
 
-    return read
+    # Once for all columns of a matrix.
+    return partial(source.latest, member, read)
 
 
 def _begins(head: bytes) -> bool:

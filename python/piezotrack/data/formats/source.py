@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import importlib
+import io
 import logging
+import os
 import warnings
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from ..._support.messages import quoted
 from ...errors import DataError, ParameterError, PiezotrackError, ShapeError
 
 if TYPE_CHECKING:
-    import os
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
 __all__ = ["Source"]
 
@@ -23,6 +24,25 @@ HEAD = 1 << 16
 # Bytes from which samples have to be backed by the file, and how often they may be more than it:
 # noise compresses by a factor of two to ten.
 BACKED, DENSEST = 100_000_000, 200
+# How often a file may be read besides once for each of its bytes.
+MOST_CALLS = 10_000
+
+
+class _BoundedReader(io.BufferedReader):
+    """A file that does not ask for memory for more than is left of it, nor is read without end."""
+
+    calls = 0
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        """Read so many bytes, or those that are left."""
+        length = os.fstat(self.fileno()).st_size
+        self.calls += 1
+        # A part has several bytes, and is read a few times; each may say where the next one is.
+        if self.calls > MOST_CALLS + length:
+            raise ValueError("its parts refer to each other in a circle")
+        if size is None or size < 0:
+            return super().read(size)
+        return super().read(min(size, max(length - self.tell(), 0)))
 
 
 class Source:
@@ -74,6 +94,10 @@ class Source:
         """Return all bytes."""
         with self._opening(), self.path.open("rb") as opened:
             return opened.read()
+
+    def opened(self) -> BinaryIO:
+        """Open the file for a library that may ask for any number of bytes of it."""
+        return _BoundedReader(io.FileIO(self.path))
 
     def error(self, sentence: str, line: int | None = None) -> DataError:
         """Make an error about the content of the file."""
@@ -166,11 +190,38 @@ class Source:
                 f"{what} is said to have {declared} bytes: expected {stored} at most, in a file "
                 f"of {self.size} bytes"
             )
-        if declared > BACKED and declared > DENSEST * self.size:
+        if declared > self.most:
             raise self.error(
                 f"{what} is said to have {declared} bytes: expected {DENSEST * self.size} at most, "
                 f"as measured samples in a file of {self.size} bytes"
             )
+
+    @property
+    def most(self) -> int:
+        """Bytes of measured samples that the file can hold, compressed."""
+        return max(BACKED, DENSEST * self.size)
+
+    def latest(self, part: str, read: Callable[[], Any]) -> Any:
+        """Return what was read last, where that is the same part of the file, or read it.
+
+        Parameters
+        ----------
+        part : str
+            What is read: the columns of an array are asked for one after the other.
+        read : callable
+            Reads it.
+
+        Returns
+        -------
+        object
+            What `read` gives. Only one part is kept, as a file may have any number of them.
+        """
+        if self._latest is None or self._latest[0] != part:
+            self._latest = None
+            self._latest = part, read()
+        return self._latest[1]
+
+    _latest: tuple[str, Any] | None = None
 
     @contextmanager
     def _opening(self) -> Iterator[None]:

@@ -30,12 +30,14 @@ __all__ = [
     "Format",
     "Table",
     "WrittenColumn",
+    "names_interval",
     "split_matrix",
     "stated_interval",
 ]
 
-# Most columns of a file.
+# Most columns of a file, and bytes of a sample in memory.
 MOST_COLUMNS = 10_000
+ITEM = 8
 # Names of a constant that is the sampling interval, or its inverse, and the units of the latter.
 INTERVALS = ("dt", "ts", "interval", "sample time", "sampling interval", "sample interval")
 RATES = ("fs", "rate", "sample rate", "sampling rate", "sampling frequency", "sample frequency")
@@ -261,6 +263,7 @@ class ChannelTable(Table):
                 )
         if count > MOST_SAMPLES:
             raise self.source.error(f"{first} has {count} samples: expected {MOST_SAMPLES} at most")
+        self.source.check_size("the sum of the columns", ITEM * count * len(main))
         table = {}
         for column in main:
             values = self.column(column)
@@ -270,12 +273,24 @@ class ChannelTable(Table):
                 )
             table[column.index] = values
         groups = {column.group for column in main}
-        for column in self.columns:
-            channel = self.channels[column.index]
-            if column.index not in table and channel.count == count and column.group in groups:
-                further = self._further(column, channel)
-                if further is not None and further.shape == (count,):
-                    table[column.index] = further
+        beside = [
+            column
+            for column in self.columns
+            if column.index not in table
+            and self.channels[column.index].count == count
+            and column.group in groups
+        ]
+        most = max(0, self.source.most // (ITEM * max(count, 1)) - len(table))
+        for column in beside[:most]:
+            further = self._further(column, self.channels[column.index])
+            if further is not None and further.shape == (count,):
+                table[column.index] = further
+        if len(beside) > most:
+            self.columns.notes.append(
+                f"{len(beside) - most} further columns are left out: all of them would have "
+                f"{ITEM * count * (len(main) + len(beside))} bytes, expected {self.source.most} at "
+                f"most, as measured samples in a file of {self.source.size} bytes"
+            )
         return table
 
     def _further(self, column: Column, channel: Channel) -> Array | None:
@@ -315,7 +330,8 @@ def _numbers(raw: Any) -> Array | None:
         values[lost] = np.nan
     if values.dtype.kind not in "biuf":
         return None
-    with np.errstate(over="ignore"):
+    # NaN in float32 may be one that signals.
+    with np.errstate(over="ignore", invalid="ignore"):
         return values.astype(np.float64, copy=False)
 
 
@@ -384,20 +400,39 @@ def _split(name: str) -> tuple[str, str]:
 def stated_interval(constants: Iterable[Channel]) -> float | None:
     """Find the sampling interval among the constants of a file [s]."""
     for channel in constants:
-        column = column_of(0, channel)
-        name = re.sub(r"[\s_-]+", " ", column.name).lower()
-        unit = column.unit.lower()
-        seconds = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}.get(unit)
-        if name.endswith((" hz", " khz")):
-            name, _, unit = name.rpartition(" ")
-        if not (name in INTERVALS and seconds) and not (name in RATES and unit in HERTZ):
+        if (scale := _interval_scale(channel)) is None:
             continue
         values = np.asarray(channel.read()).ravel()
         if values.size != 1 or values.dtype.kind not in "iuf" or not float(values[0]) > 0.0:
             continue
+        per_second, is_rate = scale
         value = float(values[0])
-        return value / seconds if seconds else 1.0 / (value * HERTZ[unit])
+        return 1.0 / (value * per_second) if is_rate else value / per_second
     return None
+
+
+def names_interval(name: str) -> bool:
+    """Whether a name is that of a sampling interval or of its inverse, with a unit.
+
+    Examples
+    --------
+    >>> names_interval("sample_rate_Hz"), names_interval("dt")
+    (True, False)
+    """
+    return _interval_scale(Channel(name, 1, list)) is not None
+
+
+def _interval_scale(channel: Channel) -> tuple[float, bool] | None:
+    """Return how many units there are in SI, and whether it is a rate; None where it is neither."""
+    column = column_of(0, channel)
+    name = re.sub(r"[\s_-]+", " ", column.name).lower()
+    unit = column.unit.lower()
+    seconds = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}.get(unit)
+    if name.endswith((" hz", " khz")):
+        name, _, unit = name.rpartition(" ")
+    if name in INTERVALS and seconds:
+        return seconds, False
+    return (HERTZ[unit], True) if name in RATES and unit in HERTZ else None
 
 
 def _first(mask: NDArray[np.bool_]) -> int | None:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from ..._support.messages import listed
 from .table import Channel, ChannelTable, Format
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from .source import Source
 
 __all__ = ["FORMAT"]
@@ -16,8 +19,13 @@ __all__ = ["FORMAT"]
 
 def _opens(source: Source) -> ChannelTable:
     nptdms = source.library("nptdms", "tdms")
-    with source.decoding("TDMS", "nptdms"):
-        file = nptdms.TdmsFile.read_metadata(source.path)
+    with _opened(source) as content:
+        try:
+            file = nptdms.TdmsFile.read_metadata(content)
+        except MemoryError:
+            raise source.error(
+                "is not a sound TDMS file: expected metadata that fit into memory"
+            ) from None
         status = file.file_status
         channels = [
             _channel(source, nptdms, channel)
@@ -32,6 +40,13 @@ def _opens(source: Source) -> ChannelTable:
         )
     _check_counts(source, file)
     return ChannelTable(source, channels)
+
+
+@contextmanager
+def _opened(source: Source) -> Iterator[BinaryIO]:
+    # Not by its name: an index beside it may be that of another file.
+    with source.decoding("TDMS", "nptdms"), source.opened() as content:
+        yield content
 
 
 def _check_counts(source: Source, file: Any) -> None:
@@ -63,7 +78,7 @@ def _channel(source: Source, nptdms: Any, channel: Any) -> Channel:
 
 
 def _read(source: Source, nptdms: Any, group: str, name: str) -> Any:
-    with source.decoding("TDMS", "nptdms"), nptdms.TdmsFile.open(source.path) as file:
+    with _opened(source) as content, nptdms.TdmsFile.open(content) as file:
         return file[group][name][:]
 
 

@@ -37,6 +37,8 @@ MOST_LETTERS = 1_000_000
 # Formats that are opened as text by mistake.
 SPREADSHEETS = (".xls", ".xlsx", ".ods")
 CUT_OFF = "; the log may have been cut off in this last line"
+# Samples before a last one without its line end that it is compared with: at least, and at most.
+LEAST_BEFORE, MOST_BEFORE = 10, 1000
 
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 _SWAP = str.maketrans(",.", ".,")
@@ -169,6 +171,7 @@ class TextTable(Table):
                 "holds a header and no samples: expected one line for each", self.header
             )
         self._count = sum(1 for _ in layout.rows())
+        self._check_last()
         self._dates: dict[int, Instant] = {}
         for column, text in zip(list(self.columns), self._fields(first[1]), strict=False):
             if not math.isnan(number_of(text)):
@@ -177,6 +180,33 @@ class TextTable(Table):
                 self._dates[column.index] = instant
             if instant is not None or (not column.unit and is_ambiguous(text)):
                 self.columns[column.index] = replace(column, unit="s")
+
+    def _check_last(self) -> None:
+        """Refuse a log that was cut off within the last field of its last line.
+
+        Many whole files do not end that line, so it is taken for a half one only where the field
+        is shorter, or has fewer decimals, than those of all samples before it.
+        """
+        lines, last = self.layout.lines, self.layout.last
+        if last != len(lines) or not lines[-1].strip() or self._count <= LEAST_BEFORE:
+            return
+        before = [line for line in lines[self.layout.first : last - 1] if line.strip()]
+        rows = [self._fields(line) for line in before[-MOST_BEFORE:]]
+        half = self._fields(lines[-1])
+        if len(half) != len(rows[-1]):
+            # Refused for the number of its fields.
+            return
+        lengths, decimals = zip(*(_lengths(row[-1]) for row in rows), strict=True)
+        length, places = _lengths(half[-1])
+        # Of a fixed number of decimals, the numbers before them may be of any length.
+        is_fixed = min(decimals) == max(decimals) > 0
+        if places < min(decimals) or (length < min(lengths) and not is_fixed):
+            raise self.source.error(
+                f"the file ends in this line, whose last field {quoted(half[-1])} is shorter than "
+                "in all lines before it: expected a whole line, or the end of one behind it; the "
+                "log may have been cut off",
+                last,
+            )
 
     def count(self, column: Column) -> int:
         """Return the number of samples."""
@@ -297,6 +327,12 @@ def _commented_titles(
         return None
     titles = split_fields(lines[above[-1]].strip().lstrip("#% "), delimiter, is_header=True)
     return (above[-1] + 1, titles) if len(titles) == count and are_titles(titles) else None
+
+
+def _lengths(text: str) -> tuple[int, int]:
+    """Return the number of characters of a field, and of those behind its decimal mark."""
+    mark = max(text.rfind("."), text.rfind(","))
+    return len(text), len(text) - 1 - mark if mark >= 0 else 0
 
 
 def _seconds(text: str, first: Instant) -> float:

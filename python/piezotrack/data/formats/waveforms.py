@@ -13,16 +13,19 @@ if TYPE_CHECKING:
 
 __all__ = ["FORMAT"]
 
+_SAMPLES = re.compile(r"#\s*Samples:\s*(\d{1,18})\s*", re.IGNORECASE)
 _RATE = re.compile(r"#\s*Sample rate:\s*([0-9.eE+-]+)\s*([kM]?)Hz\s*", re.IGNORECASE)
 FACTORS = {"": 1.0, "k": 1e3, "m": 1e6}
 
 
 def _opens(source: Source) -> TextTable:
     lines = lines_of(source)
-    dt = None
+    dt, stated = None, None
     for number, line in enumerate(lines):
         if line.strip() and not line.startswith("#"):
             break
+        if found := _SAMPLES.fullmatch(line):
+            stated = int(found[1]), number + 1
         if found := _RATE.fullmatch(line):
             try:
                 dt = 1.0 / (float(found[1]) * FACTORS[found[2].lower()])
@@ -30,7 +33,14 @@ def _opens(source: Source) -> TextTable:
                 raise source.error(
                     f"the sample rate is {found[1][:40]!r}: expected hertz above 0", number + 1
                 ) from None
-    return TextTable(source, Layout.found(source, lines), dt=dt)
+    table = TextTable(source, Layout.found(source, lines), dt=dt)
+    if stated is not None and (there := table.count(table.columns[0])) < stated[0]:
+        raise source.error(
+            f"says {stated[0]} samples and has {there}: expected equally many; the log may have "
+            "been cut off",
+            stated[1],
+        )
+    return table
 
 
 FORMAT = Format(
