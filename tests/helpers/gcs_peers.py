@@ -10,9 +10,9 @@ from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 import piezotrack as pt
-from piezotrack.hardware.gcs.arguments import Refusal
-from piezotrack.hardware.gcs.controller import VirtualController
-from piezotrack.hardware.gcs.protocol import one_answer
+from piezotrack.adapters.gcs.protocol import one_answer
+from piezotrack.adapters.simulators.gcs.arguments import Refusal
+from piezotrack.adapters.simulators.gcs.controller import VirtualController
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping

@@ -135,7 +135,7 @@ def _timed(stage: VirtualStage, limits: Limits | None, speed: float) -> VirtualD
 
 @contextmanager
 def _gcs(stage: VirtualStage, limits: Limits | None, host: str, port: int, speed: float) -> Served:
-    from ..hardware.gcs.server import GcsServer
+    from ..adapters.simulators.gcs.server import GcsServer
 
     with GcsServer(stage, limits=limits, host=host, port=port, speed=speed) as server:
         yield server.address, server.limits
@@ -143,7 +143,7 @@ def _gcs(stage: VirtualStage, limits: Limits | None, host: str, port: int, speed
 
 @contextmanager
 def _scpi(stage: VirtualStage, limits: Limits | None, host: str, port: int, speed: float) -> Served:
-    from ..hardware.virtual_scpi import VirtualScpi
+    from ..adapters.simulators.virtual_scpi import VirtualScpi
 
     device = _timed(stage, limits, speed)
     with VirtualScpi(device, host=host, port=port) as server:
@@ -165,7 +165,7 @@ def _published(
 
 
 def _epics(device: Device, prefix: str) -> None:
-    from ..hardware.epics import RECORDS, serve_epics
+    from ..adapters.epics import RECORDS, serve_epics
 
     low, high = device.limits
     records = ", ".join(f"{prefix}:{name}" for name in RECORDS)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .protocol import CONTROL_VALUE, POSITION, TARGET, VOLTAGE
+from ...gcs.protocol import CONTROL_VALUE, POSITION, TARGET, VOLTAGE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

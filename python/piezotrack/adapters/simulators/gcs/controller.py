@@ -6,6 +6,20 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
+from ...gcs.protocol import (
+    GENERATOR,
+    MOVING,
+    POSITION,
+    READY,
+    RECORD_POINTS,
+    RECORD_RATE,
+    RECORD_TABLES,
+    SERVO_CYCLE,
+    STOP,
+    VOLTAGE,
+    WAVE_POINTS,
+    array_answer,
+)
 from .arguments import (
     AXIS,
     Refusal,
@@ -36,26 +50,12 @@ from .help_text import (
     parameters,
     recorder,
 )
-from .protocol import (
-    GENERATOR,
-    MOVING,
-    POSITION,
-    READY,
-    RECORD_POINTS,
-    RECORD_RATE,
-    RECORD_TABLES,
-    SERVO_CYCLE,
-    STOP,
-    VOLTAGE,
-    WAVE_POINTS,
-    array_answer,
-)
 from .waves import WaveTables
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from ...stages.virtual import VirtualStage
+    from ....stages.virtual import VirtualStage
 
     Query = Callable[["VirtualController", Sequence[str]], list[str]]
     Action = Callable[["VirtualController", Sequence[str]], None]

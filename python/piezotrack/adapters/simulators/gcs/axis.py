@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...errors import ParameterError
-from ..device import Rates
-from ..virtual import VirtualDevice
+from ....errors import ParameterError
+from ....hardware.device import Rates
+from ....hardware.virtual import VirtualDevice
 from .generator import Generator, Recorder, Samples
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ...stages.virtual import VirtualStage
+    from ....stages.virtual import VirtualStage
 
     Array = NDArray[np.float64]
 

@@ -12,9 +12,9 @@ import numpy as np
 from .. import _core
 from .._support.messages import quoted
 from ..errors import DeviceError, ParameterError, PiezotrackError
-from .device import Device, Exchanging
-from .measuring import check_device, check_table, play_table
-from .options import required_package
+from ..hardware.device import Device, Exchanging
+from ..hardware.measuring import check_device, check_table, play_table
+from ..hardware.options import required_package
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable

@@ -14,10 +14,10 @@ from ..._support.arguments import finite, not_negative, plain, positive
 from ..._support.arrays import signal_of
 from ..._support.messages import quoted
 from ...errors import DeviceError, ParameterError
+from ...hardware.device import Rates, Record
+from ...hardware.limits import check_within, ordered
+from ...hardware.options import Options
 from ..answers import number, printable
-from ..device import Rates, Record
-from ..limits import check_within, ordered
-from ..options import Options
 from .connection import Connection
 from .protocol import GENERATOR, POSITION, RECORD_POINTS, SERVO_CYCLE, VOLTAGE, WAVE_POINTS
 

@@ -9,9 +9,9 @@ import pytest
 
 import piezotrack as pt
 from gcs_peers import LIMITS, Clock, quiet_stage
-from piezotrack.hardware.gcs.arguments import Refusal
-from piezotrack.hardware.gcs.controller import ACTIONS, QUERIES, VirtualController
-from piezotrack.hardware.gcs.protocol import ERRORS
+from piezotrack.adapters.gcs.protocol import ERRORS
+from piezotrack.adapters.simulators.gcs.arguments import Refusal
+from piezotrack.adapters.simulators.gcs.controller import ACTIONS, QUERIES, VirtualController
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -18,7 +18,7 @@ import pytest
 import piezotrack as pt
 from misbehaving import JUMP, misbehaving
 from piezotrack._support.units import require
-from piezotrack.hardware.scpi_link import number_of
+from piezotrack.adapters.scpi_link import number_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import PiezotrackError
+from ...errors import PiezotrackError
 from .listening import cannot_listen, checked_port
 from .serving import Lines, Server
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .virtual import VirtualDevice
+    from ...hardware.virtual import VirtualDevice
 
     Array = NDArray[np.float64]
 

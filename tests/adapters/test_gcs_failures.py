@@ -290,7 +290,7 @@ def test_ctrl_c_in_a_table_stops_it_and_leads_home(
             return ask(command)
 
         if where == "between two looks":
-            monkeypatch.setattr("piezotrack.hardware.gcs.device.time.sleep", interrupted)
+            monkeypatch.setattr("piezotrack.adapters.gcs.device.time.sleep", interrupted)
         else:
             monkeypatch.setattr(device._line, "ask", once)
         with pytest.raises(KeyboardInterrupt):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .protocol import CONTROL_VALUE, POSITION, TARGET, VOLTAGE
+from ...gcs.protocol import CONTROL_VALUE, POSITION, TARGET, VOLTAGE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Self
 
-from ... import _core
-from ...errors import ParameterError
-from ...stages.virtual import VirtualStage
-from ..limits import ordered
+from .... import _core
+from ....errors import ParameterError
+from ....hardware.limits import ordered
+from ....stages.virtual import VirtualStage
+from ...gcs.protocol import ENCODING, GENERATOR, MOVING, READY, STOP, one_answer
 from ..listening import cannot_listen, checked_port
 from ..serving import Lines, Server
 from .arguments import Refusal
 from .controller import VirtualController
-from .protocol import ENCODING, GENERATOR, MOVING, READY, STOP, one_answer
 
 if TYPE_CHECKING:
     import socket

@@ -15,11 +15,11 @@ from .._support.arrays import signal_of
 from .._support.messages import quoted
 from .._support.units import require
 from ..errors import DeviceError, ParameterError
+from ..hardware.device import Rates, Record
+from ..hardware.limits import check_within, ordered
+from ..hardware.options import Options
+from ..hardware.pacing import play_paced
 from .answers import number, printable, shown
-from .device import Rates, Record
-from .limits import check_within, ordered
-from .options import Options
-from .pacing import play_paced
 from .scpi_link import Link, number_of
 
 if TYPE_CHECKING:

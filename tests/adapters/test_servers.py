@@ -15,8 +15,8 @@ import pytest
 
 import piezotrack as pt
 from gcs_peers import quiet_stage
-from piezotrack.hardware import serving
-from piezotrack.hardware.serving import CLIENTS, Lines
+from piezotrack.adapters.simulators import serving
+from piezotrack.adapters.simulators.serving import CLIENTS, Lines
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -13,9 +13,9 @@ from .._support.arguments import finite, not_negative, positive
 from .._support.arrays import signal_of
 from .._support.messages import quoted
 from ..errors import DeviceError, ParameterError
-from .device import Rates, Record
-from .limits import check_within, ordered
-from .options import Options, required_package
+from ..hardware.device import Rates, Record
+from ..hardware.limits import check_within, ordered
+from ..hardware.options import Options, required_package
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

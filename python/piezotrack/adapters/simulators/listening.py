@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import errno
 
-from .. import _core
-from .._support.messages import quoted
-from ..errors import ParameterError
+from ... import _core
+from ..._support.messages import quoted
+from ...errors import ParameterError
 
 __all__ = ["cannot_listen", "checked_port"]
 

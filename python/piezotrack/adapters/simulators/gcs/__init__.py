@@ -1,0 +1,1 @@
+"""A virtual controller that speaks GCS, in front of a virtual stage."""
