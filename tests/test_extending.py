@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
+import tomllib
 
 import pytest
 
 from folders import ROOT
-from piezotrack.hardware.addresses import SCHEMES
 
 PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
 EXCERPTS = re.findall(r"^```(?:rust|py) (\S+)\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
@@ -58,6 +58,8 @@ def test_the_page_names_the_file_where_a_law_is_a_variant() -> None:
 
 def test_the_page_names_every_adapter() -> None:
     section = named_in("A device")
-    for module in SCHEMES.values():
-        name = f"{module.partition('.')[0]}/" if "." in module else f"{module}.py"
-        assert f"`{name}`" in section
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    for value in project["entry-points"]["piezotrack.devices"].values():
+        module = value.partition(":")[0].split(".")[2:]
+        name = f"{module[0]}/" if len(module) > 1 else f"{module[0]}.py"
+        assert name in section

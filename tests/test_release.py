@@ -8,7 +8,7 @@ from typing import Any
 
 import piezotrack as pt
 from folders import ROOT
-from piezotrack.hardware.addresses import SCHEMES
+from piezotrack.hardware.addresses import schemes
 
 
 def toml(name: str) -> dict[str, Any]:
@@ -44,6 +44,6 @@ def test_each_kind_of_device_has_an_extra_and_what_imports_nothing_installs_noth
     """`pip install 'piezotrack[gcs]'` is what somebody types who has such a controller."""
     extras = toml("pyproject.toml")["project"]["optional-dependencies"]
     # A virtual stage is no device that one buys.
-    devices = {*SCHEMES, "epics"} - {"virtual"}
+    devices = {*schemes(), "epics"} - {"virtual"}
     assert devices <= extras.keys()
     assert {name for name in devices if not extras[name]} == {"gcs", "scpi"}

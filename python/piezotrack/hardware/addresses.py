@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from importlib import import_module
+from importlib.metadata import entry_points
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, urlsplit
 
@@ -10,19 +10,22 @@ from .._support.messages import quoted
 from ..errors import ParameterError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from importlib.metadata import EntryPoints
 
     from .device import Device
 
-__all__ = ["SCHEMES", "connect"]
+__all__ = ["connect", "schemes"]
 
-# Where each scheme is: a module with `from_address(host, port, path, options)`.
-SCHEMES: Mapping[str, str] = {
-    "ni": "ni",
-    "scpi": "scpi",
-    "virtual": "virtual",
-    "gcs": "gcs.device",
-}
+# Entry points, of this package and of others: name is the scheme of an address, value a function
+# `from_address(host, port, path, options)` that returns a device.
+GROUP = "piezotrack.devices"
+OWN = "piezotrack"
+
+
+def schemes() -> list[str]:
+    """List the schemes of the addresses that can be connected to, those of the package first."""
+    names = sorted((entry.module.partition(".")[0] != OWN, entry.name) for entry in _entries())
+    return list(dict.fromkeys(name for _, name in names))
 
 
 def connect(address: str) -> Device:
@@ -31,7 +34,8 @@ def connect(address: str) -> Device:
     Parameters
     ----------
     address : str
-        ``SCHEME:REST``: ``virtual:`` is the stage of Xu and Li 2010, ``virtual:MODEL.json`` an
+        ``SCHEME:REST``; other packages add schemes by the entry point ``piezotrack.devices``.
+        ``virtual:`` is the stage of Xu and Li 2010, ``virtual:MODEL.json`` an
         identified one; ``gcs://HOST[:PORT][/AXIS]``: a controller that speaks GCS, port 50000 and
         axis 1 where they are not given; ``?limits=0..100V``, ``factor=1V`` and ``timeout=5s`` as
         of `GcsDevice`; ``ni:Dev1/ao0,Dev1/ai0?scale=10um/V&limits=0..7.5V`` as
@@ -55,7 +59,7 @@ def connect(address: str) -> Device:
     >>> pt.hardware.connect("virtual:").limits
     (0.0, 75.0)
     """
-    known = ", ".join(f"{name}:..." for name in SCHEMES)
+    known = ", ".join(f"{name}:..." for name in schemes())
     if not isinstance(address, str):
         raise ParameterError(f"device is {quoted(address)}: expected an address, one of {known}")
     try:
@@ -63,9 +67,15 @@ def connect(address: str) -> Device:
         host, port = parts.hostname, parts.port
     except ValueError as error:
         raise ParameterError(f"device is {quoted(address)}: {error}") from None
-    if parts.scheme not in SCHEMES:
+    named = [entry for entry in _entries() if entry.name == parts.scheme]
+    if not named:
         raise ParameterError(f"device is {quoted(address)}: expected an address, one of {known}")
     options = dict(parse_qsl(parts.query, keep_blank_values=True))
-    adapter = import_module(f".{SCHEMES[parts.scheme]}", __package__)
-    device: Device = adapter.from_address(host, port, parts.path, options)
+    # No other package replaces a scheme of this one.
+    entry = min(named, key=lambda entry: (entry.module.partition(".")[0] != OWN, entry.value))
+    device: Device = entry.load()(host, port, parts.path, options)
     return device
+
+
+def _entries() -> EntryPoints:
+    return entry_points(group=GROUP)
