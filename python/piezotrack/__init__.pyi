@@ -14,10 +14,10 @@ from .benchmarking.record import BenchmarkRecord as BenchmarkRecord
 from .control.comparing.compare import compare_controllers as compare_controllers
 from .control.controller.controller import Controller as Controller
 from .control.controller.controller_file import load_controller as load_controller
-from .control.laws.components import LowPass as LowPass
-from .control.laws.components import Notch as Notch
-from .control.laws.components import Pid as Pid
-from .control.laws.components import Repetitive as Repetitive
+from .control.laws.filters import LowPass as LowPass
+from .control.laws.filters import Notch as Notch
+from .control.laws.pid import Pid as Pid
+from .control.laws.repetitive import Repetitive as Repetitive
 from .control.learning.learn import learn as learn
 from .control.loop.contouring import contour as contour
 from .control.loop.stability import check_loop as check_loop

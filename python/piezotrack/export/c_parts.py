@@ -8,10 +8,14 @@ import numpy as np
 
 from .._support.arrays import signal_of
 from .._support.units import of_drive
-from ..control.laws.components import Pid, StateSpace
+from ..control.laws.disturbance_observer import DisturbanceObserver
 from ..control.laws.hysteresis_observer import HysteresisObserver
-from ..control.laws.laws import DisturbanceObserver, LeadLag, PerturbationEstimator, SlidingMode
+from ..control.laws.lead_lag import LeadLag
 from ..control.laws.neural_network import NetworkInverse
+from ..control.laws.perturbation_estimator import PerturbationEstimator
+from ..control.laws.pid import Pid
+from ..control.laws.sliding_mode import SlidingMode
+from ..control.laws.state_space import StateSpace
 from ..control.loop.preconditions import check_period, check_turns
 from ..errors import DataError, ParameterError, ShapeError
 from . import c_dahl, c_input, c_inverse, c_laws, c_loop

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..control.controller.controller import Controller
-from ..control.laws.components import Pid, Repetitive
+from ..control.laws.pid import Pid
+from ..control.laws.repetitive import Repetitive
 from ..control.loop.tracking import Tracking, track
 from ..identification.fit import identify
 from ..references.waveforms import sine

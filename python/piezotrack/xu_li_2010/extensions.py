@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from ..control.laws.components import Lag, LowPass, Notch, Pid, Repetitive, ZeroPhase
+from ..control.laws.filters import LowPass, Notch
+from ..control.laws.pid import Pid
+from ..control.laws.repetitive import Lag, Repetitive, ZeroPhase
 from ..control.loop.tracking import Tracking, track
 from ..data.dataset import Dataset
 from ..errors import NumericalError, ParameterError

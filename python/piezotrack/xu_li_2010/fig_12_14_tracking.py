@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from ..control.laws.components import Pid, Repetitive
+from ..control.laws.pid import Pid
+from ..control.laws.repetitive import Repetitive
 from ..control.loop.tracking import Tracking, track
 from .apparatus import loop
 from .references import SHRUNK, fast, shrunk, slow

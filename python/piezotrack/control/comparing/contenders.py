@@ -11,9 +11,9 @@ from ... import _core
 from ...errors import ParameterError
 from ...stages.dahl import DahlStage
 from ..controller.controller import Controller
-from ..laws.components import Pid
 from ..laws.hysteresis_observer import HysteresisObserver
 from ..laws.neural_network import train_network
+from ..laws.pid import Pid
 from ..learning.learn import learn
 from ..loop.tracking import can_be_learnt
 from ..tuning.h_infinity import mixed_sensitivity

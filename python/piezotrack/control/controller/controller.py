@@ -12,10 +12,17 @@ from ..._support.arrays import check_dt
 from ...errors import NumericalError, ParameterError
 from ...identification.fitted.identified_model import IdentifiedModel
 from ...stages.inverse import Inverse
-from ..laws.components import LowPass, Notch, Pid, Repetitive, StateSpace
+from ..laws.disturbance_observer import DisturbanceObserver
+from ..laws.filters import LowPass, Notch
 from ..laws.hysteresis_observer import HysteresisObserver
-from ..laws.laws import NAMED_LAWS, DisturbanceObserver, LeadLag, PerturbationEstimator, SlidingMode
+from ..laws.laws import NAMED_LAWS
+from ..laws.lead_lag import LeadLag
+from ..laws.perturbation_estimator import PerturbationEstimator
+from ..laws.pid import Pid
+from ..laws.repetitive import Repetitive
 from ..laws.scheduled_pid import ScheduledPid
+from ..laws.sliding_mode import SlidingMode
+from ..laws.state_space import StateSpace
 from ..plant import reach
 from .description import controller_text
 from .session import Session

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 from ..._support.plot_style import literal
 from ..._support.units import best_length_unit, shown_unit
-from ..laws.components import Pid, StateSpace
+from ..laws.pid import Pid
+from ..laws.state_space import StateSpace
 
 if TYPE_CHECKING:
     from ...references.reference import Reference

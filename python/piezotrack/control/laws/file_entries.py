@@ -9,9 +9,15 @@ from ... import _core
 from ..._support.arguments import as_numbers
 from ..._support.messages import quoted
 from ...errors import ParameterError
-from .components import Lag, LowPass, Notch, Pid, Repetitive, StateSpace, ZeroPhase
-from .laws import DisturbanceObserver, LeadLag, PerturbationEstimator, SlidingMode
+from .disturbance_observer import DisturbanceObserver
+from .filters import LowPass, Notch
+from .lead_lag import LeadLag
+from .perturbation_estimator import PerturbationEstimator
+from .pid import Pid
+from .repetitive import Lag, Repetitive, ZeroPhase
 from .scheduled_pid import ScheduledPid
+from .sliding_mode import SlidingMode
+from .state_space import StateSpace
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

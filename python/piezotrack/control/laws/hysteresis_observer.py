@@ -10,7 +10,7 @@ from ..._support.arguments import finite, positive
 from ...errors import ParameterError
 from ...stages.bouc_wen import BoucWenStage
 from ...stages.dahl import DahlStage
-from .components import Pid
+from .pid import Pid
 
 __all__ = ["HysteresisObserver"]
 

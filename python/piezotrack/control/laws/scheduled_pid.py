@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from ..._support.arguments import positive
 from ...errors import ParameterError
-from .components import Pid
+from .pid import Pid
 
 __all__ = ["MOST_GRADES", "ScheduledPid"]
 

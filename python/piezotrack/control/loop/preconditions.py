@@ -13,7 +13,7 @@ import numpy as np
 from ..._support.units import shown_unit
 from ...errors import ParameterError
 from ...identification.fitted.identified_model import IdentifiedModel
-from ..laws.components import Pid
+from ..laws.pid import Pid
 from ..plant import reach, settled_bottom
 from .stability import check_loop
 

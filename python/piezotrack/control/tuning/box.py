@@ -10,7 +10,8 @@ import numpy as np
 
 from ..._support.messages import quoted
 from ...errors import ParameterError
-from ..laws.components import LowPass, Notch, Repetitive, ZeroPhase
+from ..laws.filters import LowPass, Notch
+from ..laws.repetitive import Repetitive, ZeroPhase
 from .structures import SLIDING, Nominal, law_of, law_ranges, nominal_of
 
 if TYPE_CHECKING:

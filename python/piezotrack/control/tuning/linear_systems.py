@@ -14,8 +14,9 @@ from ...identification.fitted.identified_model import IdentifiedModel
 from ...stages.base import Stage
 from ...stages.virtual import VirtualStage
 from ..controller.controller import Controller, Feedback, number_pair
-from ..laws.components import Pid, StateSpace
 from ..laws.laws import NAMED_LAWS
+from ..laws.pid import Pid
+from ..laws.state_space import StateSpace
 from ..plant import linearised_plants, plant_of
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from ...stages.base import Stage
 from ...stages.inverse import Inverse
 from ...stages.xy import XYStage
 from ..controller.controller import number_pair
-from ..laws.components import LowPass, Notch
+from ..laws.filters import LowPass, Notch
 from ..loop.preconditions import check_delay
 from ..plant import Plant, plant_of, voltages_before
 from .box import parts_named

@@ -16,7 +16,7 @@ from ...references.reference import Reference
 from ...references.waveforms import sine
 from ...references.xy_reference import XYReference
 from ...stages.xy import XYStage
-from ..laws.components import Pid
+from ..laws.pid import Pid
 from ..laws.scheduled_pid import ScheduledPid
 from ..loop.contouring import contour
 from ..loop.tracking import track

@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ..laws.components import Pid
-from ..laws.laws import DisturbanceObserver, LeadLag, PerturbationEstimator, SlidingMode
+from ..laws.disturbance_observer import DisturbanceObserver
+from ..laws.lead_lag import LeadLag
+from ..laws.perturbation_estimator import PerturbationEstimator
+from ..laws.pid import Pid
+from ..laws.sliding_mode import SlidingMode
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

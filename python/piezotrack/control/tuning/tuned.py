@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..._support.units import shown_unit
-from ..laws.components import Pid
+from ..laws.pid import Pid
 from ..loop.contouring import Contour
 
 if TYPE_CHECKING:
     from ..controller.controller import Controller
-    from ..laws.components import LowPass, Notch, Repetitive
+    from ..laws.filters import LowPass, Notch
+    from ..laws.repetitive import Repetitive
     from ..loop.tracking import Tracking
     from .margins import Margins
 
