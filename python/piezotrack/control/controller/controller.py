@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from ... import _core
 from ..._support.arguments import TOO_FAR, finite
@@ -12,17 +12,9 @@ from ..._support.arrays import check_dt
 from ...errors import NumericalError, ParameterError
 from ...identification.fitted.identified_model import IdentifiedModel
 from ...stages.inverse import Inverse
-from ..laws.disturbance_observer import DisturbanceObserver
-from ..laws.filters import LowPass, Notch
-from ..laws.hysteresis_observer import HysteresisObserver
-from ..laws.laws import NAMED_LAWS
-from ..laws.lead_lag import LeadLag
-from ..laws.perturbation_estimator import PerturbationEstimator
-from ..laws.pid import Pid
+from ..laws.filters import Filter
+from ..laws.part import FeedbackLaw
 from ..laws.repetitive import Repetitive
-from ..laws.scheduled_pid import ScheduledPid
-from ..laws.sliding_mode import SlidingMode
-from ..laws.state_space import StateSpace
 from ..plant import reach
 from .description import controller_text
 from .session import Session
@@ -36,17 +28,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Controller", "number_pair"]
 
-# The feedback laws.
-Feedback: TypeAlias = (
-    Pid
-    | StateSpace
-    | LeadLag
-    | SlidingMode
-    | PerturbationEstimator
-    | DisturbanceObserver
-    | ScheduledPid
-    | HysteresisObserver
-)
 # Sampling interval for the reach of a stage [s]: its drive takes seconds.
 REACH_STEP = 0.05
 DRIVE_UNITS = ("V", "m", "N")
@@ -106,9 +87,9 @@ class Controller:
     dt: float
     limits: tuple[float, float]
     feedforward: Inverse | None = None
-    feedback: Feedback | None = None
+    feedback: FeedbackLaw | None = None
     repetitive: Repetitive | None = None
-    filters: Sequence[LowPass | Notch] = ()
+    filters: Sequence[Filter] = ()
     span: tuple[float, float] | None = None
     max_jump: float | None = None
     drive_unit: str = "V"
@@ -129,20 +110,19 @@ class Controller:
         _check_part(
             "feedback",
             self.feedback,
-            (Pid, StateSpace, *NAMED_LAWS),
+            FeedbackLaw,
             "pt.Pid, pt.control.StateSpace or another law of pt.control",
         )
         _check_part("repetitive", self.repetitive, Repetitive, "pt.Repetitive")
         if not isinstance(self.filters, Sequence):
             raise ParameterError(f"filters is {self.filters!r}: expected a list of filters")
         for one in self.filters:
-            if not isinstance(one, (LowPass, Notch)):
+            if not isinstance(one, Filter):
                 raise ParameterError(f"filters has {one!r}: expected pt.LowPass or pt.Notch")
-        if isinstance(self.feedback, Pid):
-            _check_unit("kp", self.feedback.kp, high - low, "Pid", self.drive_unit)
-        if isinstance(self.feedback, (DisturbanceObserver, HysteresisObserver)):
-            _check_unit("kp", self.feedback.pid.kp, high - low, "Pid", self.drive_unit)
-        if isinstance(self.repetitive, Repetitive):
+        inside = None if self.feedback is None else self.feedback._pid
+        if inside is not None:
+            _check_unit("kp", inside.kp, high - low, "Pid", self.drive_unit)
+        if self.repetitive is not None:
             _check_unit("kq", self.repetitive.kq, high - low, "Repetitive", self.drive_unit)
         span = self._span(low, high)
         core = _core.Controller(
@@ -165,9 +145,9 @@ class Controller:
         dt: float | None = None,
         limits: tuple[float, float] | None = None,
         playback: Literal["table", "online"] = "table",
-        feedback: Feedback | None = None,
+        feedback: FeedbackLaw | None = None,
         repetitive: Repetitive | None = None,
-        filters: Sequence[LowPass | Notch] = (),
+        filters: Sequence[Filter] = (),
         span: tuple[float, float] | None = None,
         max_jump: float | None = None,
     ) -> Controller:
@@ -321,8 +301,8 @@ def _of_record(name: str, given: T | None, known: T | None) -> T:
     return known
 
 
-def _check_part(name: str, part: object, kinds: type | tuple[type, ...], expected: str) -> None:
-    if part is not None and not isinstance(part, kinds):
+def _check_part(name: str, part: object, kind: type, expected: str) -> None:
+    if part is not None and not isinstance(part, kind):
         raise ParameterError(f"{name} is {type(part).__name__}: expected {expected}")
 
 

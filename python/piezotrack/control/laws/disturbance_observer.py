@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 from ... import _core
 from ..._support.arguments import finite, not_negative
 from ...errors import ParameterError
+from .part import FeedbackLaw, part
 from .pid import Pid
 
 __all__ = ["DisturbanceObserver", "check_nominal"]
 
 
+@part("disturbance-observer")
 @dataclass(frozen=True, kw_only=True)
-class DisturbanceObserver:
+class DisturbanceObserver(FeedbackLaw):
     r"""Disturbance observer around a PID.
 
     .. math::
@@ -58,9 +59,8 @@ class DisturbanceObserver:
 
     pid: Pid
     plant_gain: float
-    cutoff: float
     plant_time: float = 0.0
-    title: ClassVar[str] = "PID with disturbance observer"
+    cutoff: float
 
     def __post_init__(self) -> None:
         if not isinstance(self.pid, Pid):
@@ -71,14 +71,6 @@ class DisturbanceObserver:
                 "the constant that an incremental PID starts with"
             )
         check_nominal(self.plant_gain, self.plant_time, self.cutoff)
-
-    @property
-    def _settings(self) -> tuple[str, list[float]]:
-        """The name and the numbers as the core takes them; NaN for the default of tt."""
-        pid = self.pid
-        tt = math.nan if pid.tt is None else pid.tt
-        numbers = pid.kp, pid.ti, pid.td, tt, self.plant_gain, self.plant_time, self.cutoff
-        return "disturbance observer", [float(number) for number in numbers]
 
 
 def check_nominal(gain: float, time: float, cutoff: float) -> None:

@@ -1,137 +1,38 @@
-"""Parts of a controller as entries of a file: the names of their settings, with their units."""
+"""Parts of a controller as entries of a file: the names of their numbers, with their units."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
 
 from ... import _core
 from ..._support.arguments import as_numbers
+from ..._support.json_text import object_of
 from ..._support.messages import quoted
 from ...errors import ParameterError
-from .disturbance_observer import DisturbanceObserver
-from .filters import LowPass, Notch
-from .lead_lag import LeadLag
-from .perturbation_estimator import PerturbationEstimator
-from .pid import Pid
-from .repetitive import Lag, Repetitive, ZeroPhase
-from .scheduled_pid import ScheduledPid
-from .sliding_mode import SlidingMode
-from .state_space import StateSpace
+from ...identification.fitted.model_file import parameter_entries
+from ...identification.fitted.model_file import stage_of as stage_of_parameters
+from ...stages.registry import model_named
+from .part import Part, part_class
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-__all__ = ["KINDS", "Setting", "only", "part_entry", "part_of"]
+    from ...stages.base import Stage
+    from .part_info import Number
+
+__all__ = ["only", "part_entry", "part_of", "stage_entry", "stage_of"]
 
 INFINITE = "inf"
 
 
-class Setting(NamedTuple):
-    """A setting of a part.
-
-    Attributes
-    ----------
-    name : str
-        Of the argument of the class.
-    unit : str
-        Its unit, for a drive in volts; empty where it has none.
-    form : str
-        What it is: a number, a count, numbers, a truth value, a text, a part, parts.
-    """
-
-    name: str
-    unit: str = ""
-    form: str = "number"
-
-    def key(self, drive: str) -> str:
-        """Return the key of the entry, as kp_V_per_m."""
-        unit = self.unit.replace("V", drive)
-        return f"{self.name}_{unit.replace('/', '_per_')}" if unit else self.name
-
-
-PID = Setting("pid", form="part")
-NOMINAL = (
-    Setting("plant_gain", "m/V"),
-    Setting("plant_time", "s"),
-    Setting("cutoff", "Hz"),
-)
-# Every part that is made of numbers and of other parts, by its kind in a file.
-KINDS: dict[str, tuple[type, tuple[Setting, ...]]] = {
-    "pid": (
-        Pid,
-        (Setting("kp", "V/m"), Setting("ti", "s"), Setting("td", "s"), Setting("tt", "s")),
-    ),
-    "state-space": (
-        StateSpace,
-        (
-            Setting("a", form="matrix"),
-            Setting("b", form="numbers"),
-            Setting("c", form="numbers"),
-            Setting("d", "V/m"),
-            Setting("back", form="numbers"),
-        ),
-    ),
-    "lead-lag": (
-        LeadLag,
-        (
-            Setting("kp", "V/m"),
-            Setting("lead", "s"),
-            Setting("lag", "s"),
-            Setting("method", form="text"),
-        ),
-    ),
-    "sliding-mode": (
-        SlidingMode,
-        (
-            Setting("switching", "V"),
-            Setting("layer", "m"),
-            Setting("ti", "s"),
-            Setting("td", "s"),
-            Setting("tf", "s"),
-        ),
-    ),
-    "disturbance-observer": (DisturbanceObserver, (PID, *NOMINAL)),
-    "perturbation-estimator": (
-        PerturbationEstimator,
-        (Setting("sliding", form="part"), *NOMINAL),
-    ),
-    "scheduled-pid": (
-        ScheduledPid,
-        (
-            Setting("amplitudes", "m", "numbers"),
-            Setting("rates", "Hz", "numbers"),
-            Setting("gains", form="parts"),
-            Setting("first", "m_and_Hz", "numbers"),
-        ),
-    ),
-    "repetitive": (
-        Repetitive,
-        (
-            Setting("period", "s"),
-            Setting("kq", "V/m"),
-            Setting("smoothing", form="part"),
-            Setting("lead", "samples", "count"),
-            Setting("forgetting_factor"),
-            Setting("pause", form="truth"),
-        ),
-    ),
-    "lag": (Lag, (Setting("tq", "s"), Setting("compensated", form="truth"))),
-    "zero-phase": (ZeroPhase, (Setting("order", form="count"),)),
-    "low-pass": (LowPass, (Setting("cutoff", "Hz"),)),
-    "notch": (
-        Notch,
-        (Setting("frequency", "Hz"), Setting("width"), Setting("depth")),
-    ),
-}
-
-
-def part_entry(part: object, drive: str) -> dict[str, Any]:
-    """Entry of a part: its kind, and its settings with their units in their names.
+def part_entry(part: Part, drive: str) -> dict[str, Any]:
+    """Entry of a part: its name as kind, and its numbers with their units in their names.
 
     Parameters
     ----------
-    part : object
+    part : Part
         A part of a controller.
     drive : str
         Unit of the drive.
@@ -139,40 +40,53 @@ def part_entry(part: object, drive: str) -> dict[str, Any]:
     Returns
     -------
     dict
-        Of numbers, texts, lists and dicts only.
+        Of numbers, texts, lists and dicts only, in the order of the fields of its class.
     """
-    kind, (_, settings) = next(
-        (kind, known) for kind, known in KINDS.items() if type(part) is known[0]
-    )
-    values = _values(part)
-    return {"kind": kind} | {
-        one.key(drive): _written(one.form, values[one.name], drive) for one in settings
+    values = part._values
+    return {"kind": part.info.name} | {
+        one.key(drive): _written(one.form, values[one.name], drive) for one in _ordered(type(part))
     }
 
 
-def _values(part: object) -> Mapping[str, Any]:
-    if isinstance(part, StateSpace):
-        # As the core takes them: arrays of other libraries are not kept.
-        a, b, c, d, back = part._matrices
-        rows = [a[i : i + len(b)] for i in range(0, len(a), len(b))]
-        return {"a": rows, "b": b, "c": c, "d": d, "back": back}
-    return vars(part)
+def _ordered(made: type[Part]) -> list[Number]:
+    """Return the numbers of a part in the order of the fields of its class."""
+    numbers = {one.name: one for one in made.info.numbers}
+    return [numbers[one.name] for one in fields(made) if one.name in numbers]
 
 
 def _written(form: str, value: Any, drive: str) -> Any:
-    if value is None or form in ("truth", "text", "matrix"):
+    if value is None or form in ("truth", "word", "matrix"):
         return value
     match form:
         case "part":
             return part_entry(value, drive)
         case "parts":
             return [part_entry(one, drive) for one in value]
+        case "stage":
+            return stage_entry(value, drive)
         case "numbers":
             return [float(one) for one in value]
         case "count":
             return int(value)
     number = float(value)
     return INFINITE if math.isinf(number) else number
+
+
+def stage_entry(stage: Stage, drive: str) -> dict[str, Any]:
+    """Entry of a stage: its model, and its parameters with their units."""
+    return {"model": stage.info.name, "parameters": parameter_entries(stage, drive)}
+
+
+def stage_of(place: str, entry: Any, drive: str) -> Stage:
+    """Read a stage; arguments and errors as of `part_of`."""
+    found = object_of(place, entry)
+    only(place, found, ("model", "parameters"))
+    info = model_named(found["model"])
+    parameters = object_of(f"{place}: parameters", found["parameters"])
+    only(f"{place}: parameters", parameters, [one.name for one in info.parameters])
+    for name, one in parameters.items():
+        only(f"{place}: {name}", object_of(name, one), ("value", "unit", "symbol"))
+    return stage_of_parameters(info, parameters, drive)
 
 
 def part_of(place: str, entry: Any, kinds: Iterable[str], drive: str) -> Any:
@@ -206,8 +120,8 @@ def part_of(place: str, entry: Any, kinds: Iterable[str], drive: str) -> Any:
     if kind not in known:
         found = f"kind is {quoted(kind)}" if isinstance(entry, dict) else f"it is {quoted(entry)}"
         raise ParameterError(f"{place}: {found}: expected one of {', '.join(map(repr, known))}")
-    made, settings = KINDS[kind]
-    keys = {one.key(drive): one for one in settings}
+    made = part_class(kind)
+    keys = {one.key(drive): one for one in _ordered(made)}
     only(place, entry, ["kind", *keys])
     values = {
         one.name: _read(f"{place}: {key}", one, entry[key], drive) for key, one in keys.items()
@@ -245,14 +159,15 @@ def only(place: str, entry: Mapping[str, Any], keys: Iterable[str]) -> None:
         raise ParameterError(f"{before}{missing[0]!r} is missing: expected all of {known}")
 
 
-def _read(place: str, one: Setting, value: Any, drive: str) -> Any:
+def _read(place: str, one: Number, value: Any, drive: str) -> Any:
     match one.form:
         case "part":
-            inside = {"pid": ("pid",), "sliding": ("sliding-mode",)}
-            return part_of(place, value, inside.get(one.name, ("lag", "zero-phase")), drive)
+            return part_of(place, value, one.choices, drive)
         case "parts":
             listed = value if isinstance(value, list) else [value]
-            return [part_of(f"{place}[{i}]", p, ("pid",), drive) for i, p in enumerate(listed)]
+            return [part_of(f"{place}[{i}]", p, one.choices, drive) for i, p in enumerate(listed)]
+        case "stage":
+            return stage_of(place, value, drive)
         case "numbers":
             return None if value is None else as_numbers(place, value)
         case "matrix":
@@ -262,7 +177,7 @@ def _read(place: str, one: Setting, value: Any, drive: str) -> Any:
             return _core.as_count(place, value)
         case "truth":
             return _core.as_truth(place, value)
-        case "text":
+        case "word":
             return value
     return _number(place, value)
 

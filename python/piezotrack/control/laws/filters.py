@@ -5,12 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..._support.arguments import in_range, positive
+from .part import Part, part
 
-__all__ = ["LowPass", "Notch"]
+__all__ = ["Filter", "LowPass", "Notch"]
 
 
+@dataclass(frozen=True, eq=False)
+class Filter(Part):
+    """Base class of the filters of the measurement."""
+
+
+@part("low-pass")
 @dataclass(frozen=True)
-class LowPass:
+class LowPass(Filter):
     """First-order low-pass on the measurement.
 
     Parameters
@@ -24,14 +31,10 @@ class LowPass:
     def __post_init__(self) -> None:
         positive("cutoff", self.cutoff, "Hz")
 
-    @property
-    def _settings(self) -> tuple[str, list[float]]:
-        """The name and the numbers as the core takes them."""
-        return "low pass", [self.cutoff]
 
-
+@part("notch")
 @dataclass(frozen=True)
-class Notch:
+class Notch(Filter):
     """Notch on the measurement.
 
     Parameters
@@ -52,8 +55,3 @@ class Notch:
         positive("frequency", self.frequency, "Hz")
         positive("width", self.width, "parts of the frequency")
         in_range("depth", self.depth, 1.0, "parts of 1")
-
-    @property
-    def _settings(self) -> tuple[str, list[float]]:
-        """The name and the numbers as the core takes them."""
-        return "notch", [self.frequency, self.width, self.depth]

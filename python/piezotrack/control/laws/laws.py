@@ -1,4 +1,4 @@
-"""The feedback laws with a name, and a measure of chatter."""
+"""A measure of chatter."""
 
 from __future__ import annotations
 
@@ -10,12 +10,6 @@ import numpy as np
 
 from ..._support.arguments import not_negative
 from ...errors import ParameterError
-from .disturbance_observer import DisturbanceObserver
-from .hysteresis_observer import HysteresisObserver
-from .lead_lag import LeadLag
-from .perturbation_estimator import PerturbationEstimator
-from .scheduled_pid import ScheduledPid
-from .sliding_mode import SlidingMode
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,21 +17,10 @@ if TYPE_CHECKING:
     from ..loop.tracking import Tracking
 
 __all__ = [
-    "NAMED_LAWS",
     "Chatter",
     "chatter",
     "chatter_of",
 ]
-
-
-NAMED_LAWS = (
-    LeadLag,
-    SlidingMode,
-    DisturbanceObserver,
-    PerturbationEstimator,
-    ScheduledPid,
-    HysteresisObserver,
-)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Literal
 
 from ..._support.arguments import finite, not_negative
 from ...errors import ParameterError
+from .part import FeedbackLaw, part
 
 __all__ = ["LeadLag"]
 
 
+@part("lead-lag")
 @dataclass(frozen=True, kw_only=True)
-class LeadLag:
+class LeadLag(FeedbackLaw):
     r"""Lead-lag compensator, sampled as a law in state space.
 
     .. math:: C(s) = K_p \frac{1 + s T_{lead}}{1 + s T_{lag}}
@@ -49,7 +51,6 @@ class LeadLag:
     lead: float
     lag: float
     method: Literal["tustin", "matched"] = "tustin"
-    title: ClassVar[str] = "lead-lag"
 
     def __post_init__(self) -> None:
         finite("kp", self.kp, "V/m")
@@ -57,9 +58,3 @@ class LeadLag:
         not_negative("lag", self.lag, "s")
         if self.method not in ("tustin", "matched"):
             raise ParameterError(f"method is {self.method!r}: expected 'tustin' or 'matched'")
-
-    @property
-    def _settings(self) -> tuple[str, list[float]]:
-        """The name and the numbers as the core takes them."""
-        matched = float(self.method == "matched")
-        return "lead-lag", [float(self.kp), float(self.lead), float(self.lag), matched]

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 from ...errors import ParameterError
 from .disturbance_observer import check_nominal
+from .part import FeedbackLaw, part
 from .sliding_mode import SlidingMode
 
 __all__ = ["PerturbationEstimator"]
 
 
+@part("perturbation-estimator")
 @dataclass(frozen=True, kw_only=True)
-class PerturbationEstimator:
+class PerturbationEstimator(FeedbackLaw):
     r"""Sliding mode control with perturbation estimation.
 
     The disturbance observer of `DisturbanceObserver` around a `SlidingMode`: the estimate takes the
@@ -51,7 +52,6 @@ class PerturbationEstimator:
     plant_gain: float
     plant_time: float = 0.0
     cutoff: float = math.inf
-    title: ClassVar[str] = "sliding mode with perturbation estimation"
 
     def __post_init__(self) -> None:
         if not isinstance(self.sliding, SlidingMode):
@@ -59,10 +59,3 @@ class PerturbationEstimator:
                 f"sliding is {type(self.sliding).__name__}: expected pt.control.SlidingMode"
             )
         check_nominal(self.plant_gain, self.plant_time, self.cutoff)
-
-    @property
-    def _settings(self) -> tuple[str, list[float]]:
-        """The name and the numbers as the core takes them."""
-        _, inside = self.sliding._settings
-        nominal = self.plant_gain, self.plant_time, self.cutoff
-        return "perturbation", [*inside, *(float(number) for number in nominal)]

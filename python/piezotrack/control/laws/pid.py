@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from ... import _core
 from ..._support.arguments import finite, not_negative
 from ...errors import ParameterError
+from .part import FeedbackLaw, part
 
 __all__ = ["Pid"]
 
 
+@part("pid")
 @dataclass(frozen=True, kw_only=True)
-class Pid:
+class Pid(FeedbackLaw):
     r"""Incremental PID controller with back-calculation antiwindup.
 
     .. math::
@@ -60,10 +65,14 @@ class Pid:
             raise ParameterError(f"tt is {self.tt} s: expected a time above 0")
 
     @property
-    def _settings(self) -> tuple[str, list[float]]:
-        """The name and the numbers as the core takes them; NaN for the default of tt."""
-        tt = math.nan if self.tt is None else self.tt
-        return "pid", [float(one) for one in (self.kp, self.ti, self.td, tt)]
+    def _pid(self) -> Pid:
+        return self
+
+    def _linear(self, dt: float) -> tuple[Any, ...]:
+        ki = 0.0 if math.isinf(self.ti) else dt / self.ti
+        kd = self.td / dt
+        above = self.kp * np.array([1.0 + ki + kd, -(1.0 + 2.0 * kd), kd])
+        return above, [1.0, -1.0, 0.0]
 
     @classmethod
     def from_um(cls, *, kp: float, ti: float, td: float = 0.0, tt: float | None = None) -> Pid:

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from ... import _core
 from ..._support.arguments import in_range, positive
 from ...errors import ParameterError
+from .part import Part, part
 
 __all__ = ["Lag", "Repetitive", "ZeroPhase"]
 
 
+@part("lag")
 @dataclass(frozen=True, kw_only=True)
-class Lag:
+class Lag(Part):
     """First-order lag as the filter Q of a repetitive controller: the form of Xu and Li 2010.
 
     At 0.2 s it passes half of a 0.5 Hz error.
@@ -40,8 +42,9 @@ class Lag:
         _core.as_truth("compensated", self.compensated)
 
 
+@part("zero-phase")
 @dataclass(frozen=True, kw_only=True)
-class ZeroPhase:
+class ZeroPhase(Part):
     """Symmetric low-pass without delay as the filter Q of a repetitive controller.
 
     Parameters
@@ -61,8 +64,9 @@ class ZeroPhase:
 LAG = Lag()
 
 
+@part("repetitive")
 @dataclass(frozen=True, kw_only=True)
-class Repetitive:
+class Repetitive(Part):
     r"""Plug-in repetitive controller: it learns the voltage that removes a periodic error.
 
     .. math::
@@ -211,9 +215,9 @@ class Repetitive:
         """Name of the smoothing and the numbers as the core takes them."""
         match self.smoothing:
             case Lag(tq=tq, compensated=compensated):
-                kind, number = ("compensated lag" if compensated else "lag"), tq
+                kind, number = ("compensated-lag" if compensated else "lag"), tq
             case ZeroPhase(order=order):
-                kind, number = "zero phase", float(order)
+                kind, number = "zero-phase", float(order)
             case None:
                 kind, number = "none", 0.0
         last = self.forgetting_factor, self.lead, self.pause

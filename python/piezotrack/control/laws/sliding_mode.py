@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 from ... import _core
 from ..._support.arguments import not_negative, positive
 from ...errors import ParameterError
+from .part import FeedbackLaw, part
 
 __all__ = ["SlidingMode"]
 
 
+@part("sliding-mode")
 @dataclass(frozen=True, kw_only=True)
-class SlidingMode:
+class SlidingMode(FeedbackLaw):
     r"""Sliding mode control with a boundary layer, around a feedforward.
 
     .. math::
@@ -59,7 +60,6 @@ class SlidingMode:
     ti: float = math.inf
     td: float = 0.0
     tf: float = 0.0
-    title: ClassVar[str] = "sliding mode"
 
     def __post_init__(self) -> None:
         positive("switching", self.switching, "V")
@@ -70,9 +70,3 @@ class SlidingMode:
             )
         not_negative("td", self.td, "s")
         not_negative("tf", self.tf, "s")
-
-    @property
-    def _settings(self) -> tuple[str, list[float]]:
-        """The name and the numbers as the core takes them."""
-        numbers = self.switching, self.layer, self.ti, self.td, self.tf
-        return "sliding mode", [float(number) for number in numbers]

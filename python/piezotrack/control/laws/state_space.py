@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,15 +11,19 @@ from ..._support.arguments import MOST_ENTRIES, finite
 from ..._support.arrays import real_array
 from ..._support.messages import quoted
 from ...errors import DataError, ParameterError, ShapeError
+from .part import FeedbackLaw, part
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["StateSpace"]
 
 
+@part("state-space")
 @dataclass(frozen=True, eq=False)
-class StateSpace:
+class StateSpace(FeedbackLaw):
     r"""Feedback law in discrete state space, from the error [m] to a voltage [V].
 
     .. math:: x_{k+1} = A x_k + B e_k, \qquad u_k = C x_k + D e_k
@@ -72,12 +76,20 @@ class StateSpace:
         return a.tolist(), b.tolist(), c.tolist(), finite("d", _single("d", self.d), "V/m"), back
 
     @property
-    def _settings(self) -> tuple[str, list[float]]:
-        """The name and the numbers as the core takes them."""
+    def _values(self) -> Mapping[str, Any]:
+        # As the core takes them: arrays of other libraries are not kept.
         a, b, c, d, back = self._matrices
         if back == []:
             raise ParameterError("back is 0 entries: expected as many entries as b")
-        return "state space", [float(len(b)), *a, *b, *c, d, *(back or [])]
+        return {"a": np.reshape(a, (len(b), -1)).tolist(), "b": b, "c": c, "d": d, "back": back}
+
+    @property
+    def _lengths(self) -> tuple[int, ...]:
+        return (len(self._matrices[1]),)
+
+    def _linear(self, dt: float) -> tuple[Any, ...]:  # noqa: ARG002 - it is sampled
+        one = self._values
+        return one["a"], np.reshape(one["b"], (-1, 1)), np.reshape(one["c"], (1, -1)), [[one["d"]]]
 
 
 def _single(name: str, value: object) -> object:
