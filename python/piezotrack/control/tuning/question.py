@@ -23,7 +23,7 @@ from ..loop.preconditions import check_delay
 from ..plant import Plant, plant_of, voltages_before
 from .box import parts_named
 from .margins import Margins, Spread
-from .structures import LAWS
+from .structures import SOUGHT
 
 __all__ = ["FIGURES", "Axis", "Question", "asked"]
 
@@ -122,7 +122,7 @@ def asked(
     both = stage if isinstance(stage, XYStage) else None
     stages = [stage.x] if both else _stages(stage)
     references = _references(reference, XYReference if both else Reference)
-    _check_word("law", law, LAWS)
+    _check_word("law", law, SOUGHT)
     _check_has_integral_part(law, references)
     _check_kind("margins", margins, Margins)
     _check_kind("spread", spread, Spread)
@@ -246,7 +246,7 @@ def _check_word(name: str, value: Any, known: Collection[str]) -> None:
 
 
 def _check_has_integral_part(law: str, references: list[Reference]) -> None:
-    if not references and law in ("pd", "lead-lag"):
+    if not references and "ki" not in SOUGHT[law]:
         raise ParameterError(
             f"law is {law!r} without a reference: expected one with an integral part, whose gain "
             "is made large then"

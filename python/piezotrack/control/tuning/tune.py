@@ -108,8 +108,8 @@ def tune(
         stage the same for both axes, or those of x and those of y.
     law : str, optional
         The feedback law: ``"pid"``; ``"pd"``, which needs a feedforward; ``"lead-lag"``;
-        ``"sliding mode"``, ``"disturbance observer"`` around a PID, or
-        ``"perturbation estimation"``, an observer around sliding mode. An observer expects the
+        ``"sliding-mode"``, ``"disturbance-observer"`` around a PID, or
+        ``"perturbation-estimator"``, an observer around sliding mode. An observer expects the
         middle plant's static gain and its time constant at low frequencies.
     margins : Margins, optional
         What every loop keeps.
