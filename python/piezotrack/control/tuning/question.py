@@ -18,7 +18,7 @@ from ...stages.base import Stage
 from ...stages.inverse import Inverse
 from ...stages.xy import XYStage
 from ..controller.controller import number_pair
-from ..laws.filters import LowPass, Notch
+from ..laws.filters import Filter, LowPass, Notch
 from ..loop.preconditions import check_delay
 from ..plant import Plant, plant_of, voltages_before
 from .box import parts_named
@@ -284,7 +284,7 @@ def _slew(slew: float) -> float:
 
 def _filters(filters: Any) -> tuple[LowPass | Notch, ...]:
     listed = tuple(filters) if isinstance(filters, Sequence) else None
-    if listed is None or not all(isinstance(one, (LowPass, Notch)) for one in listed):
+    if listed is None or not all(isinstance(one, Filter) for one in listed):
         raise ParameterError(f"filters is {filters!r}: expected a list of pt.LowPass and pt.Notch")
     return listed
 

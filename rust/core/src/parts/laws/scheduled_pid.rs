@@ -29,6 +29,10 @@ pub(super) fn build(numbers: &[f64], dt: f64) -> Result<ScheduledPid> {
     let (amplitudes, rest) = rest.split_at_checked(along(counts[0])?).ok_or_else(short)?;
     let (rates, rest) = rest.split_at_checked(along(counts[1])?).ok_or_else(short)?;
     let (first, gains) = rest.split_at_checked(2).ok_or_else(short)?;
-    let pids: Result<Vec<Pid>> = gains.chunks_exact(4).map(pid::unsampled).collect();
+    let gains = gains.chunks_exact(4);
+    if !gains.remainder().is_empty() {
+        return Err(short());
+    }
+    let pids: Result<Vec<Pid>> = gains.map(pid::unsampled).collect();
     Ok(ScheduledPid::new(amplitudes, rates, &pids?, (first[0], first[1]), dt)?)
 }
