@@ -10,16 +10,16 @@ import pytest
 
 import piezotrack as pt
 from folders import ROOT
-from piezotrack.control.laws.file_entries import part_entry, part_of
-from piezotrack.control.laws.part import FeedbackLaw, Part, part_class
-from piezotrack.control.laws.part_info import LISTED, names_of
+from piezotrack.control.parts.file_entries import part_entry, part_of
+from piezotrack.control.parts.part import FeedbackLaw, Part, part_class
+from piezotrack.control.parts.part_info import LISTED, names_of
 from piezotrack.control.tuning.structures import SOUGHT, Nominal, law_of
 from piezotrack.errors import ParameterError
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from piezotrack.control.laws.part_info import Number
+    from piezotrack.control.parts.part_info import Number
 
 LAWS, PARTS = names_of("law"), tuple(LISTED)
 LISTS: dict[str, dict[str, Any]] = {

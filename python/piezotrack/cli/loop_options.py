@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ..control.laws.pid import Pid
-    from ..control.laws.repetitive import Repetitive
     from ..control.loop.stability import LoopCheck
     from ..control.loop.tracking import Tracking
+    from ..control.parts.repetitive import Repetitive
     from ..identification.fitted.identified_model import IdentifiedModel
     from ..references.reference import Reference
     from ..stages.virtual import VirtualStage
@@ -232,7 +232,7 @@ class Loop:
         self, model: IdentifiedModel, reference: Reference, kq: float | None, tq: float | None
     ) -> Repetitive:
         """Make the repetitive part; on one's own stage half of an error is learnt in a period."""
-        from ..control.laws.repetitive import Repetitive
+        from ..control.parts.repetitive import Repetitive
         from ..control.plant import linearised_plants, plant_of
 
         period = reference.period

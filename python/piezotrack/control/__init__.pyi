@@ -13,8 +13,6 @@ from .controller.session import Command as Command
 from .controller.session import RefusedReadings as RefusedReadings
 from .controller.session import Session as Session
 from .laws.disturbance_observer import DisturbanceObserver as DisturbanceObserver
-from .laws.filters import LowPass as LowPass
-from .laws.filters import Notch as Notch
 from .laws.hysteresis_observer import HysteresisObserver as HysteresisObserver
 from .laws.laws import Chatter as Chatter
 from .laws.laws import chatter as chatter
@@ -23,9 +21,6 @@ from .laws.neural_network import NetworkInverse as NetworkInverse
 from .laws.neural_network import train_network as train_network
 from .laws.perturbation_estimator import PerturbationEstimator as PerturbationEstimator
 from .laws.pid import Pid as Pid
-from .laws.repetitive import Lag as Lag
-from .laws.repetitive import Repetitive as Repetitive
-from .laws.repetitive import ZeroPhase as ZeroPhase
 from .laws.scheduled_pid import ScheduledPid as ScheduledPid
 from .laws.sliding_mode import SlidingMode as SlidingMode
 from .laws.state_space import StateSpace as StateSpace
@@ -50,6 +45,11 @@ from .loop.tracking import track as track
 from .on_device.closed_loop import DeviceTracking as DeviceTracking
 from .on_device.latency import Latency as Latency
 from .on_device.latency import measure_latency as measure_latency
+from .parts.filters import LowPass as LowPass
+from .parts.filters import Notch as Notch
+from .parts.repetitive import Lag as Lag
+from .parts.repetitive import Repetitive as Repetitive
+from .parts.repetitive import ZeroPhase as ZeroPhase
 from .plant import Plant as Plant
 from .tuning.h_infinity import MixedSensitivity as MixedSensitivity
 from .tuning.h_infinity import mixed_sensitivity as mixed_sensitivity

@@ -8,8 +8,8 @@ import numpy as np
 
 from ..control.controller.controller import Controller
 from ..control.laws.pid import Pid
-from ..control.laws.repetitive import Repetitive
 from ..control.loop.tracking import Tracking, track
+from ..control.parts.repetitive import Repetitive
 from ..identification.fit import identify
 from ..references.waveforms import sine
 from ..stages.dahl import DahlStage

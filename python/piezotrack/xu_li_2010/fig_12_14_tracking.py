@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 from ..control.laws.pid import Pid
-from ..control.laws.repetitive import Repetitive
 from ..control.loop.tracking import Tracking, track
+from ..control.parts.repetitive import Repetitive
 from .apparatus import loop
 from .references import SHRUNK, fast, shrunk, slow
 

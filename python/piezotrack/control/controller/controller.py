@@ -12,9 +12,9 @@ from ..._support.arrays import check_dt
 from ...errors import NumericalError, ParameterError
 from ...identification.fitted.identified_model import IdentifiedModel
 from ...stages.inverse import Inverse
-from ..laws.filters import Filter
-from ..laws.part import FeedbackLaw
-from ..laws.repetitive import Repetitive
+from ..parts.filters import Filter
+from ..parts.part import FeedbackLaw
+from ..parts.repetitive import Repetitive
 from ..plant import reach
 from .description import controller_text
 from .session import Session

@@ -19,10 +19,10 @@ from ...identification.fitted.model_file import (
 from ...identification.fitted.start import state_entry, state_of
 from ...stages.inverse import Inverse
 from ...stages.registry import stage_class
-from ..laws.file_entries import only, part_entry, part_of, stage_entry, stage_of
 from ..laws.neural_network import NETWORK, NetworkInverse
-from ..laws.part_info import names_of
 from ..loop.stability import LoopCheck, LoopReport
+from ..parts.file_entries import only, part_entry, part_of, stage_entry, stage_of
+from ..parts.part_info import names_of
 from ..tuning.tuned import Tuned, TuningReport
 from .controller import DRIVE_UNITS, Controller
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ... import _core
 from ..._support.arguments import finite, not_negative
 from ...errors import ParameterError
-from .part import FeedbackLaw, part
+from ..parts.part import FeedbackLaw, part
 from .pid import Pid
 
 __all__ = ["DisturbanceObserver", "check_nominal"]

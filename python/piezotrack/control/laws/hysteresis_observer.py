@@ -8,7 +8,7 @@ from ..._support.arguments import finite, positive
 from ...errors import ParameterError
 from ...stages.bouc_wen import BoucWenStage
 from ...stages.dahl import DahlStage
-from .part import FeedbackLaw, part
+from ..parts.part import FeedbackLaw, part
 from .pid import Pid
 
 __all__ = ["HysteresisObserver"]

@@ -7,7 +7,7 @@ from typing import Literal
 
 from ..._support.arguments import finite, not_negative
 from ...errors import ParameterError
-from .part import FeedbackLaw, part
+from ..parts.part import FeedbackLaw, part
 
 __all__ = ["LeadLag"]
 

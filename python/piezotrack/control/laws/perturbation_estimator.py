@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 from ...errors import ParameterError
+from ..parts.part import FeedbackLaw, part
 from .disturbance_observer import check_nominal
-from .part import FeedbackLaw, part
 from .sliding_mode import SlidingMode
 
 __all__ = ["PerturbationEstimator"]

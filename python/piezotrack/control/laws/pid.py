@@ -11,7 +11,7 @@ import numpy as np
 from ... import _core
 from ..._support.arguments import finite, not_negative
 from ...errors import ParameterError
-from .part import FeedbackLaw, part
+from ..parts.part import FeedbackLaw, part
 
 __all__ = ["Pid"]
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from ..._support.arguments import positive
 from ...errors import ParameterError
-from .part import FeedbackLaw, part
+from ..parts.part import FeedbackLaw, part
 from .pid import Pid
 
 __all__ = ["MOST_GRADES", "ScheduledPid"]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ... import _core
 from ..._support.arguments import not_negative, positive
 from ...errors import ParameterError
-from .part import FeedbackLaw, part
+from ..parts.part import FeedbackLaw, part
 
 __all__ = ["SlidingMode"]
 

@@ -11,7 +11,7 @@ from ..._support.arguments import MOST_ENTRIES, finite
 from ..._support.arrays import real_array
 from ..._support.messages import quoted
 from ...errors import DataError, ParameterError, ShapeError
-from .part import FeedbackLaw, part
+from ..parts.part import FeedbackLaw, part
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

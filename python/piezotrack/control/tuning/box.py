@@ -10,13 +10,13 @@ import numpy as np
 
 from ..._support.messages import quoted
 from ...errors import ParameterError
-from ..laws.filters import LowPass, Notch
-from ..laws.repetitive import Repetitive, ZeroPhase
+from ..parts.filters import LowPass, Notch
+from ..parts.repetitive import Repetitive, ZeroPhase
 from .structures import SOUGHT, Nominal, law_of, law_ranges, nominal_of
 
 if TYPE_CHECKING:
     from ... import _core
-    from ..laws.part import FeedbackLaw
+    from ..parts.part import FeedbackLaw
 
 __all__ = ["PARTS", "Box", "Parts", "box_of", "parts_named", "resonance"]
 

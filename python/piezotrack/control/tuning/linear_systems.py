@@ -13,7 +13,7 @@ from ...identification.fitted.identified_model import IdentifiedModel
 from ...stages.base import Stage
 from ...stages.virtual import VirtualStage
 from ..controller.controller import Controller, number_pair
-from ..laws.part import FeedbackLaw
+from ..parts.part import FeedbackLaw
 from ..plant import linearised_plants, plant_of
 
 if TYPE_CHECKING:

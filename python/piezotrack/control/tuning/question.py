@@ -18,8 +18,8 @@ from ...stages.base import Stage
 from ...stages.inverse import Inverse
 from ...stages.xy import XYStage
 from ..controller.controller import number_pair
-from ..laws.filters import Filter, LowPass, Notch
 from ..loop.preconditions import check_delay
+from ..parts.filters import Filter, LowPass, Notch
 from ..plant import Plant, plant_of, voltages_before
 from .box import parts_named
 from .margins import Margins, Spread

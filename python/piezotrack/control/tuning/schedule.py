@@ -265,8 +265,11 @@ def _error(
     options: dict[str, Any],
 ) -> float:
     """Rms error [m] along a reference, beginning with the gains of its place."""
-    laws: list[Any] = [replace(one.feedback, first=place) for one in controllers if one.feedback]
-    loops = [replace(one, feedback=law) for one, law in zip(controllers, laws, strict=True)]
+    laws: list[Any] = [one.feedback for one in controllers]
+    loops = [
+        replace(one, feedback=replace(law, first=place))
+        for one, law in zip(controllers, laws, strict=True)
+    ]
     how: dict[str, Any] = {"beyond_reach": True, "unstable": True}
     how |= {name: options[name] for name in ("delay", "jitter") if name in options}
     if isinstance(stage, XYStage):

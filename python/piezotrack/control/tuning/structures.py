@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from ..laws.part import part_class
+from ..parts.part import part_class
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from ... import _core
-    from ..laws.part import FeedbackLaw
+    from ..parts.part import FeedbackLaw
 
 __all__ = ["SOUGHT", "LawName", "Nominal", "law_of", "law_ranges", "nominal_of"]
 

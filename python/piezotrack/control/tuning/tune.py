@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ...references.xy_reference import XYReference
     from ...stages.inverse import Inverse
     from ...stages.xy import XYStage
-    from ..laws.filters import LowPass, Notch
+    from ..parts.filters import LowPass, Notch
     from ..plant import Plant
     from .margins import Margins, Spread
     from .options import TuneOptions

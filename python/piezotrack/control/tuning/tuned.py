@@ -10,9 +10,9 @@ from ..loop.contouring import Contour
 
 if TYPE_CHECKING:
     from ..controller.controller import Controller
-    from ..laws.filters import Filter
-    from ..laws.repetitive import Repetitive
     from ..loop.tracking import Tracking
+    from ..parts.filters import Filter
+    from ..parts.repetitive import Repetitive
     from .margins import Margins
 
 __all__ = ["Kept", "Tuned", "TunedPair", "TuningReport", "parts_text"]

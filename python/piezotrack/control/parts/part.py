@@ -22,8 +22,8 @@ __all__ = ["FeedbackLaw", "Part", "part", "part_class"]
 
 # The classes of the parts by their names, filled by the decorator.
 REGISTERED: dict[str, type[Part]] = {}
-# Modules with several parts, by their role; a law has a module of its own name.
-MODULES = {"filter": "filters", "repetitive": "repetitive", "smoothing": "repetitive"}
+# Modules with several parts, by their role; a law has a module of its own.
+MODULES = {"filter": ".filters", "repetitive": ".repetitive", "smoothing": ".repetitive"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ def part(name: str) -> Callable[[type[P]], type[P]]:
     Parameters
     ----------
     name : str
-        Name of the part. The module of a law has the same name, with underscores.
+        Name of the part. The module of a law has the same name in `laws`, with underscores.
 
     Returns
     -------
@@ -113,8 +113,8 @@ def part_class(name: str) -> type[Part]:
         The class.
     """
     if name not in REGISTERED:
-        module = MODULES.get(LISTED[name].role, name.replace("-", "_"))
-        import_module(f".{module}", __package__)
+        module = f"..laws.{name.replace('-', '_')}"
+        import_module(MODULES.get(LISTED[name].role, module), __package__)
     return REGISTERED[name]
 
 
