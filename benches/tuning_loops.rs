@@ -7,8 +7,9 @@ use std::time::Duration;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use piezotrack_control::{Controller, Limits, Pid, Repetitive, Smoothing};
 use piezotrack_core::models::Model;
+use piezotrack_core::parts::Law;
 use piezotrack_core::signal::NEVER;
-use piezotrack_core::simulate::{Law, ReferenceSamples, Timing, VirtualStage};
+use piezotrack_core::simulate::{ReferenceSamples, Timing, VirtualStage};
 use piezotrack_core::tune::{Judged, Task};
 
 const SAMPLES: u32 = 1000;

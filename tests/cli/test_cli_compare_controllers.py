@@ -9,6 +9,8 @@ import pytest
 
 from commands import ran, refusal
 from loops import model_text
+from piezotrack.cli.compare_controllers import SPELLINGS
+from piezotrack.control.comparing.contenders import CONTENDERS
 
 COMPARE = ("compare-controllers", "dahl.json", "--stage", "xu-li-2010", "--dt", "0.02")
 
@@ -50,3 +52,12 @@ def test_controllers_are_compared_and_written() -> None:
 def test_wrong_options_are_named(options: list[str], words: str) -> None:
     assert words in refusal(*COMPARE, *options)
     assert not Path("results").exists()
+
+
+@pytest.mark.parametrize("spelling", SPELLINGS)
+def test_another_spelling_is_of_a_controller_that_is_compared(spelling: str) -> None:
+    assert spelling not in CONTENDERS
+    assert SPELLINGS[spelling] in CONTENDERS
+    # It is taken: what is refused is the other one.
+    words = refusal(*COMPARE, "--controllers", f"{spelling}, pdi")
+    assert "has 'pdi'" in words

@@ -220,20 +220,23 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "span in um": ({"span_low": 0.0, "span_high": 80.0}, "span is 80 m: expected a displacement"),
     "no such law": (
         {"law": numbers("pdi", 1.0)},
-        "law is 'pdi' with 1 numbers: expected 'pid' with 4",
+        "law is 'pdi': expected 'pid', 'state-space', 'lead-lag'",
     ),
-    "too few numbers": ({"law": numbers("pid", 1.0, 2.0)}, "law is 'pid' with 2 numbers"),
+    "too few numbers": (
+        {"law": numbers("pid", 1.0, 2.0)},
+        "law is 'pid' with 2 numbers: expected kp in V/m",
+    ),
     "a state too many": (
-        {"law": numbers("state space", 1e300, 1.0)},
-        "state space, n is 1e300: expected a whole number from 1 on",
+        {"law": numbers("state-space", 1e300, 1.0)},
+        "state-space, n is 1e300: expected a whole number from 1 on",
     ),
     "numbers without a name": (
         {"law": numbers(None, 1.0)},
         "law.name is NULL: expected a name, as there are 1 values",
     ),
     "a part of a state": (
-        {"law": numbers("state space", 1.5, 1.0)},
-        "state space, n is 1.5: expected a whole number from 1 on",
+        {"law": numbers("state-space", 1.5, 1.0)},
+        "state-space, n is 1.5: expected a whole number from 1 on",
     ),
     "no truth value": (
         {"repetitive": numbers("lag", 1.0, 3e5, 0.1, 0.99, 0.0, 7.0)},
@@ -244,8 +247,8 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
         "lead is 1e18: expected a whole number from 0 on",
     ),
     "a grid without numbers": (
-        {"law": numbers("scheduled pid", 2.0)},
-        "scheduled pid with 1 numbers: expected two counts",
+        {"law": numbers("scheduled-pid", 2.0)},
+        "law is 'scheduled-pid' with 1 numbers: expected two counts",
     ),
     "a name that moves the cursor": (
         {"law": numbers("p\x1b[2Jid", 1.0)},

@@ -51,9 +51,9 @@ def test_each_feedback_keeps_the_margins_and_each_step_is_timed() -> None:
         "PID",
         "inverse + PD",
         "inverse + lead-lag",
-        "inverse + sliding mode",
-        "inverse + perturbation estimation",
-        "inverse + disturbance observer",
+        "inverse + sliding-mode",
+        "inverse + perturbation-estimator",
+        "inverse + disturbance-observer",
     ]
     found = compared(controllers=names, margins=pt.Margins(sensitivity=1.7))
     assert [row.name for row in found.rows] == names
@@ -177,7 +177,7 @@ def test_one_draw_has_no_spread() -> None:
 
 
 def test_the_tables_fit_a_terminal_and_a_notebook() -> None:
-    names = ["inverse", "inverse + perturbation estimation"]
+    names = ["inverse", "inverse + perturbation-estimator"]
     found = compared(controllers=names, references=None, rates=(2.0, 5.0, 20.0))
     lines = str(found).splitlines()
     assert max(map(len, lines)) <= 100
@@ -186,7 +186,7 @@ def test_the_tables_fit_a_terminal_and_a_notebook() -> None:
     assert sum(line.startswith("inverse + perturbation") for line in lines) == 4
     html = found._repr_html_()
     assert html.count("<table>") == html.count("</table>") == 4
-    assert "<th>inverse + perturbation estimation</th>" in html
+    assert "<th>inverse + perturbation-estimator</th>" in html
 
 
 def test_the_document_is_json() -> None:

@@ -9,8 +9,18 @@ use std::path::Path;
 use std::slice::from_ref;
 
 /// From the bottom up.
-const CORE: [&str; 9] =
-    ["error", "math", "signal", "integrator", "design", "models", "simulate", "identify", "tune"];
+const CORE: [&str; 10] = [
+    "error",
+    "math",
+    "signal",
+    "integrator",
+    "design",
+    "parts",
+    "models",
+    "simulate",
+    "identify",
+    "tune",
+];
 
 /// The rooms of `identify`, from the bottom up.
 const IDENTIFY: [&str; 10] = [

@@ -4,8 +4,9 @@
 use piezotrack_control::{Controller, Filter, Limits, Pid, Repetitive, Smoothing};
 use piezotrack_core::design::{LoopPlant, SampledLoop};
 use piezotrack_core::models::Model;
+use piezotrack_core::parts::Law;
 use piezotrack_core::signal::NEVER;
-use piezotrack_core::simulate::{Law, ReferenceSamples, Timing, VirtualStage, track};
+use piezotrack_core::simulate::{ReferenceSamples, Timing, VirtualStage, track};
 use piezotrack_core::tune::{
     Aim, Figures, Judge, Judged, Nominal, PlantSet, Requirements, Setting, Sought,
     SoughtController, Structure, Task, Template, Tuning, pid,

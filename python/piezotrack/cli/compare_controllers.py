@@ -29,6 +29,15 @@ from .output import Output
 
 __all__ = ["compare_controllers_command"]
 
+# Other spellings that the option takes.
+SPELLINGS = {
+    "inverse + sliding mode": "inverse + sliding-mode",
+    "inverse + perturbation estimation": "inverse + perturbation-estimator",
+    "inverse + disturbance observer": "inverse + disturbance-observer",
+    "inverse + scheduled PID": "inverse + scheduled-pid",
+    "PID + hysteresis observer": "PID + hysteresis-observer",
+}
+
 
 @in_words
 def compare_controllers_command(
@@ -89,7 +98,7 @@ def compare_controllers_command(
         rates=_rates(rates),
         controllers=None
         if controllers is None
-        else [one.strip() for one in controllers.split(",")],
+        else [SPELLINGS.get(one, one) for one in map(str.strip, controllers.split(","))],
         margins=Margins(sensitivity=sensitivity),
         delay=delay,
         seeds=seeds,

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from ..control.controller.controller import Controller
-from ..control.laws.components import Pid
+from ..control.laws.pid import Pid
 from ..control.loop.tracking import Tracking, track
 from ..data import datasets
 from ..data.dataset import Dataset

@@ -15,9 +15,10 @@ from .options import number_range, refuse_without_effect
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from ..control.laws.components import Pid, Repetitive
+    from ..control.laws.pid import Pid
     from ..control.loop.stability import LoopCheck
     from ..control.loop.tracking import Tracking
+    from ..control.parts.repetitive import Repetitive
     from ..identification.fitted.identified_model import IdentifiedModel
     from ..references.reference import Reference
     from ..stages.virtual import VirtualStage
@@ -189,7 +190,7 @@ class Loop:
 
     def pid(self, model: IdentifiedModel | None) -> Pid | None:
         """Make the feedback; the paper's gains are for its own stage only."""
-        from ..control.laws.components import Pid
+        from ..control.laws.pid import Pid
 
         if not self.has_feedback:
             return None
@@ -231,7 +232,7 @@ class Loop:
         self, model: IdentifiedModel, reference: Reference, kq: float | None, tq: float | None
     ) -> Repetitive:
         """Make the repetitive part; on one's own stage half of an error is learnt in a period."""
-        from ..control.laws.components import Repetitive
+        from ..control.parts.repetitive import Repetitive
         from ..control.plant import linearised_plants, plant_of
 
         period = reference.period

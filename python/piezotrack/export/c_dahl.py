@@ -87,7 +87,7 @@ def along_operations(terms: int) -> Operations:
 
 def dahl_observer(numbers: Mapping[str, Sequence[float]], unit: str) -> Part:
     """Make the observer of a Dahl hysteresis around a PID."""
-    pole, fresh, correction, a1, a2, gain, longest = numbers["Dahl observer"]
+    pole, fresh, correction, a1, a2, gain, longest = numbers["dahl-observer"]
     along, constants = dahl_operator("hysteresis", TERMS, (a1, a2, gain))
     return Part(
         title="observer of a Dahl hysteresis",

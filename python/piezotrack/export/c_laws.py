@@ -203,7 +203,7 @@ static real law_step(NAME_state *s, const struct sample *in)
 
 def sliding_mode(numbers: Numbers, unit: str) -> Part:
     """Make sliding mode control with a boundary layer."""
-    switching, gain, integral, derivative, fresh = numbers["sliding mode"]
+    switching, gain, integral, derivative, fresh = numbers["sliding-mode"]
     begin = SLIDING_INTEGRAL if integral > 0.0 else SLIDING_NO_INTEGRAL
     return Part(
         title="sliding mode control with a boundary layer",
@@ -294,7 +294,7 @@ static real sliding_step(NAME_state *s, const struct sample *in)
 
 def disturbance_observer(numbers: Numbers, unit: str, inner: str) -> Part:
     """Make the disturbance observer around the law whose functions begin with `inner`."""
-    fresh, pole, inverse = numbers["disturbance observer"]
+    fresh, pole, inverse = numbers["disturbance-observer"]
     return Part(
         title="disturbance observer",
         constants=(

@@ -8,9 +8,6 @@ import numpy as np
 
 from .._support.arrays import signal_of
 from .._support.units import of_drive
-from ..control.laws.components import Pid, StateSpace
-from ..control.laws.hysteresis_observer import HysteresisObserver
-from ..control.laws.laws import DisturbanceObserver, LeadLag, PerturbationEstimator, SlidingMode
 from ..control.laws.neural_network import NetworkInverse
 from ..control.loop.preconditions import check_period, check_turns
 from ..errors import DataError, ParameterError, ShapeError
@@ -29,6 +26,18 @@ if TYPE_CHECKING:
 __all__ = ["coefficients_of", "feedforward_table", "parts_of", "shape_of"]
 
 Numbers = dict[str, Any]
+# With what the functions of a law begin, and what it is told besides error and excess.
+FUNCTIONS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "pid": ("pid", ()),
+    "state-space": ("law", ()),
+    "lead-lag": ("law", ()),
+    "sliding-mode": ("sliding", ()),
+    "disturbance-observer": ("observer", ("applied", "feedforward")),
+    "perturbation-estimator": ("observer", ("applied", "feedforward")),
+    "hysteresis-observer": ("observer", ("measured", "applied")),
+}
+# The coefficients of a law that has a form in C: of itself, or of the law inside.
+FIRST = {"pid", "b", "sliding-mode"}
 # Longest table: its text has 50 bytes a sample.
 MOST_SAMPLES = 1_000_000
 
@@ -121,8 +130,8 @@ def shape_of(controller: Controller, table: Sequence[float] | None) -> c_loop.Sh
     ParameterError
         A part has no form in C.
     """
-    law, learner = controller.feedback, controller.repetitive
-    name, told = _law_of(law)
+    learner = controller.repetitive
+    name, told = _law_of(controller)
     forward = "given"
     if table is not None:
         forward = "table"
@@ -139,23 +148,17 @@ def shape_of(controller: Controller, table: Sequence[float] | None) -> c_loop.Sh
     )
 
 
-def _law_of(law: Any) -> tuple[str, tuple[str, ...]]:
+def _law_of(controller: Controller) -> tuple[str, tuple[str, ...]]:
     """With what the functions of a law begin, and what it is told besides error and excess."""
+    law = controller.feedback
     if law is None:
         return "", ()
-    if isinstance(law, Pid):
-        return "pid", ()
-    if isinstance(law, (StateSpace, LeadLag)):
-        return "law", ()
-    if isinstance(law, SlidingMode):
-        return "sliding", ()
-    if isinstance(law, (DisturbanceObserver, PerturbationEstimator)):
-        return "observer", ("applied", "feedforward")
-    if isinstance(law, HysteresisObserver) and law.stage.info.name == "dahl":
-        return "observer", ("measured", "applied")
-    what = law.title
-    if isinstance(law, HysteresisObserver):
-        what += f" of a {law.stage.info.title} stage"
+    # The core has no coefficients of what needs more than arithmetic.
+    if law.info.name in FUNCTIONS and coefficients_of(controller).keys() & FIRST:
+        return FUNCTIONS[law.info.name]
+    what = law.info.title
+    if (stage := getattr(law, "stage", None)) is not None:
+        what += f" of a {stage.info.title} stage"
     raise ParameterError(
         f"feedback is a {what}, which has no form in C: its step needs powers or logarithms; "
         "expected a PID, state space, lead-lag, sliding mode, a disturbance observer or the "
@@ -236,11 +239,11 @@ def _laws(numbers: Numbers, unit: str) -> list[Part]:
     if "b" in numbers:
         return [c_laws.state_space(numbers, unit)]
     inner, name = c_laws.pid, "pid"
-    if "sliding mode" in numbers:
+    if "sliding-mode" in numbers:
         inner, name = c_laws.sliding_mode, "sliding"
     laws = [inner(numbers, unit)]
-    if "disturbance observer" in numbers:
+    if "disturbance-observer" in numbers:
         laws.append(c_laws.disturbance_observer(numbers, unit, name))
-    if "Dahl observer" in numbers:
+    if "dahl-observer" in numbers:
         laws.append(c_dahl.dahl_observer(numbers, unit))
     return laws

@@ -78,18 +78,18 @@ def _feedback(numbers: dict[str, Any], unit: str) -> dict[str, Any]:
             f"d_{unit}_per_m": numbers["d"][0],
             "back": numbers.get("back"),
         }
-    if "sliding mode" in numbers:
+    if "sliding-mode" in numbers:
         inside: dict[str, Any] = {"kind": "sliding-mode"}
-        inside |= dict(zip(SLIDING, numbers["sliding mode"], strict=True))
+        inside |= dict(zip(SLIDING, numbers["sliding-mode"], strict=True))
     else:
         kp, ki, kd, tracking = numbers["pid"]
         inside = {"kind": "pid", "tracking": tracking} | _biquad(
             [kp + ki + kd, -(kp + 2.0 * kd), kd], [1.0, -1.0, 0.0]
         )
-    for kind, names in (("disturbance observer", DISTURBANCE), ("Dahl observer", DAHL)):
+    for kind, names in (("disturbance-observer", DISTURBANCE), ("dahl-observer", DAHL)):
         if kind in numbers:
             around = dict(zip(names, numbers[kind], strict=True))
-            return {"kind": kind.lower().replace(" ", "-")} | around | {"inside": inside}
+            return {"kind": kind} | around | {"inside": inside}
     return inside
 
 

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..control.controller.controller import Controller
-from ..control.laws.components import Pid, Repetitive
+from ..control.laws.pid import Pid
 from ..control.loop.tracking import Tracking, track
+from ..control.parts.repetitive import Repetitive
 from ..identification.fit import identify
 from ..references.waveforms import sine
 from ..stages.dahl import DahlStage

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from ..control.laws.components import Lag, LowPass, Notch, Pid, Repetitive, ZeroPhase
+from ..control.laws.pid import Pid
 from ..control.loop.tracking import Tracking, track
+from ..control.parts.filters import LowPass, Notch
+from ..control.parts.repetitive import Lag, Repetitive, ZeroPhase
 from ..data.dataset import Dataset
 from ..errors import NumericalError, ParameterError
 from ..identification.fit import identify

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from ..control.laws.components import Pid, Repetitive
+from ..control.laws.pid import Pid
 from ..control.loop.tracking import Tracking, track
+from ..control.parts.repetitive import Repetitive
 from .apparatus import loop
 from .references import SHRUNK, fast, shrunk, slow
 

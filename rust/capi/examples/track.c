@@ -66,7 +66,7 @@ int main(void)
         .low = 0.0,
         .high = 75.0,
         .law = {"pid", pid, 4},
-        .repetitive = {"zero phase", learner, 6},
+        .repetitive = {"zero-phase", learner, 6},
         .model = "prandtl-ishlinskii",
         .parameters = parameters,
         .parameter_count = sizeof parameters / sizeof parameters[0],

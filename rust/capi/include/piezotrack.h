@@ -45,14 +45,13 @@ typedef struct {
  * | name | values |
  * | --- | --- |
  * | "pid" | kp (V/m), ti, td (s), tt (s; NAN for its default) |
- * | "state space" | n, then A row by row, B, C, D (V/m), and n for back-calculation or none |
+ * | "state-space" | n, then A row by row, B, C, D (V/m), and n for back-calculation or none |
  * | "lead-lag" | kp (V/m), lead, lag (s), 1 for matched poles or 0 |
- * | "sliding mode" | switching gain (V), layer (m), ti, td, tf (s) |
- * | "disturbance observer" | those of the PID; gain (m/V), time (s), cutoff (Hz) |
- * | "perturbation" | those of the sliding mode; gain (m/V), time (s), cutoff (Hz) |
- * | "Dahl observer" | those of the PID; gain (m/V), time (s), correction, stroke (m); a1, a2, curvature |
- * | "Bouc-Wen observer" | the same to the stroke; rise, beta, gamma, exponent |
- * | "scheduled pid" | counts of amplitudes and rates, both (m, Hz), the first of each; PIDs |
+ * | "sliding-mode" | switching gain (V), layer (m), ti, td, tf (s) |
+ * | "disturbance-observer" | those of the PID; gain (m/V), time (s), cutoff (Hz) |
+ * | "perturbation-estimator" | those of the sliding mode; gain (m/V), time (s), cutoff (Hz) |
+ * | "scheduled-pid" | counts of amplitudes and rates, both (m, Hz), the first of each; PIDs |
+ * | "hysteresis-observer" | those of the PID; gain (m/V), time (s), correction, stroke (m); a1, a2, curvature of a Dahl hysteresis, or rise, beta, gamma, exponent of a Bouc-Wen one |
  */
 typedef struct {
   /**
@@ -84,13 +83,13 @@ typedef struct {
    */
   piezotrack_numbers law;
   /**
-   * Repetitive control: "lag", "compensated lag", "zero phase" or "none" for its smoothing, with
+   * Repetitive control: "lag", "compensated-lag", "zero-phase" or "none" for its smoothing, with
    * period (s), kq (V/m), time constant (s) or order, forgetting factor, lead (samples), 1 to
    * pause under saturation or 0.
    */
   piezotrack_numbers repetitive;
   /**
-   * Filters of the measurement: "low pass" with its cutoff (Hz), "notch" with frequency (Hz),
+   * Filters of the measurement: "low-pass" with its cutoff (Hz), "notch" with frequency (Hz),
    * width and depth.
    */
   const piezotrack_numbers *filters;

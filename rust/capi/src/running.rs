@@ -7,7 +7,8 @@ use piezotrack_control::{
 };
 use piezotrack_core::math::zeros;
 use piezotrack_core::models::{AnyInverse, AnyInverseState, Model, ParameterInfo, Values};
-use piezotrack_core::simulate::{ControllerParts, DELAY_LINE, Law, LawState, Named};
+use piezotrack_core::parts::{ControllerParts, Law, LawState, Named};
+use piezotrack_core::simulate::DELAY_LINE;
 use piezotrack_core::{Error, Result};
 
 /// What the model of the feedforward is called that is a network.

@@ -3,9 +3,10 @@
 //! `cargo run --release -p piezotrack-core --example track_virtual_stage`
 
 use piezotrack_control::{Controller, DahlInverse, Limits, Pid};
+use piezotrack_core::parts::Law;
 use piezotrack_core::signal::NEVER;
 use piezotrack_core::signal::metrics::tracking;
-use piezotrack_core::simulate::{Law, ReferenceSamples, Timing, VirtualStage, track};
+use piezotrack_core::simulate::{ReferenceSamples, Timing, VirtualStage, track};
 
 const INTERVAL: f64 = 0.02;
 const FREQUENCY: f64 = 0.2;

@@ -4,8 +4,8 @@
 //! of Python, prints nothing, and returns an [`Error`] where an argument cannot be used.
 //!
 //! The modules are layers. Each uses those before it in this list, and none after it: [`error`],
-//! [`math`], [`signal`], [`integrator`], [`design`], [`models`], [`simulate`], [`identify`],
-//! [`tune`].
+//! [`math`], [`signal`], [`integrator`], [`design`], [`parts`], [`models`], [`simulate`],
+//! [`identify`], [`tune`].
 #![forbid(unsafe_code)]
 
 pub mod design;
@@ -14,6 +14,7 @@ pub mod identify;
 pub mod integrator;
 pub mod math;
 pub mod models;
+pub mod parts;
 pub mod signal;
 pub mod simulate;
 pub mod tune;

@@ -4,7 +4,7 @@ use piezotrack_control::hysteresis::Dahl;
 use piezotrack_control::{
     Controller, HysteresisObserved, Observed, Recursion, SampledPid, SampledSlidingMode, StateSpace,
 };
-use piezotrack_core::simulate::Law;
+use piezotrack_core::parts::Law;
 
 /// Numbers by their names.
 pub type Named = Vec<(String, Vec<f64>)>;
@@ -57,11 +57,11 @@ fn of_pid(pid: &SampledPid, out: &mut Named) {
 
 fn of_sliding(law: &SampledSlidingMode, out: &mut Named) {
     let [gain, integral, derivative, fresh] = law.inside();
-    put(out, "sliding mode", &[law.switching(), gain, integral, derivative, fresh]);
+    put(out, "sliding-mode", &[law.switching(), gain, integral, derivative, fresh]);
 }
 
 fn of_disturbance<F>(law: &Observed<F>, out: &mut Named) {
-    put(out, "disturbance observer", &law.coefficients());
+    put(out, "disturbance-observer", &law.coefficients());
 }
 
 fn of_dahl<F>(
@@ -70,7 +70,7 @@ fn of_dahl<F>(
 ) {
     let [pole, fresh, correction] = law.coefficients();
     let Dahl { a1, a2, gain } = law.operator();
-    put(out, "Dahl observer", &[pole, fresh, correction, a1.0, a2.0, gain.0, law.longest()]);
+    put(out, "dahl-observer", &[pole, fresh, correction, a1.0, a2.0, gain.0, law.longest()]);
 }
 
 fn of_state_space<const N: usize>(law: &StateSpace<N>, out: &mut Named) {

@@ -4,7 +4,8 @@ use piezotrack_control::{Command, Controller, ControllerState};
 use piezotrack_core::Error;
 use piezotrack_core::design::LinearFeedback;
 use piezotrack_core::math::zeros;
-use piezotrack_core::simulate::{ControllerParts, DELAY_LINE, Law, LawState, Named};
+use piezotrack_core::parts::{ControllerParts, Law, LawState, Named};
+use piezotrack_core::simulate::DELAY_LINE;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 

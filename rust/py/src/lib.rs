@@ -15,6 +15,7 @@ mod least_squares;
 mod models;
 mod numbers;
 mod objective;
+mod parts;
 mod question;
 mod snapshots;
 mod stage;
@@ -40,6 +41,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     objective::register(module)?;
     step::register(module)?;
     swarm::register(module)?;
+    parts::register(module)?;
     control::register(module)?;
     design::register(module)?;
     least_squares::register(module)?;

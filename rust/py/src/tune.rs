@@ -231,9 +231,9 @@ fn structure((name, gain, time): &(String, f64, f64)) -> Result<Structure> {
     Ok(match name.as_str() {
         "pid" | "pd" => Structure::Pid,
         "lead-lag" => Structure::LeadLag,
-        "sliding mode" => Structure::SlidingMode,
-        "disturbance observer" => Structure::DisturbanceObserver(nominal),
-        "perturbation estimation" => Structure::PerturbationEstimation(nominal),
+        "sliding-mode" => Structure::SlidingMode,
+        "disturbance-observer" => Structure::DisturbanceObserver(nominal),
+        "perturbation-estimator" => Structure::PerturbationEstimator(nominal),
         other => {
             let expected = "the name of a feedback law";
             return Err(Error::parameter("law", format!("'{other}'"), expected));

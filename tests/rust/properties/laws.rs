@@ -6,7 +6,7 @@ use piezotrack_control::{
     LeadLag, Limits, Observable, Pid, Repetitive, ScheduledPid, SlidingMode, Smoothing, Snapshot,
     Span, StateSpace,
 };
-use piezotrack_core::simulate::{Law, LawState, MOST_STATES};
+use piezotrack_core::parts::{Law, LawState, MOST_STATES};
 use proptest::prelude::*;
 
 use crate::control::{Act, DT, ROOM, acts, composed, learner, limits, stays_within};

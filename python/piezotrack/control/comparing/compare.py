@@ -193,7 +193,7 @@ def _names(controllers: Sequence[str] | None, task: Task) -> list[str]:
     for model, name in (
         ("dahl", "Dahl inverse + PID"),
         ("bouc-wen", "Bouc-Wen inverse + PID"),
-        ("dahl", "PID + hysteresis observer"),
+        ("dahl", "PID + hysteresis-observer"),
     ):
         if model not in task.models:
             missing.add(name)

@@ -11,7 +11,6 @@ from ... import _core
 from ...errors import ParameterError
 from ...stages.dahl import DahlStage
 from ..controller.controller import Controller
-from ..laws.components import Pid
 from ..laws.hysteresis_observer import HysteresisObserver
 from ..laws.neural_network import train_network
 from ..learning.learn import learn
@@ -164,10 +163,10 @@ def _observed(task: Task) -> list[Entry | None]:
     if not isinstance(stage, DahlStage):
         raise ParameterError("models['dahl'] is no Dahl stage: expected one to observe")
     tuned = task.tuned(inverse=None)
-    assert isinstance(tuned.feedback, Pid)
+    tuned_pid: Any = tuned.feedback
     plants = plants_of([task.stage], task.limits, task.delay, task.spread)
     for share in SHARES:
-        pid = replace(tuned.feedback, kp=share * tuned.feedback.kp)
+        pid = replace(tuned_pid, kp=share * tuned_pid.kp)
         controller = replace(tuned, feedback=HysteresisObserver(stage=stage, pid=pid))
         if all(_keeps(controller, one.plant, task.margins) for one in plants):
             return task.each(controller)
@@ -270,18 +269,18 @@ CONTENDERS: dict[str, Maker] = {
     "inverse": _inverse,
     "network": _network,
     "PID": _pid_alone,
-    "PID + hysteresis observer": _observed,
+    "PID + hysteresis-observer": _observed,
     "inverse + PD": _law("pd"),
     "inverse + lead-lag": _law("lead-lag"),
     "inverse + PID": _law("pid"),
     "inverse + PID + notch": _notched,
     "Dahl inverse + PID": _other("dahl"),
     "Bouc-Wen inverse + PID": _other("bouc-wen"),
-    "inverse + sliding mode": _law("sliding mode"),
-    "inverse + perturbation estimation": _law("perturbation estimation"),
-    "inverse + disturbance observer": _law("disturbance observer"),
+    "inverse + sliding-mode": _law("sliding-mode"),
+    "inverse + perturbation-estimator": _law("perturbation-estimator"),
+    "inverse + disturbance-observer": _law("disturbance-observer"),
     "inverse + H-infinity": _h_infinity,
-    "inverse + scheduled PID": _scheduled,
+    "inverse + scheduled-pid": _scheduled,
     "inverse + PID + repetitive": _repetitive,
     "inverse + PID + learning": _learnt,
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from ... import _core
 from ..._support.arguments import TOO_FAR, expect, number_pair, one_of
@@ -12,10 +12,9 @@ from ..._support.arrays import check_dt
 from ...errors import NumericalError, ParameterError
 from ...identification.fitted.identified_model import IdentifiedModel
 from ...stages.inverse import Inverse
-from ..laws.components import LowPass, Notch, Pid, Repetitive, StateSpace
-from ..laws.hysteresis_observer import HysteresisObserver
-from ..laws.laws import NAMED_LAWS, DisturbanceObserver, LeadLag, PerturbationEstimator, SlidingMode
-from ..laws.scheduled_pid import ScheduledPid
+from ..parts.filters import Filter
+from ..parts.part import FeedbackLaw
+from ..parts.repetitive import Repetitive
 from ..plant import reach
 from .description import controller_text
 from .session import Session
@@ -29,17 +28,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Controller"]
 
-# The feedback laws.
-Feedback: TypeAlias = (
-    Pid
-    | StateSpace
-    | LeadLag
-    | SlidingMode
-    | PerturbationEstimator
-    | DisturbanceObserver
-    | ScheduledPid
-    | HysteresisObserver
-)
 # Sampling interval for the reach of a stage [s]: its drive takes seconds.
 REACH_STEP = 0.05
 DRIVE_UNITS = ("V", "m", "N")
@@ -99,9 +87,9 @@ class Controller:
     dt: float
     limits: tuple[float, float]
     feedforward: Inverse | None = None
-    feedback: Feedback | None = None
+    feedback: FeedbackLaw | None = None
     repetitive: Repetitive | None = None
-    filters: Sequence[LowPass | Notch] = ()
+    filters: Sequence[Filter] = ()
     span: tuple[float, float] | None = None
     max_jump: float | None = None
     drive_unit: str = "V"
@@ -122,18 +110,17 @@ class Controller:
         expect(
             "feedback",
             self.feedback,
-            (Pid, StateSpace, *NAMED_LAWS, nothing),
+            (FeedbackLaw, nothing),
             "pt.Pid, pt.control.StateSpace or another law of pt.control",
         )
         expect("repetitive", self.repetitive, (Repetitive, nothing), "pt.Repetitive")
         expect("filters", self.filters, Sequence, "a list of filters")
-        for i, one in enumerate(self.filters):
-            expect(f"filters[{i}]", one, (LowPass, Notch), "pt.LowPass or pt.Notch")
-        if isinstance(self.feedback, Pid):
-            _check_unit("kp", self.feedback.kp, high - low, "Pid", self.drive_unit)
-        if isinstance(self.feedback, (DisturbanceObserver, HysteresisObserver)):
-            _check_unit("kp", self.feedback.pid.kp, high - low, "Pid", self.drive_unit)
-        if isinstance(self.repetitive, Repetitive):
+        for i, part in enumerate(self.filters):
+            expect(f"filters[{i}]", part, Filter, "pt.LowPass or pt.Notch")
+        inside = None if self.feedback is None else self.feedback._pid
+        if inside is not None:
+            _check_unit("kp", inside.kp, high - low, "Pid", self.drive_unit)
+        if self.repetitive is not None:
             _check_unit("kq", self.repetitive.kq, high - low, "Repetitive", self.drive_unit)
         span = self._span(low, high)
         core = _core.Controller(
@@ -156,9 +143,9 @@ class Controller:
         dt: float | None = None,
         limits: tuple[float, float] | None = None,
         playback: Literal["table", "online"] = "table",
-        feedback: Feedback | None = None,
+        feedback: FeedbackLaw | None = None,
         repetitive: Repetitive | None = None,
-        filters: Sequence[LowPass | Notch] = (),
+        filters: Sequence[Filter] = (),
         span: tuple[float, float] | None = None,
         max_jump: float | None = None,
     ) -> Controller:

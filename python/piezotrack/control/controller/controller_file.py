@@ -14,17 +14,15 @@ from ..._support.messages import quoted
 from ...errors import DataError, ParameterError
 from ...identification.fitted.model_file import (
     entries_of,
-    parameter_entries,
     read_content,
-    stage_of,
 )
 from ...identification.fitted.start import state_entry, state_of
 from ...stages.inverse import Inverse
-from ...stages.registry import model_named, stage_class
-from ..laws.file_entries import Setting, only, part_entry, part_of
-from ..laws.hysteresis_observer import HysteresisObserver
+from ...stages.registry import stage_class
 from ..laws.neural_network import NETWORK, NetworkInverse
 from ..loop.stability import LoopCheck, LoopReport
+from ..parts.file_entries import only, part_entry, part_of, stage_entry, stage_of
+from ..parts.part_info import names_of
 from ..tuning.tuned import Tuned, TuningReport
 from .controller import DRIVE_UNITS, Controller
 
@@ -32,17 +30,10 @@ if TYPE_CHECKING:
     import os
     from pathlib import Path
 
-    from ...stages.base import Stage
-
 __all__ = ["load_controller", "save_controller"]
 
 FORMAT = "piezotrack-controller"
 SCHEMA_VERSION = 1
-LAWS = (
-    *("pid", "state-space", "lead-lag", "sliding-mode"),
-    *("disturbance-observer", "perturbation-estimator", "scheduled-pid"),
-)
-OBSERVER = "hysteresis-observer"
 
 
 def save_controller(
@@ -60,13 +51,7 @@ def document_of(
     """Content of the file of a controller: numbers, texts, lists and dicts only."""
     drive = controller.drive_unit
     forward = _inverse_entry(controller.feedforward, drive)
-    law: Any = controller.feedback
-    feedback: dict[str, Any] | None = None
-    if isinstance(law, HysteresisObserver):
-        feedback = _observer_entry(law, drive)
-    elif law is not None:
-        feedback = part_entry(law, drive)
-    learner = controller.repetitive
+    law, learner = controller.feedback, controller.repetitive
     return {
         "format": FORMAT,
         "schema_version": SCHEMA_VERSION,
@@ -76,7 +61,7 @@ def document_of(
         "span_m": None if controller.span is None else [float(one) for one in controller.span],
         "max_jump_m": None if controller.max_jump is None else _jump(controller.max_jump),
         "feedforward": forward,
-        "feedback": feedback,
+        "feedback": None if law is None else part_entry(law, drive),
         "repetitive": None if learner is None else part_entry(learner, drive),
         "filters": [part_entry(one, drive) for one in controller.filters],
         "provenance": {
@@ -155,10 +140,10 @@ def _controller_of(document: dict[str, Any]) -> Controller:
         max_jump=math.inf if jump == "inf" else jump,
         drive_unit=drive,
         feedforward=_inverse_of(document["feedforward"], drive),
-        feedback=_feedback_of(document["feedback"], drive),
-        repetitive=part_of("repetitive", document["repetitive"], ("repetitive",), drive),
+        feedback=part_of("feedback", document["feedback"], names_of("law"), drive),
+        repetitive=part_of("repetitive", document["repetitive"], names_of("repetitive"), drive),
         filters=tuple(
-            part_of(f"filters[{i}]", one, ("low-pass", "notch"), drive)
+            part_of(f"filters[{i}]", one, names_of("filter"), drive)
             for i, one in enumerate(filters)
         ),
     )
@@ -170,23 +155,7 @@ def _pair(name: str, value: Any) -> tuple[float, float]:
     return _core.as_number(name, value[0]), _core.as_number(name, value[1])
 
 
-# Stages, and what is made of them.
-
-
-def _stage_entry(stage: Stage, drive: str) -> dict[str, Any]:
-    return {"model": stage.info.name, "parameters": parameter_entries(stage, drive)}
-
-
-def _stage_of(place: str, entry: Any, drive: str) -> Stage:
-    found = object_of(place, entry)
-    only(place, found, ("model", "parameters"))
-    info = model_named(found["model"])
-    parameters = object_of(f"{place}: parameters", found["parameters"])
-    known = [one.name for one in info.parameters]
-    only(f"{place}: parameters", parameters, known)
-    for name, one in parameters.items():
-        only(f"{place}: {name}", object_of(name, one), ("value", "unit", "symbol"))
-    return stage_of(info, parameters, drive)
+# The feedforward.
 
 
 def _digest(entry: dict[str, Any]) -> str:
@@ -200,7 +169,7 @@ def _inverse_entry(inverse: Inverse | None, drive: str) -> dict[str, Any] | None
         return None
     entry: dict[str, Any] = {
         "kind": "inverse",
-        "stage": _stage_entry(inverse.stage, drive),
+        "stage": stage_entry(inverse.stage, drive),
         "offset_m": float(inverse.offset),
         "delay_s": float(inverse.delay),
         "playback": inverse.playback,
@@ -233,7 +202,7 @@ def _inverse_of(entry: Any, drive: str) -> Inverse | None:
         raise ParameterError(f"feedforward: kind is {kind}: expected 'inverse' or 'network'")
     errors = [f"trained_{drive}", f"held_out_{drive}"]
     only("feedforward", found, [*keys, "numbers", *errors] if network else keys)
-    stage = _stage_of("feedforward: stage", found["stage"], drive)
+    stage = stage_of("feedforward: stage", found["stage"], drive)
     initial = found["initial"]
     given: dict[str, Any] = {
         "stage": stage,
@@ -255,34 +224,6 @@ def _inverse_of(entry: Any, drive: str) -> Inverse | None:
     values = [numbers[key] for key in NETWORK]
     values[1] = tuple(values[1])
     return NetworkInverse(**given, numbers=tuple(values), trained=trained, held_out=held_out)
-
-
-def _observer_entry(law: HysteresisObserver, drive: str) -> dict[str, Any]:
-    return {
-        "kind": OBSERVER,
-        "stage": _stage_entry(law.stage, drive),
-        "pid": part_entry(law.pid, drive),
-        "correction": float(law.correction),
-        "stroke_m": float(law.stroke),
-    }
-
-
-def _feedback_of(entry: Any, drive: str) -> Any:
-    if not isinstance(entry, dict) or entry.get("kind") != OBSERVER:
-        if isinstance(entry, dict) and entry.get("kind") not in LAWS:
-            expected = ", ".join(map(repr, (*LAWS, OBSERVER)))
-            raise ParameterError(
-                f"feedback: kind is {quoted(entry.get('kind'))}: expected one of {expected}"
-            )
-        return part_of("feedback", entry, LAWS, drive)
-    only("feedback", entry, ("kind", "stage", "pid", "correction", Setting("stroke", "m").key("V")))
-    stage: Any = _stage_of("feedback: stage", entry["stage"], drive)
-    return HysteresisObserver(
-        stage=stage,
-        pid=part_of("feedback: pid", entry["pid"], ("pid",), drive),
-        correction=_core.as_number("feedback: correction", entry["correction"]),
-        stroke=_core.as_number("feedback: stroke_m", entry["stroke_m"]),
-    )
 
 
 # Where a controller comes from.

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from ..._support.plot_style import literal
 from ..._support.units import best_length_unit, shown_unit
-from ..laws.components import Pid, StateSpace
 
 if TYPE_CHECKING:
     from ...references.reference import Reference
@@ -21,13 +20,9 @@ def parts_text(controller: Controller) -> str:
     if controller.feedforward is not None:
         parts.append(f"feedforward ({controller.feedforward.stage.info.title})")
     if controller.feedback is not None:
-        law = controller.feedback
-        if isinstance(law, Pid):
-            parts.append("PID")
-        else:
-            parts.append("state-space feedback" if isinstance(law, StateSpace) else law.title)
+        parts.append(controller.feedback.info.title)
     if controller.repetitive is not None:
-        parts.append("repetitive control")
+        parts.append(controller.repetitive.info.title)
     return " + ".join(parts) or "no control"
 
 

@@ -1,1 +1,1 @@
-"""Feedback laws, repetitive control, filters, and their form in a file."""
+"""Feedback laws, and a neural network as feedforward."""

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 from ..._support.arguments import finite, positive
 from ...errors import ParameterError
 from ...stages.bouc_wen import BoucWenStage
 from ...stages.dahl import DahlStage
-from .components import Pid
+from ..parts.part import FeedbackLaw, part
+from .pid import Pid
 
 __all__ = ["HysteresisObserver"]
 
 
+@part("hysteresis-observer")
 @dataclass(frozen=True, kw_only=True)
-class HysteresisObserver:
+class HysteresisObserver(FeedbackLaw):
     r"""Luenberger observer of the hysteresis around a PID.
 
     .. math::
@@ -69,7 +69,6 @@ class HysteresisObserver:
     pid: Pid
     correction: float = 0.1
     stroke: float = 100e-6
-    title: ClassVar[str] = "PID with hysteresis observer"
 
     def __post_init__(self) -> None:
         if not isinstance(self.stage, (DahlStage, BoucWenStage)):
@@ -87,19 +86,18 @@ class HysteresisObserver:
         positive("stroke", self.stroke, "m")
 
     @property
-    def _settings(self) -> tuple[str, list[float]]:
-        """The name and the numbers as the core takes them; NaN for the default of tt."""
-        pid, stage = self.pid, self.stage
-        tt = math.nan if pid.tt is None else pid.tt
+    def _numbers(self) -> list[float]:
+        """PID, linear part, correction, stroke and operator, whose numbers are of the stage."""
+        stage = self.stage
         time = stage.damping / stage.stiffness
         gain = stage.piezo_coefficient
         if isinstance(stage, DahlStage):
-            name, static = "Dahl observer", gain / stage.stiffness
+            static = gain / stage.stiffness
             operator = [stage.a1, stage.a2, stage.b1 * stage.up / gain]
         else:
-            name, static = "Bouc-Wen observer", gain
+            static = gain
             # The output in volts, h/d, has its own unit in beta and gamma.
             scale = abs(gain) ** (stage.exponent - 1.0)
             operator = [stage.alpha, stage.beta * scale, stage.gamma * scale, stage.exponent]
-        numbers = pid.kp, pid.ti, pid.td, tt, static, time, self.correction, self.stroke, *operator
-        return name, [float(number) for number in numbers]
+        numbers = static, time, self.correction, self.stroke, *operator
+        return [*self.pid._numbers, *(float(number) for number in numbers)]

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar
 
 from ..._support.arguments import positive
 from ...errors import ParameterError
-from .components import Pid
+from ..parts.part import FeedbackLaw, part
+from .pid import Pid
 
 __all__ = ["MOST_GRADES", "ScheduledPid"]
 
@@ -17,8 +17,9 @@ __all__ = ["MOST_GRADES", "ScheduledPid"]
 MOST_GRADES = 4
 
 
+@part("scheduled-pid")
 @dataclass(frozen=True, kw_only=True)
-class ScheduledPid:
+class ScheduledPid(FeedbackLaw):
     """PID whose gains follow amplitude and rate of the reference, without a bump.
 
     Xu and Li 2010, conclusion, doi 10.1115/1.4001712, name it as future work. At each turning point
@@ -58,7 +59,6 @@ class ScheduledPid:
     rates: Sequence[float]
     gains: Sequence[Pid]
     first: tuple[float, float] | None = None
-    title: ClassVar[str] = "scheduled PID"
 
     def __post_init__(self) -> None:
         amplitudes = _axis("amplitudes", self.amplitudes, "m")
@@ -80,17 +80,8 @@ class ScheduledPid:
             object.__setattr__(self, name, value)
 
     @property
-    def _settings(self) -> tuple[str, list[float]]:
-        """The name and the numbers as the core takes them."""
-        assert self.first is not None
-        nan = float("nan")
-        gains = [
-            number
-            for one in self.gains
-            for number in (one.kp, one.ti, one.td, nan if one.tt is None else one.tt)
-        ]
-        counts = [float(len(self.amplitudes)), float(len(self.rates))]
-        return "scheduled pid", [*counts, *self.amplitudes, *self.rates, *self.first, *gains]
+    def _lengths(self) -> tuple[int, ...]:
+        return len(self.amplitudes), len(self.rates)
 
 
 def _axis(name: str, values: object, unit: str) -> tuple[float, ...]:

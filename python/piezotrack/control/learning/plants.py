@@ -11,7 +11,7 @@ from ... import _core
 from ..._support.arguments import not_negative, one_or_more_numbers, positive
 from ...errors import NumericalError, ParameterError
 from ..controller.controller import Controller
-from ..laws.components import StateSpace
+from ..laws.state_space import StateSpace
 from ..plant import linearised_plants, plant_of
 
 if TYPE_CHECKING:

@@ -13,7 +13,6 @@ import numpy as np
 from ..._support.units import shown_unit
 from ...errors import ParameterError
 from ...identification.fitted.identified_model import IdentifiedModel
-from ..laws.components import Pid
 from ..plant import reach, settled_bottom
 from .stability import check_loop
 
@@ -88,9 +87,9 @@ def check_stable(stage: VirtualStage, controller: Controller, delay: float) -> N
     without = one.gain_margin is not None and one.gain_margin < 1.0
     if without and one.stable_gains is not None and one.stable_gains[1] < 1.0:
         low, share = one.stable_gains
-        if isinstance(law, Pid):
+        if law is not None and law.info.name == "pid":
             unit, scale = shown_unit(controller.drive_unit)
-            kp = 1e-6 * scale * law.kp
+            kp = 1e-6 * scale * law._pid.kp
             gains = f"{share * kp:.3g} {unit}/um in place of {kp:.3g}"
             found += f"; at the limit kp would be {gains}"
             found += ", and half of that has a gain margin of 2" if low < 0.5 * share else ""

@@ -10,12 +10,13 @@ import numpy as np
 
 from ..._support.messages import quoted
 from ...errors import ParameterError
-from ..laws.components import LowPass, Notch, Repetitive, ZeroPhase
-from .structures import SLIDING, Nominal, law_of, law_ranges, nominal_of
+from ..parts.filters import LowPass, Notch
+from ..parts.repetitive import Repetitive, ZeroPhase
+from .structures import SOUGHT, Nominal, law_of, law_ranges, nominal_of
 
 if TYPE_CHECKING:
     from ... import _core
-    from .structures import SoughtLaw
+    from ..parts.part import FeedbackLaw
 
 __all__ = ["PARTS", "Box", "Parts", "box_of", "parts_named", "resonance"]
 
@@ -29,7 +30,7 @@ NYQUIST = 0.475
 class Parts(NamedTuple):
     """The parts of a controller with their settings."""
 
-    feedback: SoughtLaw
+    feedback: FeedbackLaw
     filters: tuple[LowPass | Notch, ...]
     repetitive: Repetitive | None
 
@@ -127,7 +128,7 @@ def box_of(
             "finite ones, all of one sign"
         )
     sign = math.copysign(1.0, gains[0])
-    if sign < 0.0 and law in SLIDING:
+    if sign < 0.0 and "switching" in SOUGHT[law]:
         raise ParameterError(
             f"law is {law!r}, but the stage falls as the voltage rises: expected one that rises"
         )

@@ -14,7 +14,7 @@ from ..._support.arrays import check_dt
 from ...errors import NumericalError, ParameterError
 from ...identification.fitted.identified_model import IdentifiedModel
 from ..controller.controller import Controller
-from ..laws.components import StateSpace
+from ..laws.state_space import StateSpace
 from ..plant import linearised_plants, plant_of
 from .linear_systems import sampled
 

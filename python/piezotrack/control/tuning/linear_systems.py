@@ -6,16 +6,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ... import _core
 from ..._support.arguments import not_negative, number_pair, one_of
 from ..._support.arrays import check_dt
 from ...errors import ParameterError
 from ...identification.fitted.identified_model import IdentifiedModel
 from ...stages.base import Stage
 from ...stages.virtual import VirtualStage
-from ..controller.controller import Controller, Feedback
-from ..laws.components import Pid, StateSpace
-from ..laws.laws import NAMED_LAWS
+from ..controller.controller import Controller
+from ..parts.part import FeedbackLaw
 from ..plant import linearised_plants, plant_of
 
 if TYPE_CHECKING:
@@ -27,7 +25,7 @@ CASES = ("low", "middle", "high")
 
 
 def to_control(
-    part: Plant | IdentifiedModel | Controller | Feedback,
+    part: Plant | IdentifiedModel | Controller | FeedbackLaw,
     *,
     limits: tuple[float, float] | None = None,
     gain: Literal["low", "middle", "high"] = "middle",
@@ -75,7 +73,7 @@ def to_control(
     >>> print(f"{plant.name}: {1e6 * plant.dcgain().real:.2f} um/V, {plant.nstates} states")
     Prandtl-Ishlinskii linearised, middle gain, 0 to 75 V: 1.56 um/V, 3 states
     """
-    if isinstance(part, (Controller, Pid, StateSpace, *NAMED_LAWS)):
+    if isinstance(part, (Controller, FeedbackLaw)):
         if limits is not None or delay != 0.0 or gain != "middle":
             raise ParameterError(
                 "limits, gain and delay have no effect on a feedback law: expected none"
@@ -181,7 +179,7 @@ def _held(
     return whole[:n, :n], whole[:n, n]
 
 
-def _feedback_law(part: Controller | Feedback, dt: float | None) -> Any:
+def _feedback_law(part: Controller | FeedbackLaw, dt: float | None) -> Any:
     law: Any = part
     if isinstance(part, Controller):
         if dt is not None:
@@ -194,23 +192,6 @@ def _feedback_law(part: Controller | Feedback, dt: float | None) -> Any:
     dt = check_dt(dt)
     control = _control()
     labels = {"inputs": ["error_m"], "outputs": ["voltage_V"]}
-    if isinstance(law, StateSpace):
-        rows, b, c, d, _ = law._matrices
-        a = np.reshape(rows, (len(b), len(b)))
-        system = (a, np.reshape(b, (-1, 1)), np.reshape(c, (1, -1)), [[d]])
-        return control.ss(*system, dt, name="feedback law in state space", **labels)
-    if isinstance(law, NAMED_LAWS):
-        above, below = (
-            _in_powers_of_z(one) for one in _core.law_transfer_function(law._settings, dt)
-        )
-        return control.ss(control.tf(above, below, dt), name=law.title, **labels)
-    ki = 0.0 if np.isinf(law.ti) else dt / law.ti
-    kd = law.td / dt
-    above = law.kp * np.array([1.0 + ki + kd, -(1.0 + 2.0 * kd), kd])
-    return control.ss(control.tf(above, [1.0, -1.0, 0.0], dt), name="incremental PID", **labels)
-
-
-def _in_powers_of_z(coefficients: list[float]) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Take powers of z - 1, constant term first, to powers of z, highest first."""
-    powers = np.polynomial.Polynomial(coefficients)(np.polynomial.Polynomial([-1.0, 1.0]))
-    return np.asarray(powers.coef[::-1], dtype=np.float64)
+    system = law._linear(dt)
+    made = control.ss if len(system) == 4 else control.tf
+    return control.ss(made(*system, dt), name=law.info.title, **labels)

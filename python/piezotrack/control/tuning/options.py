@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ...stages.inverse import Inverse
-    from ..laws.components import LowPass, Notch
+    from ..parts.filters import LowPass, Notch
     from .margins import Margins, Spread
     from .structures import LawName
 

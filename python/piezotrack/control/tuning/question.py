@@ -17,12 +17,12 @@ from ...references.xy_reference import XYReference
 from ...stages.base import Stage
 from ...stages.inverse import Inverse
 from ...stages.xy import XYStage
-from ..laws.components import LowPass, Notch
 from ..loop.preconditions import check_delay
+from ..parts.filters import Filter, LowPass, Notch
 from ..plant import Plant, plant_of, voltages_before
 from .box import parts_named
 from .margins import Margins, Spread
-from .structures import LAWS
+from .structures import SOUGHT
 
 __all__ = ["FIGURES", "Axis", "Question", "asked"]
 
@@ -121,7 +121,7 @@ def asked(
     both = stage if isinstance(stage, XYStage) else None
     stages = [stage.x] if both else _stages(stage)
     references = _references(reference, XYReference if both else Reference)
-    one_of("law", law, LAWS)
+    one_of("law", law, SOUGHT)
     _check_has_integral_part(law, references)
     _check_kind("margins", margins, Margins)
     _check_kind("spread", spread, Spread)
@@ -237,7 +237,7 @@ def _references(reference: Any, kind: type) -> list[Any]:
 
 
 def _check_has_integral_part(law: str, references: list[Reference]) -> None:
-    if not references and law in ("pd", "lead-lag"):
+    if not references and "ki" not in SOUGHT[law]:
         raise ParameterError(
             f"law is {law!r} without a reference: expected one with an integral part, whose gain "
             "is made large then"
@@ -275,7 +275,7 @@ def _slew(slew: float) -> float:
 
 def _filters(filters: Any) -> tuple[LowPass | Notch, ...]:
     listed = tuple(filters) if isinstance(filters, Sequence) else None
-    if listed is None or not all(isinstance(one, (LowPass, Notch)) for one in listed):
+    if listed is None or not all(isinstance(one, Filter) for one in listed):
         raise ParameterError(f"filters is {filters!r}: expected a list of pt.LowPass and pt.Notch")
     return listed
 

@@ -17,7 +17,7 @@ from ...references.reference import Reference
 from ...references.waveforms import sine
 from ...references.xy_reference import XYReference
 from ...stages.xy import XYStage
-from ..laws.components import Pid
+from ..laws.pid import Pid
 from ..laws.scheduled_pid import ScheduledPid
 from ..loop.contouring import contour
 from ..loop.tracking import track
@@ -98,8 +98,7 @@ class Schedule(NamedTuple):
 
 
 def _text(controller: Controller, table: Array) -> str:
-    law = controller.feedback
-    assert isinstance(law, ScheduledPid)
+    law: Any = controller.feedback
     unit, scale = shown_unit(controller.drive_unit)
     lines = [f"amplitude um  rate Hz  kp {unit}/um    ti ms    td ms   rms um: fixed, scheduled"]
     pairs = [(amplitude, rate) for amplitude in law.amplitudes for rate in law.rates]
@@ -257,9 +256,8 @@ def _chosen(
 
 
 def _scheduled(grid: ScheduledPid, loop: Controller, tuned: Sequence[Any], axis: int) -> Controller:
-    gains = [_loops(one)[axis].feedback for one in tuned]
-    law = replace(grid, gains=[one for one in gains if isinstance(one, Pid)])
-    return replace(loop, feedback=law)
+    gains: list[Any] = [_loops(one)[axis].feedback for one in tuned]
+    return replace(loop, feedback=replace(grid, gains=gains))
 
 
 def _error(
@@ -270,11 +268,10 @@ def _error(
     options: dict[str, Any],
 ) -> float:
     """Rms error [m] along a reference, beginning with the gains of its place."""
-    laws = [one.feedback for one in controllers]
+    laws: list[Any] = [one.feedback for one in controllers]
     loops = [
         replace(one, feedback=replace(law, first=place))
         for one, law in zip(controllers, laws, strict=True)
-        if isinstance(law, ScheduledPid)
     ]
     how: dict[str, Any] = {"beyond_reach": True, "unstable": True}
     how |= {name: options[name] for name in ("delay", "jitter") if name in options}
@@ -313,8 +310,7 @@ def _sines(centre: float) -> Waveform:
 
 def _check_between(controller: Controller, plants: list[_core.LoopPlant], margins: Margins) -> None:
     """Refuse gains that lose their margins half-way between two places of the grid."""
-    law = controller.feedback
-    assert isinstance(law, ScheduledPid)
+    law: Any = controller.feedback
     columns = len(law.rates)
     weights = np.array([_weights(one) for one in law.gains]).reshape(-1, columns, 3)
     middles = [

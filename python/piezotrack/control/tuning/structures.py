@@ -3,49 +3,37 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from ..laws.components import Pid
-from ..laws.laws import DisturbanceObserver, LeadLag, PerturbationEstimator, SlidingMode
+from ..parts.part import part_class
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from ... import _core
+    from ..parts.part import FeedbackLaw
 
-__all__ = [
-    "LAWS",
-    "SLIDING",
-    "LawName",
-    "Nominal",
-    "SoughtLaw",
-    "law_of",
-    "law_ranges",
-    "nominal_of",
-]
+__all__ = ["SOUGHT", "LawName", "Nominal", "law_of", "law_ranges", "nominal_of"]
 
 LawName = Literal[
     "pid",
     "pd",
     "lead-lag",
-    "sliding mode",
-    "disturbance observer",
-    "perturbation estimation",
+    "sliding-mode",
+    "disturbance-observer",
+    "perturbation-estimator",
 ]
-LAWS = (
-    "pid",
-    "pd",
-    "lead-lag",
-    "sliding mode",
-    "disturbance observer",
-    "perturbation estimation",
-)
-SoughtLaw: TypeAlias = Pid | LeadLag | SlidingMode | DisturbanceObserver | PerturbationEstimator
-# Laws that need a stage that rises with the voltage.
-SLIDING = ("sliding mode", "perturbation estimation")
-OBSERVED = ("disturbance observer", "perturbation estimation")
+# The settings of each law that are sought; a PD law is a PID without integral gain.
+SOUGHT = {
+    "pid": ("kp", "ki", "kd"),
+    "pd": ("kp", "kd"),
+    "lead-lag": ("static", "lead_time", "lag_time"),
+    "sliding-mode": ("kp", "ki", "kd", "switching"),
+    "disturbance-observer": ("kp", "ki", "kd", "observer"),
+    "perturbation-estimator": ("kp", "ki", "kd", "switching", "observer"),
+}
 
 
 class Nominal(NamedTuple):
@@ -74,52 +62,49 @@ def law_ranges(
     span = limits[1] - limits[0]
     # A controller refuses gains with which 1 mm asks for less than a thousandth of the range.
     least = max(1e-4 / largest, 1.001 * span)
-    kp = ("kp", least, 10.0 / largest, True)
-    ki = ("ki", 1e-4 / largest, 3.0 / largest, True)
-    kd = ("kd", 1e-4 / largest, 100.0 / largest, True)
-    switching = ("switching", 1e-3 * span, 0.3 * span, True)
-    observer = ("observer", 1e-3 / dt, 0.45 / dt, True)
-    match law:
-        case "pd":
-            return [kp, kd]
-        case "lead-lag":
-            # Its static gain is the only thing that stands for an integral part.
-            static = ("kp", least, 1e4 / largest, True)
-            times = [(f"{one}_time", 0.1 * dt, 1e6 * dt, True) for one in ("lead", "lag")]
-            return [static, *times]
-        case "sliding mode":
-            return [kp, ki, kd, switching]
-        case "disturbance observer":
-            return [kp, ki, kd, observer]
-        case "perturbation estimation":
-            return [kp, ki, kd, switching, observer]
-    return [kp, ki, kd]
+    ranges = {
+        "kp": ("kp", least, 10.0 / largest, True),
+        "ki": ("ki", 1e-4 / largest, 3.0 / largest, True),
+        "kd": ("kd", 1e-4 / largest, 100.0 / largest, True),
+        # The static gain of a lead-lag law is all that stands for an integral part.
+        "static": ("kp", least, 1e4 / largest, True),
+        "lead_time": ("lead_time", 0.1 * dt, 1e6 * dt, True),
+        "lag_time": ("lag_time", 0.1 * dt, 1e6 * dt, True),
+        "switching": ("switching", 1e-3 * span, 0.3 * span, True),
+        "observer": ("observer", 1e-3 / dt, 0.45 / dt, True),
+    }
+    return [ranges[name] for name in SOUGHT[law]]
 
 
 def law_of(
     law: str, settings: Mapping[str, float], dt: float, sign: float, nominal: Nominal
-) -> SoughtLaw:
-    """Make the law that the core has looked at."""
+) -> FeedbackLaw:
+    """Make the law that the core has evaluated."""
     kp = settings["kp"]
     ti = kp * dt / settings["ki"] if "ki" in settings else math.inf
     td = settings.get("kd", 0.0) * dt / kp
-    if law == "lead-lag":
-        return LeadLag(kp=sign * kp, lead=settings["lead_time"], lag=settings["lag_time"])
-    if law in SLIDING:
-        switching = settings["switching"]
-        sliding = SlidingMode(switching=switching, layer=switching / kp, ti=ti, td=td, tf=dt)
-        if law == "sliding mode":
-            return sliding
-        return PerturbationEstimator(
-            sliding=sliding,
-            plant_gain=nominal.gain,
-            plant_time=nominal.time,
-            cutoff=settings["observer"],
-        )
-    tt = max(math.sqrt(ti * td), dt) if math.isfinite(ti) else None
-    pid = Pid(kp=sign * kp, ti=ti, td=td, tt=tt)
-    if law == "disturbance observer":
-        return DisturbanceObserver(
-            pid=pid, plant_gain=nominal.gain, plant_time=nominal.time, cutoff=settings["observer"]
-        )
-    return pid
+    values = {
+        "kp": sign * kp,
+        "ti": ti,
+        "td": td,
+        "tt": max(math.sqrt(ti * td), dt) if math.isfinite(ti) else None,
+        "tf": dt,
+        "plant_gain": nominal.gain,
+        "plant_time": nominal.time,
+    }
+    if "lead_time" in settings:
+        values |= {"lead": settings["lead_time"], "lag": settings["lag_time"]}
+    if "switching" in settings:
+        values |= {"switching": settings["switching"], "layer": settings["switching"] / kp}
+    if "observer" in settings:
+        values["cutoff"] = settings["observer"]
+    made: FeedbackLaw = _made("pid" if law == "pd" else law, values)
+    return made
+
+
+def _made(name: str, values: Mapping[str, Any]) -> Any:
+    """Make a part, and those in it, of all values that are numbers of it."""
+    made = part_class(name)
+    inside = {one.name: one.choices[0] for one in made.info.numbers if one.form == "part"}
+    given = {one.name: values[one.name] for one in made.info.numbers if one.name in values}
+    return made(**given, **{place: _made(part, values) for place, part in inside.items()})

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ...references.xy_reference import XYReference
     from ...stages.inverse import Inverse
     from ...stages.xy import XYStage
-    from ..laws.components import LowPass, Notch
+    from ..parts.filters import LowPass, Notch
     from ..plant import Plant
     from .margins import Margins, Spread
     from .options import TuneOptions
@@ -108,8 +108,8 @@ def tune(
         stage the same for both axes, or those of x and those of y.
     law : str, optional
         The feedback law: ``"pid"``; ``"pd"``, which needs a feedforward; ``"lead-lag"``;
-        ``"sliding mode"``, ``"disturbance observer"`` around a PID, or
-        ``"perturbation estimation"``, an observer around sliding mode. An observer expects the
+        ``"sliding-mode"``, ``"disturbance-observer"`` around a PID, or
+        ``"perturbation-estimator"``, an observer around sliding mode. An observer expects the
         middle plant's static gain and its time constant at low frequencies.
     margins : Margins, optional
         What every loop keeps.

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..._support.units import shown_unit
-from ..laws.components import Pid
 from ..loop.contouring import Contour
 
 if TYPE_CHECKING:
     from ..controller.controller import Controller
-    from ..laws.components import LowPass, Notch, Repetitive
     from ..loop.tracking import Tracking
+    from ..parts.filters import Filter
+    from ..parts.repetitive import Repetitive
     from .margins import Margins
 
 __all__ = ["Kept", "Tuned", "TunedPair", "TuningReport", "parts_text"]
@@ -171,10 +171,11 @@ def parts_text(controller: Controller) -> str:
     unit, scale = shown_unit(controller.drive_unit)
     text = []
     law = controller.feedback
-    if isinstance(law, Pid):
+    if law is not None and law.info.name == "pid":
+        pid = law._pid
         text.append(
-            f"PID: kp {1e-6 * scale * law.kp:.4g} {unit}/um, ti {1e3 * law.ti:.4g} ms, "
-            f"td {1e3 * law.td:.4g} ms"
+            f"PID: kp {1e-6 * scale * pid.kp:.4g} {unit}/um, ti {1e3 * pid.ti:.4g} ms, "
+            f"td {1e3 * pid.td:.4g} ms"
         )
     elif law is not None:
         text.append(repr(law))
@@ -184,10 +185,12 @@ def parts_text(controller: Controller) -> str:
     return "\n".join(text) or "no feedback"
 
 
-def _filter_text(one: LowPass | Notch) -> str:
-    if hasattr(one, "cutoff"):
-        return f"low-pass: {one.cutoff:.4g} Hz"
-    return f"notch: {one.frequency:.4g} Hz, width {one.width:.3g}, depth {one.depth:.3g}"
+def _filter_text(one: Filter) -> str:
+    values = one._values
+    if one.info.name == "low-pass":
+        return f"low-pass: {values['cutoff']:.4g} Hz"
+    frequency, width, depth = (values[name] for name in ("frequency", "width", "depth"))
+    return f"notch: {frequency:.4g} Hz, width {width:.3g}, depth {depth:.3g}"
 
 
 def _repetitive_text(part: Repetitive, unit: str, scale: float) -> str:

@@ -2,7 +2,7 @@
 
 use piezotrack_control::{
     Controller, Feedback, Filter, HysteresisObserved, Observed, ObservedOperator, SampledPid,
-    SampledRepetitive, SampledSlidingMode, StateSpace,
+    SampledRepetitive, SampledSlidingMode, ScheduledPid, StateSpace,
 };
 
 use nalgebra::{DMatrix, DVector};
@@ -42,6 +42,17 @@ impl LinearFeedback for SampledPid {
 
     fn named_gain(&self) -> Option<f64> {
         Some(self.weights()[0])
+    }
+}
+
+/// At its first gains.
+impl LinearFeedback for ScheduledPid {
+    fn transfer_function(&self) -> [Vec<f64>; 2] {
+        self.first().transfer_function()
+    }
+
+    fn named_gain(&self) -> Option<f64> {
+        self.first().named_gain()
     }
 }
 

@@ -7,7 +7,6 @@
 mod amplifier;
 mod apparatus;
 mod closed_loop;
-mod named_parts;
 mod open_loop;
 mod sensor;
 mod sensor_delay;
@@ -20,11 +19,10 @@ mod virtual_stage;
 pub use amplifier::{Amplifier, AmplifierFlow};
 pub use apparatus::{Apparatus, ApparatusState};
 pub use closed_loop::{ClosedLoop, closed_loop};
-pub use named_parts::{ControllerParts, Named};
 pub use open_loop::{OpenLoop, open_loop};
 pub use sensor::{Sensor, SensorState};
 pub use timing::{MissedTicks, Timing};
-pub use tracking::{DELAY_LINE, Law, LawState, MOST_STATES, ReferenceSamples, TrackingRun, track};
+pub use tracking::{DELAY_LINE, ReferenceSamples, TrackingRun, track};
 pub use two_axes::{
     TwoAxes, TwoLogs, TwoMotions, TwoStates, TwoTracked, closed_loops, open_loops, track_both,
 };

@@ -10,9 +10,10 @@ use super::figures::Figures;
 use super::loops::{Motion, ReadyTask, Task};
 use crate::error::{Error, Result, not_negative};
 use crate::math::room;
+use crate::parts::Law;
 use crate::signal::contour_error::{Polyline, radial_errors};
 use crate::signal::{Stop, index};
-use crate::simulate::{Delay, Law};
+use crate::simulate::Delay;
 
 /// The shape of a path.
 #[derive(Clone, Debug)]

@@ -6,8 +6,8 @@ use super::contour::{PathTask, ReadyPath};
 use super::figures::Figures;
 use super::loops::{ReadyTask, Task};
 use crate::error::{Error, Result};
+use crate::parts::Law;
 use crate::signal::Stop;
-use crate::simulate::Law;
 
 /// A motion that controllers are judged by.
 #[derive(Clone, Debug)]

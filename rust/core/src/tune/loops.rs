@@ -13,9 +13,10 @@ use super::parts::{Part, coarse_step, parts};
 use crate::error::{Error, Result};
 use crate::math::{Lanes, dispatch_vectors, on_all_threads, room, width, zeros};
 use crate::models::{LanedPlant, LanedVisitor, StageState};
+use crate::parts::{Law, LawState};
 use crate::signal::{Stop, index};
 use crate::simulate::{
-    ApparatusState, DELAY_LINE, Law, LawState, ReferenceSamples, Timing, VirtualStage, closed_loop,
+    ApparatusState, DELAY_LINE, ReferenceSamples, Timing, VirtualStage, closed_loop,
 };
 
 /// Which error counts.

@@ -11,7 +11,7 @@ use piezotrack_control::{Controller, SampledRepetitive};
 use crate::design::{LinearFeedback, LoopPlant, in_series};
 use crate::error::{Error, Result, positive};
 use crate::math::{C, Jet, Ratio};
-use crate::simulate::Law;
+use crate::parts::Law;
 
 /// What every loop of a set keeps.
 #[derive(Clone, Copy, Debug, PartialEq)]

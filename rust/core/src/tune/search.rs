@@ -14,8 +14,8 @@ use super::requirements::{PlantSet, Requirements, Robustness};
 use super::settings::{Setting, Sought, Template};
 use crate::error::{Error, Result};
 use crate::identify::{Swarm, SwarmSettings};
+use crate::parts::Law;
 use crate::signal::{Stop, index};
-use crate::simulate::Law;
 
 /// What is made small.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,7 +5,7 @@ use piezotrack_control::{
 };
 
 use crate::error::{Error, Result};
-use crate::simulate::Law;
+use crate::parts::Law;
 
 /// A setting that is sought.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -56,7 +56,7 @@ pub enum Structure {
     /// Disturbance observer around a PID.
     DisturbanceObserver(Nominal),
     /// Disturbance observer around sliding mode.
-    PerturbationEstimation(Nominal),
+    PerturbationEstimator(Nominal),
 }
 
 /// The plant that an observer expects.
@@ -213,7 +213,7 @@ impl Template {
             Structure::DisturbanceObserver(of) => {
                 Law::ObservedPid(observer(of)?.around(inside()?, dt).ok()?)
             }
-            Structure::PerturbationEstimation(of) => {
+            Structure::PerturbationEstimator(of) => {
                 Law::ObservedSlidingMode(observer(of)?.around(sliding()?, dt).ok()?)
             }
         })

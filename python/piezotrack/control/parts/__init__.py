@@ -1,0 +1,1 @@
+"""Parts of a controller: what they have in common, filters, repetitive control, form in a file."""

@@ -1,0 +1,11 @@
+//! The feedback laws: a file for each, and their list in [`law`].
+
+mod disturbance_observer;
+mod hysteresis_observer;
+pub(super) mod law;
+mod lead_lag;
+mod perturbation_estimator;
+mod pid;
+mod scheduled_pid;
+mod sliding_mode;
+pub(super) mod state_space;

@@ -1,0 +1,61 @@
+//! Repetitive control and the filters that it may have.
+
+use piezotrack_control::{Repetitive, Smoothing};
+
+use super::info::{Form, NumberInfo, PartInfo, Role, truth, whole};
+use crate::error::{Error, Result};
+
+pub(super) const LAG: PartInfo = PartInfo::new(
+    Role::Smoothing,
+    "lag",
+    "lag",
+    &[NumberInfo::new("tq", "Tq", "s").or(0.2), NumberInfo::of("compensated", Form::Truth).or(0.0)],
+);
+
+pub(super) const ZERO_PHASE: PartInfo = PartInfo::new(
+    Role::Smoothing,
+    "zero-phase",
+    "zero-phase low-pass",
+    &[NumberInfo::of("order", Form::Count).or(2.0)],
+);
+
+pub(super) const REPETITIVE: PartInfo = PartInfo::new(
+    Role::Repetitive,
+    "repetitive",
+    "repetitive control",
+    &[
+        NumberInfo::new("period", "L", "s"),
+        NumberInfo::new("kq", "Kq", "V/m").or(1e6),
+        NumberInfo::of("smoothing", Form::Part(&[&LAG, &ZERO_PHASE])).or_none(),
+        NumberInfo::of("lead", Form::Count).in_unit("samples").or(0.0),
+        NumberInfo::new("forgetting_factor", "", "").or(0.99),
+        NumberInfo::of("pause", Form::Truth).or(1.0),
+    ],
+);
+
+/// A repetitive part from the name of its smoothing and six numbers: period (s), kq (V/m), time
+/// constant (s) or order of the smoothing, forgetting factor, lead (samples), 1 for a pause under
+/// saturation.
+pub(super) fn repetitive(smoothing: &str, numbers: &[f64]) -> Result<Repetitive> {
+    let &[period, kq, number, forgetting_factor, lead, pause] = numbers else {
+        let value = format!("'{smoothing}' with {} numbers", numbers.len());
+        return Err(Error::parameter("repetitive", value, "six numbers"));
+    };
+    let whole = |name, number| -> Result<u32> {
+        Ok(u32::try_from(whole(name, number, 0.0)?).unwrap_or(u32::MAX))
+    };
+    let smoothing = match smoothing {
+        "lag" => Smoothing::Lag { tq: number, compensated: false },
+        "compensated-lag" => Smoothing::Lag { tq: number, compensated: true },
+        "zero-phase" => Smoothing::ZeroPhase { order: whole("order", number)? },
+        "none" => Smoothing::None,
+        other => {
+            let expected = "'lag', 'compensated-lag', 'zero-phase' or 'none'";
+            return Err(Error::parameter("smoothing", format!("'{other}'"), expected));
+        }
+    };
+    let (lead, pause) = (whole("lead", lead)?, truth("pause", pause)?);
+    // The bound of the gain holds for errors in um.
+    let learner = Repetitive::new(period, smoothing, kq / 1e6)?;
+    Ok(Repetitive { forgetting_factor, lead, pause, ..learner })
+}
