@@ -21,8 +21,8 @@ from .control.laws.components import Repetitive as Repetitive
 from .control.learning.learn import learn as learn
 from .control.loop.contouring import contour as contour
 from .control.loop.stability import check_loop as check_loop
-from .control.loop.tracking import track as track
 from .control.on_device.playing import play as play
+from .control.running.track import track as track
 from .control.tuning.linear_systems import to_control as to_control
 from .control.tuning.margins import Margins as Margins
 from .control.tuning.margins import Spread as Spread

@@ -157,7 +157,7 @@ def track_command(
     from .._support.files import picture_files
     from ..control.controller.controller import Controller
     from ..control.loop.stability import check_loop
-    from ..control.loop.tracking import track
+    from ..control.running.track import track
     from ..identification.fitted.identified_model import load
 
     if device is not None:
@@ -228,7 +228,7 @@ def _on_device(
     """Close the loop of a controller file on a device; what was tracked before a fault is kept."""
     from .._support.files import picture_files
     from ..control.controller.controller_file import load_controller
-    from ..control.loop.tracking import track
+    from ..control.running.track import track
 
     loop = load_controller(file)
     result.will_write(["tracking.csv", "tracking.json", *picture_files("tracking")])

@@ -20,12 +20,10 @@ from .laws.components import Repetitive as Repetitive
 from .laws.components import StateSpace as StateSpace
 from .laws.components import ZeroPhase as ZeroPhase
 from .laws.hysteresis_observer import HysteresisObserver as HysteresisObserver
-from .laws.laws import Chatter as Chatter
 from .laws.laws import DisturbanceObserver as DisturbanceObserver
 from .laws.laws import LeadLag as LeadLag
 from .laws.laws import PerturbationEstimator as PerturbationEstimator
 from .laws.laws import SlidingMode as SlidingMode
-from .laws.laws import chatter as chatter
 from .laws.neural_network import NetworkInverse as NetworkInverse
 from .laws.neural_network import train_network as train_network
 from .laws.scheduled_pid import ScheduledPid as ScheduledPid
@@ -36,6 +34,8 @@ from .learning.learn import learn as learn
 from .learning.rules import Convergence as Convergence
 from .learning.rules import FrequencyRule as FrequencyRule
 from .learning.rules import LiftedRule as LiftedRule
+from .loop.chatter import Chatter as Chatter
+from .loop.chatter import chatter as chatter
 from .loop.contouring import Contour as Contour
 from .loop.contouring import Workspace as Workspace
 from .loop.contouring import contour as contour
@@ -46,11 +46,11 @@ from .loop.stability import LoopResponse as LoopResponse
 from .loop.stability import check_loop as check_loop
 from .loop.tracking import Metrics as Metrics
 from .loop.tracking import Tracking as Tracking
-from .loop.tracking import track as track
 from .on_device.closed_loop import DeviceTracking as DeviceTracking
 from .on_device.latency import Latency as Latency
 from .on_device.latency import measure_latency as measure_latency
 from .plant import Plant as Plant
+from .running.track import track as track
 from .tuning.h_infinity import MixedSensitivity as MixedSensitivity
 from .tuning.h_infinity import mixed_sensitivity as mixed_sensitivity
 from .tuning.linear_systems import to_control as to_control

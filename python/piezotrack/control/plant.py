@@ -1,9 +1,8 @@
-"""Plants that a controller can drive: closed-loop simulation and linearisation of each stage."""
+"""Plants that a controller can drive: reach, rest and linearisation of each stage."""
 
 from __future__ import annotations
 
 import copyreg
-from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -21,8 +20,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .controller.controller import Controller
-
     Array = NDArray[np.float64]
 
 __all__ = [
@@ -31,7 +28,6 @@ __all__ = [
     "plant_of",
     "reach",
     "resting",
-    "run_closed_loop",
     "settled_bottom",
     "voltages_before",
 ]
@@ -59,30 +55,6 @@ def plant_of(stage: Plant | IdentifiedModel) -> VirtualStage:
             "a pt.DahlStage, or an identified one"
         )
     return VirtualStage.of(stage)
-
-
-def run_closed_loop(
-    stage: VirtualStage,
-    controller: Controller,
-    reference: Array,
-    feedforward: Array,
-    sampling: tuple[float, float, int],
-    visited: tuple[float, ...] = (),
-) -> _core.TrackingRun:
-    """Simulate a closed loop, with reference [m] and feedforward [V] at the samples.
-
-    The stage is where its experiments start, or in equilibrium after slow visits to the voltages
-    `visited` [V]. `sampling` is delay and jitter [s], and the substeps kept in each sampling
-    interval.
-    """
-    stage = stepped(stage, controller)
-    return stage._core.track(controller._core, reference, feedforward, sampling, visited)
-
-
-def stepped(stage: VirtualStage, controller: Controller) -> VirtualStage:
-    """Return the stage with four steps at least in each sampling interval of a controller."""
-    step = min(stage.step, controller.dt / 4)
-    return stage if step == stage.step else replace(stage, step=step)
 
 
 def reach(

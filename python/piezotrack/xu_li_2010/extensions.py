@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ..control.laws.components import Lag, LowPass, Notch, Pid, Repetitive, ZeroPhase
-from ..control.loop.tracking import Tracking, track
+from ..control.running.track import track
 from ..data.dataset import Dataset
 from ..errors import NumericalError, ParameterError
 from ..identification.fit import identify
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from ..control.controller.controller import Controller
+    from ..control.loop.tracking import Tracking
     from ..references.reference import Reference
     from ..stages.inverse import Inverse
     from .apparatus import Apparatus

@@ -6,7 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 from ..control.laws.components import Pid, Repetitive
-from ..control.loop.tracking import Tracking, track
+from ..control.loop.tracking import Tracking
+from ..control.running.track import track
 from .apparatus import loop
 from .references import SHRUNK, fast, shrunk, slow
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..loop.closed_loop import run_closed_loop
 from ..loop.tracking import collected
 from ..on_device.playing import played_on
-from ..plant import run_closed_loop
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
