@@ -42,7 +42,7 @@ def play_command(
 ) -> None:
     """Play a feedforward as a table on a device."""
     from .._support.files import picture_files
-    from ..control.controller.controller_file import load_controller
+    from ..control.controller.load import load_controller
     from ..control.on_device.playing import play
     from ..identification.fitted.identified_model import load
 

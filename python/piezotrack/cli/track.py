@@ -227,7 +227,7 @@ def _on_device(
 ) -> None:
     """Close the loop of a controller file on a device; what was tracked before a fault is kept."""
     from .._support.files import picture_files
-    from ..control.controller.controller_file import load_controller
+    from ..control.controller.load import load_controller
     from ..control.running.track import track
 
     loop = load_controller(file)

@@ -8,7 +8,7 @@ from .comparing.comparison import Cell as Cell
 from .comparing.comparison import ControllerComparison as ControllerComparison
 from .comparing.comparison import Row as Row
 from .controller.controller import Controller as Controller
-from .controller.controller_file import load_controller as load_controller
+from .controller.load import load_controller as load_controller
 from .controller.session import Command as Command
 from .controller.session import RefusedReadings as RefusedReadings
 from .controller.session import Session as Session

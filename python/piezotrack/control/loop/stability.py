@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -109,6 +109,25 @@ class LoopCheck:
             text += f", learns in {self.periods:.2g} periods"
         return text
 
+    def margins(self) -> dict[str, Any]:
+        """Margins as plain numbers, with their units in the names.
+
+        Returns
+        -------
+        dict
+            Of numbers, truths and None only.
+        """
+        return {
+            f"plant_gain_m_per_{self.drive_unit}": self.gain,
+            "stable": self.stable,
+            "gain_margin": self.gain_margin,
+            "phase_margin_rad": self.phase_margin,
+            "delay_margin_s": self.delay_margin,
+            "crossover_Hz": self.crossover,
+            "sensitivity": self.sensitivity,
+            "learning_periods": self.periods,
+        }
+
     def _gains(self) -> str:
         """Describe where the whole loop is stable."""
         if self.stable_gains is None:
@@ -185,6 +204,16 @@ class LoopReport:
     @property
     def _cases(self) -> tuple[tuple[str, LoopCheck], ...]:
         return ("low", self.low), ("middle", self.middle), ("high", self.high)
+
+    def design(self) -> dict[str, Any]:
+        """Margins for the file of the controller, at all three gains.
+
+        Returns
+        -------
+        dict
+            Of numbers, texts, lists and dicts only.
+        """
+        return {"by": "check_loop"} | {name: case.margins() for name, case in self._cases}
 
     def response(self, count: int = 400) -> LoopResponse:
         """Frequency response at the middle gain, up to half the sampling rate.

@@ -20,7 +20,6 @@ from ..._support.plot_style import (
     panels,
     whole,
 )
-from ..controller.description import parts_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -212,7 +211,7 @@ def plot_contour(run: Contour, fig: Figure | SubFigure | None = None) -> Figure:
 
 def _parts(run: Contour) -> str:
     """Name the parts of the controllers, once where those of both axes are the same."""
-    x, y = parts_text(run.x.controller), parts_text(run.y.controller)
+    x, y = run.x.controller.title, run.y.controller.title
     return x if x == y else f"x {x}, y {y}"
 
 

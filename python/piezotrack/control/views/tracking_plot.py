@@ -27,8 +27,7 @@ from ..._support.plot_style import (
     thinned,
     whole,
 )
-from ..._support.units import drive_word, shown_unit
-from ..controller.description import run_text
+from ..._support.units import best_length_unit, drive_word, shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -306,7 +305,13 @@ def plot_tracking(run: Tracking, fig: Figure | SubFigure | None = None) -> Figur
     plot_error(run, axes[1, 0])
     plot_effort(run, axes[1, 1])
     since = f"from {run.settled:g} s on: " if run.settled else ""
-    figure.suptitle(
-        f"{run_text(run.controller, run.reference)}\n{since}{run.metrics}", fontsize="medium"
-    )
+    figure.suptitle(f"{_title(run)}\n{since}{run.metrics}", fontsize="medium")
     return whole(figure)
+
+
+def _title(run: Tracking) -> str:
+    """Name the reference, its range and the parts of the controller."""
+    reference, controller = run.reference, run.controller
+    unit, scale = best_length_unit(max(abs(reference.low), abs(reference.high)))
+    what = f"{literal(reference.name)}, {scale * reference.low:.4g} to {scale * reference.high:.4g}"
+    return f"{what} {unit}: {controller.title} at {1.0 / controller.dt:.6g} Hz"
