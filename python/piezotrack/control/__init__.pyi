@@ -63,10 +63,3 @@ from .tuning.tune import tune as tune
 from .tuning.tuned import Kept as Kept
 from .tuning.tuned import Tuned as Tuned
 from .tuning.tuned import TuningReport as TuningReport
-from .views.contouring_plot import plot_contour_error as plot_contour_error
-from .views.contouring_plot import plot_magnified as plot_magnified
-from .views.contouring_plot import plot_path as plot_path
-from .views.tracking_plot import plot_effort as plot_effort
-from .views.tracking_plot import plot_error as plot_error
-from .views.tracking_plot import plot_following as plot_following
-from .views.tracking_plot import plot_motion as plot_motion

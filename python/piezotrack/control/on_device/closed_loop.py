@@ -6,7 +6,7 @@ import math
 import time
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from ..loop.tracking import Tracking, feedforward_of
 from .guard import Guard
 from .latency import (
     check_exchanging,
-    latency_of,
     measure_latency,
     refuse_slow,
     wait_until,
@@ -26,7 +25,7 @@ from .latency import (
 from .playing import check_limits
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -52,6 +51,11 @@ class DeviceTracking(Tracking):
         Time from each tick until its voltage was out [s]; NaN where the tick was left out.
     """
 
+    views: ClassVar[Mapping[str, str]] = {
+        **Tracking.views,
+        "summary": "control.views.tracking_text:device_tracking_text",
+    }
+
     latency: Latency
     lateness: Array
 
@@ -59,17 +63,6 @@ class DeviceTracking(Tracking):
     def overruns(self) -> int:
         """Ticks whose voltage was not out within their interval, those left out included."""
         return int(np.sum(~(self.lateness <= self.controller.dt)))
-
-    def summary(self) -> str:
-        """Table of the run, and how late it was.
-
-        Returns
-        -------
-        str
-            Several lines.
-        """
-        done = latency_of(self.lateness[np.isfinite(self.lateness)])
-        return f"{super().summary()}\nlateness  {done}, {self.overruns} overruns"
 
 
 class _Log:
