@@ -17,7 +17,8 @@ from ...errors import DataError, DeviceError, Interrupted, ParameterError
 from ...hardware.device import Device
 from ...hardware.measuring import rest_of
 from ..controller.controller import Controller
-from ..loop.preconditions import check_drive_unit, check_stable, check_within_reach
+from ..loop.preconditions import check_drive_unit
+from ..loop.run import Run
 from ..on_device.playing import check_playable
 from ..plant import plant_of, voltages_before
 from .iterative_learning import IterativeLearning
@@ -286,10 +287,9 @@ def learn(
         noise=noise,
     )
     check_drive_unit(behind, controller)
-    check_stable(plant, controller, delay)
-    if not _core.as_truth("beyond_reach", beyond_reach):
-        samples = reference.sample(controller.dt)
-        check_within_reach(plant, controller.limits, samples, controller.drive_unit)
+    Run(controller, reference).check(
+        plant, delay, beyond_reach=_core.as_truth("beyond_reach", beyond_reach)
+    )
     most = _counted("trials", trials, MOST_TRIALS)
     late = not_negative("delay", delay, "s")
     periods = {

@@ -20,8 +20,7 @@ from ...references.xy_reference import XYReference, square_matrix
 from ...stages.xy import XYStage
 from ..controller.controller import Controller, number_pair
 from ..plant import reach, resting, voltages_before
-from .preconditions import check_period, check_stable, check_within_reach
-from .tracking import Tracking, collected, feedforward_of
+from .run import Run
 
 if TYPE_CHECKING:
     import os
@@ -30,6 +29,8 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike, NDArray
+
+    from .tracking import Tracking
 
     Array = NDArray[np.float64]
 
@@ -391,38 +392,36 @@ def contour(
     delay = not_negative("delay", delay, "s")
     jitter = not_negative("jitter", jitter, "s")
     substeps = _core.as_count("substeps", substeps)
-    offsets = stage.x.sensor.offset, stage.y.sensor.offset
-    forward = path if decoupling is None else path.transformed(_inverse(decoupling), offsets)
-    free = (_core.as_truth("unstable", unstable), _core.as_truth("beyond_reach", beyond_reach))
-    samples, voltages, before = [], [], []
-    parts = zip("xy", (stage.x, stage.y), both, path.axes, forward.axes, strict=True)
-    for name, axis, controller, reference, ahead in parts:
-        samples.append(reference.sample(controller.dt))
+    free = {
+        "unstable": _core.as_truth("unstable", unstable),
+        "beyond_reach": _core.as_truth("beyond_reach", beyond_reach),
+    }
+    x, y = _runs(both, path)
+    for name, axis, run in (("x", stage.x, x), ("y", stage.y, y)):
         try:
-            check_period(controller, reference)
-            if not free[0]:
-                check_stable(axis, controller, delay)
-            if not free[1]:
-                check_within_reach(axis, controller.limits, samples[-1], controller.drive_unit)
+            run.check(axis, delay, **free)
         except ParameterError as error:
             raise ParameterError(f"{name}: {error}") from None
-        along = samples[-1] if ahead is reference else ahead.sample(controller.dt)
-        voltages.append(feedforward_of(controller, ahead, along))
-        before.append(voltages_before(axis, visited, controller.limits))
-    runs = stage._core.track(
-        (both[0]._core, both[1]._core),
-        (samples[0].x, samples[1].x),
-        (voltages[0][0], voltages[1][0]),
+    ahead = x, y
+    if decoupling is not None:
+        offsets = stage.x.sensor.offset, stage.y.sensor.offset
+        ahead = _runs(both, path.transformed(_inverse(decoupling), offsets))
+    (volts_x, note_x), (volts_y, note_y) = (run.feedforward for run in ahead)
+    tracked_x, tracked_y = stage._core.track(
+        (x.controller._core, y.controller._core),
+        (x.samples.x, y.samples.x),
+        (volts_x, volts_y),
         (delay, jitter, substeps),
-        (before[0], before[1]),
+        (
+            voltages_before(stage.x, visited, x.controller.limits),
+            voltages_before(stage.y, visited, y.controller.limits),
+        ),
     )
-    x, y = (
-        collected(run, controller, reference, sampled, note, substeps)
-        for run, controller, reference, sampled, (_, note) in zip(
-            runs, both, path.axes, samples, voltages, strict=True
-        )
+    return Contour(
+        path=path,
+        x=x.collect(tracked_x, note_x, substeps),
+        y=y.collect(tracked_y, note_y, substeps),
     )
-    return Contour(path=path, x=x, y=y)
 
 
 class Workspace(NamedTuple):
@@ -497,6 +496,12 @@ def _two(controllers: Sequence[Controller]) -> tuple[Controller, Controller]:
     if x.dt != y.dt:
         raise ParameterError(f"dt of y is {y.dt:g} s: expected that of x, {x.dt:g} s")
     return x, y
+
+
+def _runs(both: tuple[Controller, Controller], path: XYReference) -> tuple[Run, Run]:
+    """Return the runs of both axes along a path."""
+    x, y = both
+    return Run(x, path.x), Run(y, path.y)
 
 
 def _inverse(matrix: ArrayLike) -> Array:

@@ -454,33 +454,3 @@ def feedforward_of(
     return controller.feedforward.played(
         reference, controller.dt, samples=samples, limits=controller.limits
     )
-
-
-def collected(
-    run: _core.TrackingRun,
-    controller: Controller,
-    reference: Reference,
-    samples: SampledReference,
-    note: str,
-    substeps: int,
-) -> Tracking:
-    """Collect the results of one axis."""
-    fine_t, fine_displacement, fine_voltage = run.motion()
-    return Tracking(
-        reference=reference,
-        controller=controller,
-        t=samples.t,
-        desired=samples.x,
-        measured=run.measured,
-        displacement=fine_displacement[::substeps],
-        loop_error=run.part("error"),
-        voltage=run.part("volts"),
-        feedforward=run.part("feedforward"),
-        feedback=run.part("feedback"),
-        repetitive=run.part("repetitive"),
-        saturated=run.saturated,
-        fine_t=fine_t,
-        fine_displacement=fine_displacement,
-        fine_voltage=fine_voltage,
-        note=note,
-    )

@@ -10,9 +10,8 @@ from ...errors import ParameterError
 from ...hardware.device import Device
 from ...references.reference import Reference
 from ..controller.controller import Controller
-from ..loop.closed_loop import run_closed_loop
-from ..loop.preconditions import check_drive_unit, check_period, check_stable, check_within_reach
-from ..loop.tracking import collected, feedforward_of
+from ..loop.preconditions import check_drive_unit
+from ..loop.run import Run
 from ..on_device.closed_loop import track_on
 from ..plant import plant_of, voltages_before
 
@@ -124,14 +123,12 @@ def track(
     check_drive_unit(stage, controller)
     delay = not_negative("delay", delay, "s")
     substeps = _core.as_count("substeps", substeps)
-    samples = reference.sample(controller.dt)
-    check_period(controller, reference)
-    if not _core.as_truth("unstable", unstable):
-        check_stable(plant, controller, delay)
-    if not _core.as_truth("beyond_reach", beyond_reach):
-        check_within_reach(plant, controller.limits, samples, controller.drive_unit)
-    voltage, note = feedforward_of(controller, reference, samples)
+    free = {
+        "unstable": _core.as_truth("unstable", unstable),
+        "beyond_reach": _core.as_truth("beyond_reach", beyond_reach),
+    }
+    run = Run(controller, reference)
+    run.check(plant, delay, **free)
     sampling = (delay, not_negative("jitter", jitter, "s"), substeps)
     before = voltages_before(plant, visited, controller.limits)
-    run = run_closed_loop(plant, controller, samples.x, voltage, sampling, before)
-    return collected(run, controller, reference, samples, note, substeps)
+    return run.simulate(plant, run.feedforward, sampling, before)
