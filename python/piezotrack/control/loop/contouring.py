@@ -425,7 +425,7 @@ def contour(
 
 
 class Workspace(NamedTuple):
-    """What an XY stage reaches.
+    """Reach of an XY stage.
 
     Attributes
     ----------
