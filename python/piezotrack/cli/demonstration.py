@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..control.controller.controller import Controller
 from ..control.laws.pid import Pid
-from ..control.loop.tracking import Tracking, track
+from ..control.running.track import track
 from ..data import datasets
 from ..data.dataset import Dataset
 from ..identification.fit import identify
@@ -16,6 +16,7 @@ from ..stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
 from ..stages.virtual import VirtualStage
 
 if TYPE_CHECKING:
+    from ..control.loop.tracking import Tracking
     from ..identification.fitted.identification import Identification
     from ..identification.fitted.score import Score
     from ..stages.inverse import Inverse

@@ -8,14 +8,12 @@ from .comparing.comparison import Cell as Cell
 from .comparing.comparison import ControllerComparison as ControllerComparison
 from .comparing.comparison import Row as Row
 from .controller.controller import Controller as Controller
-from .controller.controller_file import load_controller as load_controller
+from .controller.load import load_controller as load_controller
 from .controller.session import Command as Command
 from .controller.session import RefusedReadings as RefusedReadings
 from .controller.session import Session as Session
 from .laws.disturbance_observer import DisturbanceObserver as DisturbanceObserver
 from .laws.hysteresis_observer import HysteresisObserver as HysteresisObserver
-from .laws.laws import Chatter as Chatter
-from .laws.laws import chatter as chatter
 from .laws.lead_lag import LeadLag as LeadLag
 from .laws.neural_network import NetworkInverse as NetworkInverse
 from .laws.neural_network import train_network as train_network
@@ -31,6 +29,8 @@ from .learning.learn import learn as learn
 from .learning.rules import Convergence as Convergence
 from .learning.rules import FrequencyRule as FrequencyRule
 from .learning.rules import LiftedRule as LiftedRule
+from .loop.chatter import Chatter as Chatter
+from .loop.chatter import chatter as chatter
 from .loop.contouring import Contour as Contour
 from .loop.contouring import Workspace as Workspace
 from .loop.contouring import contour as contour
@@ -41,7 +41,6 @@ from .loop.stability import LoopResponse as LoopResponse
 from .loop.stability import check_loop as check_loop
 from .loop.tracking import Metrics as Metrics
 from .loop.tracking import Tracking as Tracking
-from .loop.tracking import track as track
 from .on_device.closed_loop import DeviceTracking as DeviceTracking
 from .on_device.latency import Latency as Latency
 from .on_device.latency import measure_latency as measure_latency
@@ -51,6 +50,7 @@ from .parts.repetitive import Lag as Lag
 from .parts.repetitive import Repetitive as Repetitive
 from .parts.repetitive import ZeroPhase as ZeroPhase
 from .plant import Plant as Plant
+from .running.track import track as track
 from .tuning.h_infinity import MixedSensitivity as MixedSensitivity
 from .tuning.h_infinity import mixed_sensitivity as mixed_sensitivity
 from .tuning.linear_systems import to_control as to_control
@@ -63,10 +63,3 @@ from .tuning.tune import tune as tune
 from .tuning.tuned import Kept as Kept
 from .tuning.tuned import Tuned as Tuned
 from .tuning.tuned import TuningReport as TuningReport
-from .views.contouring_plot import plot_contour_error as plot_contour_error
-from .views.contouring_plot import plot_magnified as plot_magnified
-from .views.contouring_plot import plot_path as plot_path
-from .views.tracking_plot import plot_effort as plot_effort
-from .views.tracking_plot import plot_error as plot_error
-from .views.tracking_plot import plot_following as plot_following
-from .views.tracking_plot import plot_motion as plot_motion

@@ -1,9 +1,8 @@
-"""Plants that a controller can drive: closed-loop simulation and linearisation of each stage."""
+"""Plants that a controller can drive: reach, rest and linearisation of each stage."""
 
 from __future__ import annotations
 
 import copyreg
-from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -21,18 +20,15 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .controller.controller import Controller
-
     Array = NDArray[np.float64]
 
 __all__ = [
     "Plant",
+    "displacement_range",
+    "initial_displacement",
     "linearised_plants",
+    "lowest_settled_displacement",
     "plant_of",
-    "reach",
-    "resting",
-    "run_closed_loop",
-    "settled_bottom",
     "voltages_before",
 ]
 
@@ -61,31 +57,7 @@ def plant_of(stage: Plant | IdentifiedModel) -> VirtualStage:
     return VirtualStage.of(stage)
 
 
-def run_closed_loop(
-    stage: VirtualStage,
-    controller: Controller,
-    reference: Array,
-    feedforward: Array,
-    sampling: tuple[float, float, int],
-    visited: tuple[float, ...] = (),
-) -> _core.TrackingRun:
-    """Simulate a closed loop, with reference [m] and feedforward [V] at the samples.
-
-    The stage is where its experiments start, or in equilibrium after slow visits to the voltages
-    `visited` [V]. `sampling` is delay and jitter [s], and the substeps kept in each sampling
-    interval.
-    """
-    stage = stepped(stage, controller)
-    return stage._core.track(controller._core, reference, feedforward, sampling, visited)
-
-
-def stepped(stage: VirtualStage, controller: Controller) -> VirtualStage:
-    """Return the stage with four steps at least in each sampling interval of a controller."""
-    step = min(stage.step, controller.dt / 4)
-    return stage if step == stage.step else replace(stage, step=step)
-
-
-def reach(
+def displacement_range(
     stage: VirtualStage | Stage, limits: tuple[float, float], dt: float
 ) -> tuple[float, float]:
     """Simulate the lowest and the highest displacement [m] between two voltages [V].
@@ -99,7 +71,7 @@ def reach(
     return float(x.min()), float(x.max())
 
 
-def resting(stage: VirtualStage, visited: tuple[float, ...]) -> float:
+def initial_displacement(stage: VirtualStage, visited: tuple[float, ...]) -> float:
     """Return the displacement [m] in which a run begins, after slow visits to voltages [V]."""
     moved = float(stage.stage.equilibrium(visited).x) if visited else 0.0
     return moved + stage.sensor.offset
@@ -120,13 +92,14 @@ def voltages_before(
     return before or (() if low <= 0.0 <= high else (low if low > 0.0 else high,))
 
 
-def settled_bottom(
+def lowest_settled_displacement(
     stage: VirtualStage, limits: tuple[float, float], top: float, dt: float
 ) -> float:
     """Simulate the lowest displacement [m] at the lower of two voltages [V], from `top` [m] down.
 
-    The voltage takes the course of `reach`, but only up to where the displacement is `top`. A stage
-    that falls as the voltage rises is lowest at the upper one, which it reaches again.
+    The voltage takes the course of `displacement_range`, but only up to where the displacement is
+    `top`. A stage that falls as the voltage rises is lowest at the upper one, which it reaches
+    again.
     """
     low, high = limits
     t, u, x = _slow_cycle(stage, low, high, dt)

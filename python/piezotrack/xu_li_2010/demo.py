@@ -8,8 +8,8 @@ import numpy as np
 
 from ..control.controller.controller import Controller
 from ..control.laws.pid import Pid
-from ..control.loop.tracking import Tracking, track
 from ..control.parts.repetitive import Repetitive
+from ..control.running.track import track
 from ..identification.fit import identify
 from ..references.waveforms import sine
 from ..stages.dahl import DahlStage
@@ -19,6 +19,7 @@ from .procedure import FITTED_SECONDS, SEARCH_BOX
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from ..control.loop.tracking import Tracking
     from ..data.dataset import Dataset
     from ..identification.fitted.estimates import Progress
     from ..identification.fitted.identification import Identification

@@ -6,9 +6,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ..control.laws.pid import Pid
-from ..control.loop.tracking import Tracking, track
 from ..control.parts.filters import LowPass, Notch
 from ..control.parts.repetitive import Lag, Repetitive, ZeroPhase
+from ..control.running.track import track
 from ..data.dataset import Dataset
 from ..errors import NumericalError, ParameterError
 from ..identification.fit import identify
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from ..control.controller.controller import Controller
+    from ..control.loop.tracking import Tracking
     from ..references.reference import Reference
     from ..stages.inverse import Inverse
     from .apparatus import Apparatus

@@ -6,8 +6,9 @@ import math
 from typing import TYPE_CHECKING
 
 from ..control.laws.pid import Pid
-from ..control.loop.tracking import Tracking, track
+from ..control.loop.tracking import Tracking
 from ..control.parts.repetitive import Repetitive
+from ..control.running.track import track
 from .apparatus import loop
 from .references import SHRUNK, fast, shrunk, slow
 

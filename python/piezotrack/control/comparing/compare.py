@@ -14,10 +14,11 @@ from ...errors import ParameterError, PiezotrackError
 from ...identification.fitted.identified_model import IdentifiedModel
 from ...references.reference import Reference
 from ...stages.base import Stage
-from ..laws.laws import chatter_of
+from ..loop.chatter import chatter_of
+from ..loop.closed_loop import run_closed_loop, stepped
 from ..loop.preconditions import check_delay
 from ..loop.tracking import can_be_learnt, feedforward_of, first_counted
-from ..plant import plant_of, run_closed_loop, stepped, voltages_before
+from ..plant import plant_of, voltages_before
 from ..tuning.margins import Margins, Spread, plants_of
 from .comparison import Cell, ControllerComparison, Row
 from .contenders import CONTENDERS, Entry, Task

@@ -3,38 +3,37 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from ... import _core
 from ..._support.arguments import not_negative
 from ..._support.arrays import signal_of
+from ..._support.files import write_result
 from ..._support.frames import frame_of
+from ..._support.result import Result
 from ..._support.statistics import FIGURES, ErrorStatistics
 from ..._support.units import drive_word, shown_unit
 from ...errors import ParameterError
-from ...hardware.device import Device
-from ...references.reference import Reference, SampledReference
 from ...stages.inverse import PlayedVoltage
-from ..controller.controller import Controller
-from ..plant import plant_of, run_closed_loop, voltages_before
-from .preconditions import check_drive_unit, check_period, check_stable, check_within_reach
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    import os
+    from collections.abc import Mapping
+    from pathlib import Path
 
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from ...identification.fitted.identified_model import IdentifiedModel
-    from ..plant import Plant
+    from ...references.reference import Reference, SampledReference
+    from ..controller.controller import Controller
 
     Array = NDArray[np.float64]
 
-__all__ = ["Metrics", "Tracking", "track"]
+__all__ = ["Metrics", "Tracking"]
 
 # Periods after which what learns has learnt.
 LEARNT = 3
@@ -66,8 +65,11 @@ class Metrics(ErrorStatistics):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Tracking:
-    """A tracked motion.
+class Tracking(Result):
+    """A tracked motion; printed, a table of its metrics.
+
+    Its picture shows motion, error, actual against desired, and the voltage with its parts; each
+    alone, in axes of your own, is a method, as `plot_error`.
 
     Attributes
     ----------
@@ -95,6 +97,15 @@ class Tracking:
     note : str
         Description of the feedforward.
     """
+
+    views: ClassVar[Mapping[str, str]] = {
+        "summary": "control.views.tracking_text:tracking_text",
+        "plot": "control.views.tracking_plot:plot_tracking",
+        "plot_motion": "control.views.tracking_plot:plot_motion",
+        "plot_error": "control.views.tracking_plot:plot_error",
+        "plot_following": "control.views.tracking_plot:plot_following",
+        "plot_effort": "control.views.tracking_plot:plot_effort",
+    }
 
     reference: Reference
     controller: Controller
@@ -243,47 +254,165 @@ class Tracking:
         """
         return frame_of(self.table)
 
-    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
-        """Desired and actual motion, error, actual against desired, and the parts of the voltage.
+    def document(self) -> dict[str, Any]:
+        """Content of the JSON file.
 
-        One panel alone, in axes of your own: `plot_motion`, `plot_error`, `plot_following`,
-        `plot_effort`.
+        Returns
+        -------
+        dict
+            Of numbers, texts, lists and dicts only.
+        """
+        loop = self.controller
+        law, learner = loop.feedback, loop.repetitive
+        return {
+            "format": "piezotrack-tracking",
+            "schema_version": 1,
+            "reference": repr(self.reference),
+            "dt": {"value": loop.dt, "unit": "s"},
+            "limits": {
+                "value": list(loop.limits),
+                "unit": loop.drive_unit,
+            },
+            "feedback": None if law is None else repr(law),
+            "repetitive": None if learner is None else repr(learner),
+            "feedforward": self.note,
+            "unit": "errors in m, phase lag in rad, widest loop as a part of the travel",
+            "from_s": self.settled,
+            "metrics": asdict(self.metrics),
+            "periods": [asdict(period) for period in self.periods],
+            "model_drive_range": None,
+            "notes": [],
+            "provenance": {"package": "piezotrack", "version": _core.__version__},
+        }
+
+    def save(
+        self, folder: str | os.PathLike[str], *, entries: Mapping[str, Any] | None = None
+    ) -> list[Path]:
+        """Write samples, metrics and picture to a folder, in one go.
 
         Parameters
         ----------
-        fig : matplotlib.figure.Figure or SubFigure, optional
-            Where to draw; a new figure of pyplot where not given.
+        folder : path-like
+            It is made where it does not exist.
+        entries : mapping, optional
+            More entries of the JSON file, which replace those of `document`.
 
         Returns
         -------
-        matplotlib.figure.Figure
-            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
+        list of pathlib.Path
+            ``tracking.csv``, ``tracking.json``, ``tracking.png`` and ``.svg``.
+
+        Raises
+        ------
+        DataError
+            The folder cannot be made or written to.
         """
-        from ..views.tracking_plot import plot_tracking
+        document = self.document() | dict(entries or {})
+        return write_result(folder, "tracking", document, self.plot(), self.table)
 
-        return plot_tracking(self, fig)
+    def plot_motion(self, *, ax: Axes | None = None) -> Axes:
+        """Plot desired and actual displacement over time.
 
-    def summary(self) -> str:
-        """Table of the run: all of it, and period by period.
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw in; default those of a new figure.
 
         Returns
         -------
-        str
-            Several lines.
+        matplotlib.axes.Axes
+            With the picture.
+
+        Examples
+        --------
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> stage = pt.DahlStage.xu_li_2010()
+        >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
+        >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
+        >>> ax = run.plot_motion(ax=Figure().subplots())
+        >>> ax.get_ylabel()
+        'displacement [um]'
         """
-        lines = [f"{self.reference!r} at {1.0 / self.controller.dt:g} Hz; {self.note}"]
-        since = f"from {self.settled:g} s on" if self.settled else "all of it"
-        lines.append(f"{since}: {self.metrics}")
-        if self.saturated.any():
-            lines.append(f"clipped in {100.0 * self.saturated.mean():.1f} % of the samples")
-        if self.periods:
-            lines.append("period  max um  rms um  mean um")
-            lines += [
-                f"{i:>6}  {1e6 * one.max_error:>6.3f}  {1e6 * one.rms_error:>6.3f}  "
-                f"{1e6 * one.mean_error:>7.3f}"
-                for i, one in enumerate(self.periods, 1)
-            ]
-        return "\n".join(lines)
+        return self._panel("plot_motion", ax)
+
+    def plot_error(self, *, ax: Axes | None = None) -> Axes:
+        """Plot the measured tracking error over time, and the largest of each period.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw in; default those of a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            With the picture.
+
+        Examples
+        --------
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> stage = pt.DahlStage.xu_li_2010()
+        >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
+        >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
+        >>> ax = run.plot_error(ax=Figure().subplots())
+        >>> ax.get_ylabel()
+        'tracking error [um]'
+        """
+        return self._panel("plot_error", ax)
+
+    def plot_following(self, *, ax: Axes | None = None) -> Axes:
+        """Plot actual against desired displacement, from the settled time on.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw in; default those of a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            With the picture.
+
+        Examples
+        --------
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> stage = pt.DahlStage.xu_li_2010()
+        >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
+        >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
+        >>> ax = run.plot_following(ax=Figure().subplots())
+        >>> ax.get_ylabel()
+        'measured displacement [um]'
+        """
+        return self._panel("plot_following", ax)
+
+    def plot_effort(self, *, ax: Axes | None = None) -> Axes:
+        """Plot the voltage and its parts over time.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw in; default those of a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            With the picture.
+
+        Examples
+        --------
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> stage = pt.DahlStage.xu_li_2010()
+        >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
+        >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
+        >>> ax = run.plot_effort(ax=Figure().subplots())
+        >>> ax.get_ylabel()
+        'voltage [V]'
+        """
+        return self._panel("plot_effort", ax)
 
 
 def _metrics(
@@ -291,119 +420,6 @@ def _metrics(
 ) -> Metrics:
     *errors, lag, loop = figures
     return Metrics(**dict(zip(FIGURES, errors, strict=True)), phase_lag=lag, widest_loop=loop)
-
-
-def track(
-    stage: Plant | IdentifiedModel | Device,
-    controller: Controller,
-    reference: Reference,
-    *,
-    delay: float = 0.0,
-    jitter: float = 0.0,
-    substeps: int = 10,
-    visited: float | Sequence[float] = (),
-    beyond_reach: bool = False,
-    unstable: bool = False,
-    safe: float | None = None,
-) -> Tracking:
-    """Track a reference in closed loop, on a simulated stage or on a device.
-
-    A simulated stage moves in continuous time; at each sampling instant the sensor is read, and the
-    voltage computed from the reading is applied and held until the next. On a device this computer
-    closes the loop, in real time: see `control.DeviceTracking`.
-
-    Parameters
-    ----------
-    stage : Stage, VirtualStage, IdentifiedModel or Device
-        The plant: any stage of ``pt.stages``, a `VirtualStage` or an `IdentifiedModel`, or a
-        `hardware.Device` with `exchange`. A stage
-        model has no noise and no amplifier (``VirtualStage.of`` gives it both), and starts at rest;
-        offset and delay of an `IdentifiedModel` are included in the displacement.
-    controller : Controller
-        The controller.
-    reference : Reference
-        The reference, as ``pt.sine(...)``.
-    delay : float, optional
-        Time from a reading to the effect of its voltage [s], in addition to the hold.
-    jitter : float, optional
-        Mean sampling jitter [s], as on a computer without real-time scheduling: the delay of each
-        sample is drawn from an exponential distribution, truncated at nine tenths of the sampling
-        interval. The draws depend on the seed of the stage's sensor.
-    substeps : int, optional
-        Instants kept in each sampling interval, for plots; up to 100000.
-    visited : float or sequence of float, optional
-        Voltages that the stage visits slowly before the run, in turn [V]: it begins in equilibrium
-        at the last, with the memory of the others, as ``(75.0, 0.0)``. By default it never moved
-        before; where 0 V is not between the limits, it begins at the limit nearest to 0 V. Not with
-        a virtual stage that is preconditioned.
-    beyond_reach : bool, optional
-        Whether the reference may exceed the reach of the stage within the voltage limits, as to
-        study saturation.
-    unstable : bool, optional
-        Whether a loop may be unstable for small motions.
-    safe : float, optional
-        Of a device: voltage before and after [V]; default 0 V, or the limit nearest to it. `delay`,
-        `jitter`, `substeps` and `visited` are those of a simulation.
-
-    Returns
-    -------
-    Tracking
-        The motion and its metrics; of a device a `control.DeviceTracking`.
-
-    Raises
-    ------
-    ParameterError
-        A number is out of its range, the reference exceeds the reach of the stage, the loop is
-        unstable, or a device is too slow for the interval.
-    NumericalError
-        The loop diverges.
-    DeviceError, Interrupted
-        A device failed, or the loop was interrupted: the output is at `safe`, and `partial` is the
-        run up to then.
-
-    Examples
-    --------
-    >>> import piezotrack as pt
-    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
-    >>> reference = pt.sine(frequency=0.2, low=0.0, high=100e-6, duration=10.0)
-    >>> run = pt.track(pt.VirtualStage.xu_li_2010(seed=1), loop, reference)
-    >>> print(f"{run.metrics.phase_lag:.2f} rad")
-    0.06 rad
-    """
-    for name, value, kind in (
-        ("controller", controller, Controller),
-        ("reference", reference, Reference),
-    ):
-        if not isinstance(value, kind):
-            raise ParameterError(f"{name} is {type(value).__name__}: expected pt.{kind.__name__}")
-    if isinstance(stage, Device):
-        if (delay, jitter, substeps, visited) != (0.0, 0.0, 10, ()):
-            raise ParameterError(
-                "delay, jitter, substeps or visited is given: expected none of them on a device, "
-                "which has its own"
-            )
-        from ..on_device.closed_loop import track_on
-
-        return track_on(
-            stage, controller, reference, safe=safe, beyond_reach=beyond_reach, unstable=unstable
-        )
-    if safe is not None:
-        raise ParameterError(f"safe is {safe!r}: expected none, as the stage is simulated")
-    plant = plant_of(stage)
-    check_drive_unit(stage, controller)
-    delay = not_negative("delay", delay, "s")
-    substeps = _core.as_count("substeps", substeps)
-    samples = reference.sample(controller.dt)
-    check_period(controller, reference)
-    if not _core.as_truth("unstable", unstable):
-        check_stable(plant, controller, delay)
-    if not _core.as_truth("beyond_reach", beyond_reach):
-        check_within_reach(plant, controller.limits, samples, controller.drive_unit)
-    voltage, note = feedforward_of(controller, reference, samples)
-    sampling = (delay, not_negative("jitter", jitter, "s"), substeps)
-    before = voltages_before(plant, visited, controller.limits)
-    run = run_closed_loop(plant, controller, samples.x, voltage, sampling, before)
-    return collected(run, controller, reference, samples, note, substeps)
 
 
 def settled_from(reference: Reference, end: float) -> float:
@@ -439,34 +455,4 @@ def feedforward_of(
         return PlayedVoltage(np.zeros(len(samples)), "no feedforward")
     return controller.feedforward.played(
         reference, controller.dt, samples=samples, limits=controller.limits
-    )
-
-
-def collected(
-    run: _core.TrackingRun,
-    controller: Controller,
-    reference: Reference,
-    samples: SampledReference,
-    note: str,
-    substeps: int,
-) -> Tracking:
-    """Collect the results of one axis."""
-    fine_t, fine_displacement, fine_voltage = run.motion()
-    return Tracking(
-        reference=reference,
-        controller=controller,
-        t=samples.t,
-        desired=samples.x,
-        measured=run.measured,
-        displacement=fine_displacement[::substeps],
-        loop_error=run.part("error"),
-        voltage=run.part("volts"),
-        feedforward=run.part("feedforward"),
-        feedback=run.part("feedback"),
-        repetitive=run.part("repetitive"),
-        saturated=run.saturated,
-        fine_t=fine_t,
-        fine_displacement=fine_displacement,
-        fine_voltage=fine_voltage,
-        note=note,
     )

@@ -10,9 +10,10 @@ import numpy as np
 from ... import _core
 from ...errors import ParameterError
 from ...references.xy_reference import XYReference
+from ..loop.closed_loop import stepped
 from ..loop.preconditions import check_drive_unit, check_within_reach
 from ..loop.tracking import feedforward_of, first_counted
-from ..plant import plant_of, stepped
+from ..plant import plant_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -20,7 +20,7 @@ from ...stages.xy import XYStage
 from ..laws.pid import Pid
 from ..laws.scheduled_pid import ScheduledPid
 from ..loop.contouring import contour
-from ..loop.tracking import track
+from ..running.track import track
 from .margins import Margins, Spread, plants_of
 from .tune import tune
 from .tuned import Tuned, TunedPair

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 
 from ...errors import ParameterError
 from ..loop.contouring import contour
-from ..loop.tracking import track
+from ..running.track import track
 from .question import FIGURES, Question, asked
 from .refusal import refusal
 from .search import Answer, searched

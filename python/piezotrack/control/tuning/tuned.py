@@ -119,6 +119,23 @@ class TuningReport:
         lines.append(f"what binds: {binding}")
         return "\n".join(lines)
 
+    def design(self) -> dict[str, Any]:
+        """Margins for the file of the controller.
+
+        Returns
+        -------
+        dict
+            Of numbers, texts, lists and dicts only.
+        """
+        return {
+            "by": "tune",
+            "figure": self.figure,
+            f"value_{self.unit}": self.value,
+            "plants": list(self.plants),
+            "kept": [one._asdict() for one in self.kept],
+            "binding": list(self.binding),
+        }
+
     def __repr__(self) -> str:
         return f"<TuningReport: {self.figure}, {len(self.plants)} plants>"
 
@@ -139,6 +156,16 @@ class Tuned(NamedTuple):
 
     def __str__(self) -> str:
         return f"{parts_text(self.controller)}\n{self.report}"
+
+    def design(self) -> dict[str, Any]:
+        """Margins for the file of the controller, those of `report`.
+
+        Returns
+        -------
+        dict
+            Of numbers, texts, lists and dicts only.
+        """
+        return self.report.design()
 
 
 class TunedPair(NamedTuple):

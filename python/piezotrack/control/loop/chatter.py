@@ -1,4 +1,4 @@
-"""A measure of chatter."""
+"""Chatter of a command: how much it changes from sample to sample, and how fast."""
 
 from __future__ import annotations
 
@@ -10,17 +10,12 @@ import numpy as np
 
 from ..._support.arguments import expect, not_negative
 from ...errors import ParameterError
+from .tracking import Tracking
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..loop.tracking import Tracking
-
-__all__ = [
-    "Chatter",
-    "chatter",
-    "chatter_of",
-]
+__all__ = ["Chatter", "chatter", "chatter_of"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +45,7 @@ def chatter(run: Tracking, *, after: float = 0.0) -> Chatter:
     Parameters
     ----------
     run : Tracking
-        What ``pt.track`` returns.
+        Tracked motion.
     after : float, optional
         Time from which it counts [s], as the loop has to settle first.
 
@@ -73,8 +68,6 @@ def chatter(run: Tracking, *, after: float = 0.0) -> Chatter:
     >>> pt.control.chatter(run, after=5.0).rms_change < 1.0
     True
     """
-    from ..loop.tracking import Tracking
-
     expect("run", run, Tracking, "what pt.track returns")
     after = not_negative("after", after, "s")
     volts = np.asarray(run.voltage)[np.asarray(run.t) >= after]

@@ -1,0 +1,1 @@
+"""Runs along a reference, simulated or on a device."""

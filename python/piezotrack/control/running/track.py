@@ -1,0 +1,134 @@
+"""`track`: a reference in closed loop, on a simulated stage or on a device."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ... import _core
+from ..._support.arguments import not_negative
+from ...errors import ParameterError
+from ...hardware.device import Device
+from ...references.reference import Reference
+from ..controller.controller import Controller
+from ..loop.preconditions import check_drive_unit
+from ..loop.run import Run
+from ..on_device.closed_loop import track_on
+from ..plant import plant_of, voltages_before
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ...identification.fitted.identified_model import IdentifiedModel
+    from ..loop.tracking import Tracking
+    from ..plant import Plant
+
+__all__ = ["track"]
+
+
+def track(
+    stage: Plant | IdentifiedModel | Device,
+    controller: Controller,
+    reference: Reference,
+    *,
+    delay: float = 0.0,
+    jitter: float = 0.0,
+    substeps: int = 10,
+    visited: float | Sequence[float] = (),
+    beyond_reach: bool = False,
+    unstable: bool = False,
+    safe: float | None = None,
+) -> Tracking:
+    """Track a reference in closed loop, on a simulated stage or on a device.
+
+    A simulated stage moves in continuous time; at each sampling instant the sensor is read, and the
+    voltage computed from the reading is applied and held until the next. On a device this computer
+    closes the loop, in real time: see `control.DeviceTracking`.
+
+    Parameters
+    ----------
+    stage : Stage, VirtualStage, IdentifiedModel or Device
+        The plant: any stage of ``pt.stages``, a `VirtualStage` or an `IdentifiedModel`, or a
+        `hardware.Device` with `exchange`. A stage
+        model has no noise and no amplifier (``VirtualStage.of`` gives it both), and starts at rest;
+        offset and delay of an `IdentifiedModel` are included in the displacement.
+    controller : Controller
+        The controller.
+    reference : Reference
+        The reference, as ``pt.sine(...)``.
+    delay : float, optional
+        Time from a reading to the effect of its voltage [s], in addition to the hold.
+    jitter : float, optional
+        Mean sampling jitter [s], as on a computer without real-time scheduling: the delay of each
+        sample is drawn from an exponential distribution, truncated at nine tenths of the sampling
+        interval. The draws depend on the seed of the stage's sensor.
+    substeps : int, optional
+        Instants kept in each sampling interval, for plots; up to 100000.
+    visited : float or sequence of float, optional
+        Voltages that the stage visits slowly before the run, in turn [V]: it begins in equilibrium
+        at the last, with the memory of the others, as ``(75.0, 0.0)``. By default it never moved
+        before; where 0 V is not between the limits, it begins at the limit nearest to 0 V. Not with
+        a virtual stage that is preconditioned.
+    beyond_reach : bool, optional
+        Whether the reference may exceed the reach of the stage within the voltage limits, as to
+        study saturation.
+    unstable : bool, optional
+        Whether a loop may be unstable for small motions.
+    safe : float, optional
+        Of a device: voltage before and after [V]; default 0 V, or the limit nearest to it. `delay`,
+        `jitter`, `substeps` and `visited` are those of a simulation.
+
+    Returns
+    -------
+    Tracking
+        The motion and its metrics; of a device a `control.DeviceTracking`.
+
+    Raises
+    ------
+    ParameterError
+        A number is out of its range, the reference exceeds the reach of the stage, the loop is
+        unstable, or a device is too slow for the interval.
+    NumericalError
+        The loop diverges.
+    DeviceError, Interrupted
+        A device failed, or the loop was interrupted: the output is at `safe`, and `partial` is the
+        run up to then.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+    >>> reference = pt.sine(frequency=0.2, low=0.0, high=100e-6, duration=10.0)
+    >>> run = pt.track(pt.VirtualStage.xu_li_2010(seed=1), loop, reference)
+    >>> print(f"{run.metrics.phase_lag:.2f} rad")
+    0.06 rad
+    """
+    for name, value, kind in (
+        ("controller", controller, Controller),
+        ("reference", reference, Reference),
+    ):
+        if not isinstance(value, kind):
+            raise ParameterError(f"{name} is {type(value).__name__}: expected pt.{kind.__name__}")
+    if isinstance(stage, Device):
+        if (delay, jitter, substeps, visited) != (0.0, 0.0, 10, ()):
+            raise ParameterError(
+                "delay, jitter, substeps or visited is given: expected none of them on a device, "
+                "which has its own"
+            )
+        return track_on(
+            stage, controller, reference, safe=safe, beyond_reach=beyond_reach, unstable=unstable
+        )
+    if safe is not None:
+        raise ParameterError(f"safe is {safe!r}: expected none, as the stage is simulated")
+    plant = plant_of(stage)
+    check_drive_unit(stage, controller)
+    delay = not_negative("delay", delay, "s")
+    substeps = _core.as_count("substeps", substeps)
+    free = {
+        "unstable": _core.as_truth("unstable", unstable),
+        "beyond_reach": _core.as_truth("beyond_reach", beyond_reach),
+    }
+    run = Run(controller, reference)
+    run.check(plant, delay, **free)
+    sampling = (delay, not_negative("jitter", jitter, "s"), substeps)
+    before = voltages_before(plant, visited, controller.limits)
+    return run.simulate(plant, run.feedforward, sampling, before)
