@@ -23,6 +23,9 @@ from .control.loop.contouring import contour as contour
 from .control.loop.stability import check_loop as check_loop
 from .control.on_device.playing import play as play
 from .control.running.track import track as track
+from .control.timing import Timing as Timing
+from .control.tuning.goal import Goal as Goal
+from .control.tuning.goal import TuningSearch as TuningSearch
 from .control.tuning.linear_systems import to_control as to_control
 from .control.tuning.margins import Margins as Margins
 from .control.tuning.margins import Spread as Spread

@@ -71,6 +71,8 @@ def compare_controllers_command(
         write_document,
     )
     from ..control.comparing.compare import compare_controllers
+    from ..control.timing import Timing
+    from ..control.tuning.goal import TuningSearch
     from ..control.tuning.margins import Margins
     from ..identification.fitted.identified_model import load
 
@@ -91,9 +93,9 @@ def compare_controllers_command(
         if controllers is None
         else [one.strip() for one in controllers.split(",")],
         margins=Margins(sensitivity=sensitivity),
-        delay=delay,
+        timing=Timing(delay=delay),
         seeds=seeds,
-        seed=seed,
+        search=TuningSearch(seed=seed),
     )
     document = found.document()
     with together(make_folder(out)) as folder:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..control.laws.components import Lag, LowPass, Notch, Pid, Repetitive, ZeroPhase
 from ..control.running.track import track
+from ..control.timing import Timing
 from ..data.dataset import Dataset
 from ..errors import NumericalError, ParameterError
 from ..identification.fit import identify
@@ -147,8 +148,8 @@ def _tried(
     rows = []
     for name, controller in controllers.items():
         try:
-            timing = apparatus.timing if controller.dt == DT else {"delay": controller.dt}
-            run = track(apparatus.x, controller, reference, **timing)
+            timing = apparatus.timing if controller.dt == DT else Timing(delay=controller.dt)
+            run = track(apparatus.x, controller, reference, timing=timing)
             cells = tuple(figures(run))
         except (ParameterError, NumericalError):
             cells = ("unstable", *[""] * (columns - 1))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ... import _core
-from ..._support.arguments import not_negative
+from ..._support.arguments import given_or
 from ..._support.files import write_columns
 from ..._support.units import drive_word, shown_unit
 from ...errors import DataError, DeviceError, Interrupted, ParameterError
@@ -18,7 +18,8 @@ from ...hardware.measuring import rest_of
 from ..controller.controller import Controller
 from ..loop.preconditions import check_drive_unit, check_stable, check_within_reach
 from ..on_device.playing import check_playable
-from ..plant import plant_of, voltages_before
+from ..plant import plant_of, timing_on
+from ..timing import Timing
 from .iterative_learning import IterativeLearning
 from .trials import PlayedTrials, SimulatedTrials
 
@@ -202,7 +203,7 @@ def learn(
     repeats: int = 2,
     method: Method = "frequency",
     models: Sequence[Plant | IdentifiedModel] = (),
-    delay: float = 0.0,
+    timing: Timing | None = None,
     more_delays: float | Sequence[float] | None = None,
     mode_scales: float | Sequence[float] = (0.9, 1.0, 1.1),
     gain: float = 0.7,
@@ -210,7 +211,6 @@ def learn(
     forgetting_factor: float = 1.0,
     change_weight: float = 0.01,
     noise: float | None = None,
-    visited: float | Sequence[float] = (),
     rest: float | None = None,
     beyond_reach: bool = False,
     progress: Callable[[IterativeLearning], None] | None = None,
@@ -242,12 +242,15 @@ def learn(
         Periods before the recorded ones, after the smooth start and the first period of the table.
     repeats : int, optional
         Records of each trial: periods, or runs of method ``"lifted"``. Two show what is noise.
-    method, models, delay, more_delays, mode_scales, gain, cutoff : optional
+    method, models, more_delays, mode_scales, gain, cutoff : optional
         As of `control.IterativeLearning`.
+    timing : Timing, optional
+        Delay and jitter of the loop, and the voltages before each trial. On a device only the
+        delay, which the learning expects.
     forgetting_factor, change_weight, noise : optional
         As there.
-    visited, beyond_reach : optional
-        As of `track`; a device has been where it has been.
+    beyond_reach : optional
+        As of `track`.
     rest : float, optional
         Voltage of a device before and after each trial [V]; default 0 V, or the limit nearest to
         it.
@@ -283,7 +286,8 @@ def learn(
     np.True_
     """
     known = _model_of(stage, controller) if model is None else model
-    home = _rest_on(stage, controller, rest, visited)
+    timing = given_or("timing", timing, Timing())
+    home = _rest_on(stage, controller, rest, timing)
     # What is behind a device is what its model says.
     behind = known if isinstance(stage, Device) else stage
     plant = plant_of(behind)
@@ -293,7 +297,7 @@ def learn(
         controller,
         method=method,
         models=models,
-        delay=delay,
+        delay=timing.delay,
         more_delays=more_delays,
         mode_scales=mode_scales,
         gain=gain,
@@ -303,12 +307,11 @@ def learn(
         noise=noise,
     )
     check_drive_unit(behind, controller)
-    check_stable(plant, controller, delay)
+    check_stable(plant, controller, timing.delay)
     if not _core.as_truth("beyond_reach", beyond_reach):
         samples = reference.sample(controller.dt)
         check_within_reach(plant, controller.limits, samples, controller.drive_unit)
     most = _counted("trials", trials, MOST_TRIALS)
-    late = not_negative("delay", delay, "s")
     periods = {
         "settle": _counted("settle", settle, 1000),
         "repeats": _counted("repeats", repeats, 1000),
@@ -317,8 +320,8 @@ def learn(
     if isinstance(stage, Device):
         runs = PlayedTrials(device=stage, rest=home, learner=learner, **periods)
     else:
-        before = voltages_before(plant, visited, controller.limits)
-        runs = SimulatedTrials(plant=plant, learner=learner, delay=late, before=before, **periods)
+        timing = timing_on(plant, timing, controller.limits)
+        runs = SimulatedTrials(plant=plant, learner=learner, timing=timing, **periods)
     return _learnt(runs, most, progress or _unseen)
 
 
@@ -400,7 +403,7 @@ def _rest_on(
     stage: Plant | IdentifiedModel | Device,
     controller: Controller,
     rest: float | None,
-    visited: float | Sequence[float],
+    timing: Timing,
 ) -> float:
     """Return the voltage at which a device rests [V], after what it needs is checked."""
     if not isinstance(stage, Device):
@@ -408,9 +411,9 @@ def _rest_on(
             raise ParameterError(f"rest is {rest!r}: expected none, as the stage is simulated")
         return 0.0
     check_playable(stage, controller)
-    if visited != ():
+    if timing != Timing(delay=timing.delay):
         raise ParameterError(
-            f"visited is {visited!r}: expected none on a device, which has been where it has been"
+            "timing has jitter or voltages_before: expected none on a device, which has its own"
         )
     return rest_of(stage, rest)
 

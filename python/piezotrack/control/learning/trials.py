@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ...references.reference import Reference
     from ...stages.virtual import VirtualStage
     from ..loop.tracking import Tracking
+    from ..timing import Timing
     from .iterative_learning import IterativeLearning
 
     Array = NDArray[np.float64]
@@ -98,15 +99,12 @@ class SimulatedTrials(Trials):
     ----------
     plant : VirtualStage
         The stage.
-    delay : float
-        From a reading to the effect of its voltage [s].
-    before : tuple of float
-        Voltages visited before [V].
+    timing : Timing
+        Timing of the loop, with the voltages before each trial.
     """
 
     plant: VirtualStage
-    delay: float
-    before: tuple[float, ...]
+    timing: Timing
 
     def run(self, table: Array, trial: int, repeat: int = 0) -> Tracking:
         """Simulate a trial with noise of its own."""
@@ -116,9 +114,7 @@ class SimulatedTrials(Trials):
         whole = self.whole()
         samples = whole.sample(controller.dt)
         volts = self.voltage(whole, table)
-        run = run_closed_loop(
-            plant, controller, samples.x, volts, (self.delay, 0.0, SUBSTEPS), self.before
-        )
+        run = run_closed_loop(plant, controller, samples.x, volts, self.timing, SUBSTEPS)
         return collected(run, controller, whole, samples, NOTE, SUBSTEPS)
 
 

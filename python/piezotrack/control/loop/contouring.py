@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ... import _core
-from ..._support.arguments import not_negative
 from ..._support.frames import frame_of
 from ..._support.statistics import ErrorStatistics
 from ..._support.units import drive_word, shown_unit
@@ -17,7 +16,7 @@ from ...errors import ParameterError
 from ...references.xy_reference import XYReference, square_matrix
 from ...stages.xy import XYStage
 from ..controller.controller import Controller, number_pair
-from ..plant import reach, resting, voltages_before
+from ..plant import reach, resting, timing_on
 from .preconditions import check_period, check_stable, check_within_reach
 from .tracking import Tracking, collected, feedforward_of
 
@@ -26,6 +25,8 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import ArrayLike, NDArray
+
+    from ..timing import Timing
 
     Array = NDArray[np.float64]
 
@@ -208,10 +209,8 @@ def contour(
     path: XYReference,
     *,
     decoupling: ArrayLike | None = None,
-    delay: float = 0.0,
-    jitter: float = 0.0,
+    timing: Timing | None = None,
     substeps: int = 10,
-    visited: Sequence[float] = (),
     beyond_reach: bool = False,
     unstable: bool = False,
 ) -> Contour:
@@ -232,15 +231,11 @@ def contour(
     decoupling : array_like, shape (2, 2), optional
         Cross-talk as of `identification.identify_cross_talk`: the feedforward follows the path
         times its inverse, which cancels the cross-talk.
-    delay : float, optional
-        Time from a reading to the effect of its voltage [s], in addition to the hold.
-    jitter : float, optional
-        Mean sampling jitter [s], as for `track`: drawn for each axis separately, but the same for
-        two models, whose sensors have no seed.
+    timing : Timing, optional
+        Delay and jitter of both loops, and the voltages before the run of both axes. The jitter is
+        drawn for each axis separately, but is the same for two models, whose sensors have no seed.
     substeps : int, optional
         Instants kept in each sampling interval.
-    visited : sequence of float, optional
-        Voltages that both stages visit slowly before the run, as for `track`.
     beyond_reach, unstable : bool, optional
         As for `track`.
 
@@ -275,33 +270,31 @@ def contour(
     if not isinstance(path, XYReference):
         raise ParameterError(f"path is {type(path).__name__}: expected pt.XYReference")
     both = _two(controllers)
-    delay = not_negative("delay", delay, "s")
-    jitter = not_negative("jitter", jitter, "s")
     substeps = _core.as_count("substeps", substeps)
     offsets = stage.x.sensor.offset, stage.y.sensor.offset
     forward = path if decoupling is None else path.transformed(_inverse(decoupling), offsets)
     free = (_core.as_truth("unstable", unstable), _core.as_truth("beyond_reach", beyond_reach))
-    samples, voltages, before = [], [], []
+    samples, voltages, timings = [], [], []
     parts = zip("xy", (stage.x, stage.y), both, path.axes, forward.axes, strict=True)
     for name, axis, controller, reference, ahead in parts:
         samples.append(reference.sample(controller.dt))
+        timings.append(timing_on(axis, timing, controller.limits))
         try:
             check_period(controller, reference)
             if not free[0]:
-                check_stable(axis, controller, delay)
+                check_stable(axis, controller, timings[-1].delay)
             if not free[1]:
                 check_within_reach(axis, controller.limits, samples[-1], controller.drive_unit)
         except ParameterError as error:
             raise ParameterError(f"{name}: {error}") from None
         along = samples[-1] if ahead is reference else ahead.sample(controller.dt)
         voltages.append(feedforward_of(controller, ahead, along))
-        before.append(voltages_before(axis, visited, controller.limits))
     runs = stage._core.track(
         (both[0]._core, both[1]._core),
         (samples[0].x, samples[1].x),
         (voltages[0][0], voltages[1][0]),
-        (delay, jitter, substeps),
-        (before[0], before[1]),
+        (timings[0], timings[1]),
+        substeps,
     )
     x, y = (
         collected(run, controller, reference, sampled, note, substeps)
@@ -369,7 +362,7 @@ def workspace(
     pairs = [number_pair("limits", one, "V") for one in ([limits] * 2 if alone else limits)]
     axes = list(zip((stage.x, stage.y), pairs, strict=True))
     x, y = (reach(one, pair, 1e-3) for one, pair in axes)
-    at_x, at_y = (resting(one, voltages_before(one, (), pair)) for one, pair in axes)
+    at_x, at_y = (resting(one, pair) for one, pair in axes)
     return Workspace(x, y, (at_x, at_y))
 
 

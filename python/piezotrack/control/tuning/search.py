@@ -14,12 +14,13 @@ from ..loop.tracking import can_be_learnt
 from .box import Box, box_of, resonance
 from .margins import NamedPlant, plants_of
 from .motions import tasks_of
-from .tuned import Kept
+from .tuned import MarginReport
 
 if TYPE_CHECKING:
-    from .question import Axis, Question
+    from .margins import Margins
+    from .problem import Axis, TuningProblem
 
-__all__ = ["Answer", "searched"]
+__all__ = ["Answer", "search_at"]
 
 # The grid of the search is accurate to this; what the exact check finds beyond is asked again.
 SLACK = 0.003
@@ -66,13 +67,13 @@ class Answer(NamedTuple):
         Of the core.
     axes : list of SoughtAxis
         What was sought.
-    kept : list of Kept
+    kept : list of MarginReport
         The margins of the settings, exact.
     """
 
     found: dict[str, Any]
     axes: list[SoughtAxis]
-    kept: list[Kept]
+    kept: list[MarginReport]
 
     @property
     def excess(self) -> float:
@@ -105,47 +106,42 @@ class Answer(NamedTuple):
         return found
 
 
-def searched(question: Question, dt: float) -> Answer:
+def search_at(problem: TuningProblem, dt: float) -> Answer:
     """Search at one sampling interval; where the exact margins are beyond, with some in reserve."""
-    axes = [_sought(question, axis, dt) for axis in question.axes]
+    axes = [_sought(problem, axis, dt) for axis in problem.axes]
     repeats = any(axis.box.period is not None for axis in axes)
-    tasks = tasks_of(question, [axis.base for axis in axes], repeats)
+    tasks = tasks_of(problem, [axis.base for axis in axes], repeats)
     reserve = 1.0
     for _ in range(ROUNDS):
         found = _core.tune(
+            problem,
+            margins=_with_reserve(problem.margins, reserve),
             axes=[axis._core for axis in axes],
             tasks=tasks,
-            required=_required(question, reserve),
-            aim=question.figure if tasks else "disturbance",
-            effort=question.effort,
-            particles=question.particles,
-            iterations=question.iterations,
-            seed=question.seed,
-            threads=question.threads,
         )
         answer = Answer(found, axes, [])
         if found["excess"] > 1.0:
             return answer
-        answer = answer._replace(kept=_kept(question, answer))
+        answer = answer._replace(kept=_kept(problem, answer))
         if answer.keeps:
             return answer
         reserve *= 1.0 + 1.2 * (answer.excess - 1.0)
     return answer
 
 
-def _sought(question: Question, axis: Axis, dt: float) -> SoughtAxis:
+def _sought(problem: TuningProblem, axis: Axis, dt: float) -> SoughtAxis:
     plants = [
         NamedPlant(f"{axis.name}, {one.name}" if axis.name else one.name, one.plant)
-        for one in plants_of(axis.stages, question.limits, question.delay, question.spread)
+        for one in plants_of(axis.stages, problem.limits, axis.timing.delay, problem.spread)
     ]
     cores = [one.plant for one in plants]
-    parts = question.parts or _usual_parts(question, cores, dt)
+    parts = problem.parts or _usual_parts(problem, cores, dt)
     of_parts = sum(one in parts for one in ("low-pass", "notch"))
     if len(axis.filters) + of_parts > 2:
         raise ParameterError(
             f"filters has {len(axis.filters)} beside {of_parts} of the parts: expected 2 in all"
         )
-    periods = {one.period for one in question.references}
+    periods = {one.period for one in problem.references}
     if "repetitive" in parts and len(periods) > 1:
         listed = ", ".join(f"{one:g} s" if one else "none" for one in sorted(periods, key=str))
         raise ParameterError(
@@ -154,50 +150,52 @@ def _sought(question: Question, axis: Axis, dt: float) -> SoughtAxis:
     period = next(iter(periods), None)
     base = Controller(
         dt=dt,
-        limits=question.limits,
+        limits=problem.limits,
         feedforward=axis.feedforward,
         filters=axis.filters,
-        drive_unit=question.drive_unit,
+        drive_unit=problem.drive_unit,
     )
-    lag = question.stage.lag if question.stage is not None else 0.0
-    box = box_of(parts, cores, dt, period, question.limits, question.law, lag)
+    lag = problem.stage.lag if problem.stage is not None else 0.0
+    box = box_of(parts, cores, dt, period, problem.limits, problem.law, lag)
     return SoughtAxis(axis.name, box, base, plants)
 
 
-def _usual_parts(question: Question, plants: list[_core.LoopPlant], dt: float) -> tuple[str, ...]:
+def _usual_parts(
+    problem: TuningProblem, plants: list[_core.LoopPlant], dt: float
+) -> tuple[str, ...]:
     parts = ["pid", "low-pass"]
     if resonance(plants, dt) is not None:
         parts.append("notch")
-    periods = {one.period for one in question.references}
+    periods = {one.period for one in problem.references}
     rising = all(plant.static_gain > 0.0 for plant in plants)
-    axes = (one.x if isinstance(one, XYReference) else one for one in question.references)
+    axes = (one.x if isinstance(one, XYReference) else one for one in problem.references)
     if len(periods) == 1 and rising and all(map(can_be_learnt, axes)):
         parts.append("repetitive")
     return tuple(parts)
 
 
-def _required(
-    question: Question, reserve: float
-) -> tuple[float, float, float, float, float, float, float]:
-    """Return what is asked for, with a factor in reserve for what the grid does not show."""
-    margins = question.margins
+def _with_reserve(margins: Margins, reserve: float) -> tuple[float, float, float, float]:
+    """Return gain, phase, sensitivity and learning with a factor in reserve.
+
+    That is for what the grid does not show.
+    """
     gain = 1.0 + (margins.gain - 1.0) * reserve
     sensitivity = 1.0 + (margins.sensitivity - 1.0) / reserve
     learning = margins.learning * (1.0 + 1e-9)
     phase = min(margins.phase * reserve, 0.999 * math.pi)
-    return gain, phase, sensitivity, learning, question.slew, question.clipped, question.allowed
+    return gain, phase, sensitivity, learning
 
 
-def _kept(question: Question, answer: Answer) -> list[Kept]:
+def _kept(problem: TuningProblem, answer: Answer) -> list[MarginReport]:
     """Check the margins of what was found, exactly, over all plants."""
-    margins = question.margins
+    margins = problem.margins
     bounds = {
         "gain margin": margins.gain,
         "phase margin": margins.phase,
         "learning": margins.learning,
         "sensitivity": margins.sensitivity,
     }
-    worst: dict[str, Kept] = {}
+    worst: dict[str, MarginReport] = {}
     for axis, controller in zip(answer.axes, answer.controllers, strict=True):
         for name, plant in axis.plants:
             check = _core.check_loop(controller._core, plant)
@@ -208,7 +206,7 @@ def _kept(question: Question, answer: Answer) -> list[Kept]:
                 "sensitivity": check["sensitivity"] if check["stable"] else math.inf,
             }
             for key, value in values.items():
-                one = Kept(key, value, bounds[key], name)
+                one = MarginReport(key, value, bounds[key], name)
                 if key not in worst or one.share > worst[key].share:
                     worst[key] = one
     if all(one.repetitive is None for one in answer.controllers):

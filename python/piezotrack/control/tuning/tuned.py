@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from ..loop.tracking import Tracking
     from .margins import Margins
 
-__all__ = ["Kept", "Tuned", "TunedPair", "TuningReport", "parts_text"]
+__all__ = ["MarginReport", "Tuned", "TunedPair", "TuningReport", "parts_text"]
 
 UNITS = {"gain margin": "", "phase margin": " rad", "sensitivity": "", "learning": ""}
 
 
-class Kept(NamedTuple):
+class MarginReport(NamedTuple):
     """A margin over the set of plants.
 
     Attributes
@@ -59,7 +59,7 @@ class TuningReport:
 
     Attributes
     ----------
-    figure : str
+    minimised : str
         What was made small.
     unit : str
         Its unit: ``"m"``, of the effort ``"V"``.
@@ -68,30 +68,30 @@ class TuningReport:
         1 V at the input of the stage [m s/V].
     runs : tuple of Tracking or of Contour
         Full simulations of the tuned loop, one for each reference.
-    kept : tuple of Kept
+    kept : tuple of MarginReport
         The margins over the set of plants.
     margins : Margins
         What was asked for.
     plants : tuple of str
         The plants of the set.
-    binding : tuple of str
-        What forbids a smaller figure: margins at their bounds, settings at the ends of their
-        ranges. Empty where the figure itself has its minimum inside.
+    active_constraints : tuple of str
+        What forbids a smaller value: margins and bounds of the goal that are used up, settings at
+        the ends of their ranges. Empty where the value has its minimum inside.
     dt : float
         Sampling interval [s].
     candidates, loops : int
-        Controllers looked at, and closed loops simulated.
+        Controllers evaluated, and closed loops simulated.
     history : tuple of float
         Best figure after each iteration; infinite as long as no candidate kept the margins.
     """
 
-    figure: str
+    minimised: str
     value: float
     runs: tuple[Any, ...]
-    kept: tuple[Kept, ...]
+    kept: tuple[MarginReport, ...]
     margins: Margins
     plants: tuple[str, ...]
-    binding: tuple[str, ...]
+    active_constraints: tuple[str, ...]
     dt: float
     candidates: int
     loops: int
@@ -100,8 +100,8 @@ class TuningReport:
 
     def __str__(self) -> str:
         lines = [
-            f"{self.figure}, at {1.0 / self.dt:.6g} Hz: {self.candidates} controllers looked at, "
-            f"{self.loops} loops simulated"
+            f"{self.minimised}, at {1.0 / self.dt:.6g} Hz: {self.candidates} controllers "
+            f"evaluated, {self.loops} loops simulated"
         ]
         if self.runs:
             scale, unit = (1e6, "um") if self.unit == "m" else (1.0, self.unit)
@@ -113,14 +113,13 @@ class TuningReport:
             lines += _run_lines(run)
         lines.append(f"over {len(self.plants)} plants:")
         lines += [f"  {one}" for one in self.kept]
-        binding = (
-            "; ".join(self.binding) or "nothing: the figure has its minimum inside of the bounds"
-        )
-        lines.append(f"what binds: {binding}")
+        active = "; ".join(self.active_constraints)
+        active = active or "nothing: the figure has its minimum inside of the bounds"
+        lines.append(f"what binds: {active}")
         return "\n".join(lines)
 
     def __repr__(self) -> str:
-        return f"<TuningReport: {self.figure}, {len(self.plants)} plants>"
+        return f"<TuningReport: {self.minimised}, {len(self.plants)} plants>"
 
 
 class Tuned(NamedTuple):
