@@ -210,7 +210,7 @@ def test_refuses(name: str) -> None:
 def test_a_refusal_names_argument_value_and_expectation() -> None:
     with pytest.raises(pt.ParameterError) as caught:
         timed(delay=-0.1)
-    assert str(caught.value) == "delay is -0.1: expected a finite number of 0 or above, in s"
+    assert str(caught.value) == "delay is -0.1 s: expected a finite number, 0 or above"
 
 
 # References of every kind, words and pictures.

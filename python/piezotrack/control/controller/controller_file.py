@@ -300,11 +300,11 @@ def _design(controller: Controller, report: Any) -> dict[str, Any] | None:
     if isinstance(report, TuningReport):
         return {
             "by": "tune",
-            "figure": report.figure,
+            "figure": report.minimised,
             f"value_{report.unit}": report.value,
             "plants": list(report.plants),
             "kept": [one._asdict() for one in report.kept],
-            "binding": list(report.binding),
+            "binding": list(report.active_constraints),
         }
     if not isinstance(report, LoopReport):
         raise ParameterError(
