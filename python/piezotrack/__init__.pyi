@@ -13,7 +13,7 @@ from .benchmarking.board import benchmark as benchmark
 from .benchmarking.record import BenchmarkRecord as BenchmarkRecord
 from .control.comparing.compare import compare_controllers as compare_controllers
 from .control.controller.controller import Controller as Controller
-from .control.controller.controller_file import load_controller as load_controller
+from .control.controller.load import load_controller as load_controller
 from .control.laws.components import LowPass as LowPass
 from .control.laws.components import Notch as Notch
 from .control.laws.components import Pid as Pid

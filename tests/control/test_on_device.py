@@ -44,6 +44,28 @@ def _short(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(latency, "MOST", 1e3)
 
 
+RUNS: dict[str, Callable[[], Any]] = {
+    "simulated": lambda: pt.track(stage(), feedforward(), SINE),
+    "played": lambda: pt.play(VirtualDevice(stage()), feedforward(), SINE),
+    "looped": lambda: pt.track(VirtualDevice(stage()), LOOP, SINE, beyond_reach=True),
+}
+
+
+@pytest.mark.usefixtures("_short")
+@pytest.mark.parametrize("kind", RUNS)
+def test_a_reference_is_sampled_once(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also on a device, whose record is collected along the same samples."""
+    sample, calls = pt.Reference.sample, []
+
+    def counted(reference: pt.Reference, dt: float) -> Any:
+        calls.append(dt)
+        return sample(reference, dt)
+
+    monkeypatch.setattr(pt.Reference, "sample", counted)
+    run = RUNS[kind]()
+    assert calls == [run.controller.dt]
+
+
 # Tables.
 
 

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 import piezotrack as pt
 from commands import run
 from mutants import changed_document, log
-from piezotrack.control.controller.controller_file import document_of
 from soak import LONGEST_MESSAGE, bad_message, judged
 
 NUMBERS = ["0.02", "0", "-1", "nan", "inf", "1e-9", "1e9", "1e300", "x", "", "\u0663", "1_0"]
@@ -174,7 +173,7 @@ def controller_text() -> str:
         repetitive=pt.Repetitive.from_um(period=1.0, kq=0.3, tq=0.05),
         filters=[pt.LowPass(5.0), pt.Notch(12.0)],
     )
-    return json.dumps(document_of(loop))
+    return json.dumps(loop.document())
 
 
 @st.composite

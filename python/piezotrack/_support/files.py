@@ -30,6 +30,7 @@ __all__ = [
     "together",
     "write_columns",
     "write_document",
+    "write_result",
 ]
 
 
@@ -228,3 +229,44 @@ def json_ready(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
+
+
+def write_result(
+    folder: str | os.PathLike[str],
+    name: str,
+    document: Mapping[str, Any],
+    figure: Figure,
+    columns: Mapping[str, np.ndarray] | None = None,
+) -> list[Path]:
+    """Write the files of a result to a folder, which is made, in one go.
+
+    Parameters
+    ----------
+    folder : path-like
+        The folder.
+    name : str
+        Of all files, without ending.
+    document : mapping
+        Content of the JSON file.
+    figure : matplotlib.figure.Figure
+        The picture.
+    columns : mapping of str to ndarray, optional
+        Content of a CSV file.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The CSV file if there is one, the JSON file, the picture.
+
+    Raises
+    ------
+    DataError
+        The folder cannot be made or written to.
+    """
+    with together(make_folder(folder)) as path:
+        tables = [] if columns is None else [write_columns(path / f"{name}.csv", columns)]
+        return [
+            *tables,
+            write_document(path / f"{name}.json", document),
+            *save_figures({name: figure}, path),
+        ]

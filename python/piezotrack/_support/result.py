@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
 __all__ = ["Result"]
@@ -64,6 +65,11 @@ class Result:
         """
         figure: Figure = self.view("plot")(self, fig)
         return figure
+
+    def _panel(self, name: str, ax: Axes | None, **options: Any) -> Axes:
+        """Draw one panel of the picture in axes, new ones where not given."""
+        axes: Axes = self.view(name)(self, ax, **options)
+        return axes
 
     def __str__(self) -> str:
         return self.summary()

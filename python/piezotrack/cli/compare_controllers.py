@@ -63,13 +63,7 @@ def compare_controllers_command(
     quiet: Quiet = False,
 ) -> None:
     """Compare controllers on one stage."""
-    from .._support.files import (
-        make_folder,
-        picture_files,
-        save_figures,
-        together,
-        write_document,
-    )
+    from .._support.files import picture_files
     from ..control.comparing.compare import compare_controllers
     from ..control.timing import Timing
     from ..control.tuning.goal import TuningSearch
@@ -97,13 +91,7 @@ def compare_controllers_command(
         seeds=seeds,
         search=TuningSearch(seed=seed),
     )
-    document = found.document()
-    with together(make_folder(out)) as folder:
-        written = [
-            write_document(folder / "controllers.json", document),
-            *save_figures({"controllers": found.plot()}, folder),
-        ]
-    result.show(str(found), document, written)
+    result.show(str(found), found.document(), found.save(out))
 
 
 def _rates(text: str) -> tuple[float, float, float]:

@@ -47,7 +47,6 @@ from .xy_stages import OwnStage, PaperStage
 
 if TYPE_CHECKING:
     from ..control.controller.controller import Controller
-    from ..control.loop.contouring import Contour
     from ..identification.experiments.cross_talk import CrossTalk
     from ..references.xy_reference import XYReference
     from ..stages.xy import XYStage
@@ -166,9 +165,9 @@ def contour_command(
     else:
         run = contour(plant, loops, desired, **mixing, beyond_reach=beyond_reach, unstable=unstable)
         notes = xy.notes(run)
-        document = _document(run, notes)
+        entries = {"notes": [*run.notes, *notes]}
         words = "\n".join([run.summary(), *(f"note  {note}" for note in notes)])
-        written = _write(run, document, out)
+        written, document = run.save(out, entries=entries), run.document() | entries
     shares = [f"{100 * share:g} %" for share in plant.cross_talk]
     between = f"y lags by {plant.lag:g} s, {shares[0]} of y in x, {shares[1]} of x in y"
     lines = [f"stage: {xy.name}: {between}; {how}", words]
@@ -272,44 +271,6 @@ def _cross_talk(stage: XYStage, loops: tuple[Controller, Controller]) -> CrossTa
     return identify_cross_talk(
         stage.record(slow[0], held[1], 1e-3), stage.record(held[0], slow[1], 1e-3)
     )
-
-
-def _document(run: Contour, notes: list[str]) -> dict[str, Any]:
-    """Content of the JSON file: the metrics."""
-    from .. import __version__
-
-    return {
-        "format": "piezotrack-contour",
-        "schema_version": 1,
-        "path": repr(run.path),
-        "unit": "errors in m, phase lag in rad, widest loop as a part of the travel",
-        "from_s": run.settled,
-        "contour": asdict(run.metrics),
-        "contour_true": asdict(run.score(true=True)),
-        "x": asdict(run.x.metrics),
-        "y": asdict(run.y.metrics),
-        "feedforward": run.x.note,
-        "notes": [*run.notes, *notes],
-        "provenance": {"package": "piezotrack", "version": __version__},
-    }
-
-
-def _write(run: Contour, document: dict[str, Any], out: Path) -> list[Path]:
-    """Write the samples as CSV, the metrics as JSON, and the picture."""
-    from .._support.files import (
-        make_folder,
-        save_figures,
-        together,
-        write_columns,
-        write_document,
-    )
-
-    with together(make_folder(out)) as folder:
-        return [
-            write_columns(folder / "contour.csv", run.table),
-            write_document(folder / "contour.json", document),
-            *save_figures({"contour": run.plot()}, folder),
-        ]
 
 
 def _names(table_2: bool) -> list[str]:

@@ -80,7 +80,7 @@ def export_command(
     quiet: Quiet = False,
 ) -> None:
     """Write a controller as C, coefficients or FMU."""
-    from ..control.controller.controller_file import load_controller
+    from ..control.controller.load import load_controller
     from ..export.write import export_controller, export_files
 
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -175,7 +175,7 @@ def learn_command(
             error, "learnt", lambda learnt: _kept(learnt, out, picture)
         ) from None
     words = _outcome(found) if device is None else f"{_outcome(found)}\n{found.final.note}"
-    result.show(words, _document(found), _write(found, out, picture))
+    result.show(words, found.document(), _write(found, out, picture))
 
 
 def _check_options(
@@ -233,7 +233,7 @@ def _kept(learnt: Learning, out: Path, picture: bool) -> str:
 
 def _show(learner: IterativeLearning) -> None:
     """Print the convergence before the first trial, and the errors of each."""
-    from ..control.learning.learn import heading, trial_line
+    from ..control.views.learning_text import heading, trial_line
 
     made = len(learner.trials)
     line = trial_line(made - 1, learner.trials[-1]) if made else heading(learner)
@@ -241,46 +241,8 @@ def _show(learner: IterativeLearning) -> None:
 
 
 def _outcome(found: Learning) -> str:
+    from ..control.views.learning_text import outcome
+
     before, after = found.errors[0], found.errors[found.best]
     best = f"best: trial {found.best}, {1e9 * after:.4g} nm rms after {1e9 * before:.4g} nm"
-    return "\n".join([*found.outcome(), best])
-
-
-def _document(found: Learning) -> dict[str, Any]:
-    """Content of the JSON document: how it converges, the errors, why it ended."""
-    from .. import __version__
-
-    learner, convergence = found.learner, found.convergence
-    return {
-        "format": "piezotrack-learning",
-        "schema_version": 1,
-        "reference": repr(learner.reference),
-        "dt": {"value": learner.controller.dt, "unit": "s"},
-        "limits": {
-            "value": list(learner.controller.limits),
-            "unit": learner.controller.drive_unit,
-        },
-        "method": learner.method,
-        "cutoff": {"value": learner.cutoff, "unit": "Hz"},
-        "convergence": {
-            "factor": convergence.factor,
-            "models": [
-                {"model": name, "factor": factor, "frequency": frequency}
-                for name, factor, frequency in convergence.cases
-            ],
-        },
-        "unit": "errors in m, frequencies in Hz",
-        "trials": [
-            {
-                "rms_error": one.rms_error,
-                "max_error": one.max_error,
-                "noise": one.noise,
-                "clipped": one.clipped,
-            }
-            for one in found.trials
-        ],
-        "best": found.best,
-        "feedforward": found.final.note,
-        "stopped": found.stopped,
-        "provenance": {"package": "piezotrack", "version": __version__},
-    }
+    return "\n".join([*outcome(found), best])

@@ -11,7 +11,7 @@ from .devices import DeviceAddress, Rest, connected
 from .error_messages import in_words
 from .options import Duration, Json, Out, Overwrite, Period, Quiet  # noqa: TC001, typer reads it
 from .output import Output
-from .track import parsed_reference, tracking_document, write_tracking
+from .track import parsed_reference
 
 __all__ = ["play_command"]
 
@@ -42,7 +42,7 @@ def play_command(
 ) -> None:
     """Play a feedforward as a table on a device."""
     from .._support.files import picture_files
-    from ..control.controller.controller_file import load_controller
+    from ..control.controller.load import load_controller
     from ..control.on_device.playing import play
     from ..identification.fitted.identified_model import load
 
@@ -52,5 +52,4 @@ def play_command(
     result.will_write(["tracking.csv", "tracking.json", *picture_files("tracking")])
     with connected(device) as used:
         run = play(used, forward, desired, rate=rate, rest=rest)
-    document = tracking_document(run, None, run.controller, [])
-    result.show(run.summary(), document, write_tracking(run, document, out))
+    result.show(run.summary(), run.document(), run.save(out))

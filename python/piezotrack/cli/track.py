@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -51,9 +50,7 @@ from .options import (
 from .output import Output
 
 if TYPE_CHECKING:
-    from ..control.controller.controller import Controller
     from ..control.loop.tracking import Tracking
-    from ..identification.fitted.identified_model import IdentifiedModel
     from ..references.reference import Reference
 
 __all__ = [
@@ -61,8 +58,6 @@ __all__ = [
     "feedforward_command",
     "parsed_reference",
     "track_command",
-    "tracking_document",
-    "write_tracking",
 ]
 
 Online = Annotated[
@@ -206,8 +201,12 @@ def track_command(
         lines += [f"note  {note}" for note in small_margins(margins)]
     elif own:
         lines.append(NO_FEEDBACK)
-    document = tracking_document(run, known, loop, notes) | {"stage": MODEL if own else PAPER}
-    result.show("\n".join(lines), document, write_tracking(run, document, out))
+    entries = {
+        "model_drive_range": known.drive_range,
+        "notes": notes,
+        "stage": MODEL if own else PAPER,
+    }
+    result.show("\n".join(lines), run.document() | entries, run.save(out, entries=entries))
 
 
 # Options of a simulation, or of a controller that a file has.
@@ -228,7 +227,7 @@ def _on_device(
 ) -> None:
     """Close the loop of a controller file on a device; what was tracked before a fault is kept."""
     from .._support.files import picture_files
-    from ..control.controller.controller_file import load_controller
+    from ..control.controller.load import load_controller
     from ..control.running.track import track
 
     loop = load_controller(file)
@@ -240,13 +239,11 @@ def _on_device(
             ended = f"ended: {error}"
 
             def write(run: Tracking) -> str:
-                document = tracking_document(run, None, loop, [ended])
-                table, *_ = write_tracking(run, document, result.out)
+                table, *_ = run.save(result.out, entries={"notes": [ended]})
                 return f"what was tracked up to then is in {table.parent}"
 
             raise with_what_is_kept(error, "tracked", write) from None
-    document = tracking_document(run, None, loop, [])
-    result.show(run.summary(), document, write_tracking(run, document, result.out))
+    result.show(run.summary(), run.document(), run.save(result.out))
 
 
 @in_words
@@ -342,46 +339,3 @@ def parsed_reference(text: str, duration: float | None, period: float | None) ->
     if period is not None:
         raise ParameterError(f"--period is for a reference from a file: expected none with {text}")
     return parse_reference(text, duration=duration)
-
-
-def tracking_document(
-    run: Tracking, known: IdentifiedModel | None, loop: Controller, notes: list[str]
-) -> dict[str, Any]:
-    """Content of the JSON file: the loop and its metrics."""
-    from .. import __version__
-
-    return {
-        "format": "piezotrack-tracking",
-        "schema_version": 1,
-        "reference": repr(run.reference),
-        "dt": {"value": loop.dt, "unit": "s"},
-        "limits": {"value": list(loop.limits), "unit": loop.drive_unit},
-        "feedback": None if loop.feedback is None else repr(loop.feedback),
-        "repetitive": None if loop.repetitive is None else repr(loop.repetitive),
-        "feedforward": run.note,
-        "unit": "errors in m, phase lag in rad, widest loop as a part of the travel",
-        "from_s": run.settled,
-        "metrics": asdict(run.metrics),
-        "periods": [asdict(one) for one in run.periods],
-        "model_drive_range": None if known is None else known.drive_range,
-        "notes": notes,
-        "provenance": {"package": "piezotrack", "version": __version__},
-    }
-
-
-def write_tracking(run: Tracking, document: dict[str, Any], out: Path) -> list[Path]:
-    """Write the samples as CSV, the metrics as JSON, and the pictures."""
-    from .._support.files import (
-        make_folder,
-        save_figures,
-        together,
-        write_columns,
-        write_document,
-    )
-
-    with together(make_folder(out)) as folder:
-        return [
-            write_columns(folder / "tracking.csv", run.table),
-            write_document(folder / "tracking.json", document),
-            *save_figures({"tracking": run.plot()}, folder),
-        ]

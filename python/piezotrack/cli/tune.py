@@ -183,12 +183,11 @@ def _document(tuned: Tuned) -> dict[str, Any]:
 def _write(tuned: Tuned, document: dict[str, Any], out: Path) -> list[Path]:
     """Write report and controller as JSON, and a picture of the loop along each reference."""
     from .._support.files import make_folder, save_figures, together, write_document
-    from ..control.controller.controller_file import save_controller
 
     with together(make_folder(out)) as folder:
         pictures = {_name(i): run.plot() for i, run in enumerate(tuned.report.runs)}
         return [
             write_document(folder / "tuning.json", document),
-            save_controller(tuned.controller, folder / "controller.json", tuned.report),
+            tuned.controller.save(folder / "controller.json", report=tuned),
             *save_figures(pictures, folder),
         ]

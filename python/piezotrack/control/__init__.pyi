@@ -8,7 +8,7 @@ from .comparing.comparison import Cell as Cell
 from .comparing.comparison import ControllerComparison as ControllerComparison
 from .comparing.comparison import Row as Row
 from .controller.controller import Controller as Controller
-from .controller.controller_file import load_controller as load_controller
+from .controller.load import load_controller as load_controller
 from .controller.session import Command as Command
 from .controller.session import RefusedReadings as RefusedReadings
 from .controller.session import Session as Session
@@ -66,10 +66,3 @@ from .tuning.tune import tune as tune
 from .tuning.tuned import MarginReport as MarginReport
 from .tuning.tuned import Tuned as Tuned
 from .tuning.tuned import TuningReport as TuningReport
-from .views.contouring_plot import plot_contour_error as plot_contour_error
-from .views.contouring_plot import plot_magnified as plot_magnified
-from .views.contouring_plot import plot_path as plot_path
-from .views.tracking_plot import plot_effort as plot_effort
-from .views.tracking_plot import plot_error as plot_error
-from .views.tracking_plot import plot_following as plot_following
-from .views.tracking_plot import plot_motion as plot_motion

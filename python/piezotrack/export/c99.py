@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from .. import _core
-from ..control.controller.description import controller_text
 from ..errors import ParameterError
 from .c_check import check_code
 from .c_parts import parts_of, shape_of
@@ -164,7 +163,7 @@ def _facts(controller: Controller, size: int, operations: Operations, *, single:
     """Write what stands above both files."""
     kind = "float, rounded from the doubles of the controller" if single else "double"
     lines = [
-        f"{controller_text(controller)}",
+        f"{controller!r}",
         f"Written by piezotrack {_core.__version__}, piezotrack export --to c99; do not edit.",
         f"Numbers: {kind}. State: {size} bytes. A step that does not saturate:",
         f"{operations}.",

@@ -6,7 +6,6 @@ import math
 from typing import TYPE_CHECKING
 
 from .. import _core
-from ..control.controller.description import controller_text
 from ..control.laws.neural_network import NETWORK, NetworkInverse
 from .c99 import checked_name
 from .c_check import check_code
@@ -60,7 +59,7 @@ def library_sources(
     facts = "\n".join(
         f" * {line}"
         for line in (
-            controller_text(controller),
+            repr(controller),
             f"Written by piezotrack {_core.__version__}, piezotrack export --to library; do not "
             "edit.",
         )

@@ -15,12 +15,8 @@ from . import (
 from .references import RULES
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..control.loop.tracking import Tracking
     from .fig_12_14_tracking import Runs
     from .measured_log import Drives
     from .run import Experiments
@@ -129,21 +125,14 @@ def _grid(runs: Runs, names: dict[str, str], columns: tuple[str, ...]) -> Figure
     """Draw each run in a row."""
     from .._support.plot_style import legend_inside, whole
     from .._support.plot_style import panels as sheet
-    from ..control.views.tracking_plot import plot_effort, plot_error, plot_following, plot_motion
 
-    panels: dict[str, Callable[[Tracking, Axes], Axes]] = {
-        "motion": plot_motion,
-        "error": plot_error,
-        "following": plot_following,
-        "effort": plot_effort,
-    }
     figure = sheet(None, (12.0, 3.3 * len(names)))
     rows = figure.subfigures(len(names), 1, squeeze=False)[:, 0]
     for (key, title), row in zip(names.items(), rows, strict=True):
         run = runs[key]
         row.suptitle(f"{title}: {run.metrics}", fontsize="medium")
         for panel, ax in zip(columns, row.subplots(1, len(columns)), strict=True):
-            panels[panel](run, ax)
+            getattr(run, f"plot_{panel}")(ax=ax)
             if panel == "error":
                 # Scaled to the settled error; the smooth start is cropped.
                 reach = 1.25e6 * run.metrics.max_error

@@ -16,7 +16,6 @@ from .._support.plot_style import (
     panels,
     whole,
 )
-from ..control.views.contouring_plot import last_turn, plot_magnified
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,7 +49,7 @@ def plot_table_2(table: Table2, fig: Figure | SubFigure | None = None) -> Figure
     circles = figure.add_subplot(grid[0, :3])
     slow = [run for case, run in table.cases if case.frequency == 0.1]
     for run in slow:
-        plot_magnified(run, circles, factor=5.0)
+        run.plot_magnified(ax=circles, factor=5.0)
     heading(circles, "0.1 Hz, contour error \N{MULTIPLICATION SIGN} 5")
     # One name for the lines of all circles, and a square as without their legends.
     circles.set_ylim(top=circles.get_ylim()[0] + float(np.ptp(circles.get_xlim())))
@@ -67,7 +66,7 @@ def _over_angle(runs: Sequence[Contour], ax: Axes) -> None:
     """Plot the error of the last turn of each circle, offset from each other."""
     apart = 1.15 * max(1e6 * run.metrics.peak_to_peak for run in runs)
     for row, run in enumerate(runs):
-        part = last_turn(run)
+        part = run.last_turn
         angle = 360.0 * np.arange(part.sum()) / part.sum()
         ax.axhline(row * apart, **GUIDE)
         ax.plot(angle, row * apart + 1e6 * run.error[part], **{**ERROR, "linewidth": 0.8})

@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from statistics import fmean, median, stdev
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from ..views.comparison_table import comparison_html, comparison_text
+from ..._support.files import write_result
+from ..._support.result import Result
 
 if TYPE_CHECKING:
+    import os
     from collections.abc import Mapping, Sequence
-
-    from matplotlib.figure import Figure, SubFigure
+    from pathlib import Path
 
     from ..controller.controller import Controller
     from ..tuning.margins import Margins
@@ -141,7 +142,7 @@ def _deviation(draws: Sequence[float]) -> float:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class ControllerComparison:
+class ControllerComparison(Result):
     """Controllers side by side; printed, a table.
 
     Attributes
@@ -160,6 +161,12 @@ class ControllerComparison:
         Draws of the sensor's noise that each controller was judged by.
     """
 
+    views: ClassVar[Mapping[str, str]] = {
+        "summary": "control.views.comparison_table:comparison_text",
+        "html": "control.views.comparison_table:comparison_html",
+        "plot": "control.views.comparison_plot:plot_controllers",
+    }
+
     rows: tuple[Row, ...]
     references: tuple[str, ...]
     variants: tuple[str, ...]
@@ -170,12 +177,6 @@ class ControllerComparison:
 
     def __repr__(self) -> str:
         return f"<ControllerComparison of {len(self.rows)} controllers>"
-
-    def __str__(self) -> str:
-        return comparison_text(self)
-
-    def _repr_html_(self) -> str:
-        return comparison_html(self)
 
     def document(self) -> dict[str, Any]:
         """Content of a JSON file, SI.
@@ -209,22 +210,25 @@ class ControllerComparison:
             "refused": dict(self.refused),
         }
 
-    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
-        """Errors of each controller as tuned, and what becomes of them on other stages.
+    def save(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write the figures and the picture to a folder, in one go.
 
         Parameters
         ----------
-        fig : matplotlib.figure.Figure or SubFigure, optional
-            Where to draw; a new figure of pyplot where not given.
+        folder : path-like
+            It is made where it does not exist.
 
         Returns
         -------
-        matplotlib.figure.Figure
-            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
-        """
-        from ..views.comparison_plot import plot_controllers
+        list of pathlib.Path
+            ``controllers.json``, ``controllers.png`` and ``.svg``.
 
-        return plot_controllers(self, fig)
+        Raises
+        ------
+        DataError
+            The folder cannot be made or written to.
+        """
+        return write_result(folder, "controllers", self.document(), self.plot())
 
 
 def _figures_of(cell: Cell) -> dict[str, Any]:

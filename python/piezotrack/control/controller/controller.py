@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    Literal,
+    Protocol,
+    TypeAlias,
+    TypeVar,
+    runtime_checkable,
+)
 
 from ... import _core
 from ..._support.arguments import TOO_FAR, finite
 from ..._support.arrays import check_dt
+from ..._support.files import write_document
+from ..._support.units import shown_unit
 from ...errors import NumericalError, ParameterError
 from ...identification.fitted.identified_model import IdentifiedModel
 from ...stages.inverse import Inverse
@@ -17,18 +28,16 @@ from ..laws.hysteresis_observer import HysteresisObserver
 from ..laws.laws import NAMED_LAWS, DisturbanceObserver, LeadLag, PerturbationEstimator, SlidingMode
 from ..laws.scheduled_pid import ScheduledPid
 from ..plant import reach
-from .description import controller_text
 from .session import Session
 
 if TYPE_CHECKING:
     import os
     from pathlib import Path
 
-    from ..loop.stability import LoopReport
-    from ..tuning.tuned import Tuned, TuningReport
+__all__ = ["Controller", "DesignReport", "number_pair"]
 
-__all__ = ["Controller", "number_pair"]
-
+FORMAT = "piezotrack-controller"
+SCHEMA_VERSION = 1
 # The feedback laws.
 Feedback: TypeAlias = (
     Pid
@@ -45,6 +54,14 @@ REACH_STEP = 0.05
 DRIVE_UNITS = ("V", "m", "N")
 # Readings are valid up to this distance from 0 where nothing is known of the stage [m].
 WIDEST = 0.01
+
+
+@runtime_checkable
+class DesignReport(Protocol):
+    """Report of the margins of a controller, as `check_loop` and `tune` return it."""
+
+    def design(self) -> dict[str, Any]:
+        """Margins for the file of the controller: numbers, texts, lists and dicts only."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -214,7 +231,13 @@ class Controller:
         )
 
     def __repr__(self) -> str:
-        return controller_text(self)
+        low, high = self.limits
+        filters = f", {len(self.filters)} filters" if self.filters else ""
+        unit, scale = shown_unit(self.drive_unit)
+        return (
+            f"Controller({self.title}, {1.0 / self.dt:.6g} Hz, "
+            f"{scale * low:g} to {scale * high:g} {unit}{filters})"
+        )
 
     def __reduce__(self) -> tuple[Any, ...]:
         # The core's controller is made again.
@@ -257,12 +280,79 @@ class Controller:
         """Where the file came from that the controller was read from; None without a file."""
         return self._provenance
 
-    def save(
-        self,
-        path: str | os.PathLike[str],
-        *,
-        report: LoopReport | TuningReport | Tuned | None = None,
-    ) -> Path:
+    @property
+    def title(self) -> str:
+        """Names of the parts, such as feedforward (Prandtl-Ishlinskii) + PID."""
+        parts = []
+        if self.feedforward is not None:
+            parts.append(f"feedforward ({self.feedforward.stage.info.title})")
+        if isinstance(self.feedback, Pid):
+            parts.append("PID")
+        elif isinstance(self.feedback, StateSpace):
+            parts.append("state-space feedback")
+        elif self.feedback is not None:
+            parts.append(self.feedback.title)
+        if self.repetitive is not None:
+            parts.append("repetitive control")
+        return " + ".join(parts) or "no control"
+
+    def document(self, *, report: DesignReport | None = None) -> dict[str, Any]:
+        """Content of the file of the controller.
+
+        Parameters
+        ----------
+        report : LoopReport, TuningReport or Tuned, optional
+            As in `save`.
+
+        Returns
+        -------
+        dict
+            Of numbers, texts, lists and dicts only.
+
+        Raises
+        ------
+        ParameterError
+            `report` is of another controller, or the feedforward is none that a file can hold.
+        """
+        from ..laws.file_entries import part_entry
+        from .controller_file import digest, feedback_entry, inverse_entry
+
+        drive, learner = self.drive_unit, self.repetitive
+        forward = inverse_entry(self.feedforward, drive)
+        jump = None if self.max_jump is None else float(self.max_jump)
+        return {
+            "format": FORMAT,
+            "schema_version": SCHEMA_VERSION,
+            "drive_unit": drive,
+            "dt_s": float(self.dt),
+            f"limits_{drive}": list(self.limits),
+            "span_m": None if self.span is None else [float(end) for end in self.span],
+            "max_jump_m": "inf" if jump == math.inf else jump,
+            "feedforward": forward,
+            "feedback": feedback_entry(self.feedback, drive),
+            "repetitive": None if learner is None else part_entry(learner, drive),
+            "filters": [part_entry(filter_, drive) for filter_ in self.filters],
+            "provenance": {
+                "package": "piezotrack",
+                "version": _core.__version__,
+                "model_sha256": None if forward is None else digest(forward["stage"]),
+                "design": self._design(report),
+            },
+        }
+
+    def _design(self, report: DesignReport | None) -> dict[str, Any] | None:
+        """Margins at design: of a report, or else of the file that this was read from."""
+        if report is None:
+            return None if self.provenance is None else self.provenance.get("design")
+        if not isinstance(report, DesignReport):
+            raise ParameterError(
+                f"report is {type(report).__name__}: expected what pt.check_loop or pt.tune returns"
+            )
+        if getattr(report, "controller", self) != self:
+            raise ParameterError("report is of another controller: expected that of this one")
+        return report.design()
+
+    def save(self, path: str | os.PathLike[str], *, report: DesignReport | None = None) -> Path:
         """Write the controller as JSON, for `load_controller` and for ``piezotrack export``.
 
         Settings have their units in their names. The file says by which version it was written, the
@@ -297,9 +387,7 @@ class Controller:
         >>> loop.save("loop.json", report=margins).name
         'loop.json'
         """
-        from .controller_file import save_controller
-
-        return save_controller(self, path, report)
+        return write_document(path, self.document(report=report))
 
 
 T = TypeVar("T")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from ... import _core
 from ..._support.arguments import finite
@@ -12,8 +12,7 @@ from ..._support.units import shown_unit
 from ...errors import ParameterError
 
 if TYPE_CHECKING:
-    from ...stages.inverse import InverseSession
-    from .controller import Controller
+    from ...stages.inverse import Inverse, InverseSession
 
 __all__ = ["Command", "RefusedReadings", "Session"]
 
@@ -73,6 +72,35 @@ class RefusedReadings(NamedTuple):
 FAR = 10.0
 
 
+class Configuration(Protocol):
+    """Parts of a `Controller` that a session steps.
+
+    Attributes
+    ----------
+    dt : float
+        Sampling interval [s].
+    limits : (float, float)
+        Lowest and highest voltage [V].
+    feedforward : Inverse or None
+        The inverse.
+    drive_unit : str
+        Unit of the commands, for what is printed.
+    """
+
+    @property
+    def dt(self) -> float: ...
+    @property
+    def limits(self) -> tuple[float, float]: ...
+    @property
+    def feedforward(self) -> Inverse | None: ...
+    @property
+    def drive_unit(self) -> str: ...
+    @property
+    def _valid(self) -> tuple[float, float]: ...
+    @property
+    def _core(self) -> _core.Controller: ...
+
+
 class Session:
     """A running controller: one call of `step` in each sampling interval.
 
@@ -86,7 +114,7 @@ class Session:
         Voltage for a bumpless start [V].
     """
 
-    def __init__(self, controller: Controller, present: float | None = None) -> None:
+    def __init__(self, controller: Configuration, present: float | None = None) -> None:
         self._controller = controller
         self._core = controller._core.start(
             None if present is None else _core.as_number("present", present)
@@ -267,7 +295,7 @@ class Session:
         if self._inverse is not None and (reached := self._core.reached()) is not None:
             self._inverse.applied(reached)
 
-    def retune(self, controller: Controller) -> None:
+    def retune(self, controller: Configuration) -> None:
         """Change gains, filters, limits and span without a bump.
 
         Where only the gains of a `Pid` change, its state is kept. Otherwise the feedback starts
@@ -319,7 +347,7 @@ def _metres(name: str, value: float) -> float:
 
 
 def _resumed(
-    kind: type[Session], controller: Controller, state: bytes, inverse: InverseSession | None
+    kind: type[Session], controller: Configuration, state: bytes, inverse: InverseSession | None
 ) -> Session:
     session = kind(controller)
     session._core.load(state)

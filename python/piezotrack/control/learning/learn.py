@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from ... import _core
 from ..._support.arguments import given_or
 from ..._support.files import write_columns
+from ..._support.result import Result
 from ..._support.units import drive_word, shown_unit
 from ...errors import DataError, DeviceError, Interrupted, ParameterError
 from ...hardware.device import Device
 from ...hardware.measuring import rest_of
 from ..controller.controller import Controller
-from ..loop.preconditions import check_drive_unit, check_stable, check_within_reach
+from ..loop.preconditions import check_drive_unit
+from ..loop.run import Run
 from ..on_device.playing import check_playable
 from ..plant import plant_of, timing_on
 from ..timing import Timing
@@ -25,9 +27,8 @@ from .trials import PlayedTrials, SimulatedTrials
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
-    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
     from ...identification.fitted.identified_model import IdentifiedModel
@@ -40,37 +41,14 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Learning", "heading", "learn", "trial_line"]
+__all__ = ["Learning", "learn"]
 
 MOST_TRIALS = 10_000
-WHY = {
-    "noise": "what repeats in the error is not distinguishable from the noise",
-    "no change": "the error falls no further",
-    "grows": "the error grows",
-    "trials": "all trials were made",
-    "interrupted": "it was interrupted, or the device failed",
-}
-
-
-def heading(learner: IterativeLearning) -> str:
-    """Write what is known before the first trial, and the titles of the table of trials."""
-    kind = {"frequency": "settled period", "lifted": "whole motion from rest"}
-    return (
-        f"{learner.reference!r}, {kind[learner.method]}, cutoff {learner.cutoff:.4g} Hz\n"
-        f"{learner.convergence}\n{'trial':>5}  {'rms nm':>9}  {'max nm':>9}  {'noise nm':>9}"
-    )
-
-
-def trial_line(place: int, trial: LearningTrial) -> str:
-    """Write a line of the table of trials."""
-    noise = "" if trial.noise is None else f"{1e9 * trial.noise:.4g}"
-    rms, most = 1e9 * trial.rms_error, 1e9 * trial.max_error
-    return f"{place:>5}  {rms:>9.4g}  {most:>9.4g}  {noise:>9}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Learning:
-    """A voltage table that was learnt.
+class Learning(Result):
+    """A voltage table that was learnt; printed, a table of the trials.
 
     Attributes
     ----------
@@ -87,6 +65,11 @@ class Learning:
     first, final : Tracking
         The runs of the first trial and of the best.
     """
+
+    views: ClassVar[Mapping[str, str]] = {
+        "summary": "control.views.learning_text:learning_text",
+        "plot": "control.views.learning_plot:plot_learning",
+    }
 
     learner: IterativeLearning
     trials: tuple[LearningTrial, ...]
@@ -119,30 +102,48 @@ class Learning:
         """What a trial leaves of the distance to the final table, on each of the models."""
         return self.learner.convergence
 
-    def summary(self) -> str:
-        """Table of the trials.
+    def document(self) -> dict[str, Any]:
+        """Content of the JSON file.
 
         Returns
         -------
-        str
-            Several lines.
+        dict
+            Of numbers, texts, lists and dicts only.
         """
-        lines = [heading(self.learner)]
-        for i, one in enumerate(self.trials):
-            lines.append(trial_line(i, one) + (" *" if i == self.best else ""))
-        return "\n".join([*lines, *self.outcome()])
-
-    def outcome(self) -> list[str]:
-        """Say why it ended, and whether the table is at a limit.
-
-        Returns
-        -------
-        list of str
-            Lines.
-        """
-        clipped = self.trials[self.best].clipped
-        limited = f"the table is at a limit in {100.0 * clipped:.1f} % of its samples"
-        return [*([limited] if clipped > 0.0 else []), f"ended: {WHY[self.stopped]}"]
+        learner, convergence = self.learner, self.convergence
+        return {
+            "format": "piezotrack-learning",
+            "schema_version": 1,
+            "reference": repr(learner.reference),
+            "dt": {"value": learner.controller.dt, "unit": "s"},
+            "limits": {
+                "value": list(learner.controller.limits),
+                "unit": learner.controller.drive_unit,
+            },
+            "method": learner.method,
+            "cutoff": {"value": learner.cutoff, "unit": "Hz"},
+            "convergence": {
+                "factor": convergence.factor,
+                "models": [
+                    {"model": name, "factor": factor, "frequency": frequency}
+                    for name, factor, frequency in convergence.cases
+                ],
+            },
+            "unit": "errors in m, frequencies in Hz",
+            "trials": [
+                {
+                    "rms_error": trial.rms_error,
+                    "max_error": trial.max_error,
+                    "noise": trial.noise,
+                    "clipped": trial.clipped,
+                }
+                for trial in self.trials
+            ],
+            "best": self.best,
+            "feedforward": self.final.note,
+            "stopped": self.stopped,
+            "provenance": {"package": "piezotrack", "version": _core.__version__},
+        }
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the best table as a CSV file: time, desired displacement, voltage.
@@ -173,23 +174,6 @@ class Learning:
                 f"feedforward_{unit}": scale * self.learner.feedforward,
             },
         )
-
-    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
-        """Errors of the first and the best trial, their tables, and the rms error of all trials.
-
-        Parameters
-        ----------
-        fig : matplotlib.figure.Figure or SubFigure, optional
-            Where to draw; a new figure of pyplot where not given.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
-        """
-        from ..views.learning_plot import plot_learning
-
-        return plot_learning(self, fig)
 
 
 def learn(
@@ -307,10 +291,9 @@ def learn(
         noise=noise,
     )
     check_drive_unit(behind, controller)
-    check_stable(plant, controller, timing.delay)
-    if not _core.as_truth("beyond_reach", beyond_reach):
-        samples = reference.sample(controller.dt)
-        check_within_reach(plant, controller.limits, samples, controller.drive_unit)
+    Run(controller, reference).check(
+        plant, timing.delay, beyond_reach=_core.as_truth("beyond_reach", beyond_reach)
+    )
     most = _counted("trials", trials, MOST_TRIALS)
     periods = {
         "settle": _counted("settle", settle, 1000),

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..loop.closed_loop import run_closed_loop
-from ..loop.tracking import collected
+from ...stages.inverse import PlayedVoltage
+from ..loop.run import Run
 from ..on_device.playing import played_on
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...hardware.device import Device
-    from ...references.reference import Reference
     from ...stages.virtual import VirtualStage
     from ..loop.tracking import Tracking
     from ..timing import Timing
@@ -57,38 +57,41 @@ class Trials(ABC):
         kept = 1 if self.learner.method == "lifted" else self.repeats
         return run.measured[run.measured.size - kept * count :].reshape(kept, count)
 
-    def whole(self) -> Reference:
-        """Return the reference of a run."""
-        reference = self.learner.reference
+    @cached_property
+    def whole(self) -> Run:
+        """The run of a trial: of the motion, or of as many periods as are played."""
+        reference, controller = self.learner.reference, self.learner.controller
         if self.learner.method == "lifted" or reference.period is None:
-            return reference
-        inverse = self.learner.controller.feedforward
+            return Run(controller, reference)
+        inverse = controller.feedforward
         started = int(np.ceil(reference.ramp / reference.period - 1e-9))
         # Until the table begins to repeat, and as many periods for the stage to follow.
         head = max(1 if inverse is None else inverse.settle, started) + self.settle
-        return replace(reference, duration=(head + self.repeats) * reference.period)
+        duration = (head + self.repeats) * reference.period
+        return Run(controller, replace(reference, duration=duration))
 
-    def voltage(self, whole: Reference, table: Array) -> Array:
+    def voltage(self, table: Array) -> Array:
         """Return the voltage along a run [V]: the feedforward with what was learnt."""
-        learner = self.learner
-        t = whole.sample(learner.controller.dt).t
-        learnt, played = table - learner.feedforward, np.zeros(t.size)
-        if learner.controller.feedforward is not None:
-            played = self._feedforward(whole)
-        if learner.method == "lifted":
+        learnt, played = table - self.learner.feedforward, self._feedforward
+        if self.learner.method == "lifted":
             return played + learnt
-        total: Array = played + np.resize(learnt, played.size) * _start(t, whole.ramp)
+        start = _start(self.whole.samples.t, self.whole.reference.ramp)
+        total: Array = played + np.resize(learnt, played.size) * start
         return total
 
-    def _feedforward(self, whole: Reference) -> Array:
-        """Return the controller's own feedforward along a run [V]."""
-        inverse, dt = self.learner.controller.feedforward, self.learner.controller.dt
-        assert inverse is not None
+    @cached_property
+    def _feedforward(self) -> Array:
+        """The controller's feedforward along a run [V]."""
+        controller, samples = self.learner.controller, self.whole.samples
+        if controller.feedforward is None:
+            return np.zeros(len(samples))
         if self.learner.method == "lifted":
             return self.learner.feedforward
         # Always from a table: what is learnt is added to the same voltage in each period.
-        as_table = replace(inverse, playback="table")
-        return as_table.played(whole, dt, limits=self.learner.controller.limits).voltage
+        as_table = replace(controller.feedforward, playback="table")
+        return as_table.played(
+            self.whole.reference, controller.dt, samples=samples, limits=controller.limits
+        ).voltage
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -108,14 +111,11 @@ class SimulatedTrials(Trials):
 
     def run(self, table: Array, trial: int, repeat: int = 0) -> Tracking:
         """Simulate a trial with noise of its own."""
-        sensor, controller = self.plant.sensor, self.learner.controller
+        sensor = self.plant.sensor
         seed = (sensor.seed + trial * self.repeats + repeat) % 2**63
         plant = replace(self.plant, sensor=replace(sensor, seed=seed))
-        whole = self.whole()
-        samples = whole.sample(controller.dt)
-        volts = self.voltage(whole, table)
-        run = run_closed_loop(plant, controller, samples.x, volts, self.timing, SUBSTEPS)
-        return collected(run, controller, whole, samples, NOTE, SUBSTEPS)
+        feedforward = PlayedVoltage(self.voltage(table), NOTE)
+        return self.whole.simulate(plant, feedforward, self.timing, SUBSTEPS)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -136,9 +136,8 @@ class PlayedTrials(Trials):
     def run(self, table: Array, trial: int, repeat: int = 0) -> Tracking:
         """Play a trial; what is random is the device's own."""
         del trial, repeat
-        whole = self.whole()
-        volts = np.clip(self.voltage(whole, table), *self.learner.controller.limits)
-        return played_on(self.device, self.learner.controller, whole, volts, NOTE, rest=self.rest)
+        volts = np.clip(self.voltage(table), *self.learner.controller.limits)
+        return played_on(self.device, self.whole, volts, NOTE, rest=self.rest)
 
 
 def _start(t: Array, ramp: float) -> Array:

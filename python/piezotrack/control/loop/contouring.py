@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from ... import _core
+from ..._support.files import write_result
 from ..._support.frames import frame_of
+from ..._support.result import Result
 from ..._support.statistics import ErrorStatistics
 from ..._support.units import drive_word, shown_unit
 from ...errors import ParameterError
@@ -17,28 +19,33 @@ from ...references.xy_reference import XYReference, square_matrix
 from ...stages.xy import XYStage
 from ..controller.controller import Controller, number_pair
 from ..plant import reach, resting, timing_on
-from .preconditions import check_period, check_stable, check_within_reach
-from .tracking import Tracking, collected, feedforward_of
+from .run import Run
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    import os
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
 
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.axes import Axes
     from numpy.typing import ArrayLike, NDArray
 
     from ..timing import Timing
+    from .tracking import Tracking
 
     Array = NDArray[np.float64]
 
-__all__ = ["Contour", "Workspace", "contour", "workspace"]
+__all__ = ["Contour", "Workspace", "contour", "spread_text", "workspace"]
 
 # Distance of the path's start from the stage that is noted, as a part of the path's size.
 JUMP = 0.05
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Contour:
-    """A contouring run.
+class Contour(Result):
+    """A contouring run; printed, its contour error and the metrics of each axis.
+
+    Its picture shows path and positions, the error magnified along the path, and the errors over
+    time; each alone, in axes of your own, is a method, as `plot_path`.
 
     Attributes
     ----------
@@ -49,12 +56,20 @@ class Contour:
         displacement, voltage and its parts. Both sensors are read at the instants ``t``.
     """
 
+    views: ClassVar[Mapping[str, str]] = {
+        "summary": "control.views.contouring_text:contour_text",
+        "plot": "control.views.contouring_plot:plot_contour",
+        "plot_path": "control.views.contouring_plot:plot_path",
+        "plot_magnified": "control.views.contouring_plot:plot_magnified",
+        "plot_contour_error": "control.views.contouring_plot:plot_contour_error",
+    }
+
     path: XYReference
     x: Tracking
     y: Tracking
 
     def __repr__(self) -> str:
-        return f"<Contour of {self.path!r}: {_words(self.metrics)}>"
+        return f"<Contour of {self.path!r}: {spread_text(self.metrics)}>"
 
     @property
     def t(self) -> Array:
@@ -143,25 +158,6 @@ class Contour:
         """
         return frame_of(self.table)
 
-    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
-        """Plot path and positions, the error magnified along the path, and the errors over time.
-
-        One panel alone, in axes of your own: `plot_path`, `plot_magnified`, `plot_contour_error`.
-
-        Parameters
-        ----------
-        fig : matplotlib.figure.Figure or SubFigure, optional
-            Where to draw; a new figure of pyplot where not given.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
-        """
-        from ..views.contouring_plot import plot_contour
-
-        return plot_contour(self, fig)
-
     @property
     def notes(self) -> list[str]:
         """Notes on the run, such as a path that begins away from the stage."""
@@ -174,29 +170,146 @@ class Contour:
             "there: let the path begin at the origin, (0, 0), or with a smooth start"
         ]
 
-    def summary(self) -> str:
-        """Table of the run: contour error, and each axis.
+    @property
+    def last_turn(self) -> NDArray[np.bool_]:
+        """Samples of the last turn, of shape (n,); all settled ones where the path is run once."""
+        turn, start = self.path.period, self.settled
+        if turn is not None:
+            start = max(start, self.t[-1] + self.x.controller.dt - turn)
+        last: NDArray[np.bool_] = self.t >= start - 1e-9
+        return last
+
+    def document(self) -> dict[str, Any]:
+        """Content of the JSON file.
 
         Returns
         -------
-        str
-            Several lines.
+        dict
+            Of numbers, texts, lists and dicts only.
         """
-        since = f"from {self.settled:g} s on" if self.settled else "all of it"
-        return "\n".join(
-            [
-                f"{self.path!r} at {1.0 / self.x.controller.dt:g} Hz; {self.x.note}",
-                *(f"note  {note}" for note in self.notes),
-                f"contour error {since}, signed, positive to the left of the path",
-                f"  measured: {_words(self.metrics)}",
-                f"  true, between the samples too: {_words(self.score(true=True))}",
-                f"x: {self.x.metrics}",
-                f"y: {self.y.metrics}",
-            ]
-        )
+        return {
+            "format": "piezotrack-contour",
+            "schema_version": 1,
+            "path": repr(self.path),
+            "unit": "errors in m, phase lag in rad, widest loop as a part of the travel",
+            "from_s": self.settled,
+            "contour": asdict(self.metrics),
+            "contour_true": asdict(self.score(true=True)),
+            "x": asdict(self.x.metrics),
+            "y": asdict(self.y.metrics),
+            "feedforward": self.x.note,
+            "notes": self.notes,
+            "provenance": {"package": "piezotrack", "version": _core.__version__},
+        }
+
+    def save(
+        self, folder: str | os.PathLike[str], *, entries: Mapping[str, Any] | None = None
+    ) -> list[Path]:
+        """Write samples, metrics and picture to a folder, in one go.
+
+        Parameters
+        ----------
+        folder : path-like
+            It is made where it does not exist.
+        entries : mapping, optional
+            More entries of the JSON file, which replace those of `document`.
+
+        Returns
+        -------
+        list of pathlib.Path
+            ``contour.csv``, ``contour.json``, ``contour.png`` and ``.svg``.
+
+        Raises
+        ------
+        DataError
+            The folder cannot be made or written to.
+        """
+        document = self.document() | dict(entries or {})
+        return write_result(folder, "contour", document, self.plot(), self.table)
+
+    def plot_path(self, *, ax: Axes | None = None) -> Axes:
+        """Plot the path and the measured positions in the plane, with the smooth start.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw in; default those of a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            With the picture.
+
+        Examples
+        --------
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> stage = pt.XYStage.xu_li_2010(seed=1)
+        >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+        >>> run = pt.contour(stage, (loop, loop), pt.circle(frequency=0.5, radius=10e-6))
+        >>> ax = run.plot_path(ax=Figure().subplots())
+        >>> ax.get_ylabel()
+        'y [um]'
+        """
+        return self._panel("plot_path", ax)
+
+    def plot_magnified(self, *, ax: Axes | None = None, factor: float | None = None) -> Axes:
+        """Plot the contour error, magnified, along the path.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw in; default those of a new figure.
+        factor : float, optional
+            Magnification; default a round number that keeps the errors readable.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            With the picture.
+
+        Examples
+        --------
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> stage = pt.XYStage.xu_li_2010(seed=1)
+        >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+        >>> run = pt.contour(stage, (loop, loop), pt.circle(frequency=0.5, radius=10e-6))
+        >>> ax = run.plot_magnified(ax=Figure().subplots())
+        >>> ax.get_ylabel()
+        'y [um]'
+        """
+        return self._panel("plot_magnified", ax, factor=factor)
+
+    def plot_contour_error(self, *, ax: Axes | None = None) -> Axes:
+        """Plot the measured contour error over the last turn, with mean and standard deviation.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw in; default those of a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            With the picture.
+
+        Examples
+        --------
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> stage = pt.XYStage.xu_li_2010(seed=1)
+        >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+        >>> run = pt.contour(stage, (loop, loop), pt.circle(frequency=0.5, radius=10e-6))
+        >>> ax = run.plot_contour_error(ax=Figure().subplots())
+        >>> ax.get_ylabel()
+        'contour error [um]'
+        """
+        return self._panel("plot_contour_error", ax)
 
 
-def _words(spread: ErrorStatistics) -> str:
+def spread_text(spread: ErrorStatistics) -> str:
+    """Write peak to peak, mean and standard deviation of a contour error."""
     return (
         f"peak to peak {1e6 * spread.peak_to_peak:.3f} um, mean {1e6 * spread.mean_error:.3f} um, "
         f"SD {1e6 * spread.sd_error:.3f} um"
@@ -271,38 +384,35 @@ def contour(
         raise ParameterError(f"path is {type(path).__name__}: expected pt.XYReference")
     both = _two(controllers)
     substeps = _core.as_count("substeps", substeps)
-    offsets = stage.x.sensor.offset, stage.y.sensor.offset
-    forward = path if decoupling is None else path.transformed(_inverse(decoupling), offsets)
-    free = (_core.as_truth("unstable", unstable), _core.as_truth("beyond_reach", beyond_reach))
-    samples, voltages, timings = [], [], []
-    parts = zip("xy", (stage.x, stage.y), both, path.axes, forward.axes, strict=True)
-    for name, axis, controller, reference, ahead in parts:
-        samples.append(reference.sample(controller.dt))
-        timings.append(timing_on(axis, timing, controller.limits))
+    free = {
+        "unstable": _core.as_truth("unstable", unstable),
+        "beyond_reach": _core.as_truth("beyond_reach", beyond_reach),
+    }
+    x, y = _runs(both, path)
+    of_x = timing_on(stage.x, timing, x.controller.limits)
+    of_y = timing_on(stage.y, timing, y.controller.limits)
+    for name, axis, run in (("x", stage.x, x), ("y", stage.y, y)):
         try:
-            check_period(controller, reference)
-            if not free[0]:
-                check_stable(axis, controller, timings[-1].delay)
-            if not free[1]:
-                check_within_reach(axis, controller.limits, samples[-1], controller.drive_unit)
+            run.check(axis, of_x.delay, **free)
         except ParameterError as error:
             raise ParameterError(f"{name}: {error}") from None
-        along = samples[-1] if ahead is reference else ahead.sample(controller.dt)
-        voltages.append(feedforward_of(controller, ahead, along))
-    runs = stage._core.track(
-        (both[0]._core, both[1]._core),
-        (samples[0].x, samples[1].x),
-        (voltages[0][0], voltages[1][0]),
-        (timings[0], timings[1]),
+    ahead = x, y
+    if decoupling is not None:
+        offsets = stage.x.sensor.offset, stage.y.sensor.offset
+        ahead = _runs(both, path.transformed(_inverse(decoupling), offsets))
+    (volts_x, note_x), (volts_y, note_y) = (run.feedforward for run in ahead)
+    tracked_x, tracked_y = stage._core.track(
+        (x.controller._core, y.controller._core),
+        (x.samples.x, y.samples.x),
+        (volts_x, volts_y),
+        (of_x, of_y),
         substeps,
     )
-    x, y = (
-        collected(run, controller, reference, sampled, note, substeps)
-        for run, controller, reference, sampled, (_, note) in zip(
-            runs, both, path.axes, samples, voltages, strict=True
-        )
+    return Contour(
+        path=path,
+        x=x.collect(tracked_x, note_x, substeps),
+        y=y.collect(tracked_y, note_y, substeps),
     )
-    return Contour(path=path, x=x, y=y)
 
 
 class Workspace(NamedTuple):
@@ -377,6 +487,12 @@ def _two(controllers: Sequence[Controller]) -> tuple[Controller, Controller]:
     if x.dt != y.dt:
         raise ParameterError(f"dt of y is {y.dt:g} s: expected that of x, {x.dt:g} s")
     return x, y
+
+
+def _runs(both: tuple[Controller, Controller], path: XYReference) -> tuple[Run, Run]:
+    """Return the runs of both axes along a path."""
+    x, y = both
+    return Run(x, path.x), Run(y, path.y)
 
 
 def _inverse(matrix: ArrayLike) -> Array:

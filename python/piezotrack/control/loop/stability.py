@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from ... import _core
 from ..._support.arguments import not_negative
+from ..._support.result import Result
 from ..._support.units import shown_unit
 from ...errors import ParameterError
 from ..plant import linearised_plants, plant_of
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure, SubFigure
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from ...identification.fitted.identified_model import IdentifiedModel
@@ -109,6 +111,25 @@ class LoopCheck:
             text += f", learns in {self.periods:.2g} periods"
         return text
 
+    def margins(self) -> dict[str, Any]:
+        """Margins as plain numbers, with their units in the names.
+
+        Returns
+        -------
+        dict
+            Of numbers, truths and None only.
+        """
+        return {
+            f"plant_gain_m_per_{self.drive_unit}": self.gain,
+            "stable": self.stable,
+            "gain_margin": self.gain_margin,
+            "phase_margin_rad": self.phase_margin,
+            "delay_margin_s": self.delay_margin,
+            "crossover_Hz": self.crossover,
+            "sensitivity": self.sensitivity,
+            "learning_periods": self.periods,
+        }
+
     def _gains(self) -> str:
         """Describe where the whole loop is stable."""
         if self.stable_gains is None:
@@ -141,7 +162,7 @@ class LoopResponse:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LoopReport:
+class LoopReport(Result):
     """Stability of the loop at the lowest, a middle and the highest small-signal gain of a stage.
 
     With hysteresis the gain depends on the path: it is least just after a reversal.
@@ -155,6 +176,11 @@ class LoopReport:
     plant : LoopPlant
         The stage linearised at the middle gain, as an object of the core.
     """
+
+    views: ClassVar[Mapping[str, str]] = {
+        "summary": "control.views.stability_text:loop_text",
+        "plot": "control.views.stability_plot:plot_loop_report",
+    }
 
     controller: Controller
     low: LoopCheck
@@ -176,15 +202,20 @@ class LoopReport:
         elsewhere = "" if self.everywhere == self.stable else "; not at every gain of the stage"
         return f"<LoopReport at {self.middle}{elsewhere}>"
 
-    def __str__(self) -> str:
-        lines = [f"{name:<7} {one}" for name, one in self._cases]
-        if self.middle.hint:
-            lines.append(f"hint: {self.middle.hint}")
-        return "\n".join(lines)
-
     @property
-    def _cases(self) -> tuple[tuple[str, LoopCheck], ...]:
+    def cases(self) -> tuple[tuple[str, LoopCheck], ...]:
+        """Name and stability at each gain."""
         return ("low", self.low), ("middle", self.middle), ("high", self.high)
+
+    def design(self) -> dict[str, Any]:
+        """Margins for the file of the controller, at all three gains.
+
+        Returns
+        -------
+        dict
+            Of numbers, texts, lists and dicts only.
+        """
+        return {"by": "check_loop"} | {name: case.margins() for name, case in self.cases}
 
     def response(self, count: int = 400) -> LoopResponse:
         """Frequency response at the middle gain, up to half the sampling rate.
@@ -216,23 +247,6 @@ class LoopReport:
             complementary=complementary,
             learning=np.asarray(learning),
         )
-
-    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
-        """Plot open loop, sensitivity and, with a repetitive part, the error left by a period.
-
-        Parameters
-        ----------
-        fig : matplotlib.figure.Figure or SubFigure, optional
-            Where to draw; a new figure of pyplot where not given.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
-        """
-        from ..views.stability_plot import plot_loop_report
-
-        return plot_loop_report(self, fig)
 
 
 def check_loop(

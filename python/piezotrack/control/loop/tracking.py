@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from ... import _core
 from ..._support.arguments import not_negative
+from ..._support.files import write_result
 from ..._support.frames import frame_of
+from ..._support.result import Result
 from ..._support.statistics import FIGURES, ErrorStatistics
 from ..._support.units import drive_word, shown_unit
 from ...errors import ParameterError
 from ...stages.inverse import PlayedVoltage
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure, SubFigure
+    import os
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
     from ...references.reference import Reference, SampledReference
@@ -58,8 +64,11 @@ class Metrics(ErrorStatistics):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Tracking:
-    """A tracked motion.
+class Tracking(Result):
+    """A tracked motion; printed, a table of its metrics.
+
+    Its picture shows motion, error, actual against desired, and the voltage with its parts; each
+    alone, in axes of your own, is a method, as `plot_error`.
 
     Attributes
     ----------
@@ -87,6 +96,15 @@ class Tracking:
     note : str
         Description of the feedforward.
     """
+
+    views: ClassVar[Mapping[str, str]] = {
+        "summary": "control.views.tracking_text:tracking_text",
+        "plot": "control.views.tracking_plot:plot_tracking",
+        "plot_motion": "control.views.tracking_plot:plot_motion",
+        "plot_error": "control.views.tracking_plot:plot_error",
+        "plot_following": "control.views.tracking_plot:plot_following",
+        "plot_effort": "control.views.tracking_plot:plot_effort",
+    }
 
     reference: Reference
     controller: Controller
@@ -234,47 +252,165 @@ class Tracking:
         """
         return frame_of(self.table)
 
-    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
-        """Desired and actual motion, error, actual against desired, and the parts of the voltage.
+    def document(self) -> dict[str, Any]:
+        """Content of the JSON file.
 
-        One panel alone, in axes of your own: `plot_motion`, `plot_error`, `plot_following`,
-        `plot_effort`.
+        Returns
+        -------
+        dict
+            Of numbers, texts, lists and dicts only.
+        """
+        loop = self.controller
+        law, learner = loop.feedback, loop.repetitive
+        return {
+            "format": "piezotrack-tracking",
+            "schema_version": 1,
+            "reference": repr(self.reference),
+            "dt": {"value": loop.dt, "unit": "s"},
+            "limits": {
+                "value": list(loop.limits),
+                "unit": loop.drive_unit,
+            },
+            "feedback": None if law is None else repr(law),
+            "repetitive": None if learner is None else repr(learner),
+            "feedforward": self.note,
+            "unit": "errors in m, phase lag in rad, widest loop as a part of the travel",
+            "from_s": self.settled,
+            "metrics": asdict(self.metrics),
+            "periods": [asdict(period) for period in self.periods],
+            "model_drive_range": None,
+            "notes": [],
+            "provenance": {"package": "piezotrack", "version": _core.__version__},
+        }
+
+    def save(
+        self, folder: str | os.PathLike[str], *, entries: Mapping[str, Any] | None = None
+    ) -> list[Path]:
+        """Write samples, metrics and picture to a folder, in one go.
 
         Parameters
         ----------
-        fig : matplotlib.figure.Figure or SubFigure, optional
-            Where to draw; a new figure of pyplot where not given.
+        folder : path-like
+            It is made where it does not exist.
+        entries : mapping, optional
+            More entries of the JSON file, which replace those of `document`.
 
         Returns
         -------
-        matplotlib.figure.Figure
-            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
+        list of pathlib.Path
+            ``tracking.csv``, ``tracking.json``, ``tracking.png`` and ``.svg``.
+
+        Raises
+        ------
+        DataError
+            The folder cannot be made or written to.
         """
-        from ..views.tracking_plot import plot_tracking
+        document = self.document() | dict(entries or {})
+        return write_result(folder, "tracking", document, self.plot(), self.table)
 
-        return plot_tracking(self, fig)
+    def plot_motion(self, *, ax: Axes | None = None) -> Axes:
+        """Plot desired and actual displacement over time.
 
-    def summary(self) -> str:
-        """Table of the run: all of it, and period by period.
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw in; default those of a new figure.
 
         Returns
         -------
-        str
-            Several lines.
+        matplotlib.axes.Axes
+            With the picture.
+
+        Examples
+        --------
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> stage = pt.DahlStage.xu_li_2010()
+        >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
+        >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
+        >>> ax = run.plot_motion(ax=Figure().subplots())
+        >>> ax.get_ylabel()
+        'displacement [um]'
         """
-        lines = [f"{self.reference!r} at {1.0 / self.controller.dt:g} Hz; {self.note}"]
-        since = f"from {self.settled:g} s on" if self.settled else "all of it"
-        lines.append(f"{since}: {self.metrics}")
-        if self.saturated.any():
-            lines.append(f"clipped in {100.0 * self.saturated.mean():.1f} % of the samples")
-        if self.periods:
-            lines.append("period  max um  rms um  mean um")
-            lines += [
-                f"{i:>6}  {1e6 * one.max_error:>6.3f}  {1e6 * one.rms_error:>6.3f}  "
-                f"{1e6 * one.mean_error:>7.3f}"
-                for i, one in enumerate(self.periods, 1)
-            ]
-        return "\n".join(lines)
+        return self._panel("plot_motion", ax)
+
+    def plot_error(self, *, ax: Axes | None = None) -> Axes:
+        """Plot the measured tracking error over time, and the largest of each period.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw in; default those of a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            With the picture.
+
+        Examples
+        --------
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> stage = pt.DahlStage.xu_li_2010()
+        >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
+        >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
+        >>> ax = run.plot_error(ax=Figure().subplots())
+        >>> ax.get_ylabel()
+        'tracking error [um]'
+        """
+        return self._panel("plot_error", ax)
+
+    def plot_following(self, *, ax: Axes | None = None) -> Axes:
+        """Plot actual against desired displacement, from the settled time on.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw in; default those of a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            With the picture.
+
+        Examples
+        --------
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> stage = pt.DahlStage.xu_li_2010()
+        >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
+        >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
+        >>> ax = run.plot_following(ax=Figure().subplots())
+        >>> ax.get_ylabel()
+        'measured displacement [um]'
+        """
+        return self._panel("plot_following", ax)
+
+    def plot_effort(self, *, ax: Axes | None = None) -> Axes:
+        """Plot the voltage and its parts over time.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw in; default those of a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            With the picture.
+
+        Examples
+        --------
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> stage = pt.DahlStage.xu_li_2010()
+        >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
+        >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
+        >>> ax = run.plot_effort(ax=Figure().subplots())
+        >>> ax.get_ylabel()
+        'voltage [V]'
+        """
+        return self._panel("plot_effort", ax)
 
 
 def _metrics(
@@ -317,34 +453,4 @@ def feedforward_of(
         return PlayedVoltage(np.zeros(len(samples)), "no feedforward")
     return controller.feedforward.played(
         reference, controller.dt, samples=samples, limits=controller.limits
-    )
-
-
-def collected(
-    run: _core.TrackingRun,
-    controller: Controller,
-    reference: Reference,
-    samples: SampledReference,
-    note: str,
-    substeps: int,
-) -> Tracking:
-    """Collect the results of one axis."""
-    fine_t, fine_displacement, fine_voltage = run.motion()
-    return Tracking(
-        reference=reference,
-        controller=controller,
-        t=samples.t,
-        desired=samples.x,
-        measured=run.measured,
-        displacement=fine_displacement[::substeps],
-        loop_error=run.part("error"),
-        voltage=run.part("volts"),
-        feedforward=run.part("feedforward"),
-        feedback=run.part("feedback"),
-        repetitive=run.part("repetitive"),
-        saturated=run.saturated,
-        fine_t=fine_t,
-        fine_displacement=fine_displacement,
-        fine_voltage=fine_voltage,
-        note=note,
     )

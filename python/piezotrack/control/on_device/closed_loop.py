@@ -6,19 +6,19 @@ import math
 import time
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from ...errors import DeviceError, Interrupted, ParameterError
 from ...hardware.measuring import rest_of
 from ...hardware.safe_end import lead, terminated
-from ..loop.preconditions import check_period, check_stable, check_within_reach
-from ..loop.tracking import Tracking, feedforward_of
+from ..loop.preconditions import check_period
+from ..loop.run import Run
+from ..loop.tracking import Tracking
 from .guard import Guard
 from .latency import (
     check_exchanging,
-    latency_of,
     measure_latency,
     refuse_slow,
     wait_until,
@@ -26,12 +26,12 @@ from .latency import (
 from .playing import check_limits
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from numpy.typing import NDArray
 
     from ...hardware.device import Device, Exchanging
-    from ...references.reference import Reference, SampledReference
+    from ...references.reference import Reference
     from ..controller.controller import Controller
     from .latency import Latency
 
@@ -52,6 +52,11 @@ class DeviceTracking(Tracking):
         Time from each tick until its voltage was out [s]; NaN where the tick was left out.
     """
 
+    views: ClassVar[Mapping[str, str]] = {
+        **Tracking.views,
+        "summary": "control.views.tracking_text:device_tracking_text",
+    }
+
     latency: Latency
     lateness: Array
 
@@ -60,40 +65,28 @@ class DeviceTracking(Tracking):
         """Ticks whose voltage was not out within their interval, those left out included."""
         return int(np.sum(~(self.lateness <= self.controller.dt)))
 
-    def summary(self) -> str:
-        """Table of the run, and how late it was.
-
-        Returns
-        -------
-        str
-            Several lines.
-        """
-        done = latency_of(self.lateness[np.isfinite(self.lateness)])
-        return f"{super().summary()}\nlateness  {done}, {self.overruns} overruns"
-
 
 class _Log:
-    """What a loop keeps, sample by sample."""
+    """Samples of a loop along a run, as they come."""
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, run: Run) -> None:
+        self.run, count = run, len(run.samples)
         self.rows = np.full((count, 7), np.nan)
         self.lateness = np.full(count, np.nan)
         self.done = 0
 
-    def tracking(
-        self, latency: Latency, controller: Controller, reference: Reference, note: str
-    ) -> DeviceTracking | None:
+    def tracking(self, latency: Latency, note: str) -> DeviceTracking | None:
         """Return what was tracked up to now; a tick that was left out has the values before it."""
         n = self.done
         if n < 2:
             return None
-        samples = reference.sample(controller.dt)
+        samples = self.run.samples
         kept = np.maximum.accumulate(np.where(np.isfinite(self.lateness[:n]), np.arange(n), 0))
         y, volts, feedforward, feedback, repetitive, error, saturated = self.rows[:n][kept].T
         t = samples.t[:n]
         return DeviceTracking(
-            reference=reference,
-            controller=controller,
+            reference=self.run.reference,
+            controller=self.run.controller,
             t=t,
             desired=samples.x[:n],
             measured=y,
@@ -157,61 +150,44 @@ def track_on(
         )
     home = rest_of(device, safe)
     check_period(controller, reference)
-    samples = reference.sample(controller.dt)
-    volts, note = feedforward_of(controller, reference, samples)
-    log = _Log(len(samples))
+    planned = Run(controller, reference)
+    volts, note = planned.feedforward
+    log = _Log(planned)
     with terminated(), _safe_after(device, home, controller.dt, log):
         latency = measure_latency(device, controller.dt, rest=home)
         refuse_slow(latency, controller.dt)
-        _check_model(controller, samples, latency, beyond_reach=beyond_reach, unstable=unstable)
+        _check_model(planned, latency, beyond_reach=beyond_reach, unstable=unstable)
         told = f"{note}; the loop closed on {device.channels[0]}"
         try:
-            _run(device, controller, samples, volts, home, log)
+            _run(device, volts, home, log)
         except DeviceError as error:
-            error.partial = log.tracking(latency, controller, reference, told)
+            error.partial = log.tracking(latency, told)
             raise
         except KeyboardInterrupt as error:
-            part = log.tracking(latency, controller, reference, told)
+            part = log.tracking(latency, told)
             raise Interrupted(str(error) or "the loop was interrupted", part) from None
-    run = log.tracking(latency, controller, reference, told)
+    run = log.tracking(latency, told)
     assert run is not None
     return run
 
 
-def _check_model(
-    controller: Controller,
-    samples: SampledReference,
-    latency: Latency,
-    *,
-    beyond_reach: bool,
-    unstable: bool,
-) -> None:
+def _check_model(run: Run, latency: Latency, *, beyond_reach: bool, unstable: bool) -> None:
     """Check what can be checked before: with the model of the feedforward, where there is one."""
     from ...stages.virtual import VirtualStage
 
-    if controller.feedforward is None:
-        return
-    inverse = controller.feedforward
-    plant = VirtualStage.of(inverse.stage, delay=inverse.delay)
-    if not unstable:
-        check_stable(plant, controller, latency.p99)
-    if not beyond_reach:
-        check_within_reach(plant, controller.limits, samples)
+    inverse = run.controller.feedforward
+    if inverse is not None:
+        plant = VirtualStage.of(inverse.stage, delay=inverse.delay)
+        run.check(plant, latency.p99, unstable=unstable, beyond_reach=beyond_reach)
 
 
-def _run(
-    device: Exchanging,
-    controller: Controller,
-    samples: SampledReference,
-    feedforward: Array,
-    home: float,
-    log: _Log,
-) -> None:
+def _run(device: Exchanging, feedforward: Array, home: float, log: _Log) -> None:
     """Go from tick to tick by the absolute time; a tick that is over is left out."""
+    controller = log.run.controller
     session, dt = controller.start(present=home), controller.dt
     low, high = controller.limits
     guard = Guard(session, dt, high - low)
-    x, held = samples.x, home
+    x, held = log.run.samples.x, home
     start = time.perf_counter() + dt
     for k in range(x.size):
         tick = start + k * dt

@@ -23,7 +23,8 @@ from ...hardware.safe_end import led_back
 from ...references.reference import Reference
 from ...stages.inverse import Inverse
 from ..controller.controller import Controller
-from ..loop.tracking import Tracking, feedforward_of
+from ..loop.run import Run
+from ..loop.tracking import Tracking
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -72,8 +73,7 @@ def check_playable(device: Device, controller: Controller) -> None:
 
 def played_on(
     device: Device,
-    controller: Controller,
-    reference: Reference,
+    run: Run,
     volts: Array,
     note: str,
     *,
@@ -81,8 +81,8 @@ def played_on(
     ramp: float = RAMP,
 ) -> Tracking:
     """Play voltages along a reference on a device [V], and return what it recorded."""
+    controller, samples = run.controller, run.samples
     rate = device.rates.nearest(1.0 / controller.dt)
-    samples = reference.sample(controller.dt)
     check_table(device, "voltage", volts)
     home = rest_of(device, rest)
     table, first = ramped(device, "voltage", volts, home, rate, ramp)
@@ -94,7 +94,7 @@ def played_on(
     low, high = controller.limits
     nothing = np.zeros(volts.size)
     return Tracking(
-        reference=reference,
+        reference=run.reference,
         controller=controller,
         t=samples.t,
         desired=samples.x,
@@ -183,9 +183,8 @@ def play(
     check_playable(device, controller)
     if controller.feedforward is None:
         raise ParameterError("controller has no feedforward: expected one, as fit.inverse() gives")
-    volts, note = feedforward_of(controller, reference, reference.sample(controller.dt))
+    run = Run(controller, reference)
+    volts, note = run.feedforward
     volts = np.clip(volts, *controller.limits)
     ways = None if rest is None else finite("rest", rest, "V")
-    return played_on(
-        device, controller, reference, volts, note, rest=ways, ramp=not_negative("ramp", ramp, "s")
-    )
+    return played_on(device, run, volts, note, rest=ways, ramp=not_negative("ramp", ramp, "s"))

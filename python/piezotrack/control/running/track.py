@@ -9,9 +9,8 @@ from ...errors import ParameterError
 from ...hardware.device import Device
 from ...references.reference import Reference
 from ..controller.controller import Controller
-from ..loop.closed_loop import run_closed_loop
-from ..loop.preconditions import check_drive_unit, check_period, check_stable, check_within_reach
-from ..loop.tracking import collected, feedforward_of
+from ..loop.preconditions import check_drive_unit
+from ..loop.run import Run
 from ..on_device.closed_loop import track_on
 from ..plant import plant_of, timing_on
 
@@ -110,12 +109,10 @@ def track(
     check_drive_unit(stage, controller)
     timing = timing_on(plant, timing, controller.limits)
     substeps = _core.as_count("substeps", substeps)
-    samples = reference.sample(controller.dt)
-    check_period(controller, reference)
-    if not _core.as_truth("unstable", unstable):
-        check_stable(plant, controller, timing.delay)
-    if not _core.as_truth("beyond_reach", beyond_reach):
-        check_within_reach(plant, controller.limits, samples, controller.drive_unit)
-    voltage, note = feedforward_of(controller, reference, samples)
-    run = run_closed_loop(plant, controller, samples.x, voltage, timing, substeps)
-    return collected(run, controller, reference, samples, note, substeps)
+    free = {
+        "unstable": _core.as_truth("unstable", unstable),
+        "beyond_reach": _core.as_truth("beyond_reach", beyond_reach),
+    }
+    run = Run(controller, reference)
+    run.check(plant, timing.delay, **free)
+    return run.simulate(plant, run.feedforward, timing, substeps)

@@ -118,6 +118,23 @@ class TuningReport:
         lines.append(f"what binds: {active}")
         return "\n".join(lines)
 
+    def design(self) -> dict[str, Any]:
+        """Margins for the file of the controller.
+
+        Returns
+        -------
+        dict
+            Of numbers, texts, lists and dicts only.
+        """
+        return {
+            "by": "tune",
+            "figure": self.minimised,
+            f"value_{self.unit}": self.value,
+            "plants": list(self.plants),
+            "kept": [one._asdict() for one in self.kept],
+            "binding": list(self.active_constraints),
+        }
+
     def __repr__(self) -> str:
         return f"<TuningReport: {self.minimised}, {len(self.plants)} plants>"
 
@@ -138,6 +155,16 @@ class Tuned(NamedTuple):
 
     def __str__(self) -> str:
         return f"{parts_text(self.controller)}\n{self.report}"
+
+    def design(self) -> dict[str, Any]:
+        """Margins for the file of the controller, those of `report`.
+
+        Returns
+        -------
+        dict
+            Of numbers, texts, lists and dicts only.
+        """
+        return self.report.design()
 
 
 class TunedPair(NamedTuple):

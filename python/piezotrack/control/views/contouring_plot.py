@@ -20,7 +20,6 @@ from ..._support.plot_style import (
     panels,
     whole,
 )
-from ..controller.description import parts_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +31,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 __all__ = [
-    "last_turn",
     "plot_contour",
     "plot_contour_error",
     "plot_magnified",
@@ -44,33 +42,9 @@ SHOWN = 0.12
 
 
 def plot_path(run: Contour, ax: Axes | None = None) -> Axes:
-    """Plot the path and the measured positions in the plane, with the smooth start.
-
-    Parameters
-    ----------
-    run : Contour
-        The run.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw in; default a new figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        With the picture.
-
-    Examples
-    --------
-    >>> from matplotlib.figure import Figure
-    >>> import piezotrack as pt
-    >>> stage = pt.XYStage.xu_li_2010(seed=1)
-    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
-    >>> run = pt.contour(stage, (loop, loop), pt.circle(frequency=0.5, radius=10e-6))
-    >>> ax = pt.control.plot_path(run, ax=Figure().subplots())
-    >>> ax.get_ylabel()
-    'y [um]'
-    """
+    """Plot the path and the measured positions in the plane, with the smooth start."""
     (ax,) = axes_or_new(ax, 1)
-    start, part = run.t < run.settled, last_turn(run)
+    start, part = run.t < run.settled, run.last_turn
     if start.any():
         mark = {**QUIET, "label": "approach"}
         ax.plot(1e6 * run.x.measured[start], 1e6 * run.y.measured[start], **mark)
@@ -82,35 +56,9 @@ def plot_path(run: Contour, ax: Axes | None = None) -> Axes:
 
 
 def plot_magnified(run: Contour, ax: Axes | None = None, factor: float | None = None) -> Axes:
-    """Plot the contour error, magnified, along the path.
-
-    Parameters
-    ----------
-    run : Contour
-        The run.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw in; default a new figure.
-    factor : float, optional
-        Magnification; default a round number that keeps the errors readable.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        With the picture.
-
-    Examples
-    --------
-    >>> from matplotlib.figure import Figure
-    >>> import piezotrack as pt
-    >>> stage = pt.XYStage.xu_li_2010(seed=1)
-    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
-    >>> run = pt.contour(stage, (loop, loop), pt.circle(frequency=0.5, radius=10e-6))
-    >>> ax = pt.control.plot_magnified(run, ax=Figure().subplots())
-    >>> ax.get_ylabel()
-    'y [um]'
-    """
+    """Plot the contour error, magnified, along the path."""
     (ax,) = axes_or_new(ax, 1)
-    part = last_turn(run)
+    part = run.last_turn
     if factor is None:
         side = min(float(np.ptp(axis)) for axis in run.path.outline)
         factor = _round_down(SHOWN * side / run.metrics.max_error)
@@ -130,33 +78,9 @@ def plot_magnified(run: Contour, ax: Axes | None = None, factor: float | None = 
 
 
 def plot_contour_error(run: Contour, ax: Axes | None = None) -> Axes:
-    """Plot the measured contour error over the last turn, with mean and standard deviation.
-
-    Parameters
-    ----------
-    run : Contour
-        The run.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw in; default a new figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        With the picture.
-
-    Examples
-    --------
-    >>> from matplotlib.figure import Figure
-    >>> import piezotrack as pt
-    >>> stage = pt.XYStage.xu_li_2010(seed=1)
-    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
-    >>> run = pt.contour(stage, (loop, loop), pt.circle(frequency=0.5, radius=10e-6))
-    >>> ax = pt.control.plot_contour_error(run, ax=Figure().subplots())
-    >>> ax.get_ylabel()
-    'contour error [um]'
-    """
+    """Plot the measured contour error over the last turn, with mean and standard deviation."""
     (ax,) = axes_or_new(ax, 1)
-    part = last_turn(run)
+    part = run.last_turn
     found = run.metrics
     mean, sd = 1e6 * found.mean_error, 1e6 * found.sd_error
     ax.plot(run.t[part], 1e6 * run.error[part], **{**ERROR, "label": "contour error"})
@@ -169,25 +93,12 @@ def plot_contour_error(run: Contour, ax: Axes | None = None) -> Axes:
 
 
 def plot_contour(run: Contour, fig: Figure | SubFigure | None = None) -> Figure:
-    """Plot all four: path, magnified error, errors of the axes and contour error, in the last turn.
-
-    Parameters
-    ----------
-    run : Contour
-        The run.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Figure to draw in; default a new one.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in.
-    """
+    """Plot path, magnified error, errors of the axes and contour error, in the last turn."""
     figure = panels(fig, (11.0, 8.4))
     grid = figure.add_gridspec(2, 2, height_ratios=[1.6, 1.0])
     plot_path(run, figure.add_subplot(grid[0, 0]))
     plot_magnified(run, figure.add_subplot(grid[0, 1]))
-    part, shared = last_turn(run), None
+    part, shared = run.last_turn, None
     inner = grid[1, 0].subgridspec(2, 1, hspace=0.1)
     for row, (name, axis) in enumerate((("x", run.x), ("y", run.y))):
         ax = figure.add_subplot(inner[row], sharex=shared, sharey=shared)
@@ -212,18 +123,8 @@ def plot_contour(run: Contour, fig: Figure | SubFigure | None = None) -> Figure:
 
 def _parts(run: Contour) -> str:
     """Name the parts of the controllers, once where those of both axes are the same."""
-    x, y = parts_text(run.x.controller), parts_text(run.y.controller)
+    x, y = run.x.controller.title, run.y.controller.title
     return x if x == y else f"x {x}, y {y}"
-
-
-def last_turn(run: Contour) -> NDArray[np.bool_]:
-    """Return the samples of the last turn; all settled ones where the path is run once."""
-    turn = run.path.period
-    start = run.settled
-    if turn is not None:
-        start = max(start, run.t[-1] + run.x.controller.dt - turn)
-    last: NDArray[np.bool_] = run.t >= start - 1e-9
-    return last
 
 
 def _plane(ax: Axes, run: Contour) -> None:

@@ -18,7 +18,6 @@ from ..._support.plot_style import (
     panels,
     whole,
 )
-from ..controller.description import parts_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -75,7 +74,7 @@ def plot_loop_report(report: LoopReport, fig: Figure | SubFigure | None = None) 
         legend_inside(ax)
     legend_inside(phase)
     gain, verdict = str(report.middle).split(": ", 1)
-    words = f"{parts_text(report.controller)} on a stage of {gain}: {verdict}"
+    words = f"{report.controller.title} on a stage of {gain}: {verdict}"
     figure.suptitle(folded(words, 78), fontsize="medium")
     return whole(figure)
 

@@ -27,8 +27,7 @@ from ..._support.plot_style import (
     thinned,
     whole,
 )
-from ..._support.units import drive_word, shown_unit
-from ..controller.description import run_text
+from ..._support.units import best_length_unit, drive_word, shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -52,31 +51,7 @@ CROPPED = 5.0
 
 
 def plot_motion(run: Tracking, ax: Axes | None = None) -> Axes:
-    """Plot desired and actual displacement over time.
-
-    Parameters
-    ----------
-    run : Tracking
-        A tracked motion.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw in; default a new figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        With the picture.
-
-    Examples
-    --------
-    >>> from matplotlib.figure import Figure
-    >>> import piezotrack as pt
-    >>> stage = pt.DahlStage.xu_li_2010()
-    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
-    >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
-    >>> ax = pt.control.plot_motion(run, ax=Figure().subplots())
-    >>> ax.get_ylabel()
-    'displacement [um]'
-    """
+    """Plot desired and actual displacement over time."""
     (ax,) = axes_or_new(ax, 1)
     kept = thinned(run.fine_displacement)
     ax.plot(run.fine_t[kept], 1e6 * run.fine_displacement[kept], **ACTUAL)
@@ -87,31 +62,7 @@ def plot_motion(run: Tracking, ax: Axes | None = None) -> Axes:
 
 
 def plot_error(run: Tracking, ax: Axes | None = None) -> Axes:
-    """Plot the measured tracking error over time, and the largest of each period.
-
-    Parameters
-    ----------
-    run : Tracking
-        A tracked motion.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw in; default a new figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        With the picture.
-
-    Examples
-    --------
-    >>> from matplotlib.figure import Figure
-    >>> import piezotrack as pt
-    >>> stage = pt.DahlStage.xu_li_2010()
-    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
-    >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
-    >>> ax = pt.control.plot_error(run, ax=Figure().subplots())
-    >>> ax.get_ylabel()
-    'tracking error [um]'
-    """
+    """Plot the measured tracking error over time, and the largest of each period."""
     (ax,) = axes_or_new(ax, 1)
     ax.plot(run.t, 1e6 * run.error, **{**ERROR, "label": "desired - measured"})
     period = run.reference.period
@@ -129,31 +80,7 @@ def plot_error(run: Tracking, ax: Axes | None = None) -> Axes:
 
 
 def plot_following(run: Tracking, ax: Axes | None = None) -> Axes:
-    """Plot actual against desired displacement, from the settled time on.
-
-    Parameters
-    ----------
-    run : Tracking
-        A tracked motion.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw in; default a new figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        With the picture.
-
-    Examples
-    --------
-    >>> from matplotlib.figure import Figure
-    >>> import piezotrack as pt
-    >>> stage = pt.DahlStage.xu_li_2010()
-    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
-    >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
-    >>> ax = pt.control.plot_following(run, ax=Figure().subplots())
-    >>> ax.get_ylabel()
-    'measured displacement [um]'
-    """
+    """Plot actual against desired displacement, from the settled time on."""
     (ax,) = axes_or_new(ax, 1)
     part = run.t >= run.settled
     ax.plot(1e6 * run.desired[part], 1e6 * run.measured[part], **{**ACTUAL, "label": "measured"})
@@ -166,31 +93,7 @@ def plot_following(run: Tracking, ax: Axes | None = None) -> Axes:
 
 
 def plot_effort(run: Tracking, ax: Axes | None = None) -> Axes:
-    """Plot the voltage and its parts over time.
-
-    Parameters
-    ----------
-    run : Tracking
-        A tracked motion.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw in; default a new figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        With the picture.
-
-    Examples
-    --------
-    >>> from matplotlib.figure import Figure
-    >>> import piezotrack as pt
-    >>> stage = pt.DahlStage.xu_li_2010()
-    >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
-    >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
-    >>> ax = pt.control.plot_effort(run, ax=Figure().subplots())
-    >>> ax.get_ylabel()
-    'voltage [V]'
-    """
+    """Plot the voltage and its parts over time."""
     (ax,) = axes_or_new(ax, 1)
     unit, scale = shown_unit(run.controller.drive_unit)
     ax.step(run.t, scale * run.voltage, where="post", **COMMAND)
@@ -285,20 +188,7 @@ def plot_feedforward(
 
 
 def plot_tracking(run: Tracking, fig: Figure | SubFigure | None = None) -> Figure:
-    """Plot all four: motion, error, actual against desired, voltage.
-
-    Parameters
-    ----------
-    run : Tracking
-        A tracked motion.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Figure to draw in; default a new one.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in.
-    """
+    """Plot all four: motion, error, actual against desired, voltage."""
     figure = panels(fig, (11.0, 7.0))
     axes = figure.subplots(2, 2)
     plot_motion(run, axes[0, 0])
@@ -306,7 +196,13 @@ def plot_tracking(run: Tracking, fig: Figure | SubFigure | None = None) -> Figur
     plot_error(run, axes[1, 0])
     plot_effort(run, axes[1, 1])
     since = f"from {run.settled:g} s on: " if run.settled else ""
-    figure.suptitle(
-        f"{run_text(run.controller, run.reference)}\n{since}{run.metrics}", fontsize="medium"
-    )
+    figure.suptitle(f"{_title(run)}\n{since}{run.metrics}", fontsize="medium")
     return whole(figure)
+
+
+def _title(run: Tracking) -> str:
+    """Name the reference, its range and the parts of the controller."""
+    reference, controller = run.reference, run.controller
+    unit, scale = best_length_unit(max(abs(reference.low), abs(reference.high)))
+    what = f"{literal(reference.name)}, {scale * reference.low:.4g} to {scale * reference.high:.4g}"
+    return f"{what} {unit}: {controller.title} at {1.0 / controller.dt:.6g} Hz"

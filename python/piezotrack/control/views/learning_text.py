@@ -1,0 +1,50 @@
+"""Text of a learning: its heading, its trials line by line, and how it ended."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..learning.iterative_learning import IterativeLearning, LearningTrial
+    from ..learning.learn import Learning
+
+__all__ = ["heading", "learning_text", "outcome", "trial_line"]
+
+WHY = {
+    "noise": "what repeats in the error is not distinguishable from the noise",
+    "no change": "the error falls no further",
+    "grows": "the error grows",
+    "trials": "all trials were made",
+    "interrupted": "it was interrupted, or the device failed",
+}
+
+
+def heading(learner: IterativeLearning) -> str:
+    """Write what is known before the first trial, and the titles of the table of trials."""
+    kind = {"frequency": "settled period", "lifted": "whole motion from rest"}
+    return (
+        f"{learner.reference!r}, {kind[learner.method]}, cutoff {learner.cutoff:.4g} Hz\n"
+        f"{learner.convergence}\n{'trial':>5}  {'rms nm':>9}  {'max nm':>9}  {'noise nm':>9}"
+    )
+
+
+def trial_line(place: int, trial: LearningTrial) -> str:
+    """Write a line of the table of trials."""
+    noise = "" if trial.noise is None else f"{1e9 * trial.noise:.4g}"
+    rms, most = 1e9 * trial.rms_error, 1e9 * trial.max_error
+    return f"{place:>5}  {rms:>9.4g}  {most:>9.4g}  {noise:>9}"
+
+
+def outcome(found: Learning) -> list[str]:
+    """Write why it ended, and whether the table is at a limit."""
+    clipped = found.trials[found.best].clipped
+    limited = f"the table is at a limit in {100.0 * clipped:.1f} % of its samples"
+    return [*([limited] if clipped > 0.0 else []), f"ended: {WHY[found.stopped]}"]
+
+
+def learning_text(found: Learning) -> str:
+    """Write the trials, the best one marked, and how it ended."""
+    lines = [heading(found.learner)]
+    for i, trial in enumerate(found.trials):
+        lines.append(trial_line(i, trial) + (" *" if i == found.best else ""))
+    return "\n".join([*lines, *outcome(found)])
