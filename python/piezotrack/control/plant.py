@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Plant",
+    "displacement_range",
+    "initial_displacement",
     "linearised_plants",
+    "lowest_settled_displacement",
     "plant_of",
-    "reach",
-    "resting",
-    "settled_bottom",
     "timing_on",
 ]
 
@@ -57,7 +57,7 @@ def plant_of(stage: Plant | IdentifiedModel) -> VirtualStage:
     return VirtualStage.of(stage)
 
 
-def reach(
+def displacement_range(
     stage: VirtualStage | Stage, limits: tuple[float, float], dt: float
 ) -> tuple[float, float]:
     """Simulate the lowest and the highest displacement [m] between two voltages [V].
@@ -71,7 +71,7 @@ def reach(
     return float(x.min()), float(x.max())
 
 
-def resting(stage: VirtualStage, limits: tuple[float, float]) -> float:
+def initial_displacement(stage: VirtualStage, limits: tuple[float, float]) -> float:
     """Return the displacement [m] in which a run between limits [V] begins."""
     before = timing_on(stage, None, limits).voltages_before
     moved = float(stage.stage.equilibrium(before).x) if before else 0.0
@@ -98,13 +98,14 @@ def timing_on(plant: VirtualStage, timing: Timing | None, limits: tuple[float, f
     return replace(given, voltages_before=(low if low > 0.0 else high,))
 
 
-def settled_bottom(
+def lowest_settled_displacement(
     stage: VirtualStage, limits: tuple[float, float], top: float, dt: float
 ) -> float:
     """Simulate the lowest displacement [m] at the lower of two voltages [V], from `top` [m] down.
 
-    The voltage takes the course of `reach`, but only up to where the displacement is `top`. A stage
-    that falls as the voltage rises is lowest at the upper one, which it reaches again.
+    The voltage takes the course of `displacement_range`, but only up to where the displacement is
+    `top`. A stage that falls as the voltage rises is lowest at the upper one, which it reaches
+    again.
     """
     low, high = limits
     t, u, x = _slow_cycle(stage, low, high, dt)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..control.plant import reach
+from ..control.plant import displacement_range
 from ..errors import NumericalError
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ def _reach(controller: Controller) -> tuple[float, float]:
             return 0.0, 1e-4
     else:
         try:
-            bottom, top = reach(controller.feedforward.stage, controller.limits, 0.05)
+            bottom, top = displacement_range(controller.feedforward.stage, controller.limits, 0.05)
         except NumericalError:
             bottom, top = low, high
         bottom, top = (

@@ -10,7 +10,7 @@ import numpy as np
 from ..._support.arguments import as_numbers
 from ...errors import ParameterError
 from ...references.waveforms import multisine, sine, staircase, triangle
-from ..plant import reach, settled_bottom
+from ..plant import displacement_range, lowest_settled_displacement
 
 if TYPE_CHECKING:
     from ...references.reference import Reference
@@ -86,9 +86,9 @@ def usual_references(
 ) -> list[Reference]:
     """Make a sine at three rates, a triangle, a staircase and a random motion within reach."""
     rates = _checked(rates, dt)
-    _, top = reach(stage, limits, REACH_STEP)
+    _, top = displacement_range(stage, limits, REACH_STEP)
     # Once up, the stage no longer comes all the way down.
-    bottom = settled_bottom(stage, limits, top, REACH_STEP)
+    bottom = lowest_settled_displacement(stage, limits, top, REACH_STEP)
     middle, half = 0.5 * (bottom + top), 0.5 * STROKE * (top - bottom)
     low, high = middle - half, middle + half
     slow, medium, fast = rates

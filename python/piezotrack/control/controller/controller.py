@@ -27,7 +27,7 @@ from ..laws.components import LowPass, Notch, Pid, Repetitive, StateSpace
 from ..laws.hysteresis_observer import HysteresisObserver
 from ..laws.laws import NAMED_LAWS, DisturbanceObserver, LeadLag, PerturbationEstimator, SlidingMode
 from ..laws.scheduled_pid import ScheduledPid
-from ..plant import reach
+from ..plant import displacement_range
 from .session import Session
 
 if TYPE_CHECKING:
@@ -251,7 +251,7 @@ class Controller:
         if self.feedforward is None:
             return None
         try:
-            bottom, top = reach(self.feedforward.stage, (low, high), REACH_STEP)
+            bottom, top = displacement_range(self.feedforward.stage, (low, high), REACH_STEP)
         except NumericalError:
             return None
         bottom, top = bottom + self.feedforward.offset, top + self.feedforward.offset

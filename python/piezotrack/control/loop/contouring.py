@@ -18,7 +18,7 @@ from ...errors import ParameterError
 from ...references.xy_reference import XYReference, square_matrix
 from ...stages.xy import XYStage
 from ..controller.controller import Controller, number_pair
-from ..plant import reach, resting, timing_on
+from ..plant import displacement_range, initial_displacement, timing_on
 from .run import Run
 
 if TYPE_CHECKING:
@@ -471,8 +471,8 @@ def workspace(
     alone = np.ndim(limits[0]) == 0
     pairs = [number_pair("limits", one, "V") for one in ([limits] * 2 if alone else limits)]
     axes = list(zip((stage.x, stage.y), pairs, strict=True))
-    x, y = (reach(one, pair, 1e-3) for one, pair in axes)
-    at_x, at_y = (resting(one, pair) for one, pair in axes)
+    x, y = (displacement_range(one, pair, 1e-3) for one, pair in axes)
+    at_x, at_y = (initial_displacement(one, pair) for one, pair in axes)
     return Workspace(x, y, (at_x, at_y))
 
 

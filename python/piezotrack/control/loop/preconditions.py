@@ -14,7 +14,7 @@ from ..._support.units import shown_unit
 from ...errors import ParameterError
 from ...identification.fitted.identified_model import IdentifiedModel
 from ..laws.components import Pid
-from ..plant import reach, settled_bottom
+from ..plant import displacement_range, lowest_settled_displacement
 from .stability import check_loop
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def check_within_reach(
     """Refuse a reference that exceeds the reach of the stage between two voltages [V]."""
     low, high = limits
     unit, scale = shown_unit(drive_unit)
-    bottom, top = reach(stage, (low, high), 1e-3)
+    bottom, top = displacement_range(stage, (low, high), 1e-3)
     slack = 0.01 * (top - bottom)
     for value, past, edge in (
         (samples.x.max(), samples.x.max() - top, top),
@@ -130,7 +130,7 @@ def check_within_reach(
     # The loop stays above the curve from rest: once up, the stage no longer comes all the way down.
     k = int(np.argmax(samples.x))
     k += int(np.argmin(samples.x[k:]))
-    lowest = settled_bottom(stage, (low, high), float(samples.x.max()), 1e-3)
+    lowest = lowest_settled_displacement(stage, (low, high), float(samples.x.max()), 1e-3)
     if (past := lowest - samples.x[k]) > slack:
         raise ParameterError(
             f"reference is {1e6 * samples.x[k]:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} "

@@ -50,12 +50,13 @@ class Run:
         self, plant: VirtualStage, delay: float, *, unstable: bool = False, beyond_reach: bool
     ) -> None:
         """Refuse another period, an unstable loop, and a reference beyond the reach of a stage."""
+        samples = self.samples
         check_period(self.controller, self.reference)
         if not unstable:
             check_stable(plant, self.controller, delay)
         if not beyond_reach:
             limits, unit = self.controller.limits, self.controller.drive_unit
-            check_within_reach(plant, limits, self.samples, unit)
+            check_within_reach(plant, limits, samples, unit)
 
     def simulate(
         self,
