@@ -193,7 +193,7 @@ fn robustness(of: &Robustness) -> RobustnessNumbers {
     )
 }
 
-/// What was found, as a dict in Python.
+/// Settings found by a search, as a dict in Python.
 #[derive(IntoPyObject)]
 struct FoundSettings {
     settings: Vec<Vec<(&'static str, f64)>>,
@@ -260,7 +260,7 @@ struct Search {
     seed: u64,
 }
 
-/// What is searched for, from the attributes of Python's `TuningProblem`.
+/// Problem of a search, from the attributes of Python's `TuningProblem`.
 #[derive(FromPyObject)]
 struct Problem {
     goal: Goal,
@@ -269,7 +269,7 @@ struct Problem {
 }
 
 impl Goal {
-    /// What is made small; without motions the effect of a disturbance.
+    /// Figure to minimise; without motions the effect of a disturbance.
     fn aim(&self, motions: usize) -> Aim {
         match self.minimise.as_str() {
             _ if motions == 0 => Aim::Disturbance,
@@ -279,7 +279,7 @@ impl Goal {
         }
     }
 
-    /// What every loop keeps: some margins and the bounds of the goal.
+    /// Requirements on every loop: margins, and the bounds of the goal.
     fn required(&self, margins: MarginNumbers) -> Requirements {
         let (gain_margin, phase_margin, sensitivity, learning) = margins;
         Requirements {

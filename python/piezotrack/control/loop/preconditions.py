@@ -30,11 +30,11 @@ MOST_INTERVALS = 100_000
 
 
 def check_delay(stage: VirtualStage, delay: float, dt: float) -> None:
-    """Refuse a delay [s], that of the sensor included, beyond the memory of a search."""
+    """Refuse a delay [s] below 0, or with that of the sensor beyond the memory of a search."""
     whole, most = delay + stage.sensor.delay, MOST_INTERVALS * dt
-    if whole > most:
+    if not (delay >= 0.0 and whole <= most):
         raise ParameterError(
-            f"delay is {whole:.6g} s in all: expected {most:.6g} s at most, "
+            f"delay is {whole:.6g} s in all: expected 0 to {most:.6g} s, "
             f"{MOST_INTERVALS} control intervals"
         )
 

@@ -1,4 +1,4 @@
-"""Why no controller was found: which constraint forbids it, and how far the nearest is off."""
+"""Refusal where no controller is feasible: its reason, and how far the nearest is off."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from .problem import TuningProblem
-    from .search import Answer
+    from .search import Solution
 
 __all__ = ["refusal"]
 
 
 class _Short(NamedTuple):
-    """A margin that the nearest gains do not have: value, plant, what was asked for, and how."""
+    """Margin that the nearest gains do not have: value, plant, bound and its side."""
 
     name: str
     value: float
@@ -32,7 +32,7 @@ class _Short(NamedTuple):
         return self.value / self.bound
 
     def sentence(self, names: Sequence[str]) -> str:
-        """Say what was asked for, and what the nearest gains have."""
+        """Write the bound, and the margin of the nearest gains."""
         side = "more" if self.least else "less"
         off = f", {self.factor:.4g} times too {'low' if self.least else 'high'}"
         bound = f"{_number(self.bound)}{self.unit}"
@@ -49,12 +49,12 @@ def _number(value: float) -> str:
     return short if float(short) == value else f"{value:.9g}"
 
 
-def refusal(problem: TuningProblem, nearest_answer: Answer) -> str:
+def refusal(problem: TuningProblem, nearest: Solution) -> str:
     """Say which constraint forbids any controller, and how far the nearest one is off."""
-    goal, found, names = problem.goal, nearest_answer.found, nearest_answer.names
-    robustness, figures = found["robustness"], found["figures"]
-    if found["excess"] <= 1.0:
-        worst = max(nearest_answer.kept, key=lambda one: one.share)
+    goal, outcome, names = problem.goal, nearest.outcome, nearest.names
+    robustness, figures = outcome["robustness"], outcome["figures"]
+    if outcome["excess"] <= 1.0:
+        worst = max(nearest.kept, key=lambda one: one.share)
         return (
             f"margins: the search found no gains whose exact margins are as asked for; the nearest "
             f"have {worst}: expected a milder margin, more particles or more iterations"

@@ -11,7 +11,7 @@ from ..running.track import track
 from .goal import MINIMISED
 from .problem import TuningProblem
 from .refusal import refusal
-from .search import Answer, search_at
+from .search import Solution, search_at
 from .tuned import Tuned, TunedPair, TuningReport
 
 if TYPE_CHECKING:
@@ -172,36 +172,38 @@ def tune(
         search=search,
         threads=threads,
     )
-    answers = [search_at(problem, interval) for interval in problem.intervals]
-    best = min(answers, key=_rank)
-    if not best.keeps:
+    solutions = [search_at(problem, interval) for interval in problem.intervals]
+    best = min(solutions, key=_rank)
+    if not best.feasible:
         raise ParameterError(refusal(problem, best))
-    return _simulated(problem, best, answers)
+    return _simulated(problem, best, solutions)
 
 
-def _rank(answer: Answer) -> tuple[bool, float, float]:
-    """Any that keeps what was asked for first, then the one nearest to it."""
-    nearest = 1.0 if answer.keeps else answer.excess
-    return not answer.keeps, nearest, answer.found["cost"]
+def _rank(solution: Solution) -> tuple[bool, float, float]:
+    """Order feasible solutions by their cost, before others by their distance from that."""
+    nearest = 1.0 if solution.feasible else solution.excess
+    return not solution.feasible, nearest, solution.outcome["cost"]
 
 
-def _simulated(problem: TuningProblem, best: Answer, answers: list[Answer]) -> Tuned | TunedPair:
+def _simulated(
+    problem: TuningProblem, best: Solution, solutions: list[Solution]
+) -> Tuned | TunedPair:
     """Simulate the best controllers in full."""
     controllers = best.controllers
     runs = tuple(_run(problem, controllers, reference) for reference in problem.references)
     report = TuningReport(
         minimised=_minimised(problem),
         unit="V" if problem.goal.minimise == "effort" and runs else "m",
-        value=best.found["cost"] * (1.0 if runs else controllers[0].dt),
+        value=best.outcome["cost"] * (1.0 if runs else controllers[0].dt),
         runs=runs,
         kept=tuple(best.kept),
         margins=problem.margins,
         plants=tuple(best.names),
         active_constraints=tuple(_active_constraints(problem, best)),
         dt=controllers[0].dt,
-        candidates=sum(one.found["candidates"] for one in answers),
-        loops=sum(one.found["loops"] for one in answers),
-        history=tuple(best.found["history"]),
+        candidates=sum(one.outcome["candidates"] for one in solutions),
+        loops=sum(one.outcome["loops"] for one in solutions),
+        history=tuple(best.outcome["history"]),
     )
     if problem.stage is not None:
         x, y = controllers
@@ -227,10 +229,10 @@ def _run(problem: TuningProblem, controllers: Any, reference: Any) -> Any:
     return track(problem.axes[0].stages[0], controllers[0], reference, **options)
 
 
-def _active_constraints(problem: TuningProblem, best: Answer) -> list[str]:
+def _active_constraints(problem: TuningProblem, best: Solution) -> list[str]:
     """Name what forbids a smaller value."""
     active = [f"{one.name}, {one.plant}" for one in best.kept if one.share > ACTIVE]
-    goal, figures = problem.goal, best.found["figures"]
+    goal, figures = problem.goal, best.outcome["figures"]
     if math.isfinite(goal.slew) and max(one[3] for one in figures) > ACTIVE * goal.slew:
         active.append("slew")
     rms = math.sqrt(sum(one[0] ** 2 for one in figures) / max(len(figures), 1))

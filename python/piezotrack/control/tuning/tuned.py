@@ -1,4 +1,4 @@
-"""The answer of a search for gains: the controller, what it keeps, and what binds."""
+"""Result of a tuning: the controller, its margins, and the active constraints."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class MarginReport(NamedTuple):
     value : float
         Of the worst plant, exact.
     bound : float
-        What was asked for.
+        The bound.
     plant : str
         Which plant is the worst.
     """
@@ -42,7 +42,7 @@ class MarginReport(NamedTuple):
 
     @property
     def share(self) -> float:
-        """How much of what was asked for is used up: 1 at the bound."""
+        """Share of the bound that is used up: 1 at the bound."""
         if self.name in ("gain margin", "phase margin"):
             return self.bound / self.value if self.value > 0.0 else float("inf")
         return self.value / self.bound
@@ -55,12 +55,12 @@ class MarginReport(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class TuningReport:
-    """What a search for gains found, and how.
+    """Report of a tuning: runs, margins, active constraints, effort of the search.
 
     Attributes
     ----------
     minimised : str
-        What was made small.
+        The figure that was made small.
     unit : str
         Its unit: ``"m"``, of the effort ``"V"``.
     value : float
@@ -71,7 +71,7 @@ class TuningReport:
     kept : tuple of MarginReport
         The margins over the set of plants.
     margins : Margins
-        What was asked for.
+        The bounds.
     plants : tuple of str
         The plants of the set.
     active_constraints : tuple of str
@@ -114,8 +114,8 @@ class TuningReport:
         lines.append(f"over {len(self.plants)} plants:")
         lines += [f"  {one}" for one in self.kept]
         active = "; ".join(self.active_constraints)
-        active = active or "nothing: the figure has its minimum inside of the bounds"
-        lines.append(f"what binds: {active}")
+        active = active or "none: the minimum lies inside the bounds"
+        lines.append(f"active constraints: {active}")
         return "\n".join(lines)
 
     def design(self) -> dict[str, Any]:
@@ -147,7 +147,7 @@ class Tuned(NamedTuple):
     controller : Controller
         To be used as it is.
     report : TuningReport
-        What it keeps, what binds.
+        Its margins and active constraints.
     """
 
     controller: Controller
@@ -175,7 +175,7 @@ class TunedPair(NamedTuple):
     controllers : (Controller, Controller)
         Of x and y, for `contour`.
     report : TuningReport
-        What they keep, what binds.
+        Their margins and active constraints.
     """
 
     controllers: tuple[Controller, Controller]
