@@ -154,7 +154,7 @@ def test_the_same_command_writes_the_same_bytes() -> None:
         ("--mode-spread 99", "--mode-spread is 99: expected per cent, 0 to below 95"),
         ("--gain-spread -3", "--gain-spread is -3: expected per cent, 0 to below 95"),
         ("--delay-spread -1", "--delay-spread is -1: expected seconds, 0 or above"),
-        ("--delay -1", "delay is -1 s: expected"),
+        ("--delay -1", "delay is -1: expected"),
         ("--dt 0", "dt is 0.0: expected"),
         ("--limits 5", "--limits has '5': expected LOW:HIGH"),
         ("--reference blob", "reference 'blob' is neither a file nor a known kind"),
