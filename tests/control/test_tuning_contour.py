@@ -151,3 +151,15 @@ def test_filters_of_each_axis() -> None:
     (x, y), _ = pt.tune(pt.XYStage.xu_li_2010(), path, parts="pid", filters=filters, **options)
     assert x.filters == (pt.LowPass(10.0),)
     assert y.filters == (pt.LowPass(4.0),)
+
+
+def test_the_runs_of_the_report_begin_after_the_voltages_before() -> None:
+    stage = pt.XYStage(x=pt.DahlStage.xu_li_2010(), y=pt.DahlStage.xu_li_2010())
+    path = pt.circle(frequency=0.5, radius=10e-6, duration=4.0)
+    timing = pt.Timing(voltages_before=(75.0, 30.0))
+    search = pt.TuningSearch(particles=10, iterations=2)
+    tuned = pt.tune(stage, path, parts="pid", timing=timing, search=search, **LOOP)
+    (run,) = tuned.report.runs
+    assert run.x.displacement[0] == pytest.approx(
+        pt.DahlStage.xu_li_2010().equilibrium([75.0, 30.0]).x, rel=1e-9
+    )
