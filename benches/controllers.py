@@ -42,7 +42,11 @@ def measured() -> tuple[Any, Any, dict[str, Any]]:
     models = {name: pt.identify(training, name) for name in ("dahl", "bouc-wen")}
     low, high = noise.drive_range
     found = {"models": models, "record": tracking, "dt": noise.dt, "limits": (low, high)}
-    return stage, model, {**found, "rates": (0.5, 2.0, 8.0), "particles": 24, "iterations": 30}
+    return (
+        stage,
+        model,
+        {**found, "rates": (0.5, 2.0, 8.0), "search": pt.TuningSearch(particles=24, iterations=30)},
+    )
 
 
 def markdown(found: pt.control.ControllerComparison) -> str:

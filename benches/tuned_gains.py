@@ -32,8 +32,9 @@ def controller(inverse: Any, dt: float, limits: tuple[float, float], **parts: An
 
 
 def tuned(stage: Any, inverse: Any, reference: Any, dt: float, delay: float, **options: Any) -> Any:
-    options = {"limits": LIMITS, "clipped": 1.0, **options}
-    return pt.tune(stage, reference, dt=dt, feedforward=inverse, delay=delay, **options)
+    options = {"limits": LIMITS, "goal": pt.Goal(largest_saturation=1.0), **options}
+    timing = pt.Timing(delay=delay)
+    return pt.tune(stage, reference, dt=dt, feedforward=inverse, timing=timing, **options)
 
 
 def largest(apparatus: Apparatus, loop: pt.Controller, reference: Any) -> tuple[float, float]:
@@ -45,8 +46,7 @@ def largest(apparatus: Apparatus, loop: pt.Controller, reference: Any) -> tuple[
             one.x,
             loop,
             reference,
-            delay=one.delay,
-            jitter=min(one.jitter, 0.2 * loop.dt),
+            timing=pt.Timing(delay=one.delay, jitter=min(one.jitter, 0.2 * loop.dt)),
             beyond_reach=True,
             unstable=True,
         )
@@ -86,7 +86,7 @@ def figures(apparatus: Apparatus, inverse: Any, rates: tuple[float, ...]) -> Non
                 apparatus.delay,
                 limits=limits,
                 parts=(*sought, *extra),
-                **budget(rate),
+                search=budget(rate),
             )
             took = time.perf_counter() - started
             found = largest(apparatus, loop, reference)
@@ -114,7 +114,7 @@ def circles(apparatus: Apparatus, inverse: Any, rates: tuple[float, ...]) -> Non
                 1.0 / rate,
                 apparatus.delay,
                 parts=parts,
-                **budget(rate),
+                search=budget(rate),
             )
             took = time.perf_counter() - started
             after = contour_error(apparatus, pair, path)
@@ -127,9 +127,9 @@ def circles(apparatus: Apparatus, inverse: Any, rates: tuple[float, ...]) -> Non
             )
 
 
-def budget(rate: float) -> dict[str, int]:
+def budget(rate: float) -> pt.TuningSearch:
     """A loop at 5 kHz has 150 000 samples."""
-    return {"particles": 32, "iterations": 40} if rate > 2000.0 else {}
+    return pt.TuningSearch(particles=32, iterations=40) if rate > 2000.0 else pt.TuningSearch()
 
 
 def contour_error(apparatus: Apparatus, pair: Any, path: Any) -> tuple[float, float]:
@@ -140,8 +140,7 @@ def contour_error(apparatus: Apparatus, pair: Any, path: Any) -> tuple[float, fl
             one.stage,
             pair,
             path,
-            delay=one.delay,
-            jitter=min(one.jitter, 0.2 * pair[0].dt),
+            timing=pt.Timing(delay=one.delay, jitter=min(one.jitter, 0.2 * pair[0].dt)),
             beyond_reach=True,
             unstable=True,
         ).metrics

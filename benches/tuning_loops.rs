@@ -61,7 +61,7 @@ fn loops(c: &mut Criterion) {
             let judged = Judged::Measured;
             let task = Task {
                 stage,
-                visited: &[],
+                voltages_before: &[],
                 timing,
                 samples,
                 beside: &[],

@@ -81,7 +81,13 @@ CALLS: dict[str, Callable[[Any], Any]] = {
     "Reference.motion": SINE.motion,
     "steps": pt.staircase(dwell=0.5, steps=2, low=0.0, high=1e-5).motion,
     "schedule waveform": lambda v: pt.schedule(
-        PLAYS, [1e-6], [0.2], waveform=v, dt=0.02, limits=(0.0, 75.0), particles=2, iterations=1
+        PLAYS,
+        [1e-6],
+        [0.2],
+        waveform=v,
+        dt=0.02,
+        limits=(0.0, 75.0),
+        search=pt.TuningSearch(particles=2, iterations=1),
     ),
     "BenchmarkRecord.of_log": pt.BenchmarkRecord.of_log,
     "Apparatus.of": pt.xu_li_2010.Apparatus.of,

@@ -61,7 +61,7 @@ def main() -> None:
         limits=LIMITS,
         feedforward=inverse,
         parts=("pid", "low-pass"),
-        clipped=1.0,
+        goal=pt.Goal(largest_saturation=1.0),
     )
     print(found)
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")

@@ -23,6 +23,9 @@ from .control.parts.filters import LowPass as LowPass
 from .control.parts.filters import Notch as Notch
 from .control.parts.repetitive import Repetitive as Repetitive
 from .control.running.track import track as track
+from .control.timing import Timing as Timing
+from .control.tuning.goal import Goal as Goal
+from .control.tuning.goal import TuningSearch as TuningSearch
 from .control.tuning.linear_systems import to_control as to_control
 from .control.tuning.margins import Margins as Margins
 from .control.tuning.margins import Spread as Spread

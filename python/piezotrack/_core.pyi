@@ -1,5 +1,5 @@
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, final
+from typing import Any, Literal, Protocol, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -313,6 +313,14 @@ class Session:
     def reset(self) -> None: ...
     def retune(self, other: Controller) -> None: ...
 
+class _Timing(Protocol):
+    @property
+    def delay(self) -> float: ...
+    @property
+    def jitter(self) -> float: ...
+    @property
+    def voltages_before(self) -> Sequence[float]: ...
+
 @final
 class VirtualStage:
     def __new__(
@@ -336,8 +344,8 @@ class VirtualStage:
         controller: Controller,
         reference: ArrayLike,
         feedforward: ArrayLike,
-        sampling: _Pace,
-        visited: ArrayLike,
+        timing: _Timing,
+        substeps: int,
     ) -> TrackingRun: ...
 
 @final
@@ -356,10 +364,8 @@ class Task:
         cls,
         *,
         stage: VirtualStage,
-        visited: ArrayLike,
+        timing: _Timing,
         dt: float,
-        delay: float,
-        jitter: float,
         reference: ArrayLike,
         feedforward: ArrayLike,
         beside: ArrayLike,
@@ -396,21 +402,42 @@ class SoughtController:
         plants: Sequence[LoopPlant],
     ) -> SoughtController: ...
 
+class _Goal(Protocol):
+    @property
+    def minimise(self) -> str: ...
+    @property
+    def effort(self) -> float: ...
+    @property
+    def slew(self) -> float: ...
+    @property
+    def largest_error(self) -> float: ...
+    @property
+    def largest_saturation(self) -> float: ...
+
+class _Budget(Protocol):
+    @property
+    def particles(self) -> int: ...
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def seed(self) -> int: ...
+
+class _TuningProblem(Protocol):
+    @property
+    def goal(self) -> _Goal: ...
+    @property
+    def search(self) -> _Budget: ...
+    @property
+    def threads(self) -> int: ...
+
 def tune(
+    problem: _TuningProblem,
     *,
+    margins: tuple[float, float, float, float],
     axes: Sequence[SoughtController],
     tasks: Sequence[Task | PathTask],
-    required: tuple[float, float, float, float, float, float, float],
-    aim: str,
-    effort: float,
-    particles: int,
-    iterations: int,
-    seed: int,
-    threads: int,
 ) -> dict[str, Any]: ...
 
-# Delay and jitter [s], and instants kept in each control interval.
-_Pace = tuple[float, float, int]
 _Motion = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 _Spread = tuple[float, float, float, float, float]
 
@@ -432,8 +459,8 @@ class XYStage:
         controllers: tuple[Controller, Controller],
         references: tuple[ArrayLike, ArrayLike],
         feedforwards: tuple[ArrayLike, ArrayLike],
-        sampling: _Pace,
-        visited: tuple[Sequence[float], Sequence[float]],
+        timings: tuple[_Timing, _Timing],
+        substeps: int,
     ) -> tuple[TrackingRun, TrackingRun]: ...
 
 def circle_errors(

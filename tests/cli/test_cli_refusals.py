@@ -345,4 +345,4 @@ def test_a_reference_beyond_reach_is_refused_without_an_option_that_tune_lacks()
     )
     assert "900 um" in said
     assert "reaches from" in said
-    assert "clipped" not in said
+    assert "largest_saturation" not in said

@@ -89,7 +89,7 @@ def test_every_option_of_a_loop_reaches_it() -> None:
             repetitive=pt.Repetitive.from_um(period=2.0, kq=0.5, tq=0.1),
         ),
         sine(0.5, 6.0, 10e-6, 60e-6),
-        delay=0.001,
+        timing=pt.Timing(delay=0.001),
     )
     assert report("a/b")["metrics"]["rms_error"] == expected.metrics.rms_error
     assert expected.repetitive.any()

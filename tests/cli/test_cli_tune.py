@@ -63,10 +63,11 @@ def test_what_is_written_is_a_loop_that_keeps_the_margins_and_the_error() -> Non
     # The loop that a person makes of the file, judged without the tuning.
     stage = pt.VirtualStage.of(known, noise=30e-9, seed=3)
     reference = pt.sine(frequency=0.5, low=10e-6, high=60e-6, duration=6.0)
-    run = pt.track(stage, loop, reference, delay=0.002)
+    timing = pt.Timing(delay=0.002)
+    run = pt.track(stage, loop, reference, timing=timing)
     (written,) = document["references"]
     assert written["metrics"]["rms_error"] == pytest.approx(run.metrics.rms_error, rel=1e-9)
-    without = pt.track(stage, pt.Controller.of(known, dt=0.02), reference, delay=0.002)
+    without = pt.track(stage, pt.Controller.of(known, dt=0.02), reference, timing=timing)
     assert run.metrics.rms_error < without.metrics.rms_error
     margins = pt.check_loop(known, loop, delay=0.002)
     for one in (margins.low, margins.middle, margins.high):
@@ -77,7 +78,7 @@ def test_what_is_written_is_a_loop_that_keeps_the_margins_and_the_error() -> Non
     kept = {one["name"]: one["value"] for one in document["kept"]}
     worst = max(one.sensitivity for one in (margins.low, margins.middle, margins.high))
     assert kept["sensitivity"] == pytest.approx(worst)
-    for words in ("PID: kp ", "low-pass: ", "what binds: ", "  results/tuning.json\n"):
+    for words in ("PID: kp ", "low-pass: ", "active constraints: ", "  results/tuning.json\n"):
         assert words in printed
 
 

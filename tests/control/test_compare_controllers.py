@@ -12,7 +12,7 @@ import pytest
 import piezotrack as pt
 
 LIMITS = (0.0, 75.0)
-QUICK: dict[str, Any] = {"particles": 16, "iterations": 12}
+QUICK: dict[str, Any] = {"search": pt.TuningSearch(particles=16, iterations=12)}
 
 
 def plays(gain: float = 1.0) -> pt.stages.PrandtlIshlinskiiStage:
@@ -215,7 +215,8 @@ def test_the_picture_has_a_mark_for_each_reference() -> None:
         ({"references": ["sine"]}, "references has str"),
         ({"limits": (1.0, 0.0)}, "expected the lower one first"),
         ({"dt": 0.0}, "dt is 0"),
-        ({"delay": -1.0}, "delay is -1"),
+        ({"timing": pt.Timing(delay=-1.0)}, "delay is -1"),
+        ({"timing": 1e-3}, "timing is float: expected pt.Timing"),
         ({"references": None, "rates": (1.0, 2.0)}, "rates is .* in rising order"),
         ({"references": None, "rates": (1.0, 2.0, 500.0)}, "rates ends with 500 Hz"),
         ({"references": None, "rates": (1e-9, 2.0, 5.0)}, "rates begins with 1e-09 Hz"),

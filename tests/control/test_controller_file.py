@@ -179,7 +179,7 @@ def test_margins_at_design_are_kept() -> None:
 def test_what_a_search_kept_is_kept() -> None:
     tuned = pt.tune(
         pt.VirtualStage.xu_li_2010(), dt=0.02, limits=(0.0, 75.0), parts=["pid"],
-        particles=6, iterations=3,
+        search=pt.TuningSearch(particles=6, iterations=3),
     )  # fmt: skip
     other = pt.load_controller(tuned.controller.save("loop.json", report=tuned))
     assert other.provenance is not None

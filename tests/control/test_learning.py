@@ -272,6 +272,18 @@ def test_the_table_is_saved_with_its_units(tmp_path: Path) -> None:
     assert len(found.plot().axes) == 3
 
 
+def test_a_trial_has_the_timing_of_its_loop() -> None:
+    stage, loop = replace(PLAYS), replace(OPEN, feedforward=PLAYS.inverse())
+    timings = [pt.Timing(), pt.Timing(jitter=2e-4), pt.Timing(voltages_before=(75.0, 0.0))]
+    usual, late, moved = (
+        pt.learn(stage, SINE, loop, trials=1, timing=timing).first for timing in timings
+    )
+    assert np.array_equal(usual.voltage, late.voltage)
+    assert (usual.measured != late.measured).any()
+    assert moved.displacement[0] == pytest.approx(PLAYS.equilibrium([75.0, 0.0]).x, rel=1e-9)
+    assert moved.displacement[0] > usual.displacement[0]
+
+
 def test_filters_for_firmware_learn_as_the_update_does() -> None:
     learner = pt.control.IterativeLearning(LINEAR, SINE, OPEN, cutoff=100.0)
     rule = learner.rule

@@ -156,9 +156,15 @@ def test_a_learning_that_ends_early_ends_at_rest_and_has_what_was_learnt(
             ("model is not given",),
         ),
         (lambda d: pt.learn(d, SINE, feedforward(), rest=80.0), ("rest is 80 V", "0 to 75 V")),
-        (lambda d: pt.learn(d, SINE, feedforward(), visited=9.0), ("visited is 9.0", "device")),
+        (
+            lambda d: pt.learn(d, SINE, feedforward(), timing=pt.Timing(voltages_before=[9.0])),
+            ("timing has jitter or voltages_before", "device"),
+        ),
         (lambda _: pt.learn(stage(), SINE, feedforward(), rest=0.0), ("rest is 0.0", "simulated")),
-        (lambda d: pt.track(d, LOOP, SINE, jitter=0.1), ("jitter", "on a device")),
+        (
+            lambda d: pt.track(d, LOOP, SINE, timing=pt.Timing(jitter=0.1)),
+            ("timing", "on a device"),
+        ),
         (lambda d: pt.track(d, LOOP, SINE, safe=-5.0), ("rest is -5 V", "0 to 75 V")),
         (lambda _: pt.track(stage(), LOOP, SINE, safe=0.0), ("safe is 0.0", "simulated")),
     ],

@@ -13,7 +13,11 @@ import piezotrack as pt
 LIMITS = (0.0, 75.0)
 DT = 1e-3
 GAIN = 1.2e-6
-QUICK: dict[str, Any] = {"particles": 24, "iterations": 25, "parts": "pid", "law": "pd"}
+QUICK: dict[str, Any] = {
+    "search": pt.TuningSearch(particles=24, iterations=25),
+    "parts": "pid",
+    "law": "pd",
+}
 
 
 def stage(gain: float = GAIN) -> pt.stages.PrandtlIshlinskiiStage:

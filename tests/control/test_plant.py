@@ -118,7 +118,9 @@ def test_the_motion_is_that_of_the_stage_under_the_held_voltage(name: str) -> No
 def test_a_part_of_a_sample_of_delay_shifts_the_motion(name: str) -> None:
     stage = STAGES[name]
     course, forward = sine(0.5, 3.0), loop(stage)
-    plain, late = (pt.track(stage, forward, course, delay=delay) for delay in (0.0, 0.006))
+    plain, late = (
+        pt.track(stage, forward, course, timing=pt.Timing(delay=delay)) for delay in (0.0, 0.006)
+    )
     # 0.006 s are three of the ten instants kept in an interval.
     shifted = late.fine_displacement[3:] - plain.fine_displacement[:-3]
     assert np.abs(shifted).max() < 1e-12

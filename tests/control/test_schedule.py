@@ -17,7 +17,7 @@ LIMITS = (0.0, 75.0)
 CENTRE = 58.5e-6
 AMPLITUDES, RATES = (10e-6, 40e-6), (0.2, 0.5)
 FULL: dict[str, Any] = {"dt": 0.02, "limits": LIMITS}
-QUICK = {**FULL, "particles": 8, "iterations": 4}
+QUICK = {**FULL, "search": pt.TuningSearch(particles=8, iterations=4)}
 SEEDS = (11, 12, 13, 14)
 
 

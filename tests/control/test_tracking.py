@@ -140,7 +140,8 @@ def test_late_samples_see_the_stage_further_on() -> None:
     controller = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=TABLE_1.inverse())
     reference = pt.triangle(frequency=0.1, low=10e-6, high=110e-6, duration=200.0)
     prompt, late = (
-        pt.track(TABLE_1, controller, reference, jitter=jitter) for jitter in (0.0, 2e-3)
+        pt.track(TABLE_1, controller, reference, timing=pt.Timing(jitter=jitter))
+        for jitter in (0.0, 2e-3)
     )
     rising = np.gradient(reference.sample(0.02).x, 0.02) > 19.9e-6
     rising &= np.roll(rising, 25) & (prompt.t > 20.0)
@@ -150,18 +151,20 @@ def test_late_samples_see_the_stage_further_on() -> None:
     assert later.std() == pytest.approx(2e-3, rel=0.15)
     assert (late.loop_error == late.error).all()
     # The same draws again, and others with another seed.
-    again = pt.track(TABLE_1, controller, reference, jitter=2e-3)
+    again = pt.track(TABLE_1, controller, reference, timing=pt.Timing(jitter=2e-3))
     assert (again.measured == late.measured).all()
     stages = [pt.VirtualStage.xu_li_2010(seed=seed) for seed in (1, 2)]
     quiet = [changed(stage, noise=0.0) for stage in stages]
-    first, second = (pt.track(stage, loop(), sine(0.5, 2.0), jitter=1e-3) for stage in quiet)
+    late_by = pt.Timing(jitter=1e-3)
+    first, second = (pt.track(stage, loop(), sine(0.5, 2.0), timing=late_by) for stage in quiet)
     assert (first.measured != second.measured).any()
 
 
 def test_a_delay_in_the_loop_is_a_delay_of_the_motion() -> None:
     inverse = dataclasses.replace(TABLE_1.inverse(), playback="online")
     controller = pt.Controller(dt=1e-3, limits=WIDE, feedforward=inverse)
-    runs = [pt.track(TABLE_1, controller, sine(0.5, 6.0), delay=late) for late in (0.0, 0.0135)]
+    timings = [pt.Timing(delay=late) for late in (0.0, 0.0135)]
+    runs = [pt.track(TABLE_1, controller, sine(0.5, 6.0), timing=timing) for timing in timings]
     lags = [run.metrics.phase_lag or 0.0 for run in runs]
     assert lags[1] - lags[0] == pytest.approx(math.pi * 0.0135, rel=0.005)
 
@@ -175,15 +178,21 @@ def test_substeps_change_what_is_kept_and_not_the_run() -> None:
 
 # What is refused.
 
+
+def timed(**timing: float) -> Any:
+    return pt.track(STAGE, loop(), sine(0.5, 2.0), timing=pt.Timing(**timing))  # type: ignore[arg-type]
+
+
 BAD: dict[str, tuple[Callable[[], Any], str]] = {
     "stage": (lambda: pt.track(5, loop(), sine(0.5, 2.0)), "stage"),  # type: ignore[arg-type]
     "controller": (lambda: pt.track(STAGE, PID, sine(0.5, 2.0)), "controller"),  # type: ignore[arg-type]
     "reference": (lambda: pt.track(STAGE, loop(), np.zeros(9)), "reference"),  # type: ignore[arg-type]
-    "jitter": (lambda: pt.track(STAGE, loop(), sine(0.5, 2.0), jitter=-0.1), "jitter"),
-    "delay": (lambda: pt.track(STAGE, loop(), sine(0.5, 2.0), delay=-0.1), "delay"),
+    "jitter": (lambda: timed(jitter=-0.1), "jitter"),
+    "delay": (lambda: timed(delay=-0.1), "delay"),
     "substeps": (lambda: pt.track(STAGE, loop(), sine(0.5, 2.0), substeps=0), "substeps"),
     "many": (lambda: pt.track(STAGE, loop(), sine(0.5, 2.0), substeps=10**12), "substeps"),
-    "delayed": (lambda: pt.track(STAGE, loop(), sine(0.5, 2.0), delay=1e300), "delay"),
+    "delayed": (lambda: timed(delay=1e300), "delay"),
+    "timing": (lambda: pt.track(STAGE, loop(), sine(0.5, 2.0), timing=1e-3), "timing"),  # type: ignore[arg-type]
     "coarse": (lambda: pt.track(STAGE, loop(), sine(30.0, 2.0)), "dt"),
     "part": (lambda: fig_12("FF").score(19.99), "start and stop"),
     "turned": (lambda: fig_12("FF").score(5.0, 4.0), "start and stop"),
@@ -200,8 +209,8 @@ def test_refuses(name: str) -> None:
 
 def test_a_refusal_names_argument_value_and_expectation() -> None:
     with pytest.raises(pt.ParameterError) as caught:
-        pt.track(STAGE, loop(), sine(0.5, 2.0), delay=-0.1)
-    assert str(caught.value) == "delay is -0.1: expected a finite number of 0 or above, in s"
+        timed(delay=-0.1)
+    assert str(caught.value) == "delay is -0.1 s: expected a finite number, 0 or above"
 
 
 # References of every kind, words and pictures.

@@ -11,24 +11,26 @@ import pytest
 import piezotrack as pt
 from piezotrack import _core
 from piezotrack.control.tuning.motions import tasks_of
-from piezotrack.control.tuning.question import asked
+from piezotrack.control.tuning.problem import TuningProblem
 
 LIMITS = (0.0, 75.0)
-QUICK: dict[str, Any] = {"limits": LIMITS, "dt": 0.02, "particles": 24, "iterations": 25}
+LOOP: dict[str, Any] = {"limits": LIMITS, "dt": 0.02}
+QUICK = {**LOOP, "search": pt.TuningSearch(particles=24, iterations=25)}
 
 
 def published(dt: float = 0.02) -> pt.Controller:
     return pt.Controller(dt=dt, limits=LIMITS, feedback=pt.Pid.xu_li_2010())
 
 
-def question(stage: pt.XYStage, path: pt.XYReference, dt: float) -> Any:
-    options: dict[str, Any] = {
-        "feedforward": None, "parts": None, "filters": (), "law": "pid", "margins": None,
-        "spread": None, "figure": "rms", "effort": 0.0, "slew": 1e9, "clipped": 1.0, "delay": 1e-3,
-        "jitter": 0.0, "visited": (), "error": "measured", "allowed": 1.0, "seeds": 1,
-        "particles": 10, "iterations": 1, "seed": 1, "threads": 0,
-    }  # fmt: skip
-    return asked(stage=stage, reference=path, dt=dt, limits=LIMITS, **options)
+TIMING = pt.Timing(delay=1e-3)
+
+
+def problem(stage: pt.XYStage, path: pt.XYReference) -> TuningProblem:
+    options: dict[str, Any] = dict.fromkeys(("feedforward", "parts", "margins", "spread", "search"))
+    return TuningProblem.checked(
+        stage=stage, reference=path, law="pid", filters=(), threads=0, timing=TIMING,
+        goal=pt.Goal(largest_saturation=1.0), **LOOP, **options,
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.013, 0.06])
@@ -44,10 +46,10 @@ def test_the_contour_error_of_the_search_is_that_of_a_full_simulation(
             frequencies=(0.4, 0.2), sizes=(15e-6, 20e-6), centre=(50e-6, 50e-6)
         )
     loops = published(), replace(published(), feedback=pt.Pid(kp=0.08e6, ti=0.01, td=0.02))
-    (task,) = tasks_of(question(stage, path, 0.02), loops, repeats=False)
+    (task,) = tasks_of(problem(stage, path), loops, repeats=False)
     assert isinstance(task, _core.PathTask)
     ((rms, largest, *_),) = task.figures([(loops[0]._core, loops[1]._core)], 1)
-    full = pt.contour(stage, loops, path, delay=1e-3).metrics
+    full = pt.contour(stage, loops, path, timing=TIMING).metrics
     # Noise is read at other instants where the lag is no whole number of intervals.
     assert rms == pytest.approx(full.rms_error, rel=0.03)
     assert largest == pytest.approx(full.max_error, rel=0.15)
@@ -71,7 +73,7 @@ def test_two_controllers_beat_the_published_gains_where_one_axis_comes_late() ->
     after = pt.contour(other, (x, y), path).metrics
     assert after.rms_error < 0.8 * before.rms_error
     assert after.rms_error < 0.95 * apart.rms_error
-    assert report.figure == "rms contour error"
+    assert report.minimised == "rms contour error"
     # The gains are the best for one draw of the noise; the full simulation reads another.
     assert report.value == pytest.approx(report.runs[0].metrics.rms_error, rel=0.15)
     for axis, loop in ((other.x, x), (other.y, y)):
@@ -105,13 +107,17 @@ def test_a_path_is_needed_and_no_reference_of_one_axis() -> None:
 
 def test_a_path_beyond_reach_names_the_axis() -> None:
     path = pt.circle(frequency=0.5, radius=20e-6, centre=(50e-6, 150e-6))
-    with pytest.raises(pt.ParameterError, match=r"y: .*clipped=0.5 or more"):
+    with pytest.raises(pt.ParameterError, match=r"y: .*largest_saturation=0.5 or more"):
         pt.tune(pt.XYStage.xu_li_2010(), path, **QUICK)
 
 
 def test_the_same_bits_for_any_number_of_threads() -> None:
     path = pt.circle(frequency=0.5, radius=10e-6, duration=6.0)
-    options: dict[str, Any] = {**QUICK, "parts": "pid", "particles": 12, "iterations": 4}
+    options: dict[str, Any] = {
+        **LOOP,
+        "parts": "pid",
+        "search": pt.TuningSearch(particles=12, iterations=4),
+    }
     one, three = (
         pt.tune(pt.XYStage.xu_li_2010(seed=1), path, threads=threads, **options)
         for threads in (1, 3)
@@ -122,7 +128,7 @@ def test_the_same_bits_for_any_number_of_threads() -> None:
 
 def test_scheduled_gains_of_both_axes_follow_the_contour() -> None:
     stage, grid = pt.XYStage.xu_li_2010(seed=1), ([10e-6, 40e-6], [0.5])
-    found = pt.schedule(stage, *grid, **{**QUICK, "particles": 16, "iterations": 12})
+    found = pt.schedule(stage, *grid, **LOOP, search=pt.TuningSearch(particles=16, iterations=12))
     assert isinstance(found, pt.control.SchedulePair)
     assert found.errors.shape == (2, 1, 2)
     assert (found.errors[..., 1] <= found.errors[..., 0]).all()
@@ -141,7 +147,19 @@ def test_scheduled_gains_of_both_axes_follow_the_contour() -> None:
 def test_filters_of_each_axis() -> None:
     path = pt.circle(frequency=0.5, radius=10e-6)
     filters: Any = ([pt.LowPass(10.0)], [pt.LowPass(4.0)])
-    options = {**QUICK, "particles": 10, "iterations": 4}
+    options = {**LOOP, "search": pt.TuningSearch(particles=10, iterations=4)}
     (x, y), _ = pt.tune(pt.XYStage.xu_li_2010(), path, parts="pid", filters=filters, **options)
     assert x.filters == (pt.LowPass(10.0),)
     assert y.filters == (pt.LowPass(4.0),)
+
+
+def test_the_runs_of_the_report_begin_after_the_voltages_before() -> None:
+    stage = pt.XYStage(x=pt.DahlStage.xu_li_2010(), y=pt.DahlStage.xu_li_2010())
+    path = pt.circle(frequency=0.5, radius=10e-6, duration=4.0)
+    timing = pt.Timing(voltages_before=(75.0, 30.0))
+    search = pt.TuningSearch(particles=10, iterations=2)
+    tuned = pt.tune(stage, path, parts="pid", timing=timing, search=search, **LOOP)
+    (run,) = tuned.report.runs
+    assert run.x.displacement[0] == pytest.approx(
+        pt.DahlStage.xu_li_2010().equilibrium([75.0, 30.0]).x, rel=1e-9
+    )

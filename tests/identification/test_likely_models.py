@@ -71,7 +71,11 @@ def test_margins_of_a_tuned_loop_hold_for_all_of_them() -> None:
     nearby = likely_models(fit, log)
     assert len(nearby) >= 6
     controller, report = pt.tune(
-        [fit, *nearby], dt=DT, limits=(0.0, 50.0), parts="pid", particles=16, iterations=10
+        [fit, *nearby],
+        dt=DT,
+        limits=(0.0, 50.0),
+        parts="pid",
+        search=pt.TuningSearch(particles=16, iterations=10),
     )
     assert len(report.plants) == 3 * (1 + len(nearby))
     loops = [pt.check_loop(one, controller) for one in nearby]

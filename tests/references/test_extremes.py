@@ -153,7 +153,7 @@ TOO_LARGE: dict[str, tuple[Callable[[], Any], str]] = {
             pt.DahlStage.xu_li_2010(),
             pt.Controller(dt=0.02, limits=(0.0, 75.0)),
             pt.sine(frequency=1.0, duration=1.0, low=0.0, high=1e-5),
-            delay=1e300,
+            timing=pt.Timing(delay=1e300),
             unstable=True,
         ),
         "delay is 1e300 s: expected",

@@ -43,7 +43,7 @@ fn task<'a>(stage: &'a VirtualStage, samples: ReferenceSamples<'a>, delay: f64) 
         Timing { interval: DT, samples: samples.reference.len(), delay, jitter: 0.0, substeps: 1 };
     Task {
         stage,
-        visited: &[],
+        voltages_before: &[],
         timing,
         samples,
         beside: &[],
@@ -55,7 +55,7 @@ fn task<'a>(stage: &'a VirtualStage, samples: ReferenceSamples<'a>, delay: f64) 
 
 /// Largest and rms error of a loop that is simulated by itself, in fine steps.
 fn alone(task: &Task<'_>, controller: &Controller<Law>) -> (f64, f64) {
-    let start = task.stage.start_after(task.visited);
+    let start = task.stage.start_after(task.voltages_before);
     let apparatus = task.stage.apparatus();
     let run = track(&apparatus, start, &task.timing, controller, task.samples, NEVER);
     let run = run.unwrap().unwrap();

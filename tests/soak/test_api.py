@@ -271,19 +271,28 @@ def check(script: Script, draw: Draw) -> None:
             script.on(report, "response", count(20).draw(draw, odd=False))
 
 
-RUN = {
-    "delay": number(0.0, near=1e-2), "jitter": number(0.0, near=1e-2), "substeps": count(2),
-    "beyond_reach": truth(True), "unstable": truth(True),
+TIMING = {
+    "delay": number(0.0, near=1e-2), "jitter": number(0.0, near=1e-2),
+    "voltages_before": numbers(75.0, 0.0),
 }  # fmt: skip
+RUN = {
+    "substeps": count(2), "beyond_reach": truth(True), "unstable": truth(True),
+}  # fmt: skip
+
+
+def run_arguments(script: Script, draw: Draw, slots: dict[str, Slot]) -> dict[str, Any]:
+    given = arguments(draw, slots, most=1)
+    if draw(st.booleans()):
+        given["timing"] = script.new("pt.Timing", **arguments(draw, TIMING, most=1))
+    return given
 
 
 def track(script: Script, draw: Draw) -> None:
     loop = controller(script, draw)
     if loop is None or sizeable(100 * SINE.duration / loop.dt):
         return
-    run = script.new(
-        "pt.track", draw(st.sampled_from(PLANTS)), loop, SINE, **arguments(draw, RUN, most=1)
-    )
+    given = run_arguments(script, draw, RUN)
+    run = script.new("pt.track", draw(st.sampled_from(PLANTS)), loop, SINE, **given)
     if run is not None:
         script.on(run, "summary")
         score = {"start": number(None, near=0.2), "stop": number(None, near=0.9)}
@@ -299,7 +308,7 @@ def contour(script: Script, draw: Draw) -> None:
     if loop is None or sizeable(100 * CIRCLE.duration / loop.dt):
         return
     slots = RUN | {"decoupling": Slot(None, st.one_of(st.just(np.eye(2)), numbers(1.0, 0.0).other))}
-    run = script.new("pt.contour", XY, [loop, loop], CIRCLE, **arguments(draw, slots, most=1))
+    run = script.new("pt.contour", XY, [loop, loop], CIRCLE, **run_arguments(script, draw, slots))
     if run is not None:
         script.on(run, "summary")
 

@@ -68,9 +68,10 @@ def test_a_closed_loop_begins_where_the_stage_was_left() -> None:
     stage = all_stages.STAGES["parallel-dahl"]
     loop = pt.Controller(dt=0.01, limits=(0.0, 75.0))
     still = pt.sine(frequency=1.0, low=0.0, high=20e-6, duration=1.0)
-    begun = pt.track(stage, loop, still, visited=(75.0, 30.0), beyond_reach=True)
+    timing = pt.Timing(voltages_before=(75.0, 30.0))
+    begun = pt.track(stage, loop, still, timing=timing, beyond_reach=True)
     x = stage.equilibrium([75.0, 30.0]).x
     assert begun.displacement[0] == pytest.approx(x, rel=1e-12)
     assert pt.track(stage, loop, still, beyond_reach=True).displacement[0] == 0.0
     with pytest.raises(pt.ParameterError, match="has its preconditioning"):
-        pt.track(pt.VirtualStage.xu_li_2010(), loop, still, visited=30.0, beyond_reach=True)
+        pt.track(pt.VirtualStage.xu_li_2010(), loop, still, timing=timing, beyond_reach=True)

@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Collection, Iterable, Sequence
 from itertools import islice
-from typing import TYPE_CHECKING, Any, TypeGuard
+from typing import TYPE_CHECKING, Any, TypeGuard, TypeVar
 
 import numpy as np
 
@@ -25,6 +25,7 @@ __all__ = [
     "check_reach",
     "expect",
     "finite",
+    "given_or",
     "has_entries",
     "hertz",
     "in_range",
@@ -37,6 +38,7 @@ __all__ = [
     "positive",
 ]
 
+Settings = TypeVar("Settings")
 # A displacement [m] that only a wrong unit explains.
 TOO_FAR = 1.0
 # Frequencies of references [Hz]: beyond them numbers derived from them leave float64.
@@ -290,3 +292,17 @@ def one_or_more_numbers(name: str, values: object) -> tuple[float, ...]:
     """
     entries = np.atleast_1d(np.asarray(values, dtype=object)).tolist()
     return tuple(_core.as_number(f"{name}[{i}]", value) for i, value in enumerate(entries))
+
+
+def given_or(name: str, value: Settings | None, default: Settings) -> Settings:
+    """Return settings of the type of the default, which stands for None.
+
+    Examples
+    --------
+    >>> given_or("limits", None, (0.0, 75.0))
+    (0.0, 75.0)
+    """
+    kind = type(default)
+    if value is not None and not isinstance(value, kind):
+        raise ParameterError(f"{name} is {type(value).__name__}: expected pt.{kind.__name__}")
+    return default if value is None else value

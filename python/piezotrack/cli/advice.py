@@ -39,7 +39,7 @@ ADVICE = [
     (r"\bcount is (?=\d+: expected 1 to)", "--plays is ", "--plays"),
     (r"\bdead_zones is ", "--asymmetry is ", "--asymmetry"),
     (r"\bmargins\.gain is ", "--gain-margin is ", "--gain-margin"),
-    (r"\ballowed is ", "--allowed-um is ", "--allowed-um"),
+    (r"\blargest_error is ", "--allowed-um is ", "--allowed-um"),
     (r"\bmethod '(frequency|lifted)'", r"--method \1", "--mode-scales"),
     (r"\brates (?=begins|ends)", "--rates ", "--rates"),
     (r"\bmode_scales is ", "--mode-scales is ", "--mode-scales"),
@@ -108,8 +108,7 @@ def as_options(text: str) -> str:
             text = re.sub(python, words, text)
     if "--resample" not in options:
         text = re.sub(r"; resample= puts it [^;]*", "", text)
-    if "--clipped" not in options:
-        text = text.replace(", or clipped=0.5 or more", "")
+    text = text.replace(", or largest_saturation=0.5 or more", "")
     for python, option, needed in ADVICE:
         if needed in options:
             text = re.sub(python, option, text)

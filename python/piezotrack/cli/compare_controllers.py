@@ -74,6 +74,8 @@ def compare_controllers_command(
     """Compare controllers on one stage."""
     from .._support.files import picture_files
     from ..control.comparing.compare import compare_controllers
+    from ..control.timing import Timing
+    from ..control.tuning.goal import TuningSearch
     from ..control.tuning.margins import Margins
     from ..identification.fitted.identified_model import load
 
@@ -94,9 +96,9 @@ def compare_controllers_command(
         if controllers is None
         else [SPELLINGS.get(one, one) for one in map(str.strip, controllers.split(","))],
         margins=Margins(sensitivity=sensitivity),
-        delay=delay,
+        timing=Timing(delay=delay),
         seeds=seeds,
-        seed=seed,
+        search=TuningSearch(seed=seed),
     )
     result.show(str(found), found.document(), found.save(out))
 

@@ -135,6 +135,7 @@ def contour_command(
 ) -> None:
     """Simulate contouring of a path with an XY stage."""
     from ..control.loop.contouring import contour
+    from ..control.timing import Timing
     from ..xu_li_2010.table_2 import run_table_2
 
     own = _is_own(stage, models, table_2)
@@ -153,7 +154,7 @@ def contour_command(
     result.will_write(_names(table_2))
     loops = xy.controllers(desired, feedforward)
     how = xy.words if feedforward else "no feedforward"
-    mixing: dict[str, Any] = {"delay": delay, "jitter": jitter}
+    mixing: dict[str, Any] = {"timing": Timing(delay=delay, jitter=jitter)}
     if decouple:
         found = _cross_talk(plant, loops)
         mixing["decoupling"] = found.matrix

@@ -130,6 +130,7 @@ def learn_command(
     from .._support.files import picture_files
     from ..control.controller.controller import Controller
     from ..control.learning.learn import learn
+    from ..control.timing import Timing
     from ..identification.fitted.identified_model import load
 
     own = stage != PAPER
@@ -161,7 +162,7 @@ def learn_command(
                 model=known,
                 trials=trials,
                 method=method,
-                delay=delay,
+                timing=Timing(delay=delay),
                 gain=gain,
                 cutoff=cutoff,
                 mode_scales=[number("--mode-scales", one) for one in mode_scales.split(",")],

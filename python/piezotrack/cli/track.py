@@ -153,6 +153,7 @@ def track_command(
     from ..control.controller.controller import Controller
     from ..control.loop.stability import check_loop
     from ..control.running.track import track
+    from ..control.timing import Timing
     from ..identification.fitted.identified_model import load
 
     if device is not None:
@@ -189,7 +190,7 @@ def track_command(
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write(["tracking.csv", "tracking.json", *picture_files("tracking")])
     free = {"beyond_reach": beyond_reach, "unstable": unstable}
-    run = track(plant, loop, desired, delay=delay, jitter=jitter, **free)
+    run = track(plant, loop, desired, timing=Timing(delay=delay, jitter=jitter), **free)
     name = f"stage: {model.name}" if own else "stage: the virtual stage of Xu and Li 2010"
     lines = [name, run.summary()]
     notes = drive_notes(known, run)

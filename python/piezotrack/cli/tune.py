@@ -87,6 +87,8 @@ def tune_command(
 ) -> None:
     """Find the gains of a controller under margins."""
     from .._support.files import picture_files
+    from ..control.timing import Timing
+    from ..control.tuning.goal import Goal, TuningSearch
     from ..control.tuning.margins import Margins, Spread
     from ..control.tuning.tune import tune
     from ..identification.fitted.identified_model import load
@@ -115,10 +117,12 @@ def tune_command(
         parts=None if parts is None else [one.strip() for one in parts.split(",")],
         margins=margins,
         spread=spread,
-        figure=_figure(figure, allowed_um),
-        allowed=math.inf if allowed_um is None else 1e-6 * allowed_um,
-        delay=delay,
-        seed=seed,
+        goal=Goal(
+            minimise=_figure(figure, allowed_um),
+            largest_error=math.inf if allowed_um is None else 1e-6 * allowed_um,
+        ),
+        timing=Timing(delay=delay),
+        search=TuningSearch(seed=seed),
     )
     document = _document(tuned)
     result.show(str(tuned), document, _write(tuned, document, out))
@@ -169,7 +173,7 @@ def _document(tuned: Tuned) -> dict[str, Any]:
         ],
         "kept": [one._asdict() for one in report.kept],
         "plants": list(report.plants),
-        "binding": list(report.binding),
+        "binding": list(report.active_constraints),
         "controllers": report.candidates,
         "loops": report.loops,
         "provenance": {"package": "piezotrack", "version": __version__},

@@ -51,6 +51,9 @@ from .parts.repetitive import Repetitive as Repetitive
 from .parts.repetitive import ZeroPhase as ZeroPhase
 from .plant import Plant as Plant
 from .running.track import track as track
+from .timing import Timing as Timing
+from .tuning.goal import Goal as Goal
+from .tuning.goal import TuningSearch as TuningSearch
 from .tuning.h_infinity import MixedSensitivity as MixedSensitivity
 from .tuning.h_infinity import mixed_sensitivity as mixed_sensitivity
 from .tuning.linear_systems import to_control as to_control
@@ -60,6 +63,6 @@ from .tuning.schedule import Schedule as Schedule
 from .tuning.schedule import SchedulePair as SchedulePair
 from .tuning.schedule import schedule as schedule
 from .tuning.tune import tune as tune
-from .tuning.tuned import Kept as Kept
+from .tuning.tuned import MarginReport as MarginReport
 from .tuning.tuned import Tuned as Tuned
 from .tuning.tuned import TuningReport as TuningReport

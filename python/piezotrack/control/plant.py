@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import copyreg
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .. import _core
-from .._support.arguments import one_or_more_numbers
+from .._support.arguments import given_or
 from ..errors import ParameterError
 from ..identification.fitted.identified_model import IdentifiedModel
 from ..stages.base import Stage
 from ..stages.virtual import VirtualStage
+from .timing import Timing
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ __all__ = [
     "linearised_plants",
     "lowest_settled_displacement",
     "plant_of",
-    "voltages_before",
+    "timing_on",
 ]
 
 # A linearised stage is pickled as its matrices.
@@ -71,25 +71,31 @@ def displacement_range(
     return float(x.min()), float(x.max())
 
 
-def initial_displacement(stage: VirtualStage, visited: tuple[float, ...]) -> float:
-    """Return the displacement [m] in which a run begins, after slow visits to voltages [V]."""
-    moved = float(stage.stage.equilibrium(visited).x) if visited else 0.0
+def initial_displacement(stage: VirtualStage, limits: tuple[float, float]) -> float:
+    """Return the displacement [m] in which a run between limits [V] begins."""
+    before = timing_on(stage, None, limits).voltages_before
+    moved = float(stage.stage.equilibrium(before).x) if before else 0.0
     return moved + stage.sensor.offset
 
 
-def voltages_before(
-    plant: VirtualStage, visited: float | Sequence[float], limits: tuple[float, float]
-) -> tuple[float, ...]:
-    """Voltages before a run [V]: those given, or the limit nearest to 0 V where 0 V is outside."""
-    before = one_or_more_numbers("visited", visited)
+def timing_on(plant: VirtualStage, timing: Timing | None, limits: tuple[float, float]) -> Timing:
+    """Return the timing of a run with the voltages before it.
+
+    Where none are given and 0 V is not between the limits [V], that is the limit nearest to 0 V.
+    """
+    given = given_or("timing", timing, Timing())
+    before = given.voltages_before
     if plant.preconditioning is not None:
         if before:
             raise ParameterError(
-                f"visited is {before}: expected none, this virtual stage has its preconditioning"
+                f"voltages_before is {before}: expected none, this virtual stage has its "
+                "preconditioning"
             )
-        return ()
+        return given
     low, high = limits
-    return before or (() if low <= 0.0 <= high else (low if low > 0.0 else high,))
+    if before or low <= 0.0 <= high:
+        return given
+    return replace(given, voltages_before=(low if low > 0.0 else high,))
 
 
 def lowest_settled_displacement(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .._support.json_text import parse_json
 from .._support.messages import quoted
 from ..control.controller.controller import Controller
+from ..control.timing import Timing
 from ..errors import ParameterError
 from ..stages.apparatus import Amplifier, Preconditioning, Sensor
 from ..stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
@@ -66,9 +67,9 @@ class Apparatus:
         return self.x.stage
 
     @property
-    def timing(self) -> dict[str, Any]:
-        """Delay and jitter as arguments of `track` and `contour`."""
-        return {"delay": self.delay, "jitter": self.jitter}
+    def timing(self) -> Timing:
+        """Delay and jitter as an argument of `track` and `contour`."""
+        return Timing(delay=self.delay, jitter=self.jitter)
 
     def seeded(self, seed: int) -> Apparatus:
         """Return the same apparatus with other seeds of both sensors.

@@ -9,6 +9,7 @@ from ..control.laws.pid import Pid
 from ..control.parts.filters import LowPass, Notch
 from ..control.parts.repetitive import Lag, Repetitive, ZeroPhase
 from ..control.running.track import track
+from ..control.timing import Timing
 from ..data.dataset import Dataset
 from ..errors import NumericalError, ParameterError
 from ..identification.fit import identify
@@ -149,8 +150,8 @@ def _tried(
     rows = []
     for name, controller in controllers.items():
         try:
-            timing = apparatus.timing if controller.dt == DT else {"delay": controller.dt}
-            run = track(apparatus.x, controller, reference, **timing)
+            timing = apparatus.timing if controller.dt == DT else Timing(delay=controller.dt)
+            run = track(apparatus.x, controller, reference, timing=timing)
             cells = tuple(figures(run))
         except (ParameterError, NumericalError):
             cells = ("unstable", *[""] * (columns - 1))

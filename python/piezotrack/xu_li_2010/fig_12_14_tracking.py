@@ -34,7 +34,7 @@ def compensation(apparatus: Apparatus, inverse: Inverse) -> Runs:
         "both": loop(inverse, feedback=PID),
     }
     return {
-        name: track(apparatus.x, one, slow(), **apparatus.timing, unstable=True)
+        name: track(apparatus.x, one, slow(), timing=apparatus.timing, unstable=True)
         for name, one in loops.items()
     }
 
@@ -51,7 +51,7 @@ def antiwindup(apparatus: Apparatus, inverse: Inverse, part: float = 1.0) -> Run
             apparatus.x,
             one,
             shrunk(part),
-            **apparatus.timing,
+            timing=apparatus.timing,
             beyond_reach=True,
             unstable=True,
         )
@@ -69,7 +69,7 @@ def repetitive(apparatus: Apparatus, inverse: Inverse, part: float = 1.0) -> Run
         "with": loop(inverse, feedback=PID, repetitive=learning),
     }
     return {
-        name: track(apparatus.x, one, reference, **apparatus.timing, unstable=True)
+        name: track(apparatus.x, one, reference, timing=apparatus.timing, unstable=True)
         for name, one in loops.items()
     }
 

@@ -27,7 +27,7 @@ def circles(
     """Run the nine circles, up to a radius [m], with the feedforward of x on both axes."""
     one = loop(inverse, feedback=PID)
     return run_table_2(
-        apparatus.stage, (one, one), **apparatus.timing, largest=largest, checked=checked
+        apparatus.stage, (one, one), timing=apparatus.timing, largest=largest, checked=checked
     )
 
 

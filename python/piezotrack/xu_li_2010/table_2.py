@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from ..control.controller.controller import Controller
+    from ..control.timing import Timing
     from ..stages.xy import XYStage
 
 __all__ = ["PUBLISHED", "Table2", "run_table_2"]
@@ -115,8 +116,7 @@ def run_table_2(
     controllers: Sequence[Controller],
     *,
     decoupling: ArrayLike | None = None,
-    delay: float = 0.0,
-    jitter: float = 0.0,
+    timing: Timing | None = None,
     largest: float = 1.0,
     checked: bool = True,
 ) -> Table2:
@@ -131,7 +131,7 @@ def run_table_2(
         The plant.
     controllers : (Controller, Controller)
         Of x and y.
-    decoupling, delay, jitter
+    decoupling, timing
         As for `contour`.
     largest : float, optional
         Radius up to which circles are run [m]: 20e-6 leaves out the last three.
@@ -164,8 +164,7 @@ def run_table_2(
                 controllers,
                 circle(frequency=case.frequency, radius=case.radius),
                 decoupling=decoupling,
-                delay=delay,
-                jitter=jitter,
+                timing=timing,
                 beyond_reach=not checked,
                 unstable=not checked,
             )

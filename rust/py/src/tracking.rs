@@ -24,13 +24,25 @@ pub fn stopped<T>(run: Option<T>) -> Result<T> {
     run.ok_or_else(|| Error::Numerical("the simulation was stopped".into()))
 }
 
-/// Delay and jitter, s, and instants kept in each control interval.
-pub type Sampling = (f64, f64, usize);
+/// Timing of a loop, from the attributes of Python's `Timing`.
+#[derive(FromPyObject)]
+pub struct LoopTiming<'py> {
+    delay: f64,
+    jitter: f64,
+    voltages_before: Bound<'py, PyAny>,
+}
 
-/// When a controller looks and acts.
-pub fn timing(controller: &PyController, samples: usize, sampling: Sampling) -> Timing {
-    let (delay, jitter, substeps) = sampling;
-    Timing { interval: controller.dt, samples, delay, jitter, substeps }
+impl LoopTiming<'_> {
+    /// When a controller looks and acts every `interval` seconds, with instants kept in between.
+    pub fn sampled(&self, interval: f64, samples: usize, substeps: usize) -> Timing {
+        let Self { delay, jitter, .. } = *self;
+        Timing { interval, samples, delay, jitter, substeps }
+    }
+
+    /// Voltages that the stage visits slowly before, V.
+    pub fn voltages_before(&self) -> PyResult<Vec<f64>> {
+        samples("voltages_before", &self.voltages_before)
+    }
 }
 
 /// Reference and feedforward as Python gives them.
@@ -58,15 +70,14 @@ impl Arrays {
     pub fn run(
         &self,
         axis: &VirtualStage,
-        visited: &[f64],
+        voltages_before: &[f64],
         controller: &PyController,
-        sampling: Sampling,
+        timing: &Timing,
         stop: Stop<'_>,
     ) -> Result<PyTrackingRun> {
-        let timing = timing(controller, self.reference.len(), sampling);
         let (apparatus, input) = (axis.apparatus(), self.input());
-        let start = axis.start_after(visited);
-        let run = track(&apparatus, start, &timing, &controller.controller, input, stop)?;
+        let start = axis.start_after(voltages_before);
+        let run = track(&apparatus, start, timing, &controller.controller, input, stop)?;
         PyTrackingRun::new(stopped(run)?)
     }
 }

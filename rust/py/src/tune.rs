@@ -15,6 +15,7 @@ use crate::control::PyController;
 use crate::design::PyLoopPlant;
 use crate::enter::enter_quiet_pool;
 use crate::errors::raise;
+use crate::tracking::LoopTiming;
 use crate::virtual_stage::PyVirtualStage;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -29,7 +30,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 #[pyclass(name = "Task", frozen, module = "piezotrack._core")]
 pub struct PyTask {
     stage: VirtualStage,
-    visited: Vec<f64>,
+    voltages_before: Vec<f64>,
     timing: Timing,
     reference: Vec<f64>,
     feedforward: Vec<f64>,
@@ -41,15 +42,13 @@ pub struct PyTask {
 #[pymethods]
 impl PyTask {
     #[new]
-    #[pyo3(signature = (*, stage, visited, dt, delay, jitter, reference, feedforward,
-        beside, first, measured))]
+    #[pyo3(signature = (*, stage, timing, dt, reference, feedforward, beside, first, measured))]
     #[expect(clippy::too_many_arguments, reason = "all named in Python")]
+    #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn new(
         stage: &PyVirtualStage,
-        visited: &Bound<'_, PyAny>,
+        timing: LoopTiming<'_>,
         dt: f64,
-        delay: f64,
-        jitter: f64,
         reference: &Bound<'_, PyAny>,
         feedforward: &Bound<'_, PyAny>,
         beside: &Bound<'_, PyAny>,
@@ -57,11 +56,10 @@ impl PyTask {
         measured: bool,
     ) -> PyResult<Self> {
         let reference = samples("reference", reference)?;
-        let timing = Timing { interval: dt, samples: reference.len(), delay, jitter, substeps: 1 };
         Ok(Self {
             stage: stage.0,
-            visited: samples("visited", visited)?,
-            timing,
+            voltages_before: timing.voltages_before()?,
+            timing: timing.sampled(dt, reference.len(), 1),
             reference,
             feedforward: samples("feedforward", feedforward)?,
             beside: samples("beside", beside)?,
@@ -91,7 +89,7 @@ impl PyTask {
             ReferenceSamples { reference: &self.reference, feedforward: &self.feedforward };
         Task {
             stage: &self.stage,
-            visited: &self.visited,
+            voltages_before: &self.voltages_before,
             timing: self.timing,
             samples,
             beside: &self.beside,
@@ -195,7 +193,7 @@ fn robustness(of: &Robustness) -> RobustnessNumbers {
     )
 }
 
-/// What was found, as a dict in Python.
+/// Settings found by a search, as a dict in Python.
 #[derive(IntoPyObject)]
 struct FoundSettings {
     settings: Vec<Vec<(&'static str, f64)>>,
@@ -241,9 +239,60 @@ fn structure((name, gain, time): &(String, f64, f64)) -> Result<Structure> {
     })
 }
 
-/// Gain margin, phase margin (rad), sensitivity, learning gain, slew (V/s), clipped share, rms
-/// error (m).
-type RequiredNumbers = (f64, f64, f64, f64, f64, f64, f64);
+/// Gain margin, phase margin (rad), sensitivity, learning gain.
+type MarginNumbers = (f64, f64, f64, f64);
+
+/// Objective and bounds, from the attributes of Python's `Goal`.
+#[derive(FromPyObject)]
+struct Goal {
+    minimise: String,
+    effort: f64,
+    slew: f64,
+    largest_error: f64,
+    largest_saturation: f64,
+}
+
+/// Budget and seed, from the attributes of Python's `TuningSearch`.
+#[derive(FromPyObject)]
+struct Search {
+    particles: usize,
+    iterations: usize,
+    seed: u64,
+}
+
+/// Problem of a search, from the attributes of Python's `TuningProblem`.
+#[derive(FromPyObject)]
+struct Problem {
+    goal: Goal,
+    search: Search,
+    threads: usize,
+}
+
+impl Goal {
+    /// Figure to minimise; without motions the effect of a disturbance.
+    fn aim(&self, motions: usize) -> Aim {
+        match self.minimise.as_str() {
+            _ if motions == 0 => Aim::Disturbance,
+            "largest" => Aim::Largest,
+            "effort" => Aim::Effort,
+            _ => Aim::Rms,
+        }
+    }
+
+    /// Requirements on every loop: margins, and the bounds of the goal.
+    fn required(&self, margins: MarginNumbers) -> Requirements {
+        let (gain_margin, phase_margin, sensitivity, learning) = margins;
+        Requirements {
+            gain_margin,
+            phase_margin,
+            sensitivity,
+            learning,
+            slew: self.slew,
+            clipped: self.largest_saturation,
+            error: self.largest_error,
+        }
+    }
+}
 
 /// A controller of which settings are sought.
 #[pyclass(name = "SoughtController", frozen, module = "piezotrack._core")]
@@ -281,47 +330,29 @@ impl PySoughtController {
     }
 }
 
-/// Searches the settings of a controller, or of those of both axes.
+/// Searches the settings of a controller, or of those of both axes, with margins that may have some
+/// in reserve.
 #[pyfunction]
-#[pyo3(signature = (*, axes, tasks, required, aim, effort, particles, iterations, seed, threads))]
-#[expect(clippy::too_many_arguments, reason = "all named in Python")]
+#[pyo3(signature = (problem, *, margins, axes, tasks))]
 #[expect(clippy::needless_pass_by_value, reason = "extracted from lists")]
 fn tune(
     py: Python<'_>,
+    problem: Problem,
+    margins: MarginNumbers,
     axes: Vec<PyRef<'_, PySoughtController>>,
     tasks: Vec<AnyTask<'_>>,
-    required: RequiredNumbers,
-    aim: &str,
-    effort: f64,
-    particles: usize,
-    iterations: usize,
-    seed: u64,
-    threads: usize,
 ) -> PyResult<FoundSettings> {
-    let (gain_margin, phase_margin, sensitivity, learning, slew, clipped, error) = required;
+    let Problem { goal, search, threads } = problem;
     let judges: Result<Vec<Judge<'_>>> = tasks.iter().map(AnyTask::judge).collect();
     let tuning = Tuning {
         axes: axes.iter().map(|axis| axis.0.clone()).collect(),
         tasks: judges.map_err(|error| raise(&error))?,
-        required: Requirements {
-            gain_margin,
-            phase_margin,
-            sensitivity,
-            learning,
-            slew,
-            clipped,
-            error,
-        },
-        aim: match aim {
-            "largest" => Aim::Largest,
-            "disturbance" => Aim::Disturbance,
-            "effort" => Aim::Effort,
-            _ => Aim::Rms,
-        },
-        effort,
-        particles,
-        iterations,
-        seed,
+        required: goal.required(margins),
+        aim: goal.aim(tasks.len()),
+        effort: goal.effort,
+        particles: search.particles,
+        iterations: search.iterations,
+        seed: search.seed,
     };
     let found = enter_quiet_pool(py, threads, |stop| tuning.search(stop))?;
     Ok(FoundSettings::of(&found))

@@ -15,7 +15,7 @@ use crate::enter::enter;
 use crate::errors::raise;
 use crate::models::{Named, named};
 use crate::stage::{PyStage, hold};
-use crate::tracking::{Arrays, PyTrackingRun, Sampling, stopped};
+use crate::tracking::{Arrays, LoopTiming, PyTrackingRun, stopped};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyVirtualStage>()?;
@@ -134,19 +134,21 @@ impl PyVirtualStage {
     }
 
     /// Simulates closed-loop tracking of a reference, after visits to voltages or from the start,
-    /// in steps of at most `step` seconds.
+    /// in steps of at most `step` seconds, with `substeps` instants kept in each control interval.
+    #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn track(
         &self,
         py: Python<'_>,
         controller: &PyController,
         reference: &Bound<'_, PyAny>,
         feedforward: &Bound<'_, PyAny>,
-        sampling: Sampling,
-        visited: &Bound<'_, PyAny>,
+        timing: LoopTiming<'_>,
+        substeps: usize,
     ) -> PyResult<PyTrackingRun> {
-        let visited = samples("visited", visited)?;
+        let before = timing.voltages_before()?;
         let input = Arrays::new(reference, feedforward)?;
-        enter(py, |stop| input.run(&self.0, &visited, controller, sampling, stop))
+        let timing = timing.sampled(controller.dt, input.input().reference.len(), substeps);
+        enter(py, |stop| input.run(&self.0, &before, controller, &timing, stop))
     }
 }
 

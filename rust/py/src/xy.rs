@@ -17,7 +17,7 @@ use crate::control::PyController;
 use crate::enter::enter;
 use crate::errors::raise;
 use crate::stage::hold;
-use crate::tracking::{Arrays, PyTrackingRun, Sampling, stopped, timing};
+use crate::tracking::{Arrays, LoopTiming, PyTrackingRun, stopped};
 use crate::virtual_stage::{OpenLoopArrays, PyVirtualStage, open_loop_arrays};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -46,10 +46,11 @@ impl PyXyStage {
     /// to voltages if there are any.
     fn both(
         &self,
-        visited: [&[f64]; 2],
+        voltages_before: [&[f64]; 2],
     ) -> (TwoAxes<'_, Stage, Stage>, TwoStates<StageState, StageState>) {
         let [x, y] = &self.axes;
-        let start = (x.start_after(visited[0]), y.start_after(visited[1]));
+        let [before_x, before_y] = voltages_before;
+        let start = (x.start_after(before_x), y.start_after(before_y));
         let (x, y) = (x.apparatus(), y.apparatus());
         let Self { cross_talk, lag, missed, .. } = *self;
         (TwoAxes { x, y, cross_talk, lag, missed }, start)
@@ -92,7 +93,8 @@ impl PyXyStage {
         Ok([open_loop_arrays(py, &x)?, open_loop_arrays(py, &y)?])
     }
 
-    /// Simulates the closed loops of two controllers of one interval along their references.
+    /// Simulates the closed loops of two controllers of one interval along their references, whose
+    /// timings differ in the voltages before only.
     #[expect(clippy::needless_pass_by_value, reason = "extracted from tuples")]
     fn track(
         &self,
@@ -100,17 +102,18 @@ impl PyXyStage {
         controllers: [PyRef<'_, PyController>; 2],
         references: [Bound<'_, PyAny>; 2],
         feedforwards: [Bound<'_, PyAny>; 2],
-        sampling: Sampling,
-        visited: [Vec<f64>; 2],
+        timings: [LoopTiming<'_>; 2],
+        substeps: usize,
     ) -> PyResult<(PyTrackingRun, PyTrackingRun)> {
         let inputs = [
             Arrays::new(&references[0], &feedforwards[0])?,
             Arrays::new(&references[1], &feedforwards[1])?,
         ];
+        let before = [timings[0].voltages_before()?, timings[1].voltages_before()?];
         let [x, y] = [&*controllers[0], &*controllers[1]];
+        let timing = timings[0].sampled(x.dt, 0, substeps);
         enter(py, |stop| {
-            let (axes, start) = self.both([&visited[0], &visited[1]]);
-            let timing = timing(x, 0, sampling);
+            let (axes, start) = self.both([&before[0], &before[1]]);
             let inputs = [inputs[0].input(), inputs[1].input()];
             let controllers = (&x.controller, &y.controller);
             let (x, y) = stopped(track_both(&axes, start, &timing, controllers, inputs, stop)?)?;

@@ -8,7 +8,7 @@ from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 from ... import _core
-from ..._support.arguments import not_negative, number_pair, one_of
+from ..._support.arguments import given_or, number_pair, one_of
 from ..._support.arrays import check_dt
 from ...errors import ParameterError, PiezotrackError
 from ...identification.fitted.identified_model import IdentifiedModel
@@ -18,7 +18,7 @@ from ..loop.chatter import chatter_of
 from ..loop.closed_loop import run_closed_loop, stepped
 from ..loop.preconditions import check_delay
 from ..loop.tracking import can_be_learnt, feedforward_of, first_counted
-from ..plant import plant_of, voltages_before
+from ..plant import plant_of, timing_on
 from ..tuning.margins import Margins, Spread, plants_of
 from .comparison import Cell, ControllerComparison, Row
 from .contenders import CONTENDERS, Entry, Task
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from ...stages.virtual import VirtualStage
     from ..controller.controller import Controller
     from ..plant import Plant
+    from ..timing import Timing
 
     Array = NDArray[np.float64]
 
@@ -59,7 +60,7 @@ def compare_controllers(
     record: Dataset | None = None,
     margins: Margins | None = None,
     spread: Spread | None = None,
-    delay: float = 0.0,
+    timing: Timing | None = None,
     seeds: int = 3,
     **options: Any,
 ) -> ControllerComparison:
@@ -92,12 +93,12 @@ def compare_controllers(
         Models under the names ``"dahl"`` and ``"bouc-wen"``, for their inverses.
     record : Dataset, optional
         To train the network with.
-    margins, spread, delay : optional
+    margins, spread, timing : optional
         As of `tune`.
     seeds : int, optional
         Draws of the sensor's noise that each controller is judged by; it is tuned with one.
     **options
-        Further arguments of `tune`, as `particles`.
+        Further arguments of `tune`, as `search`; `goal` is the rms of the true error by default.
 
     Returns
     -------
@@ -118,7 +119,8 @@ def compare_controllers(
     >>> found = pt.compare_controllers(
     ...     pt.VirtualStage.of(plays, noise=5e-9), plays, dt=1e-3, limits=(0.0, 75.0),
     ...     references=[pt.sine(frequency=5.0, low=20e-6, high=60e-6, duration=1.2)],
-    ...     controllers=["inverse", "inverse + PID"], particles=12, iterations=8,
+    ...     controllers=["inverse", "inverse + PID"],
+    ...     search=pt.TuningSearch(particles=12, iterations=8),
     ... )
     >>> [row.name for row in found.rows]
     ['inverse', 'inverse + PID']
@@ -129,8 +131,9 @@ def compare_controllers(
         raise ParameterError(
             f"model is {type(model).__name__}: expected a stage or identified model"
         )
-    interval, late = check_dt(dt), not_negative("delay", delay, "s")
-    check_delay(plant, late, interval)
+    interval = check_dt(dt)
+    timing = timing_on(plant, timing, (low, high))
+    check_delay(plant, timing.delay, interval)
     task = Task(
         stage=plant,
         inverse=model.inverse(),
@@ -139,9 +142,9 @@ def compare_controllers(
         references=_references(references) or usual_references(plant, (low, high), rates, interval),
         dt=interval,
         limits=(low, high),
-        margins=margins or Margins(),
-        spread=spread or Spread(),
-        delay=late,
+        margins=given_or("margins", margins, Margins()),
+        spread=given_or("spread", spread, Spread()),
+        timing=timing,
         options=options,
     )
     draws = _counted(seeds)
@@ -234,16 +237,12 @@ def _cell(
     # The same samples for all of them, whether they learn or not.
     first = first_counted(entry.reference, samples, learns=can_be_learnt(entry.reference))
     stages = [_drawn(variant.stage, k) for k in range(draws)]
-    found = [
-        _figures(entry, one, task.delay + variant.delay, (samples.x, voltage), first)
-        for one in stages
-    ]
+    timing = replace(task.timing, delay=task.timing.delay + variant.delay)
+    found = [_figures(entry, one, timing, (samples.x, voltage), first) for one in stages]
     rms, largest, effort, _, clipped = zip(*found, strict=True)
     chatter = None
     if chatters and all(map(math.isfinite, rms)):
-        sampling = (task.delay + variant.delay, 0.0, 1)
-        visited = voltages_before(stages[0], (), entry.controller.limits)
-        run = run_closed_loop(stages[0], entry.controller, samples.x, voltage, sampling, visited)
+        run = run_closed_loop(stages[0], entry.controller, samples.x, voltage, timing, 1)
         chatter = chatter_of(run.part("volts")[first:]).fast_change
     return Cell(rms, max(largest), fmean(effort), fmean(clipped), chatter)
 
@@ -255,17 +254,15 @@ def _drawn(stage: VirtualStage, k: int) -> VirtualStage:
 
 
 def _figures(
-    entry: Entry, stage: VirtualStage, delay: float, motion: tuple[Array, Array], first: int
+    entry: Entry, stage: VirtualStage, timing: Timing, motion: tuple[Array, Array], first: int
 ) -> tuple[float, ...]:
     """Rms and largest error [m], effort [V], slew [V/s] and clipped share of a loop."""
     reference, feedforward = motion
     plant = stepped(stage, entry.controller)
     task = _core.Task(
         stage=plant._core,
-        visited=voltages_before(plant, (), entry.controller.limits),
+        timing=timing,
         dt=entry.controller.dt,
-        delay=delay,
-        jitter=0.0,
         reference=reference,
         feedforward=feedforward,
         beside=(),
@@ -279,7 +276,7 @@ def _robustness(controller: Controller, task: Task) -> tuple[float | None, float
     """Largest sensitivity and least gain margin over the plants; None without feedback."""
     if controller.feedback is None:
         return None, None
-    plants = plants_of([task.stage], task.limits, task.delay, task.spread)
+    plants = plants_of([task.stage], task.limits, task.timing.delay, task.spread)
     checks = [_core.check_loop(controller._core, one.plant) for one in plants]
     gains = [one["gain_margin"] for one in checks if one["gain_margin"] is not None]
     return max(one["sensitivity"] for one in checks), min(gains, default=math.inf)

@@ -15,6 +15,7 @@ from ..laws.hysteresis_observer import HysteresisObserver
 from ..laws.neural_network import train_network
 from ..learning.learn import learn
 from ..loop.tracking import can_be_learnt
+from ..tuning.goal import Goal
 from ..tuning.h_infinity import mixed_sensitivity
 from ..tuning.margins import Margins, Spread, plants_of
 from ..tuning.schedule import schedule
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from ...stages.base import Stage
     from ...stages.inverse import Inverse
     from ...stages.virtual import VirtualStage
+    from ..timing import Timing
 
     Array = NDArray[np.float64]
 
@@ -41,6 +43,8 @@ __all__ = ["CONTENDERS", "Entry", "Task"]
 SHARES = (1.0, 0.8, 0.6, 0.4, 0.25, 0.1, 0.03)
 # Bandwidths that a design by H-infinity is tried with, as parts of the sampling rate.
 BANDWIDTHS = (0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12)
+# What controllers are tuned for where nothing else is asked for: what they are judged by.
+TRUE_ERROR = Goal(error="true")
 
 
 class Entry(NamedTuple):
@@ -83,8 +87,8 @@ class Task:
         Of the voltage [V].
     margins, spread : Margins, Spread
         The same for all.
-    delay : float
-        Of the loop [s].
+    timing : Timing
+        Of the loop.
     options : dict
         Further arguments of `tune`.
     """
@@ -98,7 +102,7 @@ class Task:
     limits: tuple[float, float]
     margins: Margins
     spread: Spread
-    delay: float
+    timing: Timing
     options: dict[str, Any]
 
     def tuned(self, references: Any = None, inverse: Any = "model", **changes: Any) -> Controller:
@@ -111,9 +115,8 @@ class Task:
             feedforward=self.inverse if inverse == "model" else inverse,
             margins=self.margins,
             spread=self.spread,
-            delay=self.delay,
-            error="true",
-            **{"parts": ("pid", "low-pass"), **self.options, **changes},
+            timing=self.timing,
+            **{"goal": TRUE_ERROR, "parts": ("pid", "low-pass"), **self.options, **changes},
         ).controller
 
     def alone(self, inverse: Inverse) -> Controller:
@@ -164,7 +167,7 @@ def _observed(task: Task) -> list[Entry | None]:
         raise ParameterError("models['dahl'] is no Dahl stage: expected one to observe")
     tuned = task.tuned(inverse=None)
     tuned_pid: Any = tuned.feedback
-    plants = plants_of([task.stage], task.limits, task.delay, task.spread)
+    plants = plants_of([task.stage], task.limits, task.timing.delay, task.spread)
     for share in SHARES:
         pid = replace(tuned_pid, kp=share * tuned_pid.kp)
         controller = replace(tuned, feedback=HysteresisObserver(stage=stage, pid=pid))
@@ -206,9 +209,8 @@ def _scheduled(task: Task) -> list[Entry | None]:
         feedforward=task.inverse,
         margins=task.margins,
         spread=task.spread,
-        delay=task.delay,
-        error="true",
-        **task.options,
+        timing=task.timing,
+        **{"goal": TRUE_ERROR, **task.options},
     )
     return task.each(found.controller)
 
@@ -230,7 +232,7 @@ def _learnt(task: Task) -> list[Entry | None]:
             entries.append(None)
             continue
         try:
-            found = learn(task.stage, one, controller, delay=task.delay, trials=12)
+            found = learn(task.stage, one, controller, timing=task.timing, trials=12)
         except ParameterError:
             # No table of this period converges on the set of models.
             entries.append(None)
@@ -241,7 +243,7 @@ def _learnt(task: Task) -> list[Entry | None]:
 
 def _h_infinity(task: Task) -> list[Entry | None]:
     """Take the highest bandwidth that keeps the margins for all plants."""
-    plants = plants_of([task.stage], task.limits, task.delay, task.spread)
+    plants = plants_of([task.stage], task.limits, task.timing.delay, task.spread)
     base, best = task.alone(task.inverse), None
     why = "no bandwidth tried keeps the margins for all plants"
     for share in BANDWIDTHS:
@@ -252,7 +254,7 @@ def _h_infinity(task: Task) -> list[Entry | None]:
                 bandwidth=share / task.dt,
                 limits=task.limits,
                 largest_sensitivity=task.margins.sensitivity,
-                delay=task.delay,
+                delay=task.timing.delay,
             )
         except ParameterError as error:
             why = str(error)

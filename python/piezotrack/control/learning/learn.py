@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from ... import _core
-from ..._support.arguments import not_negative
+from ..._support.arguments import given_or
 from ..._support.files import write_columns
 from ..._support.result import Result
 from ..._support.units import drive_word, shown_unit
@@ -20,7 +20,8 @@ from ..controller.controller import Controller
 from ..loop.preconditions import check_drive_unit
 from ..loop.run import Run
 from ..on_device.playing import check_playable
-from ..plant import plant_of, voltages_before
+from ..plant import plant_of, timing_on
+from ..timing import Timing
 from .iterative_learning import IterativeLearning
 from .trials import PlayedTrials, SimulatedTrials
 
@@ -186,7 +187,7 @@ def learn(
     repeats: int = 2,
     method: Method = "frequency",
     models: Sequence[Plant | IdentifiedModel] = (),
-    delay: float = 0.0,
+    timing: Timing | None = None,
     more_delays: float | Sequence[float] | None = None,
     mode_scales: float | Sequence[float] = (0.9, 1.0, 1.1),
     gain: float = 0.7,
@@ -194,7 +195,6 @@ def learn(
     forgetting_factor: float = 1.0,
     change_weight: float = 0.01,
     noise: float | None = None,
-    visited: float | Sequence[float] = (),
     rest: float | None = None,
     beyond_reach: bool = False,
     progress: Callable[[IterativeLearning], None] | None = None,
@@ -226,12 +226,15 @@ def learn(
         Periods before the recorded ones, after the smooth start and the first period of the table.
     repeats : int, optional
         Records of each trial: periods, or runs of method ``"lifted"``. Two show what is noise.
-    method, models, delay, more_delays, mode_scales, gain, cutoff : optional
+    method, models, more_delays, mode_scales, gain, cutoff : optional
         As of `control.IterativeLearning`.
+    timing : Timing, optional
+        Delay and jitter of the loop, and the voltages before each trial. On a device only the
+        delay, which the learning expects.
     forgetting_factor, change_weight, noise : optional
         As there.
-    visited, beyond_reach : optional
-        As of `track`; a device has been where it has been.
+    beyond_reach : optional
+        As of `track`.
     rest : float, optional
         Voltage of a device before and after each trial [V]; default 0 V, or the limit nearest to
         it.
@@ -267,7 +270,8 @@ def learn(
     np.True_
     """
     known = _model_of(stage, controller) if model is None else model
-    home = _rest_on(stage, controller, rest, visited)
+    timing = given_or("timing", timing, Timing())
+    home = _rest_on(stage, controller, rest, timing)
     # What is behind a device is what its model says.
     behind = known if isinstance(stage, Device) else stage
     plant = plant_of(behind)
@@ -277,7 +281,7 @@ def learn(
         controller,
         method=method,
         models=models,
-        delay=delay,
+        delay=timing.delay,
         more_delays=more_delays,
         mode_scales=mode_scales,
         gain=gain,
@@ -288,10 +292,9 @@ def learn(
     )
     check_drive_unit(behind, controller)
     Run(controller, reference).check(
-        plant, delay, beyond_reach=_core.as_truth("beyond_reach", beyond_reach)
+        plant, timing.delay, beyond_reach=_core.as_truth("beyond_reach", beyond_reach)
     )
     most = _counted("trials", trials, MOST_TRIALS)
-    late = not_negative("delay", delay, "s")
     periods = {
         "settle": _counted("settle", settle, 1000),
         "repeats": _counted("repeats", repeats, 1000),
@@ -300,8 +303,8 @@ def learn(
     if isinstance(stage, Device):
         runs = PlayedTrials(device=stage, rest=home, learner=learner, **periods)
     else:
-        before = voltages_before(plant, visited, controller.limits)
-        runs = SimulatedTrials(plant=plant, learner=learner, delay=late, before=before, **periods)
+        timing = timing_on(plant, timing, controller.limits)
+        runs = SimulatedTrials(plant=plant, learner=learner, timing=timing, **periods)
     return _learnt(runs, most, progress or _unseen)
 
 
@@ -383,7 +386,7 @@ def _rest_on(
     stage: Plant | IdentifiedModel | Device,
     controller: Controller,
     rest: float | None,
-    visited: float | Sequence[float],
+    timing: Timing,
 ) -> float:
     """Return the voltage at which a device rests [V], after what it needs is checked."""
     if not isinstance(stage, Device):
@@ -391,9 +394,9 @@ def _rest_on(
             raise ParameterError(f"rest is {rest!r}: expected none, as the stage is simulated")
         return 0.0
     check_playable(stage, controller)
-    if visited != ():
+    if timing != Timing(delay=timing.delay):
         raise ParameterError(
-            f"visited is {visited!r}: expected none on a device, which has been where it has been"
+            "timing has jitter or voltages_before: expected none on a device, which has its own"
         )
     return rest_of(stage, rest)
 

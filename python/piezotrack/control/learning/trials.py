@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ...hardware.device import Device
     from ...stages.virtual import VirtualStage
     from ..loop.tracking import Tracking
+    from ..timing import Timing
     from .iterative_learning import IterativeLearning
 
     Array = NDArray[np.float64]
@@ -101,15 +102,12 @@ class SimulatedTrials(Trials):
     ----------
     plant : VirtualStage
         The stage.
-    delay : float
-        From a reading to the effect of its voltage [s].
-    before : tuple of float
-        Voltages visited before [V].
+    timing : Timing
+        Timing of the loop, with the voltages before each trial.
     """
 
     plant: VirtualStage
-    delay: float
-    before: tuple[float, ...]
+    timing: Timing
 
     def run(self, table: Array, trial: int, repeat: int = 0) -> Tracking:
         """Simulate a trial with noise of its own."""
@@ -117,7 +115,7 @@ class SimulatedTrials(Trials):
         seed = (sensor.seed + trial * self.repeats + repeat) % 2**63
         plant = replace(self.plant, sensor=replace(sensor, seed=seed))
         feedforward = PlayedVoltage(self.voltage(table), NOTE)
-        return self.whole.simulate(plant, feedforward, (self.delay, 0.0, SUBSTEPS), self.before)
+        return self.whole.simulate(plant, feedforward, self.timing, SUBSTEPS)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

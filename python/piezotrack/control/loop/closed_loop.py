@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from ... import _core
     from ...stages.virtual import VirtualStage
     from ..controller.controller import Controller
+    from ..timing import Timing
 
     Array = NDArray[np.float64]
 
@@ -23,17 +24,16 @@ def run_closed_loop(
     controller: Controller,
     reference: Array,
     feedforward: Array,
-    sampling: tuple[float, float, int],
-    visited: tuple[float, ...] = (),
+    timing: Timing,
+    substeps: int,
 ) -> _core.TrackingRun:
     """Simulate a closed loop, with reference [m] and feedforward [V] at the samples.
 
-    The stage is where its experiments start, or in equilibrium after slow visits to the voltages
-    `visited` [V]. `sampling` is delay and jitter [s], and the substeps kept in each sampling
-    interval.
+    The stage is where its experiments start, or in equilibrium after the voltages before the run.
+    `substeps` are kept in each sampling interval.
     """
     stage = stepped(stage, controller)
-    return stage._core.track(controller._core, reference, feedforward, sampling, visited)
+    return stage._core.track(controller._core, reference, feedforward, timing, substeps)
 
 
 def stepped(stage: VirtualStage, controller: Controller) -> VirtualStage:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from ... import _core
-from ..._support.arguments import not_negative, number_pair
+from ..._support.arguments import number_pair
 from ..._support.files import write_result
 from ..._support.frames import frame_of
 from ..._support.result import Result
@@ -19,7 +19,7 @@ from ...errors import ParameterError
 from ...references.xy_reference import XYReference, square_matrix
 from ...stages.xy import XYStage
 from ..controller.controller import Controller
-from ..plant import displacement_range, initial_displacement, voltages_before
+from ..plant import displacement_range, initial_displacement, timing_on
 from .run import Run
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike, NDArray
 
+    from ..timing import Timing
     from .tracking import Tracking
 
     Array = NDArray[np.float64]
@@ -324,10 +325,8 @@ def contour(
     path: XYReference,
     *,
     decoupling: ArrayLike | None = None,
-    delay: float = 0.0,
-    jitter: float = 0.0,
+    timing: Timing | None = None,
     substeps: int = 10,
-    visited: Sequence[float] = (),
     beyond_reach: bool = False,
     unstable: bool = False,
 ) -> Contour:
@@ -348,15 +347,11 @@ def contour(
     decoupling : array_like, shape (2, 2), optional
         Cross-talk as of `identification.identify_cross_talk`: the feedforward follows the path
         times its inverse, which cancels the cross-talk.
-    delay : float, optional
-        Time from a reading to the effect of its voltage [s], in addition to the hold.
-    jitter : float, optional
-        Mean sampling jitter [s], as for `track`: drawn for each axis separately, but the same for
-        two models, whose sensors have no seed.
+    timing : Timing, optional
+        Delay and jitter of both loops, and the voltages before the run of both axes. The jitter is
+        drawn for each axis separately, but is the same for two models, whose sensors have no seed.
     substeps : int, optional
         Instants kept in each sampling interval.
-    visited : sequence of float, optional
-        Voltages that both stages visit slowly before the run, as for `track`.
     beyond_reach, unstable : bool, optional
         As for `track`.
 
@@ -391,17 +386,17 @@ def contour(
     if not isinstance(path, XYReference):
         raise ParameterError(f"path is {type(path).__name__}: expected pt.XYReference")
     both = _two(controllers)
-    delay = not_negative("delay", delay, "s")
-    jitter = not_negative("jitter", jitter, "s")
     substeps = _core.as_count("substeps", substeps)
     free = {
         "unstable": _core.as_truth("unstable", unstable),
         "beyond_reach": _core.as_truth("beyond_reach", beyond_reach),
     }
     x, y = _runs(both, path)
+    of_x = timing_on(stage.x, timing, x.controller.limits)
+    of_y = timing_on(stage.y, timing, y.controller.limits)
     for name, axis, run in (("x", stage.x, x), ("y", stage.y, y)):
         try:
-            run.check(axis, delay, **free)
+            run.check(axis, of_x.delay, **free)
         except ParameterError as error:
             raise ParameterError(f"{name}: {error}") from None
     ahead = x, y
@@ -413,11 +408,8 @@ def contour(
         (x.controller._core, y.controller._core),
         (x.samples.x, y.samples.x),
         (volts_x, volts_y),
-        (delay, jitter, substeps),
-        (
-            voltages_before(stage.x, visited, x.controller.limits),
-            voltages_before(stage.y, visited, y.controller.limits),
-        ),
+        (of_x, of_y),
+        substeps,
     )
     return Contour(
         path=path,
@@ -483,7 +475,7 @@ def workspace(
     pairs = [number_pair("limits", one, "V") for one in ([limits] * 2 if alone else limits)]
     axes = list(zip((stage.x, stage.y), pairs, strict=True))
     x, y = (displacement_range(one, pair, 1e-3) for one, pair in axes)
-    at_x, at_y = (initial_displacement(one, voltages_before(one, (), pair)) for one, pair in axes)
+    at_x, at_y = (initial_displacement(one, pair) for one, pair in axes)
     return Workspace(x, y, (at_x, at_y))
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..._support.arguments import not_negative
 from ..._support.units import shown_unit
 from ...errors import ParameterError
 from ...identification.fitted.identified_model import IdentifiedModel
@@ -29,8 +30,8 @@ MOST_INTERVALS = 100_000
 
 
 def check_delay(stage: VirtualStage, delay: float, dt: float) -> None:
-    """Refuse a delay [s], that of the sensor included, beyond the memory of a search."""
-    whole, most = delay + stage.sensor.delay, MOST_INTERVALS * dt
+    """Refuse a delay [s] below 0, or with that of the sensor beyond the memory of a search."""
+    whole, most = not_negative("delay", delay, "s") + stage.sensor.delay, MOST_INTERVALS * dt
     if whole > most:
         raise ParameterError(
             f"delay is {whole:.6g} s in all: expected {most:.6g} s at most, "

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ...stages.inverse import PlayedVoltage
     from ...stages.virtual import VirtualStage
     from ..controller.controller import Controller
+    from ..timing import Timing
 
 __all__ = ["Run"]
 
@@ -61,13 +62,13 @@ class Run:
         self,
         plant: VirtualStage,
         feedforward: PlayedVoltage,
-        sampling: tuple[float, float, int],
-        visited: tuple[float, ...] = (),
+        timing: Timing,
+        substeps: int,
     ) -> Tracking:
-        """Simulate the closed loop with a feedforward; `sampling` as of `run_closed_loop`."""
+        """Simulate the closed loop with a feedforward."""
         volts, note = feedforward
-        run = run_closed_loop(plant, self.controller, self.samples.x, volts, sampling, visited)
-        return self.collect(run, note, sampling[2])
+        run = run_closed_loop(plant, self.controller, self.samples.x, volts, timing, substeps)
+        return self.collect(run, note, substeps)
 
     def collect(self, run: _core.TrackingRun, note: str, substeps: int) -> Tracking:
         """Collect what the core has simulated."""

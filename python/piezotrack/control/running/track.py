@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ... import _core
-from ..._support.arguments import not_negative
 from ...errors import ParameterError
 from ...hardware.device import Device
 from ...references.reference import Reference
@@ -13,14 +12,13 @@ from ..controller.controller import Controller
 from ..loop.preconditions import check_drive_unit
 from ..loop.run import Run
 from ..on_device.closed_loop import track_on
-from ..plant import plant_of, voltages_before
+from ..plant import plant_of, timing_on
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from ...identification.fitted.identified_model import IdentifiedModel
     from ..loop.tracking import Tracking
     from ..plant import Plant
+    from ..timing import Timing
 
 __all__ = ["track"]
 
@@ -30,10 +28,8 @@ def track(
     controller: Controller,
     reference: Reference,
     *,
-    delay: float = 0.0,
-    jitter: float = 0.0,
+    timing: Timing | None = None,
     substeps: int = 10,
-    visited: float | Sequence[float] = (),
     beyond_reach: bool = False,
     unstable: bool = False,
     safe: float | None = None,
@@ -55,27 +51,18 @@ def track(
         The controller.
     reference : Reference
         The reference, as ``pt.sine(...)``.
-    delay : float, optional
-        Time from a reading to the effect of its voltage [s], in addition to the hold.
-    jitter : float, optional
-        Mean sampling jitter [s], as on a computer without real-time scheduling: the delay of each
-        sample is drawn from an exponential distribution, truncated at nine tenths of the sampling
-        interval. The draws depend on the seed of the stage's sensor.
+    timing : Timing, optional
+        Delay and jitter of the loop, and the voltages before the run.
     substeps : int, optional
         Instants kept in each sampling interval, for plots; up to 100000.
-    visited : float or sequence of float, optional
-        Voltages that the stage visits slowly before the run, in turn [V]: it begins in equilibrium
-        at the last, with the memory of the others, as ``(75.0, 0.0)``. By default it never moved
-        before; where 0 V is not between the limits, it begins at the limit nearest to 0 V. Not with
-        a virtual stage that is preconditioned.
     beyond_reach : bool, optional
         Whether the reference may exceed the reach of the stage within the voltage limits, as to
         study saturation.
     unstable : bool, optional
         Whether a loop may be unstable for small motions.
     safe : float, optional
-        Of a device: voltage before and after [V]; default 0 V, or the limit nearest to it. `delay`,
-        `jitter`, `substeps` and `visited` are those of a simulation.
+        Of a device: voltage before and after [V]; default 0 V, or the limit nearest to it. `timing`
+        and `substeps` are those of a simulation.
 
     Returns
     -------
@@ -109,10 +96,9 @@ def track(
         if not isinstance(value, kind):
             raise ParameterError(f"{name} is {type(value).__name__}: expected pt.{kind.__name__}")
     if isinstance(stage, Device):
-        if (delay, jitter, substeps, visited) != (0.0, 0.0, 10, ()):
+        if timing is not None or substeps != 10:
             raise ParameterError(
-                "delay, jitter, substeps or visited is given: expected none of them on a device, "
-                "which has its own"
+                "timing or substeps is given: expected neither on a device, which has its own"
             )
         return track_on(
             stage, controller, reference, safe=safe, beyond_reach=beyond_reach, unstable=unstable
@@ -121,14 +107,12 @@ def track(
         raise ParameterError(f"safe is {safe!r}: expected none, as the stage is simulated")
     plant = plant_of(stage)
     check_drive_unit(stage, controller)
-    delay = not_negative("delay", delay, "s")
+    timing = timing_on(plant, timing, controller.limits)
     substeps = _core.as_count("substeps", substeps)
     free = {
         "unstable": _core.as_truth("unstable", unstable),
         "beyond_reach": _core.as_truth("beyond_reach", beyond_reach),
     }
     run = Run(controller, reference)
-    run.check(plant, delay, **free)
-    sampling = (delay, not_negative("jitter", jitter, "s"), substeps)
-    before = voltages_before(plant, visited, controller.limits)
-    return run.simulate(plant, run.feedforward, sampling, before)
+    run.check(plant, timing.delay, **free)
+    return run.simulate(plant, run.feedforward, timing, substeps)

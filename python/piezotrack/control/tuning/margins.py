@@ -1,4 +1,4 @@
-"""What a tuned loop keeps, and the set of plants for which it keeps it."""
+"""Margins of a tuned loop, and the set of plants for which it keeps them."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Margins:
 
 @dataclass(frozen=True, kw_only=True)
 class Spread:
-    """What may be different from a model: each is added to the set of plants.
+    """Deviations of the stage from its model: each end is added to the set of plants.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def plants_of(
     spread: Spread,
 ) -> list[NamedPlant]:
     """Linearise stages at their lowest, middle and highest gain, with every end of the spread."""
-    found = []
+    plants = []
     for i, stage in enumerate(stages):
         which = f"model {i + 1}, " if len(stages) > 1 else ""
         for late in sorted(set(spread.delay)):
@@ -137,21 +137,21 @@ def plants_of(
                 text = f"{which}{case}"
                 if late > 0.0:
                     text += f", {1e3 * late:.3g} ms more delay"
-                found += _spread(text, plant, spread)
-    return found
+                plants += _spread(text, plant, spread)
+    return plants
 
 
 def _spread(text: str, plant: _core.LoopPlant, spread: Spread) -> list[NamedPlant]:
     """Vary dynamics and gain of a plant."""
     a, b, c, d, delay = plant.matrices()
-    found = []
+    plants = []
     for rate, tempo in _ends(spread.mode, "dynamics", ("slower", "faster")):
         for gain, size in _ends(spread.gain, "gain", ("lower", "higher")):
             scaled = ((rate, a), (rate, b), (gain, c))
             rows, inputs, outputs = ((factor * np.array(part)).tolist() for factor, part in scaled)
             varied = _core.LoopPlant.from_matrices(rows, inputs, outputs, gain * d, delay)
-            found.append(NamedPlant(text + tempo + size, varied))
-    return found
+            plants.append(NamedPlant(text + tempo + size, varied))
+    return plants
 
 
 def _ends(share: float, name: str, words: tuple[str, str]) -> list[tuple[float, str]]:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ...references.reference import Reference, SampledReference
     from ...stages.virtual import VirtualStage
     from ..controller.controller import Controller
-    from .question import Axis, Question
+    from .problem import Axis, TuningProblem
 
     Array = NDArray[np.float64]
 
@@ -33,38 +33,38 @@ NOTHING = np.empty(0)
 
 
 def tasks_of(
-    question: Question, bases: Sequence[Controller], repeats: bool
+    problem: TuningProblem, bases: Sequence[Controller], repeats: bool
 ) -> list[_core.Task | _core.PathTask]:
     """Make a task of each reference and draw of the noise; `bases` have the feedforward."""
     tasks: list[_core.Task | _core.PathTask] = []
-    for axis, base in zip(question.axes, bases, strict=True):
+    for axis, base in zip(problem.axes, bases, strict=True):
         check_drive_unit(axis.stages[0], base)
-    for reference in question.references:
-        for draw in range(question.seeds):
+    for reference in problem.references:
+        for draw in range(problem.search.draws):
             if isinstance(reference, XYReference):
-                tasks.append(_path_task(question, bases, reference, draw, repeats))
+                tasks.append(_path_task(problem, bases, reference, draw, repeats))
             else:
-                (axis,), (base,) = question.axes, bases
-                samples = _samples(question, axis, reference, base.dt)
+                (axis,), (base,) = problem.axes, bases
+                samples = _samples(problem, axis, reference, base.dt)
                 tasks.append(
-                    _task(question, axis, base, (reference, samples, NOTHING), draw, repeats)
+                    _task(problem, axis, base, (reference, samples, NOTHING), draw, repeats)
                 )
     return tasks
 
 
 def _path_task(
-    question: Question, bases: Sequence[Controller], path: XYReference, draw: int, repeats: bool
+    problem: TuningProblem, bases: Sequence[Controller], path: XYReference, draw: int, repeats: bool
 ) -> _core.PathTask:
-    stage: Any = question.stage
-    pairs = zip(question.axes, path.axes, bases, strict=True)
-    x, y = (_samples(question, axis, one, base.dt) for axis, one, base in pairs)
+    stage: Any = problem.stage
+    pairs = zip(problem.axes, path.axes, bases, strict=True)
+    x, y = (_samples(problem, axis, one, base.dt) for axis, one, base in pairs)
     # Cross-talk as if the other axis were where it is to be at that time.
     xy, yx = stage.cross_talk
     beside = (xy * _moved(y, -stage.lag), yx * _moved(x, stage.lag))
     motions = zip(path.axes, (x, y), beside, strict=True)
     both = [
-        _task(question, axis, base, motion, draw, repeats)
-        for axis, base, motion in zip(question.axes, bases, motions, strict=True)
+        _task(problem, axis, base, motion, draw, repeats)
+        for axis, base, motion in zip(problem.axes, bases, motions, strict=True)
     ]
     circle = None
     if path.radius is not None and path.centre is not None:
@@ -80,7 +80,7 @@ def _moved(samples: SampledReference, later: float) -> Array:
 
 
 def _task(
-    question: Question,
+    problem: TuningProblem,
     axis: Axis,
     base: Controller,
     motion: tuple[Reference, SampledReference, Array],
@@ -92,33 +92,33 @@ def _task(
     sensor = replace(plant.sensor, seed=plant.sensor.seed + draw)
     seeded: VirtualStage = stepped(replace(plant, sensor=sensor), base)
     first = first_counted(reference, samples, learns=repeats)
-    if question.stage is not None:
+    if problem.stage is not None:
         # The smooth start has no path to compare with.
         first = max(first, int(np.searchsorted(samples.t, reference.ramp - 1e-9)))
     return _core.Task(
         stage=seeded._core,
-        visited=axis.visited,
+        timing=axis.timing,
         dt=base.dt,
-        delay=question.delay,
-        jitter=question.jitter,
         reference=samples.x,
         feedforward=feedforward_of(base, reference, samples).voltage,
         beside=beside,
         first=first,
-        measured=question.measured,
+        measured=problem.goal.error == "measured",
     )
 
 
-def _samples(question: Question, axis: Axis, reference: Reference, dt: float) -> SampledReference:
+def _samples(
+    problem: TuningProblem, axis: Axis, reference: Reference, dt: float
+) -> SampledReference:
     """Sample a reference; refuse one beyond the reach of a model, with the argument for that."""
     samples = reference.sample(dt)
-    if question.clipped >= 0.5:
+    if problem.goal.largest_saturation >= 0.5:
         return samples
     for i, stage in enumerate(axis.stages, 1):
         try:
-            check_within_reach(plant_of(stage), question.limits, samples, question.drive_unit)
+            check_within_reach(plant_of(stage), problem.limits, samples, problem.drive_unit)
         except ParameterError as error:
-            words = str(error).replace("or beyond_reach=True", "or clipped=0.5 or more")
-            which = f"model {i}: " if len(axis.stages) > 1 else axis.of
+            words = str(error).replace("or beyond_reach=True", "or largest_saturation=0.5 or more")
+            which = f"model {i}: " if len(axis.stages) > 1 else axis.prefix
             raise ParameterError(f"{which}{words}") from None
     return samples

@@ -1,4 +1,4 @@
-"""Why no controller was found: which constraint forbids it, and how far the nearest is off."""
+"""Refusal where no controller is feasible: its reason, and how far the nearest is off."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from .question import Question
-    from .search import Answer
+    from .problem import TuningProblem
+    from .search import Solution
 
 __all__ = ["refusal"]
 
 
 class _Short(NamedTuple):
-    """A margin that the nearest gains do not have: value, plant, what was asked for, and how."""
+    """Margin that the nearest gains do not have: value, plant, bound and its side."""
 
     name: str
     value: float
@@ -32,7 +32,7 @@ class _Short(NamedTuple):
         return self.value / self.bound
 
     def sentence(self, names: Sequence[str]) -> str:
-        """Say what was asked for, and what the nearest gains have."""
+        """Write the bound, and the margin of the nearest gains."""
         side = "more" if self.least else "less"
         off = f", {self.factor:.4g} times too {'low' if self.least else 'high'}"
         bound = f"{_number(self.bound)}{self.unit}"
@@ -49,12 +49,12 @@ def _number(value: float) -> str:
     return short if float(short) == value else f"{value:.9g}"
 
 
-def refusal(question: Question, nearest_answer: Answer) -> str:
+def refusal(problem: TuningProblem, nearest: Solution) -> str:
     """Say which constraint forbids any controller, and how far the nearest one is off."""
-    found, names = nearest_answer.found, nearest_answer.names
-    robustness, figures = found["robustness"], found["figures"]
-    if found["excess"] <= 1.0:
-        worst = max(nearest_answer.kept, key=lambda one: one.share)
+    goal, outcome, names = problem.goal, nearest.outcome, nearest.names
+    robustness, figures = outcome["robustness"], outcome["figures"]
+    if outcome["excess"] <= 1.0:
+        worst = max(nearest.kept, key=lambda one: one.share)
         return (
             f"margins: the search found no gains whose exact margins are as asked for; the nearest "
             f"have {worst}: expected a milder margin, more particles or more iterations"
@@ -66,28 +66,28 @@ def refusal(question: Question, nearest_answer: Answer) -> str:
             "nearer to each other"
         )
     if not figures:
-        shorts = _shorts(question, robustness)
+        shorts = _shorts(problem, robustness)
         return max(shorts, key=lambda one: one.factor).sentence(names)
     fastest, share = max(one[3] for one in figures), max(one[4] for one in figures)
-    if fastest > question.slew:
+    if fastest > goal.slew:
         return (
-            f"slew is {question.slew:.4g} V/s: expected {fastest:.4g} V/s, which the slowest "
+            f"slew is {goal.slew:.4g} V/s: expected {fastest:.4g} V/s, which the slowest "
             "controller needs along these references"
         )
     error = math.sqrt(sum(one[0] ** 2 for one in figures) / len(figures))
-    if error > question.allowed:
+    if error > goal.largest_error:
         return (
-            f"allowed is {1e6 * question.allowed:.4g} um: expected {1e6 * error:.4g} um or more, "
-            "the least rms error that was found along these references"
+            f"largest_error is {1e6 * goal.largest_error:.4g} um: expected {1e6 * error:.4g} um or "
+            "more, the least rms error that was found along these references"
         )
     return (
-        f"clipped is {question.clipped:.3g}: expected {share:.3g} at least, the share of the "
-        "samples at which every controller is clipped along these references"
+        f"largest_saturation is {goal.largest_saturation:.3g}: expected {share:.3g} at least, the "
+        "share of the samples at which every controller is clipped along these references"
     )
 
 
-def _shorts(question: Question, robustness: Sequence[tuple[float, int]]) -> list[_Short]:
-    margins = question.margins
+def _shorts(problem: TuningProblem, robustness: Sequence[tuple[float, int]]) -> list[_Short]:
+    margins = problem.margins
     _, gain, phase, sensitivity, learning = robustness
     return [
         _Short("gain", *gain, margins.gain),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence, Sized
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, Unpack, overload
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from ..laws.pid import Pid
 from ..laws.scheduled_pid import ScheduledPid
 from ..loop.contouring import contour
 from ..running.track import track
+from ..timing import Timing
 from .margins import Margins, Spread, plants_of
 from .tune import tune
 from .tuned import Tuned, TunedPair
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from ...identification.fitted.identified_model import IdentifiedModel
     from ..controller.controller import Controller
     from ..plant import Plant
+    from .tune import TuneOptions
 
     Array = NDArray[np.float64]
 
@@ -119,9 +121,7 @@ def schedule(
     *,
     centre: tuple[float, float] | None = None,
     waveform: PathForm | None = None,
-    margins: Margins | None = None,
-    spread: Spread | None = None,
-    **options: Any,
+    **options: Unpack[TuneOptions],
 ) -> SchedulePair: ...
 @overload
 def schedule(
@@ -131,9 +131,7 @@ def schedule(
     *,
     centre: float | None = None,
     waveform: Waveform | None = None,
-    margins: Margins | None = None,
-    spread: Spread | None = None,
-    **options: Any,
+    **options: Unpack[TuneOptions],
 ) -> Schedule: ...
 def schedule(
     stage: Plant | IdentifiedModel | Sequence[Plant | IdentifiedModel] | XYStage,
@@ -142,9 +140,7 @@ def schedule(
     *,
     centre: float | tuple[float, float] | None = None,
     waveform: Waveform | PathForm | None = None,
-    margins: Margins | None = None,
-    spread: Spread | None = None,
-    **options: Any,
+    **options: Unpack[TuneOptions],
 ) -> Schedule | SchedulePair:
     """Tune PID gains at each amplitude and rate of a grid, for one controller without bumps.
 
@@ -167,11 +163,8 @@ def schedule(
     waveform : callable, optional
         Makes the reference of an amplitude [m] and a rate [Hz]; default a sine of four periods
         about `centre`, of an XY stage a circle of three turns.
-    margins, spread : optional
-        As of `tune`.
     **options
-        Further arguments of `tune`; `parts` is PID and low-pass by default, without a
-        repetitive part.
+        Arguments of `tune`; `parts` is PID and low-pass by default, without a repetitive part.
 
     Returns
     -------
@@ -189,7 +182,7 @@ def schedule(
     >>> stage = pt.VirtualStage.xu_li_2010(seed=1)
     >>> found = pt.schedule(
     ...     stage, [10e-6, 40e-6], [0.2], centre=58e-6, dt=0.02, limits=(0.0, 75.0), parts="pid",
-    ...     particles=12, iterations=8,
+    ...     search=pt.TuningSearch(particles=12, iterations=8),
     ... )
     >>> len(found.tuned), found.errors.shape
     (2, (2, 1, 2))
@@ -204,28 +197,29 @@ def schedule(
         amplitudes=amplitudes, rates=rates, gains=[nothing] * (_count(amplitudes) * _count(rates))
     )
     parts = options.pop("parts", ("pid", "low-pass"))
-    if "repetitive" in parts:
+    if "repetitive" in (parts or ()):
         raise ParameterError("parts has 'repetitive': expected none, its period is of one rate")
     pairs = [(amplitude, rate) for amplitude in grid.amplitudes for rate in grid.rates]
     references = [make(amplitude, rate) for amplitude, rate in pairs]
-    common = {"margins": margins, "spread": spread, **options}
+    common: dict[str, Any] = {**options}
     search: Any = tune
     fixed = search(stage, references, parts=parts, **common)
     loops = _loops(fixed)
     common |= {"dt": loops[0].dt, "limits": loops[0].limits}
     common["filters"] = tuple(one.filters for one in loops) if both else loops[0].filters
+    timing = options.get("timing") or Timing()
     tuned = [search(stage, reference, parts="pid", **common) for reference in references]
     motions = list(zip(pairs, references, strict=True))
-    chosen, scheduled, errors = _chosen(stage, motions, tuned, fixed, grid, options)
+    chosen, scheduled, errors = _chosen(stage, motions, tuned, fixed, grid, timing)
     sets: list[Sequence[Any]]
     if isinstance(stage, XYStage):
         sets = [[stage.x], [stage.y]]
     else:
         sets = [stage if isinstance(stage, Sequence) else [stage]]
+    spread, margins = options.get("spread") or Spread(), options.get("margins") or Margins()
     for controller, stages in zip(scheduled, sets, strict=True):
-        limits, delay = controller.limits, options.get("delay", 0.0)
-        plants = plants_of(stages, limits, delay, spread or Spread())
-        _check_between(controller, [one.plant for one in plants], margins or Margins())
+        plants = plants_of(stages, controller.limits, timing.delay, spread)
+        _check_between(controller, [one.plant for one in plants], margins)
     table = errors.reshape(len(grid.amplitudes), len(grid.rates), 2)
     if both:
         return SchedulePair((scheduled[0], scheduled[1]), fixed, tuple(chosen), table)
@@ -238,7 +232,7 @@ def _chosen(
     tuned: Sequence[Any],
     fixed: Tuned | TunedPair,
     grid: ScheduledPid,
-    options: dict[str, Any],
+    timing: Timing,
 ) -> tuple[list[Any], list[Controller], Array]:
     """Take the gains of a place where they are better in the schedule, else the fixed ones."""
     before = [one.metrics.rms_error for one in fixed.report.runs]
@@ -246,7 +240,7 @@ def _chosen(
     while True:
         loops = enumerate(_loops(fixed))
         scheduled = [_scheduled(grid, loop, chosen, axis) for axis, loop in loops]
-        after = [_error(stage, scheduled, place, one, options) for place, one in motions]
+        after = [_error(stage, scheduled, place, one, timing) for place, one in motions]
         # A search for one reference alone may miss what that for all has found; and in the schedule
         # its gains begin with those of the places around it.
         better = [new < (1.0 - LEAST_GAIN) * old for new, old in zip(after, before, strict=True)]
@@ -265,7 +259,7 @@ def _error(
     controllers: Sequence[Controller],
     place: tuple[float, float],
     reference: Any,
-    options: dict[str, Any],
+    timing: Timing,
 ) -> float:
     """Rms error [m] along a reference, beginning with the gains of its place."""
     laws: list[Any] = [one.feedback for one in controllers]
@@ -273,13 +267,11 @@ def _error(
         replace(one, feedback=replace(law, first=place))
         for one, law in zip(controllers, laws, strict=True)
     ]
-    how: dict[str, Any] = {"beyond_reach": True, "unstable": True}
-    how |= {name: options[name] for name in ("delay", "jitter") if name in options}
+    how: dict[str, Any] = {"timing": timing, "beyond_reach": True, "unstable": True}
     if isinstance(stage, XYStage):
         return contour(stage, loops, reference, **how).metrics.rms_error
     first = stage[0] if isinstance(stage, Sequence) else stage
-    visited = options.get("visited", ())
-    return track(first, loops[0], reference, visited=visited, **how).metrics.rms_error
+    return track(first, loops[0], reference, **how).metrics.rms_error
 
 
 def _loops(tuned: Tuned | TunedPair) -> tuple[Controller, ...]:

@@ -1,4 +1,4 @@
-"""The search for gains at one sampling interval, with an exact check of what it found."""
+"""Search for gains at one sampling interval, with an exact check of the margins."""
 
 from __future__ import annotations
 
@@ -14,21 +14,23 @@ from ..loop.tracking import can_be_learnt
 from .box import Box, box_of, resonance
 from .margins import NamedPlant, plants_of
 from .motions import tasks_of
-from .tuned import Kept
+from .tuned import MarginReport
 
 if TYPE_CHECKING:
-    from .question import Axis, Question
+    from .margins import Margins
+    from .problem import Axis, TuningProblem
 
-__all__ = ["Answer", "searched"]
+__all__ = ["Solution", "search_at"]
 
-# The grid of the search is accurate to this; what the exact check finds beyond is asked again.
+# The grid of the search is accurate to this; where the exact margins are beyond, it is searched
+# again.
 SLACK = 0.003
 # Searches with more and more in reserve.
 ROUNDS = 4
 
 
-class SoughtAxis(NamedTuple):
-    """A controller of which settings are sought."""
+class AxisSearch(NamedTuple):
+    """Controller of an axis, with the ranges of its settings and the plants of the set."""
 
     name: str
     box: Box
@@ -57,32 +59,32 @@ class SoughtAxis(NamedTuple):
         )
 
 
-class Answer(NamedTuple):
-    """Settings found at one sampling interval.
+class Solution(NamedTuple):
+    """Best settings at one sampling interval.
 
     Attributes
     ----------
-    found : dict
-        Of the core.
-    axes : list of SoughtAxis
-        What was sought.
-    kept : list of Kept
+    outcome : dict
+        Settings, figures and counts of the core.
+    axes : list of AxisSearch
+        Controllers that were searched.
+    kept : list of MarginReport
         The margins of the settings, exact.
     """
 
-    found: dict[str, Any]
-    axes: list[SoughtAxis]
-    kept: list[Kept]
+    outcome: dict[str, Any]
+    axes: list[AxisSearch]
+    kept: list[MarginReport]
 
     @property
     def excess(self) -> float:
-        """How far it is from what was asked for: above 1 where it does not keep it."""
+        """Largest ratio to a requirement, above 1 where it is not met."""
         beyond = max((one.share for one in self.kept), default=0.0)
-        return max(float(self.found["excess"]), beyond / (1.0 + SLACK))
+        return max(float(self.outcome["excess"]), beyond / (1.0 + SLACK))
 
     @property
-    def keeps(self) -> bool:
-        """Whether it keeps all that was asked for."""
+    def feasible(self) -> bool:
+        """Whether all requirements are met."""
         return self.excess <= 1.0 + 1e-9
 
     @property
@@ -93,59 +95,54 @@ class Answer(NamedTuple):
     @property
     def controllers(self) -> tuple[Controller, ...]:
         """The controller of each axis."""
-        pairs = zip(self.axes, self.found["settings"], strict=True)
+        pairs = zip(self.axes, self.outcome["settings"], strict=True)
         return tuple(axis.controller(dict(settings)) for axis, settings in pairs)
 
     def edges(self) -> list[str]:
         """Name the settings that are at an end of their range."""
-        found = []
-        for axis, settings in zip(self.axes, self.found["settings"], strict=True):
-            of = f"{axis.name}: " if axis.name else ""
-            found += [f"{of}{text}" for text in axis.box.edges(dict(settings))]
-        return found
+        edges = []
+        for axis, settings in zip(self.axes, self.outcome["settings"], strict=True):
+            prefix = f"{axis.name}: " if axis.name else ""
+            edges += [f"{prefix}{text}" for text in axis.box.edges(dict(settings))]
+        return edges
 
 
-def searched(question: Question, dt: float) -> Answer:
+def search_at(problem: TuningProblem, dt: float) -> Solution:
     """Search at one sampling interval; where the exact margins are beyond, with some in reserve."""
-    axes = [_sought(question, axis, dt) for axis in question.axes]
+    axes = [_axis_search(problem, axis, dt) for axis in problem.axes]
     repeats = any(axis.box.period is not None for axis in axes)
-    tasks = tasks_of(question, [axis.base for axis in axes], repeats)
+    tasks = tasks_of(problem, [axis.base for axis in axes], repeats)
     reserve = 1.0
     for _ in range(ROUNDS):
-        found = _core.tune(
+        outcome = _core.tune(
+            problem,
+            margins=_with_reserve(problem.margins, reserve),
             axes=[axis._core for axis in axes],
             tasks=tasks,
-            required=_required(question, reserve),
-            aim=question.figure if tasks else "disturbance",
-            effort=question.effort,
-            particles=question.particles,
-            iterations=question.iterations,
-            seed=question.seed,
-            threads=question.threads,
         )
-        answer = Answer(found, axes, [])
-        if found["excess"] > 1.0:
-            return answer
-        answer = answer._replace(kept=_kept(question, answer))
-        if answer.keeps:
-            return answer
-        reserve *= 1.0 + 1.2 * (answer.excess - 1.0)
-    return answer
+        solution = Solution(outcome, axes, [])
+        if outcome["excess"] > 1.0:
+            return solution
+        solution = solution._replace(kept=_margin_reports(problem, solution))
+        if solution.feasible:
+            return solution
+        reserve *= 1.0 + 1.2 * (solution.excess - 1.0)
+    return solution
 
 
-def _sought(question: Question, axis: Axis, dt: float) -> SoughtAxis:
+def _axis_search(problem: TuningProblem, axis: Axis, dt: float) -> AxisSearch:
     plants = [
         NamedPlant(f"{axis.name}, {one.name}" if axis.name else one.name, one.plant)
-        for one in plants_of(axis.stages, question.limits, question.delay, question.spread)
+        for one in plants_of(axis.stages, problem.limits, axis.timing.delay, problem.spread)
     ]
     cores = [one.plant for one in plants]
-    parts = question.parts or _usual_parts(question, cores, dt)
+    parts = problem.parts or _usual_parts(problem, cores, dt)
     of_parts = sum(one in parts for one in ("low-pass", "notch"))
     if len(axis.filters) + of_parts > 2:
         raise ParameterError(
             f"filters has {len(axis.filters)} beside {of_parts} of the parts: expected 2 in all"
         )
-    periods = {one.period for one in question.references}
+    periods = {one.period for one in problem.references}
     if "repetitive" in parts and len(periods) > 1:
         listed = ", ".join(f"{one:g} s" if one else "none" for one in sorted(periods, key=str))
         raise ParameterError(
@@ -154,51 +151,53 @@ def _sought(question: Question, axis: Axis, dt: float) -> SoughtAxis:
     period = next(iter(periods), None)
     base = Controller(
         dt=dt,
-        limits=question.limits,
+        limits=problem.limits,
         feedforward=axis.feedforward,
         filters=axis.filters,
-        drive_unit=question.drive_unit,
+        drive_unit=problem.drive_unit,
     )
-    lag = question.stage.lag if question.stage is not None else 0.0
-    box = box_of(parts, cores, dt, period, question.limits, question.law, lag)
-    return SoughtAxis(axis.name, box, base, plants)
+    lag = problem.stage.lag if problem.stage is not None else 0.0
+    box = box_of(parts, cores, dt, period, problem.limits, problem.law, lag)
+    return AxisSearch(axis.name, box, base, plants)
 
 
-def _usual_parts(question: Question, plants: list[_core.LoopPlant], dt: float) -> tuple[str, ...]:
+def _usual_parts(
+    problem: TuningProblem, plants: list[_core.LoopPlant], dt: float
+) -> tuple[str, ...]:
     parts = ["pid", "low-pass"]
     if resonance(plants, dt) is not None:
         parts.append("notch")
-    periods = {one.period for one in question.references}
+    periods = {one.period for one in problem.references}
     rising = all(plant.static_gain > 0.0 for plant in plants)
-    axes = (one.x if isinstance(one, XYReference) else one for one in question.references)
+    axes = (one.x if isinstance(one, XYReference) else one for one in problem.references)
     if len(periods) == 1 and rising and all(map(can_be_learnt, axes)):
         parts.append("repetitive")
     return tuple(parts)
 
 
-def _required(
-    question: Question, reserve: float
-) -> tuple[float, float, float, float, float, float, float]:
-    """Return what is asked for, with a factor in reserve for what the grid does not show."""
-    margins = question.margins
+def _with_reserve(margins: Margins, reserve: float) -> tuple[float, float, float, float]:
+    """Return gain, phase, sensitivity and learning with a factor in reserve.
+
+    That is for what the grid does not show.
+    """
     gain = 1.0 + (margins.gain - 1.0) * reserve
     sensitivity = 1.0 + (margins.sensitivity - 1.0) / reserve
     learning = margins.learning * (1.0 + 1e-9)
     phase = min(margins.phase * reserve, 0.999 * math.pi)
-    return gain, phase, sensitivity, learning, question.slew, question.clipped, question.allowed
+    return gain, phase, sensitivity, learning
 
 
-def _kept(question: Question, answer: Answer) -> list[Kept]:
-    """Check the margins of what was found, exactly, over all plants."""
-    margins = question.margins
+def _margin_reports(problem: TuningProblem, solution: Solution) -> list[MarginReport]:
+    """Check the margins of a solution, exactly, over all plants."""
+    margins = problem.margins
     bounds = {
         "gain margin": margins.gain,
         "phase margin": margins.phase,
         "learning": margins.learning,
         "sensitivity": margins.sensitivity,
     }
-    worst: dict[str, Kept] = {}
-    for axis, controller in zip(answer.axes, answer.controllers, strict=True):
+    worst: dict[str, MarginReport] = {}
+    for axis, controller in zip(solution.axes, solution.controllers, strict=True):
         for name, plant in axis.plants:
             check = _core.check_loop(controller._core, plant)
             values = {
@@ -208,9 +207,9 @@ def _kept(question: Question, answer: Answer) -> list[Kept]:
                 "sensitivity": check["sensitivity"] if check["stable"] else math.inf,
             }
             for key, value in values.items():
-                one = Kept(key, value, bounds[key], name)
-                if key not in worst or one.share > worst[key].share:
-                    worst[key] = one
-    if all(one.repetitive is None for one in answer.controllers):
+                report = MarginReport(key, value, bounds[key], name)
+                if key not in worst or report.share > worst[key].share:
+                    worst[key] = report
+    if all(one.repetitive is None for one in solution.controllers):
         del worst["learning"]
     return list(worst.values())

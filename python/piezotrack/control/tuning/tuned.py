@@ -1,4 +1,4 @@
-"""The answer of a search for gains: the controller, what it keeps, and what binds."""
+"""Result of a tuning: the controller, its margins, and the active constraints."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from ..parts.repetitive import Repetitive
     from .margins import Margins
 
-__all__ = ["Kept", "Tuned", "TunedPair", "TuningReport", "parts_text"]
+__all__ = ["MarginReport", "Tuned", "TunedPair", "TuningReport", "parts_text"]
 
 UNITS = {"gain margin": "", "phase margin": " rad", "sensitivity": "", "learning": ""}
 
 
-class Kept(NamedTuple):
+class MarginReport(NamedTuple):
     """A margin over the set of plants.
 
     Attributes
@@ -30,7 +30,7 @@ class Kept(NamedTuple):
     value : float
         Of the worst plant, exact.
     bound : float
-        What was asked for.
+        The bound.
     plant : str
         Which plant is the worst.
     """
@@ -42,7 +42,7 @@ class Kept(NamedTuple):
 
     @property
     def share(self) -> float:
-        """How much of what was asked for is used up: 1 at the bound."""
+        """Share of the bound that is used up: 1 at the bound."""
         if self.name in ("gain margin", "phase margin"):
             return self.bound / self.value if self.value > 0.0 else float("inf")
         return self.value / self.bound
@@ -55,12 +55,12 @@ class Kept(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class TuningReport:
-    """What a search for gains found, and how.
+    """Report of a tuning: runs, margins, active constraints, effort of the search.
 
     Attributes
     ----------
-    figure : str
-        What was made small.
+    minimised : str
+        The figure that was made small.
     unit : str
         Its unit: ``"m"``, of the effort ``"V"``.
     value : float
@@ -68,30 +68,30 @@ class TuningReport:
         1 V at the input of the stage [m s/V].
     runs : tuple of Tracking or of Contour
         Full simulations of the tuned loop, one for each reference.
-    kept : tuple of Kept
+    kept : tuple of MarginReport
         The margins over the set of plants.
     margins : Margins
-        What was asked for.
+        The bounds.
     plants : tuple of str
         The plants of the set.
-    binding : tuple of str
-        What forbids a smaller figure: margins at their bounds, settings at the ends of their
-        ranges. Empty where the figure itself has its minimum inside.
+    active_constraints : tuple of str
+        What forbids a smaller value: margins and bounds of the goal that are used up, settings at
+        the ends of their ranges. Empty where the value has its minimum inside.
     dt : float
         Sampling interval [s].
     candidates, loops : int
-        Controllers looked at, and closed loops simulated.
+        Controllers evaluated, and closed loops simulated.
     history : tuple of float
         Best figure after each iteration; infinite as long as no candidate kept the margins.
     """
 
-    figure: str
+    minimised: str
     value: float
     runs: tuple[Any, ...]
-    kept: tuple[Kept, ...]
+    kept: tuple[MarginReport, ...]
     margins: Margins
     plants: tuple[str, ...]
-    binding: tuple[str, ...]
+    active_constraints: tuple[str, ...]
     dt: float
     candidates: int
     loops: int
@@ -100,8 +100,8 @@ class TuningReport:
 
     def __str__(self) -> str:
         lines = [
-            f"{self.figure}, at {1.0 / self.dt:.6g} Hz: {self.candidates} controllers looked at, "
-            f"{self.loops} loops simulated"
+            f"{self.minimised}, at {1.0 / self.dt:.6g} Hz: {self.candidates} controllers "
+            f"evaluated, {self.loops} loops simulated"
         ]
         if self.runs:
             scale, unit = (1e6, "um") if self.unit == "m" else (1.0, self.unit)
@@ -113,10 +113,9 @@ class TuningReport:
             lines += _run_lines(run)
         lines.append(f"over {len(self.plants)} plants:")
         lines += [f"  {one}" for one in self.kept]
-        binding = (
-            "; ".join(self.binding) or "nothing: the figure has its minimum inside of the bounds"
-        )
-        lines.append(f"what binds: {binding}")
+        active = "; ".join(self.active_constraints)
+        active = active or "none: the minimum lies inside the bounds"
+        lines.append(f"active constraints: {active}")
         return "\n".join(lines)
 
     def design(self) -> dict[str, Any]:
@@ -129,15 +128,15 @@ class TuningReport:
         """
         return {
             "by": "tune",
-            "figure": self.figure,
+            "figure": self.minimised,
             f"value_{self.unit}": self.value,
             "plants": list(self.plants),
             "kept": [one._asdict() for one in self.kept],
-            "binding": list(self.binding),
+            "binding": list(self.active_constraints),
         }
 
     def __repr__(self) -> str:
-        return f"<TuningReport: {self.figure}, {len(self.plants)} plants>"
+        return f"<TuningReport: {self.minimised}, {len(self.plants)} plants>"
 
 
 class Tuned(NamedTuple):
@@ -148,7 +147,7 @@ class Tuned(NamedTuple):
     controller : Controller
         To be used as it is.
     report : TuningReport
-        What it keeps, what binds.
+        Its margins and active constraints.
     """
 
     controller: Controller
@@ -176,7 +175,7 @@ class TunedPair(NamedTuple):
     controllers : (Controller, Controller)
         Of x and y, for `contour`.
     report : TuningReport
-        What they keep, what binds.
+        Their margins and active constraints.
     """
 
     controllers: tuple[Controller, Controller]

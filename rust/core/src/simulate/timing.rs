@@ -30,7 +30,7 @@ const LONGEST_DELAY: f64 = 1e9;
 
 impl Timing {
     /// Checks the numbers.
-    pub(super) fn validate(&self) -> Result<()> {
+    pub(crate) fn validate(&self) -> Result<()> {
         positive("interval", self.interval, "s")?;
         not_negative("delay", self.delay, "s")?;
         not_negative("jitter", self.jitter, "s")?;

@@ -34,7 +34,7 @@ pub struct Task<'a> {
     /// The stage, with its amplifier and sensor.
     pub stage: &'a VirtualStage,
     /// Voltages that it visits slowly before, V.
-    pub visited: &'a [f64],
+    pub voltages_before: &'a [f64],
     /// When the controllers look and act; the samples are those of the reference.
     pub timing: Timing,
     /// Reference and feedforward.
@@ -57,8 +57,10 @@ impl<'a> Task<'a> {
     /// Brings the stage to where the loops begin, and draws the noise of its sensor.
     ///
     /// # Errors
-    /// Where memory does not suffice, or feedforward and reference differ in length.
+    /// Names delay or jitter of the timing; where memory does not suffice, or feedforward and
+    /// reference differ in length.
     pub fn ready(&'a self) -> Result<ReadyTask<'a>> {
+        self.timing.validate()?;
         let (found, expected) = (self.samples.feedforward.len(), self.samples.reference.len());
         if found != expected {
             return Err(Error::Shape {
@@ -75,7 +77,7 @@ impl<'a> Task<'a> {
                 expected: format!("{expected}, as many as the reference, or none"),
             });
         }
-        let start = self.stage.start_after(self.visited);
+        let start = self.stage.start_after(self.voltages_before);
         let noise = noises(self, &start)?;
         Ok(ReadyTask { task: self, start, noise })
     }
@@ -187,7 +189,7 @@ impl ReadyTask<'_> {
         let Self { task, start, noise } = self;
         if task.timing.jitter == 0.0 {
             let loops = Loops { task, start, noise, controllers, shown, stop };
-            let voltages = task.stage.visits_before(task.visited);
+            let voltages = task.stage.visits_before(task.voltages_before);
             if let Some(found) = task.stage.stage.in_lanes(&voltages, &start.plant, loops) {
                 return found;
             }

@@ -56,10 +56,11 @@ impl Requirements {
         }
         if self.error.is_nan() || self.error <= 0.0 {
             let found = format!("{} m", self.error);
-            return Err(Error::parameter("allowed", found, "above 0, or infinity"));
+            return Err(Error::parameter("largest_error", found, "above 0, or infinity"));
         }
         if !(0.0..=1.0).contains(&self.clipped) {
-            return Err(Error::parameter("clipped", self.clipped, "a share, 0 to 1"));
+            let expected = "a share, 0 to 1";
+            return Err(Error::parameter("largest_saturation", self.clipped, expected));
         }
         positive("learning", self.learning, "").map(drop)
     }

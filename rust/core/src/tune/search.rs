@@ -12,7 +12,7 @@ use super::figures::Figures;
 use super::judge::{Judge, Ready};
 use super::requirements::{PlantSet, Requirements, Robustness};
 use super::settings::{Setting, Sought, Template};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, not_negative};
 use crate::identify::{Swarm, SwarmSettings};
 use crate::parts::Law;
 use crate::signal::{Stop, index};
@@ -186,6 +186,7 @@ impl Tuning<'_> {
 
     fn validate(&self) -> Result<()> {
         self.required.validate()?;
+        not_negative("effort", self.effort, "m/V")?;
         self.axes.iter().flat_map(|axis| &axis.sought).try_for_each(Sought::validate)?;
         if self.dimensions() == 0 {
             return Err(Error::parameter("sought", "nothing", "one setting or more"));
