@@ -6,11 +6,12 @@ use core::f64::consts::TAU;
 use piezotrack_control::{Controller, Limits, Pid};
 use piezotrack_core::identify::{cross_talk, noise_at_rest};
 use piezotrack_core::models::{DahlStage, Plant};
+use piezotrack_core::parts::Law;
 use piezotrack_core::signal::contour_error::radial_errors;
 use piezotrack_core::signal::metrics::Spread;
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 use piezotrack_core::simulate::{
-    Apparatus, ApparatusState, ClosedLoop, Law, MissedTicks, ReferenceSamples, Timing, TwoAxes,
+    Apparatus, ApparatusState, ClosedLoop, MissedTicks, ReferenceSamples, Timing, TwoAxes,
     VirtualStage, open_loops, track, track_both,
 };
 

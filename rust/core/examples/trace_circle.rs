@@ -3,11 +3,12 @@
 //! `cargo run --release -p piezotrack-core --example trace_circle`
 
 use piezotrack_control::{Controller, DahlInverse, Limits, Pid};
+use piezotrack_core::parts::Law;
 use piezotrack_core::signal::NEVER;
 use piezotrack_core::signal::contour_error::radial_errors;
 use piezotrack_core::signal::metrics::Spread;
 use piezotrack_core::simulate::{
-    Law, MissedTicks, ReferenceSamples, Timing, TwoAxes, VirtualStage, track_both,
+    MissedTicks, ReferenceSamples, Timing, TwoAxes, VirtualStage, track_both,
 };
 
 const INTERVAL: f64 = 0.02;
