@@ -29,6 +29,7 @@ CIRCLE = pt.contour(
 LOG = pt.datasets.dbo_training()[3.0:4.0]
 FIT = pt.identify(LOG, "prandtl-ishlinskii")
 RESPONSE = FIT.simulate(LOG)
+LEARNT = pt.learn(PLAYS, SINE, BARE, trials=2)
 COMPARED = pt.compare(LOG, ["prandtl-ishlinskii", "maxwell-slip"])
 FALLING = Convergence(factor=0.5, model="plays", frequency=1.0, cases=())
 PERIODIC = FrequencyRule(
@@ -52,7 +53,7 @@ ODD = [
         np.array(1.0),
         np.array(["a", "b"]),
     ),
-    *(object(), 10**400, 1j, lambda *_: None, PLAYS, SINE, LOG),
+    *(object(), 1e308, 10**400, 1j, lambda *_: None, PLAYS, SINE, LOG),
 ]
 
 
@@ -77,6 +78,8 @@ CALLS: dict[str, Callable[[Any], Any]] = {
     "export_controller to": lambda v: CONTROL.export_controller(BARE, "out", to=v),
     "export_controller folder": lambda v: CONTROL.export_controller(BARE, v),
     "Controller.save": lambda v: BARE.save(v),
+    "Learning.save": lambda v: LEARNT.save(v),
+    "learn noise": lambda v: pt.learn(PLAYS, SINE, BARE, trials=2, noise=v),
     "Reference motion": lambda v: replace(SINE, motion=v),
     "Reference.motion": SINE.motion,
     "steps": pt.staircase(dwell=0.5, steps=2, low=0.0, high=1e-5).motion,

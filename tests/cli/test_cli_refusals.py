@@ -206,7 +206,7 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
     f"{COMPARE} --rates nan,1,2": ("--rates is 'nan,1,2'", "in rising order"),
     f"{COMPARE} --rates 1e-9,1,2": ("--rates begins with 1e-09 Hz", "expected 0.00015 Hz or more"),
     f"{COMPARE} --rates 1,2,25": ("--rates ends with 25 Hz", "half the sampling rate, 25 Hz"),
-    f"{COMPARE} --controllers ,": ("controllers has ''", "'inverse'"),
+    f"{COMPARE} --controllers ,": ("controllers[0] is ''", "'inverse'"),
     f"{COMPARE} --controllers network": ("not one could be made", "network: record is missing"),
     f"{COMPARE} --delay 1e9": ("delay is 1e+09 s in all", "expected 2000 s at most"),
     f"{COMPARE} --delay nan": ("delay is nan", "0 or above"),

@@ -91,12 +91,12 @@ def replacing(path: str | os.PathLike[str], *, synced: bool = False) -> Iterator
         raise DataError(f"{file} cannot be written: {reason}") from None
 
 
-def write_columns(path: Path, columns: Mapping[str, np.ndarray]) -> Path:
+def write_columns(path: str | os.PathLike[str], columns: Mapping[str, np.ndarray]) -> Path:
     """Write columns of numbers as a CSV file with a header.
 
     Parameters
     ----------
-    path : pathlib.Path
+    path : path-like
         The file.
     columns : mapping of str to ndarray, each of shape (n,)
         By title, with the unit in it.
@@ -116,7 +116,7 @@ def write_columns(path: Path, columns: Mapping[str, np.ndarray]) -> Path:
             header=",".join(columns),
             comments="",
         )
-    return path
+    return Path(path)
 
 
 def write_document(path: str | os.PathLike[str], document: Mapping[str, Any]) -> Path:

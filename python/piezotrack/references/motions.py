@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from .._support.arrays import real_array
+from .._support.arrays import LARGEST, real_array
+from .._support.messages import quoted
 from ..errors import ParameterError
 
 if TYPE_CHECKING:
@@ -42,6 +43,14 @@ __all__ = [
 POINTS, NEWTON = 64, 5
 # Most shortest periods in a motion whose extrema are sought, times its cosines: some 10 s.
 MOST_PERIODS = 2_100_000
+
+
+def _times(t: object) -> Array:
+    """Check times [s]: numbers that are finite, and whose squares are."""
+    times = real_array("t", t)
+    if not (np.abs(times) < LARGEST).all():
+        raise ParameterError(f"t is {quoted(t)}: expected times in s, below {LARGEST:g} s")
+    return times
 
 
 def s_curve(u: Array) -> tuple[Array, Array, Array]:
@@ -111,7 +120,7 @@ class Cosines:
 
     def __call__(self, t: Array) -> tuple[Array, Array, Array]:
         """Return displacement, velocity and acceleration at the times `t`."""
-        t = real_array("t", t)
+        t = _times(t)
         x, v, a = np.full(t.shape, self.offset), np.zeros(t.shape), np.zeros(t.shape)
         for size, frequency, phase in zip(
             self.amplitudes, self.frequencies, self.phases, strict=True
@@ -136,7 +145,7 @@ class Chirp:
 
     def __call__(self, t: Array) -> tuple[Array, Array, Array]:
         """Return displacement, velocity and acceleration at the times `t`."""
-        t = real_array("t", t)
+        t = _times(t)
         sweep = math.tau * (self.stop - self.start) / self.duration
         rate = math.tau * self.start + sweep * t
         phase = (math.tau * self.start + 0.5 * sweep * t) * t
@@ -159,7 +168,7 @@ class Triangle:
 
     def __call__(self, t: Array) -> tuple[Array, Array, Array]:
         """Return displacement, velocity and acceleration at the times `t`."""
-        t = real_array("t", t)
+        t = _times(t)
         half = 0.5 * self.period
         # Half the duration of a corner, and the speed with which both ends are still reached.
         corner = 0.25 * self.rounding * self.period
@@ -196,7 +205,7 @@ class Steps:
 
     def __call__(self, t: Array) -> tuple[Array, Array, Array]:
         """Return displacement, velocity and acceleration at the times `t`."""
-        t = real_array("t", t)
+        t = _times(t)
         levels = np.asarray(self.levels)
         following = np.roll(levels, -1)
         step = self.dwell + self.rise
@@ -204,9 +213,7 @@ class Steps:
             t = np.mod(t, levels.size * step)
         else:
             following[-1] = levels[-1]
-        # What is no time has no level either.
-        place = np.where(np.isnan(t), 0.0, np.floor(t / step))
-        number = np.clip(place, 0, levels.size - 1).astype(np.intp)
+        number = np.clip(np.floor(t / step), 0, levels.size - 1).astype(np.intp)
         s, slope, curvature = s_curve((t - number * step - self.dwell) / self.rise)
         travel = (following - levels)[number]
         x = levels[number] + travel * s
@@ -238,7 +245,7 @@ class Spline:
 
     def __call__(self, t: Array) -> tuple[Array, Array, Array]:
         """Return displacement, velocity and acceleration at the times `t`."""
-        t = real_array("t", t)
+        t = _times(t)
         place = t / self.dt
         u = np.mod(place, self.x.size) if self.cyclic else np.minimum(place, self.x.size - 1)
         x, v, a = (spline(u) for spline in self._splines)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ..._support.arguments import in_range, not_negative, one_of, positive
+from ..._support.arguments import check_length, in_range, not_negative, one_of, positive
 from ..._support.arrays import real_array
 from ..._support.messages import quoted
 from ...data.dataset import Dataset
@@ -151,6 +151,8 @@ class IterativeLearning:
         self._reference, self._controller = reference, controller
         self._method: Method = method
         self._noise = None if noise is None else not_negative("noise", noise, "m")
+        if self._noise is not None:
+            check_length("noise", self._noise)
         dt = controller.dt
         samples = one_trial(reference, method, dt).sample(dt)
         self._t, self._desired = samples.t, samples.x

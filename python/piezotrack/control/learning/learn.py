@@ -166,7 +166,7 @@ class Learning(Result):
         unit, scale = shown_unit(self.learner.controller.drive_unit)
         word = drive_word(self.learner.controller.drive_unit)
         return write_columns(
-            Path(path),
+            path,
             {
                 "time_s": self.learner.t,
                 "desired_um": 1e6 * self.learner.desired,

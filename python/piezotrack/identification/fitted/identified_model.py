@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from ... import _core
 from ..._support.arguments import expect
-from ..._support.arrays import check_dt, signal_of
+from ..._support.arrays import LARGEST, check_dt, signal_of
 from ..._support.files import write_document
 from ...data.dataset import Dataset
 from ...errors import ParameterError, ShapeError
@@ -423,8 +422,8 @@ class IdentifiedModel:
         """Offset to add to a simulated displacement [m]."""
         if not (isinstance(offset, str) and offset == "own"):
             shift = _core.as_number("offset", offset)
-            if not math.isfinite(shift):
-                raise ParameterError(f"offset is {shift}: expected a finite number or 'own'")
+            if not abs(shift) < LARGEST:
+                raise ParameterError(f"offset is {shift}: expected 'own', or m below {LARGEST:g}")
             return shift
         return float(np.mean(data.y - x)) if self._fits_offset(data) else 0.0
 
