@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..references.reference import SampledReference
-    from .base import Stage, StageState
+    from .motion import StageState
 
     Array = NDArray[np.float64]
 
@@ -96,7 +96,8 @@ class Inverse:
     True
     """
 
-    stage: Stage
+    # A stage of any model: the stages make inverses, and are not known here.
+    stage: Any
     offset: float = 0.0
     delay: float = 0.0
     playback: Playback = "table"
@@ -122,7 +123,9 @@ class Inverse:
     def _begun(self, dt: float, limits: Limits = None) -> _core.Inverse:
         """Return the inverse in the core, before its first sample."""
         initial = None if self.initial is None else self.stage._checked(self.initial)._named
-        core = self.stage._core.inverse(dt, offset=self.offset, delay=self.delay, initial=initial)
+        core: _core.Inverse = self.stage._core.inverse(
+            dt, offset=self.offset, delay=self.delay, initial=initial
+        )
         if limits is not None:
             core.limit(*limits)
         return core

@@ -11,8 +11,8 @@ from ... import _core
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ...stages.base import Response
     from ...stages.model_info import ModelInfo
+    from ...stages.motion import Response
 
     Array = NDArray[np.float64]
 

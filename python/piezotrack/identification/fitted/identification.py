@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...data.dataset import Dataset
-    from ...stages.base import Response
+    from ...stages.motion import Response
     from ..methods.descents import Descents
     from ..methods.particle_swarm import ParticleSwarm
     from ..solve.selection import Trial

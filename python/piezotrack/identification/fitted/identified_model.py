@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from ...data.dataset import Hold
-    from ...stages.base import Response, StageState
     from ...stages.inverse import Inverse
+    from ...stages.motion import Response, StageState
     from .drift import Drift
     from .fitted_record import FittedRecord
     from .start import History, Start

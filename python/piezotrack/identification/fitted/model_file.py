@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from ...data.dataset import Dataset
-    from ...stages.base import Stage, StageState
+    from ...stages.base import Stage
     from ...stages.model_info import ModelInfo
+    from ...stages.motion import StageState
     from .estimates import Constraint
     from .fitted_record import FittedRecord
     from .identified_model import IdentifiedModel

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...data.dataset import Dataset
-    from ...stages.base import Response
+    from ...stages.motion import Response
     from ..fitted.fitted_record import FittedRecord
     from ..fitted.identification import Identification
 
