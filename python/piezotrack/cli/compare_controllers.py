@@ -72,7 +72,7 @@ def compare_controllers_command(
     )
     from ..control.comparing.compare import compare_controllers
     from ..control.tuning.margins import Margins
-    from ..identification.fitted.identified_model import load
+    from ..identification.fitted.model_file import load
 
     own = stage != PAPER
     refuse_of_other_stage(context, own)

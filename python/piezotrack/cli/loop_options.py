@@ -308,7 +308,7 @@ def simulated(
     """Make the stage of `StageFile`, with the noise [m] of a sensor and a bandwidth [Hz]."""
     from pathlib import Path
 
-    from ..identification.fitted.identified_model import load
+    from ..identification.fitted.model_file import load
     from ..stages.virtual import VirtualStage
 
     if stage == PAPER:

@@ -51,7 +51,7 @@ def simulate_command(
         write_columns,
     )
     from .._support.units import drive_word, shown_unit
-    from ..identification.fitted.identified_model import load
+    from ..identification.fitted.model_file import load
     from ..identification.views.plot import plot_response
 
     known = load(model)

@@ -158,7 +158,7 @@ def track_command(
     from ..control.controller.controller import Controller
     from ..control.loop.stability import check_loop
     from ..control.loop.tracking import track
-    from ..identification.fitted.identified_model import load
+    from ..identification.fitted.model_file import load
 
     if device is not None:
         refuse_without_effect(context, SIMULATED, "with --device")
@@ -282,7 +282,7 @@ def feedforward_command(
     from ..control.loop.preconditions import check_within_reach
     from ..control.plant import plant_of
     from ..control.views.tracking_plot import plot_feedforward
-    from ..identification.fitted.identified_model import load
+    from ..identification.fitted.model_file import load
 
     known = load(model)
     desired = parsed_reference(reference, duration, period)

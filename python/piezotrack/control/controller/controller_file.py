@@ -12,9 +12,9 @@ from ..._support.files import write_document
 from ..._support.json_text import object_of
 from ..._support.messages import quoted
 from ...errors import DataError, ParameterError
+from ...identification.fitted.model_entries import parameter_entries
 from ...identification.fitted.model_file import (
     entries_of,
-    parameter_entries,
     read_content,
     stage_of,
 )

@@ -11,13 +11,15 @@ from typing import TYPE_CHECKING, Any, overload
 from ..._support.files import replacing
 from ..._support.frames import frame_of
 from ...errors import DataError, ParameterError
-from ..fitted.identified_model import IdentifiedModel, load
+from ..fitted.model_file import load
 from .task import FAILURE
 
 if TYPE_CHECKING:
     import os
 
     from matplotlib.figure import Figure, SubFigure
+
+    from ..fitted.identified_model import IdentifiedModel
 
 __all__ = ["Campaign", "TaskResult"]
 

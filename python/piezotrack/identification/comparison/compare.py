@@ -15,8 +15,9 @@ from ...data.dataset import Dataset
 from ...errors import ParameterError
 from ...stages.registry import MODELS, ModelInfo, model_named
 from ..fit import identify
-from ..fitted.identified_model import IdentifiedModel, load
-from ..fitted.model_file import provenance
+from ..fitted.identified_model import IdentifiedModel
+from ..fitted.model_entries import provenance
+from ..fitted.model_file import load
 from .parts import parts_of
 
 if TYPE_CHECKING:

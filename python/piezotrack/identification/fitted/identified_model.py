@@ -14,11 +14,18 @@ from ..._support.files import write_document
 from ...data.dataset import Dataset
 from ...errors import ParameterError, ShapeError
 from .delayed_reading import late_reading
-from .fitted_record import record_of
-from .model_file import document_of, drive_unit_of, read_model, sensor_number
+from .drift import drift_entry
+from .fitted_record import record_entries, record_of
+from .model_entries import (
+    FORMAT,
+    SCHEMA_VERSION,
+    drive_unit_of,
+    parameter_entries,
+    sensor_number,
+)
 from .notes import beyond_fit
 from .score import Score
-from .start import begin, checked_history, same_beginning
+from .start import begin, checked_history, same_beginning, start_entry
 
 if TYPE_CHECKING:
     import os
@@ -36,7 +43,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["IdentifiedModel", "load"]
+__all__ = ["IdentifiedModel"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -433,7 +440,27 @@ class IdentifiedModel:
         dict
             Of numbers, texts, lists and dicts only.
         """
-        return document_of(self)
+        details, info = dict(self.details), self.model.info
+        found = details.pop("parameters", {})
+        delay = dict(details.pop("delay", {}))
+        parameters = {
+            name: entry | dict(found.get(name, {}))
+            for name, entry in parameter_entries(self.model, self.drive_unit).items()
+        }
+        return {
+            "format": FORMAT,
+            "schema_version": SCHEMA_VERSION,
+            "model": info.name,
+            "parameters": parameters,
+            "scale_assumed": self.scale_assumed,
+            "offset": {"value": self.offset, "unit": "m", "fitted": self.offset_fitted},
+            "stroke": {"value": self.stroke, "unit": "m"},
+            "delay": {"value": self.delay, "unit": "s"} | delay,
+            "start": start_entry(self.start, self.drive_unit),
+            **drift_entry(self.drift),
+            **record_entries(self.records, self.drive_unit),
+            **details,
+        }
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the model to a JSON file that `load` reads back bit for bit.
@@ -460,39 +487,6 @@ class IdentifiedModel:
         for name in ("offset", "stroke", "delay"):
             sensor_number(name, getattr(self, name))
         return write_document(path, self.document())
-
-
-def load(path: str | os.PathLike[str]) -> IdentifiedModel:
-    """Read a model file.
-
-    Parameters
-    ----------
-    path : path-like
-        A file that `save` of an identified model wrote, with this version of piezotrack or an
-        older one.
-
-    Returns
-    -------
-    IdentifiedModel
-        The model, its numbers as they were saved, bit for bit.
-
-    Raises
-    ------
-    DataError
-        The file is missing, is not a model file, or was written by a newer version.
-
-    Examples
-    --------
-    >>> import piezotrack as pt
-    >>> model = pt.identification.IdentifiedModel(
-    ...     model=pt.DahlStage.xu_li_2010(), offset=0.0, offset_fitted=False, stroke=119e-6
-    ... )
-    >>> import os, tempfile
-    >>> path = model.save(os.path.join(tempfile.mkdtemp(), "dahl.json"))
-    >>> pt.load(path).model == model.model
-    True
-    """
-    return IdentifiedModel(**read_model(path))
 
 
 def _count(value: object) -> int:

@@ -16,7 +16,7 @@ from ..fitted.drift import Drift
 from ..fitted.estimates import Constraint, Estimate, LagRange, Progress, SwarmRun
 from ..fitted.fitted_record import FittedRecord
 from ..fitted.identification import Identification
-from ..fitted.model_file import constraint_entries, fit_entry, origin_of, provenance
+from ..fitted.model_entries import constraint_entries, fit_entry, origin_of, provenance
 from ..fitted.notes import spread_of
 from ..fitted.start import start_after
 from ..methods.descents import Descents
