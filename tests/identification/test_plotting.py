@@ -15,7 +15,6 @@ import piezotrack as pt
 from piezotrack._support.files import save_figures
 from piezotrack.identification.views.plot import (
     plot_convergence,
-    plot_identification,
     plot_loop,
     plot_response,
     plot_time,
@@ -124,7 +123,6 @@ def test_another_record_can_be_shown() -> None:
     assert np.allclose(y, 1e6 * other.y)
     score = fitted().score(other)
     assert f"({score.rms_percent:.3g} % of stroke)" in figure.axes[3].get_title()
-    assert len(plot_identification(fitted(), other).axes) == 4
 
 
 @pytest.mark.parametrize(

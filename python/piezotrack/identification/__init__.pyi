@@ -38,8 +38,3 @@ from .methods.least_squares import LeastSquares as LeastSquares
 from .methods.particle_swarm import ParticleSwarm as ParticleSwarm
 from .problem.objective import Objective as Objective
 from .solve.likely_models import likely_models as likely_models
-from .views.plot import plot_convergence as plot_convergence
-from .views.plot import plot_loop as plot_loop
-from .views.plot import plot_time as plot_time
-from .views.step_plot import plot_spectrum as plot_spectrum
-from .views.step_plot import plot_step as plot_step

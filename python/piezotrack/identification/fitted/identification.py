@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from .identified_model import IdentifiedModel
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
     from ...data.dataset import Dataset
@@ -104,6 +104,13 @@ class Identification(IdentifiedModel):
         Whether a time constant or a frequency lies on a bound of its range.
     """
 
+    views: ClassVar[Mapping[str, str]] = {
+        **IdentifiedModel.views,
+        "summary": "identification.views.report:summary_text",
+        "html": "identification.views.html:identification_html",
+        "convergence": "identification.views.plot:plot_convergence",
+    }
+
     data: Dataset
     cost: float
     nfev: int
@@ -150,11 +157,6 @@ class Identification(IdentifiedModel):
             f"<Identification, {self.model.info.title}: {self.cost_um:.4g} um rms, "
             f"{self.cost_percent:.3g} % of stroke; see summary()>"
         )
-
-    def _repr_html_(self) -> str:
-        from ..views.html import identification_html
-
-        return identification_html(self)
 
     @property
     def fun(self) -> float:
@@ -262,40 +264,35 @@ class Identification(IdentifiedModel):
             return f"all {self.descents.rounds} rounds were done"
         return self.stop_reason
 
-    def summary(self) -> str:
-        """Table of the result.
-
-        Returns
-        -------
-        str
-            Several lines: the cost, the ratios that the data determine, the parameters.
-        """
-        from ..views.report import summary_text
-
-        return summary_text(self)
-
-    def plot(self, data: Dataset | None = None, *, fig: Figure | SubFigure | None = None) -> Figure:
-        """Loop, displacement with its error over time, and convergence of the search.
-
-        Of several records loop and displacement of each, one below the other.
-
-        One panel alone, in axes of your own: `plot_loop`, `plot_time`, `plot_convergence`.
+    def plot_convergence(self, *, ax: Axes | None = None) -> Axes:
+        """Draw the best cost after each iteration, and where the other restarts ended.
 
         Parameters
         ----------
-        data : Dataset, optional
-            Another record, on which the model is shown; or one of several that were identified.
-        fig : matplotlib.figure.Figure or SubFigure, optional
-            Where to draw; a new figure of pyplot where not given.
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; a new figure where not given.
 
         Returns
         -------
-        matplotlib.figure.Figure
-            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
-        """
-        from ..views.plot import plot_identification
+        matplotlib.axes.Axes
+            The axes drawn on.
 
-        return plot_identification(self, data, fig)
+        Raises
+        ------
+        ParameterError
+            The model was not searched.
+
+        Examples
+        --------
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> log, few = pt.datasets.dbo_training()[3.0:5.0], pt.ParticleSwarm(iterations=3)
+        >>> fit = pt.identify(log, "dahl", swarm=few, runs=1, seed=1, progress=False)
+        >>> fit.plot_convergence(ax=Figure().subplots()).get_ylabel()
+        'best cost, rms [um]'
+        """
+        drawn: Axes = self.view("convergence")(self, ax)
+        return drawn
 
 
 def _frequency(data: Dataset) -> float:

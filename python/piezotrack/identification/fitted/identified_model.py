@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
 from ... import _core
 from ..._support.arrays import check_dt, signal_of
 from ..._support.files import write_document
+from ..._support.result import Result
 from ...data.dataset import Dataset
 from ...errors import ParameterError, ShapeError
 from .delayed_reading import late_reading
@@ -29,9 +30,11 @@ from .start import begin, checked_history, same_beginning, start_entry
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import ArrayLike, NDArray
 
     from ...data.dataset import Hold
@@ -47,7 +50,7 @@ __all__ = ["IdentifiedModel"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class IdentifiedModel:
+class IdentifiedModel(Result):
     """An identified stage, with the offset and delay of its sensor.
 
     Attributes
@@ -78,6 +81,13 @@ class IdentifiedModel:
     details : mapping
         Other entries of the model file: fit, provenance.
     """
+
+    views: ClassVar[Mapping[str, str]] = {
+        "summary": "identification.views.report:model_text",
+        "plot": "identification.views.plot:plot_model",
+        "loop": "identification.views.plot:plot_model_loop",
+        "time": "identification.views.plot:plot_model_time",
+    }
 
     # A stage of any model: each has its own parameters.
     model: Any
@@ -431,6 +441,100 @@ class IdentifiedModel:
                 raise ParameterError(f"offset is {shift}: expected a finite number or 'own'")
             return shift
         return float(np.mean(data.y - x)) if self._fits_offset(data) else 0.0
+
+    def plot(self, data: Dataset | None = None, *, fig: Figure | SubFigure | None = None) -> Figure:
+        """Loop, displacement with its error over time, and convergence of a search.
+
+        Of several records loop and displacement of each, one below the other.
+
+        Parameters
+        ----------
+        data : Dataset, optional
+            Record on which the model is shown; that of the fit where not given. A model from a file
+            has none.
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
+
+        Raises
+        ------
+        ParameterError
+            There is no record.
+        """
+        figure: Figure = self.view("plot")(self, data, fig)
+        return figure
+
+    def plot_loop(self, data: Dataset | None = None, *, ax: Axes | None = None) -> Axes:
+        """Draw the hysteresis loop: displacement over drive, measured and simulated.
+
+        Parameters
+        ----------
+        data : Dataset, optional
+            As of `plot`.
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; a new figure where not given.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes drawn on.
+
+        Raises
+        ------
+        ParameterError
+            There is no record.
+
+        Examples
+        --------
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> log = pt.datasets.dbo_training()[3.0:8.0]
+        >>> fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
+        >>> ax = fit.plot_loop(ax=Figure().subplots())
+        >>> ax.get_xlabel(), ax.get_ylabel()
+        ('drive [V]', 'displacement [um]')
+        """
+        drawn: Axes = self.view("loop")(self, data, ax)
+        return drawn
+
+    def plot_time(
+        self, data: Dataset | None = None, *, axes: Sequence[Axes] | None = None
+    ) -> tuple[Axes, Axes]:
+        """Draw measured and simulated displacement over time, and the error below.
+
+        Parameters
+        ----------
+        data : Dataset, optional
+            As of `plot`.
+        axes : two matplotlib.axes.Axes, optional
+            Where to draw; a new figure where not given.
+
+        Returns
+        -------
+        tuple of two matplotlib.axes.Axes
+            Displacement, error.
+
+        Raises
+        ------
+        ParameterError
+            There is no record.
+
+        Examples
+        --------
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> log = pt.datasets.dbo_training()[3.0:8.0]
+        >>> fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
+        >>> above, below = fit.plot_time(axes=Figure().subplots(2, 1))
+        >>> below.get_ylabel()
+        'error [nm]'
+        """
+        drawn: tuple[Axes, Axes] = self.view("time")(self, data, axes)
+        return drawn
 
     def document(self) -> dict[str, Any]:
         """Content of the JSON file.

@@ -6,11 +6,12 @@ from statistics import median
 from typing import TYPE_CHECKING
 
 from ..._support.html_table import html_table
+from ..campaigns.result import size_of
 
 if TYPE_CHECKING:
     from ..campaigns.result import Campaign, TaskResult
 
-__all__ = ["campaign_html", "campaign_text", "size_of"]
+__all__ = ["campaign_html", "campaign_text"]
 
 # Lines of the table, and of tasks without a model.
 MOST_ROWS, MOST_FAILED = 60, 20
@@ -67,14 +68,6 @@ def _agreeing(group: list[TaskResult]) -> int:
     """Count the seeds within 0.1 % of the lowest cost; those below 0.001 % of stroke are equal."""
     costs = [one.rms_percent for one in group if one.error is None]
     return sum(cost <= max(1.001 * min(costs), 1e-3) for cost in costs)
-
-
-def size_of(campaign: Campaign) -> str:
-    """Count records, models and tasks in words."""
-    counts = {"record": len(campaign.records), "model": len(campaign.models), "task": len(campaign)}
-    words = [f"{n} {word}" if n == 1 else f"{n} {word}s" for word, n in counts.items()]
-    failed = [f"{len(campaign.failed)} without a model"] if campaign.failed else []
-    return ", ".join([*words, *failed])
 
 
 def _heading(campaign: Campaign) -> str:

@@ -1,14 +1,16 @@
-"""The table of a comparison of models."""
+"""Table of a comparison of models, as text and as a notebook shows it."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..._support.html_table import html_table
+
 if TYPE_CHECKING:
     from ...data.dataset import Dataset
     from ..comparison.compare import Comparison, ModelScore
 
-__all__ = ["comparison_text"]
+__all__ = ["comparison_html", "comparison_text"]
 
 NOTES = """\
 * best on the part not fitted, which is the figure to trust. fit %: 100 (1 - |error| / |y - mean|).
@@ -52,6 +54,32 @@ def comparison_text(comparison: Comparison) -> str:
     ]
     lines += ["", *(f"note  {note}" for note in comparison.notes)] if comparison.notes else []
     return "\n".join([*(line.rstrip() for line in lines), "", NOTES])
+
+
+def comparison_html(comparison: Comparison) -> str:
+    """Write the errors of each model; the best on what was not fitted in bold."""
+    rows = [
+        (
+            row.title,
+            *(
+                cell
+                for score in (row.train, row.test)
+                for cell in (
+                    f"{1e6 * score.rms:.4g}",
+                    f"{score.rms_percent:.3g}",
+                    f"{1e6 * score.max_error:.4g}",
+                )
+            ),
+        )
+        for row in comparison.rows
+    ]
+    heads = (
+        "model",
+        *(f"{part}: {what}" for part in ("fitted", "not fitted")
+          for what in ("rms [um]", "rms [% of stroke]", "largest [um]")),
+    )  # fmt: skip
+    best = comparison.rows.index(comparison.best)
+    return html_table("Comparison", rows, heads, bold=best)
 
 
 def _mark(comparison: Comparison, row: ModelScore) -> str:

@@ -1,4 +1,4 @@
-"""A fit and a comparison as tables, as a notebook shows them."""
+"""A fit as tables, as a notebook shows it."""
 
 from __future__ import annotations
 
@@ -10,11 +10,10 @@ from .report import said_of
 
 if TYPE_CHECKING:
     from ...data.dataset import Dataset
-    from ..comparison.compare import Comparison
     from ..fitted.estimates import Constraint, Estimate
     from ..fitted.identification import Identification
 
-__all__ = ["comparison_html", "identification_html"]
+__all__ = ["identification_html"]
 
 
 def identification_html(fit: Identification) -> str:
@@ -89,29 +88,3 @@ def _estimate(fit: Identification, name: str, one: Estimate) -> tuple[str, ...]:
 
 def _constraint(one: Constraint) -> str:
     return one.text + (", active" if one.active else "")
-
-
-def comparison_html(comparison: Comparison) -> str:
-    """Write the errors of each model; the best on what was not fitted in bold."""
-    rows = [
-        (
-            row.title,
-            *(
-                cell
-                for score in (row.train, row.test)
-                for cell in (
-                    f"{1e6 * score.rms:.4g}",
-                    f"{score.rms_percent:.3g}",
-                    f"{1e6 * score.max_error:.4g}",
-                )
-            ),
-        )
-        for row in comparison.rows
-    ]
-    heads = (
-        "model",
-        *(f"{part}: {what}" for part in ("fitted", "not fitted")
-          for what in ("rms [um]", "rms [% of stroke]", "largest [um]")),
-    )  # fmt: skip
-    best = comparison.rows.index(comparison.best)
-    return html_table("Comparison", rows, heads, bold=best)

@@ -18,8 +18,9 @@ if TYPE_CHECKING:
     from ...stages.model_info import Parameter
     from ..fitted.estimates import Estimate
     from ..fitted.identification import Identification
+    from ..fitted.identified_model import IdentifiedModel
 
-__all__ = ["identification_files", "said_of", "save_identification", "summary_text"]
+__all__ = ["identification_files", "model_text", "said_of", "save_identification", "summary_text"]
 
 # Units of values that a stage gives in um, and the factor for a drive in metres.
 PER_METRE = {"um/V": ("um/um", 1e-6), "1/V": ("1/um", 1e-6)}
@@ -53,6 +54,31 @@ def summary_text(fit: Identification) -> str:
     return "\n".join(
         [*lines, *(_estimates(fit) if searched else _values(fit, fit.model.info.parameters))]
     )
+
+
+def model_text(model: IdentifiedModel) -> str:
+    """Write a model without its record, as one from a file, as a table.
+
+    Parameters
+    ----------
+    model : IdentifiedModel
+        The model.
+
+    Returns
+    -------
+    str
+        Several lines.
+    """
+    info, origin = model.model.info, model.details.get("provenance") or {}
+    source = (origin.get("data") or {}).get("source") or "a record"
+    lines = [f"{info.title}: stage identified from {source}, stroke {1e6 * model.stroke:.4g} um"]
+    if model.offset_fitted:
+        lines.append(f"      offset {1e6 * model.offset:.5g} um fitted")
+    if model.drift:
+        lines.append(f"      {model.drift}")
+    if model.delay:
+        lines.append(f"      delay {1e3 * model.delay:.4g} ms")
+    return "\n".join([*lines, "", *_values(model, info.parameters)])
 
 
 def _of_one(fit: Identification) -> list[str]:
@@ -155,7 +181,7 @@ def _estimates(fit: Identification) -> list[str]:
     return lines
 
 
-def _values(fit: Identification, parameters: Iterable[Parameter]) -> list[str]:
+def _values(fit: IdentifiedModel, parameters: Iterable[Parameter]) -> list[str]:
     """List the values of the parameters, lists of one length side by side in pairs."""
     lines, parts = ["parameters"], list(parameters)
     while parts:
@@ -178,17 +204,17 @@ def _values(fit: Identification, parameters: Iterable[Parameter]) -> list[str]:
     return lines
 
 
-def _shown(fit: Identification, one: Parameter) -> tuple[str, float]:
+def _shown(fit: IdentifiedModel, one: Parameter) -> tuple[str, float]:
     """Return the unit in which a parameter is shown, and the factor from SI."""
-    return shown_unit(of_drive(one.unit, fit.data.drive_unit))
+    return shown_unit(of_drive(one.unit, fit.drive_unit))
 
 
-def _heading(fit: Identification, one: Parameter) -> str:
+def _heading(fit: IdentifiedModel, one: Parameter) -> str:
     unit, _ = _shown(fit, one)
     return f"{one.name} {one.symbol}" + (f" [{unit}]" if unit else "")
 
 
-def _scaled(fit: Identification, one: Parameter) -> list[float]:
+def _scaled(fit: IdentifiedModel, one: Parameter) -> list[float]:
     _, scale = _shown(fit, one)
     return [scale * number for number in getattr(fit.model, one.name)]
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._support.plot_style import (
+from ..._support.plot_style import (
     ACTUAL,
     ERROR,
     GUIDE,
@@ -16,7 +16,7 @@ from .._support.plot_style import (
     panels,
     whole,
 )
-from ..control.views.contouring_plot import last_turn, plot_magnified
+from ...control.views.contouring_plot import last_turn, plot_magnified
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-    from ..control.loop.contouring import Contour
-    from .table_2 import Table2
+    from ...control.loop.contouring import Contour
+    from ..table_2 import Table2
 
 __all__ = ["plot_table_2"]
 

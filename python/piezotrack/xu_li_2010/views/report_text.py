@@ -6,16 +6,17 @@ import math
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from .published import SI
+from ..published import SI
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from .published import Obtained
-    from .reproduction import Reproduction
-    from .section import Section
+    from ..published import Obtained
+    from ..reproduction import Reproduction
+    from ..section import Section
+    from ..table_2 import Table2
 
-__all__ = ["number", "place", "reading", "seen", "summary_text", "tally"]
+__all__ = ["number", "place", "reading", "seen", "summary_text", "table_2_text", "tally"]
 
 # A second harmonic has this peak to peak in units of its SD.
 PURE_ANGLE = 2.0 * math.sqrt(2.0)
@@ -54,6 +55,26 @@ def summary_text(found: Reproduction) -> str:
         ]
     for part in found.sections:
         lines += ["", part.title, *wrap(part.text, WIDTH), *_columns(part)]
+    return "\n".join(lines)
+
+
+def table_2_text(table: Table2) -> str:
+    """Write the contour errors of Table 2, published and obtained."""
+    lines = [
+        "contour error in um, published / obtained; max is peak to peak",
+        "radius um  frequency Hz          max               mean                SD"
+        "             max / SD",
+    ]
+    for case, run in table.cases:
+        found = run.metrics
+        pairs = (
+            (case.peak_to_peak, found.peak_to_peak),
+            (case.mean, found.mean_error),
+            (case.sd, found.sd_error),
+        )
+        cells = "  ".join(f"{1e6 * one:>7.3f} /{1e6 * other:>7.3f}" for one, other in pairs)
+        ratio = f"{case.ratio:>6.1f} /{found.peak_to_peak / found.sd_error:>5.1f}"
+        lines.append(f"{1e6 * case.radius:>9g}  {case.frequency:>12g}  {cells}  {ratio}")
     return "\n".join(lines)
 
 
