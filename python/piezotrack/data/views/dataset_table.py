@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..._support.html_table import html_table
+from ..._support.table import words
 from ..._support.units import best_length_unit
 
 if TYPE_CHECKING:
@@ -27,4 +27,4 @@ def dataset_html(data: Dataset) -> str:
     ]
     rows += [(name, data.column_units.get(name, "")) for name in data.columns]
     rows += [("note", note) for note in data.notes]
-    return html_table(f"Dataset {data.source or ''}".rstrip(), rows)
+    return words(f"Dataset {data.source or ''}".rstrip(), rows).html()

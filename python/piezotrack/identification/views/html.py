@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from ..._support.html_table import html_table
+from ..._support.table import words
 from .report import said_of
 
 if TYPE_CHECKING:
@@ -34,13 +34,13 @@ def identification_html(fit: Identification) -> str:
             rows.append(("drift", str(fit.drift)))
     rows += [("constraint", _constraint(one)) for one in fit.constraints]
     rows += [("note", note) for note in fit.notes]
-    tables = [html_table(f"Identification: {fit.model.info.title}", rows)]
+    tables = [words(f"Identification: {fit.model.info.title}", rows).html()]
     if len(fit.records) > 1:
         tables.append(_records(fit))
     if fit.parameters:
         found = [_estimate(fit, name, one) for name, one in fit.parameters.items()]
         heads = ("parameter", "symbol", "value", "unit", "standard deviation")
-        tables.append(html_table("Parameters", found, heads))
+        tables.append(words("Parameters", found, heads).html())
     return "".join(tables)
 
 
@@ -73,7 +73,7 @@ def _records(fit: Identification) -> str:
         )
         for i, (one, score) in enumerate(zip(fit.records, fit.scores, strict=True))
     ]
-    return html_table("Records", rows, heads)
+    return words("Records", rows, heads).html()
 
 
 def _estimate(fit: Identification, name: str, one: Estimate) -> tuple[str, ...]:

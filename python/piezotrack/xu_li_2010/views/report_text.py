@@ -6,6 +6,7 @@ import math
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
+from ..._support.table import Column, Table
 from ..published import SI
 
 if TYPE_CHECKING:
@@ -80,14 +81,8 @@ def table_2_text(table: Table2) -> str:
 
 def _columns(part: Section) -> list[str]:
     """Write a table in columns, the first left-aligned."""
-    table = [part.heads, *part.rows]
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    lines = []
-    for row in table:
-        first, *others = zip(row, widths, strict=True)
-        cells = [first[0].ljust(first[1]), *(cell.rjust(width) for cell, width in others)]
-        lines.append(("  " + "  ".join(cells)).rstrip())
-    return lines
+    first, *others = part.heads
+    return Table([Column(first, left=True), *map(Column, others)], part.rows).lines()
 
 
 def tally(found: Reproduction) -> list[str]:
