@@ -311,7 +311,7 @@ def feedforward_command(
             samples.t, voltage, samples.x, title=title, drive_unit=known.drive_unit
         )
         written += save_figures({"feedforward": picture}, folder)
-    notes = known.beyond_fit(voltage, interval)
+    notes = known.extrapolation_notes(voltage, interval)
     lines = [
         f"{desired!r} at {1.0 / interval:g} Hz; {how}",
         f"{voltage.size} samples, {what} from {shown.min():.4g} to {shown.max():.4g} {unit}",

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["late_reading"]
+__all__ = ["delayed_reading"]
 
 
-def late_reading(info: ModelInfo, run: Response, delay: float) -> Array:
+def delayed_reading(info: ModelInfo, run: Response, delay: float) -> Array:
     """Displacement of a stage as it is read a delay later.
 
     Parameters

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..._support.statistics import sample_noise
 from ...data import diagnostics
-from . import notes as remarks
 from .fitted_record import FittedRecord
 from .identified_model import IdentifiedModel
+from .notes import above_noise, deviation_of, drift_notes, first_samples, fit_percent, lag_notes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -176,8 +176,8 @@ class Identification(IdentifiedModel):
     @property
     def fit_percent(self) -> float:
         """Share of the motion that the model explains, as `Score.fit_percent`."""
-        spread = remarks.spread_of([(data, one.weight) for data, one in self._fitted])
-        return remarks.fit_percent(self.cost, spread)
+        spread = deviation_of([(data, one.weight) for data, one in self._fitted])
+        return fit_percent(self.cost, spread)
 
     @property
     def fitted(self) -> Score:
@@ -213,7 +213,7 @@ class Identification(IdentifiedModel):
             notes.append(f"the drive is in {unit}: forces are in {unit} too, not in N")
         rates = [_frequency(data) for data, _ in self._fitted]
         if self.lags is not None and (self.lags.from_zero or max(rates) < OTHER * min(rates)):
-            notes += remarks.of_lags(self.lags, 2.0 * math.pi * rates[0])
+            notes += lag_notes(self.lags, 2.0 * math.pi * rates[0])
         if self.at_bound:
             notes.append(
                 "the record does not determine the dynamics: time constant or mode lies on a bound"
@@ -236,12 +236,12 @@ class Identification(IdentifiedModel):
             notes += diagnostics.fit_warnings(
                 data, run.x, one.cost_percent, self.model.info.hysteresis, held
             )
-        notes += remarks.of_drift(one.drift, one.stroke)
+        notes += drift_notes(one.drift, one.stroke)
         notes += self.model._notes(lambda: run)
         if self.trials:
             # A mode moves from sample to sample as noise does; what is left of it hardly does.
-            notes += remarks.above_noise(one.cost, min(sample_noise(data.y), sample_noise(rest)))
-        return notes + remarks.first_samples(rest, data)
+            notes += above_noise(one.cost, min(sample_noise(data.y), sample_noise(rest)))
+        return notes + first_samples(rest, data)
 
     @property
     def success(self) -> bool:

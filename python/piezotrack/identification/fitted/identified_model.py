@@ -14,7 +14,7 @@ from ..._support.files import write_document
 from ..._support.result import Result
 from ...data.dataset import Dataset
 from ...errors import ParameterError, ShapeError
-from .delayed_reading import late_reading
+from .delayed_reading import delayed_reading
 from .drift import drift_entry
 from .fitted_record import record_entries, record_of
 from .model_entries import (
@@ -24,7 +24,7 @@ from .model_entries import (
     parameter_entries,
     sensor_number,
 )
-from .notes import beyond_fit
+from .notes import extrapolation_notes
 from .score import Score
 from .start import begin, checked_history, same_beginning, start_entry
 
@@ -157,7 +157,7 @@ class IdentifiedModel(Result):
         own = delay + offsets + sum(1 + one.time_fitted for one in drifts)
         return sum(_count(getattr(self.model, name)) for name in free) + own
 
-    def beyond_fit(self, u: ArrayLike, dt: float | None = None) -> list[str]:
+    def extrapolation_notes(self, u: ArrayLike, dt: float | None = None) -> list[str]:
         """Remarks on a drive that goes beyond the range or the rate of the record identified.
 
         Parameters
@@ -183,7 +183,7 @@ class IdentifiedModel(Result):
         if not drive.size:
             raise ShapeError("u has no samples: expected at least one")
         most = float(max(rates)) if rates else None
-        return beyond_fit(drive, interval, self.drive_range, most, self.drive_unit)
+        return extrapolation_notes(drive, interval, self.drive_range, most, self.drive_unit)
 
     def fitted_on(self, data: Dataset) -> bool:
         """Return whether a record is the one identified, sample by sample.
@@ -268,7 +268,7 @@ class IdentifiedModel(Result):
             Displacement with offset and delay [m].
         """
         run = self.model.simulate(u, dt, hold=hold, initial=initial)
-        return late_reading(self.model.info, run, self.delay) + self.offset
+        return delayed_reading(self.model.info, run, self.delay) + self.offset
 
     def _delay_on(self, data: Dataset) -> float:
         """Delay of the sensor on a record [s]: its own where it is one of those identified."""
@@ -326,7 +326,9 @@ class IdentifiedModel(Result):
         state = self._begins(data, history, initial)
         start = data.warmup
         run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
-        x = late_reading(self.model.info, run, self._delay_on(data))[start:] + self._drift_on(data)
+        x = delayed_reading(self.model.info, run, self._delay_on(data))[start:] + self._drift_on(
+            data
+        )
         signals = {
             one.name: value[start:]
             for one in fields(run)
@@ -383,7 +385,7 @@ class IdentifiedModel(Result):
             stroke=self.stroke if own is None else own.stroke,
             offset=shift,
             spread=float(np.std(data.y)),
-            notes=tuple(self.beyond_fit(data.u, data.dt)),
+            notes=tuple(self.extrapolation_notes(data.u, data.dt)),
         )
 
     def start_on(self, data: Dataset, *, history: History | None = None) -> Start:
@@ -411,7 +413,7 @@ class IdentifiedModel(Result):
     def _residual(self, data: Dataset, state: StageState) -> Array:
         """Measured less simulated displacement in the window, without offset [m]."""
         run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
-        x = late_reading(self.model.info, run, self._delay_on(data))[
+        x = delayed_reading(self.model.info, run, self._delay_on(data))[
             data.warmup :
         ] + self._drift_on(data)
         rest: Array = data.y - x - self._added(data, x, "own")[0]

@@ -13,7 +13,7 @@ from ..fitted.estimates import LagRange
 from ..fitted.fitted_record import FittedRecord
 from ..fitted.identification import Identification
 from ..fitted.model_entries import fit_entry, origin_of, provenance
-from ..fitted.notes import spread_of
+from ..fitted.notes import deviation_of
 from ..fitted.start import start_of_fit
 from ..problem.problem import delay_bounds
 from ..problem.records import of_record
@@ -86,7 +86,7 @@ def solve_least_squares(
     model = stage_class(info)
     both = zip(records, found.records, strict=True)
     fitted = tuple(_fitted(model, info, one, own) for one, own in both)
-    spread = spread_of([(one.data, one.weight) for one in records])
+    spread = deviation_of([(one.data, one.weight) for one in records])
     first = fitted[0]
     details: dict[str, Any] = {
         "parameters": {

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from ..._support.table import words
-from .report import said_of
+from .report import parameter_notes
 
 if TYPE_CHECKING:
     from ...data.dataset import Dataset
@@ -83,7 +83,7 @@ def _estimate(fit: Identification, name: str, one: Estimate) -> tuple[str, ...]:
         deviation = "unknown"
     else:
         deviation = f"{one.deviation:.2g}" if math.isfinite(one.deviation) else "no effect"
-    return name, one.symbol, f"{one.value:.6g}", one.unit, deviation + said_of(fit, name)
+    return name, one.symbol, f"{one.value:.6g}", one.unit, deviation + parameter_notes(fit, name)
 
 
 def _constraint(one: Constraint) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..._support.files import make_folder, picture_files, save_figures, together
 from ..._support.units import of_drive, shown_unit
-from ..fitted.notes import of_start
+from ..fitted.notes import start_notes
 
 if TYPE_CHECKING:
     import os
@@ -20,7 +20,13 @@ if TYPE_CHECKING:
     from ..fitted.identification import Identification
     from ..fitted.identified_model import IdentifiedModel
 
-__all__ = ["identification_files", "model_text", "said_of", "save_identification", "summary_text"]
+__all__ = [
+    "identification_files",
+    "model_text",
+    "parameter_notes",
+    "save_identification",
+    "summary_text",
+]
 
 # Units of values that a stage gives in um, and the factor for a drive in metres.
 PER_METRE = {"um/V": ("um/um", 1e-6), "1/V": ("1/um", 1e-6)}
@@ -94,7 +100,7 @@ def _of_one(fit: Identification) -> list[str]:
         lines.append(f"      {fit.drift}")
     if fit.delay and "delay" not in fit.parameters:
         lines.append(f"      delay {1e3 * fit.delay:.4g} ms")
-    if begun := of_start(fit.start, data):
+    if begun := start_notes(fit.start, data):
         lines.append(f"      the record begins {begun}")
     return lines
 
@@ -122,7 +128,7 @@ def _of_several(fit: Identification) -> list[str]:
         ]
         if one.drift:
             lines.append(f"      {one.drift}")
-        if begun := of_start(one.start, one.data):
+        if begun := start_notes(one.start, one.data):
             lines.append(f"      it begins {begun}")
     return lines
 
@@ -281,8 +287,8 @@ def _constraints(fit: Identification) -> list[str]:
     return ["", "constraints", *rows]
 
 
-def said_of(fit: Identification, name: str) -> str:
-    """Write what a caller said of a parameter besides value and bounds, and what it met.
+def parameter_notes(fit: Identification, name: str) -> str:
+    """Write scale, tie, prior and active bound of a parameter.
 
     Parameters
     ----------
@@ -323,7 +329,7 @@ def _row(fit: Identification, name: str, estimate: Estimate, width: int) -> str:
         share = 100 * estimate.deviation / abs(estimate.value) if estimate.value else math.inf
         digits = f"{share:.2g}" if share < 10 else f"{share:.0f}"
         note = f"{digits} %" if share < 100 else "larger than the value"
-    note += said_of(fit, name)
+    note += parameter_notes(fit, name)
     return (
         f"  {name:<18}{estimate.symbol:<{width}}{estimate.value:>13.6g}  {estimate.unit:<9}{note}"
     ).rstrip()
